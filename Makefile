@@ -1,0 +1,68 @@
+# Every target works alone from a fresh clone: it needs make and Python 3.11, 3.12 or 3.13, and builds .venv itself.
+#   make PYTHON=/path/to/python3.12 test     to choose the interpreter
+#   make EXTRAS=dev test                     to leave out the optional libraries
+
+SHELL := /bin/sh
+PYTHON ?=
+EXTRAS ?= all,dev
+VENV := .venv
+INSTALLED := $(VENV)/installed
+RUN := $(VENV)/bin
+PIP := $(RUN)/python -m pip --quiet --quiet --disable-pip-version-check
+
+CASE := cases/grc750/gearbox.toml
+RESULTS := results/grc750
+
+# Prints the first interpreter that fits: the one asked for, or else whichever of the usual names runs.
+FIND_PYTHON := for candidate in $(if $(PYTHON),"$(PYTHON)",python3 python3.13 python3.12 python3.11 python); do \
+	"$$candidate" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null \
+	&& { echo "$$candidate"; exit 0; }; done; \
+	echo "exugear needs Python 3.11, 3.12 or 3.13; found: $$($(or $(PYTHON),python3) --version 2>&1)." >&2; \
+	echo "Install one, or name it: make PYTHON=/path/to/python3.12 TARGET" >&2; exit 1
+
+.PHONY: help demo demo-short test validate check lock clean
+
+help:
+	@echo "make demo        transmission error curves of the GRC 750 gear pairs, into $(RESULTS)"
+	@echo "make demo-short  the same with 10 positions of the mesh cycle"
+	@echo "make test        tests and documentation examples"
+	@echo "make validate    the long comparisons with references"
+	@echo "make check       ruff and mypy"
+	@echo "make lock        renew requirements.lock from what installs today"
+	@echo "make clean       remove all that make made, results and $(VENV) too"
+
+$(INSTALLED): pyproject.toml requirements.lock
+	@python=$$($(FIND_PYTHON)) || exit 1; \
+	$(RUN)/python -c 'import pip' 2>/dev/null || "$$python" -m venv --clear $(VENV) || { \
+		echo "No virtual environment: on Debian and Ubuntu install the package python3-venv." >&2; exit 1; }
+	@echo "Installing exugear[$(EXTRAS)] into $(VENV); this takes a minute or two."
+	@$(PIP) install --constraint requirements.lock --editable ".[$(EXTRAS)]"
+	@touch $@
+
+demo: $(INSTALLED)
+	$(RUN)/exugear ste $(CASE) --out $(RESULTS)
+
+demo-short: $(INSTALLED)
+	$(RUN)/exugear ste $(CASE) --positions 10 --out $(RESULTS)-short
+
+test: $(INSTALLED)
+	$(RUN)/python -m pytest
+
+validate: $(INSTALLED)
+	$(RUN)/python -m pytest -m validation
+
+check: $(INSTALLED)
+	$(RUN)/ruff check .
+	$(RUN)/mypy
+
+lock:
+	@python=$$($(FIND_PYTHON)) || exit 1; "$$python" -m venv --clear $(VENV)-lock
+	$(VENV)-lock/bin/python -m pip --quiet --quiet install ".[all,dev]"
+	{ echo "# Versions the tests ran with (make lock); pip takes them as constraints."; \
+	$(VENV)-lock/bin/python -m pip freeze --exclude exugear; } > requirements.lock.new
+	mv requirements.lock.new requirements.lock
+	rm -rf $(VENV)-lock
+
+clean:
+	rm -rf $(VENV) $(VENV)-lock results build *.egg-info .pytest_cache .mypy_cache .ruff_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
