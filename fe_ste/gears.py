@@ -14,85 +14,12 @@ from typing import Literal, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from fe_ste.geometry_checks import GeometryError, check_gear, check_gear_pair
+from fe_ste.involute import inverse_involute, involute
+
+__all__ = ["BasicRack", "Gear", "GearPair", "GeometryError", "Material"]
+
 FloatArray = NDArray[np.float64]
-
-LEAST_TIP_THICKNESS = 0.2
-"""Least tooth thickness at the tip circle, normal section, in normal modules."""
-
-PRESSURE_ANGLE_RANGE = (math.radians(10.0), math.radians(35.0))
-"""Normal pressure angles for which the relations here have been checked, rad."""
-
-LARGEST_HELIX_ANGLE = math.radians(50.0)
-"""Largest magnitude of the helix angle at the reference circle, rad."""
-
-_LENGTH_TOLERANCE = 1e-9
-"""Rounding allowed for in comparisons of lengths, in normal modules."""
-
-
-class GeometryError(ValueError):
-    """A gear or gear pair that cannot be made or cannot run."""
-
-
-@overload
-def involute(angle: float) -> float: ...
-
-
-@overload
-def involute(angle: FloatArray) -> FloatArray: ...
-
-
-def involute(angle: float | FloatArray) -> float | FloatArray:
-    """Involute function ``tan(angle) - angle`` (ISO 21771), rad.
-
-    Parameters
-    ----------
-    angle : float or array
-        Profile angle, rad.
-
-    Returns
-    -------
-    float or array
-        Involute polar angle, rad.
-
-    Examples
-    --------
-    >>> round(involute(math.radians(20.0)), 9)
-    0.014904384
-    """
-    if isinstance(angle, float):
-        return math.tan(angle) - angle
-    return np.asarray(np.tan(angle) - angle, dtype=np.float64)
-
-
-def inverse_involute(value: float) -> float:
-    """Angle whose involute function is `value`, by Newton's method.
-
-    Parameters
-    ----------
-    value : float
-        Involute polar angle, rad, not negative.
-
-    Returns
-    -------
-    float
-        Profile angle, rad.
-
-    Examples
-    --------
-    >>> round(math.degrees(inverse_involute(0.014904383867336446)), 9)
-    20.0
-    """
-    if value <= 0.0:
-        return 0.0
-    # inv(angle) >= angle^3 / 3 and tan(angle) <= value + pi/2 bound the root from above; from there Newton's
-    # method runs down a convex function without overshoot.
-    angle = min(math.cbrt(3.0 * value), math.atan(value + 0.5 * math.pi))
-    for _ in range(50):
-        step = (involute(angle) - value) / math.tan(angle) ** 2
-        angle -= step
-        if abs(step) < 1e-15:
-            break
-    return angle
 
 
 @dataclass(frozen=True)
@@ -200,10 +127,14 @@ class Gear:
     tooth_thinning: float = 0.0
     material: Material = Material()
 
+    def __post_init__(self) -> None:
+        """Refuse what cannot be made."""
+        check_gear(self)
+
     @property
-    def _outward(self) -> float:
+    def outward(self) -> int:
         """Direction in which the teeth point: +1 away from the axis, -1 towards it."""
-        return -1.0 if self.internal else 1.0
+        return -1 if self.internal else 1
 
     @property
     def hand(self) -> Literal["right", "left", "spur"]:
@@ -242,7 +173,7 @@ class Gear:
         """Radius of the tip circle, m."""
         if self.tip_diameter is not None:
             return 0.5 * self.tip_diameter
-        height = self.profile_shift + self._outward * self.rack.addendum
+        height = self.profile_shift + self.outward * self.rack.addendum
         return self.reference_radius + self.normal_module * height
 
     @property
@@ -250,14 +181,14 @@ class Gear:
         """Radius of the root circle, m."""
         if self.root_diameter is not None:
             return 0.5 * self.root_diameter
-        depth = self._outward * self.rack.dedendum - self.profile_shift
+        depth = self.outward * self.rack.dedendum - self.profile_shift
         return self.reference_radius - self.normal_module * depth
 
     @property
     def dedendum_factor(self) -> float:
         """Dedendum of the rack that reaches the root circle, in normal modules (ISO 21771: h_fP*)."""
         depth = self.reference_radius + self.normal_module * self.profile_shift - self.root_radius
-        return self._outward * depth / self.normal_module
+        return self.outward * depth / self.normal_module
 
     @property
     def angular_pitch(self) -> float:
@@ -272,7 +203,7 @@ class Gear:
     @property
     def reference_half_angle(self) -> float:
         """Polar half angle of the tooth at the reference circle, rad."""
-        shift = 2.0 * self._outward * self.profile_shift * math.tan(self.normal_pressure_angle)
+        shift = 2.0 * self.outward * self.profile_shift * math.tan(self.normal_pressure_angle)
         return (0.5 * math.pi + shift - self.tooth_thinning / self.transverse_module) / self.teeth
 
     @property
@@ -316,13 +247,13 @@ class Gear:
         radius = self.rack.tip_radius * self.normal_module
         if not self.internal or self._internal_fillet_centre_angle(radius) <= 0.5 * self.angular_pitch:
             return radius
-        radius = 0.0
+        # The angle is a convex, growing function of the radius: Newton's method from above converges.
         for _ in range(50):
             profile_angle = math.acos(self.base_radius / (self.root_radius - radius))
-            missing_angle = 0.5 * self.angular_pitch - self._internal_fillet_centre_angle(radius)
-            step = missing_angle * self.base_radius / (1.0 - math.sin(profile_angle))
-            radius += step
-            if abs(step) < 1e-15 * self.root_radius:
+            excess = self._internal_fillet_centre_angle(radius) - 0.5 * self.angular_pitch
+            step = excess * self.base_radius / (1.0 - math.sin(profile_angle))
+            radius -= step
+            if step < 1e-15 * self.root_radius:
                 break
         return radius
 
@@ -368,7 +299,7 @@ class Gear:
         with np.errstate(invalid="ignore"):
             profile_angle = np.arccos(self.base_radius / np.asarray(radius, dtype=np.float64))
         fall = np.tan(profile_angle) - profile_angle - involute(self.transverse_pressure_angle)
-        half_angle = self.reference_half_angle - self._outward * fall
+        half_angle = self.reference_half_angle - self.outward * fall
         return half_angle if isinstance(radius, np.ndarray) else float(half_angle)
 
     def mirrored(self) -> Gear:
@@ -408,8 +339,13 @@ class GearPair:
     gear: Gear
     centre_distance: float
 
+    def __post_init__(self) -> None:
+        """Refuse what cannot run."""
+        check_gear_pair(self)
+
     @property
     def _signed_teeth_sum(self) -> int:
+        """z1 + z2, an internal gear's teeth counted negative as in ISO 21771."""
         return self.pinion.teeth + (-self.gear.teeth if self.gear.internal else self.gear.teeth)
 
     @property
@@ -426,6 +362,16 @@ class GearPair:
     def reference_centre_distance(self) -> float:
         """Centre distance at which the reference circles touch, m."""
         return abs(self._signed_teeth_sum) * self.pinion.transverse_module / 2.0
+
+    @property
+    def backlash_free_centre_distance(self) -> float:
+        """Centre distance without backlash, m: the least of an external pair, the greatest of an internal."""
+        pinion, gear = self.pinion, self.gear
+        thickness = pinion.teeth * pinion.reference_half_angle + gear.teeth * gear.reference_half_angle
+        angle = pinion.transverse_pressure_angle
+        value = involute(angle) + (thickness - math.pi) / self._signed_teeth_sum
+        working_angle = inverse_involute(max(value, 0.0))
+        return self.reference_centre_distance * math.cos(angle) / math.cos(working_angle)
 
     @property
     def working_pressure_angle(self) -> float:
@@ -506,6 +452,16 @@ class GearPair:
     def total_contact_ratio(self) -> float:
         """Sum of transverse contact ratio and overlap ratio."""
         return self.transverse_contact_ratio + self.overlap_ratio
+
+    @property
+    def pinion_tip_clearance(self) -> float:
+        """Distance of the pinion's tip circle from the gear's root circle on the line of centres, m."""
+        return self.gear.outward * (self.centre_distance - self.gear.root_radius) - self.pinion.tip_radius
+
+    @property
+    def gear_tip_clearance(self) -> float:
+        """Distance of the gear's tip circle from the pinion's root circle on the line of centres, m."""
+        return self.gear.outward * (self.centre_distance - self.gear.tip_radius) - self.pinion.root_radius
 
     @property
     def circumferential_backlash(self) -> float:
