@@ -1,0 +1,376 @@
+"""The gearbox file as it is written: pydantic models of the TOML sections, unit in the key.
+
+Nothing here knows mechanics. The models refuse unknown keys and values that no gearbox can have;
+:mod:`exugear.gearbox` turns them into SI data and checks them against each other.
+"""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
+GROUND = "ground"
+
+
+class CaseError(ValueError):
+    """A gearbox file that cannot be used; the message says file, key, value and what would be right."""
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class RackSection(_Section):
+    """Basic rack of one gear, as factors of the normal module (ISO 53)."""
+
+    addendum: Positive = 1.0
+    dedendum: Positive = 1.25
+    tip_radius: NonNegative = 0.38
+
+
+class MaterialSection(_Section):
+    """Elastic material of a gear."""
+
+    youngs_modulus_GPa: Positive = 206.0
+    poissons_ratio: Annotated[float, Field(ge=0.0, lt=0.5)] = 0.3
+    density_kg_per_m3: Positive = 7850.0
+
+
+class GearSection(_Section):
+    """One toothed wheel; helix angle signed, right hand positive."""
+
+    teeth: Annotated[int, Field(ge=5)]
+    normal_module_mm: Positive
+    normal_pressure_angle_deg: Annotated[float, Field(gt=5.0, lt=45.0)] = 20.0
+    helix_angle_deg: Annotated[float, Field(gt=-60.0, lt=60.0)] = 0.0
+    profile_shift: Finite = 0.0
+    face_width_mm: Positive
+    held_diameter_mm: Positive
+    internal: bool = False
+    tooth_thinning_mm: NonNegative = 0.0
+    tip_diameter_mm: Positive | None = None
+    root_diameter_mm: Positive | None = None
+    rack: RackSection = RackSection()
+    material: MaterialSection = MaterialSection()
+
+
+class PairSection(_Section):
+    """Two gears that mesh: `pinion` is the smaller one (the planet against a ring)."""
+
+    pinion: Name
+    gear: Name
+    centre_distance_mm: Positive
+    table: bool = True
+
+
+class InertiaSection(_Section):
+    """Mass properties of a body in one inertia set; moments about its centre of mass."""
+
+    mass_kg: Positive | None = None
+    axial_kg_m2: Positive
+    transverse_kg_m2: Positive | None = None
+    centre_of_mass_z_mm: Finite | None = None
+
+    @model_validator(mode="after")
+    def _triangle(self) -> InertiaSection:
+        if self.transverse_kg_m2 is not None and self.axial_kg_m2 > 2.0 * self.transverse_kg_m2:
+            raise ValueError(
+                f"axial {self.axial_kg_m2} kg m2 exceeds twice the transverse {self.transverse_kg_m2} kg m2: "
+                "no rigid body has such inertias (triangle inequality)"
+            )
+        return self
+
+
+class BodySection(_Section):
+    """A rigid body turning about +z, a set of equal planets, a spin-only inertia or a fixed housing."""
+
+    axis_position_mm: tuple[Finite, Finite] | None = None
+    carrier: Name | None = None
+    orbit_radius_mm: Positive | None = None
+    planet_angles_deg: tuple[Finite, ...] = ()
+    wheels_z_mm: dict[Name, Finite] = {}
+    fixed: bool = False
+    spin_only: bool = False
+    enabled: bool = True
+    inertia: dict[Name, InertiaSection] = {}
+
+    @model_validator(mode="after")
+    def _place(self) -> BodySection:
+        planet = (self.carrier is not None, self.orbit_radius_mm is not None, bool(self.planet_angles_deg))
+        if any(planet) and not all(planet):
+            raise ValueError("a planet needs all of carrier, orbit_radius_mm and planet_angles_deg")
+        if all(planet) == (self.axis_position_mm is not None):
+            raise ValueError("give either axis_position_mm = [x, y] or the three keys of a planet")
+        if self.fixed and self.inertia:
+            raise ValueError("a fixed body has no inertia: leave the section out or set fixed = false")
+        if self.spin_only and self.wheels_z_mm:
+            raise ValueError("a spin-only body carries no gears: it has no position in space")
+        if not self.fixed and not self.inertia:
+            raise ValueError("a moving body needs an inertia table, e.g. [bodies.NAME.inertia.assemblies]")
+        return self
+
+
+class JointSection(_Section):
+    """Ideal joint that leaves the spin about z free (used by the variant `rigid`)."""
+
+    body: Name
+    on: Name = GROUND
+    z_mm: Finite
+
+
+class StiffnessSection(_Section):
+    """6x6 stiffness (or damping) of a bearing, about its place: isotropic entries or the full matrix."""
+
+    radial_N_per_m: NonNegative = 0.0
+    axial_N_per_m: NonNegative = 0.0
+    tilt_N_m_per_rad: NonNegative = 0.0
+    torsion_N_m_per_rad: NonNegative = 0.0
+    matrix: tuple[tuple[Finite, ...], ...] | None = None
+
+    @model_validator(mode="after")
+    def _shape(self) -> StiffnessSection:
+        if self.matrix is not None and [len(row) for row in self.matrix] != [6] * 6:
+            raise ValueError("matrix needs 6 rows of 6 numbers (N/m, N, N m/rad; order x y z rx ry rz)")
+        return self
+
+
+class CatalogueSection(_Section):
+    """Boundary dimensions and operating load from which ISO/TS 16281 gives a bearing's stiffness."""
+
+    type: Literal["cylindrical_roller", "tapered_roller"]
+    designation: str = ""
+    bore_mm: Positive
+    outer_diameter_mm: Positive
+    width_mm: Positive
+    contact_angle_deg: Annotated[float, Field(ge=0.0, lt=60.0)] = 0.0
+    arrangement: Literal["single", "X", "O", "tandem"] = "single"
+    row_distance_mm: NonNegative | None = None
+    full_complement: bool = False
+    radial_clearance_mm: Finite = 0.0
+    radial_load_kN: NonNegative
+    axial_load_kN: Finite = 0.0
+
+
+class BearingSection(_Section):
+    """Compliant support (variants `bushing` and `flexible`): given 6x6 or from catalogue dimensions.
+
+    Beside a `catalogue`, `stiffness` is a floor: it holds the directions that the rollers leave free.
+    """
+
+    body: Name
+    on: Name = GROUND
+    z_mm: Finite
+    housing_factor_applies: bool = True
+    stiffness: StiffnessSection | None = None
+    catalogue: CatalogueSection | None = None
+    damping: StiffnessSection | None = None
+
+    @model_validator(mode="after")
+    def _source(self) -> BearingSection:
+        if self.stiffness is None and self.catalogue is None:
+            raise ValueError("give a [.stiffness] table or a [.catalogue] table")
+        return self
+
+
+class CouplingSection(_Section):
+    """Torsional spring between the spins of two bodies on one axis."""
+
+    bodies: tuple[Name, Name]
+    stiffness_N_m_per_rad: Positive
+    damping_N_m_s_per_rad: NonNegative | None = None
+
+
+class MeshSection(_Section):
+    """A gear pair at work between two bodies; a planet set gives one mesh per planet."""
+
+    pair: Name
+    pinion_body: Name
+    gear_body: Name
+    frame: Name | None = None
+    position_angle_deg: Finite | None = None
+    phase: Finite | tuple[Finite, ...] | None = None
+
+
+class LoadCaseSection(_Section):
+    """Torques on the gearbox and, when speed-driven, the prescribed speed of one body."""
+
+    torques_N_m: dict[Name, Finite] = {}
+    torque_series: str | None = None
+    duration_s: Positive = 30.0
+    start_speed_rpm: Finite = 0.0
+    driven_body: Name | None = None
+    end_speed_rpm: Finite | None = None
+    drive_stiffness_N_m_per_rad: Positive | None = None
+    description: str = ""
+
+    @model_validator(mode="after")
+    def _drive(self) -> LoadCaseSection:
+        drive = (
+            self.driven_body is not None,
+            self.end_speed_rpm is not None,
+            self.drive_stiffness_N_m_per_rad is not None,
+        )
+        if any(drive) and not all(drive):
+            raise ValueError(
+                "a speed-driven case needs driven_body, end_speed_rpm and drive_stiffness_N_m_per_rad"
+            )
+        if not self.torques_N_m and self.torque_series is None and not any(drive):
+            raise ValueError("give torques_N_m, torque_series or a driven_body")
+        return self
+
+
+class OverallSection(_Section):
+    """Which spins the overall transmission error compares, and where its length is taken."""
+
+    input: Name
+    output: Name
+    output_gear: Name
+
+
+class StaticLoadSection(_Section):
+    """The static state that fixes loaded flanks and the load of the STE tables."""
+
+    torques_N_m: dict[Name, Finite]
+    locked: tuple[Name, ...]
+
+
+class DampingSection(_Section):
+    """Stiffness-proportional damping times: c = time * k."""
+
+    bearing_time_s: NonNegative = 4e-6
+    mesh_time_s: NonNegative = 4e-6
+    coupling_time_s: NonNegative = 4e-6
+
+
+class HousingSection(_Section):
+    """Factor on bearing stiffness that stands for the housing seat in series."""
+
+    factor: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
+
+
+class GravitySection(_Section):
+    """Weight as an acceleration vector in the model's axes; off by default."""
+
+    acceleration_m_per_s2: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)
+
+
+class SteSection(_Section):
+    """Settings of the finite-element tables."""
+
+    positions: Annotated[int, Field(ge=8, le=2000)] = 50
+    method: Literal["superelement", "nonlinear"] = "superelement"
+
+
+class CaseFile(_Section):
+    """The whole gearbox file."""
+
+    name: str
+    default_inertias: Name
+    overall: OverallSection
+    static_load: StaticLoadSection
+    gears: dict[Name, GearSection]
+    pairs: dict[Name, PairSection]
+    bodies: dict[Name, BodySection]
+    meshes: dict[Name, MeshSection]
+    load_cases: dict[Name, LoadCaseSection]
+    joints: dict[Name, JointSection] = {}
+    bearings: dict[Name, BearingSection] = {}
+    couplings: dict[Name, CouplingSection] = {}
+    damping: DampingSection = DampingSection()
+    housing: HousingSection = HousingSection()
+    gravity: GravitySection = GravitySection()
+    ste: SteSection = SteSection()
+
+
+def read_toml(path: str | Path) -> dict[str, Any]:
+    """Raw content of a TOML file.
+
+    Raises
+    ------
+    CaseError
+        No such file, nothing in it, or not TOML (with line and column).
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise CaseError(f"{path}: no such file; expected a gearbox file such as cases/grc750/gearbox.toml")
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise CaseError(f"{path}: not UTF-8 text at byte {error.start}; expected TOML") from None
+    if not text.strip():
+        raise CaseError(f"{path}: the file is empty; expected sections such as [gears.sun]")
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise CaseError(f"{path}: not valid TOML: {error}") from None
+
+
+def parse_case(content: dict[str, Any], source: str) -> CaseFile:
+    """Validate raw content; the first fault becomes one message, further faults are counted.
+
+    Examples
+    --------
+    >>> parse_case({"name": 3}, "x.toml")
+    Traceback (most recent call last):
+    ...
+    exugear.casefile.CaseError: x.toml: name = 3: input should be a valid string (and 8 more faults)
+    """
+    try:
+        return CaseFile.model_validate(content)
+    except ValidationError as error:
+        raise CaseError(_describe(error, source)) from None
+
+
+def _describe(error: ValidationError, source: str) -> str:
+    faults = error.errors()
+    # A misspelt key shows twice, as unknown and as missing: the unknown one says more.
+    fault = next((f for f in faults if f["type"] == "extra_forbidden"), faults[0])
+    key = ".".join(str(part) for part in fault["loc"])
+    if fault["type"] == "extra_forbidden":
+        text = f"unknown key{_suggestion(fault['loc'])}"
+    elif fault["type"] == "missing":
+        return f"{source}: {key}: this key is missing{_others(faults)}"
+    else:
+        text = fault["msg"].removeprefix("Value error, ")
+        text = text[0].lower() + text[1:]
+    value = "" if isinstance(fault["input"], dict) else f" = {fault['input']!r}"
+    return f"{source}: {key}{value}: {text}{_others(faults)}"
+
+
+def _others(faults: list[Any]) -> str:
+    more = len(faults) - 1
+    return f" (and {more} more fault{'s' if more > 1 else ''})" if more else ""
+
+
+def _suggestion(location: tuple[int | str, ...]) -> str:
+    """Name the nearest known key of the section that holds the unknown one."""
+    section: Any = CaseFile
+    for part in location[:-1]:
+        section = _inner(section, part)
+        if section is None:
+            return ""
+    if not (isinstance(section, type) and issubclass(section, BaseModel)):
+        return ""
+    known = list(section.model_fields)
+    near = difflib.get_close_matches(str(location[-1]), known, n=1)
+    return f"; did you mean {near[0]!r}?" if near else f"; known keys are {', '.join(known)}"
+
+
+def _inner(section: Any, part: int | str) -> Any:
+    """Model of the sub-section `part`: a field of a model, or the value type of a table of named entries."""
+    if isinstance(section, type) and issubclass(section, BaseModel):
+        field = section.model_fields.get(str(part))
+        section = field.annotation if field else None
+        candidates = [section, *getattr(section, "__args__", ())]
+        models = [c for c in candidates if isinstance(c, type) and issubclass(c, BaseModel)]
+        return models[0] if models and getattr(section, "__origin__", None) is not dict else section
+    arguments = getattr(section, "__args__", ())
+    return arguments[-1] if arguments else None

@@ -1,0 +1,818 @@
+"""The gearbox as data: bodies, supports, meshes and load cases in SI, read from TOML and checked.
+
+Axes: +z along the shafts towards the output, lengths in m, angles in rad, rotation positive about +z.
+Planet sets are written once in the file and appear here as one body, support and mesh per planet,
+numbered from 1 (`planet_1`, `sun_planet_1`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exugear.casefile import (
+    GROUND,
+    BearingSection,
+    BodySection,
+    CaseError,
+    CaseFile,
+    CatalogueSection,
+    GearSection,
+    LoadCaseSection,
+    MeshSection,
+    SteSection,
+    StiffnessSection,
+    parse_case,
+    read_toml,
+)
+from fe_ste.gears import BasicRack, Gear, GearPair, GeometryError, Material
+
+__all__ = [
+    "GROUND",
+    "Bearing",
+    "Body",
+    "CaseError",
+    "Coupling",
+    "Gearbox",
+    "Joint",
+    "LoadCase",
+    "Mesh",
+    "PairSpec",
+]
+
+CENTRE_DISTANCE_TOLERANCE = 2e-5
+"""Allowed difference between a pair's centre distance and the positions of its bodies, m."""
+ASSEMBLY_TOLERANCE = 2e-3
+"""Allowed departure from the assembly condition, in teeth: angles in a file are rounded."""
+RPM = math.pi / 30.0
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body, its place at zero angles and its mass properties (about the centre of mass).
+
+    Attributes
+    ----------
+    axis : (2,) axis position x, y at zero angles, m
+    centre_of_mass_z : float, m
+    mass, axial, transverse : kg, kg m2, kg m2; mass and transverse are 0 for a spin-only body
+    carrier, orbit_angle : name of the carrier a planet rides on (None else) and its angle there, rad
+    wheels : gear name -> z of the gear's mid-plane, m
+    """
+
+    name: str
+    family: str
+    axis: tuple[float, float]
+    centre_of_mass_z: float
+    mass: float
+    axial: float
+    transverse: float
+    carrier: str | None
+    orbit_angle: float
+    spin_only: bool
+    fixed: bool
+    wheels: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Ideal joint at `place` (m) between `on` and `body` that leaves only the spin about z."""
+
+    name: str
+    body: str
+    on: str
+    place: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Bearing:
+    """Compliant support at `place` (m, at zero angles); 6x6 in the axes of `on`, order x y z rx ry rz.
+
+    `stiffness` holds what the file gives (NaN-free 6x6) with None where only the catalogue is given; `given`
+    marks entries that replace catalogue values. `factor` (housing) is not yet multiplied in.
+    """
+
+    name: str
+    family: str
+    body: str
+    on: str
+    place: tuple[float, float, float]
+    stiffness: StiffnessSection | None
+    catalogue: CatalogueSection | None
+    damping: StiffnessSection | None
+    factor: float
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """Torsional spring (N m/rad) and damper (N m s/rad) between two spins."""
+
+    name: str
+    first: str
+    second: str
+    stiffness: float
+    damping: float
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A gear pair at work.
+
+    Attributes
+    ----------
+    pinion, gear : names of the bodies that carry gear 1 and gear 2
+    frame : body whose spin carries the line of centres, or "ground"
+    z : middle of the common face width, m
+    position_angle : polar angle of the line from gear 1's axis to gear 2's axis at zero angles, rad
+    centre_distance : from the bodies' positions, m (the pair's own value agrees within 20 um)
+    phase : PMC at zero angles where the file overrides what geometry gives, else None
+    """
+
+    name: str
+    family: str
+    pair: GearPair
+    pinion: str
+    gear: str
+    frame: str
+    z: float
+    position_angle: float
+    centre_distance: float
+    phase: float | None
+
+
+@dataclass(frozen=True)
+class LoadCase:
+    """Loads of a run: torques by body (N m), duration (s), speeds (rad/s) and the drive, if any."""
+
+    name: str
+    torques: Mapping[str, float]
+    torque_series: Path | None
+    duration: float
+    start_speed: float
+    driven_body: str | None
+    end_speed: float | None
+    drive_stiffness: float | None
+    description: str
+
+
+@dataclass(frozen=True)
+class PairSpec:
+    """What the STE table of a pair needs: geometry and the static torque on gear 1, N m."""
+
+    name: str
+    pair: GearPair
+    static_torque: float
+    table: bool
+
+
+@dataclass(frozen=True)
+class Gearbox:
+    """A checked gearbox. Build one with :meth:`from_toml` or :meth:`from_dict`.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> round(gearbox.ratio, 6)
+    81.490683
+    >>> sorted(gearbox.pairs)
+    ['high_speed', 'intermediate', 'ring_planet', 'sun_planet']
+    """
+
+    case: CaseFile
+    source: str
+    content: Mapping[str, Any] = field(repr=False)
+
+    @classmethod
+    def from_toml(cls, path: str | Path) -> Gearbox:
+        """Read and check a gearbox file.
+
+        Raises
+        ------
+        CaseError
+            Anything wrong with the file: one message with file, key, value and what would be right.
+        """
+        return cls.from_dict(read_toml(path), source=str(path))
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any], source: str = "gearbox") -> Gearbox:
+        """Check content already in memory, such as a varied case."""
+        gearbox = cls(parse_case(dict(content), source), source, content)
+        check(gearbox)
+        return gearbox
+
+    def varied(self, changes: Mapping[str, Any]) -> Gearbox:
+        """Build a new, checked gearbox with some keys replaced; keys are dotted paths of the file.
+
+        Examples
+        --------
+        >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+        >>> gearbox.varied({"housing.factor": 0.5}).case.housing.factor
+        0.5
+        """
+        content = _copied(self.content)
+        for dotted, value in changes.items():
+            section = content
+            *parents, last = dotted.split(".")
+            for part in parents:
+                section = section.setdefault(part, {})
+                if not isinstance(section, dict):
+                    raise self.fault(f"{dotted}: {part!r} is not a section")
+            section[last] = value
+        return Gearbox.from_dict(content, self.source)
+
+    def fault(self, text: str) -> CaseError:
+        """Error that names the file before `text` (key, value and what would be right)."""
+        return CaseError(f"{self.source}: {text}")
+
+    @property
+    def name(self) -> str:
+        """Title of the gearbox."""
+        return self.case.name
+
+    @property
+    def ste(self) -> SteSection:
+        """Settings of the STE tables."""
+        return self.case.ste
+
+    @property
+    def inertia_sets(self) -> tuple[str, ...]:
+        """Names of the inertia sets; every moving body has each of them."""
+        moving = [body for body in self._body_sections.values() if not body.fixed]
+        return tuple(moving[0].inertia) if moving else ()
+
+    @cached_property
+    def gears(self) -> dict[str, Gear]:
+        """All gears by name.
+
+        Raises
+        ------
+        CaseError
+            A gear that cannot be made, with its key.
+        """
+        return {
+            name: self._guard(f"gears.{name}", _gear, name, section)
+            for name, section in self.case.gears.items()
+        }
+
+    @cached_property
+    def gear_pairs(self) -> dict[str, GearPair]:
+        """All gear pairs by name."""
+        found = {}
+        for name, section in self.case.pairs.items():
+            for key in ("pinion", "gear"):
+                if getattr(section, key) not in self.gears:
+                    raise self.fault(
+                        f"pairs.{name}.{key} = {getattr(section, key)!r}: no such gear; "
+                        f"gears are {', '.join(self.gears)}"
+                    )
+            found[name] = self._guard(
+                f"pairs.{name}",
+                GearPair,
+                name=name,
+                pinion=self.gears[section.pinion],
+                gear=self.gears[section.gear],
+                centre_distance=section.centre_distance_mm * 1e-3,
+            )
+        return found
+
+    @cached_property
+    def pairs(self) -> dict[str, PairSpec]:
+        """Gear pairs with the static torque on gear 1 that the train's statics give."""
+        forces = self.static_mesh_forces()
+        found = {}
+        for name, pair in self.gear_pairs.items():
+            at_work = [abs(forces[mesh.name]) for mesh in self.meshes if mesh.pair.name == name]
+            force = sum(at_work) / len(at_work) if at_work else 0.0
+            found[name] = PairSpec(name, pair, force * pair.pinion.base_radius, self.case.pairs[name].table)
+        return found
+
+    def bodies(self, inertias: str | None = None) -> tuple[Body, ...]:
+        """All enabled bodies, planets one by one, with the mass properties of an inertia set."""
+        inertias = inertias or self.case.default_inertias
+        if inertias not in self.inertia_sets:
+            raise self.fault(f"inertia set {inertias!r} is unknown; sets are {', '.join(self.inertia_sets)}")
+        return tuple(self._bodies(inertias))
+
+    def body(self, name: str, inertias: str | None = None) -> Body:
+        """One body by name."""
+        for body in self.bodies(inertias):
+            if body.name == name:
+                return body
+        known = ", ".join(body.name for body in self.bodies(inertias))
+        raise self.fault(f"no body {name!r}; bodies are {known}")
+
+    @cached_property
+    def joints(self) -> tuple[Joint, ...]:
+        """Ideal joints of the variant `rigid`."""
+        found = []
+        for name, section in self.case.joints.items():
+            if not self._known(f"joints.{name}", section.body, section.on):
+                continue
+            for suffix, body, on in self._instances(section.body, section.on):
+                found.append(Joint(name + suffix, body, on, self._place(body, section.z_mm)))
+        return tuple(found)
+
+    @cached_property
+    def bearings(self) -> tuple[Bearing, ...]:
+        """Compliant supports of the variants `bushing` and `flexible`."""
+        found: list[Bearing] = []
+        for name, section in self.case.bearings.items():
+            if self._known(f"bearings.{name}", section.body, section.on):
+                found.extend(self._bearing_instances(name, section))
+        return tuple(found)
+
+    @cached_property
+    def couplings(self) -> tuple[Coupling, ...]:
+        """Torsional springs between spins."""
+        found = []
+        for name, section in self.case.couplings.items():
+            if not self._known(f"couplings.{name}", *section.bodies):
+                continue
+            damping = section.damping_N_m_s_per_rad
+            if damping is None:
+                damping = self.case.damping.coupling_time_s * section.stiffness_N_m_per_rad
+            found.append(Coupling(name, *section.bodies, section.stiffness_N_m_per_rad, damping))
+        return tuple(found)
+
+    @cached_property
+    def meshes(self) -> tuple[Mesh, ...]:
+        """All meshes at work, one per planet."""
+        found: list[Mesh] = []
+        for name, section in self.case.meshes.items():
+            if self._known(f"meshes.{name}", section.pinion_body, section.gear_body):
+                found.extend(self._mesh_instances(name, section))
+        return tuple(found)
+
+    @cached_property
+    def load_cases(self) -> dict[str, LoadCase]:
+        """Load cases by name."""
+        return {name: self._load_case(name, section) for name, section in self.case.load_cases.items()}
+
+    # -- kinematics and statics of the spins -------------------------------------------------------------
+
+    @cached_property
+    def spinning(self) -> tuple[str, ...]:
+        """Names of the bodies that can turn, in the order of the spin vector."""
+        return tuple(body.name for body in self.bodies() if not body.fixed)
+
+    def mesh_row(self, mesh: Mesh) -> NDArray[np.float64]:
+        """Return how a mesh closes per unit spins: r_b1 (t1 - tf) +- r_b2 (t2 - tf), flank s = +1, m/rad.
+
+        Plus for an external pair, minus for an internal one; tf is the spin of the frame.
+        """
+        row = np.zeros(len(self.spinning))
+        first = mesh.pair.pinion.base_radius
+        second = mesh.pair.gear.base_radius * (-1.0 if mesh.pair.gear.internal else 1.0)
+        for name, value in ((mesh.pinion, first), (mesh.gear, second), (mesh.frame, -(first + second))):
+            if name in self.spinning:
+                row[self.spinning.index(name)] += value
+        return row
+
+    @cached_property
+    def kinematic_modes(self) -> NDArray[np.float64]:
+        """Basis of rolling motions, (bodies, mobility): no mesh closes, no coupling twists."""
+        rows = np.vstack([self._spin_rows(), np.zeros((1, len(self.spinning)))])
+        scale = np.abs(rows).max(axis=1, keepdims=True)
+        _, singular, basis = np.linalg.svd(rows / np.where(scale > 0, scale, 1.0))
+        rank = int(np.sum(singular > 1e-9 * singular[0]))
+        return basis[rank:].T
+
+    def rolling_speeds(self, body: str, speed: float) -> dict[str, float]:
+        """Spins of all bodies (rad/s) in rolling motion when `body` turns at `speed`.
+
+        Raises
+        ------
+        CaseError
+            The train has more than one degree of freedom, or the body does not turn with it.
+        """
+        modes = self.kinematic_modes
+        if modes.shape[1] != 1:
+            raise self.fault(
+                f"the gear train has {modes.shape[1]} degrees of freedom; "
+                "a speed of one body does not fix the others"
+            )
+        if body not in self.spinning or abs(modes[self.spinning.index(body), 0]) < 1e-12:
+            raise self.fault(f"body {body!r} does not turn with the gear train")
+        values = modes[:, 0] * (speed / modes[self.spinning.index(body), 0])
+        return dict(zip(self.spinning, values.tolist(), strict=True))
+
+    @cached_property
+    def ratio(self) -> float:
+        """Spin of the overall output per spin of the overall input."""
+        return self.rolling_speeds(self.case.overall.input, 1.0)[self.case.overall.output]
+
+    def mesh_frequencies(self, speed: float) -> dict[str, float]:
+        """Mesh frequency (Hz) of each mesh when the overall input turns at `speed` rad/s."""
+        spins = {GROUND: 0.0, **self.rolling_speeds(self.case.overall.input, speed)}
+        return {
+            mesh.name: abs(spins.get(mesh.pinion, 0.0) - spins.get(mesh.frame, 0.0))
+            * mesh.pair.pinion.teeth
+            / (2.0 * math.pi)
+            for mesh in self.meshes
+        }
+
+    def static_mesh_forces(self, torques: Mapping[str, float] | None = None) -> dict[str, float]:
+        """Line-of-action force F_bt of each mesh (N) in the static state, least-norm where planets share.
+
+        The sign says which flank of gear 1 carries: positive = the one that faces the sense of +z rotation.
+        `torques` default to the file's static load; the same bodies are locked.
+        """
+        load = self.case.static_load
+        torques = load.torques_N_m if torques is None else torques
+        for key, names in (("torques_N_m", tuple(torques)), ("locked", load.locked)):
+            for name in names:
+                if name not in self.spinning:
+                    raise self.fault(
+                        f"static_load.{key} = {name!r}: no such turning body; "
+                        f"bodies are {', '.join(self.spinning)}"
+                    )
+        applied = np.array([torques.get(name, 0.0) for name in self.spinning])
+        locks = np.array([[float(name == lock) for name in self.spinning] for lock in load.locked])
+        balance = np.vstack([self._spin_rows(), locks.reshape(-1, len(self.spinning))]).T
+        forces = np.linalg.lstsq(balance, applied, rcond=1e-12)[0]
+        if np.abs(balance @ forces - applied).max() > 1e-9 * np.abs(applied).max():
+            raise self.fault(
+                f"static_load: the torques {dict(torques)} are not held by locking "
+                f"{', '.join(load.locked) or 'nothing'}"
+            )
+        return {mesh.name: float(force) for mesh, force in zip(self.meshes, forces, strict=False)}
+
+    def _spin_rows(self) -> NDArray[np.float64]:
+        rows = [self.mesh_row(mesh) for mesh in self.meshes]
+        for coupling in self.couplings:
+            rows.append(
+                np.array(
+                    [float(name == coupling.first) - float(name == coupling.second) for name in self.spinning]
+                )
+            )
+        return np.array(rows).reshape(-1, len(self.spinning))
+
+    # -- from sections to data ---------------------------------------------------------------------------
+
+    @cached_property
+    def _body_sections(self) -> dict[str, BodySection]:
+        return {name: section for name, section in self.case.bodies.items() if section.enabled}
+
+    def _known(self, key: str, *names: str) -> bool:
+        """Tell whether all bodies are enabled; an unknown name is an error, a disabled one is not."""
+        for name in names:
+            if name != GROUND and name not in self.case.bodies:
+                raise self.fault(
+                    f"{key}: no body {name!r}; bodies are {', '.join(self.case.bodies)} and ground"
+                )
+        return all(name == GROUND or name in self._body_sections for name in names)
+
+    def _guard(self, key: str, build: Any, *arguments: Any, **named: Any) -> Any:
+        try:
+            return build(*arguments, **named)
+        except GeometryError as error:
+            raise self.fault(f"{key}: {error}") from None
+
+    def _suffixes(self, name: str) -> list[str]:
+        count = len(self._body_sections[name].planet_angles_deg) if name in self._body_sections else 0
+        return [f"_{number}" for number in range(1, count + 1)] or [""]
+
+    def _instances(self, first: str, second: str) -> list[tuple[str, str, str]]:
+        """(suffix, first, second) for each planet; sets meet single bodies or equal sets."""
+        one, two = self._suffixes(first), self._suffixes(second)
+        if len(one) > 1 and len(two) > 1 and len(one) != len(two):
+            raise self.fault(f"bodies {first!r} and {second!r} are planet sets of different size")
+        many = one if len(one) >= len(two) else two
+        return [
+            (suffix, first + (suffix if one != [""] else ""), second + (suffix if two != [""] else ""))
+            for suffix in many
+        ]
+
+    def _bodies(self, inertias: str) -> Iterator[Body]:
+        for family, section in self._body_sections.items():
+            inertia = section.inertia.get(inertias)
+            if inertia is None and not section.fixed:
+                raise self.fault(
+                    f"bodies.{family}.inertia: no set {inertias!r}; every moving body "
+                    f"needs the sets {', '.join(self.inertia_sets)}"
+                )
+            angles = [math.radians(angle) for angle in section.planet_angles_deg] or [0.0]
+            for suffix, angle in zip(self._suffixes(family), angles, strict=True):
+                yield Body(
+                    name=family + suffix,
+                    family=family,
+                    axis=self._axis(family, angle),
+                    centre_of_mass_z=1e-3 * ((inertia and inertia.centre_of_mass_z_mm) or 0.0),
+                    mass=(inertia and inertia.mass_kg) or 0.0,
+                    axial=inertia.axial_kg_m2 if inertia else 0.0,
+                    transverse=(inertia and inertia.transverse_kg_m2) or 0.0,
+                    carrier=section.carrier,
+                    orbit_angle=angle if section.carrier else 0.0,
+                    spin_only=section.spin_only,
+                    fixed=section.fixed,
+                    wheels={gear: z * 1e-3 for gear, z in section.wheels_z_mm.items()},
+                )
+
+    def _axis(self, family: str, angle: float) -> tuple[float, float]:
+        section = self.case.bodies[family]
+        if section.axis_position_mm is not None:
+            x, y = section.axis_position_mm
+            return x * 1e-3, y * 1e-3
+        carrier, radius = section.carrier, section.orbit_radius_mm
+        if carrier is None or radius is None:
+            raise self.fault(f"bodies.{family}: give axis_position_mm or the keys of a planet")
+        if not self._known(f"bodies.{family}.carrier", carrier):
+            raise self.fault(f"bodies.{family}.carrier = {carrier!r}: that body is not enabled")
+        if self.case.bodies[carrier].axis_position_mm is None:
+            raise self.fault(f"bodies.{family}.carrier = {carrier!r}: a carrier cannot be a planet")
+        x, y = self._axis(carrier, 0.0)
+        return x + radius * 1e-3 * math.cos(angle), y + radius * 1e-3 * math.sin(angle)
+
+    @cached_property
+    def _named_bodies(self) -> dict[str, Body]:
+        return {body.name: body for body in self.bodies()}
+
+    def _place(self, body: str, z_mm: float) -> tuple[float, float, float]:
+        return (*self._named_bodies[body].axis, z_mm * 1e-3)
+
+    def _bearing_instances(self, name: str, section: BearingSection) -> Iterator[Bearing]:
+        factor = self.case.housing.factor if section.housing_factor_applies else 1.0
+        for suffix, body, on in self._instances(section.body, section.on):
+            yield Bearing(
+                name + suffix,
+                name,
+                body,
+                on,
+                self._place(body, section.z_mm),
+                section.stiffness,
+                section.catalogue,
+                section.damping,
+                factor,
+            )
+
+    def _mesh_instances(self, name: str, section: MeshSection) -> Iterator[Mesh]:
+        key = f"meshes.{name}"
+        if section.pair not in self.gear_pairs:
+            raise self.fault(
+                f"{key}.pair = {section.pair!r}: no such pair; pairs are {', '.join(self.gear_pairs)}"
+            )
+        pair = self.gear_pairs[section.pair]
+        instances = self._instances(section.pinion_body, section.gear_body)
+        phases = section.phase if isinstance(section.phase, tuple) else (section.phase,) * len(instances)
+        if len(phases) != len(instances):
+            raise self.fault(
+                f"{key}.phase = {list(phases)}: {len(instances)} meshes need {len(instances)} phases"
+            )
+        for (suffix, pinion, gear), phase in zip(instances, phases, strict=True):
+            first, second = self._named_bodies[pinion], self._named_bodies[gear]
+            frame = section.frame or first.carrier or second.carrier or GROUND
+            if frame != GROUND and frame not in self._named_bodies:
+                raise self.fault(f"{key}.frame = {frame!r}: no such body; use a carrier's name or ground")
+            dx, dy = second.axis[0] - first.axis[0], second.axis[1] - first.axis[1]
+            angle = math.atan2(dy, dx)
+            stated = section.position_angle_deg
+            if stated is not None and abs(math.remainder(angle - math.radians(stated), 2 * math.pi)) > 1e-4:
+                raise self.fault(
+                    f"{key}.position_angle_deg = {stated}: the bodies' positions give "
+                    f"{math.degrees(angle):.4f} deg; leave the key out or correct the positions"
+                )
+            yield Mesh(
+                name + suffix,
+                name,
+                pair,
+                pinion,
+                gear,
+                frame,
+                self._common_middle(key, pair, first, second),
+                angle,
+                math.hypot(dx, dy),
+                phase,
+            )
+
+    def _common_middle(self, key: str, pair: GearPair, first: Body, second: Body) -> float:
+        """Middle of the overlap of the two faces, m."""
+        low, high = -math.inf, math.inf
+        for body, gear in ((first, pair.pinion), (second, pair.gear)):
+            if gear.name not in body.wheels:
+                raise self.fault(
+                    f"{key}: body {body.family!r} carries no gear {gear.name!r}; give its z in "
+                    f"bodies.{body.family}.wheels_z_mm"
+                )
+            low = max(low, body.wheels[gear.name] - gear.face_width / 2)
+            high = min(high, body.wheels[gear.name] + gear.face_width / 2)
+        if high <= low:
+            raise self.fault(
+                f"{key}: the faces of {pair.pinion.name} and {pair.gear.name} do not overlap in z"
+            )
+        return (low + high) / 2
+
+    def _load_case(self, name: str, section: LoadCaseSection) -> LoadCase:
+        key = f"load_cases.{name}"
+        for body in (*section.torques_N_m, *((section.driven_body,) if section.driven_body else ())):
+            if body not in self.spinning:
+                raise self.fault(f"{key}: no turning body {body!r}; bodies are {', '.join(self.spinning)}")
+        series = None
+        if section.torque_series is not None:
+            series = Path(self.source).parent / section.torque_series
+            if not series.is_file():
+                raise self.fault(
+                    f"{key}.torque_series = {section.torque_series!r}: no such file "
+                    "beside the gearbox file; expected CSV with time_s and BODY_N_m columns"
+                )
+        return LoadCase(
+            name,
+            dict(section.torques_N_m),
+            series,
+            section.duration_s,
+            section.start_speed_rpm * RPM,
+            section.driven_body,
+            None if section.end_speed_rpm is None else section.end_speed_rpm * RPM,
+            section.drive_stiffness_N_m_per_rad,
+            section.description,
+        )
+
+
+def _copied(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _copied(entry) for key, entry in value.items()}
+    return list(value) if isinstance(value, list) else value
+
+
+def _gear(name: str, section: GearSection) -> Gear:
+    """Gear from its section: millimetres to metres, degrees to radians."""
+    return Gear(
+        name=name,
+        teeth=section.teeth,
+        normal_module=section.normal_module_mm * 1e-3,
+        normal_pressure_angle=math.radians(section.normal_pressure_angle_deg),
+        helix_angle=math.radians(section.helix_angle_deg),
+        profile_shift=section.profile_shift,
+        face_width=section.face_width_mm * 1e-3,
+        held_diameter=section.held_diameter_mm * 1e-3,
+        internal=section.internal,
+        rack=BasicRack(**section.rack.model_dump()),
+        tip_diameter=None if section.tip_diameter_mm is None else section.tip_diameter_mm * 1e-3,
+        root_diameter=None if section.root_diameter_mm is None else section.root_diameter_mm * 1e-3,
+        tooth_thinning=section.tooth_thinning_mm * 1e-3,
+        material=Material(
+            youngs_modulus=section.material.youngs_modulus_GPa * 1e9,
+            poissons_ratio=section.material.poissons_ratio,
+            density=section.material.density_kg_per_m3,
+        ),
+    )
+
+
+def check(gearbox: Gearbox) -> None:
+    """Check the parts of a gearbox against each other.
+
+    Raises
+    ------
+    CaseError
+        Inertia sets incomplete, positions that contradict a centre distance, planets that cannot be
+        assembled or collide, a body joined to nothing, a static load that nothing holds.
+    """
+    if gearbox.case.default_inertias not in gearbox.inertia_sets:
+        raise gearbox.fault(
+            f"default_inertias = {gearbox.case.default_inertias!r}: no such set; "
+            f"sets are {', '.join(gearbox.inertia_sets)}"
+        )
+    for inertias in gearbox.inertia_sets:
+        gearbox.bodies(inertias)
+    _check_mass_properties(gearbox)
+    _check_centre_distances(gearbox)
+    _check_planets(gearbox)
+    _check_connected(gearbox)
+    _check_joints(gearbox)
+    overall = gearbox.case.overall
+    for key in ("input", "output"):
+        if getattr(overall, key) not in gearbox.spinning:
+            raise gearbox.fault(
+                f"overall.{key} = {getattr(overall, key)!r}: no such turning body; "
+                f"bodies are {', '.join(gearbox.spinning)}"
+            )
+    if overall.output_gear not in gearbox.gears:
+        raise gearbox.fault(
+            f"overall.output_gear = {overall.output_gear!r}: no such gear; "
+            f"gears are {', '.join(gearbox.gears)}"
+        )
+    gearbox.static_mesh_forces()
+    for collection in (gearbox.bearings, gearbox.couplings, gearbox.load_cases):
+        list(collection)
+
+
+def _check_mass_properties(gearbox: Gearbox) -> None:
+    for family, section in gearbox.case.bodies.items():
+        for inertias, values in section.inertia.items():
+            if section.spin_only:
+                continue
+            for key in ("mass_kg", "transverse_kg_m2", "centre_of_mass_z_mm"):
+                if getattr(values, key) is None:
+                    raise gearbox.fault(
+                        f"bodies.{family}.inertia.{inertias}.{key}: this key is "
+                        "missing; only a spin_only body needs nothing but axial_kg_m2"
+                    )
+
+
+def _check_centre_distances(gearbox: Gearbox) -> None:
+    for mesh in gearbox.meshes:
+        difference = mesh.centre_distance - mesh.pair.centre_distance
+        if abs(difference) > CENTRE_DISTANCE_TOLERANCE:
+            raise gearbox.fault(
+                f"pairs.{mesh.pair.name}.centre_distance_mm = {mesh.pair.centre_distance * 1e3:g}: "
+                f"the bodies {mesh.pinion} and {mesh.gear} stand {mesh.centre_distance * 1e3:.4f} mm apart; "
+                f"they may differ by {CENTRE_DISTANCE_TOLERANCE * 1e3:g} mm"
+            )
+
+
+def _check_planets(gearbox: Gearbox) -> None:
+    bodies = {body.name: body for body in gearbox.bodies()}
+    for family, section in gearbox.case.bodies.items():
+        planets = [body for body in bodies.values() if body.family == family and body.carrier is not None]
+        for one, two in zip(planets, planets[1:] + planets[:1], strict=True):
+            if one is two:
+                continue
+            gap = math.dist(one.axis, two.axis)
+            needed = 2.0 * max(gearbox.gears[gear].tip_radius for gear in one.wheels)
+            if gap <= needed:
+                raise gearbox.fault(
+                    f"bodies.{family}.planet_angles_deg = {list(section.planet_angles_deg)}: "
+                    f"{one.name} and {two.name} collide, their axes are {gap * 1e3:.2f} mm apart, their tips "
+                    f"need more than {needed * 1e3:.2f} mm"
+                )
+        _check_assembly(gearbox, family, planets)
+
+
+def _check_assembly(gearbox: Gearbox, family: str, planets: list[Body]) -> None:
+    """Compare every planet with the first: going round two meshes must close on whole teeth.
+
+    With tooth numbers zp of the planet wheel and zc of the central wheel (negative for an external one),
+    (zc_b zp_a - zc_a zp_b) angle / 2 pi must be a multiple of gcd(zp_a, zp_b); for one planet wheel
+    between sun and ring this is the familiar (z_sun + z_ring) angle / 2 pi = integer.
+    """
+    for planet in planets[1:]:
+        teeth = [
+            _teeth_on_planet(mesh, planet.name)
+            for mesh in gearbox.meshes
+            if planet.name in (mesh.pinion, mesh.gear)
+        ]
+        angle = planet.orbit_angle - planets[0].orbit_angle
+        for planet_teeth, central_teeth in teeth[1:]:
+            whole = math.gcd(planet_teeth, teeth[0][0])
+            turns = (central_teeth * teeth[0][0] - teeth[0][1] * planet_teeth) / whole
+            off = math.remainder(turns * angle / (2.0 * math.pi), 1.0)
+            if abs(off) > ASSEMBLY_TOLERANCE:
+                raise gearbox.fault(
+                    f"bodies.{family}.planet_angles_deg: {planet.name} cannot be assembled at "
+                    f"{math.degrees(angle):.4f} deg from the first planet; angles must be multiples of "
+                    f"360/{abs(turns):g} = {360.0 / abs(turns):.4f} deg"
+                )
+
+
+def _teeth_on_planet(mesh: Mesh, planet: str) -> tuple[int, int]:
+    """(teeth of the planet's wheel, teeth of its mate, the latter negative unless internal)."""
+    pinion, gear = mesh.pair.pinion, mesh.pair.gear
+    if mesh.pinion == planet:
+        return pinion.teeth, gear.teeth if gear.internal else -gear.teeth
+    return gear.teeth, -pinion.teeth
+
+
+def _check_connected(gearbox: Gearbox) -> None:
+    links = [(mesh.pinion, mesh.gear) for mesh in gearbox.meshes]
+    links += [(coupling.first, coupling.second) for coupling in gearbox.couplings]
+    links += [(body.name, body.carrier) for body in gearbox.bodies() if body.carrier]
+    names = [body.name for body in gearbox.bodies()]
+    reached = {gearbox.case.overall.input}
+    while True:
+        more = {b for pair in links for a, b in (pair, pair[::-1]) if a in reached} - reached
+        if not more:
+            break
+        reached |= more
+    lost = [name for name in names if name not in reached]
+    if lost:
+        raise gearbox.fault(
+            f"bodies {', '.join(lost)} are joined to {gearbox.case.overall.input} by no "
+            "mesh, coupling or carrier; the gear train must be one connected whole"
+        )
+
+
+def _check_joints(gearbox: Gearbox) -> None:
+    bodies = {body.name: body for body in gearbox.bodies()}
+    seen: dict[str, str] = {}
+    for joint in gearbox.joints:
+        body = bodies[joint.body]
+        if body.fixed or body.spin_only:
+            raise gearbox.fault(
+                f"joints.{joint.name}.body = {joint.body!r}: a fixed or spin-only body takes no joint"
+            )
+        if joint.body in seen:
+            raise gearbox.fault(
+                f"joints.{joint.name}.body = {joint.body!r}: the body already turns "
+                f"on {seen[joint.body]}; a second ideal joint on the same axis is redundant"
+            )
+        if body.carrier is not None and joint.on != body.carrier:
+            raise gearbox.fault(
+                f"joints.{joint.name}.on = {joint.on!r}: a planet turns on its carrier {body.carrier!r}"
+            )
+        seen[joint.body] = joint.name
