@@ -157,8 +157,8 @@ class CylindricalRollerBearing:
 class TaperedRollerBearing:
     """Single-row tapered roller bearing from its boundary dimensions.
 
-    The rollers' pressure line is taken at the one contact angle that catalogues state (outer raceway); the
-    The pressure line is taken at the one contact angle that catalogues state (outer raceway); the
+    The pressure line is taken at the one contact angle that catalogues state (outer raceway); the rib is
+    left out. Used alone, the bearing holds an inner ring that is pushed towards +z; turn it by a negative
     `contact_angle` or combine two in a `BearingPair`.
 
     Parameters
