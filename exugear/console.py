@@ -1,0 +1,93 @@
+"""What the command line says and how it ends: results on standard output, all else on standard error."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, NoReturn
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+from rich.table import Table
+from rich.text import Text
+
+EXIT_FAILED = 1
+EXIT_BAD_INPUT = 2
+EXIT_INTERRUPTED = 130
+
+results = Console()
+messages = Console(stderr=True)
+
+
+class BadInputError(Exception):
+    """The user's input cannot be used: nothing was written, the message says what would be right."""
+
+
+class FailedError(Exception):
+    """The work was begun and could not be finished; what was finished is kept."""
+
+
+@contextmanager
+def exit_codes() -> Iterator[None]:
+    """Turn errors the user can act on into one message and an exit code; others keep their traceback.
+
+    2 after `BadInputError`, 1 after `FailedError`, 130 after Ctrl-C.
+    """
+    try:
+        yield
+    except BadInputError as error:
+        _end("Bad input", error, EXIT_BAD_INPUT)
+    except FailedError as error:
+        _end("Failed", error, EXIT_FAILED)
+    except KeyboardInterrupt:
+        _end("Stopped", "finished results are kept; the same command goes on from there", EXIT_INTERRUPTED)
+
+
+def _end(what: str, reason: object, code: int) -> NoReturn:
+    note(f"{what}: {reason}", style="red")
+    sys.exit(code)
+
+
+def note(message: str, style: str = "") -> None:
+    """Say something that is no result, unwrapped, so that paths in it can be copied."""
+    messages.print(Text(message, style=style), soft_wrap=True)
+
+
+def progress_bar() -> Progress:
+    """Return a bar with a count and the time left, to be used as a context manager."""
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        console=messages,
+    )
+
+
+def print_json(summary: Mapping[str, Any]) -> None:
+    """Print one object on standard output."""
+    sys.stdout.write(json.dumps(summary, indent=2, allow_nan=False) + "\n")
+
+
+def print_table(title: str, rows: list[dict[str, str]]) -> None:
+    """Print rows under the keys of the first one; the first column is text, the others are numbers."""
+    table = Table(
+        title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, padding=(0, 1, 0, 0)
+    )
+    for place, heading in enumerate(rows[0]):
+        table.add_column(heading, justify="right" if place else "left", no_wrap=True)
+    for row in rows:
+        table.add_row(*row.values())
+    results.print(table)
