@@ -130,6 +130,7 @@ class Mesh:
     pinion, gear : names of the bodies that carry gear 1 and gear 2
     frame : body whose spin carries the line of centres, or "ground"
     z : middle of the common face width, m
+    offsets : z of that middle from the middle of gear 1 and of gear 2, m
     position_angle : polar angle of the line from gear 1's axis to gear 2's axis at zero angles, rad
     centre_distance : from the bodies' positions, m (the pair's own value agrees within 20 um)
     phase : PMC at zero angles where the file overrides what geometry gives, else None
@@ -142,6 +143,7 @@ class Mesh:
     gear: str
     frame: str
     z: float
+    offsets: tuple[float, float]
     position_angle: float
     centre_distance: float
     phase: float | None
@@ -578,17 +580,19 @@ class Gearbox:
                     f"{key}.position_angle_deg = {stated}: the bodies' positions give "
                     f"{math.degrees(angle):.4f} deg; leave the key out or correct the positions"
                 )
+            z = self._common_middle(key, pair, first, second)
             yield Mesh(
-                name + suffix,
-                name,
-                pair,
-                pinion,
-                gear,
-                frame,
-                self._common_middle(key, pair, first, second),
-                angle,
-                math.hypot(dx, dy),
-                phase,
+                name=name + suffix,
+                family=name,
+                pair=pair,
+                pinion=pinion,
+                gear=gear,
+                frame=frame,
+                z=z,
+                offsets=(z - first.wheels[pair.pinion.name], z - second.wheels[pair.gear.name]),
+                position_angle=angle,
+                centre_distance=math.hypot(dx, dy),
+                phase=phase,
             )
 
     def _common_middle(self, key: str, pair: GearPair, first: Body, second: Body) -> float:

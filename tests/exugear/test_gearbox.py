@@ -14,9 +14,6 @@ from exugear.gearbox import CaseError, Gearbox
 CASE = Path(__file__).parents[2] / "cases" / "grc750" / "gearbox.toml"
 
 
-@pytest.fixture(scope="module")
-def grc() -> Gearbox:
-    return Gearbox.from_toml(CASE)
 
 
 @pytest.fixture

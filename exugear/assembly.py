@@ -1,0 +1,364 @@
+"""A gearbox variant as equations of motion on one vector of coordinates, independent of any solver.
+
+Everything is packed once into arrays for the kernels: Exudyn (system.py) and the compiled solver are built
+from the same assembly, so they solve the same equations in the same coordinates.
+
+Bodies with six coordinates come first, in the order of the file, then those with their spin alone. In the
+variant `rigid` every body has its spin alone: ideal joints leave nothing else, and a planet rides on its
+carrier's spin.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from exugear import bearings as rolling
+from exugear.casefile import CatalogueSection, StiffnessSection
+from exugear.gearbox import Bearing, Body, Gearbox
+from exugear.kernels import (
+    ConnectorArrays,
+    InertiaArrays,
+    MeshArrays,
+    SpringArrays,
+    accelerations,
+    add_connector_forces,
+    add_mesh_forces,
+    add_mesh_jacobian,
+    add_spring_forces,
+)
+from exugear.mesh_element import Angles, MeshElement, mesh_elements, node_position, pack
+
+Floats = NDArray[np.float64]
+Variant = Literal["rigid", "bushing"]
+VARIANTS: tuple[str, ...] = get_args(Variant)
+
+
+class VariantError(ValueError):
+    """A variant that cannot be built from this gearbox."""
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """Equations of motion of a gearbox variant.
+
+    Attributes
+    ----------
+    gearbox, variant, law, inertias : what was assembled
+    bodies : moving bodies in the order of their coordinates
+    coordinates : the six state indices of each body by name, -1 where there is none
+    size : number of coordinates
+    elements, meshes : mesh elements and their arrays
+    connector_names, connectors : bearings (none in the variant `rigid`)
+    spring_names, springs : torsional couplings
+    inertia : mass properties; in the variant `rigid` the planets' orbit is in the carrier's
+    """
+
+    gearbox: Gearbox
+    variant: str
+    law: str
+    inertias: str
+    bodies: tuple[Body, ...]
+    coordinates: Mapping[str, tuple[int, ...]]
+    size: int
+    elements: tuple[MeshElement, ...]
+    meshes: MeshArrays
+    connector_names: tuple[str, ...]
+    connectors: ConnectorArrays
+    spring_names: tuple[str, ...]
+    springs: SpringArrays
+    inertia: InertiaArrays
+
+    def has_six(self, body: Body) -> bool:
+        """Tell whether a body has all six coordinates."""
+        return self.coordinates[body.name][0] >= 0
+
+    @cached_property
+    def spin(self) -> dict[str, int]:
+        """Coordinate of each body's spin."""
+        return {body.name: self.coordinates[body.name][5] for body in self.bodies}
+
+    @cached_property
+    def mesh_names(self) -> tuple[str, ...]:
+        """Names of the meshes in the order of the arrays."""
+        return tuple(element.mesh.name for element in self.elements)
+
+    @cached_property
+    def mean_meshes(self) -> MeshArrays:
+        """Mesh arrays with k(PMC) replaced by its mean over the cycle."""
+        return pack(self.elements, self.coordinates, averaged=True)
+
+    def forces(self, q: Floats, v: Floats, meshes: MeshArrays | None = None) -> Floats:
+        """Generalized forces of meshes, bearings and couplings, shape (size,), N and N m."""
+        f = np.zeros(self.size)
+        add_mesh_forces(q, v, self.meshes if meshes is None else meshes, f)
+        add_connector_forces(q, v, self.connectors, f)
+        add_spring_forces(q, v, self.springs, f)
+        return f + self.weight
+
+    @cached_property
+    def weight(self) -> Floats:
+        """Generalized forces of gravity, shape (size,)."""
+        f = np.zeros(self.size)
+        acceleration = np.array(self.gearbox.case.gravity.acceleration_m_per_s2)
+        for body in self.bodies:
+            if self.has_six(body):
+                f[list(self.coordinates[body.name][:3])] = body.mass * acceleration
+        return f
+
+    def torque_vector(self, torques: Mapping[str, float]) -> Floats:
+        """Generalized forces of torques about the bodies' spin axes (N m), shape (size,)."""
+        f = np.zeros(self.size)
+        for name, torque in torques.items():
+            if name not in self.spin:
+                raise VariantError(f"no turning body {name!r} to load; bodies are {', '.join(self.spin)}")
+            f[self.spin[name]] += torque
+        return f
+
+    def accelerations(self, q: Floats, v: Floats, applied: Floats) -> Floats:
+        """Accelerations under all forces and the applied generalized forces, shape (size,)."""
+        out = np.zeros(self.size)
+        accelerations(q, v, self.inertia, self.forces(q, v) + applied, out)
+        return out
+
+    def mesh_jacobians(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """Differentiate the mesh forces to q and to v, each (size, size)."""
+        jq, jv = np.zeros((self.size, self.size)), np.zeros((self.size, self.size))
+        add_mesh_jacobian(q, v, self.meshes, jq, jv)
+        return jq, jv
+
+    @cached_property
+    def mass_matrix(self) -> Floats:
+        """Mass matrix at zero tilts, diagonal, (size, size)."""
+        m = np.zeros((self.size, self.size))
+        for n, o in enumerate(self.inertia.body):
+            values = [self.inertia.mass[n]] * 3 + [self.inertia.transverse[n]] * 2 + [self.inertia.axial[n]]
+            m[range(o, o + 6), range(o, o + 6)] = values
+        m[self.inertia.spin, self.inertia.spin] = self.inertia.spin_inertia
+        return m
+
+    def rolling_velocity(self, q: Floats, speeds: Mapping[str, float]) -> Floats:
+        """Velocities when the train rolls at the given spins and the planets orbit with their carriers."""
+        v = np.zeros(self.size)
+        for body in self.bodies:
+            v[self.spin[body.name]] = speeds[body.name]
+            if self.has_six(body) and body.carrier is not None:
+                x, y = self._from_carrier_axis(body, q)
+                o = self.coordinates[body.name][0]
+                v[o : o + 2] = speeds[body.carrier] * np.array([-y, x])
+        return v
+
+    def rolling_acceleration(
+        self, q: Floats, speeds: Mapping[str, float], rates: Mapping[str, float]
+    ) -> Floats:
+        """Accelerations of a train that rolls at given spins and spin rates, planets' orbit included."""
+        a = np.zeros(self.size)
+        for body in self.bodies:
+            a[self.spin[body.name]] = rates[body.name]
+            if self.has_six(body) and body.carrier is not None:
+                x, y = self._from_carrier_axis(body, q)
+                o, w = self.coordinates[body.name][0], speeds[body.carrier]
+                a[o : o + 2] = rates[body.carrier] * np.array([-y, x]) - w**2 * np.array([x, y])
+        return a
+
+    def _from_carrier_axis(self, body: Body, q: Floats) -> tuple[float, float]:
+        carrier = next(other for other in self.bodies if other.name == body.carrier)
+        o = self.coordinates[body.name][0]
+        return body.axis[0] - carrier.axis[0] + float(q[o]), body.axis[1] - carrier.axis[1] + float(q[o + 1])
+
+    def inertia_forces(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        """Generalized forces that the accelerations a need, shape (size,): the inverse of `accelerations`."""
+        f = np.zeros(self.size)
+        for n, o in enumerate(self.inertia.body):
+            mass, jt, ja = self.inertia.mass[n], self.inertia.transverse[n], self.inertia.axial[n]
+            sb, cb = math.sin(q[o + 4]), math.cos(q[o + 4])
+            da, db = v[o + 3], v[o + 4]
+            p = ja * (v[o + 5] + da * sb)
+            f[o : o + 3] = mass * a[o : o + 3]
+            f[o + 5] = ja * (a[o + 5] + a[o + 3] * sb + da * db * cb)
+            f[o + 3] = jt * cb**2 * a[o + 3] + f[o + 5] * sb + p * db * cb - 2.0 * jt * da * db * sb * cb
+            f[o + 4] = jt * a[o + 4] + jt * da**2 * sb * cb - p * da * cb
+        f[self.inertia.spin] = self.inertia.spin_inertia * a[self.inertia.spin]
+        return f
+
+
+def assemble(
+    gearbox: Gearbox,
+    variant: str,
+    stiffness: Mapping[str, ArrayLike],
+    law: str = "line_of_action",
+    inertias: str | None = None,
+    flanks: Mapping[str, int] | None = None,
+    angles: Angles = "reference",
+) -> Assembly:
+    """Assemble a variant; arguments as in `exugear.mesh_element.mesh_elements`.
+
+    Raises
+    ------
+    VariantError
+        Unknown variant, or supports missing for it.
+    MeshError
+        Unknown law, or no stiffness for a pair at work.
+    """
+    if variant not in VARIANTS:
+        raise VariantError(f"variant {variant!r} is unknown; variants are {', '.join(VARIANTS)}")
+    inertias = inertias or gearbox.case.default_inertias
+    moving = [body for body in gearbox.bodies(inertias) if not body.fixed]
+    _check_supports(gearbox, variant, moving)
+    six = [body for body in moving if variant != "rigid" and not body.spin_only]
+    alone = [body for body in moving if body not in six]
+    coordinates = _coordinates(six, alone)
+    elements = mesh_elements(gearbox, stiffness, law, inertias, flanks, angles)
+    bodies = {body.name: body for body in gearbox.bodies(inertias)}
+    return Assembly(
+        gearbox=gearbox,
+        variant=variant,
+        law=law,
+        inertias=inertias,
+        bodies=(*six, *alone),
+        coordinates=coordinates,
+        size=6 * len(six) + len(alone),
+        elements=elements,
+        meshes=pack(elements, coordinates),
+        connector_names=tuple(bearing.name for bearing in gearbox.bearings) if six else (),
+        connectors=_connectors(gearbox, bodies, coordinates) if six else no_connectors(),
+        spring_names=tuple(coupling.name for coupling in gearbox.couplings),
+        springs=_springs(gearbox, coordinates),
+        inertia=_inertia(variant, six, alone),
+    )
+
+
+def _check_supports(gearbox: Gearbox, variant: str, moving: list[Body]) -> None:
+    """Every body of the variant `rigid` needs its joint: without one it would not turn on a fixed axis."""
+    held = {joint.body for joint in gearbox.joints}
+    missing = [body.name for body in moving if not body.spin_only and body.name not in held]
+    if variant == "rigid" and missing:
+        raise VariantError(f"variant rigid: no joint holds {', '.join(missing)}; add one under [joints]")
+    if variant == "bushing" and not gearbox.bearings:
+        raise VariantError("variant bushing: the gearbox file has no [bearings]")
+
+
+def _coordinates(six: list[Body], alone: list[Body]) -> dict[str, tuple[int, ...]]:
+    """Six state indices of each moving body; -1 for all but the spin where a body has nothing else."""
+    found = {body.name: tuple(range(6 * n, 6 * n + 6)) for n, body in enumerate(six)}
+    for n, body in enumerate(alone):
+        found[body.name] = (-1, -1, -1, -1, -1, 6 * len(six) + n)
+    return found
+
+
+def _inertia(variant: str, six: list[Body], alone: list[Body]) -> InertiaArrays:
+    orbiting = {
+        carrier.name: sum(
+            body.mass * math.dist(body.axis, carrier.axis) ** 2
+            for body in alone
+            if body.carrier == carrier.name and variant == "rigid"
+        )
+        for carrier in alone
+    }
+    return InertiaArrays(
+        body=np.arange(len(six), dtype=np.int64) * 6,
+        mass=np.array([body.mass for body in six]),
+        transverse=np.array([body.transverse for body in six]),
+        axial=np.array([body.axial for body in six]),
+        spin=np.arange(len(alone), dtype=np.int64) + 6 * len(six),
+        spin_inertia=np.array([body.axial + orbiting[body.name] for body in alone]),
+    )
+
+
+def _springs(gearbox: Gearbox, coordinates: Mapping[str, tuple[int, ...]]) -> SpringArrays:
+    pairs = [(coordinates[c.first][5], coordinates[c.second][5]) for c in gearbox.couplings]
+    return SpringArrays(
+        coordinates=np.array(pairs, dtype=np.int64).reshape(-1, 2),
+        stiffness=np.array([c.stiffness for c in gearbox.couplings]),
+        damping=np.array([c.damping for c in gearbox.couplings]),
+    )
+
+
+def _connectors(
+    gearbox: Gearbox, bodies: Mapping[str, Body], coordinates: Mapping[str, tuple[int, ...]]
+) -> ConnectorArrays:
+    supports = gearbox.bearings
+    starts, local, places = [], [], []
+    for bearing in supports:
+        ends = [bodies[name] if name in coordinates else None for name in (bearing.on, bearing.body)]
+        nodes = [np.zeros(3) if body is None else node_position(body) for body in ends]
+        starts.append([-1 if body is None else coordinates[body.name][0] for body in ends])
+        local.append([np.array(bearing.place) - node for node in nodes])
+        places.append(nodes)
+    matrices = [bearing_matrices(bearing, gearbox.case.damping.bearing_time_s) for bearing in supports]
+    return ConnectorArrays(
+        bodies=np.array(starts, dtype=np.int64),
+        local=np.array(local),
+        place=np.array(places),
+        stiffness=np.array([stiffness for stiffness, _ in matrices]),
+        damping=np.array([damping for _, damping in matrices]),
+    )
+
+
+def no_connectors() -> ConnectorArrays:
+    """Arrays of a system without bearings."""
+    empty = np.zeros((0, 2, 3))
+    matrices = np.zeros((0, 6, 6))
+    return ConnectorArrays(np.zeros((0, 2), dtype=np.int64), empty, empty, matrices, matrices)
+
+
+def bearing_matrices(bearing: Bearing, damping_time: float) -> tuple[Floats, Floats]:
+    """Stiffness and damping (6, 6) of a bearing, housing factor included, in the axes of what it sits on.
+
+    Catalogue bearings: tangent of ISO/TS 16281 at the stated load, averaged over cage positions and
+    directions, raised to the stated floor. Given ones: as given. Damping as given, else time times stiffness.
+
+    Raises
+    ------
+    exugear.bearings.BearingError
+        The catalogue dimensions or the load are impossible.
+    """
+    given = _matrix(bearing.stiffness)
+    if bearing.catalogue is not None:
+        given = rolling.regularised(_catalogue_stiffness(bearing.catalogue), np.diag(given))
+    stiffness = bearing.factor * given
+    if bearing.damping is not None:
+        return stiffness, _matrix(bearing.damping)
+    return stiffness, rolling.proportional_damping(stiffness, damping_time)
+
+
+def _matrix(section: StiffnessSection | None) -> Floats:
+    if section is None:
+        return np.zeros((6, 6))
+    if section.matrix is not None:
+        return np.array(section.matrix, dtype=np.float64)
+    radial, tilt = section.radial_N_per_m, section.tilt_N_m_per_rad
+    return np.diag([radial, radial, section.axial_N_per_m, tilt, tilt, section.torsion_N_m_per_rad])
+
+
+@lru_cache(maxsize=64)
+def _catalogue_stiffness(section: CatalogueSection) -> Floats:
+    one: rolling.CylindricalRollerBearing | rolling.TaperedRollerBearing
+    if section.type == "cylindrical_roller":
+        one = rolling.CylindricalRollerBearing(
+            bore=section.bore_mm * 1e-3,
+            outside_diameter=section.outer_diameter_mm * 1e-3,
+            width=section.width_mm * 1e-3,
+            full_complement=section.full_complement,
+            radial_clearance=section.radial_clearance_mm * 1e-3,
+        )
+    else:
+        one = rolling.TaperedRollerBearing(
+            bore=section.bore_mm * 1e-3,
+            outside_diameter=section.outer_diameter_mm * 1e-3,
+            width=section.width_mm * 1e-3,
+            contact_angle=math.radians(section.contact_angle_deg),
+            radial_clearance=section.radial_clearance_mm * 1e-3,
+        )
+    whole: rolling.RollerBearing = one
+    if section.arrangement != "single":
+        distance = None if section.row_distance_mm is None else section.row_distance_mm * 1e-3
+        whole = rolling.BearingPair(bearing=one, arrangement=section.arrangement, row_distance=distance)
+    force = (section.radial_load_kN * 1e3, 0.0, section.axial_load_kN * 1e3)
+    return rolling.axially_symmetric(rolling.pitch_averaged_tangent(whole, force))

@@ -1,0 +1,430 @@
+r"""Compiled mesh and connector laws on arrays of coordinates; no Exudyn, no files, no names.
+
+Coordinates are those of Exudyn's ``NodeRigidBodyRxyz``: translations x, y, z (m), tilts a, b about x and
+the tilted y, and the unwrapped spin about the body's z axis (rad), all zero in the reference state. A body
+may also have its spin alone.
+
+Mesh law
+--------
+Each mesh lives in a frame that carries its line of centres: ground, or a carrier of spin psi. With R the
+rotation by psi, p a gear's place relative to the frame's axis and S = z x,
+
+    z_b   = R^T (p_b + x_b) - p_b,  tilts likewise,  spin_b - psi          displacements seen from the frame
+    delta = sum_b W_b . z_b                                                deflection, W constant
+    pmc   = phase + (spin_1 - psi) cycles                                  position in the mesh cycle
+    F     = k(pmc) delta + c d delta/dt                                    scalar mesh force
+    f     = -F dg/dq,  g = sum_b V_b . z_b                                 generalized force
+
+    z_b   = R^T (p_b + x_b) - p_b,  tilts likewise,  spin_b - psi        displacements seen from the frame
+g does not change when everything turns with psi, the carrier's share of the force balances moments exactly.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple, TypeVar, cast
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Function = TypeVar("Function", bound=Callable[..., object])
+
+END_SIZE = 6
+ROW_SIZE = 13
+"""Local coordinates of a mesh: six of gear 1, six of gear 2, the spin of the frame."""
+
+
+def compiled(function: Function) -> Function:
+    """Compile a function to machine code, kept on disk between processes; exact floating-point order."""
+    return cast(Function, numba.njit(cache=True, nogil=True)(function))
+
+
+class MeshArrays(NamedTuple):
+    """All meshes of a system as arrays; m meshes, n cubic pieces at most.
+
+    Attributes
+    ----------
+    coordinates : (m, 13) position of each local coordinate in the state, -1 where there is none
+    place : (m, 2, 2) axis of each gear relative to the frame's axis at zero angles, m
+    deflection, force : (m, 12) rows W and V, m/m and m/rad
+    cycles : (m,) mesh cycles per rad of gear 1 relative to the frame, signed by the loaded flank
+    phase : (m,) position in the mesh cycle at zero angles
+    pieces : (m,) number of equal cubic pieces over the mesh cycle
+    stiffness : (m, n, 4) coefficients of k over each piece, N/m
+    damping : (m,) N s/m
+    line_of_action : (m,) F_bt per scalar mesh force
+    """
+
+    coordinates: Integers
+    place: Floats
+    deflection: Floats
+    force: Floats
+    cycles: Floats
+    phase: Floats
+    pieces: Integers
+    stiffness: Floats
+    damping: Floats
+    line_of_action: Floats
+
+
+class ConnectorArrays(NamedTuple):
+    """All 6x6 connectors (bearings); c connectors.
+
+    Attributes
+    ----------
+    bodies : (c, 2) first coordinate of the two bodies, -1 for ground; stiffness is in the first body's axes
+    local : (c, 2, 3) attachment in each body's axes, relative to its node, m
+    place : (c, 2, 3) node positions at zero angles, m (for ground: zero)
+    stiffness, damping : (c, 6, 6) N/m .. N m/rad, and times s
+    """
+
+    bodies: Integers
+    local: Floats
+    place: Floats
+    stiffness: Floats
+    damping: Floats
+
+
+class SpringArrays(NamedTuple):
+    """Torsional springs between two spins: (s, 2) coordinates, (s,) N m/rad and N m s/rad."""
+
+    coordinates: Integers
+    stiffness: Floats
+    damping: Floats
+
+
+class InertiaArrays(NamedTuple):
+    """Inertias, axially symmetric with the centre of mass at the node.
+
+    Attributes
+    ----------
+    body : (b,) first coordinate of each body with six coordinates
+    mass, transverse, axial : (b,) kg, kg m2, kg m2
+    spin : (s,) coordinate of each body with its spin alone
+    spin_inertia : (s,) kg m2
+    """
+
+    body: Integers
+    mass: Floats
+    transverse: Floats
+    axial: Floats
+    spin: Integers
+    spin_inertia: Floats
+
+
+def periodic_cubic(samples: Floats) -> Floats:
+    """Coefficients of a periodic C1 cubic through equally spaced samples over one cycle.
+
+    Slopes are central differences (Catmull-Rom), so that a sample acts on its neighbourhood only.
+
+    Parameters
+    ----------
+    samples : (n,) array
+        Values at pmc = 0, 1/n, ...; one sample means a constant.
+
+    Returns
+    -------
+    (n, 4) array
+        Coefficients c of sum_j c_j t^j on each piece, t from 0 to 1.
+
+    Examples
+    --------
+    >>> periodic_cubic(np.array([1.0, 2.0, 1.0, 0.0]))[0]
+    array([ 1. ,  1. ,  0.5, -0.5])
+    """
+    values = np.asarray(samples, dtype=np.float64)
+    following = np.roll(values, -1)
+    slope = 0.5 * (following - np.roll(values, 1))
+    next_slope = np.roll(slope, -1)
+    rise = following - values
+    return np.stack(
+        [values, slope, 3.0 * rise - 2.0 * slope - next_slope, slope + next_slope - 2.0 * rise], axis=1
+    )
+
+
+@compiled
+def stiffness_at(coefficients: Floats, pieces: int, pmc: float) -> tuple[float, float]:
+    """Stiffness (N/m) and its slope per cycle at any position in the mesh cycle; pieces (n, 4)."""
+    scaled = (pmc - math.floor(pmc)) * pieces
+    piece = min(int(scaled), pieces - 1)
+    t = scaled - piece
+    c = coefficients[piece]
+    value: float = c[0] + t * (c[1] + t * (c[2] + t * c[3]))
+    slope = (c[1] + t * (2.0 * c[2] + t * 3.0 * c[3])) * pieces
+    return value, slope
+
+
+@compiled
+def frame_row(
+    q: Floats, index: Integers, place: Floats, row: Floats, gradient: Floats, turning: Floats
+) -> float:
+    """Value of sum W . z with its gradient (13,) and the gradient's derivative to psi (13,) for one mesh."""
+    psi = q[index[12]] if index[12] >= 0 else 0.0
+    c, s = math.cos(psi), math.sin(psi)
+    value = 0.0
+    gradient[:] = 0.0
+    turning[:] = 0.0
+    for end in range(2):
+        o = END_SIZE * end
+        for pair in (0, 3):
+            if index[o + pair] < 0:
+                continue
+            px, py = (place[end, 0], place[end, 1]) if pair == 0 else (0.0, 0.0)
+            x, y = px + q[index[o + pair]], py + q[index[o + pair + 1]]
+            lx, ly = c * x + s * y, c * y - s * x
+            wx, wy = row[o + pair], row[o + pair + 1]
+            value += wx * (lx - px) + wy * (ly - py)
+            gradient[o + pair] = c * wx - s * wy
+            gradient[o + pair + 1] = s * wx + c * wy
+            turning[o + pair] = -gradient[o + pair + 1]
+            turning[o + pair + 1] = gradient[o + pair]
+            gradient[12] += wx * ly - wy * lx
+            turning[12] -= wx * lx + wy * ly
+        if index[o + 2] >= 0:
+            value += row[o + 2] * q[index[o + 2]]
+            gradient[o + 2] = row[o + 2]
+        spin = q[index[o + 5]] if index[o + 5] >= 0 else 0.0
+        value += row[o + 5] * (spin - psi)
+        gradient[o + 5] = row[o + 5]
+        gradient[12] -= row[o + 5]
+    return value
+
+
+@compiled
+def mesh_position(q: Floats, m: int, meshes: MeshArrays) -> float:
+    """Position in the mesh cycle of mesh m, unwrapped."""
+    spin = q[meshes.coordinates[m, 5]] if meshes.coordinates[m, 5] >= 0 else 0.0
+    psi = q[meshes.coordinates[m, 12]] if meshes.coordinates[m, 12] >= 0 else 0.0
+    position: float = meshes.phase[m] + meshes.cycles[m] * (spin - psi)
+    return position
+
+
+@compiled
+def along(index: Integers, row: Floats, v: Floats) -> float:
+    """Scalar product of a local row (13,) with the state's entries it belongs to."""
+    total = 0.0
+    for i in range(ROW_SIZE):
+        if index[i] >= 0:
+            total += row[i] * v[index[i]]
+    return total
+
+
+@compiled
+def add_mesh_forces(q: Floats, v: Floats, meshes: MeshArrays, f: Floats) -> None:
+    """Add the generalized forces of all meshes to f, shape of q."""
+    gradient, turning = np.empty(ROW_SIZE), np.empty(ROW_SIZE)
+    acting, acting_turning = np.empty(ROW_SIZE), np.empty(ROW_SIZE)
+    for m in range(meshes.coordinates.shape[0]):
+        index, place = meshes.coordinates[m], meshes.place[m]
+        delta = frame_row(q, index, place, meshes.deflection[m], gradient, turning)
+        frame_row(q, index, place, meshes.force[m], acting, acting_turning)
+        k, _ = stiffness_at(meshes.stiffness[m], meshes.pieces[m], mesh_position(q, m, meshes))
+        force = k * delta + meshes.damping[m] * along(index, gradient, v)
+        for i in range(ROW_SIZE):
+            if index[i] >= 0:
+                f[index[i]] -= force * acting[i]
+
+
+@compiled
+def add_mesh_jacobian(q: Floats, v: Floats, meshes: MeshArrays, jq: Floats, jv: Floats) -> None:
+    """Add d f/dq and d f/dv of `add_mesh_forces` to jq and jv, each (n, n)."""
+    gradient, turning = np.empty(ROW_SIZE), np.empty(ROW_SIZE)
+    acting, acting_turning = np.empty(ROW_SIZE), np.empty(ROW_SIZE)
+    slope_row = np.empty(ROW_SIZE)
+    for m in range(meshes.coordinates.shape[0]):
+        index, place = meshes.coordinates[m], meshes.place[m]
+        delta = frame_row(q, index, place, meshes.deflection[m], gradient, turning)
+        frame_row(q, index, place, meshes.force[m], acting, acting_turning)
+        k, k_slope = stiffness_at(meshes.stiffness[m], meshes.pieces[m], mesh_position(q, m, meshes))
+        c = meshes.damping[m]
+        force = k * delta + c * along(index, gradient, v)
+        psi_rate = v[index[12]] if index[12] >= 0 else 0.0
+        for j in range(ROW_SIZE):
+            slope_row[j] = k * gradient[j] + c * turning[j] * psi_rate
+        slope_row[12] = k * gradient[12] + c * along(index, turning, v)
+        slope_row[5] += delta * k_slope * meshes.cycles[m]
+        slope_row[12] -= delta * k_slope * meshes.cycles[m]
+        for i in range(ROW_SIZE):
+            if index[i] < 0:
+                continue
+            for j in range(ROW_SIZE):
+                if index[j] < 0:
+                    continue
+                jq[index[i], index[j]] -= acting[i] * slope_row[j]
+                jv[index[i], index[j]] -= acting[i] * c * gradient[j]
+            if index[12] >= 0:
+                jq[index[i], index[12]] -= force * acting_turning[i]
+                if i != 12:
+                    jq[index[12], index[i]] -= force * acting_turning[i]
+
+
+@compiled
+def mesh_state(q: Floats, v: Floats, meshes: MeshArrays, out: Floats) -> None:
+    """Fill (m, 6): deflection (m), its rate (m/s), pmc in [0, 1), k (N/m), F_bt (N), dk/dt (N/m/s).
+
+    The last column times half the squared deflection is the power that k(pmc) puts into the mesh.
+    """
+    gradient, turning = np.empty(ROW_SIZE), np.empty(ROW_SIZE)
+    for m in range(meshes.coordinates.shape[0]):
+        index = meshes.coordinates[m]
+        delta = frame_row(q, index, meshes.place[m], meshes.deflection[m], gradient, turning)
+        rate = along(index, gradient, v)
+        pmc = mesh_position(q, m, meshes)
+        k, k_slope = stiffness_at(meshes.stiffness[m], meshes.pieces[m], pmc)
+        spin_rate = v[index[5]] if index[5] >= 0 else 0.0
+        psi_rate = v[index[12]] if index[12] >= 0 else 0.0
+        out[m, 0], out[m, 1] = delta, rate
+        out[m, 2], out[m, 3] = pmc - math.floor(pmc), k
+        out[m, 4] = (k * delta + meshes.damping[m] * rate) * meshes.line_of_action[m]
+        out[m, 5] = k_slope * meshes.cycles[m] * (spin_rate - psi_rate)
+
+
+@compiled
+def rotation(a: float, b: float, spin: float, out: Floats) -> None:
+    """Rotation matrix Rx(a) Ry(b) Rz(spin), (3, 3)."""
+    ca, sa, cb, sb = math.cos(a), math.sin(a), math.cos(b), math.sin(b)
+    cg, sg = math.cos(spin), math.sin(spin)
+    out[0, 0], out[0, 1], out[0, 2] = cb * cg, -cb * sg, sb
+    out[1, 0], out[1, 1], out[1, 2] = ca * sg + sa * sb * cg, ca * cg - sa * sb * sg, -sa * cb
+    out[2, 0], out[2, 1], out[2, 2] = sa * sg - ca * sb * cg, sa * cg + ca * sb * sg, ca * cb
+
+
+@compiled
+def body_point(
+    q: Floats, v: Floats, start: int, node: Floats, local: Floats, turn: Floats, out: Floats
+) -> None:
+    """Move a body-fixed point: turn (3, 3); out (4, 3) = arm, position, velocity, angular velocity."""
+    if start < 0:
+        turn[:] = 0.0
+        out[:] = 0.0
+        for i in range(3):
+            turn[i, i] = 1.0
+            out[0, i] = local[i]
+            out[1, i] = node[i] + local[i]
+        return
+    a, b = q[start + 3], q[start + 4]
+    rotation(a, b, q[start + 5], turn)
+    da, db, dg = v[start + 3], v[start + 4], v[start + 5]
+    ca, sa, cb, sb = math.cos(a), math.sin(a), math.cos(b), math.sin(b)
+    wx, wy, wz = da + sb * dg, ca * db - sa * cb * dg, sa * db + ca * cb * dg
+    for i in range(3):
+        out[0, i] = turn[i, 0] * local[0] + turn[i, 1] * local[1] + turn[i, 2] * local[2]
+        out[1, i] = node[i] + q[start + i] + out[0, i]
+    r = out[0]
+    out[2, 0] = v[start] + wy * r[2] - wz * r[1]
+    out[2, 1] = v[start + 1] + wz * r[0] - wx * r[2]
+    out[2, 2] = v[start + 2] + wx * r[1] - wy * r[0]
+    out[3, 0], out[3, 1], out[3, 2] = wx, wy, wz
+
+
+@compiled
+def connector_load(
+    q: Floats, v: Floats, n: int, connectors: ConnectorArrays, arms: Floats, out: Floats
+) -> None:
+    """Fill force and moment (6,) that connector n takes from its second body, global axes; and arms (2, 3).
+
+    The law of Exudyn's RigidBodySpringDamper: displacement and rate of the second attachment in the first
+    body's axes; the rate is not corrected for the turning of those axes.
+    """
+    turn0, turn1 = np.empty((3, 3)), np.empty((3, 3))
+    point0, point1 = np.empty((4, 3)), np.empty((4, 3))
+    index, place, local = connectors.bodies[n], connectors.place[n], connectors.local[n]
+    body_point(q, v, index[0], place[0], local[0], turn0, point0)
+    body_point(q, v, index[1], place[1], local[1], turn1, point1)
+    displacement, rate = np.zeros(6), np.zeros(6)
+    relative = np.zeros((3, 3))
+    for i in range(3):
+        for j in range(3):
+            displacement[i] += turn0[j, i] * (point1[1, j] - point0[1, j])
+            rate[i] += turn0[j, i] * (point1[2, j] - point0[2, j])
+            rate[3 + i] += turn0[j, i] * (point1[3, j] - point0[3, j])
+            for k in range(3):
+                relative[i, j] += turn0[k, i] * turn1[k, j]
+    displacement[3] = math.atan2(-relative[1, 2], relative[2, 2])
+    displacement[4] = math.asin(min(1.0, max(-1.0, relative[0, 2])))
+    displacement[5] = math.atan2(-relative[0, 1], relative[0, 0])
+    own = connectors.stiffness[n] @ displacement + connectors.damping[n] @ rate
+    for i in range(3):
+        arms[0, i], arms[1, i] = point0[0, i], point1[0, i]
+        out[i] = turn0[i, 0] * own[0] + turn0[i, 1] * own[1] + turn0[i, 2] * own[2]
+        out[3 + i] = turn0[i, 0] * own[3] + turn0[i, 1] * own[4] + turn0[i, 2] * own[5]
+
+
+@compiled
+def add_wrench(q: Floats, start: int, sign: float, load: Floats, arm: Floats, f: Floats) -> None:
+    """Add a global force and moment (6,) acting at `arm` from the node to the Rxyz coordinates of a body."""
+    if start < 0:
+        return
+    a, b = q[start + 3], q[start + 4]
+    ca, sa, cb, sb = math.cos(a), math.sin(a), math.cos(b), math.sin(b)
+    mx = sign * (load[3] + arm[1] * load[2] - arm[2] * load[1])
+    my = sign * (load[4] + arm[2] * load[0] - arm[0] * load[2])
+    mz = sign * (load[5] + arm[0] * load[1] - arm[1] * load[0])
+    for i in range(3):
+        f[start + i] += sign * load[i]
+    f[start + 3] += mx
+    f[start + 4] += ca * my + sa * mz
+    f[start + 5] += sb * mx - sa * cb * my + ca * cb * mz
+
+
+@compiled
+def add_connector_forces(q: Floats, v: Floats, connectors: ConnectorArrays, f: Floats) -> None:
+    """Add the generalized forces of all connectors to f."""
+    load, arms = np.empty(6), np.empty((2, 3))
+    for n in range(connectors.bodies.shape[0]):
+        connector_load(q, v, n, connectors, arms, load)
+        add_wrench(q, connectors.bodies[n, 0], 1.0, load, arms[0], f)
+        add_wrench(q, connectors.bodies[n, 1], -1.0, load, arms[1], f)
+
+
+@compiled
+def add_spring_forces(q: Floats, v: Floats, springs: SpringArrays, f: Floats) -> None:
+    """Add the torques of the torsional springs to f."""
+    for n in range(springs.coordinates.shape[0]):
+        i, j = springs.coordinates[n]
+        torque = springs.stiffness[n] * (q[j] - q[i]) + springs.damping[n] * (v[j] - v[i])
+        f[i] += torque
+        f[j] -= torque
+
+
+@compiled
+def accelerations(q: Floats, v: Floats, inertia: InertiaArrays, f: Floats, out: Floats) -> None:
+    """Solve the equations of motion of the bodies for the accelerations under generalized forces f.
+
+    For an axially symmetric body in Rxyz coordinates with p = J_a (spin' + a' sin b):
+
+        J_t cos^2 b a'' = Q_a - Q_spin sin b - p b' cos b + 2 J_t a' b' sin b cos b
+        J_t b'' = Q_b - J_t a'^2 sin b cos b + p a' cos b,   spin'' = Q_spin / J_a - a'' sin b - a' b' cos b
+    """
+    for n in range(inertia.body.size):
+        o, jt, ja = inertia.body[n], inertia.transverse[n], inertia.axial[n]
+        for i in range(3):
+            out[o + i] = f[o + i] / inertia.mass[n]
+        sb, cb = math.sin(q[o + 4]), math.cos(q[o + 4])
+        da, db = v[o + 3], v[o + 4]
+        p = ja * (v[o + 5] + da * sb)
+        out[o + 3] = (f[o + 3] - f[o + 5] * sb - p * db * cb + 2.0 * jt * da * db * sb * cb) / (jt * cb * cb)
+        out[o + 4] = (f[o + 4] - jt * da * da * sb * cb + p * da * cb) / jt
+        out[o + 5] = f[o + 5] / ja - out[o + 3] * sb - da * db * cb
+    for n in range(inertia.spin.size):
+        out[inertia.spin[n]] = f[inertia.spin[n]] / inertia.spin_inertia[n]
+
+
+@compiled
+def kinetic_energies(q: Floats, v: Floats, inertia: InertiaArrays, out: Floats) -> None:
+    """Fill the kinetic energy (J) of each body, six-coordinate bodies first."""
+    for n in range(inertia.body.size):
+        o = inertia.body[n]
+        square = v[o] ** 2 + v[o + 1] ** 2 + v[o + 2] ** 2
+        sb, cb = math.sin(q[o + 4]), math.cos(q[o + 4])
+        tilting = (v[o + 3] * cb) ** 2 + v[o + 4] ** 2
+        spin = v[o + 5] + v[o + 3] * sb
+        out[n] = 0.5 * (
+            inertia.mass[n] * square + inertia.transverse[n] * tilting + inertia.axial[n] * spin**2
+        )
+    for n in range(inertia.spin.size):
+        out[inertia.body.size + n] = 0.5 * inertia.spin_inertia[n] * v[inertia.spin[n]] ** 2

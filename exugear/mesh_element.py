@@ -1,0 +1,388 @@
+"""The mesh force element: frames, signs and phases of every mesh, and its parameters for the kernel.
+
+Frames and signs, in this one place
+-----------------------------------
+- All axes along +z, rotations positive about +z, helix angle positive for a right-hand gear.
+- u is the unit vector from gear 1's axis to the pitch point: towards gear 2's axis for an external pair,
+  away from it for an internal one. t = z x u is where gear 1's pitch point moves when gear 1 turns
+  positively.
+- s = +1 when the loaded flank of gear 1 faces +t (gear 1, driving, turns positively), else -1. It follows
+  from the sign of the transmitted torque, not of the speed.
+- The flank of gear 1 pushes gear 2 with F_bt (s t cos a + u sin a - s z tan b), a the working transverse
+  pressure angle, b the base helix angle of gear 1. Gear 1 feels the opposite: the radial part -u sin a
+  separates the gears, for external and internal pairs alike, and a right-hand gear driving in +z is pushed
+  towards +z.
+- Deflection is positive when the flanks approach. It is conjugate to F_bt, so that its spin part is
+  s (r_b1 theta_1 + r_b2 theta_2) for an external pair and s (r_b1 theta_1 - r_b2 theta_2) for an internal
+  one.
+- PMC grows with s theta_1, seen from the frame of the line of centres; PMC = 0 when the loaded flanks touch
+  in the pitch point at the middle of the common face.
+
+Laws
+----
+``line_of_action``  k(PMC) of the table on the deflection above; force and deflection share one row
+``seed``            tangential deflection at the pitch point; force T = (1, tan phi_n / cos beta, -tan beta)
+``constant``        as line_of_action with the table's mean stiffness
+``iso6336``         as line_of_action with the mean stiffness of ISO 6336-1 method B
+``rigid``           no deflection: the gears roll (rigid variant only)
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from exugear.gearbox import GROUND, Body, Gearbox, Mesh
+from exugear.kernels import MeshArrays, periodic_cubic
+
+Floats = NDArray[np.float64]
+MeshLaw = Literal["rigid", "constant", "iso6336", "seed", "line_of_action"]
+MESH_LAWS: tuple[str, ...] = get_args(MeshLaw)
+Angles = Literal["reference", "operating"]
+
+PHASE_TOLERANCE = 5e-3
+"""Allowed misfit of a closed chain of meshes, in mesh cycles: file angles and positions are rounded."""
+
+
+class MeshError(ValueError):
+    """A mesh that the element cannot represent."""
+
+
+@dataclass(frozen=True)
+class MeshElement:
+    """One mesh as the kernel sees it.
+
+    Attributes
+    ----------
+    mesh : Mesh
+    flank : +1 or -1, the loaded flank s of gear 1
+    deflection, force : (12,) rows about the two bodies' nodes (x y z, tilts, spin of gear 1, then gear 2)
+    place : (2, 2) axes of the two bodies relative to the frame's axis, m
+    cycles : mesh cycles per rad of gear 1 relative to the frame
+    phase : PMC at zero angles
+    stiffness : (n,) k over the mesh cycle, in the law's own coordinate, N/m
+    damping : N s/m, in the law's own coordinate
+    line_of_action : F_bt per scalar force of the law
+    """
+
+    mesh: Mesh
+    flank: int
+    deflection: Floats
+    force: Floats
+    place: Floats
+    cycles: float
+    phase: float
+    stiffness: Floats
+    damping: float
+    line_of_action: float
+
+
+@dataclass(frozen=True)
+class MeshGeometry:
+    """Directions and angles of a mesh at zero angles, from the bodies' positions."""
+
+    radial: Floats
+    tangential: Floats
+    pressure_angle: float
+    pinion_radius: float
+    gear_radius: float
+
+    @classmethod
+    def of(cls, mesh: Mesh) -> MeshGeometry:
+        """Geometry at the operating centre distance of the bodies."""
+        pair = mesh.pair
+        sign = -1.0 if pair.gear.internal else 1.0
+        base_sum = pair.gear.base_radius + sign * pair.pinion.base_radius
+        angle = math.acos(base_sum / mesh.centre_distance)
+        radial = sign * np.array([math.cos(mesh.position_angle), math.sin(mesh.position_angle), 0.0])
+        return cls(
+            radial=radial,
+            tangential=np.array([-radial[1], radial[0], 0.0]),
+            pressure_angle=angle,
+            pinion_radius=pair.pinion.base_radius / math.cos(angle),
+            gear_radius=pair.gear.base_radius / math.cos(angle),
+        )
+
+    @property
+    def polar_angle(self) -> float:
+        """Polar angle of u, rad."""
+        return math.atan2(self.radial[1], self.radial[0])
+
+
+def loaded_flanks(gearbox: Gearbox, torques: Mapping[str, float] | None = None) -> dict[str, int]:
+    """Tell the loaded flank s of each mesh under the static load, or other torques at the same locks."""
+    forces = gearbox.static_mesh_forces(torques)
+    return {name: -1 if force < 0.0 else 1 for name, force in forces.items()}
+
+
+def wrench_row(direction: Floats, pitch_point: Floats, nodes: tuple[Floats, Floats]) -> Floats:
+    """Row (12,) of a force along `direction` (3,) at the pitch point: plus on gear 1, minus on gear 2."""
+    ends = [np.concatenate([direction, np.cross(pitch_point - node, direction)]) for node in nodes]
+    return np.concatenate([ends[0], -ends[1]])
+
+
+def rows_of_law(
+    mesh: Mesh, flank: int, nodes: tuple[Floats, Floats], law: str, angles: Angles = "reference"
+) -> tuple[Floats, Floats]:
+    """Deflection row and force row (12,) of a mesh law about the two bodies' nodes."""
+    geometry = MeshGeometry.of(mesh)
+    along, across, axial = geometry.tangential, geometry.radial, np.array([0.0, 0.0, 1.0])
+    first_axis = np.array([nodes[0][0], nodes[0][1], mesh.z])
+    pitch_point = first_axis + geometry.pinion_radius * across
+    if law != "seed":
+        helix = mesh.pair.pinion.base_helix_angle
+        direction = (
+            flank * math.cos(geometry.pressure_angle) * along
+            + math.sin(geometry.pressure_angle) * across
+            - flank * math.tan(helix) * axial
+        )
+        row = wrench_row(direction, pitch_point, nodes)
+        return row, row
+    pressure, helix = seed_angles(mesh, angles)
+    tangent = flank * along
+    pushing = tangent + math.tan(pressure) * across - flank * math.tan(helix) * axial
+    return wrench_row(tangent, pitch_point, nodes), wrench_row(pushing, pitch_point, nodes)
+
+
+def seed_angles(mesh: Mesh, angles: Angles) -> tuple[float, float]:
+    """Transverse pressure angle and helix angle of gear 1 that the law `seed` uses, rad."""
+    pinion = mesh.pair.pinion
+    if angles == "reference":
+        return pinion.transverse_pressure_angle, pinion.helix_angle
+    pressure = MeshGeometry.of(mesh).pressure_angle
+    return pressure, math.atan(math.tan(pinion.base_helix_angle) / math.cos(pressure))
+
+
+def law_stiffness(mesh: Mesh, law: str, line_of_action: Floats, angles: Angles) -> tuple[Floats, float]:
+    """Stiffness of a law from F_bt/STE over the cycle, and F_bt per scalar force of the law.
+
+    The seed's tangential law has k = F_tt / (STE / cos phi) with F_tt = F_bt cos phi, so k is cos^2 phi
+    times the table's; its moment F_tt r_w is that of F_bt = F_tt / cos a with the operating angle a.
+    """
+    if law in ("constant", "iso6336"):
+        return np.array([np.mean(line_of_action)]), 1.0
+    if law == "line_of_action":
+        return line_of_action, 1.0
+    pressure, _ = seed_angles(mesh, angles)
+    return math.cos(pressure) ** 2 * line_of_action, 1.0 / math.cos(MeshGeometry.of(mesh).pressure_angle)
+
+
+def mesh_elements(
+    gearbox: Gearbox,
+    stiffness: Mapping[str, ArrayLike],
+    law: str = "line_of_action",
+    inertias: str | None = None,
+    flanks: Mapping[str, int] | None = None,
+    angles: Angles = "reference",
+) -> tuple[MeshElement, ...]:
+    """Elements of all meshes.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    stiffness : mapping of pair name to (n,) array
+        F_bt / STE at pmc = 0, 1/n, ..., N/m; a single value for a constant.
+    law : str
+        One of `MESH_LAWS` but ``rigid``, which has no force.
+    inertias : str, optional
+        Inertia set: it decides where the bodies' nodes (centres of mass) are.
+    flanks : mapping, optional
+        Loaded flank of each mesh; from the static load by default.
+    angles : {"reference", "operating"}
+        Angles of the law `seed`.
+
+    Raises
+    ------
+    MeshError
+        Unknown law, or no stiffness for a pair at work.
+    """
+    if law not in MESH_LAWS or law == "rigid":
+        known = ", ".join(name for name in MESH_LAWS if name != "rigid")
+        raise MeshError(f"mesh law {law!r} has no force element; laws are {known}")
+    flanks = loaded_flanks(gearbox) if flanks is None else flanks
+    phases = mesh_phases(gearbox, flanks)
+    bodies = {body.name: body for body in gearbox.bodies(inertias)}
+    time = gearbox.case.damping.mesh_time_s
+    elements = []
+    for mesh in gearbox.meshes:
+        if mesh.pair.name not in stiffness:
+            raise MeshError(f"mesh {mesh.name}: no stiffness for pair {mesh.pair.name!r}; compute its table")
+        samples = np.atleast_1d(np.asarray(stiffness[mesh.pair.name], dtype=np.float64))
+        if not (np.all(np.isfinite(samples)) and np.all(samples > 0.0)):
+            raise MeshError(f"pair {mesh.pair.name}: mesh stiffness must be positive and finite")
+        flank = flanks[mesh.name]
+        nodes = (node_position(bodies[mesh.pinion]), node_position(bodies[mesh.gear]))
+        deflection, force = rows_of_law(mesh, flank, nodes, law, angles)
+        own, factor = law_stiffness(mesh, law, samples, angles)
+        elements.append(
+            MeshElement(
+                mesh, flank, deflection, force, _places(mesh, bodies),
+                flank * mesh.pair.pinion.teeth / (2.0 * math.pi), phases[mesh.name], own,
+                time * float(np.mean(own)), factor,
+            )
+        )  # fmt: skip
+    return tuple(elements)
+
+
+def node_position(body: Body) -> Floats:
+    """Position of a body's node, its centre of mass, at zero angles, m."""
+    return np.array([*body.axis, body.centre_of_mass_z])
+
+
+def _places(mesh: Mesh, bodies: Mapping[str, Body]) -> Floats:
+    """Axes of the two gears relative to the frame's axis (2, 2); irrelevant but finite for ground."""
+    origin: Floats = np.array(bodies[mesh.frame].axis if mesh.frame != GROUND else (0.0, 0.0))
+    places: Floats = np.array([bodies[mesh.pinion].axis, bodies[mesh.gear].axis]) - origin
+    if mesh.frame != GROUND:
+        for name, place in zip((mesh.pinion, mesh.gear), places, strict=True):
+            if bodies[name].carrier is None and math.hypot(*place) > 1e-6:
+                raise MeshError(f"mesh {mesh.name}: body {name} is not on the axis of its frame {mesh.frame}")
+    return places
+
+
+def mesh_phases(gearbox: Gearbox, flanks: Mapping[str, int]) -> dict[str, float]:
+    """Compute the PMC of each mesh at zero angles from tooth numbers, planet places and tooth thickness.
+
+    The wheels' tooth orientations follow from one another: a mesh whose loaded flanks touch fixes gear 2
+    once gear 1 is placed. A mesh between two wheels not yet placed starts at PMC = 0. Wheels on one shaft
+    that belong to
+    different stages are timed independently of each other.
+
+    Raises
+    ------
+    MeshError
+        A closed chain of meshes (sun, planets, ring) does not fit with its loaded flanks in contact.
+    """
+    orientation: dict[tuple[str, str], float] = {}
+    phases: dict[str, float] = {}
+    waiting = list(gearbox.meshes)
+    while waiting:
+        mesh = next((m for m in waiting if any(end in orientation for end in _wheels(m))), waiting[0])
+        waiting.remove(mesh)
+        phases[mesh.name] = _place_wheels(mesh, flanks[mesh.name], orientation)
+    for mesh in gearbox.meshes:
+        if mesh.phase is not None:
+            phases[mesh.name] = mesh.phase % 1.0
+    return phases
+
+
+def _wheels(mesh: Mesh) -> tuple[tuple[str, str], tuple[str, str]]:
+    return (mesh.pinion, mesh.pair.pinion.name), (mesh.gear, mesh.pair.gear.name)
+
+
+def _place_wheels(mesh: Mesh, flank: int, orientation: dict[tuple[str, str], float]) -> float:
+    """PMC of a mesh from the wheels already placed; places those that are not."""
+    first, second = _wheels(mesh)
+    found = [
+        ToothContact(mesh, flank, number).cycle(orientation[wheel])
+        for number, wheel in ((1, first), (2, second))
+        if wheel in orientation
+    ]
+    misfit = math.remainder(found[0] - found[1], 1.0) if len(found) == 2 else 0.0
+    if abs(misfit) > PHASE_TOLERANCE:
+        raise MeshError(
+            f"mesh {mesh.name}: the gears do not fit, loaded flanks miss each other by {misfit:.4f} of a "
+            "mesh cycle; check planet angles and tooth thicknesses"
+        )
+    phase = found[0] % 1.0 if found else 0.0
+    for number, wheel in ((1, first), (2, second)):
+        if wheel not in orientation:
+            orientation[wheel] = ToothContact(mesh, flank, number).orientation(phase)
+    return phase
+
+
+@dataclass(frozen=True)
+class ToothContact:
+    """How PMC and the orientation of one wheel's teeth hang together in a mesh.
+
+    The orientation is the polar angle of a tooth's middle at zero body angle, in the wheel's own middle
+    plane. With eta the tooth's half angle at the working radius, the loaded flank is at +s eta from it, on
+    an internal wheel at
+    -s eta; in the pitch point it stands at u (gear 1, internal gear 2) or opposite (external gear 2).
+    """
+
+    mesh: Mesh
+    flank: int
+    number: int
+
+    def cycle(self, orientation: float) -> float:
+        """PMC at zero angles of a wheel so oriented."""
+        return (orientation + self._flank_offset - self._pitch_point) / self._pitch
+
+    def orientation(self, cycle: float) -> float:
+        """Orientation of the wheel at a given PMC."""
+        return cycle * self._pitch - self._flank_offset + self._pitch_point
+
+    @property
+    def _wheel_is_internal(self) -> bool:
+        return self.number == 2 and self.mesh.pair.gear.internal
+
+    @property
+    def _pitch(self) -> float:
+        """Angle by which the wheel turns per mesh cycle; an external gear 2 turns against gear 1."""
+        pair = self.mesh.pair
+        if self.number == 1:
+            return self.flank * pair.pinion.angular_pitch
+        return (self.flank if pair.gear.internal else -self.flank) * pair.gear.angular_pitch
+
+    @property
+    def _flank_offset(self) -> float:
+        """Angle from the orientation to the loaded flank at the working radius, in the plane of the mesh."""
+        pair = self.mesh.pair
+        gear, radius = (
+            (pair.pinion, pair.pinion_working_radius)
+            if self.number == 1
+            else (pair.gear, pair.gear_working_radius)
+        )
+        side = -self.flank if self._wheel_is_internal else self.flank
+        twist = self.mesh.offsets[self.number - 1] * math.tan(gear.helix_angle) / gear.reference_radius
+        return side * float(gear.half_angle(radius)) + twist
+
+    @property
+    def _pitch_point(self) -> float:
+        """Polar angle of the pitch point about the wheel's axis."""
+        angle = MeshGeometry.of(self.mesh).polar_angle
+        return angle + math.pi if self.number == 2 and not self._wheel_is_internal else angle
+
+
+def pack(
+    elements: tuple[MeshElement, ...], coordinates: Mapping[str, tuple[int, ...]], averaged: bool = False
+) -> MeshArrays:
+    """Arrays for the kernel.
+
+    Parameters
+    ----------
+    elements : tuple of MeshElement
+    coordinates : mapping of body name to its six state indices (-1 where there is none)
+    averaged : bool
+        Replace k(PMC) by its mean over the cycle, as eigenmodes need it.
+    """
+    count = len(elements)
+    samples = [np.array([np.mean(e.stiffness)]) if averaged else e.stiffness for e in elements]
+    width = max((len(values) for values in samples), default=1)
+    stiffness = np.zeros((count, width, 4))
+    for block, values in zip(stiffness, samples, strict=True):
+        block[: len(values)] = periodic_cubic(values)
+    index = np.full((count, 13), -1, dtype=np.int64)
+    for row, element in zip(index, elements, strict=True):
+        mesh = element.mesh
+        row[:6] = coordinates.get(mesh.pinion, (-1,) * 6)
+        row[6:12] = coordinates.get(mesh.gear, (-1,) * 6)
+        row[12] = coordinates.get(mesh.frame, (-1,) * 6)[5]
+    return MeshArrays(
+        coordinates=index,
+        place=np.array([e.place for e in elements]).reshape(count, 2, 2),
+        deflection=np.array([e.deflection for e in elements]).reshape(count, 12),
+        force=np.array([e.force for e in elements]).reshape(count, 12),
+        cycles=np.array([e.cycles for e in elements]),
+        phase=np.array([e.phase for e in elements]),
+        pieces=np.array([len(values) for values in samples], dtype=np.int64),
+        stiffness=stiffness,
+        damping=np.array([e.damping for e in elements]),
+        line_of_action=np.array([e.line_of_action for e in elements]),
+    )

@@ -1,0 +1,26 @@
+"""Shared inputs: the GRC case and mesh stiffnesses of known shape that stand for FE tables."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from exugear.gearbox import Gearbox
+
+CASE = Path(__file__).parents[2] / "cases" / "grc750" / "gearbox.toml"
+
+
+@pytest.fixture(scope="session")
+def grc() -> Gearbox:
+    return Gearbox.from_toml(CASE)
+
+
+@pytest.fixture(scope="session")
+def stiffness() -> dict[str, np.ndarray]:
+    """Means by ISO 6336-1 as listed in the case data, N/m, with harmonics as strong as tables have them."""
+    cycle = 2.0 * np.pi * np.arange(50) / 50
+    mean = {"sun_planet": 3.77e9, "ring_planet": 4.85e9, "intermediate": 3.07e9, "high_speed": 1.93e9}
+    shape = 1.0 + 0.05 * np.cos(cycle + 0.3) + 0.02 * np.cos(2 * cycle + 1.1) + 0.01 * np.cos(3 * cycle)
+    return {name: value * shape for name, value in mean.items()}
