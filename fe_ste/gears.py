@@ -379,15 +379,19 @@ class GearPair:
         base = self.reference_centre_distance * math.cos(self.pinion.transverse_pressure_angle)
         return math.acos(base / self.centre_distance)
 
+    def working_radius(self, gear: Gear) -> float:
+        """Radius of the working circle of either gear of the pair, m."""
+        return self.centre_distance * gear.teeth / abs(self._signed_teeth_sum)
+
     @property
     def pinion_working_radius(self) -> float:
         """Radius of the pinion's working circle, m."""
-        return self.centre_distance * self.pinion.teeth / abs(self._signed_teeth_sum)
+        return self.working_radius(self.pinion)
 
     @property
     def gear_working_radius(self) -> float:
         """Radius of the gear's working circle, m."""
-        return self.centre_distance * self.gear.teeth / abs(self._signed_teeth_sum)
+        return self.working_radius(self.gear)
 
     @property
     def working_helix_angle(self) -> float:

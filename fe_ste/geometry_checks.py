@@ -9,6 +9,9 @@ import math
 import numbers
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from fe_ste.fillet import root_fillet
 from fe_ste.involute import involute
 
 if TYPE_CHECKING:
@@ -28,6 +31,9 @@ LARGEST_HELIX_ANGLE = math.radians(50.0)
 
 LENGTH_TOLERANCE = 1e-9
 """Rounding allowed for when lengths are compared, in normal modules."""
+
+FILLET_TOLERANCE = 1e-5
+"""Error of the fillet as a polygon when a tip corner is led past it, in normal modules."""
 
 
 class GeometryError(ValueError):
@@ -79,6 +85,7 @@ def check_gear_pair(pair: GearPair) -> None:
     _check_tip_clearances(pair)
     _check_tip_interference(pair)
     _check_contact(pair)
+    _check_fillet_clearance(pair)
     if pair.gear.internal:
         _check_tips_pass(pair)
 
@@ -318,6 +325,56 @@ def _check_contact(pair: GearPair) -> None:
     if ratio < 1.0:
         remedy = f"must be at least 1: no contact at centre_distance = {_mm(pair.centre_distance)}"
         raise _refuse_pair(pair, "transverse contact ratio", f"{ratio:.4f}", remedy)
+
+
+def _check_fillet_clearance(pair: GearPair) -> None:
+    """Refuse a tip whose corner, outside the path of contact, cuts into the root fillet of its mate."""
+    for tip, mate in ((pair.pinion, pair.gear), (pair.gear, pair.pinion)):
+        gap = corner_to_fillet_gap(pair, tip, mate)
+        if gap < -FILLET_TOLERANCE * tip.normal_module:
+            word = "larger" if tip.internal else "smaller"
+            remedy = (
+                f"interferes with the root fillet of '{mate.name}', its corner cuts {_mm(-gap)} into it: "
+                f"a {word} one, or a smaller rack.tip_radius of '{mate.name}', is needed"
+            )
+            raise _refuse_pair(pair, f"tip_diameter of '{tip.name}'", _mm(2.0 * tip.tip_radius), remedy)
+
+
+def corner_to_fillet_gap(pair: GearPair, tip: Gear, mate: Gear) -> float:
+    """Least gap between the way of a tip corner and the mate's root fillet.
+
+    The corner leaves the line of action at the end of the path of contact and goes deeper than there. The
+    flanks are taken in contact, as on the path of contact.
+
+    Parameters
+    ----------
+    pair : GearPair
+        The pair.
+    tip, mate : Gear
+        The gear whose tip corner moves and the gear whose fillet it passes.
+
+    Returns
+    -------
+    float
+        Arc about the mate's axis, m; negative if the corner cuts into the fillet, infinite if it does not get
+        below the form circle.
+    """
+    distance, radius = pair.centre_distance, tip.tip_radius
+    # Origin on the tip's axis, x along the line of centres to the pitch point; x as the mate sees it is
+    # to_mate * distance + turn * x.
+    to_mate, turn = (-1.0 if tip.internal else 1.0), -float(pair.gear.outward)
+    cosine = to_mate * turn * (mate.form_radius**2 - distance**2 - radius**2) / (2.0 * distance * radius)
+    if cosine >= 1.0:
+        return math.inf
+    corner = np.linspace(-1.0, 1.0, 1001) * math.acos(max(cosine, -1.0))
+    x, y = to_mate * distance + turn * radius * np.cos(corner), radius * np.sin(corner)
+    seen_radius, seen_angle = np.hypot(x, y), np.arctan2(y, x)
+    # The flanks touch at the pitch point at rotation zero.
+    rotation = corner - tip.half_angle(radius) + tip.half_angle(pair.working_radius(tip))
+    mate_tooth = mate.half_angle(pair.working_radius(mate)) + rotation * tip.teeth / mate.teeth
+    fillet = root_fillet(mate, np.linspace(0.0, 1.0, 2001))[:: -mate.outward]
+    half_angle = np.interp(seen_radius, np.hypot(*fillet.T), np.arctan2(fillet[:, 1], fillet[:, 0]))
+    return float(np.min(seen_radius * (mate_tooth - half_angle - seen_angle)))
 
 
 def _check_tips_pass(pair: GearPair) -> None:

@@ -110,7 +110,7 @@ class FlankModification:
         gear : Gear
             The modified gear.
         radius, z : array
-            Radius and axial position of the points, m, the middle of this gear's face width at zero; broadcast
+            Radius and axial position of the points, m, the middle of the face width at zero; broadcast
             against each other.
 
         Returns
