@@ -84,6 +84,12 @@ def any_grc_gear(request: pytest.FixtureRequest) -> Gear:
     return grc_gear(str(request.param))
 
 
+@pytest.fixture(params=tuple(name for name, row in GRC_ROWS.items() if not row.internal))
+def any_external_grc_gear(request: pytest.FixtureRequest) -> Gear:
+    """Each of the six external gears in turn."""
+    return grc_gear(str(request.param))
+
+
 @pytest.fixture(params=tuple(GRC_PAIRS))
 def any_grc_pair(request: pytest.FixtureRequest) -> GearPair:
     """Each of the four pairs in turn."""
