@@ -32,11 +32,13 @@ from exugear.kernels import (
     add_mesh_forces,
     add_mesh_jacobian,
     add_spring_forces,
+    connector_load,
+    mesh_state,
 )
 from exugear.mesh_element import Angles, MeshElement, mesh_elements, node_position, pack
 
 Floats = NDArray[np.float64]
-Variant = Literal["rigid", "bushing"]
+Variant = Literal["rigid", "bushing", "jointed"]
 VARIANTS: tuple[str, ...] = get_args(Variant)
 
 
@@ -172,6 +174,19 @@ class Assembly:
         o = self.coordinates[body.name][0]
         return body.axis[0] - carrier.axis[0] + float(q[o]), body.axis[1] - carrier.axis[1] + float(q[o + 1])
 
+    def bearing_loads(self, q: Floats, v: Floats) -> Floats:
+        """Force and moment that each bearing takes from its body, (bearings, 6), global axes, N and N m."""
+        loads, arms = np.zeros((len(self.connector_names), 6)), np.zeros((2, 3))
+        for n, load in enumerate(loads):
+            connector_load(q, v, n, self.connectors, arms, load)
+        return loads
+
+    def mesh_states(self, q: Floats, v: Floats) -> Floats:
+        """State of each mesh, (meshes, 6): see `exugear.kernels.mesh_state`."""
+        out = np.zeros((len(self.elements), 6))
+        mesh_state(q, v, self.meshes, out)
+        return out
+
     def inertia_forces(self, q: Floats, v: Floats, a: Floats) -> Floats:
         """Generalized forces that the accelerations a need, shape (size,): the inverse of `accelerations`."""
         f = np.zeros(self.size)
@@ -226,8 +241,8 @@ def assemble(
         size=6 * len(six) + len(alone),
         elements=elements,
         meshes=pack(elements, coordinates),
-        connector_names=tuple(bearing.name for bearing in gearbox.bearings) if six else (),
-        connectors=_connectors(gearbox, bodies, coordinates) if six else no_connectors(),
+        connector_names=tuple(b.name for b in gearbox.bearings) if variant == "bushing" else (),
+        connectors=_connectors(gearbox, bodies, coordinates) if variant == "bushing" else no_connectors(),
         spring_names=tuple(coupling.name for coupling in gearbox.couplings),
         springs=_springs(gearbox, coordinates),
         inertia=_inertia(variant, six, alone),
@@ -238,8 +253,8 @@ def _check_supports(gearbox: Gearbox, variant: str, moving: list[Body]) -> None:
     """Every body of the variant `rigid` needs its joint: without one it would not turn on a fixed axis."""
     held = {joint.body for joint in gearbox.joints}
     missing = [body.name for body in moving if not body.spin_only and body.name not in held]
-    if variant == "rigid" and missing:
-        raise VariantError(f"variant rigid: no joint holds {', '.join(missing)}; add one under [joints]")
+    if variant != "bushing" and missing:
+        raise VariantError(f"variant {variant}: no joint holds {', '.join(missing)}; add one under [joints]")
     if variant == "bushing" and not gearbox.bearings:
         raise VariantError("variant bushing: the gearbox file has no [bearings]")
 

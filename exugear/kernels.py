@@ -134,7 +134,7 @@ def periodic_cubic(samples: Floats) -> Floats:
     Examples
     --------
     >>> periodic_cubic(np.array([1.0, 2.0, 1.0, 0.0]))[0]
-    array([ 1. ,  1. ,  0.5, -0.5])
+    array([ 1.,  1.,  1., -1.])
     """
     values = np.asarray(samples, dtype=np.float64)
     following = np.roll(values, -1)

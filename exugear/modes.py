@@ -1,0 +1,345 @@
+"""Eigenmodes of a gearbox variant: frequencies, damping, where the energy sits, and what moves in words.
+
+Linearised about the static equilibrium under the file's static load, PMC frozen and mesh stiffness averaged
+over the cycle. The tangent of the law at that load is used: k'(PMC) times the deflection would give the free
+rotation a false stiffness.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from exugear.assembly import Assembly, assemble
+from exugear.gearbox import Gearbox
+from exugear.kernels import (
+    ConnectorArrays,
+    MeshArrays,
+    SpringArrays,
+    add_connector_forces,
+    add_mesh_jacobian,
+    add_spring_forces,
+)
+from exugear.mesh_element import Angles
+from exugear.statics import locked_equilibrium
+
+Floats = NDArray[np.float64]
+DIFFERENCE_STEP = 1e-6
+RIGID_BODY_LIMIT = 0.1
+"""Modes below this frequency (Hz) are motions of the whole train without deflection."""
+FREE_ROTATION = "free rotation of the train"
+MOTIONS = ("spin", "radial", "axial", "tilt")
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """Mass, and stiffness and damping by element, about a state; each matrix (size, size).
+
+    Attributes
+    ----------
+    mass : (size, size)
+    stiffness, damping : element name -> matrix; elements are meshes, bearings, couplings
+    """
+
+    mass: Floats
+    stiffness: Mapping[str, Floats]
+    damping: Mapping[str, Floats]
+
+    @property
+    def total_stiffness(self) -> Floats:
+        """Sum over all elements."""
+        total: Floats = np.sum(list(self.stiffness.values()), axis=0)
+        return total
+
+    @property
+    def total_damping(self) -> Floats:
+        """Sum over all elements."""
+        total: Floats = np.sum(list(self.damping.values()), axis=0)
+        return total
+
+
+def linearise(assembly: Assembly, q: Floats) -> Linearised:
+    """Matrices about the coordinates q at rest, mesh stiffness averaged over the cycle."""
+    stiffness: dict[str, Floats] = {}
+    damping: dict[str, Floats] = {}
+    rest = np.zeros(assembly.size)
+    averaged = assembly.mean_meshes
+    for n, name in enumerate(assembly.mesh_names):
+        one = MeshArrays._make(values[n : n + 1] for values in averaged)
+        jq, jv = np.zeros((assembly.size,) * 2), np.zeros((assembly.size,) * 2)
+        add_mesh_jacobian(q, rest, one, jq, jv)
+        stiffness[name], damping[name] = -jq, -jv
+    for n, name in enumerate(assembly.connector_names):
+        connector = ConnectorArrays._make(values[n : n + 1] for values in assembly.connectors)
+        stiffness[name], damping[name] = _tangents(assembly.size, q, connector, add_connector_forces)
+    for n, name in enumerate(assembly.spring_names):
+        spring = SpringArrays._make(values[n : n + 1] for values in assembly.springs)
+        stiffness[name], damping[name] = _tangents(assembly.size, q, spring, add_spring_forces)
+    return Linearised(assembly.mass_matrix, stiffness, damping)
+
+
+def _tangents(
+    size: int, q: Floats, element: Any, add: Callable[[Floats, Floats, Any, Floats], None]
+) -> tuple[Floats, Floats]:
+    """Stiffness and damping matrices of one element by central differences of its force."""
+
+    def force(dq: Floats, v: Floats) -> Floats:
+        f = np.zeros(size)
+        add(q + dq, v, element, f)
+        return f
+
+    none = np.zeros(size)
+    steps = DIFFERENCE_STEP * np.eye(size)
+    k = np.array([force(-e, none) - force(e, none) for e in steps]).T / (2.0 * DIFFERENCE_STEP)
+    d = np.array([force(none, -e) - force(none, e) for e in steps]).T / (2.0 * DIFFERENCE_STEP)
+    return k, d
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Eigenmodes in order of frequency; n modes.
+
+    Attributes
+    ----------
+    assembly : what was linearised
+    frequency : (n,) undamped, Hz
+    damping_ratio : (n,) share of critical damping, from the damping matrix in the mode
+    shapes : (size, n) real, unit modal mass
+    strain : (n, elements) share of strain energy by mesh, bearing and coupling
+    kinetic : (n, bodies, 4) share of kinetic energy by body and motion (spin, radial, axial, tilt)
+    overall : (n,) overall DTE of the mode at unit modal mass, m / sqrt(kg)
+    amplification : (n, meshes) overall DTE at resonance per amplitude of STE in one mesh, m/m
+    names : what moves, in words
+    """
+
+    assembly: Assembly
+    frequency: Floats
+    damping_ratio: Floats
+    shapes: Floats
+    element_names: tuple[str, ...]
+    strain: Floats
+    kinetic: Floats
+    overall: Floats
+    amplification: Floats
+    names: tuple[str, ...]
+
+    def nearest(self, frequency: float) -> int:
+        """Find the number of the mode nearest to a frequency (Hz)."""
+        return int(np.argmin(np.abs(self.frequency - frequency)))
+
+    def to_dataset(self) -> xr.Dataset:
+        """Labelled arrays with units, what `save` writes."""
+        assembly = self.assembly
+        coordinate_names = coordinate_labels(assembly)
+        variables: dict[str, tuple[tuple[str, ...], Any, dict[str, str]]] = {
+            "frequency": (("mode",), self.frequency, {"units": "Hz"}),
+            "damping_ratio": (("mode",), self.damping_ratio, {"units": "1"}),
+            "shape": (("coordinate", "mode"), self.shapes, {"units": "1/sqrt(kg) or 1/(m sqrt(kg))"}),
+            "strain_energy_share": (("mode", "element"), self.strain, {"units": "1"}),
+            "kinetic_energy_share": (("mode", "body", "motion"), self.kinetic, {"units": "1"}),
+            "overall_dte": (("mode",), self.overall, {"units": "m/sqrt(kg)"}),
+            "amplification": (("mode", "mesh"), self.amplification, {"units": "m/m"}),
+            "name": (("mode",), np.array(self.names, dtype=object), {}),
+        }
+        coordinates: dict[str, Any] = {
+            "mode": np.arange(1, len(self.names) + 1),
+            "coordinate": np.array(coordinate_names, dtype=object),
+            "element": np.array(self.element_names, dtype=object),
+            "body": np.array([body.name for body in assembly.bodies], dtype=object),
+            "motion": np.array(MOTIONS, dtype=object),
+            "mesh": np.array(assembly.mesh_names, dtype=object),
+        }
+        attributes = {
+            "gearbox": assembly.gearbox.name,
+            "variant": assembly.variant,
+            "mesh_law": assembly.law,
+            "inertias": assembly.inertias,
+            "housing_factor": assembly.gearbox.case.housing.factor,
+        }
+        return xr.Dataset(variables, coordinates, attributes)
+
+    def save(self, path: str | Path) -> Path:
+        """Write to netCDF (atomically) and return the path."""
+        path = Path(path)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial = path.with_suffix(".partial.nc")
+        self.to_dataset().to_netcdf(partial, engine="h5netcdf")
+        return partial.replace(path)
+
+
+def coordinate_labels(assembly: Assembly) -> list[str]:
+    """Name of each coordinate, such as `hss.spin`."""
+    labels = [""] * assembly.size
+    for body in assembly.bodies:
+        for motion, index in zip(
+            ("x", "y", "z", "tilt_x", "tilt_y", "spin"), assembly.coordinates[body.name], strict=True
+        ):
+            if index >= 0:
+                labels[index] = f"{body.name}.{motion}"
+    return labels
+
+
+def eigenmodes(
+    gearbox: Gearbox,
+    variant: str,
+    stiffness: Mapping[str, ArrayLike],
+    mesh_law: str = "line_of_action",
+    inertias: str | None = None,
+    angles: Angles = "reference",
+) -> Modes:
+    """Eigenmodes of a gearbox variant at its static load.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    variant : {"rigid", "bushing"}
+    stiffness : mapping of pair name to (n,) array
+        Mesh stiffness F_bt / STE over the cycle, N/m, for example from the STE tables.
+    mesh_law : str
+        See `exugear.mesh_element`.
+    inertias : str, optional
+        Inertia set; the file's default otherwise.
+    angles : {"reference", "operating"}
+        Angles of the law `seed`.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> stiffness = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
+    >>> modes = eigenmodes(gearbox, "rigid", stiffness)
+    >>> len(modes.frequency), modes.names[0]
+    (8, 'free rotation of the train')
+    """
+    assembly = assemble(gearbox, variant, stiffness, mesh_law, inertias, angles=angles)
+    return modes_of(assembly)
+
+
+def modes_of(assembly: Assembly, preload: bool = True) -> Modes:
+    """Eigenmodes of an assembly, at its static load or (preload False) unloaded."""
+    load = assembly.gearbox.case.static_load
+    q = np.zeros(assembly.size)
+    if preload:
+        q = locked_equilibrium(assembly, load.torques_N_m, load.locked, assembly.mean_meshes)
+    linear = linearise(assembly, q)
+    frequency, shapes = undamped_modes(linear.mass, linear.total_stiffness)
+    masses = np.einsum("im,ij,jm->m", shapes, linear.mass, shapes)
+    shapes = shapes / np.sqrt(masses)
+    omega = 2.0 * np.pi * frequency
+    modal_damping = np.einsum("im,ij,jm->m", shapes, linear.total_damping, shapes)
+    elastic = frequency > RIGID_BODY_LIMIT
+    ratio = np.divide(modal_damping, 2.0 * omega, out=np.zeros_like(omega), where=elastic)
+    strain = np.array([np.einsum("im,ij,jm->m", shapes, k, shapes) for k in linear.stiffness.values()]).T
+    strain = np.where(elastic[:, None], strain / np.maximum(strain.sum(axis=1, keepdims=True), 1e-300), 0.0)
+    kinetic = _kinetic_shares(assembly, shapes)
+    overall = overall_row(assembly) @ shapes
+    element_names = tuple(linear.stiffness)
+    return Modes(
+        assembly=assembly,
+        frequency=np.where(elastic, frequency, 0.0),
+        damping_ratio=ratio,
+        shapes=shapes,
+        element_names=element_names,
+        strain=strain,
+        kinetic=kinetic,
+        overall=np.abs(overall),
+        amplification=_amplification(assembly, linear, shapes, overall, omega, ratio, elastic),
+        names=tuple(
+            mode_name(assembly, element_names, kinetic[m], strain[m])
+            if elastic[m]
+            else "free rotation of the train"
+            for m in range(frequency.size)
+        ),
+    )
+
+
+def undamped_modes(mass: Floats, stiffness: Floats) -> tuple[Floats, Floats]:
+    """Solve M x'' + K x = 0 for frequencies (Hz, ascending) and real shapes; M diagonal, K any.
+
+    A preloaded connector or the law `seed` makes K unsymmetric. Equal frequencies may then come out as a
+    complex pair that differs from real by round-off; its real and imaginary parts span the same plane.
+    """
+    root = np.sqrt(np.diag(mass))
+    values, vectors = scipy.linalg.eig(stiffness / np.outer(root, root))
+    shapes = np.where(values.imag < 0.0, vectors.imag, vectors.real)
+    order = np.argsort(values.real)
+    frequency = np.sqrt(np.maximum(values.real[order], 0.0)) / (2.0 * np.pi)
+    return frequency, shapes[:, order] / root[:, None]
+
+
+def overall_row(assembly: Assembly) -> Floats:
+    """Build the row (size,) of the overall DTE as a length: (output - ratio input) times base radius, m."""
+    overall = assembly.gearbox.case.overall
+    radius = assembly.gearbox.gears[overall.output_gear].base_radius
+    row = np.zeros(assembly.size)
+    row[assembly.spin[overall.output]] += radius
+    row[assembly.spin[overall.input]] -= radius * assembly.gearbox.ratio
+    return row
+
+
+def _kinetic_shares(assembly: Assembly, shapes: Floats) -> Floats:
+    """Share of kinetic energy (n, bodies, 4)."""
+    energy = np.diag(assembly.mass_matrix)[:, None] * shapes**2
+    shares = np.zeros((shapes.shape[1], len(assembly.bodies), len(MOTIONS)))
+    for n, body in enumerate(assembly.bodies):
+        index = assembly.coordinates[body.name]
+        for motion, members in enumerate(((5,), (0, 1), (2,), (3, 4))):
+            for member in members:
+                if index[member] >= 0:
+                    shares[:, n, motion] += energy[index[member]]
+    whole: Floats = shares.sum(axis=(1, 2), keepdims=True)
+    return shares / whole
+
+
+def _amplification(
+    assembly: Assembly,
+    linear: Linearised,
+    shapes: Floats,
+    overall: Floats,
+    omega: Floats,
+    ratio: Floats,
+    elastic: NDArray[np.bool_],
+) -> Floats:
+    """Overall DTE at resonance per unit STE of each mesh: |overall| |k w phi| / (2 zeta omega^2)."""
+    found = np.zeros((omega.size, len(assembly.mesh_names)))
+    resonance = np.where(elastic, 2.0 * ratio * omega**2, np.inf)
+    resonance = np.where(resonance > 0.0, resonance, np.inf)
+    for n, (name, element) in enumerate(zip(assembly.mesh_names, assembly.elements, strict=True)):
+        mean = float(np.mean(element.stiffness))
+        strain = np.einsum("im,ij,jm->m", shapes, linear.stiffness[name], shapes)
+        closing = np.sqrt(np.maximum(strain, 0.0) / mean)
+        found[:, n] = np.abs(overall) * mean * closing / resonance
+    return found
+
+
+def mode_name(assembly: Assembly, element_names: tuple[str, ...], kinetic: Floats, strain: Floats) -> str:
+    """Describe a mode: who moves how, until 80 % of the kinetic energy is told, and what is strained most.
+
+    Parameters
+    ----------
+    kinetic : (bodies, 4) share by body and motion
+    strain : (elements,) share by mesh, bearing and coupling
+    """
+    moving: dict[str, float] = {}
+    for body, shares in zip(assembly.bodies, kinetic, strict=True):
+        for motion, share in zip(MOTIONS, shares, strict=True):
+            family = "planets" if body.carrier else body.name
+            moving[f"{family} {motion}"] = moving.get(f"{family} {motion}", 0.0) + float(share)
+    strained: dict[str, float] = {}
+    for name, share in zip(element_names, strain, strict=True):
+        family = name.rstrip("0123456789").rstrip("_")
+        strained[family] = strained.get(family, 0.0) + float(share)
+    words, told = [], 0.0
+    for what, share in sorted(moving.items(), key=lambda item: -item[1]):
+        if told >= 0.8 or share < 0.05:
+            break
+        words.append(f"{what} {100 * share:.0f} %")
+        told += share
+    most = max(strained, key=lambda name: strained[name])
+    return f"{', '.join(words)}; strained: {most} {100 * strained[most]:.0f} %"

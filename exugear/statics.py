@@ -1,0 +1,151 @@
+"""States in balance: the output locked under load, and the start of a run in uniform acceleration.
+
+Both are Newton solutions of the assembly's own forces; elastic deflections are small against the geometry, so
+that a few steps with a difference quotient of the residual reach round-off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from exugear.assembly import Assembly
+from exugear.kernels import MeshArrays
+
+Floats = NDArray[np.float64]
+STEP = 1e-7
+"""Difference step of the Newton matrices, m and rad: far above round-off, far below any radius."""
+
+
+class BalanceError(RuntimeError):
+    """No state in balance was found."""
+
+
+@dataclass(frozen=True)
+class StartState:
+    """Coordinates and velocities at the start of a run, with the spin rates (rad/s2) it starts with."""
+
+    q: Floats
+    v: Floats
+    rates: Mapping[str, float]
+    drive_torque: float
+
+
+def _newton(residual: Callable[[Floats], Floats], start: Floats, scale: Floats, what: str) -> Floats:
+    """Newton's method with central differences; `scale` is the size of each residual that counts as one."""
+    x = start.copy()
+    best = np.inf
+    for _ in range(30):
+        r = residual(x)
+        error = float(np.max(np.abs(r) / scale))
+        if not np.isfinite(error):
+            break
+        if error < 1e-12 or (error < 1e-9 and error > 0.5 * best):
+            return x
+        best = min(best, error)
+        columns = [(residual(x + STEP * e) - residual(x - STEP * e)) / (2.0 * STEP) for e in np.eye(x.size)]
+        matrix = np.array(columns).T
+        try:
+            x = x - scipy.linalg.solve(matrix / scale[:, None], r / scale)
+        except (scipy.linalg.LinAlgError, scipy.linalg.LinAlgWarning):
+            raise BalanceError(
+                f"{what}: the stiffness matrix is singular; a body may move without resistance"
+            ) from None
+    raise BalanceError(f"{what}: no balance found, the residual stays at {best:.2e} of the load")
+
+
+def locked_equilibrium(
+    assembly: Assembly,
+    torques: Mapping[str, float],
+    locked: Sequence[str],
+    meshes: MeshArrays | None = None,
+) -> Floats:
+    """Coordinates at rest under torques (N m) with some spins held at zero.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    torques : mapping of body name to torque about +z, N m
+    locked : names of the bodies whose spins are held
+    meshes : MeshArrays, optional
+        Mesh arrays to use instead of the assembly's, such as its `mean_meshes`.
+
+    Raises
+    ------
+    BalanceError
+        The structure is free to move, or Newton's method does not converge.
+    """
+    held = [assembly.spin[name] for name in locked]
+    free = np.setdiff1d(np.arange(assembly.size), held)
+    applied = assembly.torque_vector(torques)
+    rest = np.zeros(assembly.size)
+
+    def residual(x: Floats) -> Floats:
+        q = np.zeros(assembly.size)
+        q[free] = x
+        return (assembly.forces(q, rest, meshes) + applied)[free]
+
+    q = np.zeros(assembly.size)
+    scale = np.full(free.size, _load_scale(applied))
+    q[free] = _newton(residual, np.zeros(free.size), scale, "static state")
+    return q
+
+
+def _load_scale(applied: Floats) -> float:
+    """Size of the loads (N or N m, at least 1) that residuals are measured by."""
+    return max(1.0, float(np.abs(applied).max(initial=0.0)))
+
+
+def accelerating_start(
+    assembly: Assembly,
+    torques: Mapping[str, float],
+    input_speed: float = 0.0,
+    driven: tuple[str, float] | None = None,
+) -> StartState:
+    """State that rolls with a uniform acceleration, deflections in balance with loads and inertia forces.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    torques : mapping of body name to torque about +z, N m
+    input_speed : float
+        Speed of the overall input, rad/s; all other speeds follow by rolling.
+    driven : (body, spin rate), optional
+        A body whose spin rate (rad/s2) is prescribed; the torque that this takes is solved for.
+
+    Raises
+    ------
+    BalanceError
+        As `locked_equilibrium`; also when the train has several degrees of freedom.
+    """
+    gearbox = assembly.gearbox
+    reference = gearbox.case.overall.input
+    unit = gearbox.rolling_speeds(reference, 1.0)
+    speeds = {name: value * input_speed for name, value in unit.items()}
+    applied = assembly.torque_vector(torques)
+    pinned = assembly.spin[reference]
+    direction = np.zeros(assembly.size)
+    known_rate = 0.0
+    if driven is not None:
+        direction[assembly.spin[driven[0]]] = 1.0
+        known_rate = driven[1] / unit[driven[0]]
+    size = _load_scale(applied)
+
+    def split(x: Floats) -> tuple[Floats, dict[str, float], float]:
+        rate = known_rate if driven is not None else float(x[-1])
+        torque = size * float(x[-1]) if driven is not None else 0.0
+        return x[:-1], {name: value * rate for name, value in unit.items()}, torque
+
+    def residual(x: Floats) -> Floats:
+        q, rates, torque = split(x)
+        v = assembly.rolling_velocity(q, speeds)
+        needed = assembly.inertia_forces(q, v, assembly.rolling_acceleration(q, speeds, rates))
+        return np.append(assembly.forces(q, v) + applied + torque * direction - needed, size * q[pinned])
+
+    x = _newton(residual, np.zeros(assembly.size + 1), np.full(assembly.size + 1, size), "start of the run")
+    q, rates, torque = split(x)
+    return StartState(q, assembly.rolling_velocity(q, speeds), rates, torque)
