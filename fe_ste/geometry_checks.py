@@ -277,14 +277,16 @@ def _check_centre_distance(pair: GearPair) -> None:
 
 
 def _check_backlash(pair: GearPair) -> None:
-    backlash = pair.circumferential_backlash
-    if backlash < -LENGTH_TOLERANCE * pair.pinion.normal_module:
-        word, bound = ("large", "at most") if pair.gear.internal else ("small", "at least")
-        remedy = (
-            f"is too {word}: the flanks would overlap by {_mm(-backlash)}; "
-            f"{bound} {_mm(pair.backlash_free_centre_distance)} is needed"
-        )
-        raise _refuse_pair(pair, "centre_distance", _mm(pair.centre_distance), remedy)
+    backlash, limit = pair.circumferential_backlash, pair.backlash_free_centre_distance
+    if backlash >= -LENGTH_TOLERANCE * pair.pinion.normal_module:
+        return
+    if limit <= abs(pair.gear.base_radius - pair.pinion.base_radius):
+        remedy = f"leaves no room for the teeth of '{pair.pinion.name}' at any centre distance: more is needed"
+        value = f"{pair.gear.profile_shift:g}"
+        raise _refuse_pair(pair, f"profile_shift of '{pair.gear.name}'", value, remedy)
+    word, bound = ("large", "at most") if pair.gear.internal else ("small", "at least")
+    remedy = f"is too {word}: the flanks would overlap by {_mm(-backlash)}; {bound} {_mm(limit)} is needed"
+    raise _refuse_pair(pair, "centre_distance", _mm(pair.centre_distance), remedy)
 
 
 def _check_tip_clearances(pair: GearPair) -> None:
@@ -295,9 +297,7 @@ def _check_tip_clearances(pair: GearPair) -> None:
         if clearance <= 0.0:
             bound = tip.tip_radius + tip.outward * clearance
             word = "above" if tip.internal else "below"
-            remedy = (
-                f"runs {_mm(-clearance)} into the root of '{root.name}': {word} {_mm(2.0 * bound)} needed"
-            )
+            remedy = f"runs {_mm(-clearance)} into the root of '{root.name}': {word} {_mm(2.0 * bound)} needed"
             raise _refuse_pair(pair, f"tip_diameter of '{tip.name}'", _mm(2.0 * tip.tip_radius), remedy)
 
 
@@ -390,7 +390,7 @@ def _check_tips_pass(pair: GearPair) -> None:
 
 
 def internal_tip_gap(pair: GearPair) -> float:
-    """Least gap between mating tip corners of an internal pair where the tip circles cross.
+    """Gap between mating tip corners of an internal pair where the tip circles cross.
 
     The flanks are taken in contact, as on the path of contact; the back flanks have the backlash in addition.
 
@@ -408,15 +408,11 @@ def internal_tip_gap(pair: GearPair) -> float:
     at_pinion = math.acos(
         (gear.tip_radius**2 - distance**2 - pinion.tip_radius**2) / (2.0 * distance * pinion.tip_radius)
     )
-    at_gear = math.acos(
-        (gear.tip_radius**2 + distance**2 - pinion.tip_radius**2) / (2.0 * distance * gear.tip_radius)
-    )
+    at_gear = math.acos((gear.tip_radius**2 + distance**2 - pinion.tip_radius**2) / (2.0 * distance * gear.tip_radius))
     working = involute(pair.working_pressure_angle)
     pinion_corner = working - involute(math.acos(pinion.base_radius / pinion.tip_radius))
     gear_corner = working - involute(math.acos(gear.base_radius / gear.tip_radius))
     # Angles from the line of centres; with the flanks touching at the pitch point the corners stand at
-    # pinion_corner and gear_corner. Turn the pinion's corner to either crossing of the tip circles.
-    gaps = (
-        (side * at_pinion - pinion_corner) / pair.ratio + gear_corner - side * at_gear for side in (1.0, -1.0)
-    )
-    return gear.tip_radius * min(gaps)
+    # pinion_corner and gear_corner. The pinion's is turned to the crossing at which it runs out of the
+    # mesh; at the other it runs in far behind its mate.
+    return gear.tip_radius * ((at_pinion - pinion_corner) / pair.ratio + gear_corner - at_gear)

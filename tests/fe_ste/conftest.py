@@ -73,9 +73,7 @@ def grc_gear(name: str) -> Gear:
 def grc_pair(name: str) -> GearPair:
     """Pair of the GRC gearbox by its name in `GRC_PAIRS`."""
     pinion, gear, centre_distance = GRC_PAIRS[name]
-    return GearPair(
-        name=name, pinion=grc_gear(pinion), gear=grc_gear(gear), centre_distance=1e-3 * centre_distance
-    )
+    return GearPair(name=name, pinion=grc_gear(pinion), gear=grc_gear(gear), centre_distance=1e-3 * centre_distance)
 
 
 @pytest.fixture(params=tuple(GRC_ROWS))

@@ -125,9 +125,7 @@ def test_backlash_of_thinned_teeth_grows_with_the_working_circle(any_grc_pair: G
     given = any_grc_pair
     full = dataclasses.replace(
         given,
-        pinion=dataclasses.replace(
-            given.pinion, tooth_thinning=0.0, profile_shift=given.pinion.profile_shift - 1e-3
-        ),
+        pinion=dataclasses.replace(given.pinion, tooth_thinning=0.0, profile_shift=given.pinion.profile_shift - 1e-3),
         gear=dataclasses.replace(given.gear, tooth_thinning=0.0),
     )
     thin = dataclasses.replace(full, pinion=_thinned(full.pinion), gear=_thinned(full.gear))
@@ -167,9 +165,7 @@ def test_contact_ratios_and_path_follow_from_the_tips(any_grc_pair: GearPair) ->
     along = np.array([math.sin(angle), math.cos(angle)])
     other = np.array([outward * given.centre_distance, 0.0])
     assert np.linalg.norm(foot + given.path_end * along) == pytest.approx(pinion.tip_radius, rel=1e-14)
-    assert np.linalg.norm(foot + given.path_start * along - other) == pytest.approx(
-        gear.tip_radius, rel=1e-14
-    )
+    assert np.linalg.norm(foot + given.path_start * along - other) == pytest.approx(gear.tip_radius, rel=1e-14)
     pitch_point = foot + given.path_pitch_point * along
     np.testing.assert_allclose(pitch_point, [given.pinion_working_radius, 0.0], atol=1e-16)
     assert given.transverse_contact_ratio == pytest.approx(
@@ -296,9 +292,7 @@ def test_grc_dedendum_from_printed_root_diameters_as_tabulated(
     derived: tuple[GearPair, dict[str, tuple[float, ...]]],
 ) -> None:
     found, table = derived
-    for gear, root, dedendum in zip(
-        (found.pinion, found.gear), table["root"], table["dedendum"], strict=True
-    ):
+    for gear, root, dedendum in zip((found.pinion, found.gear), table["root"], table["dedendum"], strict=True):
         rack = BasicRack(dedendum=9.0, tip_radius=0.3)
         by_root = dataclasses.replace(gear, root_diameter=1e-3 * root, rack=rack)
         # Profile shifts are tabulated to three digits.

@@ -127,9 +127,7 @@ def test_accepted_external_pairs_run_free_and_interfering_ones_collide() -> None
 
 @pytest.mark.parametrize("addendum", [0.8, 0.9, 1.0])
 @pytest.mark.parametrize("teeth", [28, 40])
-def test_accepted_internal_pairs_run_free_and_tips_of_too_close_teeth_collide(
-    addendum: float, teeth: int
-) -> None:
+def test_accepted_internal_pairs_run_free_and_tips_of_too_close_teeth_collide(addendum: float, teeth: int) -> None:
     rack = BasicRack(addendum=addendum, dedendum=1.25, tip_radius=0.2)
     pinion = spur(teeth=teeth, profile_shift=0.6, rack=rack, held_diameter=10e-3)
     verdicts = []
@@ -356,6 +354,12 @@ REFUSED_PAIRS: dict[str, tuple[Gear, Gear, float, str]] = {
         r"centre_distance = 73\.7000 mm is too large: the flanks would overlap by 0\.1\d\d\d mm; at "
         r"most 73\.5000 mm",
     ),
+    "no room in the ring": (
+        spur(teeth=90, profile_shift=0.5),
+        ring(profile_shift=0.1),
+        0.0135,
+        r"profile_shift of 'ring' = 0\.1 leaves no room for the teeth of 'wheel' at any centre distance",
+    ),
     "no contact": (
         spur(),
         spur(),
@@ -426,9 +430,7 @@ def test_corner_that_cuts_the_fillet_outside_the_path_of_contact_is_refused() ->
         spur(name=name, teeth=teeth, profile_shift=shift, rack=rack)
         for name, teeth, shift in (("small", 46, 0.075), ("large", 48, 0.1795))
     )
-    message = (
-        r"tip_diameter of '\w+' = .* interferes with the root fillet of '\w+', its corner cuts 0\.0\d+ mm"
-    )
+    message = r"tip_diameter of '\w+' = .* interferes with the root fillet of '\w+', its corner cuts 0\.0\d+ mm"
     with pytest.raises(GeometryError, match=message):
         pair(pinion, gear, 3e-3 * (47.0 + 0.075 + 0.1795))
 
@@ -442,6 +444,32 @@ def test_difference_in_teeth_too_small_is_refused() -> None:
         pair(pinion, gear, tight_internal_distance(pinion, gear))
 
 
+def test_pinion_that_swallows_the_tip_circle_of_the_ring_is_refused() -> None:
+    """55/56 teeth, where the tip circles do not even cross: 28.84 mm is above 27.16 mm + 0.53 mm."""
+    rack = BasicRack(addendum=0.967, dedendum=1.17, tip_radius=0.245)
+    module = {"normal_module": 1e-3, "rack": rack}
+    pinion = spur(teeth=55, profile_shift=0.78, held_diameter=20e-3, **module)
+    gear = ring(teeth=56, profile_shift=1.22, held_diameter=80e-3, **module)
+    distance = 0.533e-3
+    assert pinion.tip_radius > gear.tip_radius + distance
+    with pytest.raises(GeometryError, match=r"difference in teeth = 1 is too small"):
+        pair(pinion, gear, distance)
+
+
+@pytest.mark.parametrize("name", [name for name in REFUSED_PAIRS if "fillet" in name])
+def test_tip_diameter_named_against_interference_touches_the_form_circle(name: str) -> None:
+    pinion, gear, distance, _ = REFUSED_PAIRS[name]
+    message = str(refusal(pinion, gear, distance))
+    named = 1e-3 * float(message.split("mm is needed")[0].split()[-1])
+    if "tip_diameter of 'wheel'" in message:
+        pinion = dataclasses.replace(pinion, tip_diameter=named - 1e-6)
+    else:
+        gear = dataclasses.replace(gear, tip_diameter=named - gear.outward * 1e-6)
+    assert "which begins at the form diameter" in message
+    # Clear of the form circle on the path of contact; the corner may still cut the fillet beside it.
+    assert "which begins at the form diameter" not in str(refusal(pinion, gear, distance))
+
+
 def test_distances_named_in_refusals_are_accepted(any_grc_pair: GearPair) -> None:
     """The least (internal: greatest) centre distance is right up to the digits printed."""
     limit = any_grc_pair.backlash_free_centre_distance
@@ -453,7 +481,5 @@ def test_distances_named_in_refusals_are_accepted(any_grc_pair: GearPair) -> Non
 
 def test_one_missing_digit_of_the_helix_is_refused(sun_planet: GearPair) -> None:
     tilted = dataclasses.replace(sun_planet.gear, helix_angle=math.radians(-7.5))
-    with pytest.raises(
-        GeometryError, match=r"helix_angle of 'planet' = -7\.5000 deg does not mate with 7\.4950 deg"
-    ):
+    with pytest.raises(GeometryError, match=r"helix_angle of 'planet' = -7\.5000 deg does not mate with 7\.4950 deg"):
         dataclasses.replace(sun_planet, gear=tilted)

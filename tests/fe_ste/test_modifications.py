@@ -98,6 +98,14 @@ def test_profile_slope_opens_the_end_that_its_sign_names(any_grc_gear: Gear, sig
     np.testing.assert_allclose(gap, expected, atol=1e-10 * MICRON)
 
 
+def test_slopes_stay_at_zero_beyond_their_end(any_grc_gear: Gear) -> None:
+    """The mate may be wider: points beyond this gear's face must not gain material."""
+    z = any_grc_gear.face_width * np.array([-0.6, 0.6])
+    modification = FlankModification(helix_slope=10 * MICRON)
+    gap = modification.gap(any_grc_gear, np.full(2, any_grc_gear.reference_radius), z)
+    np.testing.assert_array_equal(gap, [0.0, 10 * MICRON])
+
+
 def full_modification(gear: Gear) -> FlankModification:
     length = 0.5 * gear.normal_module
     return FlankModification(
@@ -118,9 +126,7 @@ def test_modifications_add_up_and_never_add_material(any_grc_gear: Gear) -> None
     gap = whole.gap(gear, radius, z)
     assert gap.shape == (21, 11)
     assert np.all(gap >= 0.0)
-    parts = (
-        FlankModification(**{field.name: getattr(whole, field.name)}) for field in dataclasses.fields(whole)
-    )
+    parts = (FlankModification(**{field.name: getattr(whole, field.name)}) for field in dataclasses.fields(whole))
     np.testing.assert_allclose(gap, sum(part.gap(gear, radius, z) for part in parts), atol=ROUNDING)
 
 
@@ -164,12 +170,8 @@ def test_unknown_shape_of_relief_is_refused_and_known_ones_may_be_text() -> None
 
 @pytest.mark.parametrize("start_mm", [math.nan, 100.0, 220.0])
 @pytest.mark.parametrize("key", ["tip_relief", "root_relief"])
-def test_relief_that_starts_off_the_involute_is_refused(
-    sun_planet: GearPair, key: str, start_mm: float
-) -> None:
+def test_relief_that_starts_off_the_involute_is_refused(sun_planet: GearPair, key: str, start_mm: float) -> None:
     modification = FlankModification(**{key: Relief(10 * MICRON, 1e-3 * start_mm)})
-    message = (
-        rf"gear 'planet': {key}\.start_radius = {start_mm:.4f} mm must lie on the involute, between 189\.77"
-    )
+    message = rf"gear 'planet': {key}\.start_radius = {start_mm:.4f} mm must lie on the involute, between 189\.77"
     with pytest.raises(GeometryError, match=message):
         modification.gap(sun_planet.gear, np.array([0.2]), np.zeros(1))

@@ -170,17 +170,13 @@ def test_form_radius_by_hand() -> None:
 
 
 @pytest.mark.parametrize("tip_radius", [0.05, 0.15, 0.3, 0.6])
-def test_internal_fillet_is_an_arc_tangent_to_flank_and_root_circle(
-    ring_planet: GearPair, tip_radius: float
-) -> None:
+def test_internal_fillet_is_an_arc_tangent_to_flank_and_root_circle(ring_planet: GearPair, tip_radius: float) -> None:
     rack = dataclasses.replace(ring_planet.gear.rack, tip_radius=tip_radius)
     gear = dataclasses.replace(ring_planet.gear, rack=rack)
     profile = tooth_profile(gear)
     start, end = profile.fillet[0], profile.fillet[-1]
     centre = end * (1.0 - gear.fillet_radius / gear.root_radius)
-    np.testing.assert_allclose(
-        np.hypot(*(profile.fillet - centre).T), gear.fillet_radius, rtol=0.0, atol=NANO
-    )
+    np.testing.assert_allclose(np.hypot(*(profile.fillet - centre).T), gear.fillet_radius, rtol=0.0, atol=NANO)
     # Tangent to the flank: the line from the arc's centre to its start is the flank's normal, which
     # touches the base circle.
     normal = (start - centre) / gear.fillet_radius
@@ -239,6 +235,4 @@ def test_fillet_points_are_evenly_spaced(any_grc_gear: Gear) -> None:
 
 
 def test_hand_of_the_helix_does_not_change_the_transverse_section(any_grc_gear: Gear) -> None:
-    np.testing.assert_array_equal(
-        tooth_profile(any_grc_gear).fillet, tooth_profile(any_grc_gear.mirrored()).fillet
-    )
+    np.testing.assert_array_equal(tooth_profile(any_grc_gear).fillet, tooth_profile(any_grc_gear.mirrored()).fillet)
