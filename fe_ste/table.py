@@ -1,0 +1,209 @@
+"""Look-up tables of the static transmission error of a gear pair: computed, stored, opened again.
+
+A table is one netCDF file that xarray reads without this package. It carries its whole input and the hash of it; a
+file whose hash differs from what is asked for is refused, never used.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from functools import cached_property, lru_cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from fe_ste.contact import ContactSettings
+from fe_ste.elasticity import HANDOVER_DEPTH, FlankCompliance, flank_compliance
+from fe_ste.gears import Gear, GearPair
+from fe_ste.hexmesh import MeshSettings
+from fe_ste.modifications import FlankModification
+from fe_ste.ste import PairCompliance, static_transmission_error
+
+#: Raised when a change of the method changes the numbers, so that tables of the old method are not used.
+METHOD_VERSION = 1
+
+
+class TableError(ValueError):
+    """A table file that is missing, unreadable, or belongs to another input."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TableInput:
+    """All that the numbers of a table depend on.
+
+    Parameters
+    ----------
+    pair : GearPair
+    torque : tuple of float
+        Static torques on gear 1, N m.
+    positions : int
+        Positions of the mesh cycle.
+    centre_distance : tuple of float
+        m; empty for the pair's own.
+    misalignment : tuple of float
+        rad.
+    mesh : MeshSettings
+    contact : ContactSettings
+    pinion_modification, gear_modification : FlankModification
+
+    Examples
+    --------
+    >>> gear = Gear(name="gear", teeth=30, normal_module=3e-3, face_width=20e-3, held_diameter=50e-3)
+    >>> pair = GearPair(name="pair", pinion=gear, gear=gear, centre_distance=90e-3)
+    >>> len(TableInput(pair=pair, torque=(100.0,)).hash)
+    64
+    """
+
+    pair: GearPair
+    torque: tuple[float, ...]
+    positions: int = 50
+    centre_distance: tuple[float, ...] = ()
+    misalignment: tuple[float, ...] = (0.0,)
+    mesh: MeshSettings = field(default_factory=MeshSettings)
+    contact: ContactSettings = field(default_factory=ContactSettings)
+    pinion_modification: FlankModification = field(default_factory=FlankModification)
+    gear_modification: FlankModification = field(default_factory=FlankModification)
+
+    def resolved(self) -> dict[str, Any]:
+        """Return the input as plain data, with everything that has a default spelled out."""
+        return {"method_version": METHOD_VERSION, "handover_depth": HANDOVER_DEPTH, **asdict(self)}
+
+    @cached_property
+    def hash(self) -> str:
+        """SHA-256 of the resolved input."""
+        return hashlib.sha256(json.dumps(self.resolved(), sort_keys=True).encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class MeshTable:
+    """Static transmission error of a pair over its axes.
+
+    Attributes
+    ----------
+    dataset : xarray.Dataset
+        See `fe_ste.static_transmission_error`; with the input, its hash and the solver's figures as attributes.
+    """
+
+    dataset: xr.Dataset
+
+    @classmethod
+    def compute(cls, wanted: TableInput, progress: Callable[[int, int], None] | None = None) -> MeshTable:
+        """Compute a table.
+
+        Parameters
+        ----------
+        wanted : TableInput
+        progress : callable, optional
+            Called with the number of finished states and of all states.
+        """
+        compliance = _compliance(wanted)
+        dataset = static_transmission_error(
+            compliance,
+            wanted.torque,
+            wanted.positions,
+            centre_distance=wanted.centre_distance or None,
+            misalignment=wanted.misalignment,
+            progress=progress,
+        )
+        dataset.attrs |= _attributes(wanted, compliance)
+        return cls(dataset)
+
+    @classmethod
+    def open(cls, path: str | Path, wanted: TableInput | None = None) -> MeshTable:
+        """Read a table into memory.
+
+        Parameters
+        ----------
+        path : path
+        wanted : TableInput, optional
+            If given, the table must have been computed from exactly this input.
+
+        Raises
+        ------
+        TableError
+            If the file is missing, cannot be read, is no table, or belongs to another input.
+        """
+        path = Path(path)
+        if not path.is_file():
+            raise TableError(f"{path}: no such table")
+        try:
+            dataset = xr.load_dataset(path, engine="h5netcdf")
+        except (OSError, ValueError, KeyError) as error:
+            raise TableError(f"{path}: not a readable netCDF table ({error})") from error
+        if "ste" not in dataset or "input_hash" not in dataset.attrs:
+            raise TableError(f"{path}: holds no static transmission error table")
+        if wanted is not None and dataset.attrs["input_hash"] != wanted.hash:
+            raise TableError(f"{path}: was computed from another input; compute it again")
+        return cls(dataset)
+
+    def save(self, path: str | Path) -> None:
+        """Write the table; a file of that name is replaced only by a complete one.
+
+        Parameters
+        ----------
+        path : path
+            Its directory is made if need be.
+        """
+        path = Path(path)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
+        os.close(handle)
+        try:
+            self.dataset.to_netcdf(Path(temporary), engine="h5netcdf")
+            Path(temporary).chmod(0o644)
+            os.replace(temporary, path)
+        except BaseException:
+            Path(temporary).unlink(missing_ok=True)
+            raise
+
+    @property
+    def input_hash(self) -> str:
+        """Hash of the input the table was computed from."""
+        return str(self.dataset.attrs["input_hash"])
+
+    @property
+    def failures(self) -> list[str]:
+        """Positions that were not solved, with the reason."""
+        return [line for line in str(self.dataset.attrs["failures"]).splitlines() if line]
+
+
+@lru_cache(maxsize=8)
+def _flank(gear: Gear, side: int, mesh: MeshSettings) -> FlankCompliance:
+    return flank_compliance(gear, side, mesh)
+
+
+def _compliance(wanted: TableInput) -> PairCompliance:
+    """Prepare the pair; a gear that meshes twice on the same flank, as a planet does, is computed once."""
+    pair = wanted.pair
+    flanks = (
+        _flank(pair.pinion, 1, wanted.mesh),
+        _flank(pair.gear, -1 if pair.gear.internal else 1, wanted.mesh),
+    )
+    prepared = PairCompliance.from_flanks(pair, flanks, wanted.contact)
+    return prepared.with_modifications(wanted.pinion_modification, wanted.gear_modification)
+
+
+def _attributes(wanted: TableInput, compliance: PairCompliance) -> dict[str, str | int | float]:
+    figures: dict[str, str | int | float] = {}
+    for role, flank in zip(("pinion", "gear"), compliance.flanks, strict=True):
+        figures |= {f"{role}_{name}": value for name, value in flank.figures.items()}
+        figures[f"{role}_held_diameter"] = flank.gear.held_diameter
+    packages = ("exugear", "numpy", "scipy", "scikit-fem", "numba")
+    return {
+        "title": f"static transmission error of gear pair {wanted.pair.name}",
+        "pair": wanted.pair.name,
+        "input": json.dumps(wanted.resolved(), sort_keys=True),
+        "input_hash": wanted.hash,
+        "boundary": "pinion hub held; gear hub (or ring's outer rim) rigid and turning about its axis only",
+        "method": "closed ring of 8-node hexahedra with incompatible modes, half-space near field, linear elastic, "
+        "frictionless contact on the exact rigid gap",
+        **figures,
+        "versions": json.dumps({package: version(package) for package in packages}),
+    }
