@@ -332,6 +332,18 @@ class GearPair:
     Points of contact are told by ``xi``, the distance along the transverse line of action from the point
     where it touches the pinion's base circle: ``xi = r_b1 tan(alpha_1)``. A driving pinion moves the contact
     from `path_start` (tip of the gear) to `path_end` (tip of the pinion).
+
+    Examples
+    --------
+    >>> wheel = {"normal_module": 3e-3, "face_width": 20e-3, "held_diameter": 100e-3}
+    >>> first, second = Gear(name="1", teeth=50, **wheel), Gear(name="2", teeth=50, **wheel)
+    >>> pair = GearPair(name="spur", pinion=first, gear=second, centre_distance=0.151)
+    >>> round(math.degrees(pair.working_pressure_angle), 3), round(pair.transverse_contact_ratio, 3)
+    (21.018, 1.432)
+    >>> pair.with_centre_distance(0.149)
+    Traceback (most recent call last):
+        ...
+    fe_ste.geometry_checks.GeometryError: gear pair 'spur': centre_distance = 149.0000 mm is too small: ...
     """
 
     name: str
