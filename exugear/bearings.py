@@ -241,9 +241,7 @@ class BearingPair:
     def __post_init__(self) -> None:
         """Refuse distances and arrangements that do not exist."""
         if self.arrangement not in ("X", "O", "tandem"):
-            raise BearingError(
-                f"bearing pair: arrangement = {self.arrangement!r} is not 'X', 'O' or 'tandem'"
-            )
+            raise BearingError(f"bearing pair: arrangement = {self.arrangement!r} is not 'X', 'O' or 'tandem'")
         if self.row_distance is not None and self.row_distance < 0.0:
             raise BearingError(f"bearing pair: row_distance = {self.row_distance} m must not be negative")
         if self.axial_preload != 0.0 and self.rows[0].contact_angle == 0.0:
@@ -268,16 +266,12 @@ class BearingPair:
 
 def _check_boundary_dimensions(bore: float, outside_diameter: float, width: float) -> None:
     if not 0.0 < bore < outside_diameter:
-        raise BearingError(
-            f"bearing: bore = {bore} m must lie between 0 and outside_diameter = {outside_diameter} m"
-        )
+        raise BearingError(f"bearing: bore = {bore} m must lie between 0 and outside_diameter = {outside_diameter} m")
     if not width > 0.0:
         raise BearingError(f"bearing: width = {width} m must be positive")
 
 
-def _row_from_catalogue(
-    bearing: CylindricalRollerBearing | TaperedRollerBearing, contact_angle: float
-) -> RollerRow:
+def _row_from_catalogue(bearing: CylindricalRollerBearing | TaperedRollerBearing, contact_angle: float) -> RollerRow:
     """Fill what the catalogue leaves open with the usual proportions of the design."""
     pitch_diameter = 0.5 * (bearing.bore + bearing.outside_diameter)
     diameter = bearing.roller_diameter or 0.27 * (bearing.outside_diameter - bearing.bore)
@@ -348,9 +342,7 @@ def _row_laminae(row: RollerRow, first_roller_angle: float) -> LaminaArrays:
     cosine, sine = math.cos(row.contact_angle), math.sin(row.contact_angle)
     normal = np.column_stack([cosine * np.cos(polar), cosine * np.sin(polar), np.full(polar.size, sine)])
     radius = 0.5 * row.pitch_diameter - along * sine
-    point = np.column_stack(
-        [radius * np.cos(polar), radius * np.sin(polar), row.axial_position + along * cosine]
-    )
+    point = np.column_stack([radius * np.cos(polar), radius * np.sin(polar), row.axial_position + along * cosine])
     drop = -row.profile_factor * row.roller_diameter * np.log(1.0 - (2.0 * along / row.effective_length) ** 2)
     return LaminaArrays(
         direction=np.hstack([normal, np.cross(point, normal)]),
@@ -395,12 +387,8 @@ def secant_stiffness(laminae: LaminaArrays, displacement: FloatArray) -> FloatAr
     load = lamina_loads(laminae, displacement)
     carrying = load > 0.0
     if np.any(whole_approach[carrying] <= 0.0):
-        raise BearingError(
-            "a preloaded row carries where the displacement opens it: it has no secant, use the tangent"
-        )
-    return _weighted_gram(
-        laminae.direction, np.divide(load, whole_approach, out=np.zeros_like(load), where=carrying)
-    )
+        raise BearingError("a preloaded row carries where the displacement opens it: it has no secant, use the tangent")
+    return _weighted_gram(laminae.direction, np.divide(load, whole_approach, out=np.zeros_like(load), where=carrying))
 
 
 def _weighted_gram(direction: FloatArray, weight: FloatArray) -> FloatArray:

@@ -63,8 +63,7 @@ def harmonics(name: str, order: float, count: int) -> tuple[OrderLine, ...]:
     [('planetary', 99.0), ('2 x planetary', 198.0)]
     """
     return tuple(
-        OrderLine(name if number == 1 else f"{number} x {name}", number * order)
-        for number in range(1, count + 1)
+        OrderLine(name if number == 1 else f"{number} x {name}", number * order) for number in range(1, count + 1)
     )
 
 
@@ -125,9 +124,7 @@ def resample_uniform(time: ArrayLike, values: ArrayLike, rate: float) -> tuple[F
     """
     instants, signal = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     if instants.shape != signal.shape or instants.ndim != 1 or instants.size < 8:
-        raise ValueError(
-            f"time {instants.shape} and values {signal.shape} must be two rows of 8 or more samples"
-        )
+        raise ValueError(f"time {instants.shape} and values {signal.shape} must be two rows of 8 or more samples")
     steps = np.diff(instants)
     if not np.all(steps > 0.0):
         raise ValueError(f"time must increase, but does not after {instants[:-1][~(steps > 0.0)][0]:.9g} s")
@@ -295,9 +292,7 @@ def waterfall(
     if signal.shape != shaft.shape or signal.ndim != 1:
         raise ValueError(f"values {signal.shape} and speed {shaft.shape} must be two rows of equal length")
     if length < 8 or signal.size < length:
-        raise ValueError(
-            f"window_length = {window_length} s is {length} samples: it needs 8 to {signal.size}"
-        )
+        raise ValueError(f"window_length = {window_length} s is {length} samples: it needs 8 to {signal.size}")
     if not 0.0 <= overlap < 1.0:
         raise ValueError(f"overlap = {overlap} must lie in [0, 1)")
     frames = _frames(signal, length, overlap)
@@ -458,18 +453,14 @@ def line_level(spectra: Waterfall, line: OrderLine) -> FloatArray:
     index = nearest[:, None] + np.arange(-reach, reach + 1)
     last = spectra.frequency.size - 1
     # The nearest spectral line always counts; half a resolution is at least that.
-    near = (
-        np.abs(index * spacing - frequency[:, None]) <= np.maximum(0.5 * resolution, 0.5 * spacing)[:, None]
-    )
+    near = np.abs(index * spacing - frequency[:, None]) <= np.maximum(0.5 * resolution, 0.5 * spacing)[:, None]
     level = np.take_along_axis(spectra.level, np.clip(index, 0, last), axis=1)
     highest: FloatArray = np.where(near, level, -np.inf).max(axis=1)
     inside = (frequency > 4.0 / spectra.window_length) & (nearest <= last)
     return np.where(inside, highest, np.nan)
 
 
-def pick_resonances(
-    spectra: Waterfall, lines: Iterable[OrderLine], *, prominence: float = 6.0
-) -> tuple[Pick, ...]:
+def pick_resonances(spectra: Waterfall, lines: Iterable[OrderLine], *, prominence: float = 6.0) -> tuple[Pick, ...]:
     """Find the peaks along order lines.
 
     Parameters
@@ -586,9 +577,7 @@ def _within_resolution(first: Pick, second: Pick) -> bool:
     return abs(first.frequency - second.frequency) <= max(first.resolution, second.resolution)
 
 
-def match_eigenfrequencies(
-    found: Sequence[Pick | Resonance], eigenfrequencies: ArrayLike
-) -> tuple[int | None, ...]:
+def match_eigenfrequencies(found: Sequence[Pick | Resonance], eigenfrequencies: ArrayLike) -> tuple[int | None, ...]:
     """Name the eigenfrequency that each finding belongs to.
 
     Parameters
@@ -645,9 +634,7 @@ class AbsenceRule:
         )
 
 
-def only_in_first(
-    picks: Iterable[Pick], other: Waterfall, rule: AbsenceRule | None = None
-) -> tuple[Pick, ...]:
+def only_in_first(picks: Iterable[Pick], other: Waterfall, rule: AbsenceRule | None = None) -> tuple[Pick, ...]:
     """Select the peaks of one run that another run does not show.
 
     Parameters

@@ -29,9 +29,7 @@ from exugear.bearings import (
 
 
 def cylindrical(bore, outside, width, **options):
-    return CylindricalRollerBearing(
-        bore=1e-3 * bore, outside_diameter=1e-3 * outside, width=1e-3 * width, **options
-    )
+    return CylindricalRollerBearing(bore=1e-3 * bore, outside_diameter=1e-3 * outside, width=1e-3 * width, **options)
 
 
 def tapered(bore, outside, width, degrees, **options):
@@ -186,9 +184,9 @@ def test_tangent_is_the_difference_quotient_of_the_load(bearing):
     for column in range(6):
         step = np.zeros(6)
         step[column] = 1e-10 * scale[column]
-        quotient = (
-            bearing_load(laminae, displacement + step) - bearing_load(laminae, displacement - step)
-        ) / (2.0 * step[column])
+        quotient = (bearing_load(laminae, displacement + step) - bearing_load(laminae, displacement - step)) / (
+            2.0 * step[column]
+        )
         # Laminae at the edge of the zone have a slope like delta^(1/9): 1e-5 of the largest entry of a row.
         largest = np.abs(tangent).max(axis=1)
         assert np.all(np.abs(quotient - tangent[:, column]) <= 1e-5 * largest + 1e-3)

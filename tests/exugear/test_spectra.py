@@ -59,9 +59,7 @@ def test_lower_rate_keeps_the_band_and_holds_back_aliases(frequency, gain, toler
     fine = np.arange(16000) / 8000.0
     time, values = resample_uniform(fine, np.sin(2 * np.pi * frequency * fine), 1000.0)
     middle = slice(100, -100)
-    np.testing.assert_allclose(
-        values[middle], gain * np.sin(2 * np.pi * frequency * time[middle]), atol=tolerance
-    )
+    np.testing.assert_allclose(values[middle], gain * np.sin(2 * np.pi * frequency * time[middle]), atol=tolerance)
 
 
 def test_resampling_refuses_time_that_stands_still():
@@ -102,9 +100,7 @@ def test_spectrum_of_several_rows_is_that_of_each():
 
 def test_waterfall_shows_a_steady_tone_at_every_speed():
     time, speed, _ = run_up(duration=4.0)
-    run = waterfall(
-        5.0 + 2e-6 * np.sin(2 * np.pi * 640.0 * time), speed, RATE, window_length=0.125, reference=1e-6
-    )
+    run = waterfall(5.0 + 2e-6 * np.sin(2 * np.pi * 640.0 * time), speed, RATE, window_length=0.125, reference=1e-6)
     assert np.all(run.frequency[np.argmax(run.amplitude, axis=1)] == 640.0)
     # 6.02 dB re 1 um; the mean of 5 is removed to rounding.
     np.testing.assert_allclose(run.level.max(axis=1), 20 * math.log10(2.0), atol=1e-6)
@@ -185,9 +181,7 @@ def test_no_window_makes_a_chirp_narrower_than_the_root_of_its_rate():
 def test_resonance_of_a_swept_oscillator_is_picked_within_the_resolution(frequency, damping):
     time, speed, angle = run_up(duration=10.0)  # 200 Hz/s
     response = oscillator(np.sin(60 * angle), frequency, damping)
-    run = waterfall(
-        response, speed, RATE, window_length=sweep_matched_window(200.0), overlap=0.8, reference=1.0
-    )
+    run = waterfall(response, speed, RATE, window_length=sweep_matched_window(200.0), overlap=0.8, reference=1.0)
     (pick,) = pick_resonances(run, [MESH])
     assert pick.resolution == pytest.approx(math.sqrt(200.0), rel=0.02)
     assert abs(pick.frequency - frequency) < pick.resolution
@@ -198,9 +192,7 @@ def test_resonance_of_a_swept_oscillator_is_picked_within_the_resolution(frequen
 
 def test_level_of_a_slowly_swept_resonance_is_its_magnification():
     time, speed, angle = run_up(duration=40.0, end_frequency=400.0)
-    run = waterfall(
-        oscillator(np.sin(60 * angle), 250.0, 0.05), speed, RATE, window_length=0.25, reference=1.0
-    )
+    run = waterfall(oscillator(np.sin(60 * angle), 250.0, 0.05), speed, RATE, window_length=0.25, reference=1.0)
     (pick,) = pick_resonances(run, [MESH])
     assert pick.level == pytest.approx(20 * math.log10(10.0), abs=0.5)  # 1 / (2 D), scalloping 0.4 dB
 
@@ -265,12 +257,8 @@ def test_what_the_other_run_never_reached_is_not_called_absent():
     soft = swept_pair([600.0, 1300.0])
     time, speed, angle = run_up(duration=20.0)
     short = slice(0, round(8.0 * RATE))
-    stopped = waterfall(
-        np.sin(60 * angle[short]), speed[short], RATE, window_length=0.1, overlap=0.8, reference=1.0
-    )
-    assert [pick.frequency > 1000 for pick in only_in_first(pick_resonances(soft, [MESH]), stopped)] == [
-        False
-    ]
+    stopped = waterfall(np.sin(60 * angle[short]), speed[short], RATE, window_length=0.1, overlap=0.8, reference=1.0)
+    assert [pick.frequency > 1000 for pick in only_in_first(pick_resonances(soft, [MESH]), stopped)] == [False]
 
 
 def test_no_eigenfrequency_within_the_resolution_is_no_match():
