@@ -1,7 +1,7 @@
 """Compliance of a gear's flank: scikit-fem hexahedra of one tooth sector, condensed and closed to the full ring.
 
 The sector's stiffness matrix is condensed onto its two cut faces; the ring of z equal sectors is then closed
-exactly by the discrete Fourier transform over the teeth (a block-circulant system). What is stored per gear is the
+exactly (ring.py). What is stored per gear is the
 normal displacement of the flank of each tooth under unit normal loads on the flank of one tooth, from which the
 mesh-dependent near field of the loaded tooth is taken out: the contact solver puts the half-space solution there.
 """
@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 import scipy.sparse
 import skfem
 from numpy.typing import NDArray
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 from fe_ste.gears import Gear, Material
 from fe_ste.halfspace import tent_displacements, tent_weights
 from fe_ste.hexmesh import MeshSettings, SectionMesh, SectorMesh, sector_mesh
+from fe_ste.ring import open_chain_faces, ring_faces, uniform_faces
 from fe_ste.sparse import Backend, factorise
 
 FloatArray = NDArray[np.float64]
@@ -85,8 +85,7 @@ def stiffness_matrix(
     rows = np.repeat(unknowns, 24, axis=1).ravel()
     columns = np.tile(unknowns, (1, 24)).ravel()
     size = 3 * len(points)
-    entries = (element_stiffness.ravel(), (rows, columns))
-    return scipy.sparse.csr_matrix(scipy.sparse.coo_matrix(entries, shape=(size, size)))
+    return scipy.sparse.csr_matrix((element_stiffness.ravel(), (rows, columns)), shape=(size, size))
 
 
 def _incompatible_gradients(basis: skfem.CellBasis, determinant: FloatArray) -> FloatArray:
@@ -95,7 +94,7 @@ def _incompatible_gradients(basis: skfem.CellBasis, determinant: FloatArray) -> 
     inverse = basis.mapping.invDF(middle)[..., 0]
     ratio = basis.mapping.detDF(middle) / determinant
     slope = 4.0 * (1.0 - 2.0 * basis.X)
-    return np.einsum("iae,iq,eq->iaeq", inverse, slope, ratio)
+    return np.asarray(np.einsum("iae,iq,eq->iaeq", inverse, slope, ratio))
 
 
 def _gradient_products(gradients: FloatArray, volume: FloatArray, material: Material) -> FloatArray:
@@ -246,24 +245,16 @@ def flank_compliance(
     depth = HANDOVER_DEPTH * gear.normal_module if depth is None else depth
     sector = _CondensedSector.from_mesh(mesh, side, depth, incompatible_modes, backend)
     if open_teeth is None:
-        teeth = [
-            (offset, 0)
-            for offset in range(-min(TOOTH_REACH, (gear.teeth - 1) // 2), min(TOOTH_REACH, gear.teeth // 2) + 1)
-        ]
-        faces = sector.ring_faces(gear.teeth, [offset for offset, _ in teeth])
-        total = sector.ring_total(gear.teeth)
+        faces, torque = sector.ring_faces(gear.teeth, min(TOOTH_REACH, (gear.teeth - 2) // 2)), sector.ring_torque()
     else:
-        half = open_teeth // 2
-        teeth = [(read, loaded) for loaded in range(-half, half + 1) for read in range(-half, half + 1)]
-        faces, total = sector.open_faces(open_teeth)
+        faces, torque = sector.open_faces(open_teeth)
     regular = {}
-    for read, loaded in teeth:
-        regular[read, loaded] = sector.displacement(read == loaded, *faces[read, loaded])
     near = _near_field(mesh, side, depth, mirror)
-    for (read, loaded), block in regular.items():
+    for (read, loaded), cut_faces in faces.items():
+        regular[read, loaded] = sector.displacement(read == loaded, *cut_faces)
         if read == loaded:
-            block -= near
-            block[:] = (block + block.T) / 2
+            own = regular[read, loaded] - near
+            regular[read, loaded] = (own + own.T) / 2
     return FlankCompliance(
         gear=gear,
         side=side,
@@ -273,7 +264,7 @@ def flank_compliance(
         axial=mesh.axial_positions,
         regular=regular,
         closed=open_teeth is None,
-        hub_torque=total,
+        hub_torque=torque,
         figures={
             "unknowns": 3 * len(mesh.points),
             "elements": len(mesh.hexahedra),
@@ -434,74 +425,33 @@ class _CondensedSector:
             weights=tent_weights(mesh.section.flank_roll, mesh.axial_positions),
         )
 
-    def _blocks(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        half = self.stiffness.shape[0] // 2
-        minus, plus = slice(0, half), slice(half, None)
-        matrix = self.stiffness
-        return matrix[minus, minus], matrix[minus, plus], matrix[plus, minus], matrix[plus, plus]
+    def ring_faces(self, teeth: int, reach: int) -> dict[tuple[int, int], tuple[FloatArray, FloatArray]]:
+        """Displacement of the minus and plus face of the teeth within `reach` of the loaded one."""
+        faces = ring_faces(self.stiffness, self.face_load, teeth, reach)
+        return {(offset, 0): (faces[offset], faces[offset + 1]) for offset in range(-reach, reach + 1)}
 
-    def _harmonic(self, harmonic: int, teeth: int) -> NDArray[np.complex128]:
-        """Face displacement of one harmonic of the ring under unit loads on the flank nodes of tooth 0."""
-        minus_minus, minus_plus, plus_minus, plus_plus = self._blocks()
-        half = len(minus_minus)
-        phase = np.exp(2j * np.pi * harmonic / teeth)
-        matrix = minus_minus + plus_plus + minus_plus * phase + plus_minus / phase
-        load = self.face_load[:half] + self.face_load[half:] / phase
-        return np.asarray(scipy.linalg.solve(matrix, load, assume_a="pos", check_finite=False), dtype=np.complex128)
-
-    def ring_faces(self, teeth: int, offsets: list[int]) -> dict[tuple[int, int], tuple[FloatArray, FloatArray]]:
-        """Displacement of the minus and plus face of the teeth at `offsets` from the loaded one."""
-        wanted = sorted({offset + step for offset in offsets for step in (0, 1)})
-        half = self.stiffness.shape[0] // 2
-        faces = {offset: np.zeros((half, self.face_load.shape[1])) for offset in wanted}
-        for harmonic in range(teeth // 2 + 1):
-            shape = self._harmonic(harmonic, teeth)
-            twice = 1.0 if harmonic == 0 or 2 * harmonic == teeth else 2.0
-            for offset in wanted:
-                angle = 2.0 * np.pi * harmonic * offset / teeth
-                faces[offset] += twice / teeth * (np.cos(angle) * shape.real - np.sin(angle) * shape.imag)
-        return {(offset, 0): (faces[offset], faces[offset + 1]) for offset in offsets}
-
-    def ring_total(self, teeth: int) -> FloatArray:
+    def ring_torque(self) -> FloatArray:
         """Torque of the reaction at the held surface of the whole ring per unit nodal load."""
-        uniform = self._harmonic(0, teeth).real
-        half = len(uniform)
-        return np.asarray(self.fixed_torque + (self.static_torque[:half] + self.static_torque[half:]) @ uniform)
+        minus, plus = np.split(self.static_torque, 2)
+        return np.asarray(self.fixed_torque + (minus + plus) @ uniform_faces(self.stiffness, self.face_load))
 
     def open_faces(self, teeth: int) -> tuple[dict[tuple[int, int], tuple[FloatArray, FloatArray]], FloatArray]:
         """Face displacements of an open chain of sectors with free ends, for every loaded tooth.
 
         Also the torque of the reaction at the held surface when the middle tooth is loaded.
         """
-        minus_minus, minus_plus, plus_minus, plus_plus = self._blocks()
-        half = len(minus_minus)
-        size = half * (teeth + 1)
-        matrix = np.zeros((size, size))
-        part = [slice(half * face, half * (face + 1)) for face in range(teeth + 1)]
-        for sector in range(teeth):
-            here, there = part[sector], part[sector + 1]
-            matrix[here, here] += minus_minus
-            matrix[there, there] += plus_plus
-            matrix[here, there] += minus_plus
-            matrix[there, here] += plus_minus
-        factor = scipy.linalg.cho_factor(matrix, overwrite_a=True)
-        faces, total = {}, self.fixed_torque
-        for loaded in range(teeth):
-            load = np.zeros((size, self.face_load.shape[1]))
-            load[part[loaded]], load[part[loaded + 1]] = self.face_load[:half], self.face_load[half:]
-            solution = scipy.linalg.cho_solve(factor, load)
-            for read in range(teeth):
-                faces[read - teeth // 2, loaded - teeth // 2] = (
-                    solution[part[read]],
-                    solution[part[read + 1]],
-                )
-            if loaded == teeth // 2:
-                total = self.fixed_torque + sum(
-                    self.static_torque[:half] @ solution[part[read]]
-                    + self.static_torque[half:] @ solution[part[read + 1]]
-                    for read in range(teeth)
-                )
-        return faces, np.asarray(total)
+        middle = teeth // 2
+        by_load = open_chain_faces(self.stiffness, self.face_load, teeth)
+        faces = {
+            (read - middle, loaded - middle): (chain[read], chain[read + 1])
+            for loaded, chain in enumerate(by_load)
+            for read in range(teeth)
+        }
+        minus, plus = np.split(self.static_torque, 2)
+        torque = self.fixed_torque.copy()
+        for read in range(teeth):
+            torque += minus @ by_load[middle][read] + plus @ by_load[middle][read + 1]
+        return faces, torque
 
     def displacement(self, own: bool, minus: FloatArray, plus: FloatArray) -> FloatArray:
         """Compliance (read node, loaded node): at depth under tent loads on the own tooth, on the surface elsewhere."""

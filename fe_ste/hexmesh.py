@@ -333,7 +333,7 @@ def _symmetric_grading(count: int, ratio: float) -> FloatArray:
     """Fractions 0..1 whose intervals grow geometrically from both ends by `ratio` to the middle."""
     position = np.minimum(np.arange(count), np.arange(count)[::-1])
     size = ratio ** (position / max(position.max(), 1))
-    return _fractions(size)
+    return _fractions(np.asarray(size, dtype=np.float64))
 
 
 def _geometric(count: int, first: float) -> FloatArray:
@@ -345,7 +345,7 @@ def _geometric(count: int, first: float) -> FloatArray:
         return first * float(np.sum(ratio ** np.arange(count))) - 1.0
 
     size = first * brentq(excess, 1.0, 50.0) ** np.arange(count)
-    return _fractions(size)
+    return _fractions(np.asarray(size, dtype=np.float64))
 
 
 def _fractions(sizes: FloatArray) -> FloatArray:
