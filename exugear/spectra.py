@@ -60,10 +60,10 @@ def harmonics(name: str, order: float, count: int) -> tuple[OrderLine, ...]:
     Examples
     --------
     >>> [(line.name, line.order) for line in harmonics("planetary", 99.0, 2)]
-    [('planetary', 99.0), ('2 x planetary', 198.0)]
+    [('planetary', 99.0), ('2 × planetary', 198.0)]
     """
     return tuple(
-        OrderLine(name if number == 1 else f"{number} x {name}", number * order) for number in range(1, count + 1)
+        OrderLine(name if number == 1 else f"{number} × {name}", number * order) for number in range(1, count + 1)
     )
 
 
@@ -227,8 +227,16 @@ class Waterfall:
         """Window, overlap and reference in words, for captions."""
         return (
             f"{self.window.capitalize()} window {1e3 * self.window_length:.3g} ms, "
-            f"overlap {100 * self.overlap:.0f} %, 0 dB = {self.reference:.3g} {self.unit}"
+            f"overlap {100 * self.overlap:.0f} %, 0 dB = {self.reference_text}"
         )
+
+    @property
+    def reference_text(self) -> str:
+        """Amplitude of 0 dB with a metric prefix, such as 1 µm."""
+        for prefix, factor in (("", 1.0), ("m", 1e-3), ("µ", 1e-6), ("n", 1e-9)):
+            if self.reference >= 0.999 * factor:
+                return f"{self.reference / factor:g} {prefix}{self.unit}"
+        return f"{self.reference:g} {self.unit}"
 
     def resolution(self, line: OrderLine) -> FloatArray:
         """Frequency resolution along an order line, Hz, shape (n,).
@@ -460,7 +468,9 @@ def line_level(spectra: Waterfall, line: OrderLine) -> FloatArray:
     return np.where(inside, highest, np.nan)
 
 
-def pick_resonances(spectra: Waterfall, lines: Iterable[OrderLine], *, prominence: float = 6.0) -> tuple[Pick, ...]:
+def pick_resonances(
+    spectra: Waterfall, lines: Iterable[OrderLine], *, prominence: float = 6.0, depth: float = 60.0
+) -> tuple[Pick, ...]:
     """Find the peaks along order lines.
 
     Parameters
@@ -471,6 +481,9 @@ def pick_resonances(spectra: Waterfall, lines: Iterable[OrderLine], *, prominenc
         Where to look.
     prominence : float
         Least height of a peak over the higher of the two valleys beside it, dB.
+    depth : float
+        Peaks so far below the highest level on any of the lines, dB, are left out: where an order excites
+        nothing, its line shows the ripple of the spectral floor.
 
     Returns
     -------
@@ -486,7 +499,14 @@ def pick_resonances(spectra: Waterfall, lines: Iterable[OrderLine], *, prominenc
     >>> [round(pick.frequency) for pick in pick_resonances(run, [OrderLine("mesh", 100.0)])]
     [120]
     """
-    return tuple(pick for line in lines for pick in _peaks_on_line(spectra, line, prominence))
+    searched = tuple(lines)
+    highest = max((_highest(line_level(spectra, line)) for line in searched), default=0.0)
+    picks = (pick for line in searched for pick in _peaks_on_line(spectra, line, prominence))
+    return tuple(pick for pick in picks if pick.level > highest - depth)
+
+
+def _highest(level: FloatArray) -> float:
+    return float(np.max(level, initial=-np.inf, where=np.isfinite(level)))
 
 
 def _peaks_on_line(spectra: Waterfall, line: OrderLine, prominence: float) -> list[Pick]:

@@ -105,7 +105,7 @@ def test_waterfall_shows_a_steady_tone_at_every_speed():
     # 6.02 dB re 1 um; the mean of 5 is removed to rounding.
     np.testing.assert_allclose(run.level.max(axis=1), 20 * math.log10(2.0), atol=1e-6)
     np.testing.assert_allclose(run.speed, np.interp(run.time, time, speed), rtol=1e-9)
-    assert run.description == "Hann window 125 ms, overlap 75 %, 0 dB = 1e-06 m"
+    assert run.description == "Hann window 125 ms, overlap 75 %, 0 dB = 1 µm"
 
 
 def test_speed_counts_by_magnitude():
@@ -207,7 +207,7 @@ def test_two_orders_find_the_same_resonance_and_are_one_group():
     assert len(groups) == 2
     for group, frequency in zip(groups, (700.0, 1200.0), strict=True):
         assert abs(group.frequency - frequency) < group.resolution
-        assert {pick.line.name for pick in group.picks} == {"mesh", "2 x mesh"}
+        assert {pick.line.name for pick in group.picks} == {"mesh", "2 × mesh"}
         assert group.picks[0].level >= group.picks[1].level
     assert match_eigenfrequencies(groups, [1200.0, 700.0]) == (1, 0)
 
@@ -220,6 +220,15 @@ def test_prominence_is_the_height_over_the_valley():
     (pick,) = pick_resonances(run, [MESH])
     assert pick.prominence == pytest.approx(12.0, abs=1.0)  # scalloping and spread
     assert pick_resonances(run, [MESH], prominence=14.0) == ()
+
+
+def test_ripple_of_a_line_without_excitation_is_not_picked():
+    _, speed, angle = run_up(duration=20.0)
+    noise = 1e-5 * np.random.default_rng(0).normal(size=angle.size)
+    run = waterfall(oscillator(np.sin(60 * angle), 700.0, 0.02) + noise, speed, RATE, window_length=0.1, reference=1.0)
+    silent = OrderLine("silent", 101.0)
+    assert {pick.line for pick in pick_resonances(run, [MESH, silent])} == {MESH}
+    assert len(pick_resonances(run, [MESH, silent], depth=200.0)) > 10
 
 
 def swept_pair(frequencies):
