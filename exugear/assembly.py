@@ -156,9 +156,7 @@ class Assembly:
                 v[o : o + 2] = speeds[body.carrier] * np.array([-y, x])
         return v
 
-    def rolling_acceleration(
-        self, q: Floats, speeds: Mapping[str, float], rates: Mapping[str, float]
-    ) -> Floats:
+    def rolling_acceleration(self, q: Floats, speeds: Mapping[str, float], rates: Mapping[str, float]) -> Floats:
         """Accelerations of a train that rolls at given spins and spin rates, planets' orbit included."""
         a = np.zeros(self.size)
         for body in self.bodies:

@@ -219,9 +219,7 @@ class LoadCaseSection(_Section):
             self.drive_stiffness_N_m_per_rad is not None,
         )
         if any(drive) and not all(drive):
-            raise ValueError(
-                "a speed-driven case needs driven_body, end_speed_rpm and drive_stiffness_N_m_per_rad"
-            )
+            raise ValueError("a speed-driven case needs driven_body, end_speed_rpm and drive_stiffness_N_m_per_rad")
         if not self.torques_N_m and self.torque_series is None and not any(drive):
             raise ValueError("give torques_N_m, torque_series or a driven_body")
         return self

@@ -258,10 +258,7 @@ class Gearbox:
         CaseError
             A gear that cannot be made, with its key.
         """
-        return {
-            name: self._guard(f"gears.{name}", _gear, name, section)
-            for name, section in self.case.gears.items()
-        }
+        return {name: self._guard(f"gears.{name}", _gear, name, section) for name, section in self.case.gears.items()}
 
     @cached_property
     def gear_pairs(self) -> dict[str, GearPair]:
@@ -397,8 +394,7 @@ class Gearbox:
         modes = self.kinematic_modes
         if modes.shape[1] != 1:
             raise self.fault(
-                f"the gear train has {modes.shape[1]} degrees of freedom; "
-                "a speed of one body does not fix the others"
+                f"the gear train has {modes.shape[1]} degrees of freedom; a speed of one body does not fix the others"
             )
         if body not in self.spinning or abs(modes[self.spinning.index(body), 0]) < 1e-12:
             raise self.fault(f"body {body!r} does not turn with the gear train")
@@ -432,8 +428,7 @@ class Gearbox:
             for name in names:
                 if name not in self.spinning:
                     raise self.fault(
-                        f"static_load.{key} = {name!r}: no such turning body; "
-                        f"bodies are {', '.join(self.spinning)}"
+                        f"static_load.{key} = {name!r}: no such turning body; bodies are {', '.join(self.spinning)}"
                     )
         applied = np.array([torques.get(name, 0.0) for name in self.spinning])
         locks = np.array([[float(name == lock) for name in self.spinning] for lock in load.locked])
@@ -450,9 +445,7 @@ class Gearbox:
         rows = [self.mesh_row(mesh) for mesh in self.meshes]
         for coupling in self.couplings:
             rows.append(
-                np.array(
-                    [float(name == coupling.first) - float(name == coupling.second) for name in self.spinning]
-                )
+                np.array([float(name == coupling.first) - float(name == coupling.second) for name in self.spinning])
             )
         return np.array(rows).reshape(-1, len(self.spinning))
 
@@ -466,9 +459,7 @@ class Gearbox:
         """Tell whether all bodies are enabled; an unknown name is an error, a disabled one is not."""
         for name in names:
             if name != GROUND and name not in self.case.bodies:
-                raise self.fault(
-                    f"{key}: no body {name!r}; bodies are {', '.join(self.case.bodies)} and ground"
-                )
+                raise self.fault(f"{key}: no body {name!r}; bodies are {', '.join(self.case.bodies)} and ground")
         return all(name == GROUND or name in self._body_sections for name in names)
 
     def _guard(self, key: str, build: Any, *arguments: Any, **named: Any) -> Any:
@@ -557,16 +548,12 @@ class Gearbox:
     def _mesh_instances(self, name: str, section: MeshSection) -> Iterator[Mesh]:
         key = f"meshes.{name}"
         if section.pair not in self.gear_pairs:
-            raise self.fault(
-                f"{key}.pair = {section.pair!r}: no such pair; pairs are {', '.join(self.gear_pairs)}"
-            )
+            raise self.fault(f"{key}.pair = {section.pair!r}: no such pair; pairs are {', '.join(self.gear_pairs)}")
         pair = self.gear_pairs[section.pair]
         instances = self._instances(section.pinion_body, section.gear_body)
         phases = section.phase if isinstance(section.phase, tuple) else (section.phase,) * len(instances)
         if len(phases) != len(instances):
-            raise self.fault(
-                f"{key}.phase = {list(phases)}: {len(instances)} meshes need {len(instances)} phases"
-            )
+            raise self.fault(f"{key}.phase = {list(phases)}: {len(instances)} meshes need {len(instances)} phases")
         for (suffix, pinion, gear), phase in zip(instances, phases, strict=True):
             first, second = self._named_bodies[pinion], self._named_bodies[gear]
             frame = section.frame or first.carrier or second.carrier or GROUND
@@ -607,9 +594,7 @@ class Gearbox:
             low = max(low, body.wheels[gear.name] - gear.face_width / 2)
             high = min(high, body.wheels[gear.name] + gear.face_width / 2)
         if high <= low:
-            raise self.fault(
-                f"{key}: the faces of {pair.pinion.name} and {pair.gear.name} do not overlap in z"
-            )
+            raise self.fault(f"{key}: the faces of {pair.pinion.name} and {pair.gear.name} do not overlap in z")
         return (low + high) / 2
 
     def _load_case(self, name: str, section: LoadCaseSection) -> LoadCase:
@@ -698,8 +683,7 @@ def check(gearbox: Gearbox) -> None:
             )
     if overall.output_gear not in gearbox.gears:
         raise gearbox.fault(
-            f"overall.output_gear = {overall.output_gear!r}: no such gear; "
-            f"gears are {', '.join(gearbox.gears)}"
+            f"overall.output_gear = {overall.output_gear!r}: no such gear; gears are {', '.join(gearbox.gears)}"
         )
     gearbox.static_mesh_forces()
     for collection in (gearbox.bearings, gearbox.couplings, gearbox.load_cases):
@@ -757,9 +741,7 @@ def _check_assembly(gearbox: Gearbox, family: str, planets: list[Body]) -> None:
     """
     for planet in planets[1:]:
         teeth = [
-            _teeth_on_planet(mesh, planet.name)
-            for mesh in gearbox.meshes
-            if planet.name in (mesh.pinion, mesh.gear)
+            _teeth_on_planet(mesh, planet.name) for mesh in gearbox.meshes if planet.name in (mesh.pinion, mesh.gear)
         ]
         angle = planet.orbit_angle - planets[0].orbit_angle
         for planet_teeth, central_teeth in teeth[1:]:
@@ -807,9 +789,7 @@ def _check_joints(gearbox: Gearbox) -> None:
     for joint in gearbox.joints:
         body = bodies[joint.body]
         if body.fixed or body.spin_only:
-            raise gearbox.fault(
-                f"joints.{joint.name}.body = {joint.body!r}: a fixed or spin-only body takes no joint"
-            )
+            raise gearbox.fault(f"joints.{joint.name}.body = {joint.body!r}: a fixed or spin-only body takes no joint")
         if joint.body in seen:
             raise gearbox.fault(
                 f"joints.{joint.name}.body = {joint.body!r}: the body already turns "

@@ -141,9 +141,7 @@ def periodic_cubic(samples: Floats) -> Floats:
     slope = 0.5 * (following - np.roll(values, 1))
     next_slope = np.roll(slope, -1)
     rise = following - values
-    return np.stack(
-        [values, slope, 3.0 * rise - 2.0 * slope - next_slope, slope + next_slope - 2.0 * rise], axis=1
-    )
+    return np.stack([values, slope, 3.0 * rise - 2.0 * slope - next_slope, slope + next_slope - 2.0 * rise], axis=1)
 
 
 @compiled
@@ -159,9 +157,7 @@ def stiffness_at(coefficients: Floats, pieces: int, pmc: float) -> tuple[float, 
 
 
 @compiled
-def frame_row(
-    q: Floats, index: Integers, place: Floats, row: Floats, gradient: Floats, turning: Floats
-) -> float:
+def frame_row(q: Floats, index: Integers, place: Floats, row: Floats, gradient: Floats, turning: Floats) -> float:
     """Value of sum W . z with its gradient (13,) and the gradient's derivative to psi (13,) for one mesh."""
     psi = q[index[12]] if index[12] >= 0 else 0.0
     c, s = math.cos(psi), math.sin(psi)
@@ -294,9 +290,7 @@ def rotation(a: float, b: float, spin: float, out: Floats) -> None:
 
 
 @compiled
-def body_point(
-    q: Floats, v: Floats, start: int, node: Floats, local: Floats, turn: Floats, out: Floats
-) -> None:
+def body_point(q: Floats, v: Floats, start: int, node: Floats, local: Floats, turn: Floats, out: Floats) -> None:
     """Move a body-fixed point: turn (3, 3); out (4, 3) = arm, position, velocity, angular velocity."""
     if start < 0:
         turn[:] = 0.0
@@ -322,36 +316,56 @@ def body_point(
 
 
 @compiled
-def connector_load(
-    q: Floats, v: Floats, n: int, connectors: ConnectorArrays, arms: Floats, out: Floats
+def connector_motion(
+    q: Floats, v: Floats, n: int, connectors: ConnectorArrays, turn: Floats, arms: Floats, out: Floats
 ) -> None:
-    """Fill force and moment (6,) that connector n takes from its second body, global axes; and arms (2, 3).
+    """Fill displacement, rate and change of displacement (3, 6) of connector n, its axes and the arms (2, 3).
 
-    The law of Exudyn's RigidBodySpringDamper: displacement and rate of the second attachment in the first
-    body's axes; the rate is not corrected for the turning of those axes.
+    As Exudyn's RigidBodySpringDamper: the second attachment against the first in the first body's axes; the
+    rate is not corrected for the turning of those axes. The third row is the true time derivative of the
+    displacement, which the rate differs from in turning axes and for spinning, tilted bodies.
     """
-    turn0, turn1 = np.empty((3, 3)), np.empty((3, 3))
+    turn1 = np.empty((3, 3))
     point0, point1 = np.empty((4, 3)), np.empty((4, 3))
     index, place, local = connectors.bodies[n], connectors.place[n], connectors.local[n]
-    body_point(q, v, index[0], place[0], local[0], turn0, point0)
+    body_point(q, v, index[0], place[0], local[0], turn, point0)
     body_point(q, v, index[1], place[1], local[1], turn1, point1)
-    displacement, rate = np.zeros(6), np.zeros(6)
     relative = np.zeros((3, 3))
-    for i in range(3):
-        for j in range(3):
-            displacement[i] += turn0[j, i] * (point1[1, j] - point0[1, j])
-            rate[i] += turn0[j, i] * (point1[2, j] - point0[2, j])
-            rate[3 + i] += turn0[j, i] * (point1[3, j] - point0[3, j])
-            for k in range(3):
-                relative[i, j] += turn0[k, i] * turn1[k, j]
-    displacement[3] = math.atan2(-relative[1, 2], relative[2, 2])
-    displacement[4] = math.asin(min(1.0, max(-1.0, relative[0, 2])))
-    displacement[5] = math.atan2(-relative[0, 1], relative[0, 0])
-    own = connectors.stiffness[n] @ displacement + connectors.damping[n] @ rate
+    out[:] = 0.0
     for i in range(3):
         arms[0, i], arms[1, i] = point0[0, i], point1[0, i]
-        out[i] = turn0[i, 0] * own[0] + turn0[i, 1] * own[1] + turn0[i, 2] * own[2]
-        out[3 + i] = turn0[i, 0] * own[3] + turn0[i, 1] * own[4] + turn0[i, 2] * own[5]
+        for j in range(3):
+            out[0, i] += turn[j, i] * (point1[1, j] - point0[1, j])
+            out[1, i] += turn[j, i] * (point1[2, j] - point0[2, j])
+            out[1, 3 + i] += turn[j, i] * (point1[3, j] - point0[3, j])
+            for k in range(3):
+                relative[i, j] += turn[k, i] * turn1[k, j]
+    out[0, 3] = math.atan2(-relative[1, 2], relative[2, 2])
+    out[0, 4] = math.asin(min(1.0, max(-1.0, relative[0, 2])))
+    out[0, 5] = math.atan2(-relative[0, 1], relative[0, 0])
+    spinning = np.zeros(3)
+    for i in range(3):
+        for j in range(3):
+            spinning[i] += turn[j, i] * point0[3, j]
+    d, w = out[0], out[1]
+    out[2, 0] = w[0] - spinning[1] * d[2] + spinning[2] * d[1]
+    out[2, 1] = w[1] - spinning[2] * d[0] + spinning[0] * d[2]
+    out[2, 2] = w[2] - spinning[0] * d[1] + spinning[1] * d[0]
+    across = math.cos(d[3]) * w[5] - math.sin(d[3]) * w[4]
+    out[2, 5] = across / math.cos(d[4])
+    out[2, 4] = math.cos(d[3]) * w[4] + math.sin(d[3]) * w[5]
+    out[2, 3] = w[3] - math.sin(d[4]) * out[2, 5]
+
+
+@compiled
+def connector_load(q: Floats, v: Floats, n: int, connectors: ConnectorArrays, arms: Floats, out: Floats) -> None:
+    """Fill force and moment (6,) that connector n takes from its second body, global axes; arms (2, 3)."""
+    turn, motion = np.empty((3, 3)), np.empty((3, 6))
+    connector_motion(q, v, n, connectors, turn, arms, motion)
+    own = connectors.stiffness[n] @ motion[0] + connectors.damping[n] @ motion[1]
+    for i in range(3):
+        out[i] = turn[i, 0] * own[0] + turn[i, 1] * own[1] + turn[i, 2] * own[2]
+        out[3 + i] = turn[i, 0] * own[3] + turn[i, 1] * own[4] + turn[i, 2] * own[5]
 
 
 @compiled
@@ -423,8 +437,6 @@ def kinetic_energies(q: Floats, v: Floats, inertia: InertiaArrays, out: Floats) 
         sb, cb = math.sin(q[o + 4]), math.cos(q[o + 4])
         tilting = (v[o + 3] * cb) ** 2 + v[o + 4] ** 2
         spin = v[o + 5] + v[o + 3] * sb
-        out[n] = 0.5 * (
-            inertia.mass[n] * square + inertia.transverse[n] * tilting + inertia.axial[n] * spin**2
-        )
+        out[n] = 0.5 * (inertia.mass[n] * square + inertia.transverse[n] * tilting + inertia.axial[n] * spin**2)
     for n in range(inertia.spin.size):
         out[inertia.body.size + n] = 0.5 * inertia.spin_inertia[n] * v[inertia.spin[n]] ** 2

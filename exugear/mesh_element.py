@@ -335,9 +335,7 @@ class ToothContact:
         """Angle from the orientation to the loaded flank at the working radius, in the plane of the mesh."""
         pair = self.mesh.pair
         gear, radius = (
-            (pair.pinion, pair.pinion_working_radius)
-            if self.number == 1
-            else (pair.gear, pair.gear_working_radius)
+            (pair.pinion, pair.pinion_working_radius) if self.number == 1 else (pair.gear, pair.gear_working_radius)
         )
         side = -self.flank if self._wheel_is_internal else self.flank
         twist = self.mesh.offsets[self.number - 1] * math.tan(gear.helix_angle) / gear.reference_radius

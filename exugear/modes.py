@@ -251,9 +251,7 @@ def modes_of(assembly: Assembly, preload: bool = True) -> Modes:
         overall=np.abs(overall),
         amplification=_amplification(assembly, linear, shapes, overall, omega, ratio, elastic),
         names=tuple(
-            mode_name(assembly, element_names, kinetic[m], strain[m])
-            if elastic[m]
-            else "free rotation of the train"
+            mode_name(assembly, element_names, kinetic[m], strain[m]) if elastic[m] else "free rotation of the train"
             for m in range(frequency.size)
         ),
     )

@@ -14,8 +14,6 @@ from exugear.gearbox import CaseError, Gearbox
 CASE = Path(__file__).parents[2] / "cases" / "grc750" / "gearbox.toml"
 
 
-
-
 @pytest.fixture
 def content() -> dict:
     return copy.deepcopy(tomllib.loads(CASE.read_text(encoding="utf-8")))

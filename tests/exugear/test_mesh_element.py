@@ -51,9 +51,7 @@ def states(assembly: Assembly, q: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("law", ["line_of_action", "seed"])
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
-def test_rolling_at_rated_speed_has_no_deflection_rate(
-    grc: Gearbox, stiffness: dict, law: str, variant: str
-) -> None:
+def test_rolling_at_rated_speed_has_no_deflection_rate(grc: Gearbox, stiffness: dict, law: str, variant: str) -> None:
     assembly = assemble(grc, variant, stiffness, law)
     speeds = grc.rolling_speeds("carrier", RATED)
     for angle in (0.0, 0.4, 100.0):

@@ -18,9 +18,7 @@ FORCES = {"sun_planet": 422.4e3, "ring_planet": 422.4e3, "intermediate": 128.7e3
 
 
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
-def test_locked_output_gives_the_mesh_forces_of_the_statics(
-    grc: Gearbox, stiffness: dict, variant: str
-) -> None:
+def test_locked_output_gives_the_mesh_forces_of_the_statics(grc: Gearbox, stiffness: dict, variant: str) -> None:
     assembly = assemble(grc, variant, stiffness)
     q = locked_equilibrium(assembly, TORQUE, ["hss"])
     force = dict(zip(assembly.mesh_names, assembly.mesh_states(q, 0 * q)[:, 4], strict=True))
@@ -74,9 +72,7 @@ def test_bearing_reactions_balance_the_mesh_forces(grc: Gearbox, stiffness: dict
             o = assembly.coordinates[body.name][0]
             alone = assembly_of_one_bearing(assembly, bearing.name, q)
             force += alone[o : o + 3]
-            moment += np.cross(node + q[o : o + 3], alone[o : o + 3]) + to_moment(
-                q[o : o + 6], alone[o + 3 : o + 6]
-            )
+            moment += np.cross(node + q[o : o + 3], alone[o : o + 3]) + to_moment(q[o : o + 6], alone[o + 3 : o + 6])
             assert np.allclose(alone[o : o + 3], -load[:3], rtol=1e-12)
     psi = q[assembly.spin["carrier"]]
     turn = np.array([[math.cos(psi), -math.sin(psi), 0], [math.sin(psi), math.cos(psi), 0], [0, 0, 1]])
@@ -107,9 +103,7 @@ def to_moment(coordinates: np.ndarray, generalized: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
 @pytest.mark.parametrize(("case", "sense"), [("reference", -1), ("generating", 1)])
-def test_run_starts_in_uniform_acceleration(
-    grc: Gearbox, stiffness: dict, variant: str, case: str, sense: int
-) -> None:
+def test_run_starts_in_uniform_acceleration(grc: Gearbox, stiffness: dict, variant: str, case: str, sense: int) -> None:
     assembly = assemble(grc, variant, stiffness)
     torques = grc.load_cases[case].torques
     start = accelerating_start(assembly, torques)

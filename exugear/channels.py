@@ -1,0 +1,224 @@
+"""What a run records: signals per sample and the account of energy, by compiled loops over coordinates."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exugear.assembly import Assembly
+from exugear.gearbox import GROUND
+from exugear.kernels import (
+    ROW_SIZE,
+    ConnectorArrays,
+    InertiaArrays,
+    MeshArrays,
+    SpringArrays,
+    compiled,
+    connector_load,
+    connector_motion,
+    frame_row,
+    kinetic_energies,
+    mesh_state,
+)
+from exugear.modes import overall_row
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+BALANCE_TERMS = (
+    "work_of_loads",
+    "kinetic_energy",
+    "elastic_energy",
+    "dissipated_energy",
+    "work_of_varying_stiffness",
+    "non_conservative_work",
+)
+"""Loads' work = change of kinetic and elastic energy + the other three."""
+
+
+@compiled
+def mesh_signals(q: Floats, v: Floats, meshes: MeshArrays, out: Floats) -> None:
+    """Fill (samples, 2 m): deflection (m), then F_bt (N) of each mesh; q and v (samples, size)."""
+    count = meshes.cycles.size
+    state = np.empty((count, 6))
+    for n in range(q.shape[0]):
+        mesh_state(q[n], v[n], meshes, state)
+        for m in range(count):
+            out[n, m] = state[m, 0]
+            out[n, count + m] = state[m, 4]
+
+
+@compiled
+def bearing_signals(q: Floats, v: Floats, connectors: ConnectorArrays, out: Floats) -> None:
+    """Fill (samples, 3 c): force of each bearing on its body (N), global axes."""
+    load, arms = np.empty(6), np.empty((2, 3))
+    for n in range(q.shape[0]):
+        for c in range(connectors.bodies.shape[0]):
+            connector_load(q[n], v[n], c, connectors, arms, load)
+            for i in range(3):
+                out[n, 3 * c + i] = -load[i]
+
+
+@compiled
+def joint_signals(
+    q: Floats, v: Floats, meshes: MeshArrays, ends: Integers, hosts: Integers, planets: Floats, out: Floats
+) -> None:
+    """Fill (samples, 3 j): force of each ideal joint on its body (N), global axes, in minimal coordinates.
+
+    Parameters
+    ----------
+    ends : (m, 2) joint that carries gear 1 and gear 2, -1 for none
+    hosts : (j,) joint of the body that a joint sits on (the carrier's for a planet), -1 for ground
+    planets : (j, 4) mass, x and y from the carrier's axis, coordinate of the carrier's spin; mass 0 else
+    """
+    state = np.empty((meshes.cycles.size, 6))
+    for n in range(q.shape[0]):
+        mesh_state(q[n], v[n], meshes, state)
+        out[n, :] = 0.0
+        for m in range(meshes.cycles.size):
+            psi = q[n, meshes.coordinates[m, 12]] if meshes.coordinates[m, 12] >= 0 else 0.0
+            cosine, sine = math.cos(psi), math.sin(psi)
+            scalar = state[m, 4] / meshes.line_of_action[m]
+            for end in range(2):
+                j = ends[m, end]
+                if j >= 0:
+                    x, y, z = meshes.force[m, 6 * end : 6 * end + 3]
+                    out[n, 3 * j] += scalar * (cosine * x - sine * y)
+                    out[n, 3 * j + 1] += scalar * (sine * x + cosine * y)
+                    out[n, 3 * j + 2] += scalar * z
+        for j in range(hosts.size):
+            if planets[j, 0] > 0.0:
+                c = int(planets[j, 3])
+                cosine, sine = math.cos(q[n, c]), math.sin(q[n, c])
+                square = v[n, c] ** 2
+                out[n, 3 * j] -= planets[j, 0] * square * (cosine * planets[j, 1] - sine * planets[j, 2])
+                out[n, 3 * j + 1] -= planets[j, 0] * square * (sine * planets[j, 1] + cosine * planets[j, 2])
+            if hosts[j] >= 0:
+                for i in range(3):
+                    out[n, 3 * hosts[j] + i] += out[n, 3 * j + i]
+
+
+@compiled
+def mesh_energies(q: Floats, v: Floats, meshes: MeshArrays, state: Floats, out: Floats) -> None:
+    """Add elastic energy (J) and the powers (W) damped, of k(PMC), non-conservative to out (4,)."""
+    mesh_state(q, v, meshes, state)
+    gradient, turning = np.empty(ROW_SIZE), np.empty(ROW_SIZE)
+    for m in range(meshes.cycles.size):
+        index = meshes.coordinates[m]
+        delta, rate, k = state[m, 0], state[m, 1], state[m, 3]
+        force = state[m, 4] / meshes.line_of_action[m]
+        frame_row(q, index, meshes.place[m], meshes.force[m], gradient, turning)
+        acting_rate = 0.0
+        for i in range(ROW_SIZE):
+            if index[i] >= 0:
+                acting_rate += gradient[i] * v[index[i]]
+        out[0] += 0.5 * k * delta * delta
+        out[1] += meshes.damping[m] * rate * rate
+        out[2] -= 0.5 * state[m, 5] * delta * delta
+        out[3] += force * (acting_rate - rate)
+
+
+@compiled
+def bearing_energies(q: Floats, v: Floats, connectors: ConnectorArrays, out: Floats) -> None:
+    """Add elastic energy (J) and the powers (W) damped and non-conservative of all bearings to out (4,).
+
+    The connector's rate is not the derivative of its displacement (see `connector_motion`): with stiffness that
+    couples tilt and translation the elastic force then does a little work of its own, of second order.
+    """
+    turn, arms, motion = np.empty((3, 3)), np.empty((2, 3)), np.empty((3, 6))
+    for n in range(connectors.bodies.shape[0]):
+        connector_motion(q, v, n, connectors, turn, arms, motion)
+        elastic = connectors.stiffness[n] @ motion[0]
+        out[0] += 0.5 * np.dot(motion[0], elastic)
+        out[3] += np.dot(elastic, motion[1] - motion[2])
+        out[1] += np.dot(motion[1], connectors.damping[n] @ motion[1])
+
+
+@compiled
+def spring_energies(q: Floats, v: Floats, springs: SpringArrays, out: Floats) -> None:
+    """Add elastic energy (J) and damping power (W) of all couplings to out (4,)."""
+    for n in range(springs.coordinates.shape[0]):
+        i, j = springs.coordinates[n]
+        out[0] += 0.5 * springs.stiffness[n] * (q[j] - q[i]) ** 2
+        out[1] += springs.damping[n] * (v[j] - v[i]) ** 2
+
+
+@compiled
+def energy_signals(
+    q: Floats,
+    v: Floats,
+    meshes: MeshArrays,
+    connectors: ConnectorArrays,
+    springs: SpringArrays,
+    inertia: InertiaArrays,
+    out: Floats,
+) -> None:
+    """Fill (samples, 5): kinetic and elastic energy (J); powers (W) damped, of k(PMC), non-conservative."""
+    state = np.empty((meshes.cycles.size, 6))
+    kinetic = np.empty(inertia.body.size + inertia.spin.size)
+    for n in range(q.shape[0]):
+        kinetic_energies(q[n], v[n], inertia, kinetic)
+        out[n, :] = 0.0
+        out[n, 0] = kinetic.sum()
+        mesh_energies(q[n], v[n], meshes, state, out[n, 1:])
+        bearing_energies(q[n], v[n], connectors, out[n, 1:])
+        spring_energies(q[n], v[n], springs, out[n, 1:])
+
+
+class Channels:
+    """The signals of an assembly, in the order of the columns of :meth:`sample`.
+
+    Columns: spin of the overall input (rad/s), overall DTE (rad), DTE and F_bt of each mesh, force (x, y, z) of
+    each support: bearings, or the ideal joints of the variant `rigid`.
+    """
+
+    def __init__(self, assembly: Assembly) -> None:
+        self.assembly = assembly
+        overall = assembly.gearbox.case.overall
+        self.radius = assembly.gearbox.gears[overall.output_gear].base_radius
+        self._overall = overall_row(assembly) / self.radius
+        self._input = assembly.spin[overall.input]
+        self.mesh_names = assembly.mesh_names
+        joints = assembly.gearbox.joints if assembly.variant == "rigid" else ()
+        self.support_names = assembly.connector_names or tuple(joint.name for joint in joints)
+        self._joints = _joint_arrays(assembly) if joints else None
+        self.count = 2 + 2 * len(self.mesh_names) + 3 * len(self.support_names)
+
+    def sample(self, q: Floats, v: Floats) -> Floats:
+        """Signals of states q, v (samples, size), shape (samples, count)."""
+        meshes = len(self.mesh_names)
+        out = np.empty((q.shape[0], self.count))
+        out[:, 0] = v[:, self._input]
+        out[:, 1] = q @ self._overall
+        mesh_signals(q, v, self.assembly.meshes, out[:, 2 : 2 + 2 * meshes])
+        supports = out[:, 2 + 2 * meshes :]
+        if self._joints is not None:
+            joint_signals(q, v, self.assembly.meshes, *self._joints, supports)
+        else:
+            bearing_signals(q, v, self.assembly.connectors, supports)
+        return out
+
+    def energies(self, q: Floats, v: Floats) -> Floats:
+        """Energies and powers of states q, v (samples, size), shape (samples, 5): see `energy_signals`."""
+        out = np.empty((q.shape[0], 5))
+        a = self.assembly
+        energy_signals(q, v, a.meshes, a.connectors, a.springs, a.inertia, out)
+        return out
+
+
+def _joint_arrays(assembly: Assembly) -> tuple[Integers, Integers, Floats]:
+    """Build the arrays of `joint_signals`; a planet hands its force on to its carrier's joint."""
+    joints = assembly.gearbox.joints
+    bodies = {body.name: body for body in assembly.gearbox.bodies(assembly.inertias)}
+    number = {joint.body: n for n, joint in enumerate(joints)}
+    ends = [[number.get(e.mesh.pinion, -1), number.get(e.mesh.gear, -1)] for e in assembly.elements]
+    hosts = [-1 if joint.on == GROUND else number.get(joint.on, -1) for joint in joints]
+    planets = np.zeros((len(joints), 4))
+    for n, joint in enumerate(joints):
+        body = bodies[joint.body]
+        if body.carrier is not None:
+            axis = np.array(body.axis) - np.array(bodies[body.carrier].axis)
+            planets[n] = body.mass, axis[0], axis[1], assembly.spin[body.carrier]
+    return np.array(ends, dtype=np.int64), np.array(hosts, dtype=np.int64), planets

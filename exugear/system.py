@@ -1,0 +1,498 @@
+"""The one place that builds and runs an Exudyn system.
+
+Bodies are ``NodeRigidBodyRxyz`` with z as spin axis, so that the unwrapped angle is a coordinate; bearings
+are ``RigidBodySpringDamper``; all meshes together are one ``ObjectGenericODE2`` on the nodes that the
+bodies already own,
+with an analytic jacobian. ``mesh_route="loads"`` is the textbook way instead: per mesh and gear a force and
+a torque load with a user function. It gives the same trajectory, slower, and without any jacobian.
+
+The variant `rigid` runs in minimal coordinates (one spin per body, nothing else is free under ideal joints)
+in one ``ObjectGenericODE2``; `jointed` keeps the bodies and the ideal joints and is what it is checked
+against.
+
+Exudyn's behaviour that is relied upon: user forces are right-hand sides, user jacobians belong to the left-
+hand side; coordinates come without reference values; explicit solvers do not notice NaN; returning False
+from a user function
+stops a run silently.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exugear.assembly import Assembly, VariantError
+from exugear.gearbox import Body, Joint
+from exugear.kernels import (
+    ROW_SIZE,
+    MeshArrays,
+    add_mesh_forces,
+    add_mesh_jacobian,
+)
+from exugear.mesh_element import node_position
+
+Floats = NDArray[np.float64]
+MeshRoute = Literal["element", "loads"]
+Observer = Callable[[float, Floats, Floats], bool]
+"""Called at the start and after each step with time, coordinates and velocities; False stops the run."""
+
+# Exudyn's type stubs cover a part of it only, so both modules count as untyped.
+exudyn: Any = importlib.import_module("exudyn")
+items: Any = importlib.import_module("exudyn.itemInterface")
+exudyn.config.suppressWarnings = True
+
+
+class SolverFailure(RuntimeError):
+    """Exudyn's solver gave up."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A machine that turns one body at a prescribed angle, behind a torsional spring and damper.
+
+    Attributes
+    ----------
+    body : name of the driven body
+    stiffness, damping : N m/rad, N m s/rad
+    angle, speed : functions of time, rad and rad/s
+    """
+
+    body: str
+    stiffness: float
+    damping: float
+    angle: Callable[[float], float]
+    speed: Callable[[float], float]
+
+
+@dataclass(frozen=True)
+class Loading:
+    """What acts from outside.
+
+    Attributes
+    ----------
+    constant : torque by body, N m
+    varying : torque by body as a function of time, N m
+    drive : machine that prescribes the angle of one body
+    """
+
+    constant: Mapping[str, float] = field(default_factory=dict)
+    varying: Mapping[str, Callable[[float], float]] = field(default_factory=dict)
+    drive: Drive | None = None
+
+    @property
+    def is_constant(self) -> bool:
+        """Tell whether the generalized forces never change."""
+        return self.drive is None and not self.varying
+
+    def generalized(self, assembly: Assembly, t: float, q: Floats, v: Floats) -> Floats:
+        """Generalized forces at a state, shape (size,)."""
+        f = assembly.torque_vector(self.constant)
+        for name, torque in self.varying.items():
+            f[assembly.spin[name]] += torque(t)
+        if self.drive is not None:
+            i, drive = assembly.spin[self.drive.body], self.drive
+            f[i] += drive.stiffness * (drive.angle(t) - q[i]) + drive.damping * (drive.speed(t) - v[i])
+        return f
+
+
+class ExudynSystem:
+    """An assembled Exudyn model of a gearbox variant.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    q, v : (size,) arrays
+        Initial coordinates and velocities in the assembly's order.
+    loading : Loading
+    mesh_route : {"element", "loads"}
+        One element for all meshes, or user-function loads per mesh.
+    meshes : MeshArrays, optional
+        Mesh arrays other than the assembly's; None for the assembly's.
+    with_meshes : bool
+        False leaves the meshes out, for linearisation of the rest.
+
+    Attributes
+    ----------
+    mbs : exudyn.MainSystem
+        The system, open to everything Exudyn offers.
+    """
+
+    def __init__(
+        self,
+        assembly: Assembly,
+        q: Floats,
+        v: Floats,
+        loading: Loading,
+        mesh_route: MeshRoute = "element",
+        meshes: MeshArrays | None = None,
+        with_meshes: bool = True,
+    ) -> None:
+        self.assembly = assembly
+        self.loading = loading
+        self._meshes = assembly.meshes if meshes is None else meshes
+        self._container = exudyn.SystemContainer()
+        self.mbs = self._container.AddSystem()
+        self._nodes: dict[str, Any] = {}
+        self._bodies: dict[str, Any] = {}
+        if assembly.variant == "rigid":
+            if mesh_route != "element":
+                raise VariantError("mesh_route 'loads' needs bodies: use the variant jointed or bushing")
+            self._add_minimal(q, v, with_meshes)
+        else:
+            self._add_bodies(q, v)
+            self._add_connectors()
+            self._add_couplings()
+            self._add_loading()
+            if assembly.variant == "jointed":
+                for joint in assembly.gearbox.joints:
+                    self._add_joint(joint)
+            if with_meshes and mesh_route == "element":
+                self._add_mesh_element()
+            elif with_meshes:
+                self._add_mesh_loads()
+        self.mbs.Assemble()
+        self._order = self._coordinate_order()
+
+    # -- building ----------------------------------------------------------------------------------------
+
+    def _add_minimal(self, q: Floats, v: Floats, with_meshes: bool) -> None:
+        """Build all spins as one object: masses, couplings, meshes and loads in one user function."""
+        assembly, springs = self.assembly, self.assembly.springs
+        size = assembly.size
+        node = self.mbs.AddNode(
+            items.NodeGenericODE2(
+                referenceCoordinates=[0.0] * size,
+                initialCoordinates=q.tolist(),
+                initialCoordinates_t=v.tolist(),
+                numberOfODE2Coordinates=size,
+            )
+        )
+        k, d = np.zeros((size, size)), np.zeros((size, size))
+        for (i, j), stiffness, damping in zip(springs.coordinates, springs.stiffness, springs.damping, strict=True):
+            pattern = np.ix_([i, j], [i, j])
+            k[pattern] += stiffness * np.array([[1.0, -1.0], [-1.0, 1.0]])
+            d[pattern] += damping * np.array([[1.0, -1.0], [-1.0, 1.0]])
+        add_forces, jacobian = _mesh_functions(self._meshes, size)
+        loading = self.loading
+        steady = loading.generalized(assembly, 0.0, q, v) if loading.is_constant else None
+
+        def force(mbs: Any, t: float, item: int, q: Any, v: Any) -> Floats:
+            x, y = np.array(q), np.array(v)
+            f = loading.generalized(assembly, t, x, y) if steady is None else steady.copy()
+            if with_meshes:
+                add_forces(x, y, f)
+            return f
+
+        self.mbs.AddObject(
+            items.ObjectGenericODE2(
+                nodeNumbers=[node],
+                massMatrix=assembly.mass_matrix,
+                stiffnessMatrix=k,
+                dampingMatrix=d,
+                forceUserFunction=force,
+                jacobianUserFunction=jacobian if loading.drive is None and with_meshes else 0,
+            )
+        )
+        self._nodes["*"] = node
+
+    def _add_bodies(self, q: Floats, v: Floats) -> None:
+        for body in self.assembly.bodies:
+            if self.assembly.has_six(body):
+                self._add_rigid_body(body, q, v)
+            else:
+                i = self.assembly.spin[body.name]
+                self._nodes[body.name] = self.mbs.AddNode(
+                    items.Node1D(referenceCoordinates=[0.0], initialCoordinates=[q[i]], initialVelocities=[v[i]])
+                )
+                self._bodies[body.name] = self.mbs.AddObject(
+                    items.ObjectMass1D(physicsMass=body.axial, nodeNumber=self._nodes[body.name])
+                )
+
+    def _add_rigid_body(self, body: Body, q: Floats, v: Floats) -> None:
+        o = self.assembly.coordinates[body.name][0]
+        node = self.mbs.AddNode(
+            items.NodeRigidBodyRxyz(
+                referenceCoordinates=[*node_position(body).tolist(), 0.0, 0.0, 0.0],
+                initialCoordinates=q[o : o + 6].tolist(),
+                initialVelocities=v[o : o + 6].tolist(),
+            )
+        )
+        self._nodes[body.name] = node
+        inertia = [body.transverse, body.transverse, body.axial, 0.0, 0.0, 0.0]
+        self._bodies[body.name] = self.mbs.AddObject(
+            items.ObjectRigidBody(physicsMass=body.mass, physicsInertia=inertia, nodeNumber=node)
+        )
+        acceleration = self.assembly.gearbox.case.gravity.acceleration_m_per_s2
+        if any(acceleration):
+            marker = self.mbs.AddMarker(items.MarkerBodyMass(bodyNumber=self._bodies[body.name]))
+            self.mbs.AddLoad(items.LoadMassProportional(markerNumber=marker, loadVector=list(acceleration)))
+
+    def _point(self, body: str, place: Floats) -> Any:
+        """Marker at a place (m, at zero angles) on a body or on the ground."""
+        if body in self._bodies:
+            found = next(b for b in self.assembly.bodies if b.name == body)
+            number, place = self._bodies[body], place - node_position(found)
+        else:
+            number = self._ground()
+        return self.mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=number, localPosition=place.tolist()))
+
+    def _ground(self) -> Any:
+        if "*ground" not in self._bodies:
+            self._bodies["*ground"] = self.mbs.AddObject(items.ObjectGround())
+        return self._bodies["*ground"]
+
+    def _add_connectors(self) -> None:
+        if not self.assembly.connector_names:
+            return
+        connectors = self.assembly.connectors
+        for n, bearing in enumerate(self.assembly.gearbox.bearings):
+            place = np.array(bearing.place)
+            self.mbs.AddObject(
+                items.RigidBodySpringDamper(
+                    markerNumbers=[self._point(bearing.on, place), self._point(bearing.body, place)],
+                    stiffness=connectors.stiffness[n],
+                    damping=connectors.damping[n],
+                )
+            )
+
+    def _add_joint(self, joint: Joint) -> None:
+        place = np.array(joint.place)
+        self.mbs.AddObject(
+            items.GenericJoint(
+                markerNumbers=[self._point(joint.on, place), self._point(joint.body, place)],
+                constrainedAxes=[1, 1, 1, 1, 1, 0],
+            )
+        )
+
+    def _spin_marker(self, body: str) -> Any:
+        six = next(self.assembly.has_six(b) for b in self.assembly.bodies if b.name == body)
+        return self.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=self._nodes[body], coordinate=5 if six else 0))
+
+    def _add_couplings(self) -> None:
+        for coupling in self.assembly.gearbox.couplings:
+            self.mbs.AddObject(
+                items.CoordinateSpringDamper(
+                    markerNumbers=[self._spin_marker(coupling.first), self._spin_marker(coupling.second)],
+                    stiffness=coupling.stiffness,
+                    damping=coupling.damping,
+                )
+            )
+
+    def _add_loading(self) -> None:
+        for name, constant in self.loading.constant.items():
+            self.mbs.AddLoad(items.LoadCoordinate(markerNumber=self._spin_marker(name), load=constant))
+        for name, torque in self.loading.varying.items():
+            self.mbs.AddLoad(
+                items.LoadCoordinate(
+                    markerNumber=self._spin_marker(name),
+                    load=torque(0.0),
+                    loadUserFunction=_load_function(torque),
+                )
+            )
+        drive = self.loading.drive
+        if drive is not None:
+            fixed = self.mbs.AddNode(items.NodePointGround())
+            ground = self.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=fixed, coordinate=0))
+            self.mbs.AddObject(
+                items.CoordinateSpringDamper(
+                    markerNumbers=[ground, self._spin_marker(drive.body)],
+                    stiffness=drive.stiffness,
+                    damping=drive.damping,
+                    springForceUserFunction=_drive_function(drive),
+                )
+            )
+
+    def _add_mesh_element(self) -> None:
+        """Add the one object for all meshes, on the nodes of the bodies with six coordinates."""
+        bodies = [body for body in self.assembly.bodies if self.assembly.has_six(body)]
+        size = 6 * len(bodies)
+        add_forces, jacobian = _mesh_functions(self._meshes, size)
+
+        def force(mbs: Any, t: float, item: int, q: Any, v: Any) -> Floats:
+            f = np.zeros(size)
+            add_forces(np.array(q), np.array(v), f)
+            return f
+
+        self.mbs.AddObject(
+            items.ObjectGenericODE2(
+                nodeNumbers=[self._nodes[body.name] for body in bodies],
+                forceUserFunction=force,
+                jacobianUserFunction=jacobian,
+            )
+        )
+
+    def _add_mesh_loads(self) -> None:
+        """Add per mesh and body one force and one torque load whose user functions read the nodes."""
+        for n, element in enumerate(self.assembly.elements):
+            one = MeshArrays._make(values[n : n + 1] for values in self._meshes)
+            mesh = element.mesh
+            involved = [name for name in (mesh.pinion, mesh.gear, mesh.frame) if name in self._nodes]
+            for name in involved:
+                vectors = _MeshVectors(self, one, involved, name)
+                marker = self.mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=self._bodies[name]))
+                for load, of in (
+                    (items.LoadForceVector, vectors.force),
+                    (items.LoadTorqueVector, vectors.torque),
+                ):
+                    self.mbs.AddLoad(load(markerNumber=marker, loadVector=[0.0, 0.0, 0.0], loadVectorUserFunction=of))
+
+    # -- state -------------------------------------------------------------------------------------------
+
+    def _coordinate_order(self) -> NDArray[np.int64]:
+        """Position in Exudyn's coordinate vector of each coordinate of the assembly."""
+        if "*" in self._nodes:
+            return np.arange(self.assembly.size, dtype=np.int64)
+        order = np.zeros(self.assembly.size, dtype=np.int64)
+        for body in self.assembly.bodies:
+            first = self.mbs.GetNodeODE2Index(self._nodes[body.name])
+            own = [index for index in self.assembly.coordinates[body.name] if index >= 0]
+            order[own] = first + np.arange(len(own))
+        return order
+
+    def state(self) -> tuple[float, Floats, Floats]:
+        """Time (s), coordinates and velocities now."""
+        data = self.mbs.systemData
+        return (
+            float(data.GetTime()),
+            np.array(data.GetODE2Coordinates())[self._order],
+            np.array(data.GetODE2Coordinates_t())[self._order],
+        )
+
+    # -- solving -----------------------------------------------------------------------------------------
+
+    def run(self, start: float, steps: int, step: float, observe: Observer | None = None, explicit: bool = True) -> int:
+        """Integrate equal steps from the initial state; return the number of steps that Exudyn counted.
+
+        Parameters
+        ----------
+        start : float
+            Time at the beginning, s.
+        steps, step : int, float
+            Number and length (s) of the steps.
+        observe : callable, optional
+            Called at the start and after each step; returning False ends the run there.
+        explicit : bool
+            RK44; else generalized-alpha, which the variant `jointed` needs.
+
+        Raises
+        ------
+        SolverFailure
+            Exudyn gave up; the observer has seen everything up to there.
+        """
+        settings = exudyn.SimulationSettings()
+        integration = settings.timeIntegration
+        integration.startTime = start
+        integration.endTime = start + steps * step
+        integration.numberOfSteps = steps
+        integration.verboseMode = 0
+        integration.generalizedAlpha.spectralRadius = 0.9
+        integration.newton.useModifiedNewton = True
+        integration.newton.relativeTolerance = 1e-10
+        integration.newton.absoluteTolerance = 1e-12
+        settings.linearSolverType = exudyn.LinearSolverType.EigenSparse
+        settings.solutionSettings.writeSolutionToFile = False
+        settings.displayStatistics = False
+        if observe is not None:
+            self.mbs.SetPostStepUserFunction(self._post_step(observe))
+        solver = exudyn.MainSolverExplicit() if explicit else exudyn.MainSolverImplicitSecondOrder()
+        if explicit:
+            integration.explicitIntegration.dynamicSolverType = exudyn.DynamicSolverType.RK44
+        try:
+            solver.SolveSystem(self.mbs, settings)
+        except exudyn.ExudynError as error:
+            raise SolverFailure(str(error).splitlines()[0]) from None
+        return int(solver.it.currentStepIndex) - 1
+
+    def _post_step(self, observe: Observer) -> Callable[[Any, float], bool]:
+        def after_step(mbs: Any, t: float) -> bool:
+            _, q, v = self.state()
+            return observe(t, q, v)
+
+        return after_step
+
+    def linearised(self) -> tuple[Floats, Floats, Floats]:
+        """Mass, stiffness and damping matrices of Exudyn about the initial state, in the assembly's order."""
+        mass, stiffness, damping = self.mbs.ComputeLinearizedSystem()[:3]
+        grid = np.ix_(self._order, self._order)
+        return np.array(mass)[grid], np.array(stiffness)[grid], np.array(damping)[grid]
+
+    def joint_null_space(self) -> tuple[Floats, Floats]:
+        """Motions (size, n) that ideal joints leave, a unit spin per column, and the mass in them (n, n)."""
+        mass, _, _, _, null = self.mbs.ComputeLinearizedSystem(
+            projectIntoConstraintNullspace=True, returnConstraintNullspace=True
+        )[:5]
+        basis = np.array(null).T[self._order]
+        spins = [self.assembly.spin[body.name] for body in self.assembly.bodies]
+        to_spins = np.linalg.inv(basis[spins])
+        return basis @ to_spins, to_spins.T @ np.array(mass) @ to_spins
+
+
+def _mesh_functions(
+    meshes: MeshArrays, size: int
+) -> tuple[Callable[[Floats, Floats, Floats], None], Callable[..., Floats]]:
+    """Force adder and Exudyn jacobian of all meshes on `size` coordinates."""
+
+    def add_forces(q: Floats, v: Floats, f: Floats) -> None:
+        add_mesh_forces(q, v, meshes, f)
+
+    def jacobian(mbs: Any, t: float, item: int, q: Any, v: Any, factor_q: float, factor_v: float) -> Floats:
+        jq, jv = np.zeros((size, size)), np.zeros((size, size))
+        add_mesh_jacobian(np.array(q), np.array(v), meshes, jq, jv)
+        return -(factor_q * jq + factor_v * jv)
+
+    return add_forces, jacobian
+
+
+def _load_function(torque: Callable[[float], float]) -> Callable[[Any, float, float], float]:
+    return lambda mbs, t, load: torque(t)
+
+
+def _drive_function(drive: Drive) -> Callable[..., float]:
+    def force(mbs: Any, t: float, item: int, u: float, v: float, k: float, d: float, offset: float) -> float:
+        return k * (u - drive.angle(t)) + d * (v - drive.speed(t))
+
+    return force
+
+
+class _MeshVectors:
+    """Global force and torque of one mesh on one body, for load user functions."""
+
+    def __init__(self, system: ExudynSystem, mesh: MeshArrays, involved: list[str], body: str) -> None:
+        self._nodes = [system._nodes[name] for name in involved]
+        self._own = involved.index(body)
+        unique = list(dict.fromkeys(involved))
+        local = np.full((1, ROW_SIZE), -1, dtype=np.int64)
+        for i in range(ROW_SIZE):
+            if mesh.coordinates[0, i] >= 0:
+                for n, name in enumerate(unique):
+                    own = system.assembly.coordinates[name]
+                    if mesh.coordinates[0, i] in own:
+                        local[0, i] = 6 * n + own.index(int(mesh.coordinates[0, i]))
+        self._mesh = mesh._replace(coordinates=local)
+
+    def _generalized(self, mbs: Any) -> tuple[Floats, Floats]:
+        output = exudyn.OutputVariableType
+        q = np.concatenate([mbs.GetNodeOutput(n, output.Coordinates) for n in self._nodes])
+        v = np.concatenate([mbs.GetNodeOutput(n, output.Coordinates_t) for n in self._nodes])
+        f = np.zeros(q.size)
+        add_mesh_forces(q, v, self._mesh, f)
+        own = slice(6 * self._own, 6 * self._own + 6)
+        return q[own], f[own]
+
+    def force(self, mbs: Any, t: float, load: Any) -> list[float]:
+        """Force, N."""
+        values: list[float] = self._generalized(mbs)[1][:3].tolist()
+        return values
+
+    def torque(self, mbs: Any, t: float, load: Any) -> list[float]:
+        """Torque, N m, from the generalized moments Q of the Rxyz angles: G^T M = Q."""
+        q, f = self._generalized(mbs)
+        ca, sa, cb, sb = np.cos(q[3]), np.sin(q[3]), np.cos(q[4]), np.sin(q[4])
+        transposed = np.array([[1.0, 0.0, 0.0], [0.0, ca, sa], [sb, -sa * cb, ca * cb]])
+        values: list[float] = np.linalg.solve(transposed, f[3:]).tolist()
+        return values
