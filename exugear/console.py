@@ -12,8 +12,8 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import (
     BarColumn,
-    MofNCompleteColumn,
     Progress,
+    TaskProgressColumn,
     TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
@@ -64,15 +64,16 @@ def note(message: str, style: str = "") -> None:
 
 
 def progress_bar() -> Progress:
-    """Return a bar with a count and the time left, to be used as a context manager."""
+    """Return a bar with the time left, to be used as a context manager."""
     return Progress(
         TextColumn("{task.description}"),
         BarColumn(),
-        MofNCompleteColumn(),
+        TaskProgressColumn(),
         TimeElapsedColumn(),
         TextColumn("left"),
         TimeRemainingColumn(),
         console=messages,
+        speed_estimate_period=3600.0,  # work comes in bursts: the whole of it tells the speed
     )
 
 
@@ -83,9 +84,7 @@ def print_json(summary: Mapping[str, Any]) -> None:
 
 def print_table(title: str, rows: list[dict[str, str]]) -> None:
     """Print rows under the keys of the first one; the first column is text, the others are numbers."""
-    table = Table(
-        title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, padding=(0, 1, 0, 0)
-    )
+    table = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for place, heading in enumerate(rows[0]):
         table.add_column(heading, justify="right" if place else "left", no_wrap=True)
     for row in rows:

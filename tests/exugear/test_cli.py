@@ -3,16 +3,61 @@
 from __future__ import annotations
 
 import json
+import shutil
+import signal
+import subprocess
+import sys
+import time
 from importlib.metadata import version
 from pathlib import Path
 
+import numpy as np
 import pytest
+import xarray
 from typer.testing import CliRunner
 
 from exugear.cli import app
 from exugear.console import BadInputError, FailedError, exit_codes
+from exugear.gearbox import Gearbox
+from exugear.tables import order_tables
+from fe_ste.table import MeshTable
 
 CASE = Path(__file__).parents[2] / "cases" / "grc750" / "gearbox.toml"
+
+
+SPUR_PAIR = """
+name = "one spur pair"
+default_inertias = "disc"
+overall = { input = "shaft_1", output = "shaft_2", output_gear = "wheel" }
+static_load = { torques_N_m = { shaft_1 = 100.0 }, locked = ["shaft_2"] }
+
+[gears]
+pinion = { teeth = 20, normal_module_mm = 3.0, face_width_mm = 15.0, held_diameter_mm = 30.0 }
+wheel = { teeth = 30, normal_module_mm = 3.0, face_width_mm = 15.0, held_diameter_mm = 50.0 }
+
+[pairs]
+spur = { pinion = "pinion", gear = "wheel", centre_distance_mm = 75.0 }
+
+[bodies.shaft_1]
+axis_position_mm = [0.0, 0.0]
+wheels_z_mm = { pinion = 0.0 }
+inertia.disc = { mass_kg = 1.0, axial_kg_m2 = 1e-3, transverse_kg_m2 = 1e-3, centre_of_mass_z_mm = 0.0 }
+
+[bodies.shaft_2]
+axis_position_mm = [75.0, 0.0]
+wheels_z_mm = { wheel = 0.0 }
+inertia.disc = { mass_kg = 2.0, axial_kg_m2 = 3e-3, transverse_kg_m2 = 3e-3, centre_of_mass_z_mm = 0.0 }
+
+[joints]
+bearing_1 = { body = "shaft_1", z_mm = 0.0 }
+bearing_2 = { body = "shaft_2", z_mm = 0.0 }
+
+[meshes]
+spur = { pair = "spur", pinion_body = "shaft_1", gear_body = "shaft_2" }
+
+[load_cases]
+still = { torques_N_m = { shaft_1 = 100.0 } }
+"""
 
 
 def exugear(*arguments):
@@ -91,3 +136,121 @@ def test_an_error_of_the_program_itself_keeps_its_traceback():
 
 def test_the_version_is_that_of_the_distribution():
     assert exugear("--version").stdout.split() == ["exugear", version("exugear")]
+
+
+@pytest.fixture
+def spur_case(tmp_path):
+    path = tmp_path / "spur.toml"
+    path.write_text(SPUR_PAIR, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def computed(tmp_path_factory):
+    """The spur pair's table and pictures, computed once; nobody changes them."""
+    folder = tmp_path_factory.mktemp("computed")
+    case = folder / "spur.toml"
+    case.write_text(SPUR_PAIR, encoding="utf-8")
+    return case, folder / "out", exugear("ste", case, "--positions", 8, "--out", folder / "out", "--json")
+
+
+def test_ste_writes_a_table_and_its_pictures_and_names_them(computed):
+    _, out, outcome = computed
+    assert outcome.exit_code == 0, outcome.stderr
+    summary = json.loads(outcome.stdout)
+    (table,) = summary["tables"]
+    assert table["not_converged"] == 0
+    assert sorted(path.name for path in out.rglob("*.nc")) == ["spur.nc"]
+    assert {"ste.png", "load_share_spur.png"} <= {Path(picture).name for picture in summary["pictures"]}
+    assert all(Path(picture).is_file() for picture in summary["pictures"])
+
+
+def test_xarray_alone_reads_the_table(computed):
+    _, out, outcome = computed
+    with xarray.open_dataset(out / "tables" / "spur.nc") as table:
+        assert dict(table.sizes) | {"pmc": 8, "torque": 1} == dict(table.sizes)
+        # The file holds what the summary says.
+        mean = json.loads(outcome.stdout)["tables"][0]["ste_mean_um"]
+        assert float(table["ste"].mean()) == pytest.approx(1e-6 * mean, rel=1e-12)
+
+
+def test_a_second_run_keeps_what_fits_and_another_number_of_positions_does_not(computed):
+    case, out, _ = computed
+    table = out / "tables" / "spur.nc"
+    written = table.stat().st_mtime_ns
+    outcome = exugear("ste", case, "--positions", 8, "--out", out)
+    assert outcome.exit_code == 0
+    assert "kept" in outcome.stderr
+    assert table.stat().st_mtime_ns == written
+    gearbox = Gearbox.from_toml(case)
+    assert order_tables(gearbox, out, positions=8)[0].stored
+    assert "another input" in order_tables(gearbox, out, positions=9)[0].replaces
+
+
+def test_a_damaged_table_is_computed_again(spur_case, tmp_path):
+    (tmp_path / "tables").mkdir()
+    (tmp_path / "tables" / "spur.nc").write_bytes(b"no netCDF")
+    (order,) = order_tables(Gearbox.from_toml(spur_case), tmp_path)
+    assert order.stored is None
+    assert "spur.nc" in order.replaces
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--mesh", "bevel"], "'bevel'; the pairs are spur"),
+        (["--positions", "3"], "greater than or equal to 8"),
+        (["--method", "guess"], "superelement"),
+    ],
+)
+def test_ste_with_bad_options_writes_nothing(spur_case, tmp_path, options, said):
+    out = tmp_path / "out"
+    outcome = exugear("ste", spur_case, "--out", out, *options)
+    assert outcome.exit_code == 2
+    assert said in outcome.stderr
+    assert outcome.stdout == ""
+    assert not out.exists()
+
+
+def test_a_results_folder_that_is_a_file_is_told_before_the_work(spur_case):
+    outcome = exugear("ste", spur_case, "--out", spur_case)
+    assert outcome.exit_code == 2
+    assert "--out" in outcome.stderr
+
+
+def test_a_pair_without_load_is_bad_input(tmp_path):
+    case = tmp_path / "idle.toml"
+    case.write_text(SPUR_PAIR.replace("shaft_1 = 100.0 }, locked", "shaft_1 = 0.0 }, locked"), encoding="utf-8")
+    outcome = exugear("ste", case, "--out", tmp_path / "out")
+    assert outcome.exit_code == 2
+    assert "pairs.spur" in outcome.stderr
+
+
+def test_positions_that_are_not_solved_are_reported_and_end_with_code_1(computed, tmp_path):
+    case, out, _ = computed
+    (order,) = order_tables(Gearbox.from_toml(case), out, positions=8)
+    data = order.stored.dataset.copy(deep=True)
+    data["converged"][2], data["ste"][2] = False, np.nan
+    data.attrs["failures"] = "pmc 0.250, torque 100 N m: no balance"
+    MeshTable(data).save(tmp_path / "tables" / "spur.nc")
+    shutil.copytree(out / "pictures", tmp_path / "pictures")
+    outcome = exugear("ste", case, "--positions", 8, "--out", tmp_path)
+    assert outcome.exit_code == 1
+    assert "spur: pmc 0.250, torque 100 N m: no balance" in outcome.stderr
+    assert "7/8" in outcome.stdout
+
+
+def test_ctrl_c_ends_with_130_and_leaves_no_half_written_table(spur_case, tmp_path):
+    out = tmp_path / "out"
+    program = "from exugear.cli import main; main()"
+    command = [sys.executable, "-c", program, "ste", str(spur_case), "--out", str(out)]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    # The folder is made right before the finite elements, which take seconds.
+    deadline = time.monotonic() + 60.0
+    while not out.exists() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130, said
+    assert "Stopped" in said
+    assert not list(out.rglob("*.nc*"))
