@@ -386,20 +386,31 @@ class Gearbox:
     def rolling_speeds(self, body: str, speed: float) -> dict[str, float]:
         """Spins of all bodies (rad/s) in rolling motion when `body` turns at `speed`.
 
+        In a train of several degrees of freedom, locked bodies other than the overall input and output stand.
+
         Raises
         ------
         CaseError
-            The train has more than one degree of freedom, or the body does not turn with it.
+            The train is not fixed by that, or the body does not turn with it.
         """
+        if body not in self.spinning:
+            raise self.fault(f"body {body!r} does not turn; bodies are {', '.join(self.spinning)}")
         modes = self.kinematic_modes
-        if modes.shape[1] != 1:
+        prescribed = {body: speed, **dict.fromkeys(self._held_aside(body), 0.0)}
+        rows = modes[[self.spinning.index(name) for name in prescribed]]
+        wanted = np.array(list(prescribed.values()))
+        weights, _, rank, _ = np.linalg.lstsq(rows, wanted, rcond=1e-9)
+        if rank < modes.shape[1] or np.abs(rows @ weights - wanted).max() > 1e-9 * abs(speed):
             raise self.fault(
-                f"the gear train has {modes.shape[1]} degrees of freedom; a speed of one body does not fix the others"
+                f"the gear train has {modes.shape[1]} degrees of freedom; turning {', '.join(prescribed)} "
+                "does not fix it: name the bodies that are held in static_load.locked"
             )
-        if body not in self.spinning or abs(modes[self.spinning.index(body), 0]) < 1e-12:
-            raise self.fault(f"body {body!r} does not turn with the gear train")
-        values = modes[:, 0] * (speed / modes[self.spinning.index(body), 0])
-        return dict(zip(self.spinning, values.tolist(), strict=True))
+        return dict(zip(self.spinning, (modes @ weights).tolist(), strict=True))
+
+    def _held_aside(self, body: str) -> tuple[str, ...]:
+        """Bodies that a train of several degrees of freedom holds: the locked ones but input, output, `body`."""
+        overall = self.case.overall
+        return tuple(name for name in self.case.static_load.locked if name not in (body, overall.input, overall.output))
 
     @cached_property
     def ratio(self) -> float:

@@ -117,6 +117,7 @@ class Modes:
     overall : (n,) overall DTE of the mode at unit modal mass, m / sqrt(kg)
     amplification : (n, meshes) overall DTE at resonance per amplitude of STE in one mesh, m/m
     names : what moves, in words
+    growth_rate : fastest growth of any disturbance, 1/s; above 0 only where the law `seed` makes a mode flutter
     """
 
     assembly: Assembly
@@ -129,6 +130,7 @@ class Modes:
     overall: Floats
     amplification: Floats
     names: tuple[str, ...]
+    growth_rate: float
 
     def nearest(self, frequency: float) -> int:
         """Find the number of the mode nearest to a frequency (Hz)."""
@@ -162,6 +164,7 @@ class Modes:
             "mesh_law": assembly.law,
             "inertias": assembly.inertias,
             "housing_factor": assembly.gearbox.case.housing.factor,
+            "growth_rate": self.growth_rate,
         }
         return xr.Dataset(variables, coordinates, attributes)
 
@@ -254,6 +257,7 @@ def modes_of(assembly: Assembly, preload: bool = True) -> Modes:
             mode_name(assembly, element_names, kinetic[m], strain[m]) if elastic[m] else "free rotation of the train"
             for m in range(frequency.size)
         ),
+        growth_rate=growth_rate(linear),
     )
 
 
@@ -269,6 +273,16 @@ def undamped_modes(mass: Floats, stiffness: Floats) -> tuple[Floats, Floats]:
     order = np.argsort(values.real)
     frequency = np.sqrt(np.maximum(values.real[order], 0.0)) / (2.0 * np.pi)
     return frequency, shapes[:, order] / root[:, None]
+
+
+def growth_rate(linear: Linearised) -> float:
+    """Largest real part of the eigenvalues of M x'' + D x' + K x = 0, 1/s, the free rotation left out."""
+    size = len(linear.mass)
+    mass = np.diag(linear.mass)[:, None]
+    lower = np.hstack([-linear.total_stiffness / mass, -linear.total_damping / mass])
+    values = scipy.linalg.eigvals(np.vstack([np.eye(size, 2 * size, size), lower]))
+    elastic = np.abs(values.imag) > 2.0 * np.pi * RIGID_BODY_LIMIT
+    return float(values.real[elastic].max(initial=-np.inf))
 
 
 def overall_row(assembly: Assembly) -> Floats:

@@ -153,16 +153,13 @@ def test_missing_and_binary_files_are_one_clear_message(tmp_path: Path) -> None:
 def test_turning_ring_gives_two_degrees_of_freedom(content: dict) -> None:
     content["bodies"]["housing"].pop("fixed")
     content["bodies"]["housing"]["inertia"] = {
-        name: {
-            "mass_kg": 509.0,
-            "axial_kg_m2": 160.0,
-            "transverse_kg_m2": 92.0,
-            "centre_of_mass_z_mm": -104.5,
-        }
+        name: {"mass_kg": 509.0, "axial_kg_m2": 160.0, "transverse_kg_m2": 92.0, "centre_of_mass_z_mm": -104.5}
         for name in ("assemblies", "gears")
     }
     content["static_load"]["locked"] = ["hss", "housing"]
     gearbox = Gearbox.from_dict(content)
     assert gearbox.kinematic_modes.shape[1] == 2
-    with pytest.raises(CaseError, match="2 degrees of freedom"):
-        gearbox.rolling_speeds("carrier", 1.0)
+    assert gearbox.ratio == pytest.approx((1 + 99 / 21) * 82 / 23 * 88 / 22, rel=1e-12)  # the ring held
+    content["overall"]["input"] = "housing"  # now nothing holds the carrier
+    with pytest.raises(CaseError, match=r"2 degrees of freedom.*static_load.locked"):
+        _ = Gearbox.from_dict(content).ratio
