@@ -7,8 +7,11 @@ comes with SciPy. Both give the same numbers to 1e-9; PARDISO is faster by about
 from __future__ import annotations
 
 import importlib.util
+import os
+import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, Self, TypeAlias
 
@@ -140,6 +143,7 @@ class PardisoFactorisation(Factorisation):
     name = "pardiso"
 
     def __init__(self, matrix: SparseMatrix) -> None:
+        _point_out_mkl()
         from pypardiso import PyPardisoSolver
         from pypardiso.pardiso_wrapper import PyPardisoError
 
@@ -273,6 +277,13 @@ def _check_recovers_known_solution(matrix: SparseMatrix, factorisation: Factoris
         raise _not_positive_definite(
             matrix.shape[0], f"a known solution comes back with a relative error of {error:.1e}"
         )
+
+
+def _point_out_mkl() -> None:
+    """Tell pypardiso where the wheel puts MKL, or it walks all of the environment for each solver it makes."""
+    found = sorted(Path(sys.prefix).glob("lib/libmkl_rt.so*"))
+    if found:
+        os.environ.setdefault("PYPARDISO_MKL_RT", str(found[0]))
 
 
 def _not_positive_definite(unknowns: int, reason: str) -> FactorisationError:
