@@ -12,8 +12,8 @@ import xarray as xr
 from exugear.gearbox import CaseError, Gearbox
 from fe_ste.plots import plot_load_share, plot_ste_curves
 from fe_ste.scene import contact_quads, draw_tooth_contact, meshed_teeth
-from fe_ste.ste import contact_state, pair_compliance
-from fe_ste.table import MeshTable, TableError, TableInput
+from fe_ste.ste import contact_state
+from fe_ste.table import MeshTable, TableError, TableInput, prepared_compliance
 
 TABLE_FOLDER = "tables"
 PICTURE_FOLDER = "pictures"
@@ -170,7 +170,7 @@ def draw_contact(order: TableOrder, table: MeshTable, out: Path) -> Path:
         The contact at position 0 cannot be solved.
     """
     pair = order.wanted.pair
-    compliance = pair_compliance(pair, order.wanted.mesh, order.wanted.contact)
+    compliance = prepared_compliance(order.wanted)
     state = contact_state(compliance, order.wanted.torque[0], 0.0)
     quads = contact_quads(pair, state.cells, 0.0, compliance.axial, compliance.slice_width)
     teeth = sorted({int(tooth) for tooth in state.cells.tooth[state.pressure > 0.0]})

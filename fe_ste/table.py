@@ -103,7 +103,7 @@ class MeshTable:
         progress : callable, optional
             Called with the number of finished states and of all states.
         """
-        compliance = _compliance(wanted)
+        compliance = prepared_compliance(wanted)
         dataset = static_transmission_error(
             compliance,
             wanted.torque,
@@ -179,8 +179,8 @@ def _flank(gear: Gear, side: int, mesh: MeshSettings) -> FlankCompliance:
     return flank_compliance(gear, side, mesh)
 
 
-def _compliance(wanted: TableInput) -> PairCompliance:
-    """Prepare the pair; a gear that meshes twice on the same flank, as a planet does, is computed once."""
+def prepared_compliance(wanted: TableInput) -> PairCompliance:
+    """Prepare the pair of a table; flanks are kept, so a planet, which meshes twice on one flank, is computed once."""
     pair = wanted.pair
     flanks = (
         _flank(pair.pinion, 1, wanted.mesh),
