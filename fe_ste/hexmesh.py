@@ -231,7 +231,7 @@ def _section_mesh(gear: Gear, settings: MeshSettings) -> SectionMesh:
     rim_centre, rim_plus = _rim_blocks(gear, core, upper[0], lower, settings)
     rim_minus = rim_plus[::-1] * np.array([1.0, -1.0])
 
-    points, (core_id, centre_id, plus_id, minus_id) = _merge([core, rim_centre, rim_plus, rim_minus])
+    points, (core_id, centre_id, plus_id, minus_id) = _joined(core, rim_centre, rim_plus, rim_minus)
     quads = np.concatenate([_quads(ids) for ids in (core_id, centre_id, plus_id, minus_id)])
     if gear.internal:  # the blocks run towards the axis there, which mirrors them
         quads = quads[:, ::-1]
@@ -356,12 +356,21 @@ def _quads(ids: IntArray) -> IntArray:
     return np.stack([ids[:-1, :-1], ids[:-1, 1:], ids[1:, 1:], ids[1:, :-1]], axis=-1).reshape(-1, 4)
 
 
-def _merge(blocks: list[FloatArray]) -> tuple[FloatArray, list[IntArray]]:
-    """Join the blocks' coincident nodes; return the nodes and each block's node numbers."""
-    points = np.concatenate([block.reshape(-1, 2) for block in blocks])
-    tolerance = 1e-9 * np.abs(points).max()
-    _, first, inverse = np.unique(
-        np.round(points / tolerance).astype(np.int64), axis=0, return_index=True, return_inverse=True
-    )
-    ids = np.split(inverse.ravel(), np.cumsum([block.shape[0] * block.shape[1] for block in blocks])[:-1])
-    return points[first], [part.reshape(block.shape[:2]) for part, block in zip(ids, blocks, strict=True)]
+def _joined(
+    core: FloatArray, centre: FloatArray, plus: FloatArray, minus: FloatArray
+) -> tuple[FloatArray, tuple[IntArray, IntArray, IntArray, IntArray]]:
+    """Join the blocks along their common edges; return the nodes and each block's node numbers.
+
+    The edges are known, so nothing is compared by distance: a node missed by rounding would be a crack.
+    """
+    core_id = np.arange(core.shape[0] * core.shape[1]).reshape(core.shape[:2])
+    centre_id = np.concatenate([_numbers(core_id, centre[:, :-1]), core_id[:, :1]], axis=1)
+    plus_id = np.concatenate([centre_id[-1:], _numbers(centre_id, plus[1:])])
+    minus_id = np.concatenate([_numbers(plus_id, minus[:-1]), centre_id[:1]])
+    new = (core, centre[:, :-1], plus[1:], minus[:-1])
+    return np.concatenate([part.reshape(-1, 2) for part in new]), (core_id, centre_id, plus_id, minus_id)
+
+
+def _numbers(before: IntArray, nodes: FloatArray) -> IntArray:
+    """Numbers for the new `nodes` of a block, after the largest number `before`."""
+    return np.asarray(before.max() + 1 + np.arange(nodes.shape[0] * nodes.shape[1]).reshape(nodes.shape[:2]))

@@ -38,6 +38,8 @@ FloatArray = NDArray[np.float64]
 
 #: Cells further apart than this many approaches in the unloaded position cannot touch.
 _GAP_REACH = 1.3
+#: Part of its cells by which a window that contact fills grows at either side.
+_WINDOW_GROWTH = 0.2
 _WINDOW_ATTEMPTS = 6
 
 
@@ -156,9 +158,14 @@ class ContactState:
 
 @dataclass
 class _Search:
-    """What one position hands on to the next: it only sets where the search starts."""
+    """What one position hands on to the next: where the search starts, not the size of the cells.
 
-    half_window: float
+    A window that contact fills gets more cells of the same width, so that the result of a position does not depend
+    on the positions solved before.
+    """
+
+    cell_width: float
+    cells: int
     approach: float
 
 
@@ -226,22 +233,23 @@ def contact_state(
     rotation = pmc * pair.pinion.angular_pitch
     reach = compliance.sliced[0].reach
     teeth = np.arange(-reach - 1, reach + 2)
+    count, reckoned = search.cells, search.approach
     for _ in range(_WINDOW_ATTEMPTS):
-        cells = lay_cells(kinematics, rotation, teeth, compliance.axial, search.half_window, compliance.contact.cells)
+        cells = lay_cells(kinematics, rotation, teeth, compliance.axial, count * search.cell_width / 2, count)
         gap = cells.gap + _extra_gap(compliance, cells, misalignment)
-        near = gap - gap.min() < _GAP_REACH * search.approach
+        near = gap - gap.min() < _GAP_REACH * reckoned
         cells, gap = cells.select(near), gap[near]
         if np.ptp(cells.tooth) > reach:
             raise ContactError(f"contact spreads over more than {reach + 1} tooth pairs: the torque is too large")
         matrix = compliance_matrix(cells, kinematics, compliance.axial, compliance.flanks, compliance.sliced)
-        solution = solve_complementarity(matrix, gap, load, gap - gap.min() < 0.7 * search.approach)
+        solution = solve_complementarity(matrix, gap, load, gap - gap.min() < 0.7 * reckoned)
         depth = solution.approach - gap.min()
-        if depth > 0.95 * _GAP_REACH * search.approach:
-            search.approach = 1.2 * depth
+        if depth > 0.95 * _GAP_REACH * reckoned:
+            reckoned = 1.2 * depth
         elif _touches_window(cells, solution.force):
-            search.half_window *= 1.4
+            count += 2 * math.ceil(_WINDOW_GROWTH * count)
         else:
-            search.approach = depth
+            search.cells, search.approach = count, depth
             _check_on_flanks(compliance, cells, solution.force)
             area = 4.0 * cells.half_across * (0.5 * compliance.slice_width / kinematics.base_helix_cosine)
             return ContactState(pmc, load, cells, solution, solution.force / area)
@@ -276,7 +284,8 @@ def _new_search(compliance: PairCompliance, load: float) -> _Search:
     pair = compliance.pair
     half_width = hertz_half_width(pair, load / least_contact_length(pair))
     stiffness = 10e9 * pair.face_width  # two thirds of a usual mesh stiffness: the first guess may be too large
-    return _Search(compliance.contact.window * half_width, load / stiffness)
+    contact = compliance.contact
+    return _Search(2 * contact.window * half_width / contact.cells, contact.cells, load / stiffness)
 
 
 def _touches_window(cells: Cells, force: FloatArray) -> bool:
@@ -329,7 +338,9 @@ def static_transmission_error(
     Raises
     ------
     ValueError
-        If a torque is not positive or fewer than one position is asked for.
+        If a torque is not positive, a misalignment not finite, or fewer than one position is asked for.
+    GeometryError
+        If the gears cannot run at a centre distance.
 
     Examples
     --------
@@ -346,9 +357,14 @@ def static_transmission_error(
     torques = np.atleast_1d(np.asarray(torque, dtype=float))
     if not (np.isfinite(torques) & (torques > 0)).all():
         raise ValueError(f"torque = {torque}: must be positive torques on gear 1; a table belongs to one loaded flank")
+    geometry = pair.pair if isinstance(pair, PairCompliance) else pair
+    distances = np.atleast_1d(geometry.centre_distance if centre_distance is None else centre_distance)
+    for distance in distances:
+        geometry.with_centre_distance(float(distance))  # refuses before the finite elements, not after
     compliance = pair if isinstance(pair, PairCompliance) else pair_compliance(pair, mesh, contact)
-    distances = np.atleast_1d(compliance.pair.centre_distance if centre_distance is None else centre_distance)
     misalignments = np.atleast_1d(np.asarray(misalignment, dtype=float))
+    if not np.isfinite(misalignments).all():
+        raise ValueError(f"misalignment = {misalignment}: must be finite angles in rad")
     shape = (positions, len(torques), len(distances), len(misalignments))
     result = _Collector(compliance, shape)
     for c, distance in enumerate(distances):

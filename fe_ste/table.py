@@ -27,7 +27,7 @@ from fe_ste.modifications import FlankModification
 from fe_ste.ste import PairCompliance, static_transmission_error
 
 #: Raised when a change of the method changes the numbers, so that tables of the old method are not used.
-METHOD_VERSION = 1
+METHOD_VERSION = 2
 
 
 class TableError(ValueError):
