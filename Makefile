@@ -10,6 +10,9 @@ INSTALLED := $(VENV)/installed
 RUN := $(VENV)/bin
 PIP := $(RUN)/python -m pip --quiet --quiet --disable-pip-version-check
 
+# Idle BLAS threads wait actively and slow compiled loops beside them; the command line sets the same.
+export OPENBLAS_NUM_THREADS ?= 1
+
 CASE := cases/grc750/gearbox.toml
 RESULTS := results/grc750
 

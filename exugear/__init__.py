@@ -10,12 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from exugear.gearbox import CaseError, Gearbox
+    from exugear.modes import eigenmodes
+    from exugear.runup import simulate
 
-__all__ = ["CaseError", "Gearbox", "__version__"]
+__all__ = ["CaseError", "Gearbox", "__version__", "eigenmodes", "simulate"]
 
 _HOMES = {
     "CaseError": "exugear.gearbox",
     "Gearbox": "exugear.gearbox",
+    "eigenmodes": "exugear.modes",
+    "simulate": "exugear.runup",
 }
 
 
