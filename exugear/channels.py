@@ -200,6 +200,10 @@ class Channels:
             bearing_signals(q, v, self.assembly.connectors, supports)
         return out
 
+    def mesh_deflections(self, signals: Floats) -> Floats:
+        """DTE of each mesh among the columns of `sample`, (samples, meshes), m."""
+        return signals[:, 2 : 2 + len(self.mesh_names)]
+
     def energies(self, q: Floats, v: Floats) -> Floats:
         """Energies and powers of states q, v (samples, size), shape (samples, 5): see `energy_signals`."""
         out = np.empty((q.shape[0], 5))

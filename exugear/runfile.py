@@ -78,7 +78,7 @@ class Decimator:
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """State from which a run goes on: raw step number, coordinates, velocities, filter memory, energies."""
+    """State from which a run goes on: step number, coordinates, velocities, filter memory, accounts so far."""
 
     step: int
     q: Floats
@@ -87,6 +87,7 @@ class Checkpoint:
     pending_first: int
     balance: Floats
     start_angle: float
+    pulling_time: Floats
 
 
 class RunFile:
@@ -128,6 +129,9 @@ class RunFile:
         self._variable("mesh_dte", ("time", "mesh"), "m", "f4")
         self._variable("mesh_force", ("time", "mesh"), "N", "f4")
         self._variable("support_force", ("time", "support", "axis"), "N", "f4")
+        self._variable("pulling_time", ("mesh",), "s", "f8")
+        note = "time in which the deflection had the sign that teeth cannot carry (the laws are bilateral)"
+        file.variables["pulling_time"].attrs["long_name"] = note
         self._variable("balance_time", ("balance_time",), "s", "f8")
         for term in BALANCE_TERMS:
             self._variable(term, ("balance_time",), "J", "f8")
@@ -176,6 +180,7 @@ class RunFile:
         file.variables["state_q"][:] = state.q
         file.variables["state_v"][:] = state.v
         file.variables["state_balance"][:] = state.balance
+        file.variables["pulling_time"][:] = state.pulling_time
         if len(state.pending):
             file.variables["state_pending"][: len(state.pending)] = state.pending
         file.attrs["state_step"] = state.step
@@ -194,6 +199,7 @@ class RunFile:
             pending_first=int(file.attrs["state_pending_first"]),
             balance=np.array(file.variables["state_balance"][:]),
             start_angle=float(file.attrs["start_angle"]),
+            pulling_time=np.array(file.variables["pulling_time"][:]),
         )
 
     @property

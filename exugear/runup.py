@@ -162,6 +162,7 @@ class Recorder:
         self.partial_path = directory / "run.partial.nc"
         self.progress = progress
         self.balance = np.zeros(len(BALANCE_TERMS))
+        self._pulling_time = np.zeros(len(self.channels.mesh_names))
         self._powers: Floats | None = None
         rows = max(1, round(FLUSH_INTERVAL / step))
         self._q = np.empty((rows, assembly.size))
@@ -185,7 +186,7 @@ class Recorder:
             state = self.file.last_checkpoint()
             self.first_step, self.q, self.v = state.step, state.q, state.v
             self.decimator.pending, self.decimator.first = state.pending, state.pending_first
-            self.balance = state.balance
+            self.balance, self._pulling_time = state.balance, state.pulling_time
             offset = state.start_angle
         else:
             self.first_step = 0
@@ -206,6 +207,7 @@ class Recorder:
             "housing_factor": gearbox.case.housing.factor,
             "ratio": gearbox.ratio,
             "output_base_radius": self.channels.radius,
+            "highest_order": max(gearbox.mesh_frequencies(2.0 * math.pi).values()),
             "step": self.step,
             "solver": f"Exudyn {version('exudyn')}, {'generalized-alpha' if self._is_jointed else 'RK44'}",
             "complete": 0,
@@ -287,13 +289,15 @@ class Recorder:
             return
         t, q, v = self._t[:n], self._q[:n], self._v[:n]
         self._account(t, q, v)
-        centre, rows = self.decimator.push(self.channels.sample(q, v))
+        signals = self.channels.sample(q, v)
+        self._pulling_time += self.step * np.sum(self.channels.mesh_deflections(signals) < 0.0, axis=0)
+        centre, rows = self.decimator.push(signals)
         times = self.step * (centre + self.decimator.factor * np.arange(len(rows), dtype=np.float64))
         self.file.append(times, rows, float(t[-1]), self.balance)
         self.file.checkpoint(
             Checkpoint(
                 round(float(t[-1]) / self.step), q[-1], v[-1], self.decimator.pending, self.decimator.first,
-                self.balance, self._offset,
+                self.balance, self._offset, self._pulling_time,
             )
         )  # fmt: skip
         self._filled = 0

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.signal
 import xarray as xr
 
 from exugear.channels import BALANCE_TERMS
@@ -83,9 +86,6 @@ def test_stopped_run_resumes_where_it_was(
 ) -> None:
     monkeypatch.setattr("exugear.runup.FLUSH_INTERVAL", 0.01)
     whole = opened(simulate(grc, "rigid", stiffness, tmp_path / "whole", duration=0.05).path)
-
-    import os
-    import signal
 
     def press_ctrl_c(progress: Progress) -> None:
         if progress.simulated > 0.019:
@@ -204,6 +204,37 @@ def test_decimation_keeps_the_band_and_removes_what_would_fold() -> None:
     expected = rows[first::2, 0][: len(results)]
     assert np.abs(results[:, 0] - expected).max() < 2e-4  # passband ripple of an 80 dB design
     assert np.abs(results[:, 1]).max() < 2e-4  # twice the 6.4 kHz mesh would fold to 7.2 kHz
+
+
+def test_equal_planets_in_phase_load_the_sun_evenly(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
+    """Rigid variant at speed: equal forces 120 degrees apart leave nothing on the sun at any harmonic."""
+    data = opened(simulate(grc, "rigid", stiffness, tmp_path, load_case="rated", duration=0.1).path)
+    force = data.mesh_force.to_numpy()[:, :3].astype(float)
+    angles = 2 * np.pi * np.arange(3) / 3
+    radial = np.hypot(force @ np.cos(angles), force @ np.sin(angles))
+    assert np.ptp(force) > 1e-3 * force.mean()  # the meshes do vibrate
+    assert radial.max() < 1e-6 * force.mean()  # forces are stored with seven digits
+    assert float(data.pulling_time.max()) == 0.0
+
+
+@pytest.mark.validation
+@pytest.mark.parametrize("variant", ["rigid", "bushing"])
+def test_mesh_frequencies_stand_out_of_the_spectrum(
+    grc: Gearbox, stiffness: dict, tmp_path: Path, variant: str
+) -> None:
+    """Constant 22.1 rpm: peaks at 1.65000, 7.80952, 29.87992 Hz per rpm within the resolution of the run."""
+    data = opened(simulate(grc, variant, stiffness, tmp_path, load_case="rated", duration=3.0).path)
+    data = data.sel(time=slice(0.5, None))
+    rpm = abs(float(data.input_speed.mean())) * 30 / np.pi
+    values = scipy.signal.detrend(data.overall_dte.to_numpy(), type="linear") * np.hanning(data.sizes["time"])
+    rate = 1.0 / float(data.time[1] - data.time[0])
+    spectrum, frequency = np.abs(np.fft.rfft(values)), np.fft.rfftfreq(values.size, 1.0 / rate)
+    width = 2.0 * rate / values.size  # of the Hann window
+    for order in (1.65, 7.809524, 29.879917):
+        near = np.abs(frequency - order * rpm) < 10 * width
+        peak = frequency[near][np.argmax(spectrum[near])]
+        assert abs(peak - order * rpm) < width
+        assert spectrum[near].max() > 10 * np.median(spectrum[near])
 
 
 @pytest.mark.validation

@@ -1,0 +1,56 @@
+"""Order lines of a gearbox: what its meshes excite per turn of the overall input."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from exugear.gearbox import Gearbox
+from exugear.spectra import OrderLine, Waterfall, harmonics, sweep_matched_window, waterfall
+
+
+def order_lines(gearbox: Gearbox, count: int = 3) -> tuple[OrderLine, ...]:
+    """Mesh orders with harmonics; meshes of one frequency (sun and ring) share a line.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    count : int
+        Harmonics of each mesh, the first included.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> [(line.name, round(line.order, 3)) for line in order_lines(gearbox, 1)]
+    [('sun_planet', 99.0), ('intermediate', 468.571), ('high_speed', 1792.795)]
+    """
+    once = gearbox.mesh_frequencies(2.0 * math.pi)  # one turn per second
+    lines: list[OrderLine] = []
+    seen: list[float] = []
+    for mesh in gearbox.meshes:
+        order = once[mesh.name]
+        if not any(abs(order - known) < 1e-6 * known for known in seen):
+            seen.append(order)
+            lines.extend(harmonics(mesh.family, order, count))
+    return tuple(lines)
+
+
+def run_waterfall(path: str | Path) -> Waterfall:
+    """Waterfall of the overall DTE of a run; the window suits its fastest first-order sweep.
+
+    Parameters
+    ----------
+    path : path
+        ``run.nc`` of a run-up.
+    """
+    with xr.open_dataset(path, engine="h5netcdf") as data:
+        time = data["time"].to_numpy()
+        speed = data["input_speed"].to_numpy()
+        values = data["overall_dte"].to_numpy()
+        highest_order = float(data.attrs["highest_order"])
+    sweep = highest_order * abs(np.ptp(speed)) / (2.0 * math.pi * np.ptp(time))
+    rate = (time.size - 1) / float(np.ptp(time))
+    return waterfall(values, speed, rate, window_length=sweep_matched_window(sweep))
