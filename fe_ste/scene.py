@@ -116,18 +116,24 @@ def rendered_image(plotter: pyvista.Plotter) -> tuple[ImageArray, float]:
     pixel : float
         Size of a pixel in the units of the scene.
     """
+    plotter.render()  # what has moved since the last picture
     image = np.asarray(plotter.screenshot(return_img=True), dtype=np.uint8)
     return image, 2.0 * plotter.camera.parallel_scale / image.shape[0]
 
 
-def without_margins(image: ImageArray, margin: int = 20) -> ImageArray:
-    """Cut the white borders of an image down to `margin` pixels."""
+def drawn_part(image: ImageArray, margin: int = 20) -> tuple[slice, slice]:
+    """Rows and columns of an image that are not white, and `margin` pixels around them."""
     drawn = np.any(image != 255, axis=-1)
     rows, columns = np.flatnonzero(drawn.any(axis=1)), np.flatnonzero(drawn.any(axis=0))
     if not rows.size:
-        return image
-    top, left = max(0, rows[0] - margin), max(0, columns[0] - margin)
-    return image[top : rows[-1] + 1 + margin, left : columns[-1] + 1 + margin]
+        return slice(None), slice(None)
+    top, left = max(0, int(rows[0]) - margin), max(0, int(columns[0]) - margin)
+    return slice(top, int(rows[-1]) + 1 + margin), slice(left, int(columns[-1]) + 1 + margin)
+
+
+def without_margins(image: ImageArray, margin: int = 20) -> ImageArray:
+    """Cut the white borders of an image down to `margin` pixels."""
+    return image[drawn_part(image, margin)]
 
 
 def nice_length(longest: float) -> float:
