@@ -91,126 +91,120 @@ class Checkpoint:
 
 
 class RunFile:
-    """Writer of one run.
+    """Writer of one run. The file is closed between writes, so that others may read it and a kill leaves it whole.
 
     Parameters
     ----------
     path : Path
         The partial file.
     channels : Channels
-    attributes : mapping
-        What was run, written as attributes.
-    resume : bool
-        Go on in an existing file instead of starting a new one.
+    attributes : mapping, optional
+        What is run: starts a new file with these attributes. Without them an existing file is gone on with.
     """
 
-    def __init__(self, path: Path, channels: Channels, attributes: Mapping[str, Any], resume: bool = False) -> None:
+    def __init__(self, path: Path, channels: Channels, attributes: Mapping[str, Any] | None = None) -> None:
         self.path = path
         self.channels = channels
         path.parent.mkdir(parents=True, exist_ok=True)
-        self._file = h5netcdf.File(path, "a" if resume else "w")
-        if not resume:
-            self._create(attributes)
+        if attributes is not None:
+            with h5netcdf.File(path, "w") as file:
+                self._create(file, attributes)
 
-    def _create(self, attributes: Mapping[str, Any]) -> None:
-        file, channels = self._file, self.channels
+    def _create(self, file: h5netcdf.File, attributes: Mapping[str, Any]) -> None:
+        channels = self.channels
         sizes = {"mesh": len(channels.mesh_names), "support": len(channels.support_names), "axis": 3}
-        file.dimensions = {
-            "time": None, "balance_time": None, **sizes, "name_length": 64,
-            "coordinate": channels.assembly.size, "signal": channels.count, "pending": None,
-            "term": len(BALANCE_TERMS),
-        }  # fmt: skip
+        states = {"coordinate": channels.assembly.size, "signal": channels.count, "term": len(BALANCE_TERMS)}
+        file.dimensions = {"time": None, "balance_time": None, "pending": None, **sizes, **states}
         for key, value in attributes.items():
             file.attrs[key] = value
-        self._variable("time", ("time",), "s", "f8")
-        self._variable("input_speed", ("time",), "rad/s", "f8")
-        self._variable("overall_dte_angle", ("time",), "rad", "f8")
-        self._variable("overall_dte", ("time",), "m", "f8")
-        self._variable("mesh_dte", ("time", "mesh"), "m", "f4")
-        self._variable("mesh_force", ("time", "mesh"), "N", "f4")
-        self._variable("support_force", ("time", "support", "axis"), "N", "f4")
-        self._variable("pulling_time", ("mesh",), "s", "f8")
+        series, balance = ("time",), ("balance_time",)
+        _add(file, "time", series, "s")
+        _add(file, "input_speed", series, "rad/s")
+        _add(file, "overall_dte_angle", series, "rad")
+        _add(file, "overall_dte", series, "m")
+        _add(file, "mesh_dte", (*series, "mesh"), "m", "f4")
+        _add(file, "mesh_force", (*series, "mesh"), "N", "f4")
+        _add(file, "support_force", (*series, "support", "axis"), "N", "f4")
+        _add(file, "pulling_time", ("mesh",), "s")
         note = "time in which the deflection had the sign that teeth cannot carry (the laws are bilateral)"
         file.variables["pulling_time"].attrs["long_name"] = note
-        self._variable("balance_time", ("balance_time",), "s", "f8")
+        _add(file, "balance_time", balance, "s")
         for term in BALANCE_TERMS:
-            self._variable(term, ("balance_time",), "J", "f8")
-        for name, dimension in (("state_q", "coordinate"), ("state_v", "coordinate"), ("state_balance", "term")):
-            self._variable(name, (dimension,), "SI", "f8")
-        self._variable("state_pending", ("pending", "signal"), "SI", "f8")
+            _add(file, term, balance, "J")
+        _add(file, "state_q", ("coordinate",), "m or rad")
+        _add(file, "state_v", ("coordinate",), "m/s or rad/s")
+        _add(file, "state_balance", ("term",), "J")
+        _add(file, "state_pending", ("pending", "signal"), "of the signals")
         for dimension, names in (("mesh", channels.mesh_names), ("support", channels.support_names)):
             variable = file.create_variable(dimension, (dimension,), TEXT)
             if names:
                 variable[:] = np.array(names, dtype=object)
 
-    def _variable(self, name: str, dimensions: tuple[str, ...], units: str, kind: str) -> None:
-        chunks = tuple(
-            4096 if d in ("time", "balance_time", "pending") else max(1, self._file.dimensions[d].size)
-            for d in dimensions
-        )
-        self._file.create_variable(name, dimensions, kind, chunks=chunks).attrs["units"] = units
+    def append(self, times: Floats, rows: Floats, balance_time: float, state: Checkpoint) -> None:
+        """Append decimated samples, one line of the energy account, and the state to go on from."""
+        with h5netcdf.File(self.path, "a") as file:
+            self._append_samples(file, times, rows)
+            row = file.dimensions["balance_time"].size
+            file.resize_dimension("balance_time", row + 1)
+            file.variables["balance_time"][row] = balance_time
+            for term, value in zip(BALANCE_TERMS, state.balance, strict=True):
+                file.variables[term][row] = value
+            file.resize_dimension("pending", len(state.pending))
+            if len(state.pending):
+                file.variables["state_pending"][: len(state.pending)] = state.pending
+            file.variables["state_q"][:] = state.q
+            file.variables["state_v"][:] = state.v
+            file.variables["state_balance"][:] = state.balance
+            file.variables["pulling_time"][:] = state.pulling_time
+            file.attrs["state_step"] = state.step
+            file.attrs["state_pending_first"] = state.pending_first
+            file.attrs["start_angle"] = state.start_angle
 
-    def append(self, times: Floats, rows: Floats, balance_time: float, balance: Floats) -> None:
-        """Append decimated samples and one line of the energy account."""
-        file, channels = self._file, self.channels
+    def _append_samples(self, file: h5netcdf.File, times: Floats, rows: Floats) -> None:
+        if not len(times):
+            return
+        channels = self.channels
         begin = file.dimensions["time"].size
         end = begin + len(times)
-        if len(times):
-            file.resize_dimension("time", end)
-            meshes, supports = len(channels.mesh_names), len(channels.support_names)
-            file.variables["time"][begin:end] = times
-            file.variables["input_speed"][begin:end] = rows[:, 0]
-            file.variables["overall_dte_angle"][begin:end] = rows[:, 1]
-            file.variables["overall_dte"][begin:end] = rows[:, 1] * channels.radius
-            file.variables["mesh_dte"][begin:end] = rows[:, 2 : 2 + meshes]
-            file.variables["mesh_force"][begin:end] = rows[:, 2 + meshes : 2 + 2 * meshes]
-            if supports:
-                forces = rows[:, 2 + 2 * meshes :].reshape(-1, supports, 3)
-                file.variables["support_force"][begin:end] = forces
-        row = file.dimensions["balance_time"].size
-        file.resize_dimension("balance_time", row + 1)
-        file.variables["balance_time"][row] = balance_time
-        for term, value in zip(BALANCE_TERMS, balance, strict=True):
-            file.variables[term][row] = value
-
-    def checkpoint(self, state: Checkpoint) -> None:
-        """Keep the state to go on from, and bring everything to the disk."""
-        file = self._file
-        file.resize_dimension("pending", len(state.pending))
-        file.variables["state_q"][:] = state.q
-        file.variables["state_v"][:] = state.v
-        file.variables["state_balance"][:] = state.balance
-        file.variables["pulling_time"][:] = state.pulling_time
-        if len(state.pending):
-            file.variables["state_pending"][: len(state.pending)] = state.pending
-        file.attrs["state_step"] = state.step
-        file.attrs["state_pending_first"] = state.pending_first
-        file.attrs["start_angle"] = state.start_angle
-        file.flush()
+        file.resize_dimension("time", end)
+        meshes, supports = len(channels.mesh_names), len(channels.support_names)
+        file.variables["time"][begin:end] = times
+        file.variables["input_speed"][begin:end] = rows[:, 0]
+        file.variables["overall_dte_angle"][begin:end] = rows[:, 1]
+        file.variables["overall_dte"][begin:end] = rows[:, 1] * channels.radius
+        file.variables["mesh_dte"][begin:end] = rows[:, 2 : 2 + meshes]
+        file.variables["mesh_force"][begin:end] = rows[:, 2 + meshes : 2 + 2 * meshes]
+        if supports:
+            forces = rows[:, 2 + 2 * meshes :].reshape(-1, supports, 3)
+            file.variables["support_force"][begin:end] = forces
 
     def last_checkpoint(self) -> Checkpoint:
         """Read the state that the file was left with."""
-        file = self._file
-        return Checkpoint(
-            step=int(file.attrs["state_step"]),
-            q=np.array(file.variables["state_q"][:]),
-            v=np.array(file.variables["state_v"][:]),
-            pending=np.array(file.variables["state_pending"][:]).reshape(-1, self.channels.count),
-            pending_first=int(file.attrs["state_pending_first"]),
-            balance=np.array(file.variables["state_balance"][:]),
-            start_angle=float(file.attrs["start_angle"]),
-            pulling_time=np.array(file.variables["pulling_time"][:]),
-        )
+        with h5netcdf.File(self.path, "r") as file:
+            return Checkpoint(
+                step=int(file.attrs["state_step"]),
+                q=np.array(file.variables["state_q"][:]),
+                v=np.array(file.variables["state_v"][:]),
+                pending=np.array(file.variables["state_pending"][:]).reshape(-1, self.channels.count),
+                pending_first=int(file.attrs["state_pending_first"]),
+                balance=np.array(file.variables["state_balance"][:]),
+                start_angle=float(file.attrs["start_angle"]),
+                pulling_time=np.array(file.variables["pulling_time"][:]),
+            )
 
     @property
     def attributes(self) -> Mapping[str, Any]:
         """Attributes of the file."""
-        return dict(self._file.attrs)
+        with h5netcdf.File(self.path, "r") as file:
+            return dict(file.attrs)
 
     def note(self, key: str, value: Any) -> None:
         """Write one attribute."""
-        self._file.attrs[key] = value
+        with h5netcdf.File(self.path, "a") as file:
+            file.attrs[key] = value
 
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
+
+def _add(file: h5netcdf.File, name: str, dimensions: tuple[str, ...], units: str, kind: str = "f8") -> None:
+    growing = ("time", "balance_time", "pending")
+    chunks = tuple(4096 if d in growing else max(1, file.dimensions[d].size) for d in dimensions)
+    file.create_variable(name, dimensions, kind, chunks=chunks).attrs["units"] = units

@@ -181,7 +181,7 @@ class Recorder:
         if resume:
             if not self.partial_path.is_file():
                 raise RunError(f"{self.partial_path}: nothing to resume; run without resuming first")
-            self.file = RunFile(self.partial_path, self.channels, {}, resume=True)
+            self.file = RunFile(self.partial_path, self.channels)
             self._check_same_run(case)
             state = self.file.last_checkpoint()
             self.first_step, self.q, self.v = state.step, state.q, state.v
@@ -228,25 +228,21 @@ class Recorder:
         self._wall_start = time.perf_counter()
         system = ExudynSystem(self.assembly, self.q, self.v, self.loading, mesh_route)
         start = self.first_step * self.step
-        try:
-            with _interruption(self):
-                try:
-                    system.run(start, self.steps - self.first_step, self.step, self._observe, not self._is_jointed)
-                except SolverFailure as error:
-                    self._fault = self._fault or f"Exudyn gave up at t = {self._last_time:.6g} s: {error}"
-                self._flush()
-            end = self._last_time
-            complete = not self._stop and not self._fault
-            if complete:
-                self.file.note("complete", 1)
-        finally:
-            self.file.close()
+        with _interruption(self):
+            try:
+                system.run(start, self.steps - self.first_step, self.step, self._observe, not self._is_jointed)
+            except SolverFailure as error:
+                self._fault = self._fault or f"Exudyn gave up at t = {self._last_time:.6g} s: {error}"
+            self._flush()
+        complete = not self._stop and not self._fault
+        if complete:
+            self.file.note("complete", 1)
         wall = time.perf_counter() - self._wall_start
         if self._fault:
             raise RunError(f"{self._fault}; what was reached is in {self.partial_path}")
         if complete:
             self.partial_path.replace(self.final_path)
-        return Run(self.final_path if complete else self.partial_path, complete, end, wall)
+        return Run(self.final_path if complete else self.partial_path, complete, self._last_time, wall)
 
     def interrupt(self) -> None:
         """Stop after the present step."""
@@ -293,13 +289,17 @@ class Recorder:
         self._pulling_time += self.step * np.sum(self.channels.mesh_deflections(signals) < 0.0, axis=0)
         centre, rows = self.decimator.push(signals)
         times = self.step * (centre + self.decimator.factor * np.arange(len(rows), dtype=np.float64))
-        self.file.append(times, rows, float(t[-1]), self.balance)
-        self.file.checkpoint(
-            Checkpoint(
-                round(float(t[-1]) / self.step), q[-1], v[-1], self.decimator.pending, self.decimator.first,
-                self.balance, self._offset, self._pulling_time,
-            )
-        )  # fmt: skip
+        state = Checkpoint(
+            step=round(float(t[-1]) / self.step),
+            q=q[-1],
+            v=v[-1],
+            pending=self.decimator.pending,
+            pending_first=self.decimator.first,
+            balance=self.balance,
+            start_angle=self._offset,
+            pulling_time=self._pulling_time,
+        )
+        self.file.append(times, rows, float(t[-1]), state)
         self._filled = 0
         if self.progress is not None:
             self.progress(self._state_of_progress(float(t[-1])))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -105,6 +107,32 @@ def test_stopped_run_resumes_where_it_was(
         scale = float(np.abs(whole[name]).max())
         assert np.abs(data[name].to_numpy() - whole[name].to_numpy()).max() < 1e-9 * scale
     assert float(data.work_of_loads[-1]) == pytest.approx(float(whole.work_of_loads[-1]), rel=1e-9)
+
+
+KILLED = """
+import os, signal, sys
+import numpy as np
+import exugear.runup as runup
+from exugear.gearbox import Gearbox
+
+runup.FLUSH_INTERVAL = 0.005
+gearbox = Gearbox.from_toml(sys.argv[1])
+stiffness = {"sun_planet": 4e9, "ring_planet": 5e9, "intermediate": 3e9, "high_speed": 2e9}
+
+def kill(progress):
+    if progress.simulated > 0.012:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+runup.simulate(gearbox, "rigid", stiffness, sys.argv[2], duration=0.05, progress=kill)
+"""
+
+
+def test_killed_run_leaves_a_readable_file(grc: Gearbox, tmp_path: Path) -> None:
+    ended = subprocess.run([sys.executable, "-c", KILLED, grc.source, str(tmp_path)], check=False)
+    assert ended.returncode == -signal.SIGKILL
+    data = opened(tmp_path / "rigid" / "reference-line_of_action-assemblies" / "run.partial.nc")
+    assert 0.008 < float(data.time[-1]) < 0.02
+    assert data.attrs["complete"] == 0
 
 
 def test_resuming_another_run_is_refused(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
