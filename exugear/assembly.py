@@ -17,6 +17,7 @@ from functools import cached_property, lru_cache
 from typing import Literal, get_args
 
 import numpy as np
+import scipy.linalg
 from numpy.typing import ArrayLike, NDArray
 
 from exugear import bearings as rolling
@@ -60,6 +61,7 @@ class Assembly:
     connector_names, connectors : bearings (none in the variant `rigid`)
     spring_names, springs : torsional couplings
     inertia : mass properties; in the variant `rigid` the planets' orbit is in the carrier's
+    motions : (size, n) motions that are free; the identity, but for the law `rigid` the rolling ones
     """
 
     gearbox: Gearbox
@@ -76,6 +78,7 @@ class Assembly:
     spring_names: tuple[str, ...]
     springs: SpringArrays
     inertia: InertiaArrays
+    motions: Floats
 
     def has_six(self, body: Body) -> bool:
         """Tell whether a body has all six coordinates."""
@@ -224,10 +227,12 @@ def assemble(
     inertias = inertias or gearbox.case.default_inertias
     moving = [body for body in gearbox.bodies(inertias) if not body.fixed]
     _check_supports(gearbox, variant, moving)
+    if law == "rigid" and variant != "rigid":
+        raise VariantError(f"mesh law rigid: its gears only roll, which needs the variant rigid, not {variant}")
     six = [body for body in moving if variant != "rigid" and not body.spin_only]
     alone = [body for body in moving if body not in six]
     coordinates = _coordinates(six, alone)
-    elements = mesh_elements(gearbox, stiffness, law, inertias, flanks, angles)
+    elements = () if law == "rigid" else mesh_elements(gearbox, stiffness, law, inertias, flanks, angles)
     bodies = {body.name: body for body in gearbox.bodies(inertias)}
     return Assembly(
         gearbox=gearbox,
@@ -244,6 +249,7 @@ def assemble(
         spring_names=tuple(coupling.name for coupling in gearbox.couplings),
         springs=_springs(gearbox, coordinates),
         inertia=_inertia(variant, six, alone),
+        motions=_rolling_motions(gearbox, coordinates) if law == "rigid" else np.eye(6 * len(six) + len(alone)),
     )
 
 
@@ -282,6 +288,15 @@ def _inertia(variant: str, six: list[Body], alone: list[Body]) -> InertiaArrays:
         spin=np.arange(len(alone), dtype=np.int64) + 6 * len(six),
         spin_inertia=np.array([body.axial + orbiting[body.name] for body in alone]),
     )
+
+
+def _rolling_motions(gearbox: Gearbox, coordinates: Mapping[str, tuple[int, ...]]) -> Floats:
+    """Motions of the spins (size, n) in which no mesh closes; couplings may twist."""
+    rows = np.array([gearbox.mesh_row(mesh) for mesh in gearbox.meshes])
+    order = [coordinates[name][5] for name in gearbox.spinning]
+    motions = np.zeros((len(order), len(order) - np.linalg.matrix_rank(rows)))
+    motions[order] = scipy.linalg.null_space(rows / np.abs(rows).max(axis=1, keepdims=True))
+    return motions
 
 
 def _springs(gearbox: Gearbox, coordinates: Mapping[str, tuple[int, ...]]) -> SpringArrays:

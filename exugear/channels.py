@@ -225,4 +225,4 @@ def _joint_arrays(assembly: Assembly) -> tuple[Integers, Integers, Floats]:
         if body.carrier is not None:
             axis = np.array(body.axis) - np.array(bodies[body.carrier].axis)
             planets[n] = body.mass, axis[0], axis[1], assembly.spin[body.carrier]
-    return np.array(ends, dtype=np.int64), np.array(hosts, dtype=np.int64), planets
+    return np.array(ends, dtype=np.int64).reshape(-1, 2), np.array(hosts, dtype=np.int64), planets

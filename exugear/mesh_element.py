@@ -24,7 +24,7 @@ Laws
 ``seed``            tangential deflection at the pitch point; force T = (1, tan phi_n / cos beta, -tan beta)
 ``constant``        as line_of_action with the table's mean stiffness
 ``iso6336``         as line_of_action with the mean stiffness of ISO 6336-1 method B
-``rigid``           no deflection: the gears roll (rigid variant only)
+``rigid``           no deflection and no element: the gears roll, only couplings twist (variant `rigid`)
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ def mesh_stiffness(gearbox: Gearbox, law: str, directory: str | Path | None = No
     ----------
     gearbox : Gearbox
     law : str
-        ``iso6336`` needs no tables; every other law reads them.
+        ``iso6336`` and ``rigid`` need no tables; every other law reads them.
     directory : path, optional
         Results directory with ``tables/<pair>.nc``.
 
@@ -44,6 +44,8 @@ def mesh_stiffness(gearbox: Gearbox, law: str, directory: str | Path | None = No
     """
     at_work = {mesh.pair.name for mesh in gearbox.meshes}
     specs = {name: spec for name, spec in gearbox.pairs.items() if name in at_work}
+    if law == "rigid":
+        return {}
     if law == "iso6336":
         return {name: np.array([_iso(spec)]) for name, spec in specs.items()}
     if directory is None:

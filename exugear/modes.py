@@ -55,14 +55,12 @@ class Linearised:
     @property
     def total_stiffness(self) -> Floats:
         """Sum over all elements."""
-        total: Floats = np.sum(list(self.stiffness.values()), axis=0)
-        return total
+        return sum(self.stiffness.values(), start=np.zeros_like(self.mass))
 
     @property
     def total_damping(self) -> Floats:
         """Sum over all elements."""
-        total: Floats = np.sum(list(self.damping.values()), axis=0)
-        return total
+        return sum(self.damping.values(), start=np.zeros_like(self.mass))
 
 
 def linearise(assembly: Assembly, q: Floats) -> Linearised:
@@ -231,7 +229,7 @@ def modes_of(assembly: Assembly, preload: bool = True) -> Modes:
     if preload:
         q = locked_equilibrium(assembly, load.torques_N_m, load.locked, assembly.mean_meshes)
     linear = linearise(assembly, q)
-    frequency, shapes = undamped_modes(linear.mass, linear.total_stiffness)
+    frequency, shapes = undamped_modes(linear.mass, linear.total_stiffness, assembly.motions)
     masses = np.einsum("im,ij,jm->m", shapes, linear.mass, shapes)
     shapes = shapes / np.sqrt(masses)
     omega = 2.0 * np.pi * frequency
@@ -257,19 +255,21 @@ def modes_of(assembly: Assembly, preload: bool = True) -> Modes:
             mode_name(assembly, element_names, kinetic[m], strain[m]) if elastic[m] else "free rotation of the train"
             for m in range(frequency.size)
         ),
-        growth_rate=growth_rate(linear),
+        growth_rate=growth_rate(linear) if assembly.law != "rigid" else 0.0,
     )
 
 
-def undamped_modes(mass: Floats, stiffness: Floats) -> tuple[Floats, Floats]:
+def undamped_modes(mass: Floats, stiffness: Floats, motions: Floats | None = None) -> tuple[Floats, Floats]:
     """Solve M x'' + K x = 0 for frequencies (Hz, ascending) and real shapes; M diagonal, K any.
 
-    A preloaded connector or the law `seed` makes K unsymmetric. Equal frequencies may then come out as a
-    complex pair that differs from real by round-off; its real and imaginary parts span the same plane.
+    A preloaded connector or the law `seed` makes K unsymmetric. Equal frequencies may then come out as a complex pair
+    that differs from real by round-off; its real and imaginary parts span the same plane. `motions` (size, n) are
+    those that are free, all by default.
     """
     root = np.sqrt(np.diag(mass))
-    values, vectors = scipy.linalg.eig(stiffness / np.outer(root, root))
-    shapes = np.where(values.imag < 0.0, vectors.imag, vectors.real)
+    basis = scipy.linalg.orth(root[:, None] * (np.eye(len(mass)) if motions is None else motions))
+    values, vectors = scipy.linalg.eig(basis.T @ (stiffness / np.outer(root, root)) @ basis)
+    shapes = basis @ np.where(values.imag < 0.0, vectors.imag, vectors.real)
     order = np.argsort(values.real)
     frequency = np.sqrt(np.maximum(values.real[order], 0.0)) / (2.0 * np.pi)
     return frequency, shapes[:, order] / root[:, None]

@@ -80,19 +80,16 @@ def locked_equilibrium(
         The structure is free to move, or Newton's method does not converge.
     """
     held = [assembly.spin[name] for name in locked]
-    free = np.setdiff1d(np.arange(assembly.size), held)
+    free = assembly.motions @ scipy.linalg.null_space(assembly.motions[held])
     applied = assembly.torque_vector(torques)
     rest = np.zeros(assembly.size)
 
     def residual(x: Floats) -> Floats:
-        q = np.zeros(assembly.size)
-        q[free] = x
-        return (assembly.forces(q, rest, meshes) + applied)[free]
+        return free.T @ (assembly.forces(free @ x, rest, meshes) + applied)
 
-    q = np.zeros(assembly.size)
-    scale = np.full(free.size, _load_scale(applied))
-    q[free] = _newton(residual, np.zeros(free.size), scale, "static state")
-    return q
+    count = free.shape[1]
+    scale = np.full(count, _load_scale(applied))
+    return free @ _newton(residual, np.zeros(count), scale, "static state")
 
 
 def _load_scale(applied: Floats) -> float:
@@ -134,18 +131,21 @@ def accelerating_start(
         direction[assembly.spin[driven[0]]] = 1.0
         known_rate = driven[1] / unit[driven[0]]
     size = _load_scale(applied)
+    motions = assembly.motions
 
     def split(x: Floats) -> tuple[Floats, dict[str, float], float]:
         rate = known_rate if driven is not None else float(x[-1])
         torque = size * float(x[-1]) if driven is not None else 0.0
-        return x[:-1], {name: value * rate for name, value in unit.items()}, torque
+        return motions @ x[:-1], {name: value * rate for name, value in unit.items()}, torque
 
     def residual(x: Floats) -> Floats:
         q, rates, torque = split(x)
         v = assembly.rolling_velocity(q, speeds)
         needed = assembly.inertia_forces(q, v, assembly.rolling_acceleration(q, speeds, rates))
-        return np.append(assembly.forces(q, v) + applied + torque * direction - needed, size * q[pinned])
+        unbalanced = assembly.forces(q, v) + applied + torque * direction - needed
+        return np.append(motions.T @ unbalanced, size * q[pinned])
 
-    x = _newton(residual, np.zeros(assembly.size + 1), np.full(assembly.size + 1, size), "start of the run")
+    count = motions.shape[1] + 1
+    x = _newton(residual, np.zeros(count), np.full(count, size), "start of the run")
     q, rates, torque = split(x)
     return StartState(q, assembly.rolling_velocity(q, speeds), rates, torque)

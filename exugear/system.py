@@ -161,15 +161,18 @@ class ExudynSystem:
     # -- building ----------------------------------------------------------------------------------------
 
     def _add_minimal(self, q: Floats, v: Floats, with_meshes: bool) -> None:
-        """Build all spins as one object: masses, couplings, meshes and loads in one user function."""
-        assembly, springs = self.assembly, self.assembly.springs
+        """Build all spins as one object: masses, couplings, meshes and loads in one user function.
+
+        Its coordinates are the weights of the free motions: the spins themselves but for the law `rigid`.
+        """
+        assembly, springs, motions = self.assembly, self.assembly.springs, self.assembly.motions
         size = assembly.size
         node = self.mbs.AddNode(
             items.NodeGenericODE2(
-                referenceCoordinates=[0.0] * size,
-                initialCoordinates=q.tolist(),
-                initialCoordinates_t=v.tolist(),
-                numberOfODE2Coordinates=size,
+                referenceCoordinates=[0.0] * motions.shape[1],
+                initialCoordinates=np.linalg.lstsq(motions, q)[0].tolist(),
+                initialCoordinates_t=np.linalg.lstsq(motions, v)[0].tolist(),
+                numberOfODE2Coordinates=motions.shape[1],
             )
         )
         k, d = np.zeros((size, size)), np.zeros((size, size))
@@ -181,21 +184,22 @@ class ExudynSystem:
         loading = self.loading
         steady = loading.generalized(assembly, 0.0, q, v) if loading.is_constant else None
 
-        def force(mbs: Any, t: float, item: int, q: Any, v: Any) -> Floats:
-            x, y = np.array(q), np.array(v)
-            f = loading.generalized(assembly, t, x, y) if steady is None else steady.copy()
+        def force(mbs: Any, t: float, item: int, y: Any, rate: Any) -> Floats:
+            q, v = motions @ np.array(y), motions @ np.array(rate)
+            f = loading.generalized(assembly, t, q, v) if steady is None else steady.copy()
             if with_meshes:
-                add_forces(x, y, f)
-            return f
+                add_forces(q, v, f)
+            return f @ motions
 
+        has_jacobian = loading.drive is None and with_meshes and assembly.law != "rigid"
         self.mbs.AddObject(
             items.ObjectGenericODE2(
                 nodeNumbers=[node],
-                massMatrix=assembly.mass_matrix,
-                stiffnessMatrix=k,
-                dampingMatrix=d,
+                massMatrix=motions.T @ assembly.mass_matrix @ motions,
+                stiffnessMatrix=motions.T @ k @ motions,
+                dampingMatrix=motions.T @ d @ motions,
                 forceUserFunction=force,
-                jacobianUserFunction=jacobian if loading.drive is None and with_meshes else 0,
+                jacobianUserFunction=jacobian if has_jacobian else 0,
             )
         )
         self._nodes["*"] = node
@@ -357,11 +361,10 @@ class ExudynSystem:
     def state(self) -> tuple[float, Floats, Floats]:
         """Time (s), coordinates and velocities now."""
         data = self.mbs.systemData
-        return (
-            float(data.GetTime()),
-            np.array(data.GetODE2Coordinates())[self._order],
-            np.array(data.GetODE2Coordinates_t())[self._order],
-        )
+        q, v = np.array(data.GetODE2Coordinates()), np.array(data.GetODE2Coordinates_t())
+        if "*" in self._nodes:
+            return float(data.GetTime()), self.assembly.motions @ q, self.assembly.motions @ v
+        return float(data.GetTime()), q[self._order], v[self._order]
 
     # -- solving -----------------------------------------------------------------------------------------
 

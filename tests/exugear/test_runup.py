@@ -218,6 +218,14 @@ def test_wrong_torque_series_is_named(grc: Gearbox, stiffness: dict, tmp_path: P
         simulate(gearbox, "rigid", stiffness, tmp_path, load_case="measured", duration=0.01)
 
 
+def test_run_with_rigid_meshes(grc: Gearbox, tmp_path: Path) -> None:
+    data = opened(simulate(grc, "rigid", {}, tmp_path, mesh_law="rigid", duration=0.05).path)
+    assert data.sizes["mesh"] == 0
+    # Nothing yields between input and output but round-off of the angles.
+    assert float(np.abs(data.overall_dte).max()) < 1e-12
+    assert float(data.input_speed[-1]) == pytest.approx(-0.75 * 0.05, rel=2e-2)
+
+
 def test_unknown_load_case_is_named(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
     with pytest.raises(CaseError, match="no load case 'storm'"):
         simulate(grc, "rigid", stiffness, tmp_path, load_case="storm")

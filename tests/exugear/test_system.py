@@ -8,7 +8,7 @@ import pytest
 from exugear.assembly import Assembly, VariantError, assemble
 from exugear.gearbox import Gearbox
 from exugear.kernels import add_connector_forces, add_spring_forces
-from exugear.modes import linearise
+from exugear.modes import linearise, modes_of
 from exugear.statics import StartState, accelerating_start
 from exugear.system import ExudynSystem, Loading
 
@@ -142,3 +142,19 @@ def test_gravity_acts_on_the_masses(grc: Gearbox, stiffness: dict) -> None:
     add_connector_forces(rest, rest, assembly.connectors, f)
     add_spring_forces(rest, rest, assembly.springs, f)
     assert np.abs(f).max() < 1e-6  # N; nothing else acts at rest (round-off of the places)
+
+
+def test_rigid_meshes_leave_the_train_and_its_couplings(grc: Gearbox) -> None:
+    """Two bodies about one spring: everything geared together, and the brake behind its coupling."""
+    assembly = assemble(grc, "rigid", {}, "rigid")
+    assert assembly.motions.shape[1] == 2
+    spins = grc.rolling_speeds("carrier", grc.rolling_speeds("hss", 1.0)["carrier"])
+    referred = sum(assembly.mass_matrix[i, i] * spins[n] ** 2 for n, i in assembly.spin.items() if n != "brake")
+    frequency = np.sqrt(1e6 * (1 / 0.39 + 1 / referred)) / (2 * np.pi)
+    assert modes_of(assembly).frequency == pytest.approx([0.0, frequency], rel=1e-9)
+    start = accelerating_start(assembly, LOAD)
+    rows = trajectory(ExudynSystem(assembly, start.q, start.v, Loading(LOAD)), 400)
+    carrier = rows[-1, 1 + assembly.size + assembly.spin["carrier"]]
+    assert carrier == pytest.approx(start.rates["carrier"] * 0.01, rel=1e-9)
+    with pytest.raises(VariantError, match="needs the variant rigid"):
+        assemble(grc, "bushing", {}, "rigid")
