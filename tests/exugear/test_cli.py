@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import shutil
 import signal
@@ -20,7 +21,9 @@ from exugear.cli import app
 from exugear.console import BadInputError, FailedError, exit_codes
 from exugear.gearbox import Gearbox
 from exugear.tables import order_tables
-from fe_ste.table import MeshTable
+from fe_ste.contact import ContactSettings
+from fe_ste.hexmesh import MeshSettings
+from fe_ste.table import MeshTable, TableInput
 
 CASE = Path(__file__).parents[2] / "cases" / "grc750" / "gearbox.toml"
 
@@ -58,6 +61,19 @@ spur = { pair = "spur", pinion_body = "shaft_1", gear_body = "shaft_2" }
 [load_cases]
 still = { torques_N_m = { shaft_1 = 100.0 } }
 """
+
+
+@pytest.fixture(scope="module", autouse=True)
+def coarse_meshes():
+    """Few elements a tooth: what the numbers are worth is tested elsewhere."""
+    coarse = functools.partial(
+        TableInput,
+        mesh=MeshSettings(layers=4, flank=8, thickness=6),
+        contact=ContactSettings(slices=8),
+    )
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("exugear.tables.TableInput", coarse)
+        yield
 
 
 def exugear(*arguments):
