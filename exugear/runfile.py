@@ -17,6 +17,7 @@ import scipy.signal
 from numpy.typing import NDArray
 
 from exugear.channels import BALANCE_TERMS, Channels
+from exugear.kernels import compiled
 
 Floats = NDArray[np.float64]
 
@@ -24,6 +25,20 @@ TEXT = np.dtype("O", metadata={"vlen": str})
 """Text of any length, as HDF5 stores it."""
 TAPS_PER_FACTOR = 31
 """Length of the anti-aliasing filter per decimation factor: 80 dB above 0.58, flat below 0.42 of the rate."""
+
+
+@compiled
+def filter_rows(rows: Floats, taps: Floats, factor: int, out: Floats) -> None:
+    """Fill out (count, columns) with every so many rows, filtered by symmetric taps of unit sum (middle first)."""
+    half = taps.size - 1
+    for n in range(out.shape[0]):
+        middle = n * factor + half
+        for c in range(rows.shape[1]):
+            out[n, c] = rows[middle, c]
+        for k in range(1, taps.size):
+            if taps[k] != 0.0:
+                for c in range(rows.shape[1]):
+                    out[n, c] += taps[k] * (rows[middle - k, c] + rows[middle + k, c] - 2.0 * rows[middle, c])
 
 
 class Decimator:
@@ -52,6 +67,7 @@ class Decimator:
         window = ("kaiser", 8.0)
         taps = [1.0] if factor == 1 else scipy.signal.firwin(2 * self.half + 1, 1.0 / factor, window=window)
         self.taps = np.asarray(taps)
+        self.taps[np.abs(self.taps) < 1e-15] = 0.0  # every other one is, but for round-off, when halving the rate
         self.pending = np.zeros((0, count))
         self.first = 0  # number of the raw row that `pending` starts with
 
@@ -66,10 +82,9 @@ class Decimator:
             return centre, np.zeros((0, self.pending.shape[1]))
         begin = centre - self.half - self.first
         window = self.pending[begin : begin + (count - 1) * self.factor + len(self.taps)]
-        # Angles far from zero lose no digits: what is filtered is the difference from the first row.
-        base = window[0]
-        filtered = scipy.signal.upfirdn(self.taps, window - base, down=1, axis=0)
-        results = filtered[len(self.taps) - 1 :: self.factor][:count] + base
+        # Angles far from zero lose no digits: what is filtered is the difference from the middle row.
+        results = np.empty((count, window.shape[1]))
+        filter_rows(window, self.taps[self.half :], self.factor, results)
         following = centre + count * self.factor - self.half
         self.pending = self.pending[following - self.first :]
         self.first = following
@@ -140,15 +155,16 @@ class RunFile:
             if names:
                 variable[:] = np.array(names, dtype=object)
 
-    def append(self, times: Floats, rows: Floats, balance_time: float, state: Checkpoint) -> None:
-        """Append decimated samples, one line of the energy account, and the state to go on from."""
+    def append(self, times: Floats, rows: Floats, balance_times: Floats, balances: Floats, state: Checkpoint) -> None:
+        """Append decimated samples, lines of the energy account (n, terms), and the state to go on from."""
         with h5netcdf.File(self.path, "a") as file:
             self._append_samples(file, times, rows)
-            row = file.dimensions["balance_time"].size
-            file.resize_dimension("balance_time", row + 1)
-            file.variables["balance_time"][row] = balance_time
-            for term, value in zip(BALANCE_TERMS, state.balance, strict=True):
-                file.variables[term][row] = value
+            begin = file.dimensions["balance_time"].size
+            end = begin + len(balance_times)
+            file.resize_dimension("balance_time", end)
+            file.variables["balance_time"][begin:end] = balance_times
+            for term, values in zip(BALANCE_TERMS, balances.T, strict=True):
+                file.variables[term][begin:end] = values
             file.resize_dimension("pending", len(state.pending))
             if len(state.pending):
                 file.variables["state_pending"][: len(state.pending)] = state.pending

@@ -1,8 +1,9 @@
 """Load cases in time: start in balance, integrate, stream the results.
 
-Time step: the highest frequency asked for is the high-speed mesh at the top of the run-up, 6.4 kHz at 215 rpm of the
-GRC case. The classical Runge-Kutta method loses (w h)^5 / 144 of the amplitude per radian there; 25 us keep the error
-of a resonance peak near 0.2 %, and the highest eigenfrequency (7 kHz) far from the limit of stability, w h = 2.8.
+Two solvers take the same assembly: `exugear.compiled`, and Exudyn as the model of record. Both hand their states to
+one `Recorder`, which filters, accounts for energy and writes. Without a step asked for, `exugear.compiled.choose_step`
+finds the longest that is stable and keeps the excitation in the band: 6.4 kHz is the high-speed mesh of the GRC at
+215 rpm.
 """
 
 from __future__ import annotations
@@ -18,13 +19,23 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from exugear.assembly import Assembly, assemble
 from exugear.channels import BALANCE_TERMS, Channels
+from exugear.compiled import (
+    CompiledSystem,
+    DriveLaw,
+    LoadTable,
+    Observer,
+    choose_step,
+    highest_rate,
+    refusal,
+    unstable,
+)
 from exugear.gearbox import CaseError, Gearbox, LoadCase
 from exugear.mesh_element import Angles
 from exugear.runfile import Checkpoint, Decimator, RunFile
@@ -33,10 +44,16 @@ from exugear.system import Drive, ExudynSystem, Loading, MeshRoute, SolverFailur
 
 Floats = NDArray[np.float64]
 
-STEP = 2.5e-5
+Solver = Literal["compiled", "exudyn"]
+SOLVERS: tuple[str, ...] = get_args(Solver)
+
+BAND = 6.4e3
+"""Highest frequency whose amplitude is kept, Hz."""
 SAMPLE_RATE = 20e3
 FLUSH_INTERVAL = 0.25
 """Simulated time between writes to disk, s."""
+FLUSH_FACTOR = {"compiled": 4, "exudyn": 1}
+"""How many times this interval each solver goes without: opening the file costs as much as 2000 compiled steps."""
 
 
 class RunError(RuntimeError):
@@ -83,14 +100,16 @@ def simulate(
     mesh_law: str = "line_of_action",
     inertias: str | None = None,
     duration: float | None = None,
-    step: float = STEP,
+    step: float | None = None,
+    band: float = BAND,
     sample_rate: float = SAMPLE_RATE,
+    solver: Solver | None = None,
     mesh_route: MeshRoute = "element",
     angles: Angles = "reference",
     resume: bool = False,
     progress: Callable[[Progress], None] | None = None,
 ) -> Run:
-    """Run a load case in Exudyn and stream the results to ``<out>/<variant>/<...>/run.nc``.
+    """Run a load case and stream the results to ``<out>/<variant>/<...>/run.nc``.
 
     Parameters
     ----------
@@ -104,10 +123,14 @@ def simulate(
         As in the gearbox file and `exugear.mesh_element`.
     duration : float, optional
         Simulated time, s; the load case's by default.
-    step, sample_rate : float
-        Integration step (s) and stored rate (Hz); the rate must divide the steps.
+    step : float, optional
+        Integration step, s; chosen from `band` and the fastest eigenfrequency by default.
+    band, sample_rate : float
+        Highest frequency whose amplitude is kept, and stored rate, Hz; the rate must divide the steps.
+    solver : {"compiled", "exudyn"}, optional
+        The compiled one where it applies by default.
     mesh_route : {"element", "loads"}
-        See `exugear.system`.
+        See `exugear.system`; "loads" is Exudyn's alone.
     resume : bool
         Go on from the partial file of a stopped run.
     progress : callable, optional
@@ -121,7 +144,8 @@ def simulate(
     Raises
     ------
     RunError
-        A state that is not finite, a step that Exudyn cut, or nothing to resume.
+        The compiled solver does not take the variant or the step, a state that is not finite, a step that Exudyn
+        cut, or nothing to resume.
     """
     if load_case not in gearbox.load_cases:
         raise gearbox.fault(f"no load case {load_case!r}; load cases are {', '.join(gearbox.load_cases)}")
@@ -129,8 +153,20 @@ def simulate(
     assembly = assemble(gearbox, variant, stiffness, mesh_law, inertias, angles=angles)
     directory = run_directory(out, variant, load_case, mesh_law, assembly.inertias)
     total = case.duration if duration is None else duration
-    recorder = Recorder(assembly, case, directory, total, step, sample_rate, resume, progress)
+    chosen = _solver(solver, assembly, mesh_route)
+    step = choose_step(assembly, sample_rate, band) if step is None else step
+    recorder = Recorder(assembly, case, directory, total, step, band, sample_rate, chosen, resume, progress)
     return recorder.run(mesh_route)
+
+
+def _solver(asked: str | None, assembly: Assembly, mesh_route: str) -> str:
+    """Solver to take: the one asked for if it can, else the compiled one where it applies."""
+    if asked is not None and asked not in SOLVERS:
+        raise RunError(f"solver {asked!r} is unknown; solvers are {', '.join(SOLVERS)}")
+    reason = refusal(assembly) if mesh_route == "element" else "user-function loads exist in Exudyn only"
+    if asked == "compiled" and reason:
+        raise RunError(f"the compiled solver cannot run this: {reason}; use --solver exudyn")
+    return "exudyn" if reason else asked or "compiled"
 
 
 class Recorder:
@@ -143,12 +179,19 @@ class Recorder:
         directory: Path,
         total: float,
         step: float,
+        band: float,
         sample_rate: float,
+        solver: str,
         resume: bool,
         progress: Callable[[Progress], None] | None,
     ) -> None:
         self.assembly = assembly
         self.step = step
+        self.band = band
+        self.solver = solver
+        self._rate = highest_rate(assembly)
+        if solver == "compiled" and unstable(self._rate, step):
+            raise RunError(unstable(self._rate, step))
         self.steps = round(total / step)
         factor = max(1, round(1.0 / (step * sample_rate)))
         if abs(factor * step * sample_rate - 1.0) > 1e-9:
@@ -164,7 +207,7 @@ class Recorder:
         self.balance = np.zeros(len(BALANCE_TERMS))
         self._pulling_time = np.zeros(len(self.channels.mesh_names))
         self._powers: Floats | None = None
-        rows = max(1, round(FLUSH_INTERVAL / step))
+        rows = max(1, round(FLUSH_FACTOR[solver] * FLUSH_INTERVAL / step))
         self._q = np.empty((rows, assembly.size))
         self._v = np.empty((rows, assembly.size))
         self._t = np.empty(rows)
@@ -192,7 +235,8 @@ class Recorder:
             self.first_step = 0
             self.q, self.v, offset = _start(self.assembly, case, series)
             self.file = RunFile(self.partial_path, self.channels, self._attributes(case))
-        self.loading = _loading(case, series, offset, self.assembly.gearbox)
+        self.loads = _load_table(case, series, offset, self.assembly.gearbox)
+        self.observer = Observer(self.channels, self.loads)
         self._offset = offset
         self._skip_first = resume
 
@@ -209,9 +253,17 @@ class Recorder:
             "output_base_radius": self.channels.radius,
             "highest_order": max(gearbox.mesh_frequencies(2.0 * math.pi).values()),
             "step": self.step,
-            "solver": f"Exudyn {version('exudyn')}, {'generalized-alpha' if self._is_jointed else 'RK44'}",
+            "band": self.band,
+            "fastest_eigenvalue": self._rate,
+            "solver": self._solver_name,
             "complete": 0,
         }
+
+    @property
+    def _solver_name(self) -> str:
+        if self.solver == "compiled":
+            return "compiled, RK4"
+        return f"Exudyn {version('exudyn')}, {'generalized-alpha' if self._is_jointed else 'RK44'}"
 
     @property
     def _is_jointed(self) -> bool:
@@ -226,13 +278,11 @@ class Recorder:
     def run(self, mesh_route: MeshRoute) -> Run:
         """Integrate to the end, or to the first fault or interruption."""
         self._wall_start = time.perf_counter()
-        system = ExudynSystem(self.assembly, self.q, self.v, self.loading, mesh_route)
-        start = self.first_step * self.step
         with _interruption(self):
-            try:
-                system.run(start, self.steps - self.first_step, self.step, self._observe, not self._is_jointed)
-            except SolverFailure as error:
-                self._fault = self._fault or f"Exudyn gave up at t = {self._last_time:.6g} s: {error}"
+            if self.solver == "compiled":
+                self._integrate()
+            else:
+                self._integrate_in_exudyn(mesh_route)
             self._flush()
         complete = not self._stop and not self._fault
         if complete:
@@ -244,6 +294,33 @@ class Recorder:
             self.partial_path.replace(self.final_path)
         return Run(self.final_path if complete else self.partial_path, complete, self._last_time, wall)
 
+    def _integrate_in_exudyn(self, mesh_route: MeshRoute) -> None:
+        system = ExudynSystem(self.assembly, self.q, self.v, _loading(self.loads), mesh_route)
+        start = self.first_step * self.step
+        try:
+            system.run(start, self.steps - self.first_step, self.step, self._observe, not self._is_jointed)
+        except SolverFailure as error:
+            self._fault = self._fault or f"Exudyn gave up at t = {self._last_time:.6g} s: {error}"
+
+    def _integrate(self) -> None:
+        """Let the compiled solver fill the buffers, one call per flush."""
+        system = CompiledSystem(self.assembly, self.q, self.v, self.loads, self.step)
+        done = self.first_step
+        if not self._observe(done * self.step, self.q, self.v):
+            return
+        while done < self.steps and not self._stop and not self._fault:
+            end = min(self._filled + self.steps - done, len(self._t))
+            q, v = self._q[self._filled : end], self._v[self._filled : end]
+            good = system.advance(done, q, v)
+            if good < len(q):
+                self._fault = f"the state is not finite at t = {(done + good + 1) * self.step:.6g} s"
+            self._t[self._filled : self._filled + good] = self.step * np.arange(done + 1, done + good + 1)
+            self._filled += good
+            done += good
+            self._last_time = done * self.step
+            if self._filled == len(self._t):
+                self._flush()
+
     def interrupt(self) -> None:
         """Stop after the present step."""
         self._stop = True
@@ -253,7 +330,7 @@ class Recorder:
         if self._skip_first:  # the state resumed from is in the file already
             self._skip_first = False
             self._last_time, self._count = t, 0
-            self._powers = self._energies_and_powers(np.array([t]), q[None], v[None])[1]
+            self._powers = self.observer.observe(np.array([t]), q[None], v[None])[2]
             return True
         if not (np.isfinite(q).all() and np.isfinite(v).all()):
             self._fault = f"the state is not finite at t = {t:.6g} s"
@@ -284,8 +361,8 @@ class Recorder:
         if n == 0:
             return
         t, q, v = self._t[:n], self._q[:n], self._v[:n]
-        self._account(t, q, v)
-        signals = self.channels.sample(q, v)
+        signals, energies, powers = self.observer.observe(t, q, v)
+        balance_times, balances = self._account(t, energies, powers)
         self._pulling_time += self.step * np.sum(self.channels.mesh_deflections(signals) < 0.0, axis=0)
         centre, rows = self.decimator.push(signals)
         times = self.step * (centre + self.decimator.factor * np.arange(len(rows), dtype=np.float64))
@@ -299,7 +376,7 @@ class Recorder:
             start_angle=self._offset,
             pulling_time=self._pulling_time,
         )
-        self.file.append(times, rows, float(t[-1]), state)
+        self.file.append(times, rows, balance_times, balances, state)
         self._filled = 0
         if self.progress is not None:
             self.progress(self._state_of_progress(float(t[-1])))
@@ -311,26 +388,24 @@ class Recorder:
         remaining = wall * (end - now) / done if done > 0.0 else math.inf
         return Progress(now, end, wall, remaining)
 
-    def _account(self, t: Floats, q: Floats, v: Floats) -> None:
-        """Carry the account of energy on: energies as they are, powers integrated by the trapezoidal rule."""
-        energies, powers = self._energies_and_powers(t, q, v)
-        series = powers if self._powers is None else np.vstack([self._powers, powers])
-        added = self.step * (series[1:] + series[:-1]).sum(axis=0) / 2.0
-        self._powers = powers[-1:]
-        self.balance = self.balance.copy()
-        self.balance[[0, 3, 4, 5]] += added
-        self.balance[1:3] = energies[-1]
+    def _account(self, t: Floats, energies: Floats, powers: Floats) -> tuple[Floats, Floats]:
+        """Carry the account of energy on; times (s) and lines of it, (n, terms), to write.
 
-    def _energies_and_powers(self, t: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """Energies (samples, 2) in J, and the powers (samples, 4) that the account integrates, W."""
-        energies = self.channels.energies(q, v)
-        if self.loading.is_constant:
-            load = v @ self.loading.generalized(self.assembly, 0.0, q[0], v[0])
-        else:
-            states = zip(t, q, v, strict=True)
-            load = np.array([self.loading.generalized(self.assembly, float(at), x, y) @ y for at, x, y in states])
-        load = load + v @ self.assembly.weight
-        return energies[:, :2], np.column_stack([load, energies[:, 2:]])
+        Energies are taken as they are, powers integrated by the trapezoidal rule.
+        """
+        before = powers[:1] if self._powers is None else self._powers
+        series = np.vstack([before, powers])
+        lines = np.empty((len(t), len(BALANCE_TERMS)))
+        worked = self.balance[[0, 3, 4, 5]] + 0.5 * self.step * np.cumsum(series[1:] + series[:-1], axis=0)
+        if self._powers is None:
+            worked -= self.step * powers[0]  # no time passes before the first state
+        lines[:, [0, 3, 4, 5]] = worked
+        lines[:, 1:3] = energies
+        self._powers = powers[-1:]
+        self.balance = lines[-1]
+        stride = max(1, round(FLUSH_INTERVAL / self.step))
+        chosen = np.unique(np.append(np.arange(0, len(t), stride), len(t) - 1))
+        return t[chosen], lines[chosen]
 
 
 @contextmanager
@@ -377,22 +452,35 @@ def _driven_start_speed(gearbox: Gearbox, case: LoadCase) -> float:
     return unit[str(case.driven_body)] * case.start_speed
 
 
-def _loading(case: LoadCase, series: Mapping[str, tuple[Floats, Floats]], offset: float, gearbox: Gearbox) -> Loading:
+def _load_table(
+    case: LoadCase, series: Mapping[str, tuple[Floats, Floats]], offset: float, gearbox: Gearbox
+) -> LoadTable:
+    """Gather what acts from outside; a drive starts `offset` (rad) ahead."""
     drive = None
     if case.driven_body is not None and case.drive_stiffness is not None:
-        first, rate = _driven_start_speed(gearbox, case), _drive_rate(gearbox, case)
-        drive = Drive(
+        drive = DriveLaw(
             body=case.driven_body,
             stiffness=case.drive_stiffness,
             damping=gearbox.case.damping.coupling_time_s * case.drive_stiffness,
-            angle=lambda t: offset + first * t + 0.5 * rate * t * t,
-            speed=lambda t: first + rate * t,
+            angle=(offset, _driven_start_speed(gearbox, case), 0.5 * _drive_rate(gearbox, case)),
         )
-    return Loading(
-        constant=case.torques,
-        varying={name: _interpolator(times, values) for name, (times, values) in series.items()},
-        drive=drive,
-    )
+    return LoadTable(case.torques, series, drive)
+
+
+def _loading(loads: LoadTable) -> Loading:
+    """Express the same as functions of time, for Exudyn."""
+    drive = None
+    if loads.drive is not None:
+        ahead, speed, half = loads.drive.angle
+        drive = Drive(
+            body=loads.drive.body,
+            stiffness=loads.drive.stiffness,
+            damping=loads.drive.damping,
+            angle=lambda t: ahead + speed * t + half * t * t,
+            speed=lambda t: speed + 2.0 * half * t,
+        )
+    varying = {name: _interpolator(times, values) for name, (times, values) in loads.series.items()}
+    return Loading(loads.constant, varying, drive)
 
 
 def _interpolator(times: Floats, values: Floats) -> Callable[[float], float]:

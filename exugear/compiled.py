@@ -1,0 +1,366 @@
+"""The compiled solver: an assembly's equations integrated by the classical Runge-Kutta method without Exudyn.
+
+Same coordinates and same laws as the Exudyn system built from the same assembly (see `exugear.equations`), so that
+the trajectories differ by round-off only, a hundred times faster.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from exugear.assembly import Assembly
+from exugear.channels import Channels
+from exugear.equations import (
+    Bodies,
+    Connectors,
+    Equations,
+    Joints,
+    Loads,
+    Meshes,
+    Springs,
+    Work,
+    advance,
+    evaluate,
+    observe,
+)
+from exugear.gearbox import GROUND
+from exugear.modes import linearise, overall_row
+
+Floats = NDArray[np.float64]
+
+STABILITY_LIMIT = 2.6
+"""Below this |lambda| h the method is stable for every damped motion, oscillating or creeping."""
+STABLE = 2.0
+"""Chosen |lambda| h at most: leaves room for k(PMC) at its peaks."""
+ACCURATE = 1.02
+"""Allowed w h at the top of the band: the response to an excitation there is then 0.15 % in error."""
+ROUND_OFF = 1e-14
+"""Entries of a bearing's matrix this small beside its diagonal are left-overs of rotating it, and left out."""
+
+
+@dataclass(frozen=True)
+class DriveLaw:
+    """A machine that turns one body at an angle quadratic in time, behind a spring and damper.
+
+    Attributes
+    ----------
+    body : name of the driven body
+    stiffness, damping : N m/rad, N m s/rad
+    angle : coefficients of 1, t, t^2; rad, rad/s, rad/s2
+    """
+
+    body: str
+    stiffness: float
+    damping: float
+    angle: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class LoadTable:
+    """What acts from outside, as numbers: constant torques, torques linear between lines, a drive.
+
+    Attributes
+    ----------
+    constant : torque by body about +z, N m
+    series : by body times (s) and torques (N m)
+    drive : optional
+    """
+
+    constant: Mapping[str, float] = field(default_factory=dict)
+    series: Mapping[str, tuple[Floats, Floats]] = field(default_factory=dict)
+    drive: DriveLaw | None = None
+
+
+def refusal(assembly: Assembly) -> str:
+    """Reason why the compiled solver cannot take a variant, empty if it can.
+
+    Every body of an assembly is axially symmetric with its centre of mass on its axis and at its node, as the
+    equations need it; what is left to refuse are constraints.
+    """
+    if assembly.variant == "jointed":
+        return "the variant jointed keeps ideal joints as constraints, which an explicit method cannot solve"
+    return ""
+
+
+def highest_rate(assembly: Assembly) -> float:
+    """Largest |eigenvalue| (rad/s) of the linearised system at rest, mean mesh stiffness, damping included."""
+    linear = linearise(assembly, np.zeros(assembly.size))
+    free = assembly.motions
+    root = np.sqrt(np.diag(linear.mass))
+    basis = scipy.linalg.orth(root[:, None] * free) / root[:, None]  # free motions of unit mass
+    size = free.shape[1]
+    lower = np.hstack([-basis.T @ linear.total_stiffness @ basis, -basis.T @ linear.total_damping @ basis])
+    return float(np.abs(scipy.linalg.eigvals(np.vstack([np.eye(size, 2 * size, size), lower]))).max())
+
+
+def choose_step(assembly: Assembly, sample_rate: float, band: float) -> float:
+    """Longest step (s) that divides the sampling interval, is stable, and keeps excitation up to `band` (Hz).
+
+    The method answers an excitation of frequency w with a relative error of about 0.0015 (w h)^4.
+
+    Examples
+    --------
+    >>> from exugear.assembly import assemble
+    >>> from exugear.gearbox import Gearbox
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> stiffness = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
+    >>> choose_step(assemble(gearbox, "rigid", stiffness), sample_rate=20e3, band=6.4e3)
+    2.5e-05
+    """
+    longest = min(STABLE / max(highest_rate(assembly), 1e-9), ACCURATE / (2.0 * np.pi * band))
+    return float(1.0 / (sample_rate * np.ceil(1.0 / (sample_rate * longest) - 1e-9)))
+
+
+def unstable(rate: float, step: float) -> str:
+    """Reason why a step (s) is not stable for a largest eigenvalue `rate` (rad/s), empty if it is.
+
+    Examples
+    --------
+    >>> unstable(1e4, 2.5e-5)
+    ''
+    >>> unstable(2e5, 2.5e-5)
+    'step = 2.5e-05 s is not stable: the fastest motion has 2e+05 rad/s; use 1e-05 s or less'
+    """
+    if step * rate <= STABILITY_LIMIT:
+        return ""
+    longest = STABLE / rate
+    return f"step = {step:g} s is not stable: the fastest motion has {rate:.4g} rad/s; use {longest:.2g} s or less"
+
+
+class _Numbers:
+    """Numbering of bodies and of the coordinates whose sine is needed."""
+
+    def __init__(self, assembly: Assembly) -> None:
+        self.assembly = assembly
+        self.size = assembly.size
+        self.starts = [int(start) for start in assembly.inertia.body]
+        self.turning = [assembly.size]
+
+    def body(self, start: int) -> int:
+        """Find the number of the body that starts at a coordinate; the ground (-1) comes last."""
+        return len(self.starts) if start < 0 else self.starts.index(start)
+
+    def slot(self, coordinate: int) -> int:
+        """Place of a coordinate's sine, taken up if it is new; 0 for none."""
+        if coordinate < 0:
+            return 0
+        if coordinate not in self.turning:
+            self.turning.append(coordinate)
+        return self.turning.index(coordinate)
+
+
+def _connectors(numbers: _Numbers) -> tuple[Connectors, NDArray[np.int64]]:
+    """Connectors, and the slot of the sine of each body's spin where a connector needs it."""
+    given = numbers.assembly.connectors
+    ends = np.array([[numbers.body(int(s)) for s in pair] for pair in given.bodies], dtype=np.int64).reshape(-1, 2)
+    slots = np.zeros(len(numbers.starts) + 1, dtype=np.int64)
+    twisting = np.zeros(len(ends), dtype=np.int64)
+    first, entries = [0], []
+    for n, (i, j) in enumerate(ends):
+        stiffness, damping = _without_round_off(given.stiffness[n]), _without_round_off(given.damping[n])
+        twisting[n] = stiffness[:, 5].any()
+        for end, needed in ((i, True), (j, twisting[n] or given.local[n, 1, :2].any())):
+            if needed and end < len(numbers.starts):
+                slots[end] = numbers.slot(numbers.starts[end] + 5)
+        places = np.argwhere((stiffness != 0.0) | (damping != 0.0))
+        entries += [(r, c, stiffness[r, c], damping[r, c]) for r, c in places]
+        first.append(len(entries))
+    columns = list(zip(*entries, strict=True)) if entries else [(), (), (), ()]
+    connectors = Connectors(
+        ends=ends,
+        local=given.local,
+        gap=(given.place[:, 1] + given.local[:, 1]) - (given.place[:, 0] + given.local[:, 0]),
+        twisting=twisting,
+        first=np.array(first, dtype=np.int64),
+        row=np.array(columns[0], dtype=np.int64),
+        column=np.array(columns[1], dtype=np.int64),
+        stiffness=np.array(columns[2], dtype=np.float64),
+        damping=np.array(columns[3], dtype=np.float64),
+    )
+    return connectors, slots
+
+
+def _without_round_off(matrix: Floats) -> Floats:
+    """Set entries to zero that are nothing beside the translations' and the tilts' stiffness."""
+    size = np.sqrt(np.array([matrix.diagonal()[:3].max()] * 3 + [matrix.diagonal()[3:].max()] * 3))
+    small = np.abs(matrix) <= ROUND_OFF * np.outer(size, size)
+    return np.where(small, 0.0, matrix)
+
+
+def _meshes(numbers: _Numbers) -> Meshes:
+    given = numbers.assembly.meshes
+    place = given.place.copy()
+    place[given.coordinates[:, :12].reshape(-1, 2, 6)[:, :, 0] < 0] = 0.0
+    others = np.delete(given.coordinates[:, :12], [5, 11], axis=1)
+    return Meshes(
+        coordinates=np.where(given.coordinates < 0, numbers.size, given.coordinates),
+        slot=np.array([numbers.slot(int(c)) for c in given.coordinates[:, 12]], dtype=np.int64),
+        place=place,
+        deflection=given.deflection,
+        force=given.force,
+        conjugate=np.all(given.deflection == given.force, axis=1).astype(np.int64),
+        spinning=np.all(others < 0, axis=1).astype(np.int64),
+        cycles=given.cycles,
+        phase=given.phase,
+        pieces=given.pieces,
+        stiffness=given.stiffness,
+        damping=given.damping,
+        line_of_action=given.line_of_action,
+    )
+
+
+def _joints(numbers: _Numbers) -> Joints:
+    assembly = numbers.assembly
+    joints = assembly.gearbox.joints if assembly.variant == "rigid" else ()
+    bodies = {body.name: body for body in assembly.gearbox.bodies(assembly.inertias)}
+    number = {joint.body: n for n, joint in enumerate(joints)}
+    ends = [[number.get(e.mesh.pinion, -1), number.get(e.mesh.gear, -1)] for e in assembly.elements]
+    planet, carrier = np.zeros((len(joints), 3)), np.full(len(joints), numbers.size)
+    for n, joint in enumerate(joints):
+        body = bodies[joint.body]
+        if body.carrier is not None:
+            axis = np.array(body.axis) - np.array(bodies[body.carrier].axis)
+            planet[n] = body.mass, axis[0], axis[1]
+            carrier[n] = assembly.spin[body.carrier]
+    return Joints(
+        ends=np.array(ends, dtype=np.int64).reshape(-1, 2),
+        host=np.array([-1 if j.on == GROUND else number.get(j.on, -1) for j in joints], dtype=np.int64),
+        planet=planet,
+        carrier=carrier.astype(np.int64),
+        slot=np.array([numbers.slot(int(c)) if c < numbers.size else 0 for c in carrier], dtype=np.int64),
+    )
+
+
+def _loads(assembly: Assembly, loads: LoadTable) -> Loads:
+    series = list(loads.series.values())
+    drive = () if loads.drive is None else (loads.drive,)
+    return Loads(
+        steady=assembly.torque_vector(loads.constant) + assembly.weight,
+        coordinate=np.array([assembly.spin[name] for name in loads.series], dtype=np.int64),
+        first=np.cumsum([0] + [len(times) for times, _ in series]).astype(np.int64),
+        time=np.concatenate([np.zeros(0)] + [times for times, _ in series]),
+        torque=np.concatenate([np.zeros(0)] + [torques for _, torques in series]),
+        drive=np.array([assembly.spin[d.body] for d in drive], dtype=np.int64),
+        law=np.array([(d.stiffness, d.damping, *d.angle) for d in drive]).reshape(-1, 5),
+    )
+
+
+def equations_of(assembly: Assembly, loads: LoadTable) -> Equations:
+    """Arrays of an assembly under loads, as the compiled loops read them."""
+    numbers = _Numbers(assembly)
+    connectors, slots = _connectors(numbers)
+    meshes, joints = _meshes(numbers), _joints(numbers)
+    inertia, springs = assembly.inertia, assembly.springs
+    bodies = Bodies(
+        start=np.append(inertia.body, numbers.size),
+        slot=slots,
+        mass=inertia.mass,
+        transverse=inertia.transverse,
+        axial=inertia.axial,
+        spin=inertia.spin,
+        spin_inertia=inertia.spin_inertia,
+        inverse=_rolling_inverse(assembly) if assembly.law == "rigid" else np.zeros((0, 0)),
+        turning=np.array(numbers.turning, dtype=np.int64),
+    )
+    return Equations(
+        bodies=bodies,
+        connectors=connectors,
+        meshes=meshes,
+        springs=Springs(springs.coordinates, springs.stiffness, springs.damping),
+        loads=_loads(assembly, loads),
+        joints=joints,
+    )
+
+
+def _rolling_inverse(assembly: Assembly) -> Floats:
+    """Inverse mass matrix of spins that only roll: B (B^T M B)^-1 B^T with the free motions B."""
+    free, mass = assembly.motions, assembly.mass_matrix
+    inverse = free @ np.linalg.solve(free.T @ mass @ free, free.T)
+    return np.ascontiguousarray(inverse[np.ix_(assembly.inertia.spin, assembly.inertia.spin)])
+
+
+def work_for(equations: Equations, q: Floats, v: Floats) -> Work:
+    """Memory for the compiled loops, at the state q, v (size,)."""
+    none = np.zeros(6)
+    frames = np.zeros((equations.bodies.start.size, 16))
+    frames[-1, [0, 4, 8, 13, 15]] = 1.0  # the ground neither turns nor tilts
+    return Work(
+        q=np.append(q, none),
+        v=np.append(v, none),
+        stage_q=np.zeros(q.size + 6),
+        stage_v=np.zeros(q.size + 6),
+        force=np.zeros(q.size + 6),
+        rate=np.zeros(q.size + 6),
+        total=np.zeros(q.size + 6),
+        turns=np.zeros((equations.bodies.turning.size, 2)),
+        frames=frames,
+        wrench=np.zeros((equations.bodies.start.size, 6)),
+        motion=np.zeros((4, 6)),
+        gradient=np.zeros((2, 13)),
+        series=equations.loads.first[:-1].copy(),
+        states=np.zeros((equations.meshes.slot.size, 5)),
+    )
+
+
+class CompiledSystem:
+    """An assembly in motion.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    q, v : (size,) arrays
+        Initial coordinates and velocities.
+    loads : LoadTable
+    step : float
+        Time step, s; `unstable` tells whether it is stable.
+    """
+
+    def __init__(self, assembly: Assembly, q: Floats, v: Floats, loads: LoadTable, step: float) -> None:
+        self.step = step
+        self.equations = equations_of(assembly, loads)
+        self._size = assembly.size
+        self._work = work_for(self.equations, q, v)
+
+    def accelerations(self, time: float = 0.0) -> Floats:
+        """Accelerations (size,) at the present state and a time (s)."""
+        evaluate(time, self._work.q, self._work.v, self.equations, self._work)
+        return self._work.rate[: self._size].copy()
+
+    def advance(self, first: int, q: Floats, v: Floats) -> int:
+        """Fill q and v (steps, size) with the states after each step from step number `first` on.
+
+        Returns
+        -------
+        int
+            Number of steps that stayed finite.
+        """
+        return advance(first, self.step, self.equations, self._work, q, v)
+
+
+class Observer:
+    """Signals and energies of states by one compiled loop; columns as those of `exugear.channels.Channels`."""
+
+    def __init__(self, channels: Channels, loads: LoadTable) -> None:
+        assembly = channels.assembly
+        overall = assembly.gearbox.case.overall
+        self._count = channels.count
+        self._input = assembly.spin[overall.input]
+        self._overall = overall_row(assembly) / channels.radius
+        self._equations = equations_of(assembly, loads)
+        self._work = work_for(self._equations, np.zeros(assembly.size), np.zeros(assembly.size))
+
+    def observe(self, time: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:
+        """Signals (samples, count), energies (samples, 2) in J and powers (samples, 4) in W of states q, v.
+
+        The powers are those of the loads, damping, k(PMC), and non-conservative forces.
+        """
+        signals, energies = np.empty((len(time), self._count)), np.empty((len(time), 6))
+        signals[:, 0] = v[:, self._input]
+        signals[:, 1] = q @ self._overall
+        observe(time, q, v, self._equations, self._work, signals[:, 2:], energies)
+        return signals, energies[:, :2], energies[:, 2:]
