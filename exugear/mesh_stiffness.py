@@ -9,14 +9,11 @@ from numpy.typing import NDArray
 
 from exugear.gearbox import Gearbox, PairSpec
 from exugear.mesh_element import MeshError
+from exugear.tables import fitting_table, table_path
 from fe_ste.iso6336 import mesh_stiffness as iso_stiffness
+from fe_ste.table import TableError
 
 Floats = NDArray[np.float64]
-
-
-def table_path(directory: str | Path, pair: str) -> Path:
-    """Place of a pair's table: ``tables/<pair>.nc`` in the results directory."""
-    return Path(directory) / "tables" / f"{pair}.nc"
 
 
 def mesh_stiffness(gearbox: Gearbox, law: str, directory: str | Path | None = None) -> dict[str, Floats]:
@@ -33,7 +30,7 @@ def mesh_stiffness(gearbox: Gearbox, law: str, directory: str | Path | None = No
     Raises
     ------
     MeshError
-        A table is missing, holds unsolved positions, or belongs to another gear pair or torque.
+        A table is missing, holds unsolved positions, or was computed from another input.
 
     Examples
     --------
@@ -50,7 +47,7 @@ def mesh_stiffness(gearbox: Gearbox, law: str, directory: str | Path | None = No
         return {name: np.array([_iso(spec)]) for name, spec in specs.items()}
     if directory is None:
         raise MeshError(f"mesh law {law!r} needs STE tables: give the directory they were written to")
-    return {name: table_stiffness(table_path(directory, name), spec) for name, spec in specs.items()}
+    return {name: table_stiffness(gearbox, name, Path(directory)) for name in specs}
 
 
 def _iso(spec: PairSpec) -> float:
@@ -58,31 +55,14 @@ def _iso(spec: PairSpec) -> float:
     return iso_stiffness(spec.pair, tangential_force=force or None).stiffness
 
 
-def table_stiffness(path: Path, spec: PairSpec) -> Floats:
-    """Stiffness samples from a table at the pair's static torque, own centre distance, no misalignment."""
-    from fe_ste.table import MeshTable, TableError
-
+def table_stiffness(gearbox: Gearbox, name: str, directory: Path) -> Floats:
+    """Stiffness samples of a pair from its table, which must have been computed from exactly this case."""
     try:
-        dataset = MeshTable.open(path).dataset
+        dataset = fitting_table(gearbox, name, directory).dataset
     except TableError as error:
-        raise MeshError(f"pair {spec.name}: {error}; compute the tables first (exugear ste)") from None
-    point = dataset.sel(
-        torque=spec.static_torque,
-        centre_distance=spec.pair.centre_distance,
-        misalignment=0.0,
-        method="nearest",
-    )
-    for axis, wanted, tolerance in (
-        ("torque", spec.static_torque, 1e-3 * spec.static_torque),
-        ("centre_distance", spec.pair.centre_distance, 1e-5),
-        ("misalignment", 0.0, 1e-6),
-    ):
-        if abs(float(point[axis]) - wanted) > tolerance:
-            raise MeshError(
-                f"pair {spec.name}: {path} has {axis} = {float(point[axis]):g}, the gearbox needs {wanted:g}; "
-                "compute the tables of this case again"
-            )
+        raise MeshError(f"pair {name}: {error} (exugear ste)") from None
+    point = dataset.isel(torque=0, centre_distance=0, misalignment=0)
     if not bool(np.all(point["converged"])):
         unsolved = int(np.sum(~point["converged"].to_numpy().astype(bool)))
-        raise MeshError(f"pair {spec.name}: {path} holds {unsolved} unsolved positions")
+        raise MeshError(f"pair {name}: {table_path(directory, name)} holds {unsolved} unsolved positions")
     return np.asarray(point["mesh_stiffness"].to_numpy(), dtype=np.float64)

@@ -28,6 +28,7 @@ from exugear.kernels import (
     add_spring_forces,
 )
 from exugear.mesh_element import Angles
+from exugear.results import input_hash
 from exugear.statics import locked_equilibrium
 
 Floats = NDArray[np.float64]
@@ -161,6 +162,7 @@ class Modes:
             "variant": assembly.variant,
             "mesh_law": assembly.law,
             "inertias": assembly.inertias,
+            "input_hash": input_hash(assembly),
             "housing_factor": assembly.gearbox.case.housing.factor,
             "growth_rate": self.growth_rate,
         }

@@ -38,19 +38,30 @@ def order_lines(gearbox: Gearbox, count: int = 3) -> tuple[OrderLine, ...]:
     return tuple(lines)
 
 
-def run_waterfall(path: str | Path) -> Waterfall:
-    """Waterfall of the overall DTE of a run; the window suits its fastest first-order sweep.
+def run_waterfall(path: str | Path, window_length: float | None = None) -> Waterfall:
+    """Waterfall of the overall DTE of a run-up.
 
     Parameters
     ----------
     path : path
         ``run.nc`` of a run-up.
+    window_length : float, optional
+        s; what suits the fastest first-order sweep by default. Runs to be compared need the same.
+
+    Raises
+    ------
+    ValueError
+        The speed does not change, so that nothing says how long a window should be, or the run is too short.
     """
     with xr.open_dataset(path, engine="h5netcdf") as data:
         time = data["time"].to_numpy()
         speed = data["input_speed"].to_numpy()
         values = data["overall_dte"].to_numpy()
         highest_order = float(data.attrs["highest_order"])
-    sweep = highest_order * abs(np.ptp(speed)) / (2.0 * math.pi * np.ptp(time))
+    if time.size < 2:
+        raise ValueError(f"{path}: holds {time.size} samples, too few for a spectrum; run for longer")
+    if window_length is None:
+        sweep = highest_order * abs(np.ptp(speed)) / (2.0 * math.pi * np.ptp(time))
+        window_length = sweep_matched_window(sweep)
     rate = (time.size - 1) / float(np.ptp(time))
-    return waterfall(values, speed, rate, window_length=sweep_matched_window(sweep))
+    return waterfall(values, speed, rate, window_length=window_length)

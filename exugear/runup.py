@@ -38,6 +38,7 @@ from exugear.compiled import (
 )
 from exugear.gearbox import CaseError, Gearbox, LoadCase
 from exugear.mesh_element import Angles
+from exugear.results import input_hash
 from exugear.runfile import Checkpoint, Decimator, RunFile
 from exugear.statics import accelerating_start
 from exugear.system import Drive, ExudynSystem, Loading, MeshRoute, SolverFailure
@@ -248,6 +249,7 @@ class Recorder:
             "load_case": case.name,
             "mesh_law": assembly.law,
             "inertias": assembly.inertias,
+            "input_hash": input_hash(assembly, case.name),
             "housing_factor": gearbox.case.housing.factor,
             "ratio": gearbox.ratio,
             "output_base_radius": self.channels.radius,

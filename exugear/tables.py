@@ -96,12 +96,48 @@ def order_tables(
     return [_order(gearbox, name, out, positions or gearbox.ste.positions) for name in dict.fromkeys(chosen)]
 
 
-def _order(gearbox: Gearbox, name: str, out: Path, positions: int) -> TableOrder:
+def table_path(out: Path, name: str) -> Path:
+    """Place of a pair's table: ``tables/<pair>.nc`` in the results folder."""
+    return out / TABLE_FOLDER / f"{name}.nc"
+
+
+def wanted_table(gearbox: Gearbox, name: str, positions: int) -> TableInput:
+    """All that the numbers of a pair's table depend on."""
     spec = gearbox.pairs[name]
     # Statics leave rounding in the torque; another machine's must not make another hash of it.
     torque = float(f"{spec.static_torque:.12g}")
-    wanted = TableInput(pair=spec.pair, torque=(torque,), positions=positions)
-    path = out / TABLE_FOLDER / f"{name}.nc"
+    return TableInput(pair=spec.pair, torque=(torque,), positions=positions)
+
+
+def fitting_table(gearbox: Gearbox, name: str, out: Path) -> MeshTable:
+    """Read the table of a pair, however many positions it has, if all else is the case's.
+
+    Raises
+    ------
+    fe_ste.table.TableError
+        The file is missing, unreadable, or was computed from another input.
+    """
+    path = table_path(out, name)
+    table = MeshTable.open(path)
+    if table.input_hash != wanted_table(gearbox, name, table.dataset.sizes["pmc"]).hash:
+        raise TableError(f"{path}: was computed from another input; compute it again")
+    return table
+
+
+def missing_tables(gearbox: Gearbox, out: Path) -> list[TableOrder]:
+    """List the tables that dynamics need and that are not there, or belong to another input."""
+    orders = []
+    for name in dict.fromkeys(mesh.pair.name for mesh in gearbox.meshes):
+        try:
+            fitting_table(gearbox, name, out)
+        except TableError:
+            orders += order_tables(gearbox, out, [name])
+    return orders
+
+
+def _order(gearbox: Gearbox, name: str, out: Path, positions: int) -> TableOrder:
+    wanted = wanted_table(gearbox, name, positions)
+    path = table_path(out, name)
     if not path.exists():
         return TableOrder(name, wanted, path, None)
     try:
