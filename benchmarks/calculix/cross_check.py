@@ -1,0 +1,266 @@
+"""Static transmission error by the superelement and by CalculiX on the same open sectors.
+
+Run ``python benchmarks/calculix/cross_check.py`` for all cases, or with names of cases; it renews their entries
+in ``results.json``. See README.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import math
+import platform
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from ccx_model import CalculixSettings, placed_sectors, run_calculix, write_input
+from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline
+
+from fe_ste.contact import (
+    Cells,
+    ContactSettings,
+    FlankPair,
+    SlicedCompliance,
+    compliance_matrix,
+    lay_cells,
+    solve_complementarity,
+)
+from fe_ste.elasticity import FlankCompliance, flank_compliance
+from fe_ste.gears import BasicRack, Gear, GearPair
+from fe_ste.hexmesh import MeshSettings
+from fe_ste.ste import hertz_half_width, least_contact_length
+
+FloatArray = NDArray[np.float64]
+
+RESULTS = Path(__file__).with_name("results.json")
+TEETH = 3
+#: Mesh stiffness per face width from which the search for the cells in contact starts, Pa; no result depends on it.
+_USUAL_STIFFNESS = 14e9
+
+
+def spur_pair() -> GearPair:
+    """Two equal spur gears, 50 teeth, module 3 mm, 20 mm wide, held at 100 mm diameter."""
+    gear = Gear(name="spur", teeth=50, normal_module=3e-3, face_width=20e-3, held_diameter=100e-3)
+    return GearPair(name="spur", pinion=gear, gear=gear, centre_distance=150e-3)
+
+
+def _grc_gear(name: str, teeth: int, hand: int, shift: float, held_diameter: float, internal: bool = False) -> Gear:
+    """Gear of the planetary stage of the GRC 750 gearbox at 60 mm face width."""
+    return Gear(
+        name=name,
+        teeth=teeth,
+        normal_module=10e-3,
+        helix_angle=hand * math.radians(7.495),
+        profile_shift=shift,
+        face_width=60e-3,
+        held_diameter=held_diameter,
+        internal=internal,
+        rack=BasicRack(addendum=1.0, dedendum=1.46, tip_radius=0.36),
+        tooth_thinning=0.2e-3,
+    )
+
+
+def helical_pair() -> GearPair:
+    """Sun and planet of the GRC 750 gearbox (21/39) at 60 mm face width."""
+    sun, planet = _grc_gear("sun", 21, 1, 0.176, 120e-3), _grc_gear("planet", 39, -1, 0.399, 290e-3)
+    return GearPair(name="helical", pinion=sun, gear=planet, centre_distance=308e-3)
+
+
+def internal_pair() -> GearPair:
+    """Planet and ring of the GRC 750 gearbox (39/99) at 60 mm face width."""
+    planet = _grc_gear("planet", 39, -1, 0.399, 290e-3)
+    ring = _grc_gear("ring", 99, -1, 0.974, 1166e-3, internal=True)
+    return GearPair(name="internal", pinion=planet, gear=ring, centre_distance=308e-3)
+
+
+PAIRS = {"spur": spur_pair, "helical": helical_pair, "internal": internal_pair}
+
+
+@dataclass(frozen=True)
+class Case:
+    """One position of one pair on one mesh.
+
+    Parameters
+    ----------
+    pair : str
+        Key of `PAIRS`.
+    torque : float
+        On gear 1, N m.
+    pmc : float
+    mesh : MeshSettings
+    calculix : CalculixSettings
+    """
+
+    pair: str
+    torque: float
+    pmc: float
+    mesh: MeshSettings
+    calculix: CalculixSettings = CalculixSettings()
+
+
+def open_sector_approach(
+    pair: GearPair, flanks: tuple[FlankCompliance, FlankCompliance], torque: float, pmc: float, contact: ContactSettings
+) -> float:
+    """Compute the static transmission error (m) with each tooth's own compliance, that of the end teeth included."""
+    one, two = pair.pinion, pair.gear
+    edges = np.linspace(-pair.face_width / 2, pair.face_width / 2, contact.slices + 1)
+    axial = (edges[1:] + edges[:-1]) / 2
+    cosine = math.cos(one.base_helix_angle)
+    load = torque / (one.base_radius * cosine)
+    kinematics = FlankPair.from_pair(pair, flanks[0].roll[0], flanks[0].roll[-1])
+    window = contact.window * hertz_half_width(pair, load / least_contact_length(pair))
+    last = max(read for read, _ in flanks[0].regular)
+    teeth = np.arange(-last, last + 1)
+    cells = lay_cells(kinematics, pmc * one.angular_pitch, teeth, axial, window, contact.cells)
+    reckoned = load / (_USUAL_STIFFNESS * pair.face_width)
+    cells = cells.select(cells.gap - cells.gap.min() < 6.0 * reckoned)
+    matrix = compliance_matrix(cells, kinematics, axial, flanks, _no_regular_part(flanks, axial, 2 * last))
+    senses = (1, 1 if two.internal else -1)
+    for flank, sense, roll in zip(flanks, senses, (cells.roll, cells.gear_roll), strict=True):
+        matrix += _regular_part(flank, cells, sense * cells.tooth, roll, axial)
+    solution = solve_complementarity(matrix, cells.gap, load, cells.gap - cells.gap.min() < reckoned)
+    return solution.approach / cosine
+
+
+def _regular_part(
+    flank: FlankCompliance, cells: Cells, tooth: NDArray[np.int64], roll: FloatArray, axial: FloatArray
+) -> FloatArray:
+    """Regular compliance between all cells, interpolated by cubic splines on the flank grid."""
+    arc = flank.gear.base_radius * flank.roll**2 / 2.0
+    at = np.clip(flank.gear.base_radius * roll**2 / 2.0, arc[0], arc[-1])
+    along_roll = make_interp_spline(arc, np.eye(len(arc)), k=3)(at)
+    along_axis = make_interp_spline(flank.axial, np.eye(len(flank.axial)), k=3)(axial[cells.layer])
+    weights = (along_roll[:, :, None] * along_axis[:, None, :]).reshape(len(roll), -1)
+    result = np.zeros((len(roll), len(roll)))
+    for read in np.unique(tooth):
+        for loaded in np.unique(tooth):
+            rows, columns = tooth == read, tooth == loaded
+            block = weights[rows] @ flank.between(int(read), int(loaded)) @ weights[columns].T
+            result[np.ix_(rows, columns)] = block
+    return (result + result.T) / 2
+
+
+def _no_regular_part(
+    flanks: tuple[FlankCompliance, FlankCompliance], axial: FloatArray, reach: int
+) -> tuple[SlicedCompliance, SlicedCompliance]:
+    """Tables of zeros: they leave the half-space part of the compliance matrix alone."""
+
+    def zeros(flank: FlankCompliance) -> SlicedCompliance:
+        arc = flank.gear.base_radius * flank.roll**2 / 2.0
+        knots = make_interp_spline(arc, np.zeros_like(arc), k=3).t
+        shape = (2 * reach + 1, len(axial), len(axial), len(arc), len(arc))
+        return SlicedCompliance(np.broadcast_to(0.0, shape), knots, reach, 1, flank.gear.base_radius)
+
+    return zeros(flanks[0]), zeros(flanks[1])
+
+
+def superelement(case: Case, contact: ContactSettings | None = None) -> dict[str, float]:
+    """Solve a case by the superelement: static transmission error and processor times."""
+    pair = PAIRS[case.pair]()
+    started = time.process_time()
+    one, two = (
+        flank_compliance(gear, side, case.mesh, open_teeth=TEETH)
+        for gear, side in ((pair.pinion, 1), (pair.gear, -1 if pair.gear.internal else 1))
+    )
+    offline = time.process_time() - started
+    started = time.process_time()
+    ste = open_sector_approach(pair, (one, two), case.torque, case.pmc, contact or ContactSettings())
+    return {"ste_um": 1e6 * ste, "offline_cpu_s": offline, "position_cpu_s": time.process_time() - started}
+
+
+def calculix(case: Case, expected: float, folder: Path, threads: int = 1) -> dict[str, float | int | str]:
+    """Solve a case by CalculiX; `expected` (m) only sets how far the first step closes the flanks."""
+    pair = PAIRS[case.pair]()
+    sectors = placed_sectors(pair, case.mesh, TEETH, case.pmc)
+    path = folder / "pair.inp"
+    write_input(path, pair, sectors, case.torque, expected, case.calculix)
+    result = run_calculix(path, pair, 3 * sum(len(sector.points) for sector in sectors), threads)
+    return {
+        "ste_um": 1e6 * result.ste,
+        "unknowns": result.unknowns,
+        "position_cpu_s": result.processor_time,
+        "position_wall_s": result.wall_time,
+        "iterations": result.iterations,
+        "version": result.version,
+        "threads": threads,
+    }
+
+
+def compare(case: Case, threads: int = 1) -> dict[str, Any]:
+    """Both methods on one case, as stored."""
+    ours = superelement(case)
+    with tempfile.TemporaryDirectory() as folder:
+        theirs = calculix(case, 1e-6 * ours["ste_um"], Path(folder), threads)
+    difference = ours["ste_um"] / float(theirs["ste_um"]) - 1.0
+    return {
+        "case": dataclasses.asdict(case),
+        "open_teeth": TEETH,
+        "calculix": theirs,
+        "superelement": ours,
+        "difference_percent": 100.0 * difference,
+        "machine": f"{platform.system()} {platform.machine()}",
+    }
+
+
+def _mesh(layers: int, flank: int) -> MeshSettings:
+    return MeshSettings(layers=layers, flank=flank, thickness=6, fillet=3, root=3, rim=6)
+
+
+_COARSE = _mesh(5, 16)
+_FINE = MeshSettings(layers=4, flank=32, thickness=8, fillet=6, root=5, rim=12, grading=6.0)
+_LARGE = CalculixSettings(large_displacements=True)
+_SOFT = CalculixSettings(contact_stiffness=50.0)
+
+CASES = {
+    "spur 0 coarse": Case("spur", 340.0, 0.0, _COARSE),
+    "spur 0 flank 32": Case("spur", 340.0, 0.0, _mesh(5, 32)),
+    "spur 0 flank 64": Case("spur", 340.0, 0.0, _mesh(4, 64)),
+    "spur 0 fine": Case("spur", 340.0, 0.0, _FINE),
+    "spur 0.5 coarse": Case("spur", 340.0, 0.5, _COARSE),
+    "spur 0.5 fine": Case("spur", 340.0, 0.5, _FINE),
+    "spur 0 coarse, large displacements": Case("spur", 340.0, 0.0, _COARSE, _LARGE),
+    "spur 0 coarse, soft contact": Case("spur", 340.0, 0.0, _COARSE, _SOFT),
+    "helical 0 flank 16": Case("helical", 5400.0, 0.0, _mesh(6, 16)),
+    "helical 0 flank 24": Case("helical", 5400.0, 0.0, _mesh(9, 24)),
+    "helical 0 flank 32": Case("helical", 5400.0, 0.0, _mesh(12, 32)),
+    "helical 0 flank 48, 6 layers": Case("helical", 5400.0, 0.0, _mesh(6, 48)),
+    "helical 0.5 flank 16": Case("helical", 5400.0, 0.5, _mesh(6, 16)),
+    "helical 0.5 flank 24": Case("helical", 5400.0, 0.5, _mesh(9, 24)),
+    "internal 0 flank 16": Case("internal", 10000.0, 0.0, _mesh(6, 16)),
+    "internal 0 flank 32": Case("internal", 10000.0, 0.0, _mesh(6, 32)),
+}
+
+
+def stored() -> dict[str, dict[str, Any]]:
+    """Results by name of the case."""
+    if not RESULTS.exists():
+        return {}
+    results: dict[str, dict[str, Any]] = json.loads(RESULTS.read_text(encoding="utf-8"))
+    return results
+
+
+def main() -> None:
+    """Run the cases named on the command line and store their results."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("cases", nargs="*", help="names of cases; all, if none is given")
+    parser.add_argument("--threads", type=int, default=1, help="threads of ccx")
+    arguments = parser.parse_args()
+    for name in arguments.cases or CASES:
+        entry = compare(CASES[name], arguments.threads)
+        RESULTS.write_text(json.dumps(stored() | {name: entry}, indent=1) + "\n", encoding="utf-8")
+        ours, theirs = entry["superelement"]["ste_um"], entry["calculix"]["ste_um"]
+        sys.stdout.write(
+            f"{name}: superelement {ours:.3f} um, CalculiX {theirs:.3f} um, {entry['difference_percent']:+.2f} %\n"
+        )
+        sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()
