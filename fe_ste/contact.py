@@ -476,9 +476,9 @@ def solve_complementarity(
         if not active.any():
             active = gap == gap.min()
         force, approach, per_load = _solve_active(compliance, gap, load, active)
-        if not math.isfinite(approach):  # comparisons with it would all pass
-            raise ContactError("the contact problem holds values that are not numbers")
         clearance = compliance @ force + gap - approach
+        if np.isnan(clearance).any():  # every comparison below would pass
+            raise ContactError("the contact problem holds values that are not numbers")
         tolerance = 1e-12 * max(abs(approach), 1e-12)
         wrong = np.where(active, force < 0.0, clearance < -tolerance)
         if not wrong.any():
