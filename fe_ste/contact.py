@@ -271,13 +271,13 @@ def _add_regular(
     first: IntArray,
     weights: FloatArray,
     table: FloatArray,
-    reach: int,
-    sense: int,
+    number: IntArray,
+    first_tooth: int,
 ) -> None:
-    """Add the regular compliance of one gear, ``table[offset + reach, slice, slice, roll spline, roll spline]``."""
+    """Add the regular compliance of one gear, see `SlicedCompliance`."""
     for i in range(len(tooth)):
         for j in range(i + 1):
-            block = table[sense * (tooth[i] - tooth[j]) + reach, layer[i], layer[j]]
+            block = table[number[tooth[i] - first_tooth, tooth[j] - first_tooth], layer[i], layer[j]]
             total = 0.0
             for a in range(4):
                 row = 0.0
@@ -300,42 +300,72 @@ class SlicedCompliance:
 
     Attributes
     ----------
-    table : ndarray (2 reach + 1, slices, slices, f, f)
-        m/N, by tooth offset.
+    table : ndarray (blocks, slices, slices, f, f)
+        m/N.
+    number : ndarray (t, t)
+        Block of (tooth pair read, tooth pair loaded); in a closed ring their difference decides.
+    first_tooth : int
+        Tooth pair of row and column 0 of `number`.
     knots : ndarray
         Knots of the cubic splines over the arc length u = r_b roll^2 / 2, m.
-    reach : int
-    sense : int
-        Sense in which this gear's tooth numbers run with the tooth pairs.
+    base_radius : float
+        m.
     """
 
     table: FloatArray
+    number: IntArray
+    first_tooth: int
     knots: FloatArray
-    reach: int
-    sense: int
     base_radius: float
 
     @classmethod
-    def from_flank(cls, flank: FlankCompliance, axial: FloatArray, sense: int, reach: int) -> SlicedCompliance:
-        """Contract `flank` onto slices at `axial`; ``reach`` is the largest difference of tooth pairs in contact."""
+    def from_flank(
+        cls, flank: FlankCompliance, axial: FloatArray, sense: int, teeth: IntArray, reach: int
+    ) -> SlicedCompliance:
+        """Contract `flank` onto slices.
+
+        Parameters
+        ----------
+        flank : FlankCompliance
+        axial : ndarray
+            Middle of the slices, m.
+        sense : int
+            Sense in which this gear's tooth numbers run with the tooth pairs.
+        teeth : ndarray
+            Consecutive tooth pairs that may touch.
+        reach : int
+            Largest difference of tooth pairs in contact at once.
+        """
         arc = flank.gear.base_radius * flank.roll**2 / 2.0
         along_roll = make_interp_spline(arc, np.eye(len(arc)), k=3)
         at_slices = make_interp_spline(flank.axial, np.eye(len(flank.axial)), k=3)(axial)
-        shape = (len(arc), len(flank.axial))
-        blocks = []
-        for offset in range(-reach, reach + 1):
-            block = flank.between(offset, 0).reshape(*shape, *shape)
-            block = np.einsum("ka,paqb->pkqb", at_slices, block, optimize=True)
-            block = np.einsum("lb,pkqb->klpq", at_slices, block, optimize=True)
-            block = np.einsum("rp,klpq->klrq", along_roll.c, block, optimize=True)
-            blocks.append(np.einsum("sq,klrq->klrs", along_roll.c, block, optimize=True))
-        return cls(np.ascontiguousarray(blocks), along_roll.t, reach, sense, flank.gear.base_radius)
+        keys: list[tuple[int, int]] = []
+        number = np.full((len(teeth), len(teeth)), -1, dtype=np.int64)
+        for row, read in enumerate(teeth):
+            for column, loaded in enumerate(teeth):
+                if abs(read - loaded) <= reach:
+                    key = flank.key(int(sense * read), int(sense * loaded))
+                    if key not in keys:
+                        keys.append(key)
+                    number[row, column] = keys.index(key)
+        blocks = [_contracted(flank.regular[key], at_slices, along_roll.c) for key in keys]
+        return cls(np.array(blocks), number, int(teeth[0]), along_roll.t, flank.gear.base_radius)
 
     def weights(self, roll: FloatArray) -> tuple[IntArray, FloatArray]:
         """First spline and the four spline values at each roll angle."""
         arc = np.clip(self.base_radius * roll**2 / 2.0, self.knots[0], self.knots[-1])
         rows = BSpline.design_matrix(arc, self.knots, 3)
         return rows.indices.reshape(-1, 4)[:, 0].astype(np.int64), rows.data.reshape(-1, 4)
+
+
+def _contracted(block: FloatArray, at_slices: FloatArray, to_splines: FloatArray) -> FloatArray:
+    """Turn nodal values on the flank grid (f l, f l) into spline coefficients at the slices (k, k, f, f)."""
+    rolls, layers = len(to_splines), at_slices.shape[1]
+    values = block.reshape(rolls, layers, rolls, layers)
+    values = np.einsum("ka,paqb->pkqb", at_slices, values, optimize=True)
+    values = np.einsum("lb,pkqb->klpq", at_slices, values, optimize=True)
+    values = np.einsum("rp,klpq->klrq", to_splines, values, optimize=True)
+    return np.ascontiguousarray(np.einsum("sq,klrq->klrs", to_splines, values, optimize=True))
 
 
 @dataclass(frozen=True)
@@ -423,7 +453,7 @@ def compliance_matrix(
     )
     for part, roll in zip(sliced, (cells.roll, cells.gear_roll), strict=True):
         first, weights = part.weights(roll)
-        _add_regular(matrix, cells.tooth, cells.layer, first, weights, part.table, part.reach, part.sense)
+        _add_regular(matrix, cells.tooth, cells.layer, first, weights, part.table, part.number, part.first_tooth)
     _mirror_lower(matrix)
     return matrix
 

@@ -162,10 +162,19 @@ class FlankCompliance:
         ValueError
             If the teeth are further apart than was computed, or outside the open sector.
         """
+        return self.regular[self.key(read, loaded)]
+
+    def key(self, read: int, loaded: int) -> tuple[int, int]:
+        """Return the key of two teeth in `regular`; raises as `between` does."""
         key = (read - loaded, 0) if self.closed else (read, loaded)
         if key not in self.regular:
             raise ValueError(f"gear {self.gear.name}: no compliance between teeth {read} and {loaded}")
-        return self.regular[key]
+        return key
+
+    @property
+    def tooth_reach(self) -> int:
+        """Largest number of a tooth, on either side of tooth 0, whose compliance is known."""
+        return max(read for read, _ in self.regular)
 
     @property
     def lead(self) -> float:

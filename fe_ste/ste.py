@@ -35,6 +35,7 @@ from fe_ste.modifications import FlankModification
 from fe_ste.sparse import Backend
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 #: Cells further apart than this many approaches in the unloaded position cannot touch.
 _GAP_REACH = 1.3
@@ -55,6 +56,10 @@ class PairCompliance:
     contact : ContactSettings
     axial : ndarray (slices,)
         Middle of the contact slices, m.
+    teeth : ndarray
+        Tooth pairs that may touch.
+    reach : int
+        Largest difference of tooth pairs in contact at once.
     sliced : tuple of SlicedCompliance
     modifications : tuple of FlankModification
         Gear 1, gear 2.
@@ -64,6 +69,8 @@ class PairCompliance:
     flanks: tuple[FlankCompliance, FlankCompliance]
     contact: ContactSettings
     axial: FloatArray
+    teeth: IntArray
+    reach: int
     sliced: tuple[SlicedCompliance, SlicedCompliance]
     modifications: tuple[FlankModification, FlankModification] = (FlankModification(), FlankModification())
 
@@ -78,13 +85,14 @@ class PairCompliance:
         contact = contact or ContactSettings()
         edges = np.linspace(-pair.face_width / 2, pair.face_width / 2, contact.slices + 1)
         axial = (edges[1:] + edges[:-1]) / 2
-        reach = math.ceil(pair.total_contact_ratio)
-        reach = min([reach] + [max(read - loaded for read, loaded in flank.regular) for flank in flanks])
+        reach, outermost = _teeth_in_contact(pair, flanks)
+        teeth = np.arange(-outermost, outermost + 1)
         senses = (1, 1 if pair.gear.internal else -1)
         one, two = (
-            SlicedCompliance.from_flank(flank, axial, sense, reach) for flank, sense in zip(flanks, senses, strict=True)
+            SlicedCompliance.from_flank(flank, axial, sense, teeth, reach)
+            for flank, sense in zip(flanks, senses, strict=True)
         )
-        return cls(pair, flanks, contact, axial, (one, two))
+        return cls(pair, flanks, contact, axial, teeth, reach, (one, two))
 
     def at_centre_distance(self, centre_distance: float) -> PairCompliance:
         """Return the same gears at another operating centre distance."""
@@ -98,6 +106,19 @@ class PairCompliance:
     def slice_width(self) -> float:
         """Axial width of a contact slice, m."""
         return self.pair.face_width / len(self.axial)
+
+
+def _teeth_in_contact(pair: GearPair, flanks: tuple[FlankCompliance, FlankCompliance]) -> tuple[int, int]:
+    """Largest difference of tooth pairs in contact at once, and outermost tooth pair that may touch.
+
+    In a closed ring every tooth is there, and contact needs one tooth pair more on either side than the contact ratio;
+    an open sector has its own teeth and no others.
+    """
+    reach = min([math.ceil(pair.total_contact_ratio)] + [flank.tooth_reach for flank in flanks if flank.closed])
+    open_reach = [flank.tooth_reach for flank in flanks if not flank.closed]
+    if open_reach:
+        return min([reach, 2 * min(open_reach)]), min(open_reach)
+    return reach, reach + 1
 
 
 def pair_compliance(
@@ -231,8 +252,7 @@ def contact_state(
     search = search or _new_search(compliance, load)
     kinematics = FlankPair.from_pair(pair, compliance.flanks[0].roll[0], compliance.flanks[0].roll[-1])
     rotation = pmc * pair.pinion.angular_pitch
-    reach = compliance.sliced[0].reach
-    teeth = np.arange(-reach - 1, reach + 2)
+    reach, teeth = compliance.reach, compliance.teeth
     count, reckoned = search.cells, search.approach
     for _ in range(_WINDOW_ATTEMPTS):
         cells = lay_cells(kinematics, rotation, teeth, compliance.axial, count * search.cell_width / 2, count)
@@ -414,8 +434,7 @@ class _Collector:
     """Gathers the results of all positions and marks those that failed."""
 
     def __init__(self, compliance: PairCompliance, shape: tuple[int, int, int, int]) -> None:
-        reach = compliance.sliced[0].reach + 1
-        self.teeth = np.arange(-reach, reach + 1)
+        self.teeth = compliance.teeth
         self.axial = compliance.axial
         self.finished = 0
         self.failures: list[str] = []
