@@ -18,31 +18,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from ccx_model import CalculixSettings, placed_sectors, run_calculix, write_input
-from numpy.typing import NDArray
-from scipy.interpolate import make_interp_spline
 
-from fe_ste.contact import (
-    Cells,
-    ContactSettings,
-    FlankPair,
-    SlicedCompliance,
-    compliance_matrix,
-    lay_cells,
-    solve_complementarity,
-)
-from fe_ste.elasticity import FlankCompliance, flank_compliance
+from fe_ste.contact import ContactSettings
 from fe_ste.gears import BasicRack, Gear, GearPair
 from fe_ste.hexmesh import MeshSettings
-from fe_ste.ste import hertz_half_width, least_contact_length
-
-FloatArray = NDArray[np.float64]
+from fe_ste.ste import contact_state, pair_compliance
 
 RESULTS = Path(__file__).with_name("results.json")
 TEETH = 3
-#: Mesh stiffness per face width from which the search for the cells in contact starts, Pa; no result depends on it.
-_USUAL_STIFFNESS = 14e9
 
 
 def spur_pair() -> GearPair:
@@ -105,73 +89,15 @@ class Case:
     calculix: CalculixSettings = CalculixSettings()
 
 
-def open_sector_approach(
-    pair: GearPair, flanks: tuple[FlankCompliance, FlankCompliance], torque: float, pmc: float, contact: ContactSettings
-) -> float:
-    """Compute the static transmission error (m) with each tooth's own compliance, that of the end teeth included."""
-    one, two = pair.pinion, pair.gear
-    edges = np.linspace(-pair.face_width / 2, pair.face_width / 2, contact.slices + 1)
-    axial = (edges[1:] + edges[:-1]) / 2
-    cosine = math.cos(one.base_helix_angle)
-    load = torque / (one.base_radius * cosine)
-    kinematics = FlankPair.from_pair(pair, flanks[0].roll[0], flanks[0].roll[-1])
-    window = contact.window * hertz_half_width(pair, load / least_contact_length(pair))
-    last = max(read for read, _ in flanks[0].regular)
-    teeth = np.arange(-last, last + 1)
-    cells = lay_cells(kinematics, pmc * one.angular_pitch, teeth, axial, window, contact.cells)
-    reckoned = load / (_USUAL_STIFFNESS * pair.face_width)
-    cells = cells.select(cells.gap - cells.gap.min() < 6.0 * reckoned)
-    matrix = compliance_matrix(cells, kinematics, axial, flanks, _no_regular_part(flanks, axial, 2 * last))
-    senses = (1, 1 if two.internal else -1)
-    for flank, sense, roll in zip(flanks, senses, (cells.roll, cells.gear_roll), strict=True):
-        matrix += _regular_part(flank, cells, sense * cells.tooth, roll, axial)
-    solution = solve_complementarity(matrix, cells.gap, load, cells.gap - cells.gap.min() < reckoned)
-    return solution.approach / cosine
-
-
-def _regular_part(
-    flank: FlankCompliance, cells: Cells, tooth: NDArray[np.int64], roll: FloatArray, axial: FloatArray
-) -> FloatArray:
-    """Regular compliance between all cells, interpolated by cubic splines on the flank grid."""
-    arc = flank.gear.base_radius * flank.roll**2 / 2.0
-    at = np.clip(flank.gear.base_radius * roll**2 / 2.0, arc[0], arc[-1])
-    along_roll = make_interp_spline(arc, np.eye(len(arc)), k=3)(at)
-    along_axis = make_interp_spline(flank.axial, np.eye(len(flank.axial)), k=3)(axial[cells.layer])
-    weights = (along_roll[:, :, None] * along_axis[:, None, :]).reshape(len(roll), -1)
-    result = np.zeros((len(roll), len(roll)))
-    for read in np.unique(tooth):
-        for loaded in np.unique(tooth):
-            rows, columns = tooth == read, tooth == loaded
-            block = weights[rows] @ flank.between(int(read), int(loaded)) @ weights[columns].T
-            result[np.ix_(rows, columns)] = block
-    return (result + result.T) / 2
-
-
-def _no_regular_part(
-    flanks: tuple[FlankCompliance, FlankCompliance], axial: FloatArray, reach: int
-) -> tuple[SlicedCompliance, SlicedCompliance]:
-    """Tables of zeros: they leave the half-space part of the compliance matrix alone."""
-
-    def zeros(flank: FlankCompliance) -> SlicedCompliance:
-        arc = flank.gear.base_radius * flank.roll**2 / 2.0
-        knots = make_interp_spline(arc, np.zeros_like(arc), k=3).t
-        shape = (2 * reach + 1, len(axial), len(axial), len(arc), len(arc))
-        return SlicedCompliance(np.broadcast_to(0.0, shape), knots, reach, 1, flank.gear.base_radius)
-
-    return zeros(flanks[0]), zeros(flanks[1])
-
-
 def superelement(case: Case, contact: ContactSettings | None = None) -> dict[str, float]:
     """Solve a case by the superelement: static transmission error and processor times."""
     pair = PAIRS[case.pair]()
     started = time.process_time()
-    one, two = (
-        flank_compliance(gear, side, case.mesh, open_teeth=TEETH)
-        for gear, side in ((pair.pinion, 1), (pair.gear, -1 if pair.gear.internal else 1))
-    )
+    compliance = pair_compliance(pair, case.mesh, contact, open_teeth=TEETH)
     offline = time.process_time() - started
     started = time.process_time()
-    ste = open_sector_approach(pair, (one, two), case.torque, case.pmc, contact or ContactSettings())
+    state = contact_state(compliance, case.torque, case.pmc)
+    ste = state.solution.approach / math.cos(pair.pinion.base_helix_angle)
     return {"ste_um": 1e6 * ste, "offline_cpu_s": offline, "position_cpu_s": time.process_time() - started}
 
 
