@@ -7,15 +7,19 @@ from __future__ import annotations
 
 import math
 import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from exugear.console import (
     BadInputError,
     FailedError,
+    StoppedError,
     exit_codes,
     note,
     print_json,
@@ -28,6 +32,9 @@ if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
     from exugear.gearbox import Gearbox, PairSpec
+    from exugear.modes import Modes
+    from exugear.runup import Progress as RunProgress
+    from exugear.runup import Run
     from exugear.tables import TableOrder
     from fe_ste.table import MeshTable
 
@@ -43,6 +50,37 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print a summary as one
 OutOption = Annotated[
     Path | None,
     typer.Option("--out", metavar="DIR", help="Results folder. [default: results/FOLDER-OF-THE-CASE]"),
+]
+
+
+class Variant(StrEnum):
+    """How the shafts are held: on ideal joints or on their rolling bearings."""
+
+    rigid = "rigid"
+    bushing = "bushing"
+
+
+class MeshLaw(StrEnum):
+    """How teeth in mesh push each other."""
+
+    rigid = "rigid"
+    constant = "constant"
+    iso6336 = "iso6336"
+    seed = "seed"
+    line_of_action = "line_of_action"
+
+
+class Solver(StrEnum):
+    """What integrates: the compiled loop, or Exudyn as the model of record."""
+
+    compiled = "compiled"
+    exudyn = "exudyn"
+
+
+VariantOption = Annotated[Variant, typer.Option(help="How the shafts are held.", show_default=False)]
+LawOption = Annotated[MeshLaw, typer.Option("--mesh-law", help="How teeth in mesh push each other.")]
+InertiasOption = Annotated[
+    str | None, typer.Option("--inertias", metavar="SET", help="Inertia set. [default: as the file says]")
 ]
 
 
@@ -115,16 +153,137 @@ def ste(
 
         gearbox = read_gearbox(case)
         orders, folder = _order_tables(gearbox, case, out, mesh or [], positions)
-        tables = _fill_tables(orders)
-        beside = stored_tables(gearbox, folder, positions)
-        pictures = draw_curves({**beside, **tables}, folder) + _draw_contacts(orders, tables, folder)
+        with _time_noted(folder, "tables of transmission error"):
+            tables = _fill_tables(orders)
+        with _time_noted(folder, "pictures of the tables"):
+            beside = stored_tables(gearbox, folder, positions)
+            pictures = draw_curves({**beside, **tables}, folder) + _draw_contacts(orders, tables, folder)
         _report_tables(case, folder, orders, tables, pictures, as_json)
+
+
+@app.command()
+def modes(
+    case: CaseArgument,
+    variant: VariantOption,
+    mesh_law: LawOption = MeshLaw.line_of_action,
+    inertias: InertiasOption = None,
+    out: OutOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Compute the eigenmodes of a variant at its static load, with a Campbell diagram.
+
+    Tables that are missing or do not fit the case are computed first.
+    """
+    with exit_codes():
+        gearbox = read_gearbox(case)
+        folder = _results_folder(case, out)
+        _fill_missing_tables(gearbox, folder, mesh_law)
+        with _time_noted(folder, f"modes, {variant}, {inertias or gearbox.case.default_inertias}, {mesh_law}"):
+            found, path = _compute_modes(gearbox, folder, variant.value, mesh_law.value, inertias)
+            picture = _draw_campbell(found, path)
+        rows = _mode_summaries(found)
+        if as_json:
+            assembly = found.assembly
+            label = {"variant": assembly.variant, "mesh_law": assembly.law, "inertias": assembly.inertias}
+            print_json({"case": str(case), **label, "modes": rows, "file": str(path), "picture": str(picture)})
+            return
+        print_table(f"Modes of {_label(found)}", [_mode_row(row) for row in rows], ("what moves",))
+        results.print(f"Modes in {path}, diagram in {picture}", highlight=False)
+
+
+@app.command()
+def run(
+    case: CaseArgument,
+    variant: VariantOption,
+    mesh_law: LawOption = MeshLaw.line_of_action,
+    inertias: InertiasOption = None,
+    load_case: Annotated[
+        str | None, typer.Option("--load-case", metavar="NAME", help="Load case. [default: the first of the file]")
+    ] = None,
+    solver: Annotated[Solver, typer.Option(help="What integrates.")] = Solver.compiled,
+    duration: Annotated[
+        float | None, typer.Option(min=1e-3, metavar="S", help="Simulated time, s. [default: the load case's]")
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with a run that was stopped.")] = False,
+    out: OutOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Run a load case in time; results are written while it goes on.
+
+    Ctrl-C keeps what was reached. Tables that are missing or do not fit the case are computed first.
+    """
+    with exit_codes():
+        gearbox = read_gearbox(case)
+        loads = load_case or next(iter(gearbox.load_cases), "")
+        folder = _results_folder(case, out)
+        _fill_missing_tables(gearbox, folder, mesh_law)
+        inertias = inertias or gearbox.case.default_inertias
+        with _time_noted(folder, f"run, {variant}, {loads}, {inertias}, {mesh_law}, solver {solver}"):
+            finished = _simulate(
+                gearbox, folder, variant.value, mesh_law.value, inertias, loads, solver.value, duration, resume
+            )
+        _report_run(case, finished, as_json)
+
+
+@app.command()
+def view(
+    case: CaseArgument,
+    variant: Annotated[Variant, typer.Option(help="How the shafts are held.")] = Variant.bushing,
+    mesh_law: LawOption = MeshLaw.line_of_action,
+    inertias: InertiasOption = None,
+    near: Annotated[
+        float, typer.Option(min=0.0, metavar="HZ", help="Frequency whose nearest mode is shown first.")
+    ] = 3215.0,
+    animation: Annotated[bool, typer.Option("--gif", help="Write that mode as an animated picture, too.")] = False,
+    out: OutOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show the gearbox and its modes in three dimensions: a web page that stands alone, and pictures."""
+    with exit_codes():
+        gearbox = read_gearbox(case)
+        folder = _results_folder(case, out)
+        _fill_missing_tables(gearbox, folder, mesh_law)
+        found, path = _compute_modes(gearbox, folder, variant.value, mesh_law.value, inertias)
+        written = _draw_modes(found, path.parent, found.nearest(near), animation)
+        if as_json:
+            print_json({"case": str(case), "mode": found.nearest(near) + 1, "files": [str(file) for file in written]})
+            return
+        for file in written:
+            results.print(str(file), highlight=False, soft_wrap=True)
+
+
+@app.command()
+def report(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Results folder.", show_default=False)],
+    near: Annotated[float, typer.Option(min=1.0, metavar="HZ", help="Frequency to look for modes at.")] = 3215.0,
+    as_json: JsonOption = False,
+) -> None:
+    """Write a report of a results folder: one web page with pictures, tables, assumptions, and where time went.
+
+    Compares the variants whose runs and modes are there.
+    """
+    with exit_codes():
+        from exugear.gearbox import CaseError
+        from exugear.report import ReportError, write_report
+
+        if not folder.is_dir():
+            raise BadInputError(f"{folder}: no such folder; name the one that `exugear run` wrote into")
+        try:
+            with _time_noted(folder, "report"), progress_bar() as bar:
+                task = bar.add_task("report", total=None)
+                written = write_report(folder, near, lambda what: bar.update(task, description=what))
+        except (CaseError, ReportError) as error:
+            raise BadInputError(error) from error
+        except OSError as error:
+            raise FailedError(f"report of {folder}: {error}") from error
+        _report_report(folder, written.path, written.statements, written.left_out, as_json)
 
 
 def _order_tables(
     gearbox: Gearbox, case: Path, out: Path | None, names: list[str], positions: int | None
 ) -> tuple[list[TableOrder], Path]:
     from exugear.gearbox import CaseError
+    from exugear.results import keep_case
     from exugear.tables import order_tables
 
     folder = out or Path("results") / case.resolve().parent.name
@@ -133,6 +292,7 @@ def _order_tables(
     except CaseError as error:
         raise BadInputError(error) from error
     make_results_folder(folder)
+    keep_case(gearbox, folder)
     for order in orders:
         if order.stored:
             note(f"{order.name}: kept {order.path}, computed from the same input")
@@ -176,6 +336,263 @@ def _work(order: TableOrder) -> int:
     """Work of a table, in positions: the time left counts the finite elements of both gears as well."""
     finite_elements = 150
     return finite_elements + order.wanted.positions
+
+
+def _results_folder(case: Path, out: Path | None) -> Path:
+    folder = out or Path("results") / case.resolve().parent.name
+    make_results_folder(folder)
+    return folder
+
+
+@contextmanager
+def _time_noted(folder: Path, step: str) -> Iterator[None]:
+    """Write into the results folder how long a step took, if it ended well."""
+    from exugear.results import note_time
+
+    start = time.perf_counter()
+    yield
+    note_time(folder, step, time.perf_counter() - start)
+
+
+@contextmanager
+def _model_errors() -> Iterator[None]:
+    """Turn errors of the model's parts into those of the command line."""
+    from exugear.assembly import VariantError
+    from exugear.bearings import BearingError
+    from exugear.gearbox import CaseError
+    from exugear.mesh_element import MeshError
+    from exugear.statics import BalanceError
+
+    try:
+        yield
+    except (CaseError, VariantError, MeshError, BearingError) as error:
+        raise BadInputError(error) from error
+    except BalanceError as error:
+        raise FailedError(error) from error
+
+
+def _fill_missing_tables(gearbox: Gearbox, folder: Path, law: MeshLaw) -> None:
+    """Compute the tables that a law needs and that are not there or belong to another input."""
+    from exugear.results import keep_case
+    from exugear.tables import missing_tables
+
+    keep_case(gearbox, folder)
+    if law in (MeshLaw.rigid, MeshLaw.iso6336):
+        return
+    with _model_errors():
+        orders = missing_tables(gearbox, folder)
+    for order in orders:
+        note(order.replaces or f"{order.name}: no table in {folder}; it is computed first")
+    with _time_noted(folder, "tables, computed before dynamics") if orders else nullcontext():
+        tables = _fill_tables(orders)
+    failures = [f"{name}: {line}" for name, table in tables.items() for line in table.failures]
+    if failures:
+        raise FailedError("\n".join(["positions of the tables that are not solved:", *failures]))
+
+
+def _compute_modes(gearbox: Gearbox, folder: Path, variant: str, law: str, inertias: str | None) -> tuple[Modes, Path]:
+    from exugear.mesh_stiffness import mesh_stiffness
+    from exugear.modes import eigenmodes
+    from exugear.results import modes_path
+
+    with _model_errors():
+        found = eigenmodes(gearbox, variant, mesh_stiffness(gearbox, law, folder), law, inertias)
+    return found, found.save(modes_path(folder, variant, law, found.assembly.inertias))
+
+
+def _draw_campbell(found: Modes, path: Path) -> Path:
+    """Draw the modes that the overall transmission error sees, over the speeds of the fastest load case."""
+    from exugear.comparison import mobility_shares
+    from exugear.orders import order_lines
+    from exugear.plots import plot_campbell
+
+    gearbox, least = found.assembly.gearbox, 1e-3
+    shares = mobility_shares(found.to_dataset())
+    seen = (found.frequency > 0.0) & (shares >= least)
+    highest = max(gearbox.mesh_frequencies(1.0).values())
+    top = 1.1 * float(max(found.frequency[seen], default=1.0))
+    picture = path.with_name("campbell.png")
+    plot_campbell(
+        found.frequency[seen],
+        order_lines(gearbox),
+        top / highest,
+        picture,
+        weights=(shares[seen] / shares.max()) ** 0.5,
+        highest_frequency=top,
+        title=f"{_label(found)}: modes with a share over {100 * least:g} %",
+    )
+    return picture
+
+
+def _label(found: Modes) -> str:
+    assembly = found.assembly
+    factor = assembly.gearbox.case.housing.factor
+    return f"{assembly.variant}, law {assembly.law}, inertias {assembly.inertias}, housing factor {factor:g}"
+
+
+def _mode_summaries(found: Modes) -> list[dict[str, Any]]:
+    from exugear.comparison import report_mode
+
+    data = found.to_dataset()
+    reports = [report_mode(data, place) for place in range(len(found.names))]
+    return [
+        {
+            "mode": mode.place + 1,
+            "frequency_Hz": mode.frequency,
+            "damping_ratio": mode.damping_ratio,
+            "share_of_overall_dte": mode.share,
+            "amplification": mode.amplification,
+            "name": mode.name,
+        }
+        for mode in reports
+    ]
+
+
+def _mode_row(summary: dict[str, Any]) -> dict[str, str]:
+    return {
+        "no.": str(summary["mode"]),
+        "Hz": f"{summary['frequency_Hz']:.1f}",
+        "damping\n%": f"{100 * summary['damping_ratio']:.2f}",
+        "DTE share\n%": f"{100 * summary['share_of_overall_dte']:.2f}",
+        "amplif.": f"{summary['amplification']:.2f}",
+        "what moves": summary["name"],
+    }
+
+
+def _simulate(
+    gearbox: Gearbox,
+    folder: Path,
+    variant: str,
+    law: str,
+    inertias: str,
+    load_case: str,
+    solver: Literal["compiled", "exudyn"],
+    duration: float | None,
+    resume: bool,
+) -> Run:
+    """Run a load case behind a progress bar."""
+    from exugear.mesh_stiffness import mesh_stiffness
+    from exugear.runup import RunError, run_directory, simulate
+
+    partial = run_directory(folder, variant, load_case, law, inertias) / "run.partial.nc"
+    if resume and not partial.is_file():
+        raise BadInputError(f"--resume: no stopped run in {partial.parent}; run without it")
+    if not resume and partial.is_file():
+        note(f"{partial}: a stopped run is begun anew; --resume would have gone on from it")
+    with progress_bar() as bar:
+        task = bar.add_task(f"{variant}: start in balance", total=None)
+
+        def show(at: RunProgress) -> None:
+            text = f"{variant}: {at.simulated:.2f} of {at.total:g} s, {at.speed:.2f} simulated s per s"
+            bar.update(task, completed=at.simulated, total=at.total, description=text)
+
+        try:
+            with _model_errors():
+                return simulate(
+                    gearbox,
+                    variant,
+                    mesh_stiffness(gearbox, law, folder),
+                    folder,
+                    load_case=load_case,
+                    mesh_law=law,
+                    inertias=inertias,
+                    duration=duration,
+                    solver=solver,
+                    resume=resume,
+                    progress=show,
+                )
+        except (RunError, OSError) as error:
+            raise FailedError(error) from error
+
+
+def _report_run(case: Path, finished: Run, as_json: bool) -> None:
+    """Print what a run reached; end with 130 if it was stopped."""
+    if not finished.complete:
+        raise StoppedError(f"at {finished.end:.3f} s; kept in {finished.path}, --resume goes on from there")
+    import xarray as xr
+
+    from exugear.comparison import RPM
+    from exugear.report import energy_residual
+
+    with xr.open_dataset(finished.path, engine="h5netcdf") as data:
+        summary = {
+            "case": str(case),
+            **{key: str(data.attrs[key]) for key in ("variant", "load_case", "mesh_law", "inertias", "solver")},
+            "file": str(finished.path),
+            "simulated_s": finished.end,
+            "wall_s": round(finished.wall, 2),
+            "input_speed_rpm": float(data["input_speed"][-1]) / RPM,
+            "energy_not_accounted_for": energy_residual(data),
+            "longest_pull_of_a_mesh_s": float(data["pulling_time"].max()),
+        }
+    if as_json:
+        print_json({key: None if value != value else value for key, value in summary.items()})
+        return
+    results.print(
+        f"{summary['variant']}, {summary['load_case']}, law {summary['mesh_law']}, inertias {summary['inertias']}: "
+        f"{finished.end:g} s simulated in {finished.wall:.1f} s ({summary['solver']}), "
+        f"{summary['input_speed_rpm']:.1f} rpm reached",
+        highlight=False,
+        soft_wrap=True,
+    )
+    results.print(f"Results in {finished.path}", highlight=False, soft_wrap=True)
+
+
+def _draw_modes(found: Modes, folder: Path, first: int, animation: bool) -> list[Path]:
+    """Write the page of all elastic modes, and pictures of the gearbox and one mode if this machine can render."""
+    from exugear.scene import animate_mode, draw_gearbox, draw_mode
+    from exugear.shapes import bodies_of, mode_scene, motions_of
+    from exugear.viewer import write_mode_page
+    from fe_ste.scene import RenderingError
+
+    assembly = found.assembly
+    bodies = bodies_of(assembly.gearbox)
+    drawn = {body.name for body in bodies}
+    scenes = {}
+    for place, name in enumerate(found.names):
+        motions = motions_of(assembly.bodies, assembly.coordinates, found.shapes[:, place])
+        moving = {body: motion for body, motion in motions.items() if body in drawn}
+        if found.frequency[place] > 0.0 and any(motion.any() for motion in moving.values()):
+            scenes[place] = mode_scene(bodies, moving, title=f"{found.frequency[place]:.0f} Hz: {name}")
+    if not scenes:
+        raise BadInputError(f"{_label(found)}: no elastic mode to show")
+    places = list(scenes)
+    shown = places.index(first) if first in scenes else 0
+    heading = f"{assembly.gearbox.name}, {_label(found)}"
+    written = [write_mode_page(list(scenes.values()), folder / "modes.html", heading=heading, first=shown)]
+    scene = scenes[places[shown]]
+    stem = folder / f"mode_{places[shown] + 1}"
+    try:
+        draw_gearbox(bodies, folder / "gearbox.png", title=assembly.gearbox.name)
+        draw_mode(scene, stem.with_suffix(".png"))
+        written += [folder / "gearbox.png", stem.with_suffix(".png")]
+        if animation:
+            written.append(animate_mode(scene, stem.with_suffix(".gif")))
+    except RenderingError as error:
+        note(f"No pictures: {error}", style="yellow")
+    return written
+
+
+def _report_report(
+    folder: Path, path: Path, statements: tuple[str, ...], left_out: tuple[str, ...], as_json: bool
+) -> None:
+    from exugear.results import times_spent
+
+    spent = times_spent(folder)
+    for line in left_out:
+        note(f"Left out: {line}", style="yellow")
+    if as_json:
+        times = {entry.step: entry.seconds for entry in spent}
+        print_json({"report": str(path), "statements": list(statements), "left_out": list(left_out), "seconds": times})
+        return
+    for line in statements:
+        results.print(f"- {line}", highlight=False)
+    rows = [
+        {"step": entry.step, "wall s": f"{entry.seconds:.1f}", "peak MB": f"{1e-6 * entry.memory:.0f}"}
+        for entry in spent
+    ]
+    print_table("Where the time went, the last time of each step (steps side by side overlap)", rows)
+    results.print(f"Report: {path}", highlight=False, soft_wrap=True)
 
 
 def _draw_contacts(orders: list[TableOrder], tables: dict[str, MeshTable], folder: Path) -> list[Path]:

@@ -31,8 +31,8 @@ REFERENCE_FREQUENCY = 3215.0
 """Frequency of the global mode that the reference study found with compliant bearings, Hz."""
 NEAR = 0.05
 """A mode within this part of a frequency counts as near it."""
-LEAST_SHARE = 1e-3
-"""Modes with a smaller share of the overall transmission error's mobility cannot show in its spectrum."""
+LEAST_SHARE = 1e-5
+"""Modes with a smaller share of the overall transmission error's mobility are no match for a resonance of it."""
 RPM = math.pi / 30.0
 
 

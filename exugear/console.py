@@ -6,7 +6,7 @@ import json
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any, NoReturn
+from typing import Any, Literal, NoReturn
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -37,11 +37,15 @@ class FailedError(Exception):
     """The work was begun and could not be finished; what was finished is kept."""
 
 
+class StoppedError(Exception):
+    """The user stopped the work; the message says what is kept and how to go on."""
+
+
 @contextmanager
 def exit_codes() -> Iterator[None]:
     """Turn errors the user can act on into one message and an exit code; others keep their traceback.
 
-    2 after `BadInputError`, 1 after `FailedError`, 130 after Ctrl-C.
+    2 after `BadInputError`, 1 after `FailedError`, 130 after `StoppedError` and Ctrl-C.
     """
     try:
         yield
@@ -49,6 +53,8 @@ def exit_codes() -> Iterator[None]:
         _end("Bad input", error, EXIT_BAD_INPUT)
     except FailedError as error:
         _end("Failed", error, EXIT_FAILED)
+    except StoppedError as error:
+        _end("Stopped", error, EXIT_INTERRUPTED)
     except KeyboardInterrupt:
         _end("Stopped", "finished results are kept; the same command goes on from there", EXIT_INTERRUPTED)
 
@@ -82,11 +88,13 @@ def print_json(summary: Mapping[str, Any]) -> None:
     sys.stdout.write(json.dumps(summary, indent=2, allow_nan=False) + "\n")
 
 
-def print_table(title: str, rows: list[dict[str, str]]) -> None:
-    """Print rows under the keys of the first one; the first column is text, the others are numbers."""
+def print_table(title: str, rows: list[dict[str, str]], texts: tuple[str, ...] = ()) -> None:
+    """Print rows under the keys of the first one; the first column is text, others numbers but for `texts`."""
     table = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for place, heading in enumerate(rows[0]):
-        table.add_column(heading, justify="right" if place else "left", no_wrap=True)
+        words = heading in texts
+        justify: Literal["left", "right"] = "right" if place and not words else "left"
+        table.add_column(heading, justify=justify, no_wrap=not words, overflow="fold" if words else "ellipsis")
     for row in rows:
         table.add_row(*row.values())
     results.print(table)
