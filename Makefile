@@ -15,6 +15,24 @@ export OPENBLAS_NUM_THREADS ?= 1
 
 CASE := cases/grc750/gearbox.toml
 RESULTS := results/grc750
+EXUGEAR := $(RUN)/exugear
+
+# Both variants run up side by side as two processes, then modes, then the report, which compares them.
+#   $(call dynamics,FOLDER,INERTIA SETS,OPTIONS OF run)
+define dynamics
+@mkdir -p $(1)
+@for inertias in $(2); do \
+	$(EXUGEAR) run $(CASE) --variant rigid --inertias $$inertias --out $(1) $(3) >$(1)/rigid.log 2>&1 & rigid=$$!; \
+	$(EXUGEAR) run $(CASE) --variant bushing --inertias $$inertias --out $(1) $(3); bushing=$$?; \
+	wait $$rigid; code=$$?; tail -n 2 $(1)/rigid.log; \
+	test $$code -eq 0 && test $$bushing -eq 0 || exit 1; \
+	for variant in rigid bushing; do \
+		$(EXUGEAR) modes $(CASE) --variant $$variant --inertias $$inertias --out $(1) >$(1)/modes-$$variant-$$inertias.txt \
+		|| exit 1; \
+	done; \
+done
+$(EXUGEAR) report $(1)
+endef
 
 # Prints the first interpreter that fits: the one asked for, or else whichever of the usual names runs.
 FIND_PYTHON := for candidate in $(if $(PYTHON),"$(PYTHON)",python3 python3.13 python3.12 python3.11 python); do \
@@ -26,8 +44,8 @@ FIND_PYTHON := for candidate in $(if $(PYTHON),"$(PYTHON)",python3 python3.13 py
 .PHONY: help demo demo-short test validate check lock clean
 
 help:
-	@echo "make demo        transmission error curves of the GRC 750 gear pairs, into $(RESULTS)"
-	@echo "make demo-short  the same with 10 positions of the mesh cycle"
+	@echo "make demo        GRC 750 from gear data to waterfalls, modes and a report, into $(RESULTS)"
+	@echo "make demo-short  the same with 10 positions of the mesh cycle and 4 s of the run-up"
 	@echo "make test        tests and documentation examples"
 	@echo "make validate    the long comparisons with references"
 	@echo "make check       ruff and mypy"
@@ -43,10 +61,12 @@ $(INSTALLED): pyproject.toml requirements.lock
 	@touch $@
 
 demo: $(INSTALLED)
-	$(RUN)/exugear ste $(CASE) --out $(RESULTS)
+	$(EXUGEAR) ste $(CASE) --out $(RESULTS)
+	$(call dynamics,$(RESULTS),assemblies gears,)
 
 demo-short: $(INSTALLED)
-	$(RUN)/exugear ste $(CASE) --positions 10 --out $(RESULTS)-short
+	$(EXUGEAR) ste $(CASE) --positions 10 --out $(RESULTS)-short
+	$(call dynamics,$(RESULTS)-short,assemblies,--duration 4)
 
 test: $(INSTALLED)
 	$(RUN)/python -m pytest

@@ -591,7 +591,7 @@ def _report_report(
         {"step": entry.step, "wall s": f"{entry.seconds:.1f}", "peak MB": f"{1e-6 * entry.memory:.0f}"}
         for entry in spent
     ]
-    print_table("Where the time went, the last time of each step (steps side by side overlap)", rows)
+    print_table("Where the time went, the last time of each step (steps side by side overlap)", rows, ("step",))
     results.print(f"Report: {path}", highlight=False, soft_wrap=True)
 
 
