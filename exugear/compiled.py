@@ -29,6 +29,7 @@ from exugear.equations import (
     observe,
 )
 from exugear.gearbox import GROUND
+from exugear.kernels import ConnectorArrays
 from exugear.modes import linearise, overall_row
 
 Floats = NDArray[np.float64]
@@ -174,13 +175,16 @@ def _connectors(numbers: _Numbers) -> tuple[Connectors, NDArray[np.int64]]:
     """Connectors, and the slot of the sine of each body's spin where a connector needs it."""
     given = numbers.assembly.connectors
     ends = np.array([[numbers.body(int(s)) for s in pair] for pair in given.bodies], dtype=np.int64).reshape(-1, 2)
+    order = np.lexsort((ends[:, 1], ends[:, 0])).astype(np.int64)
+    given = ConnectorArrays._make(values[order] for values in given)
+    ends = ends[order]
     slots = np.zeros(len(numbers.starts) + 1, dtype=np.int64)
     twisting = np.zeros(len(ends), dtype=np.int64)
     first, entries = [0], []
     for n, (i, j) in enumerate(ends):
         stiffness, damping = _without_round_off(given.stiffness[n]), _without_round_off(given.damping[n])
-        twisting[n] = stiffness[:, 5].any()
-        for end, needed in ((i, True), (j, twisting[n] or given.local[n, 1, :2].any())):
+        twisting[(ends == ends[n]).all(axis=1)] |= stiffness[:, 5].any()
+        for end, needed in ((i, True), (j, stiffness[:, 5].any() or given.local[n, 1, :2].any())):
             if needed and end < len(numbers.starts):
                 slots[end] = numbers.slot(numbers.starts[end] + 5)
         places = np.argwhere((stiffness != 0.0) | (damping != 0.0))
@@ -188,9 +192,11 @@ def _connectors(numbers: _Numbers) -> tuple[Connectors, NDArray[np.int64]]:
         first.append(len(entries))
     columns = list(zip(*entries, strict=True)) if entries else [(), (), (), ()]
     connectors = Connectors(
+        number=order,
         ends=ends,
         local=given.local,
         gap=(given.place[:, 1] + given.local[:, 1]) - (given.place[:, 0] + given.local[:, 0]),
+        repeated=np.append(0, (ends[1:] == ends[:-1]).all(axis=1)).astype(np.int64)[: len(ends)],
         twisting=twisting,
         first=np.array(first, dtype=np.int64),
         row=np.array(columns[0], dtype=np.int64),

@@ -63,22 +63,26 @@ class Bodies(NamedTuple):
 
 
 class Connectors(NamedTuple):
-    """6x6 connectors; stiffness and damping as lists of entries that are not zero.
+    """6x6 connectors, those between the same bodies one after the other, entries that are not zero as lists.
 
     Attributes
     ----------
+    number : (c,) place of each connector in the assembly
     ends : (c, 2) numbers of the two bodies in `Bodies`
     local : (c, 2, 3) attachment in each body's axes, m
     gap : (c, 3) second attachment against the first at zero angles, m
-    twisting : (c,) 1 where the angle about z acts, else 0
+    repeated : (c,) 1 where the one before has the same ends, so that angles and their rates are known
+    twisting : (c,) 1 where the angle about z acts on these ends, else 0
     first : (c + 1,) first entry of each connector
     row, column : (e,) place of each entry in the 6x6 matrix
     stiffness, damping : (e,) its values
     """
 
+    number: Integers
     ends: Integers
     local: Floats
     gap: Floats
+    repeated: Integers
     twisting: Integers
     first: Integers
     row: Integers
@@ -236,34 +240,45 @@ def move_connector(
     i, j = connectors.ends[n, 0], connectors.ends[n, 1]
     o, p = bodies.start[i], bodies.start[j]
     one, two = work.frames[i], work.frames[j]
-    x, y, z = connectors.local[n, 0]
-    ax = one[0] * x + one[1] * y + one[2] * z
-    ay = one[3] * x + one[4] * y + one[5] * z
-    az = one[6] * x + one[7] * y + one[8] * z
-    dx, dy, dz = x - ax, y - ay, z - az
     x, y, z = connectors.local[n, 1]
     bx = two[0] * x + two[1] * y + two[2] * z
     by = two[3] * x + two[4] * y + two[5] * z
     bz = two[6] * x + two[7] * y + two[8] * z
-    dx += connectors.gap[n, 0] + q[p] - q[o] + (bx - x)
-    dy += connectors.gap[n, 1] + q[p + 1] - q[o + 1] + (by - y)
-    dz += connectors.gap[n, 2] + q[p + 2] - q[o + 2] + (bz - z)
-    ox, oy, oz = one[9], one[10], one[11]
     wx, wy, wz = two[9], two[10], two[11]
-    ux = v[p] - v[o] + (wy * bz - wz * by) - (oy * az - oz * ay)
-    uy = v[p + 1] - v[o + 1] + (wz * bx - wx * bz) - (oz * ax - ox * az)
-    uz = v[p + 2] - v[o + 2] + (wx * by - wy * bx) - (ox * ay - oy * ax)
-    wx, wy, wz = wx - ox, wy - oy, wz - oz
+    dx = connectors.gap[n, 0] + q[p] + (bx - x)
+    dy = connectors.gap[n, 1] + q[p + 1] + (by - y)
+    dz = connectors.gap[n, 2] + q[p + 2] + (bz - z)
+    ux = v[p] + (wy * bz - wz * by)
+    uy = v[p + 1] + (wz * bx - wx * bz)
+    uz = v[p + 2] + (wx * by - wy * bx)
+    ax, ay, az = connectors.local[n, 0]
     strain, rate = work.motion[0], work.motion[1]
     if i == bodies.mass.size:
         strain[0], strain[1], strain[2] = dx, dy, dz
         rate[0], rate[1], rate[2] = ux, uy, uz
+        if connectors.repeated[n] == 1:
+            return ax, ay, az, bx, by, bz
         rate[3], rate[4], rate[5] = wx, wy, wz
         strain[3], strain[4] = q[p + 3], q[p + 4]
     else:
+        x, y, z = ax, ay, az
+        ax = one[0] * x + one[1] * y + one[2] * z
+        ay = one[3] * x + one[4] * y + one[5] * z
+        az = one[6] * x + one[7] * y + one[8] * z
+        ox, oy, oz = one[9], one[10], one[11]
+        dx += (x - ax) - q[o]
+        dy += (y - ay) - q[o + 1]
+        dz += (z - az) - q[o + 2]
+        ux -= v[o] + (oy * az - oz * ay)
+        uy -= v[o + 1] + (oz * ax - ox * az)
+        uz -= v[o + 2] + (ox * ay - oy * ax)
         for k in range(3):
             strain[k] = one[k] * dx + one[3 + k] * dy + one[6 + k] * dz
             rate[k] = one[k] * ux + one[3 + k] * uy + one[6 + k] * uz
+        if connectors.repeated[n] == 1:
+            return ax, ay, az, bx, by, bz
+        wx, wy, wz = wx - ox, wy - oy, wz - oz
+        for k in range(3):
             rate[3 + k] = one[k] * wx + one[3 + k] * wy + one[6 + k] * wz
         first = one[0] * two[2] + one[3] * two[5] + one[6] * two[8]
         second = one[1] * two[2] + one[4] * two[5] + one[7] * two[8]
@@ -573,9 +588,10 @@ def observe_connectors(
             energy[1] += 0.5 * elastic * strain[row]
             energy[3] += damped * rate[row]
             energy[5] += elastic * (rate[row] - true[row])
+        first = 3 * connectors.number[n]
         for i in range(3):
             o = 3 * i
-            signals[3 * n + i] = -(turn[o] * own[0] + turn[o + 1] * own[1] + turn[o + 2] * own[2])
+            signals[first + i] = -(turn[o] * own[0] + turn[o + 1] * own[1] + turn[o + 2] * own[2])
 
 
 @kernel
