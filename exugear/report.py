@@ -293,7 +293,7 @@ def _waterfall_picture(
     path = writer.picture(f"waterfall-{file_part}")
     spectra = {run.variant: run.spectra for run in runs}
     plot_waterfalls(spectra, lines, path, marks=marks, highest_frequency=top)
-    caption = f"Overall transmission error over carrier speed; {label}."
+    caption = f"Overall transmission error over speed; {label}. {runs[0].spectra.description}."
     if comparisons:
         caption += f" Circles: resonances that variant {STIFF} does not show, numbered as in the table below."
     return page.picture(path, caption)
