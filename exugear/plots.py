@@ -34,7 +34,7 @@ def plot_waterfalls(
     *,
     marks: Mapping[str, Sequence[Pick]] | None = None,
     highest_frequency: float | None = None,
-    dynamic_range: float = 70.0,
+    dynamic_range: float = 110.0,
     quantity: str = "overall transmission error",
 ) -> Figure:
     """Draw waterfalls side by side on one scale.
