@@ -49,7 +49,7 @@ CaseArgument = Annotated[Path, typer.Argument(metavar="CASE.toml", help="The gea
 JsonOption = Annotated[bool, typer.Option("--json", help="Print a summary as one JSON object.")]
 OutOption = Annotated[
     Path | None,
-    typer.Option("--out", metavar="DIR", help="Results folder. [default: results/FOLDER-OF-THE-CASE]"),
+    typer.Option("--out", metavar="DIR", help="Results folder. (default: results/FOLDER-OF-THE-CASE)"),
 ]
 
 
@@ -80,7 +80,7 @@ class Solver(StrEnum):
 VariantOption = Annotated[Variant, typer.Option(help="How the shafts are held.", show_default=False)]
 LawOption = Annotated[MeshLaw, typer.Option("--mesh-law", help="How teeth in mesh push each other.")]
 InertiasOption = Annotated[
-    str | None, typer.Option("--inertias", metavar="SET", help="Inertia set. [default: as the file says]")
+    str | None, typer.Option("--inertias", metavar="SET", help="Inertia set. (default: as the file says)")
 ]
 
 
@@ -134,11 +134,11 @@ def ste(
     case: CaseArgument,
     mesh: Annotated[
         list[str] | None,
-        typer.Option("--mesh", metavar="NAME", help="Gear pair to compute; repeatable. [default: all]"),
+        typer.Option("--mesh", metavar="NAME", help="Gear pair to compute; repeatable. (default: all)"),
     ] = None,
     positions: Annotated[
         int | None,
-        typer.Option(min=8, max=2000, help="Positions of the mesh cycle. [default: as the file says, 50]"),
+        typer.Option(min=8, max=2000, help="Positions of the mesh cycle. (default: as the file says, 50)"),
     ] = None,
     method: Annotated[Method, typer.Option(help="How the teeth deflect.")] = Method.superelement,
     out: OutOption = None,
@@ -176,6 +176,7 @@ def modes(
     """
     with exit_codes():
         gearbox = read_gearbox(case)
+        _check_choices(gearbox, variant, mesh_law, inertias)
         folder = _results_folder(case, out)
         _fill_missing_tables(gearbox, folder, mesh_law)
         with _time_noted(folder, f"modes, {variant}, {inertias or gearbox.case.default_inertias}, {mesh_law}"):
@@ -198,11 +199,11 @@ def run(
     mesh_law: LawOption = MeshLaw.line_of_action,
     inertias: InertiasOption = None,
     load_case: Annotated[
-        str | None, typer.Option("--load-case", metavar="NAME", help="Load case. [default: the first of the file]")
+        str | None, typer.Option("--load-case", metavar="NAME", help="Load case. (default: the first of the file)")
     ] = None,
     solver: Annotated[Solver, typer.Option(help="What integrates.")] = Solver.compiled,
     duration: Annotated[
-        float | None, typer.Option(min=1e-3, metavar="S", help="Simulated time, s. [default: the load case's]")
+        float | None, typer.Option(min=1e-3, metavar="S", help="Simulated time, s. (default: the load case's)")
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with a run that was stopped.")] = False,
     out: OutOption = None,
@@ -215,9 +216,12 @@ def run(
     with exit_codes():
         gearbox = read_gearbox(case)
         loads = load_case or next(iter(gearbox.load_cases), "")
-        folder = _results_folder(case, out)
-        _fill_missing_tables(gearbox, folder, mesh_law)
+        _check_choices(gearbox, variant, mesh_law, inertias, loads)
         inertias = inertias or gearbox.case.default_inertias
+        folder = _results_folder(case, out, make=not resume)
+        if resume and not _partial_run(folder, variant.value, loads, mesh_law.value, inertias).is_file():
+            raise BadInputError(f"--resume: no run of these choices was stopped in {folder}; run without it")
+        _fill_missing_tables(gearbox, folder, mesh_law)
         with _time_noted(folder, f"run, {variant}, {loads}, {inertias}, {mesh_law}, solver {solver}"):
             finished = _simulate(
                 gearbox, folder, variant.value, mesh_law.value, inertias, loads, solver.value, duration, resume
@@ -241,6 +245,7 @@ def view(
     """Show the gearbox and its modes in three dimensions: a web page that stands alone, and pictures."""
     with exit_codes():
         gearbox = read_gearbox(case)
+        _check_choices(gearbox, variant, mesh_law, inertias)
         folder = _results_folder(case, out)
         _fill_missing_tables(gearbox, folder, mesh_law)
         found, path = _compute_modes(gearbox, folder, variant.value, mesh_law.value, inertias)
@@ -338,10 +343,30 @@ def _work(order: TableOrder) -> int:
     return finite_elements + order.wanted.positions
 
 
-def _results_folder(case: Path, out: Path | None) -> Path:
+def _results_folder(case: Path, out: Path | None, make: bool = True) -> Path:
     folder = out or Path("results") / case.resolve().parent.name
-    make_results_folder(folder)
+    if make:
+        make_results_folder(folder)
     return folder
+
+
+def _partial_run(folder: Path, variant: str, load_case: str, law: str, inertias: str) -> Path:
+    from exugear.runup import run_directory
+
+    return run_directory(folder, variant, load_case, law, inertias) / "run.partial.nc"
+
+
+def _check_choices(
+    gearbox: Gearbox, variant: Variant, law: MeshLaw, inertias: str | None, load_case: str | None = None
+) -> None:
+    """Refuse what the gearbox does not have before anything is written."""
+    with _model_errors():
+        gearbox.bodies(inertias)
+        if load_case is not None and load_case not in gearbox.load_cases:
+            known = ", ".join(gearbox.load_cases) or "none"
+            raise gearbox.fault(f"no load case {load_case!r}; load cases are {known}")
+    if law is MeshLaw.rigid and variant is not Variant.rigid:
+        raise BadInputError(f"--mesh-law rigid: its gears only roll, which needs the variant rigid, not {variant}")
 
 
 @contextmanager
@@ -472,11 +497,9 @@ def _simulate(
 ) -> Run:
     """Run a load case behind a progress bar."""
     from exugear.mesh_stiffness import mesh_stiffness
-    from exugear.runup import RunError, run_directory, simulate
+    from exugear.runup import RunError, simulate
 
-    partial = run_directory(folder, variant, load_case, law, inertias) / "run.partial.nc"
-    if resume and not partial.is_file():
-        raise BadInputError(f"--resume: no stopped run in {partial.parent}; run without it")
+    partial = _partial_run(folder, variant, load_case, law, inertias)
     if not resume and partial.is_file():
         note(f"{partial}: a stopped run is begun anew; --resume would have gone on from it")
     with progress_bar() as bar:

@@ -120,7 +120,7 @@ def test_dynamics_refuses_a_table_of_another_input_but_not_of_other_positions(ca
         ("modes", ["--variant", "rigid", "--inertias", "none"], "sets are disc"),
         ("run", ["--variant", "rigid", "--load-case", "nothing"], "load cases are run_up"),
         ("run", ["--variant", "rigid", "--duration", "-1"], "--duration"),
-        ("run", ["--variant", "rigid", "--resume"], "no stopped run"),
+        ("run", ["--variant", "rigid", "--resume"], "was stopped in"),
         ("run", ["--variant", "bushing", "--mesh-law", "rigid"], "needs the variant rigid"),
     ],
 )
@@ -130,6 +130,7 @@ def test_bad_input_is_one_message_and_code_2(case, verb, options, said):
     assert outcome.stdout == ""
     assert said in outcome.stderr
     assert "Traceback" not in outcome.stderr
+    assert not (case.parent / "out").exists()
 
 
 def test_a_run_that_fails_ends_with_code_1(case, monkeypatch):
