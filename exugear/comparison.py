@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -158,12 +159,12 @@ class Comparison:
     second: VariantRun
     rule: AbsenceRule
 
-    @property
+    @cached_property
     def only_first(self) -> tuple[Finding, ...]:
         """Resonances of the first run whose peaks the second does not show."""
         return self.first.findings(only_in_first(self.first.picks, self.second.spectra, self.rule))
 
-    @property
+    @cached_property
     def only_second(self) -> tuple[Finding, ...]:
         """Resonances of the second run whose peaks the first does not show."""
         return self.second.findings(only_in_first(self.second.picks, self.first.spectra, self.rule))

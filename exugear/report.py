@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from exugear import page
 from exugear.assembly import Assembly, VariantError, assemble
@@ -42,6 +43,8 @@ from exugear.shapes import bodies_of, mode_scene, motions_of
 from exugear.tables import PICTURE_FOLDER, fitting_table
 from fe_ste.scene import RenderingError
 from fe_ste.table import MeshTable, TableError
+
+FloatArray = NDArray[np.float64]
 
 STIFF = "rigid"
 """Variant that others are compared with."""
@@ -113,11 +116,18 @@ class _Writer:
     left_out: list[str] = field(default_factory=list)
     pictures: list[Path] = field(default_factory=list)
     models: dict[Model, Assembly] = field(default_factory=dict)
+    stiffnesses: dict[str, dict[str, FloatArray]] = field(default_factory=dict)
+
+    def stiffness(self, law: str) -> dict[str, FloatArray]:
+        """Mesh stiffness of a law from the tables of the folder, read once."""
+        if law not in self.stiffnesses:
+            self.stiffnesses[law] = mesh_stiffness(self.gearbox, law, self.folder)
+        return self.stiffnesses[law]
 
     def assembled(self, model: Model) -> Assembly:
         """Equations of a model, with the tables of the folder."""
         if model not in self.models:
-            stiffness = mesh_stiffness(self.gearbox, model.law, self.folder)
+            stiffness = self.stiffness(model.law)
             self.models[model] = assemble(self.gearbox, model.variant, stiffness, model.law, model.inertias)
         return self.models[model]
 
@@ -469,7 +479,7 @@ def _sensitivity(writer: _Writer, modes: Mapping[Model, xr.Dataset]) -> tuple[st
     compliant = [model for model in modes if model.variant != STIFF] or list(modes)
     for model in sorted(compliant, key=lambda model: model.inertias != writer.gearbox.case.default_inertias):
         writer.tell(f"sensitivities of {model.words}")
-        stiffness = mesh_stiffness(writer.gearbox, model.law, writer.folder)
+        stiffness = writer.stiffness(model.law)
         parameters = parameters_of(writer.gearbox, model.variant, stiffness, model.law, model.inertias)
         sweeps = [sweep_modes(parameter) for parameter in parameters]
         found += [(model, remedy) for remedy in remedies(sweeps, writer.target, SEEN)]
@@ -514,7 +524,7 @@ def _remedy_row(writer: _Writer, model: Model, remedy: Remedy) -> dict[str, obje
 
 def _counterpart(writer: _Writer, model: Model, remedy: Remedy) -> float:
     """Frequency (Hz) of the nearest mode that is seen in the stiff variant under the same assumption."""
-    stiffness = mesh_stiffness(writer.gearbox, model.law, writer.folder)
+    stiffness = writer.stiffness(model.law)
     same = [
         parameter
         for parameter in parameters_of(writer.gearbox, STIFF, stiffness, model.law, model.inertias)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.interpolate
@@ -217,7 +218,7 @@ class Waterfall:
     reference: float
     unit: str
 
-    @property
+    @cached_property
     def level(self) -> FloatArray:
         """Level in dB, shape (n, m); silence ends 200 dB below the reference."""
         return 20.0 * np.log10(np.maximum(self.amplitude / self.reference, 1e-10))
