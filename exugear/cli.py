@@ -183,6 +183,8 @@ def modes(
             found, path = _compute_modes(gearbox, folder, variant.value, mesh_law.value, inertias)
             picture = _draw_campbell(found, path)
         rows = _mode_summaries(found)
+        if found.growth_rate > 0.0:
+            note(f"Unstable: disturbances grow by up to {found.growth_rate:.3g} 1/s; a run diverges", style="yellow")
         if as_json:
             assembly = found.assembly
             label = {"variant": assembly.variant, "mesh_law": assembly.law, "inertias": assembly.inertias}

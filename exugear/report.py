@@ -400,6 +400,9 @@ def _modes_section(writer: _Writer, modes: Mapping[Model, xr.Dataset]) -> str:
             rows.append(_nearest_row(model, seen, writer.target))
         writer.statements.append(_nearest_statement(model, data, nearest, seen, writer.target))
         pictures.append(_energies_picture(writer, model, seen))
+        growth = float(data.attrs["growth_rate"])
+        if growth > 0.0:
+            writer.statements.append(f"{model.words}: unstable, disturbances grow by up to {growth:.3g} 1/s.")
     sensitivity, found = _sensitivity(writer, modes)
     return page.section(
         f"Modes near {target}",
