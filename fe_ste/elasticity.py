@@ -20,6 +20,7 @@ from fe_ste.halfspace import tent_displacements, tent_weights
 from fe_ste.hexmesh import MeshSettings, SectionMesh, SectorMesh, sector_mesh
 from fe_ste.ring import open_chain_faces, ring_faces, uniform_faces
 from fe_ste.sparse import Backend, factorise
+from fe_ste.threads import one_dense_thread
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -250,6 +251,20 @@ def flank_compliance(
     """
     if open_teeth is not None and not (1 <= open_teeth <= gear.teeth and open_teeth % 2 == 1):
         raise ValueError(f"open_teeth = {open_teeth}: must be an odd number from 1 to {gear.teeth}")
+    with one_dense_thread():
+        return _flank_compliance(gear, side, settings, open_teeth, incompatible_modes, depth, mirror, backend)
+
+
+def _flank_compliance(
+    gear: Gear,
+    side: int,
+    settings: MeshSettings | None,
+    open_teeth: int | None,
+    incompatible_modes: bool,
+    depth: float | None,
+    mirror: float,
+    backend: Backend | None,
+) -> FlankCompliance:
     mesh = sector_mesh(gear, settings)
     depth = HANDOVER_DEPTH * gear.normal_module if depth is None else depth
     sector = _CondensedSector.from_mesh(mesh, side, depth, incompatible_modes, backend)

@@ -33,6 +33,7 @@ from fe_ste.gears import Gear, GearPair
 from fe_ste.hexmesh import MeshSettings
 from fe_ste.modifications import FlankModification
 from fe_ste.sparse import Backend
+from fe_ste.threads import one_dense_thread
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -387,15 +388,16 @@ def static_transmission_error(
         raise ValueError(f"misalignment = {misalignment}: must be finite angles in rad")
     shape = (positions, len(torques), len(distances), len(misalignments))
     result = _Collector(compliance, shape)
-    for c, distance in enumerate(distances):
-        placed = compliance.at_centre_distance(float(distance))
-        for t, load_torque in enumerate(torques):
-            for m, tilt in enumerate(misalignments):
-                search = _new_search(placed, _normal_load(placed.pair, load_torque))
-                for p in range(positions):
-                    result.solve((p, t, c, m), placed, float(load_torque), p / positions, search, float(tilt))
-                    if progress is not None:
-                        progress(result.finished, int(np.prod(shape)))
+    with one_dense_thread():
+        for c, distance in enumerate(distances):
+            placed = compliance.at_centre_distance(float(distance))
+            for t, load_torque in enumerate(torques):
+                for m, tilt in enumerate(misalignments):
+                    search = _new_search(placed, _normal_load(placed.pair, load_torque))
+                    for p in range(positions):
+                        result.solve((p, t, c, m), placed, float(load_torque), p / positions, search, float(tilt))
+                        if progress is not None:
+                            progress(result.finished, int(np.prod(shape)))
     axes = {
         "pmc": np.arange(positions) / positions,
         "torque": torques,
