@@ -257,6 +257,8 @@ def contact_state(
     count, reckoned = search.cells, search.approach
     for _ in range(_WINDOW_ATTEMPTS):
         cells = lay_cells(kinematics, rotation, teeth, compliance.axial, count * search.cell_width / 2, count)
+        if not cells.tooth.size:
+            break
         gap = cells.gap + _extra_gap(compliance, cells, misalignment)
         near = gap - gap.min() < _GAP_REACH * reckoned
         cells, gap = cells.select(near), gap[near]
@@ -378,14 +380,14 @@ def static_transmission_error(
     torques = np.atleast_1d(np.asarray(torque, dtype=float))
     if not (np.isfinite(torques) & (torques > 0)).all():
         raise ValueError(f"torque = {torque}: must be positive torques on gear 1; a table belongs to one loaded flank")
+    misalignments = np.atleast_1d(np.asarray(misalignment, dtype=float))
+    if not np.isfinite(misalignments).all():
+        raise ValueError(f"misalignment = {misalignment}: must be finite angles in rad")
     geometry = pair.pair if isinstance(pair, PairCompliance) else pair
     distances = np.atleast_1d(geometry.centre_distance if centre_distance is None else centre_distance)
     for distance in distances:
         geometry.with_centre_distance(float(distance))  # refuses before the finite elements, not after
     compliance = pair if isinstance(pair, PairCompliance) else pair_compliance(pair, mesh, contact)
-    misalignments = np.atleast_1d(np.asarray(misalignment, dtype=float))
-    if not np.isfinite(misalignments).all():
-        raise ValueError(f"misalignment = {misalignment}: must be finite angles in rad")
     shape = (positions, len(torques), len(distances), len(misalignments))
     result = _Collector(compliance, shape)
     with one_dense_thread():
