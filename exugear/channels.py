@@ -34,8 +34,13 @@ BALANCE_TERMS = (
     "dissipated_energy",
     "work_of_varying_stiffness",
     "non_conservative_work",
+    "bearing_rate_work",
 )
-"""Loads' work = change of kinetic and elastic energy + the other three."""
+"""Loads' work = change of kinetic and elastic energy + the other four.
+
+The last two: what the law `seed` does because its force has parts that its deflection does not see, and what the
+bearings do because their rate is not the derivative of their displacement (see `bearing_energies`).
+"""
 
 
 @compiled
@@ -102,7 +107,7 @@ def joint_signals(
 
 @compiled
 def mesh_energies(q: Floats, v: Floats, meshes: MeshArrays, state: Floats, out: Floats) -> None:
-    """Add elastic energy (J) and the powers (W) damped, of k(PMC), non-conservative to out (4,)."""
+    """Add elastic energy (J) and the powers (W) damped, of k(PMC), non-conservative to out (5,)."""
     mesh_state(q, v, meshes, state)
     gradient, turning = np.empty(ROW_SIZE), np.empty(ROW_SIZE)
     for m in range(meshes.cycles.size):
@@ -122,7 +127,7 @@ def mesh_energies(q: Floats, v: Floats, meshes: MeshArrays, state: Floats, out: 
 
 @compiled
 def bearing_energies(q: Floats, v: Floats, connectors: ConnectorArrays, out: Floats) -> None:
-    """Add elastic energy (J) and the powers (W) damped and non-conservative of all bearings to out (4,).
+    """Add elastic energy (J), damping power and power of the rate's own (W) of all bearings to out (5,).
 
     The connector's rate is not the derivative of its displacement (see `connector_motion`): with stiffness that
     couples tilt and translation the elastic force then does a little work of its own, of second order.
@@ -132,13 +137,13 @@ def bearing_energies(q: Floats, v: Floats, connectors: ConnectorArrays, out: Flo
         connector_motion(q, v, n, connectors, turn, arms, motion)
         elastic = connectors.stiffness[n] @ motion[0]
         out[0] += 0.5 * np.dot(motion[0], elastic)
-        out[3] += np.dot(elastic, motion[1] - motion[2])
+        out[4] += np.dot(elastic, motion[1] - motion[2])
         out[1] += np.dot(motion[1], connectors.damping[n] @ motion[1])
 
 
 @compiled
 def spring_energies(q: Floats, v: Floats, springs: SpringArrays, out: Floats) -> None:
-    """Add elastic energy (J) and damping power (W) of all couplings to out (4,)."""
+    """Add elastic energy (J) and damping power (W) of all couplings to out (5,)."""
     for n in range(springs.coordinates.shape[0]):
         i, j = springs.coordinates[n]
         out[0] += 0.5 * springs.stiffness[n] * (q[j] - q[i]) ** 2
@@ -155,7 +160,7 @@ def energy_signals(
     inertia: InertiaArrays,
     out: Floats,
 ) -> None:
-    """Fill (samples, 5): kinetic and elastic energy (J); powers (W) damped, of k(PMC), non-conservative."""
+    """Fill (samples, 6): kinetic and elastic energy (J); powers (W) as the last four of `BALANCE_TERMS`."""
     state = np.empty((meshes.cycles.size, 6))
     kinetic = np.empty(inertia.body.size + inertia.spin.size)
     for n in range(q.shape[0]):
@@ -205,8 +210,8 @@ class Channels:
         return signals[:, 2 : 2 + len(self.mesh_names)]
 
     def energies(self, q: Floats, v: Floats) -> Floats:
-        """Energies and powers of states q, v (samples, size), shape (samples, 5): see `energy_signals`."""
-        out = np.empty((q.shape[0], 5))
+        """Energies and powers of states q, v (samples, size), shape (samples, 6): see `energy_signals`."""
+        out = np.empty((q.shape[0], 6))
         a = self.assembly
         energy_signals(q, v, a.meshes, a.connectors, a.springs, a.inertia, out)
         return out

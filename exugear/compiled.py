@@ -377,11 +377,11 @@ class Observer:
         self._work = work_for(self._equations, np.zeros(assembly.size), np.zeros(assembly.size))
 
     def observe(self, time: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:
-        """Signals (samples, count), energies (samples, 2) in J and powers (samples, 4) in W of states q, v.
+        """Signals (samples, count), energies (samples, 2) in J and powers (samples, 5) in W of states q, v.
 
-        The powers are those of the loads, damping, k(PMC), and non-conservative forces.
+        The powers are those of the loads, damping, k(PMC), and non-conservative forces of meshes and bearings.
         """
-        signals, energies = np.empty((len(time), self._count)), np.empty((len(time), 6))
+        signals, energies = np.empty((len(time), self._count)), np.empty((len(time), 7))
         signals[:, 0] = v[:, self._input]
         signals[:, 1] = q @ self._overall
         observe(time, q, v, self._equations, self._work, signals[:, 2:], energies)

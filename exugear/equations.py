@@ -587,7 +587,7 @@ def observe_connectors(
             own[row] += elastic + damped
             energy[1] += 0.5 * elastic * strain[row]
             energy[3] += damped * rate[row]
-            energy[5] += elastic * (rate[row] - true[row])
+            energy[6] += elastic * (rate[row] - true[row])
         first = 3 * connectors.number[n]
         for i in range(3):
             o = 3 * i
@@ -635,10 +635,10 @@ def observe_bodies(q: Floats, v: Floats, bodies: Bodies, work: Work, energy: Flo
 def observe(
     time: Floats, q: Floats, v: Floats, equations: Equations, work: Work, signals: Floats, energies: Floats
 ) -> None:
-    """Fill signals (samples, 2 m + 3 supports) and energies (samples, 6) of states q, v (samples, size).
+    """Fill signals (samples, 2 m + 3 supports) and energies (samples, 7) of states q, v (samples, size).
 
     Signals: deflection and F_bt of each mesh, force of each bearing or ideal joint. Energies: kinetic and elastic (J);
-    powers (W) of the loads, damped, of k(PMC), non-conservative.
+    powers (W) of the loads, damped, of k(PMC), non-conservative of meshes and of bearings.
     """
     size = q.shape[1]
     meshes, springs = equations.meshes, equations.springs

@@ -398,10 +398,10 @@ class Recorder:
         before = powers[:1] if self._powers is None else self._powers
         series = np.vstack([before, powers])
         lines = np.empty((len(t), len(BALANCE_TERMS)))
-        worked = self.balance[[0, 3, 4, 5]] + 0.5 * self.step * np.cumsum(series[1:] + series[:-1], axis=0)
+        worked = self.balance[[0, 3, 4, 5, 6]] + 0.5 * self.step * np.cumsum(series[1:] + series[:-1], axis=0)
         if self._powers is None:
             worked -= self.step * powers[0]  # no time passes before the first state
-        lines[:, [0, 3, 4, 5]] = worked
+        lines[:, [0, 3, 4, 5, 6]] = worked
         lines[:, 1:3] = energies
         self._powers = powers[-1:]
         self.balance = lines[-1]
