@@ -21,6 +21,7 @@ from exugear.console import (
     FailedError,
     StoppedError,
     exit_codes,
+    interruption,
     note,
     print_json,
     print_table,
@@ -328,6 +329,7 @@ def _fill_table(order: TableOrder, bar: Progress, task: TaskID) -> MeshTable:
     bar.update(task, description=f"{order.name}: finite elements")
 
     def at_position(done: int, of: int) -> None:
+        interruption.check()
         completed = before + _work(order) - of + done
         bar.update(task, completed=completed, description=f"{order.name}: position {done} of {of}")
 

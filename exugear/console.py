@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import signal
 import sys
+import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from types import FrameType
 from typing import Any, Literal, NoReturn
 
 from rich.box import SIMPLE_HEAD
@@ -41,6 +44,38 @@ class StoppedError(Exception):
     """The user stopped the work; the message says what is kept and how to go on."""
 
 
+class Interruption:
+    """Ctrl-C, remembered: Python drops the exception where it falls into a finaliser or a library's callback."""
+
+    def __init__(self) -> None:
+        self._wanted = False
+
+    @contextmanager
+    def listening(self) -> Iterator[None]:
+        """Remember Ctrl-C inside the context, besides raising it; only the main thread receives it."""
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+        self._wanted = False
+        before = signal.signal(signal.SIGINT, self._remember)
+        try:
+            yield
+        finally:
+            signal.signal(signal.SIGINT, before)
+
+    def _remember(self, number: int, frame: FrameType | None) -> None:
+        self._wanted = True
+        raise KeyboardInterrupt
+
+    def check(self) -> None:
+        """Raise a Ctrl-C that came and was dropped; long work calls this between its steps."""
+        if self._wanted:
+            raise KeyboardInterrupt
+
+
+interruption = Interruption()
+
+
 @contextmanager
 def exit_codes() -> Iterator[None]:
     """Turn errors the user can act on into one message and an exit code; others keep their traceback.
@@ -48,7 +83,8 @@ def exit_codes() -> Iterator[None]:
     2 after `BadInputError`, 1 after `FailedError`, 130 after `StoppedError` and Ctrl-C.
     """
     try:
-        yield
+        with interruption.listening():
+            yield
     except BadInputError as error:
         _end("Bad input", error, EXIT_BAD_INPUT)
     except FailedError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import json
 import shutil
@@ -18,7 +19,7 @@ import xarray
 from typer.testing import CliRunner
 
 from exugear.cli import app
-from exugear.console import BadInputError, FailedError, exit_codes
+from exugear.console import BadInputError, FailedError, exit_codes, interruption
 from exugear.gearbox import Gearbox
 from exugear.tables import order_tables
 from fe_ste.contact import ContactSettings
@@ -270,3 +271,19 @@ def test_ctrl_c_ends_with_130_and_leaves_no_half_written_table(spur_case, tmp_pa
     assert process.returncode == 130, said
     assert "Stopped" in said
     assert not list(out.rglob("*.nc*"))
+
+
+def test_ctrl_c_that_a_callback_swallowed_still_stops(capsys):
+    with pytest.raises(SystemExit) as end, exit_codes():
+        with contextlib.suppress(KeyboardInterrupt):  # what a finaliser or a library's callback does with it
+            signal.raise_signal(signal.SIGINT)
+        interruption.check()
+    assert end.value.code == 130
+    assert "Stopped" in capsys.readouterr().err
+
+
+def test_work_after_a_stopped_one_is_not_stopped():
+    with pytest.raises(SystemExit), exit_codes():
+        signal.raise_signal(signal.SIGINT)
+    with exit_codes():
+        interruption.check()
