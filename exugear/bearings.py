@@ -19,7 +19,6 @@ from dataclasses import dataclass, replace
 from typing import Literal, Protocol
 
 import numpy as np
-import scipy.optimize
 from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
@@ -556,6 +555,8 @@ def _first_touch(laminae: LaminaArrays, force: FloatArray) -> FloatArray:
     upper = float(np.max(laminae.gap[touching] / facing[touching])) + 1e-6
     while shortage(upper) > 0.0:
         upper *= 2.0
+    import scipy.optimize  # a tenth of a second that a gearbox with given stiffnesses need not wait
+
     distance: FloatArray = scipy.optimize.brentq(shortage, 0.0, upper) * direction
     return distance
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from exugear.assembly import Assembly
@@ -41,6 +42,14 @@ BALANCE_TERMS = (
 The last two: what the law `seed` does because its force has parts that its deflection does not see, and what the
 bearings do because their rate is not the derivative of their displacement (see `bearing_energies`).
 """
+
+
+def energy_residual(data: xr.Dataset) -> float:
+    """Part of the change of kinetic energy that the account of a run does not explain; NaN without a change."""
+    change = {term: float(data[term][-1] - data[term][0]) for term in BALANCE_TERMS}
+    explained = sum(value for term, value in change.items() if term != "work_of_loads")
+    kinetic = change["kinetic_energy"]
+    return (change["work_of_loads"] - explained) / kinetic if kinetic else math.nan
 
 
 @compiled

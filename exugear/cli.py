@@ -206,7 +206,7 @@ def run(
     ] = None,
     solver: Annotated[Solver, typer.Option(help="What integrates.")] = Solver.compiled,
     duration: Annotated[
-        float | None, typer.Option(min=1e-3, metavar="S", help="Simulated time, s. (default: the load case's)")
+        float | None, typer.Option(min=1e-2, metavar="S", help="Simulated time, s. (default: the load case's)")
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with a run that was stopped.")] = False,
     out: OutOption = None,
@@ -538,8 +538,8 @@ def _report_run(case: Path, finished: Run, as_json: bool) -> None:
         raise StoppedError(f"at {finished.end:.3f} s; kept in {finished.path}, --resume goes on from there")
     import xarray as xr
 
-    from exugear.comparison import RPM
-    from exugear.report import energy_residual
+    from exugear.channels import energy_residual
+    from exugear.gearbox import RPM
 
     with xr.open_dataset(finished.path, engine="h5netcdf") as data:
         summary = {

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from exugear import page
 from exugear.assembly import Assembly, VariantError, assemble
-from exugear.channels import BALANCE_TERMS
+from exugear.channels import energy_residual
 from exugear.comparison import (
     NEAR,
     REFERENCE_FREQUENCY,
@@ -372,14 +372,6 @@ def _run_row(run: VariantRun) -> dict[str, object]:
         "energy not accounted for": f"{figures:.1e}",
         "longest pull of a mesh / s": f"{pulling:.3g}",
     }
-
-
-def energy_residual(data: xr.Dataset) -> float:
-    """Part of the change of kinetic energy that the account of a run does not explain; NaN without a change."""
-    change = {term: float(data[term][-1] - data[term][0]) for term in BALANCE_TERMS}
-    explained = sum(value for term, value in change.items() if term != "work_of_loads")
-    kinetic = change["kinetic_energy"]
-    return (change["work_of_loads"] - explained) / kinetic if kinetic else math.nan
 
 
 # -- modes -------------------------------------------------------------------------------------------------------

@@ -3,7 +3,7 @@
 Two solvers take the same assembly: `exugear.compiled`, and Exudyn as the model of record. Both hand their states to
 one `Recorder`, which filters, accounts for energy and writes. Without a step asked for, `exugear.compiled.choose_step`
 finds the longest that is stable and keeps the excitation in the band: 6.4 kHz is the high-speed mesh of the GRC at
-215 rpm.
+215 rpm. Exudyn is loaded only where it integrates.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from types import FrameType
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -41,7 +41,9 @@ from exugear.mesh_element import Angles
 from exugear.results import input_hash
 from exugear.runfile import Checkpoint, Decimator, RunFile
 from exugear.statics import accelerating_start
-from exugear.system import Drive, ExudynSystem, Loading, MeshRoute, SolverFailure
+
+if TYPE_CHECKING:
+    from exugear.system import Loading, MeshRoute
 
 Floats = NDArray[np.float64]
 
@@ -297,6 +299,8 @@ class Recorder:
         return Run(self.final_path if complete else self.partial_path, complete, self._last_time, wall)
 
     def _integrate_in_exudyn(self, mesh_route: MeshRoute) -> None:
+        from exugear.system import ExudynSystem, SolverFailure
+
         system = ExudynSystem(self.assembly, self.q, self.v, _loading(self.loads), mesh_route)
         start = self.first_step * self.step
         try:
@@ -471,6 +475,8 @@ def _load_table(
 
 def _loading(loads: LoadTable) -> Loading:
     """Express the same as functions of time, for Exudyn."""
+    from exugear.system import Drive, Loading
+
     drive = None
     if loads.drive is not None:
         ahead, speed, half = loads.drive.angle

@@ -88,14 +88,25 @@ def test_only_two_modules_know_exudyn(module):
     assert "exudyn" not in {name.split(".")[0] for name in runtime_imports(MODULES[module])}
 
 
-def test_help_loads_no_heavy_library():
-    heavy = ("numpy", "scipy", "pydantic", "xarray", "numba", "matplotlib", "skfem", "pyvista", "exudyn")
+def left_unloaded(arguments: list[str], heavy: tuple[str, ...]) -> str:
+    """Output of the command line run in a process of its own, in which none of the named libraries was loaded."""
     program = (
         "import sys\nfrom exugear.cli import app\n"
-        "try:\n    app(['--help'])\nexcept SystemExit:\n    pass\n"
+        f"try:\n    app({arguments!r})\nexcept SystemExit as end:\n    assert not end.code, end.code\n"
         f"sys.exit(', '.join(name for name in {heavy!r} if name in sys.modules) or 0)"
     )
     command = [sys.executable, "-c", program]
     outcome = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
-    assert outcome.returncode == 0, f"loaded by --help: {outcome.stderr}"
-    assert "Usage" in outcome.stdout
+    assert outcome.returncode == 0, f"loaded by {arguments[0]}: {outcome.stderr}"
+    return outcome.stdout
+
+
+def test_help_loads_no_heavy_library():
+    heavy = ("numpy", "scipy", "pydantic", "xarray", "numba", "matplotlib", "skfem", "pyvista", "exudyn")
+    assert "Usage" in left_unloaded(["--help"], heavy)
+
+
+def test_compiled_run_loads_neither_exudyn_nor_what_draws(tmp_path):
+    run = ["run", "cases/grc750/gearbox.toml", "--variant", "rigid", "--mesh-law", "iso6336", "--duration", "0.01"]
+    heavy = ("exudyn", "matplotlib", "pyvista", "scipy.signal", "scipy.stats", "pypardiso")
+    assert "0.01 s simulated" in left_unloaded([*run, "--out", str(tmp_path)], heavy)

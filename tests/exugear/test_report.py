@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from exugear.channels import energy_residual
 from exugear.gearbox import CaseError, Gearbox
 from exugear.mesh_stiffness import mesh_stiffness
 from exugear.modes import eigenmodes
-from exugear.report import ReportError, energy_residual, write_report
+from exugear.report import ReportError, write_report
 from exugear.results import input_hash, keep_case, kept_case, modes_path, note_time, times_spent
 from exugear.runup import simulate
 from exugear.tables import order_tables

@@ -15,7 +15,7 @@ import xarray as xr
 
 from exugear.channels import BALANCE_TERMS
 from exugear.gearbox import CaseError, Gearbox
-from exugear.runfile import Decimator
+from exugear.runfile import Decimator, low_pass
 from exugear.runup import Progress, RunError, simulate
 from exugear.system import ExudynSystem
 
@@ -242,6 +242,13 @@ def test_decimation_keeps_the_band_and_removes_what_would_fold() -> None:
     expected = rows[first::2, 0][: len(results)]
     assert np.abs(results[:, 0] - expected).max() < 2e-4  # passband ripple of an 80 dB design
     assert np.abs(results[:, 1]).max() < 2e-4  # twice the 6.4 kHz mesh would fold to 7.2 kHz
+
+
+def test_low_pass_is_the_one_that_scipy_designs() -> None:
+    for factor in (2, 3, 5):
+        half = 31 * factor // 2
+        expected = scipy.signal.firwin(2 * half + 1, 1.0 / factor, window=("kaiser", 8.0))
+        assert np.abs(low_pass(factor, half) - expected).max() < 1e-15
 
 
 def test_equal_planets_in_phase_load_the_sun_evenly(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
