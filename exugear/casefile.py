@@ -261,10 +261,27 @@ class GravitySection(_Section):
 
 
 class SteSection(_Section):
-    """Settings of the finite-element tables."""
+    """Settings of the finite-element tables; the axes are those of a table with ``grid``."""
 
     positions: Annotated[int, Field(ge=8, le=2000)] = 50
     method: Literal["superelement", "nonlinear"] = "superelement"
+    grid: bool = False
+    torque_factors: tuple[Positive, ...] = (0.05, 0.2, 0.5, 1.0, 1.5, 2.0)
+    centre_distance_offsets_um: tuple[Finite, ...] = (-200.0, -100.0, 0.0, 100.0, 200.0)
+    misalignment_um: tuple[Finite, ...] = (-80.0, -40.0, 0.0, 40.0, 80.0)
+
+    @model_validator(mode="after")
+    def _axes(self) -> SteSection:
+        for key, values, static in (
+            ("torque_factors", self.torque_factors, 1.0),
+            ("centre_distance_offsets_um", self.centre_distance_offsets_um, 0.0),
+            ("misalignment_um", self.misalignment_um, 0.0),
+        ):
+            if list(values) != sorted(set(values)):
+                raise ValueError(f"{key} = {list(values)}: values must rise")
+            if static not in values:
+                raise ValueError(f"{key} = {list(values)}: {static} must be among them, the static state")
+        return self
 
 
 class CaseFile(_Section):

@@ -142,6 +142,10 @@ def ste(
         typer.Option(min=8, max=2000, help="Positions of the mesh cycle. (default: as the file says, 50)"),
     ] = None,
     method: Annotated[Method, typer.Option(help="How the teeth deflect.")] = Method.superelement,
+    grid: Annotated[
+        bool,
+        typer.Option("--grid", help="Over load, centre distance and misalignment too, with the axes of the file."),
+    ] = False,
     out: OutOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -153,7 +157,7 @@ def ste(
         from exugear.tables import draw_curves, stored_tables
 
         gearbox = read_gearbox(case)
-        orders, folder = _order_tables(gearbox, case, out, mesh or [], positions)
+        orders, folder = _order_tables(gearbox, case, out, mesh or [], positions, grid)
         with _time_noted(folder, "tables of transmission error"):
             tables = _fill_tables(orders)
         with _time_noted(folder, "pictures of the tables"):
@@ -288,7 +292,7 @@ def report(
 
 
 def _order_tables(
-    gearbox: Gearbox, case: Path, out: Path | None, names: list[str], positions: int | None
+    gearbox: Gearbox, case: Path, out: Path | None, names: list[str], positions: int | None, grid: bool
 ) -> tuple[list[TableOrder], Path]:
     from exugear.gearbox import CaseError
     from exugear.results import keep_case
@@ -296,7 +300,7 @@ def _order_tables(
 
     folder = out or Path("results") / case.resolve().parent.name
     try:
-        orders = order_tables(gearbox, folder, names, positions)
+        orders = order_tables(gearbox, folder, names, positions, grid)
     except CaseError as error:
         raise BadInputError(error) from error
     make_results_folder(folder)
@@ -324,27 +328,35 @@ def _fill_tables(orders: list[TableOrder]) -> dict[str, MeshTable]:
 def _fill_table(order: TableOrder, bar: Progress, task: TaskID) -> MeshTable:
     from fe_ste.gears import GeometryError
     from fe_ste.sparse import FactorisationError
+    from fe_ste.sweep import SweepError
 
     before = bar.tasks[task].completed
     bar.update(task, description=f"{order.name}: finite elements")
 
-    def at_position(done: int, of: int) -> None:
+    what = "position" if _states(order) == order.wanted.positions else "state"
+
+    def at_state(done: int, of: int) -> None:
         interruption.check()
         completed = before + _work(order) - of + done
-        bar.update(task, completed=completed, description=f"{order.name}: position {done} of {of}")
+        bar.update(task, completed=completed, description=f"{order.name}: {what} {done} of {of}")
 
     try:
-        return order.fill(at_position)
+        return order.fill(at_state)
     except GeometryError as error:
         raise BadInputError(f"pairs.{order.name}: {error}") from error
-    except (FactorisationError, OSError) as error:
+    except (FactorisationError, SweepError, OSError) as error:
         raise FailedError(f"{order.name}: {error}") from error
 
 
 def _work(order: TableOrder) -> int:
-    """Work of a table, in positions: the time left counts the finite elements of both gears as well."""
-    finite_elements = 150
-    return finite_elements + order.wanted.positions
+    """Work of a table, in states: the time left counts the finite elements of both gears as well."""
+    finite_elements = 500
+    return finite_elements + _states(order)
+
+
+def _states(order: TableOrder) -> int:
+    wanted = order.wanted
+    return wanted.positions * len(wanted.torque) * max(len(wanted.centre_distance), 1) * len(wanted.misalignment)
 
 
 def _results_folder(case: Path, out: Path | None, make: bool = True) -> Path:
@@ -714,7 +726,7 @@ def _ste_row(summary: dict[str, Any]) -> dict[str, str]:
     def shown(key: str, form: str, factor: float = 1.0) -> str:
         return "-" if summary[key] is None else format(factor * summary[key], form)
 
-    solved = summary["positions"] - summary["not_converged"]
+    solved = summary["states"] - summary["not_converged"]
     return {
         "pair": summary["pair"],
         "torque 1\nN m": shown("torque_gear_1_N_m", ".1f"),
@@ -722,5 +734,5 @@ def _ste_row(summary: dict[str, Any]) -> dict[str, str]:
         "peak-peak\nµm": shown("ste_peak_to_peak_um", ".3f"),
         "stiffness\nMN/m": shown("mesh_stiffness_mean_N_per_m", ".1f", 1e-6),
         "pressure\nMPa": shown("max_pressure_MPa", ".0f"),
-        "positions\nsolved": f"{solved}/{summary['positions']}",
+        "states\nsolved": f"{solved}/{summary['states']}",
     }

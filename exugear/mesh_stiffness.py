@@ -58,10 +58,9 @@ def _iso(spec: PairSpec) -> float:
 def table_stiffness(gearbox: Gearbox, name: str, directory: Path) -> Floats:
     """Stiffness samples of a pair from its table, which must have been computed from exactly this case."""
     try:
-        dataset = fitting_table(gearbox, name, directory).dataset
+        point = fitting_table(gearbox, name, directory).static_state
     except TableError as error:
         raise MeshError(f"pair {name}: {error} (exugear ste)") from None
-    point = dataset.isel(torque=0, centre_distance=0, misalignment=0)
     if not bool(np.all(point["converged"])):
         unsolved = int(np.sum(~point["converged"].to_numpy().astype(bool)))
         raise MeshError(f"pair {name}: {table_path(directory, name)} holds {unsolved} unsolved positions")

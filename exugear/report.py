@@ -640,14 +640,14 @@ def _tables_section(writer: _Writer, tables: Mapping[str, MeshTable]) -> str:
     rows = [
         {
             "pair": name,
-            "torque on gear 1 / N m": f"{float(table.dataset['torque'][0]):.1f}",
-            "positions": table.dataset.sizes["pmc"],
-            "mean / µm": f"{1e6 * float(table.dataset['ste'].mean()):.2f}",
-            "peak to peak / µm": f"{1e6 * float(table.dataset['ste'].max() - table.dataset['ste'].min()):.3f}",
-            "mean stiffness / (N/µm)": f"{1e-6 * float(table.dataset['mesh_stiffness'].mean()):.0f}",
+            "torque on gear 1 / N m": f"{float(state['torque']):.1f}",
+            "positions": state.sizes["pmc"],
+            "mean / µm": f"{1e6 * float(state['ste'].mean()):.2f}",
+            "peak to peak / µm": f"{1e6 * float(state['ste'].max() - state['ste'].min()):.3f}",
+            "mean stiffness / (N/µm)": f"{1e-6 * float(state['mesh_stiffness'].mean()):.0f}",
             "ISO 6336-1 B / (N/µm)": f"{1e-6 * float(iso[name].mean()):.0f}",
         }
-        for name, table in tables.items()
+        for name, state in ((name, table.static_state) for name, table in tables.items())
     ]
     folder = writer.folder / PICTURE_FOLDER
     curves = folder / "ste.png"

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
 from exugear.gearbox import CaseError, Gearbox
+from fe_ste.gears import GearPair, GeometryError
 from fe_ste.plots import plot_load_share, plot_ste_curves
 from fe_ste.scene import contact_quads, draw_tooth_contact, meshed_teeth
 from fe_ste.ste import contact_state
@@ -44,20 +45,26 @@ class TableOrder:
     replaces: str = ""
 
     def fill(self, progress: Callable[[int, int], None] | None = None) -> MeshTable:
-        """Compute the table and write its file.
+        """Compute the table and write its file; what a stopped computation had finished is taken up.
 
         Parameters
         ----------
         progress : callable, optional
             Called with the number of finished positions and of all positions.
         """
-        table = MeshTable.compute(self.wanted, progress)
+        partial = self.path.with_suffix(".partial.nc")
+        table = MeshTable.compute(self.wanted, progress, partial=partial)
         table.save(self.path)
+        partial.unlink(missing_ok=True)
         return table
 
 
 def order_tables(
-    gearbox: Gearbox, out: Path, names: Iterable[str] = (), positions: int | None = None
+    gearbox: Gearbox,
+    out: Path,
+    names: Iterable[str] = (),
+    positions: int | None = None,
+    grid: bool = False,
 ) -> list[TableOrder]:
     """List the tables of a gearbox and find those that are there; computes and writes nothing.
 
@@ -71,6 +78,8 @@ def order_tables(
         Pairs to list; without any, those that the file wants a table of.
     positions : int, optional
         Positions of the mesh cycle; without it what the file says.
+    grid : bool
+        Ask for the axes of the file even if its section ``ste`` does not.
 
     Raises
     ------
@@ -93,7 +102,9 @@ def order_tables(
                 f"{gearbox.source}: pairs.{name}: carries no torque in [static_load]; "
                 "a table needs one, for it belongs to one loaded flank"
             )
-    return [_order(gearbox, name, out, positions or gearbox.ste.positions) for name in dict.fromkeys(chosen)]
+    grid = grid or gearbox.ste.grid
+    wanted = {name: wanted_table(gearbox, name, positions or gearbox.ste.positions, grid) for name in chosen}
+    return [_order(gearbox, name, out, order, grid) for name, order in wanted.items()]
 
 
 def table_path(out: Path, name: str) -> Path:
@@ -101,16 +112,64 @@ def table_path(out: Path, name: str) -> Path:
     return out / TABLE_FOLDER / f"{name}.nc"
 
 
-def wanted_table(gearbox: Gearbox, name: str, positions: int) -> TableInput:
-    """All that the numbers of a pair's table depend on."""
+def wanted_table(gearbox: Gearbox, name: str, positions: int, grid: bool = False) -> TableInput:
+    """All that the numbers of a pair's table depend on.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    name : str
+        Pair.
+    positions : int
+    grid : bool
+        Over the axes of the file's section ``ste``, else the static state alone.
+
+    Raises
+    ------
+    CaseError
+        If the gears cannot run at a centre distance of the axes.
+    """
     spec = gearbox.pairs[name]
     # Statics leave rounding in the torque; another machine's must not make another hash of it.
-    torque = float(f"{spec.static_torque:.12g}")
-    return TableInput(pair=spec.pair, torque=(torque,), positions=positions)
+    torque = _rounded(spec.static_torque)
+    if not grid:
+        return TableInput(pair=spec.pair, torque=(torque,), positions=positions, static_torque=torque)
+    width = spec.pair.face_width
+    return TableInput(
+        pair=spec.pair,
+        torque=tuple(torque if factor == 1.0 else _rounded(torque * factor) for factor in gearbox.ste.torque_factors),
+        positions=positions,
+        centre_distance=tuple(_distance(gearbox, spec.pair, um) for um in gearbox.ste.centre_distance_offsets_um),
+        misalignment=tuple(1e-6 * opening / width for opening in gearbox.ste.misalignment_um),
+        static_torque=torque,
+    )
 
 
-def fitting_table(gearbox: Gearbox, name: str, out: Path) -> MeshTable:
+def _distance(gearbox: Gearbox, pair: GearPair, offset_um: float) -> float:
+    distance = pair.centre_distance + 1e-6 * offset_um
+    try:
+        pair.with_centre_distance(distance)
+    except GeometryError as error:
+        raise CaseError(f"{gearbox.source}: ste.centre_distance_offsets_um: {offset_um:g}: {error}") from None
+    return distance
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.12g}")
+
+
+def fitting_table(gearbox: Gearbox, name: str, out: Path, grid: bool = False) -> MeshTable:
     """Read the table of a pair, however many positions it has, if all else is the case's.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    name : str
+        Pair.
+    out : Path
+        Results folder.
+    grid : bool
+        Whether it must have exactly the axes of the file's section ``ste``; else any axes with the static state serve.
 
     Raises
     ------
@@ -119,39 +178,64 @@ def fitting_table(gearbox: Gearbox, name: str, out: Path) -> MeshTable:
     """
     path = table_path(out, name)
     table = MeshTable.open(path)
-    if table.input_hash != wanted_table(gearbox, name, table.dataset.sizes["pmc"]).hash:
+    wanted = wanted_table(gearbox, name, table.dataset.sizes["pmc"], grid)
+    if not (table.input_hash == wanted.hash or (not grid and _holds(table, wanted))):
         raise TableError(f"{path}: was computed from another input; compute it again")
     return table
 
 
-def missing_tables(gearbox: Gearbox, out: Path) -> list[TableOrder]:
-    """List the tables that dynamics need and that are not there, or belong to another input."""
+def _holds(table: MeshTable, static: TableInput) -> bool:
+    """Whether a table over more states was computed from the input `static`, axes aside, and holds its state."""
+    try:
+        torque = float(table.static_state["torque"])
+    except TableError:
+        return False
+    torques, distances, misalignments = (
+        tuple(table.dataset[name].to_numpy().tolist()) for name in ("torque", "centre_distance", "misalignment")
+    )
+    wider = replace(static, torque=torques, centre_distance=distances, misalignment=misalignments)
+    return torque == static.torque[0] and table.input_hash == wider.hash
+
+
+def missing_tables(gearbox: Gearbox, out: Path, grid: bool = False) -> list[TableOrder]:
+    """List the tables that dynamics need and that are not there, or belong to another input.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    out : Path
+        Results folder.
+    grid : bool
+        Whether the mesh law interpolates over load, centre distance and misalignment.
+    """
     orders = []
     for name in dict.fromkeys(mesh.pair.name for mesh in gearbox.meshes):
         try:
-            fitting_table(gearbox, name, out)
+            fitting_table(gearbox, name, out, grid)
         except TableError:
-            orders += order_tables(gearbox, out, [name])
+            orders += order_tables(gearbox, out, [name], grid=grid)
     return orders
 
 
-def _order(gearbox: Gearbox, name: str, out: Path, positions: int) -> TableOrder:
-    wanted = wanted_table(gearbox, name, positions)
+def _order(gearbox: Gearbox, name: str, out: Path, wanted: TableInput, grid: bool) -> TableOrder:
     path = table_path(out, name)
     if not path.exists():
         return TableOrder(name, wanted, path, None)
     try:
-        return TableOrder(name, wanted, path, MeshTable.open(path, wanted))
+        stored = fitting_table(gearbox, name, out, grid)
     except TableError as error:
         return TableOrder(name, wanted, path, None, str(error))
+    if stored.dataset.sizes["pmc"] != wanted.positions:
+        return TableOrder(name, wanted, path, None, f"{path}: was computed from another input, with other positions")
+    return TableOrder(name, wanted, path, stored)
 
 
 def summarise(order: TableOrder, table: MeshTable) -> dict[str, Any]:
     """Return the figures of a table that a person asks for first; the unit is part of the key.
 
-    What no converged position gives is None.
+    Of the static state, but for the numbers of states. What no converged position gives is None.
     """
-    data = table.dataset
+    data = table.static_state
 
     def figure(values: xr.DataArray) -> float | None:
         value = float(values)
@@ -160,9 +244,10 @@ def summarise(order: TableOrder, table: MeshTable) -> dict[str, Any]:
     return {
         "pair": order.name,
         "table": str(order.path),
-        "torque_gear_1_N_m": order.wanted.torque[0],
+        "torque_gear_1_N_m": float(data["torque"]),
         "positions": order.wanted.positions,
-        "not_converged": int((~data["converged"]).sum()),
+        "states": table.dataset["ste"].size,
+        "not_converged": int((~table.dataset["converged"]).sum()),
         "ste_mean_um": figure(1e6 * data["ste"].mean()),
         "ste_peak_to_peak_um": figure(1e6 * (data["ste"].max() - data["ste"].min())),
         "mesh_stiffness_mean_N_per_m": figure(data["mesh_stiffness"].mean()),
@@ -181,11 +266,11 @@ def draw_curves(tables: Mapping[str, MeshTable], out: Path) -> list[Path]:
     """Draw the transmission error of all pairs and the load share of each; return the pictures' files."""
     folder = out / PICTURE_FOLDER
     curves = folder / "ste.png"
-    plot_ste_curves({name: table.dataset for name, table in tables.items()}, curves)
+    plot_ste_curves({name: table.static_state for name, table in tables.items()}, curves)
     shares = []
     for name, table in tables.items():
         path = folder / f"load_share_{name}.png"
-        plot_load_share(table.dataset, path, title=_title(name, table))
+        plot_load_share(table.static_state, path, title=_title(name, table))
         shares.append(path)
     return [curves, *shares]
 
@@ -207,16 +292,16 @@ def draw_contact(order: TableOrder, table: MeshTable, out: Path) -> Path:
     """
     pair = order.wanted.pair
     compliance = prepared_compliance(order.wanted)
-    state = contact_state(compliance, order.wanted.torque[0], 0.0)
+    state = contact_state(compliance, float(table.static_state["torque"]), 0.0)
     quads = contact_quads(pair, state.cells, 0.0, compliance.axial, compliance.slice_width)
     teeth = sorted({int(tooth) for tooth in state.cells.tooth[state.pressure > 0.0]})
     pinion, gear = meshed_teeth(pair, 0.0, teeth, order.wanted.mesh)
     path = contact_picture(order.name, out)
-    highest = float(table.dataset["max_pressure"].isel(pmc=0).max())
+    highest = float(table.static_state["max_pressure"].isel(pmc=0))
     title = _title(order.name, table)
     draw_tooth_contact(pinion, gear, quads, state.pressure, path, title=title, highest_pressure=highest)
     return path
 
 
 def _title(name: str, table: MeshTable) -> str:
-    return f"{name}, {float(table.dataset['torque'][0]):.0f} N m on gear 1"
+    return f"{name}, {float(table.static_state['torque']):.0f} N m on gear 1"

@@ -226,9 +226,37 @@ def _mean_inverse_distance(across: float, along: float, half_across: float, half
     return rectangle_integral(across, along, half_across, half_along) / (4.0 * half_across * half_along)
 
 
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+def _add_far(
+    row: FloatArray, strength: float, roll: float, across_scale: float, shift: float, along: float, half_across: float,
+    half_along: float, rolls: FloatArray, halves: FloatArray,
+) -> None:  # fmt: skip
+    """Add the resultants and second moments of the cells of one slice, seen from afar, to ``row``; no branches."""
+    for j in range(len(rolls)):
+        across = across_scale * (roll + rolls[j]) * (roll - rolls[j] - shift)
+        half = 0.5 * (half_across + halves[j])
+        inverse = 1.0 / (across * across + along * along)
+        moments = half * half * (2 * across * across - along * along)
+        moments += half_along * half_along * (2 * along * along - across * across)
+        row[j] += strength * math.sqrt(inverse) * (1.0 + moments * inverse * inverse / 6.0)
+
+
+@njit(cache=True)
+def _add_near(
+    row: FloatArray, strength: float, roll: float, across_scale: float, shift: float, along: float, half_across: float,
+    half_along: float, rolls: FloatArray, halves: FloatArray,
+) -> None:  # fmt: skip
+    """Add the cells of one slice, seen from near, to ``row``."""
+    for j in range(len(rolls)):
+        across = across_scale * (roll + rolls[j]) * (roll - rolls[j] - shift)
+        half = 0.5 * (half_across + halves[j])
+        row[j] += strength * _mean_inverse_distance(across, along, half, half_along)
+
+
 @njit(cache=True)
 def _add_half_spaces(
     matrix: FloatArray,
+    groups: IntArray,
     tooth: IntArray,
     axial: FloatArray,
     roll: FloatArray,
@@ -241,31 +269,42 @@ def _add_half_spaces(
 ) -> None:
     """Add the surface displacement of both half-spaces under uniform cell pressures of unit resultant.
 
-    ``surface`` is (1 - nu^2) / (pi E) of each gear, ``ends`` the axial position of its free end faces (+-), and
-    ``mirror`` the strength of the image loads behind them.
+    ``groups`` bounds the runs of cells of one tooth pair and slice; distances along the contact line are common to a
+    run, and so is whether it is seen from near. ``surface`` is (1 - nu^2) / (pi E) of each gear, ``ends`` the axial
+    position of its free end faces (+-), and ``mirror`` the strength of the image loads behind them.
     """
-    both = surface[0] + surface[1]
-    for i in range(len(tooth)):
-        for j in range(i + 1):
-            if tooth[i] != tooth[j]:
+    scale = 0.5 * pair.base_radius_1
+    from_afar = _FAR * max(half_along, half_across.max())
+    along, strength = np.empty(5), np.empty(5)
+    for g in range(len(groups) - 1):
+        for h in range(g + 1):
+            one, other = groups[g], groups[h]
+            if tooth[one] != tooth[other]:
                 continue
-            apart = axial[i] - axial[j]
-            mean_roll = 0.5 * (roll[i] + roll[j])
-            across = pair.base_radius_1 * mean_roll * (roll[i] - roll[j] - pair.twist_1 * apart)
-            along = apart / pair.base_helix_cosine
-            half = 0.5 * (half_across[i] + half_across[j])
-            value = both * _mean_inverse_distance(across, along, half, half_along)
-            for body in range(2):
-                if mirror[body] != 0.0:
-                    for sign in (-1.0, 1.0):
-                        image = (axial[i] + axial[j] - 2.0 * sign * ends[body]) / pair.base_helix_cosine
-                        value += mirror[body] * surface[body] * _mean_inverse_distance(across, image, half, half_along)
-            matrix[i, j] += value
+            apart, together = axial[one] - axial[other], axial[one] + axial[other]
+            along[0], strength[0] = apart / pair.base_helix_cosine, surface[0] + surface[1]
+            for image in range(4):
+                body, sign = image // 2, 2.0 * (image % 2) - 1.0
+                along[image + 1] = (together - 2.0 * sign * ends[body]) / pair.base_helix_cosine
+                strength[image + 1] = mirror[body] * surface[body]
+            rolls, halves = roll[other : groups[h + 1]], half_across[other : groups[h + 1]]
+            shift = pair.twist_1 * apart
+            for i in range(one, groups[g + 1]):
+                row = matrix[i, other : groups[h + 1]]
+                for load in range(5):
+                    if strength[load] == 0.0:
+                        continue
+                    place = (strength[load], roll[i], scale, shift, along[load], half_across[i], half_along)
+                    if abs(along[load]) >= from_afar:
+                        _add_far(row, *place, rolls, halves)
+                    else:
+                        _add_near(row, *place, rolls, halves)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
 def _add_regular(
     matrix: FloatArray,
+    groups: IntArray,
     tooth: IntArray,
     layer: IntArray,
     first: IntArray,
@@ -274,17 +313,31 @@ def _add_regular(
     number: IntArray,
     first_tooth: int,
 ) -> None:
-    """Add the regular compliance of one gear, see `SlicedCompliance`."""
-    for i in range(len(tooth)):
-        for j in range(i + 1):
-            block = table[number[tooth[i] - first_tooth, tooth[j] - first_tooth], layer[i], layer[j]]
-            total = 0.0
-            for a in range(4):
-                row = 0.0
-                for b in range(4):
-                    row += block[first[i] + a, first[j] + b] * weights[j, b]
-                total += weights[i, a] * row
-            matrix[i, j] += total
+    """Add the regular compliance of one gear, see `SlicedCompliance`; ``groups`` as in `_add_half_spaces`."""
+    read = np.empty(table.shape[4])
+    for g in range(len(groups) - 1):
+        for h in range(g + 1):
+            one, other, end = groups[g], groups[h], groups[h + 1]
+            block = table[number[tooth[one] - first_tooth, tooth[other] - first_tooth], layer[one], layer[other]]
+            lowest, highest = first[other], first[other]
+            for j in range(other, end):
+                lowest, highest = min(lowest, first[j]), max(highest, first[j])
+            for i in range(one, groups[g + 1]):
+                for b in range(lowest, highest + 4):
+                    read[b] = (
+                        weights[i, 0] * block[first[i], b]
+                        + weights[i, 1] * block[first[i] + 1, b]
+                        + weights[i, 2] * block[first[i] + 2, b]
+                        + weights[i, 3] * block[first[i] + 3, b]
+                    )
+                for j in range(other, end):
+                    at = first[j]
+                    matrix[i, j] += (
+                        weights[j, 0] * read[at]
+                        + weights[j, 1] * read[at + 1]
+                        + weights[j, 2] * read[at + 2]
+                        + weights[j, 3] * read[at + 3]
+                    )
 
 
 @njit(cache=True)
@@ -439,8 +492,11 @@ def compliance_matrix(
     matrix = np.zeros((len(cells.tooth), len(cells.tooth)))
     materials = [flank.gear.material for flank in flanks]
     surface = np.array([(1 - m.poissons_ratio**2) / (np.pi * m.youngs_modulus) for m in materials])
+    starts = np.flatnonzero(np.diff(cells.tooth * len(axial) + cells.layer)) + 1
+    groups = np.concatenate([[0], starts, [len(cells.tooth)]])
     _add_half_spaces(
         matrix,
+        groups,
         cells.tooth,
         axial[cells.layer],
         cells.roll,
@@ -453,7 +509,8 @@ def compliance_matrix(
     )
     for part, roll in zip(sliced, (cells.roll, cells.gear_roll), strict=True):
         first, weights = part.weights(roll)
-        _add_regular(matrix, cells.tooth, cells.layer, first, weights, part.table, part.number, part.first_tooth)
+        blocks = (part.table, part.number, part.first_tooth)
+        _add_regular(matrix, groups, cells.tooth, cells.layer, first, weights, *blocks)
     _mirror_lower(matrix)
     return matrix
 
@@ -505,8 +562,12 @@ def solve_complementarity(
     for iteration in range(1, max_iterations + 1):
         if not active.any():
             active = gap == gap.min()
-        force, approach, per_load = _solve_active(compliance, gap, load, active)
-        clearance = compliance @ force + gap - approach
+        numbers = np.flatnonzero(active)
+        rows = compliance[numbers]
+        closing, approach, per_load = _solve_active(rows[:, numbers], gap[numbers], load)
+        force = np.zeros(len(gap))
+        force[numbers] = closing
+        clearance = closing @ rows + gap - approach
         if np.isnan(clearance).any():  # every comparison below would pass
             raise ContactError("the contact problem holds values that are not numbers")
         tolerance = 1e-12 * max(abs(approach), 1e-12)
@@ -526,18 +587,17 @@ def solve_complementarity(
     raise ContactError(f"the active set did not settle in {max_iterations} iterations ({count} cells still change)")
 
 
-def _solve_active(
-    compliance: FloatArray, gap: FloatArray, load: float, active: BoolArray
-) -> tuple[FloatArray, float, float]:
-    """Solve for contact on the `active` cells exactly: forces, approach, derivative of the approach by the load."""
-    numbers = np.flatnonzero(active)
+def _solve_active(compliance: FloatArray, gap: FloatArray, load: float) -> tuple[FloatArray, float, float]:
+    """Solve for contact on all cells given: forces, approach, derivative of the approach by the load.
+
+    Overwrites ``compliance``.
+    """
     try:
-        factor = scipy.linalg.cho_factor(compliance[np.ix_(numbers, numbers)], lower=True, check_finite=False)
+        # The transpose of the symmetric matrix is in the order that LAPACK works in.
+        factor = scipy.linalg.cho_factor(compliance.T, lower=True, overwrite_a=True, check_finite=False)
     except np.linalg.LinAlgError as error:
         raise ContactError("the compliance of the contact cells is not positive definite") from error
-    right = np.stack([np.ones(len(numbers)), gap[numbers]], axis=1)
-    unit, closed = scipy.linalg.cho_solve(factor, right, check_finite=False).T
+    right = np.stack([np.ones(len(gap)), gap])
+    unit, closed = scipy.linalg.cho_solve(factor, right.T, overwrite_b=True, check_finite=False).T
     approach = (load + closed.sum()) / unit.sum()
-    force = np.zeros(len(gap))
-    force[numbers] = unit * approach - closed
-    return force, float(approach), float(1.0 / unit.sum())
+    return unit * approach - closed, float(approach), float(1.0 / unit.sum())

@@ -49,14 +49,14 @@ def interior_normal_displacement(across: float, along: float, depth: float, pois
 
 
 @njit(cache=True, fastmath=False)
-def _corner(x: float, y: float) -> float:
-    distance = math.sqrt(x * x + y * y)
-    total = 0.0
-    if x != 0.0:
-        total += x * math.asinh(y / abs(x))
-    if y != 0.0:
-        total += y * math.asinh(x / abs(y))
-    return total if distance > 0.0 else 0.0
+def _weighted_difference(x: float, high: float, low: float, to_high: float, to_low: float) -> float:
+    """Evaluate x [asinh(high / |x|) - asinh(low / |x|)] with one logarithm; ``to_high`` is hypot(x, high)."""
+    if x == 0.0:
+        return 0.0
+    above, below = abs(high) + to_high, abs(low) + to_low
+    if (high < 0.0) == (low < 0.0):
+        return x * math.log(above / below) if high >= 0.0 else x * math.log(below / above)
+    return x * math.log(above * below / (x * x))
 
 
 @njit(cache=True, fastmath=False)
@@ -81,11 +81,15 @@ def rectangle_integral(across: float, along: float, half_across: float, half_alo
     ----------
     A. E. H. Love, Phil. Trans. R. Soc. A 228 (1929) 377-420; Johnson, Contact Mechanics, eq. (3.25).
     """
+    right, left = across + half_across, across - half_across
+    top, bottom = along + half_along, along - half_along
+    right_top, right_bottom = math.hypot(right, top), math.hypot(right, bottom)
+    left_top, left_bottom = math.hypot(left, top), math.hypot(left, bottom)
     return (
-        _corner(across + half_across, along + half_along)
-        - _corner(across + half_across, along - half_along)
-        - _corner(across - half_across, along + half_along)
-        + _corner(across - half_across, along - half_along)
+        _weighted_difference(right, top, bottom, right_top, right_bottom)
+        - _weighted_difference(left, top, bottom, left_top, left_bottom)
+        + _weighted_difference(top, right, left, right_top, left_top)
+        - _weighted_difference(bottom, right, left, right_bottom, left_bottom)
     )
 
 

@@ -10,8 +10,10 @@ face width.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -36,13 +38,16 @@ from fe_ste.sparse import Backend
 from fe_ste.threads import one_dense_thread
 
 FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int64]
 
 #: Cells further apart than this many approaches in the unloaded position cannot touch.
 _GAP_REACH = 1.3
 #: Part of its cells by which a window that contact fills grows at either side.
 _WINDOW_GROWTH = 0.2
-_WINDOW_ATTEMPTS = 6
+_WINDOW_ATTEMPTS = 10
+#: Places across the window that an address tells apart.
+_PLACES = 64
 
 
 @dataclass(frozen=True)
@@ -179,16 +184,29 @@ class ContactState:
 
 
 @dataclass
-class _Search:
-    """What one position hands on to the next: where the search starts, not the size of the cells.
+class SearchStart:
+    """Where the search for a state begins: what solved states hand on. It never changes what is found.
 
-    A window that contact fills gets more cells of the same width, so that the result of a position does not depend
-    on the positions solved before.
+    A window that contact fills gets more cells of the same width, cells too far apart to touch are left out only if
+    they are, and the complementarity problem has one solution: so a state is the same whichever were solved before.
+
+    Attributes
+    ----------
+    cells : int
+        Cells of a slice across the window.
+    depth : float
+        Reckoned approach beyond the first touch, m.
+    touching : ndarray, optional
+        Addresses, relative to the contact lines, of the cells that carried load.
     """
 
-    cell_width: float
     cells: int
-    approach: float
+    depth: float
+    touching: IntArray | None = None
+
+    def scaled(self, factor: float) -> SearchStart:
+        """Return the start for `factor` times the load; the cells grow with the contact, so their addresses stay."""
+        return replace(self, depth=self.depth * factor)
 
 
 def hertz_half_width(pair: GearPair, line_load: float) -> float:
@@ -207,6 +225,7 @@ def hertz_half_width(pair: GearPair, line_load: float) -> float:
     return math.sqrt(4.0 * line_load * compliance / (math.pi * curvature))
 
 
+@lru_cache(maxsize=64)
 def least_contact_length(pair: GearPair, samples: int = 100) -> float:
     """Least total length of the contact lines over the mesh cycle, m."""
     axial = np.linspace(-0.5, 0.5, 401) * pair.face_width
@@ -220,13 +239,7 @@ def least_contact_length(pair: GearPair, samples: int = 100) -> float:
     return float(length.min())
 
 
-def contact_state(
-    compliance: PairCompliance,
-    torque: float,
-    pmc: float,
-    search: _Search | None = None,
-    misalignment: float = 0.0,
-) -> ContactState:
+def contact_state(compliance: PairCompliance, torque: float, pmc: float, misalignment: float = 0.0) -> ContactState:
     """Solve the contact of one position.
 
     Parameters
@@ -248,41 +261,185 @@ def contact_state(
     ContactError
         If the contact does not settle, or leaves the flank.
     """
-    pair = compliance.pair
-    load = _normal_load(pair, torque)
-    search = search or _new_search(compliance, load)
-    kinematics = FlankPair.from_pair(pair, compliance.flanks[0].roll[0], compliance.flanks[0].roll[-1])
-    rotation = pmc * pair.pinion.angular_pitch
-    reach, teeth = compliance.reach, compliance.teeth
-    count, reckoned = search.cells, search.approach
+    (state,) = contact_states(compliance, torque, pmc, np.array([misalignment]), [new_start(compliance, torque)])
+    if isinstance(state, ContactError):
+        raise state
+    return state
+
+
+def contact_states(
+    compliance: PairCompliance, torque: float, pmc: float, misalignments: FloatArray, starts: list[SearchStart]
+) -> list[ContactState | ContactError]:
+    """Solve the contact of one position under several misalignments, which share the compliance of the cells.
+
+    Parameters
+    ----------
+    compliance : PairCompliance
+    torque : float
+        Static torque on gear 1, N m, positive.
+    pmc : float
+        Position in the mesh cycle.
+    misalignments : ndarray (m,)
+        rad.
+    starts : list of SearchStart
+        One for each misalignment; replaced in place by what was found.
+
+    Returns
+    -------
+    list of ContactState or ContactError
+        For each misalignment the state, or why there is none.
+    """
+    search = _Search(compliance, torque, pmc, misalignments, starts)
     for _ in range(_WINDOW_ATTEMPTS):
-        cells = lay_cells(kinematics, rotation, teeth, compliance.axial, count * search.cell_width / 2, count)
-        if not cells.tooth.size:
+        pending = search.pending()
+        if not pending:
             break
-        gap = cells.gap + _extra_gap(compliance, cells, misalignment)
-        near = gap - gap.min() < _GAP_REACH * reckoned
-        cells, gap = cells.select(near), gap[near]
-        if np.ptp(cells.tooth) > reach:
-            raise ContactError(f"contact spreads over more than {reach + 1} tooth pairs: the torque is too large")
-        matrix = compliance_matrix(cells, kinematics, compliance.axial, compliance.flanks, compliance.sliced)
-        solution = solve_complementarity(matrix, gap, load, gap - gap.min() < 0.7 * reckoned)
+        window = search.window(pending)
+        for group in window.groups(compliance.reach):
+            search.solve(window, group)
+    for index in search.pending():
+        message = f"the contact is wider than the flanks, or found no approach, at torque {torque:g} N m"
+        search.found[index] = ContactError(message)
+    return [search.found[index] for index in range(len(starts))]
+
+
+@dataclass(frozen=True)
+class _Window:
+    """Cells laid at one position, with the gaps of several misalignments over them.
+
+    Attributes
+    ----------
+    cells : Cells
+    end : ndarray (n,)
+        Whether a cell ends the window where no tip edge does.
+    address : ndarray (n,)
+        Tooth pair, slice and place relative to the contact line in one number.
+    gap, near : dict
+        Misalignment's index -> gap (n,), m, and which cells are near enough to touch.
+    """
+
+    cells: Cells
+    end: BoolArray
+    address: IntArray
+    gap: dict[int, FloatArray]
+    near: dict[int, BoolArray]
+
+    def groups(self, reach: int) -> list[list[int]]:
+        """Misalignments whose cells are few enough tooth pairs to share a compliance matrix."""
+        if not self.near:
+            return []
+        together = np.any(list(self.near.values()), axis=0)
+        if np.ptp(self.cells.tooth[together]) <= reach:
+            return [list(self.near)]
+        return [[index] for index in self.near]
+
+
+class _Search:
+    """The search for the contact of one position under several misalignments."""
+
+    def __init__(
+        self,
+        compliance: PairCompliance,
+        torque: float,
+        pmc: float,
+        misalignments: FloatArray,
+        starts: list[SearchStart],
+    ) -> None:
+        self.compliance, self.pmc, self.misalignments, self.starts = compliance, pmc, misalignments, starts
+        pair, roll = compliance.pair, compliance.flanks[0].roll
+        self.load = _normal_load(pair, torque)
+        self.kinematics = FlankPair.from_pair(pair, roll[0], roll[-1])
+        self.rotation = pmc * pair.pinion.angular_pitch
+        self.cell_width = _cell_width(compliance, self.load)
+        self.too_deep = [math.inf] * len(starts)
+        self.found: dict[int, ContactState | ContactError] = {}
+
+    def pending(self) -> list[int]:
+        """Misalignments whose state is not found yet."""
+        return [index for index in range(len(self.starts)) if index not in self.found]
+
+    def window(self, pending: list[int]) -> _Window:
+        """Lay the cells that the states of `pending` need."""
+        count = max(self.starts[index].cells for index in pending)
+        one, axial = self.compliance, self.compliance.axial
+        cells = lay_cells(self.kinematics, self.rotation, one.teeth, axial, count * self.cell_width / 2, count)
+        if not cells.tooth.size:  # wider than the flanks
+            return _Window(cells, cells.cut, cells.tooth, {}, {})
+        removed = cells.gap + _modification_gap(one, cells)
+        wedge = axial[cells.layer] * math.cos(one.pair.pinion.base_helix_angle)
+        gap = {index: removed + self.misalignments[index] * wedge for index in pending}
+        near = {index: g - g.min() < _GAP_REACH * self.starts[index].depth for index, g in gap.items()}
+        return _Window(cells, _window_ends(cells), self._addresses(cells), gap, near)
+
+    def _addresses(self, cells: Cells) -> IntArray:
+        pair, radius = self.kinematics, self.kinematics.base_radius_1
+        axial = self.compliance.axial[cells.layer]
+        line = pair.working_roll + self.rotation + cells.tooth * pair.pitch_1 + pair.twist_1 * axial
+        from_line = 0.5 * radius * (cells.roll**2 - line * np.abs(line)) / self.cell_width
+        place = np.clip(np.rint(from_line) + _PLACES // 2, 0, _PLACES - 1).astype(np.int64)
+        row = (cells.tooth - self.compliance.teeth[0]) * len(self.compliance.axial) + cells.layer
+        return np.asarray(row * _PLACES + place, dtype=np.int64)
+
+    def solve(self, window: _Window, group: list[int]) -> None:
+        """Solve the states of `group`; one that needs other cells stays pending, with a start that asks for them."""
+        near = np.any([window.near[index] for index in group], axis=0)
+        if np.ptp(window.cells.tooth[near]) > self.compliance.reach:
+            self._come_nearer(group[0])
+            return
+        cells, address, end = window.cells.select(near), window.address[near], window.end[near]
+        one = self.compliance
+        matrix = compliance_matrix(cells, self.kinematics, one.axial, one.flanks, one.sliced)
+        for index in group:
+            gap = window.gap[index][near]
+            try:
+                solution = solve_complementarity(matrix, gap, self.load, self._guess(index, gap, address))
+                if self._settled(index, solution, gap, end):
+                    self.found[index] = self._state(cells, solution)
+                    carrying = address[solution.force > 0]
+                    self.starts[index] = replace(self.starts[index], touching=carrying)
+            except ContactError as error:
+                self.found[index] = error
+
+    def _guess(self, index: int, gap: FloatArray, address: IntArray) -> BoolArray:
+        start = self.starts[index]
+        if start.touching is None:
+            return np.asarray(gap - gap.min() < 0.7 * start.depth)
+        return np.isin(address, start.touching)
+
+    def _come_nearer(self, index: int) -> None:
+        """Leave out cells further apart: more tooth pairs than can touch at once were reckoned to be near."""
+        start = self.starts[index]
+        self.too_deep[index] = start.depth
+        self.starts[index] = replace(start, depth=0.7 * start.depth)
+
+    def _settled(self, index: int, solution: ContactSolution, gap: FloatArray, end: BoolArray) -> bool:
+        """Whether all cells that may touch were there; else change the start."""
+        start = self.starts[index]
         depth = solution.approach - gap.min()
-        if depth > 0.95 * _GAP_REACH * reckoned:
-            reckoned = 1.2 * depth
-        elif _touches_window(cells, solution.force):
-            count += 2 * math.ceil(_WINDOW_GROWTH * count)
-        else:
-            search.cells, search.approach = count, depth
-            _check_on_flanks(compliance, cells, solution.force)
-            area = 4.0 * cells.half_across * (0.5 * compliance.slice_width / kinematics.base_helix_cosine)
-            return ContactState(pmc, load, cells, solution, solution.force / area)
-    raise ContactError(f"the contact is wider than the flanks, or found no approach, at torque {torque:g} N m")
+        if depth > 0.95 * _GAP_REACH * start.depth:
+            if depth >= self.too_deep[index]:
+                most = self.compliance.reach + 1
+                raise ContactError(f"contact spreads over more than {most} tooth pairs: the torque is too large")
+            self.starts[index] = replace(start, depth=min(1.2 * depth, 0.5 * (depth + self.too_deep[index])))
+            return False
+        if (solution.force[end] > 0).any():
+            self.starts[index] = replace(start, cells=start.cells + 2 * math.ceil(_WINDOW_GROWTH * start.cells))
+            return False
+        self.starts[index] = replace(start, depth=depth)
+        return True
+
+    def _state(self, cells: Cells, solution: ContactSolution) -> ContactState:
+        _check_on_flanks(self.compliance, cells, solution.force)
+        half_along = 0.5 * self.compliance.slice_width / self.kinematics.base_helix_cosine
+        return ContactState(
+            self.pmc, self.load, cells, solution, solution.force / (4.0 * cells.half_across * half_along)
+        )
 
 
-def _extra_gap(compliance: PairCompliance, cells: Cells, misalignment: float) -> FloatArray:
-    """Gap over the cells, along the normal, that modifications and misalignment add to the conjugate flanks."""
+def _modification_gap(compliance: PairCompliance, cells: Cells) -> FloatArray:
+    """Gap over the cells, along the normal, that modifications add to the conjugate flanks."""
     axial = compliance.axial[cells.layer]
-    gap = misalignment * axial * math.cos(compliance.pair.pinion.base_helix_angle)
+    gap = np.zeros(len(axial))
     gears = (compliance.pair.pinion, compliance.pair.gear)
     for gear, roll, modification in zip(gears, (cells.roll, cells.gear_roll), compliance.modifications, strict=True):
         radius = gear.base_radius * np.sqrt(1.0 + roll**2)
@@ -303,21 +460,25 @@ def _check_on_flanks(compliance: PairCompliance, cells: Cells, force: FloatArray
             raise ContactError(f"gear {flank.gear.name}: contact reaches the form circle, where the involute ends")
 
 
-def _new_search(compliance: PairCompliance, load: float) -> _Search:
-    pair = compliance.pair
+def _cell_width(compliance: PairCompliance, load: float) -> float:
+    """Width of the contact cells along the profile under a normal load, m."""
+    pair, contact = compliance.pair, compliance.contact
     half_width = hertz_half_width(pair, load / least_contact_length(pair))
-    stiffness = 10e9 * pair.face_width  # two thirds of a usual mesh stiffness: the first guess may be too large
-    contact = compliance.contact
-    return _Search(2 * contact.window * half_width / contact.cells, contact.cells, load / stiffness)
+    return 2 * contact.window * half_width / contact.cells
 
 
-def _touches_window(cells: Cells, force: FloatArray) -> bool:
-    """Whether contact reaches a side of the window that is no tip edge."""
+def new_start(compliance: PairCompliance, torque: float) -> SearchStart:
+    """Start of a search that knows no other state."""
+    stiffness = 10e9 * compliance.pair.face_width  # two thirds of a usual mesh stiffness: may be too deep
+    return SearchStart(compliance.contact.cells, _normal_load(compliance.pair, torque) / stiffness)
+
+
+def _window_ends(cells: Cells) -> BoolArray:
+    """Cells at either side of the window, but for those that a tip edge cuts."""
     group = cells.tooth * (cells.layer.max() + 1) + cells.layer
-    first = np.flatnonzero(np.diff(group, prepend=group[0] - 1))
-    last = np.append(first[1:], len(group)) - 1
-    ends = np.concatenate([first, last])
-    return bool((force[ends][~cells.cut[ends]] > 0).any())
+    first = np.diff(group, prepend=group[0] - 1) != 0
+    last = np.append(first[1:], True)
+    return np.asarray((first | last) & ~cells.cut)
 
 
 def static_transmission_error(
@@ -354,9 +515,10 @@ def static_transmission_error(
     -------
     xarray.Dataset
         Over (pmc, torque, centre_distance, misalignment): ste (m), mesh_stiffness and tangent_stiffness (N/m),
-        line_of_action_force (N), load_share by ``tooth``, line_load (N/m of contact line) by ``tooth`` and
-        ``axial_position``, max_pressure and edge_pressure (Pa; inside the flank, and in cells at a tip edge, where it
-        depends on the cells), iterations, converged. Positions that failed are not a number; ``failures`` says why.
+        line_of_action_force (N), load_centre (m, the derivative of ste by misalignment), load_share by ``tooth``,
+        line_load (N/m of contact line) by ``tooth`` and ``axial_position``, max_pressure and edge_pressure (Pa; inside
+        the flank, and in cells at a tip edge, where it depends on the cells), iterations, converged. Positions that
+        failed are not a number; ``failures`` says why.
 
     Raises
     ------
@@ -375,38 +537,116 @@ def static_transmission_error(
     >>> bool((curve.ste > 5e-6).all() and (curve.ste < 20e-6).all())
     True
     """
-    if positions < 1:
-        raise ValueError(f"positions = {positions}: at least 1 is needed")
-    torques = np.atleast_1d(np.asarray(torque, dtype=float))
-    if not (np.isfinite(torques) & (torques > 0)).all():
-        raise ValueError(f"torque = {torque}: must be positive torques on gear 1; a table belongs to one loaded flank")
-    misalignments = np.atleast_1d(np.asarray(misalignment, dtype=float))
-    if not np.isfinite(misalignments).all():
-        raise ValueError(f"misalignment = {misalignment}: must be finite angles in rad")
     geometry = pair.pair if isinstance(pair, PairCompliance) else pair
-    distances = np.atleast_1d(geometry.centre_distance if centre_distance is None else centre_distance)
-    for distance in distances:
-        geometry.with_centre_distance(float(distance))  # refuses before the finite elements, not after
+    axes = StateAxes.checked(geometry, torque, positions, centre_distance, misalignment)
     compliance = pair if isinstance(pair, PairCompliance) else pair_compliance(pair, mesh, contact)
-    shape = (positions, len(torques), len(distances), len(misalignments))
-    result = _Collector(compliance, shape)
+    total = math.prod(axes.shape)
+    tell = (lambda done: progress(done, total)) if progress is not None else None
+    return solve_positions(compliance, axes, range(positions), tell).dataset(axes)
+
+
+@dataclass(frozen=True)
+class StateAxes:
+    """Axes of a grid of states.
+
+    Attributes
+    ----------
+    positions : int
+        Equally spaced positions of the mesh cycle.
+    torque, centre_distance, misalignment : ndarray
+        N m, m, rad.
+    """
+
+    positions: int
+    torque: FloatArray
+    centre_distance: FloatArray
+    misalignment: FloatArray
+
+    @classmethod
+    def checked(
+        cls,
+        pair: GearPair,
+        torque: float | Sequence[float],
+        positions: int = 50,
+        centre_distance: float | Sequence[float] | None = None,
+        misalignment: float | Sequence[float] = 0.0,
+    ) -> StateAxes:
+        """Return the axes after checking each value; for the errors see `static_transmission_error`."""
+        if positions < 1:
+            raise ValueError(f"positions = {positions}: at least 1 is needed")
+        torques = np.atleast_1d(np.asarray(torque, dtype=float))
+        if not (np.isfinite(torques) & (torques > 0)).all():
+            raise ValueError(
+                f"torque = {torque}: must be positive torques on gear 1; a table belongs to one loaded flank"
+            )
+        misalignments = np.atleast_1d(np.asarray(misalignment, dtype=float))
+        if not np.isfinite(misalignments).all():
+            raise ValueError(f"misalignment = {misalignment}: must be finite angles in rad")
+        own = pair.centre_distance if centre_distance is None else centre_distance
+        distances = np.atleast_1d(np.asarray(own, dtype=float))
+        for distance in distances:
+            pair.with_centre_distance(float(distance))  # refuses before the finite elements, not after
+        return cls(positions, torques, distances, misalignments)
+
+    @property
+    def shape(self) -> tuple[int, int, int, int]:
+        """Number of states along each axis, positions first."""
+        return self.positions, len(self.torque), len(self.centre_distance), len(self.misalignment)
+
+    def coordinates(self) -> dict[str, FloatArray]:
+        """Return the values along each axis under its name."""
+        return {
+            "pmc": np.arange(self.positions) / self.positions,
+            "torque": self.torque,
+            "centre_distance": self.centre_distance,
+            "misalignment": self.misalignment,
+        }
+
+
+def solve_positions(
+    compliance: PairCompliance,
+    axes: StateAxes,
+    positions: Iterable[int],
+    progress: Callable[[int], None] | None = None,
+) -> StateResults:
+    """Solve all states of some positions of a grid.
+
+    Misalignments share the compliance of the contact cells; a solved position hands its contact on to the next, and a
+    torque to the next one at the first position.
+
+    Parameters
+    ----------
+    compliance : PairCompliance
+    axes : StateAxes
+    positions : iterable of int
+        Numbers of the positions; in a row they are solved fastest.
+    progress : callable, optional
+        Called with the number of finished states.
+
+    Returns
+    -------
+    StateResults
+        Of these positions alone.
+    """
+    chosen = list(positions)
+    results = StateResults.empty(compliance, (len(chosen), *axes.shape[1:]))
+    finished = 0
     with one_dense_thread():
-        for c, distance in enumerate(distances):
+        for c, distance in enumerate(axes.centre_distance):
             placed = compliance.at_centre_distance(float(distance))
-            for t, load_torque in enumerate(torques):
-                for m, tilt in enumerate(misalignments):
-                    search = _new_search(placed, _normal_load(placed.pair, load_torque))
-                    for p in range(positions):
-                        result.solve((p, t, c, m), placed, float(load_torque), p / positions, search, float(tilt))
+            first = [new_start(placed, float(axes.torque[0])) for _ in axes.misalignment]
+            for t, torque in enumerate(axes.torque):
+                starts = [start.scaled(float(torque / axes.torque[max(t - 1, 0)])) for start in first]
+                for p, position in enumerate(chosen):
+                    pmc = position / axes.positions
+                    states = contact_states(placed, float(torque), pmc, axes.misalignment, starts)
+                    first = list(starts) if p == 0 else first
+                    for m, state in enumerate(states):
+                        results.put((p, t, c, m), placed, float(torque), pmc, float(axes.misalignment[m]), state)
+                        finished += 1
                         if progress is not None:
-                            progress(result.finished, int(np.prod(shape)))
-    axes = {
-        "pmc": np.arange(positions) / positions,
-        "torque": torques,
-        "centre_distance": distances,
-        "misalignment": misalignments,
-    }
-    return result.dataset(axes)
+                            progress(finished)
+    return results
 
 
 def _normal_load(pair: GearPair, torque: float) -> float:
@@ -427,6 +667,7 @@ _UNITS = {
     "line_of_action_force": ("N", "torque on gear 1 over its base radius"),
     "load_share": ("1", "part of the normal load that a tooth pair carries"),
     "line_load": ("N/m", "normal load per length of contact line"),
+    "load_centre": ("m", "axial position of the resultant normal load: derivative of ste by misalignment"),
     "max_pressure": ("Pa", "largest contact pressure away from tip edges"),
     "edge_pressure": ("Pa", "largest contact pressure in cells at a tip edge; depends on their size"),
     "iterations": ("1", "active-set iterations"),
@@ -434,42 +675,88 @@ _UNITS = {
 }
 
 
-class _Collector:
-    """Gathers the results of all positions and marks those that failed."""
+_RESULTS = ("ste", "tangent_stiffness", "load_centre", "max_pressure", "edge_pressure")
 
-    def __init__(self, compliance: PairCompliance, shape: tuple[int, int, int, int]) -> None:
-        self.teeth = compliance.teeth
-        self.axial = compliance.axial
-        self.finished = 0
-        self.failures: list[str] = []
-        self.values = {
-            name: np.full(shape, np.nan) for name in ("ste", "tangent_stiffness", "max_pressure", "edge_pressure")
-        }
-        self.line_load = np.full((*shape, len(self.teeth), len(self.axial)), np.nan)
-        self.load_share = np.full((*shape, len(self.teeth)), np.nan)
-        self.iterations = np.zeros(shape, dtype=np.int32)
-        self.base_radius = compliance.pair.pinion.base_radius
 
-    def solve(
+@dataclass
+class StateResults:
+    """Results of states over (pmc, torque, centre_distance, misalignment); those that failed are not a number.
+
+    Attributes
+    ----------
+    teeth : ndarray (t,)
+        Tooth pairs that may touch.
+    axial : ndarray (k,)
+        Middle of the contact slices, m.
+    base_radius : float
+        Of gear 1, m.
+    values : dict
+        Name of a result -> ndarray over the axes.
+    line_load, load_share : ndarray (..., t, k), (..., t)
+    iterations : ndarray
+    failures : list of str
+        Why states failed.
+    """
+
+    teeth: IntArray
+    axial: FloatArray
+    base_radius: float
+    values: dict[str, FloatArray]
+    line_load: FloatArray
+    load_share: FloatArray
+    iterations: NDArray[np.int32]
+    failures: list[str] = field(default_factory=list)
+
+    @classmethod
+    def empty(cls, compliance: PairCompliance, shape: tuple[int, int, int, int]) -> StateResults:
+        """Results of `shape` of which none is there yet."""
+        teeth, axial = compliance.teeth, compliance.axial
+        return cls(
+            teeth,
+            axial,
+            compliance.pair.pinion.base_radius,
+            {name: np.full(shape, np.nan) for name in _RESULTS},
+            np.full((*shape, len(teeth), len(axial)), np.nan),
+            np.full((*shape, len(teeth)), np.nan),
+            np.zeros(shape, dtype=np.int32),
+        )
+
+    @classmethod
+    def from_dataset(cls, like: StateResults, dataset: xr.Dataset) -> StateResults:
+        """Read back a dataset with all tooth pairs; its teeth, slices and base radius are those of `like`."""
+        return cls(
+            like.teeth,
+            like.axial,
+            like.base_radius,
+            {name: dataset[name].to_numpy() for name in _RESULTS},
+            dataset["line_load"].to_numpy(),
+            dataset["load_share"].to_numpy(),
+            dataset["iterations"].to_numpy(),
+            [line for line in str(dataset.attrs["failures"]).splitlines() if line],
+        )
+
+    def put(
         self,
         index: tuple[int, int, int, int],
         compliance: PairCompliance,
         torque: float,
         pmc: float,
-        search: _Search,
         misalignment: float,
+        state: ContactState | ContactError,
     ) -> None:
-        """Solve one state and keep its results, or why there are none."""
-        self.finished += 1
-        try:
-            state = contact_state(compliance, torque, pmc, search, misalignment)
-        except ContactError as error:
-            self.failures.append(f"pmc {pmc:.3f}, torque {torque:g} N m: {error}")
+        """Keep the results of one state, or why there are none."""
+        if isinstance(state, ContactError):
+            distance = compliance.pair.centre_distance
+            self.failures.append(
+                f"pmc {pmc:.3f}, torque {torque:g} N m, centre distance {1e3 * distance:.7g} mm, "
+                f"misalignment {1e6 * misalignment:.4g} urad: {state}"
+            )
             return
         cosine = math.cos(compliance.pair.pinion.base_helix_angle)
         cells, solution = state.cells, state.solution
         self.values["ste"][index] = solution.approach / cosine
         self.values["tangent_stiffness"][index] = cosine**2 / solution.approach_per_load
+        self.values["load_centre"][index] = solution.force @ compliance.axial[cells.layer] / state.normal_load
         self.values["max_pressure"][index] = state.pressure[~cells.cut].max(initial=0.0)
         self.values["edge_pressure"][index] = state.pressure[cells.cut].max(initial=0.0)
         loads = np.zeros((len(self.teeth), len(self.axial)))
@@ -478,21 +765,33 @@ class _Collector:
         self.load_share[index] = loads.sum(axis=1) / state.normal_load
         self.iterations[index] = solution.iterations
 
-    def dataset(self, axes: dict[str, FloatArray]) -> xr.Dataset:
-        """Label the results."""
-        names = tuple(axes)
-        force = np.broadcast_to(axes["torque"][:, None, None] / self.base_radius, self.iterations.shape)
+    def insert(self, positions: Sequence[int], part: StateResults) -> None:
+        """Take over the results of some positions."""
+        rows = np.asarray(positions)
+        for name, values in part.values.items():
+            self.values[name][rows] = values
+        for name in ("line_load", "load_share", "iterations"):
+            getattr(self, name)[rows] = getattr(part, name)
+        self.failures += part.failures
+
+    def dataset(self, axes: StateAxes, all_teeth: bool = False) -> xr.Dataset:
+        """Label the results; tooth pairs that never carry load are left out unless `all_teeth` asks for them."""
+        coordinates = axes.coordinates()
+        names = tuple(coordinates)
+        force = np.broadcast_to(axes.torque[:, None, None] / self.base_radius, self.iterations.shape)
         carries = np.nan_to_num(self.load_share).max(axis=(0, 1, 2, 3)) > 0
+        shown = carries | all_teeth
+        variables: dict[str, tuple[tuple[str, ...], NDArray[Any]]]
         variables = {name: (names, values) for name, values in self.values.items()}
         variables |= {
             "mesh_stiffness": (names, force / self.values["ste"]),
             "line_of_action_force": (names, force),
-            "load_share": ((*names, "tooth"), self.load_share[..., carries]),
-            "line_load": ((*names, "tooth", "axial_position"), self.line_load[..., carries, :]),
+            "load_share": ((*names, "tooth"), self.load_share[..., shown]),
+            "line_load": ((*names, "tooth", "axial_position"), self.line_load[..., shown, :]),
             "iterations": (names, self.iterations),
             "converged": (names, np.isfinite(self.values["ste"])),
         }
-        coordinates = axes | {"tooth": self.teeth[carries], "axial_position": self.axial}
+        coordinates |= {"tooth": self.teeth[shown], "axial_position": self.axial}
         dataset = xr.Dataset(variables, coordinates)
         for name, (unit, meaning) in _UNITS.items():
             dataset[name].attrs = {"units": unit, "long_name": meaning}

@@ -8,15 +8,16 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import tempfile
+import math
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field
 from functools import cached_property, lru_cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from fe_ste.contact import ContactSettings
@@ -24,10 +25,13 @@ from fe_ste.elasticity import HANDOVER_DEPTH, FlankCompliance, flank_compliance
 from fe_ste.gears import Gear, GearPair
 from fe_ste.hexmesh import MeshSettings
 from fe_ste.modifications import FlankModification
-from fe_ste.ste import PairCompliance, static_transmission_error
+from fe_ste.ste import PairCompliance, StateAxes
+from fe_ste.sweep import Checkpoint, Submits, process_pool, replace_file, sweep_states
 
 #: Raised when a change of the method changes the numbers, so that tables of the old method are not used.
-METHOD_VERSION = 2
+METHOD_VERSION = 3
+#: Beyond this many states the start of processes is repaid.
+_STATES_IN_PROCESS = 1000
 
 
 class TableError(ValueError):
@@ -52,6 +56,8 @@ class TableInput:
     mesh : MeshSettings
     contact : ContactSettings
     pinion_modification, gear_modification : FlankModification
+    static_torque : float, optional
+        Which of several torques is that of the static state.
 
     Examples
     --------
@@ -70,6 +76,7 @@ class TableInput:
     contact: ContactSettings = field(default_factory=ContactSettings)
     pinion_modification: FlankModification = field(default_factory=FlankModification)
     gear_modification: FlankModification = field(default_factory=FlankModification)
+    static_torque: float | None = None
 
     def resolved(self) -> dict[str, Any]:
         """Return the input as plain data, with everything that has a default spelled out."""
@@ -94,7 +101,14 @@ class MeshTable:
     dataset: xr.Dataset
 
     @classmethod
-    def compute(cls, wanted: TableInput, progress: Callable[[int, int], None] | None = None) -> MeshTable:
+    def compute(
+        cls,
+        wanted: TableInput,
+        progress: Callable[[int, int], None] | None = None,
+        *,
+        executor: Submits | None = None,
+        partial: Path | None = None,
+    ) -> MeshTable:
         """Compute a table.
 
         Parameters
@@ -102,16 +116,29 @@ class MeshTable:
         wanted : TableInput
         progress : callable, optional
             Called with the number of finished states and of all states.
+        executor : optional
+            What the states are sent to, see `fe_ste.sweep`; without it two processes share a grid of more than a
+            thousand states, and this process solves fewer.
+        partial : Path, optional
+            File in which finished positions are kept; a computation that was stopped goes on from there.
+
+        Raises
+        ------
+        ValueError, GeometryError
+            As in `fe_ste.static_transmission_error`.
+        SweepError
+            If workers are lost.
         """
-        compliance = prepared_compliance(wanted)
-        dataset = static_transmission_error(
-            compliance,
-            wanted.torque,
-            wanted.positions,
-            centre_distance=wanted.centre_distance or None,
-            misalignment=wanted.misalignment,
-            progress=progress,
+        pair = wanted.pair
+        axes = StateAxes.checked(
+            pair, wanted.torque, wanted.positions, wanted.centre_distance or None, wanted.misalignment
         )
+        compliance = prepared_compliance(wanted)
+        checkpoint = None if partial is None else Checkpoint(partial, wanted.hash)
+        with ExitStack() as owned:
+            if executor is None and math.prod(axes.shape) > _STATES_IN_PROCESS:
+                executor = owned.enter_context(process_pool())
+            dataset = sweep_states(compliance, axes, executor=executor, checkpoint=checkpoint, progress=progress)
         dataset.attrs |= _attributes(wanted, compliance)
         return cls(dataset)
 
@@ -151,22 +178,33 @@ class MeshTable:
         path : path
             Its directory is made if need be.
         """
-        path = Path(path)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
-        os.close(handle)
-        try:
-            self.dataset.to_netcdf(Path(temporary), engine="h5netcdf")
-            Path(temporary).chmod(0o644)
-            os.replace(temporary, path)
-        except BaseException:
-            Path(temporary).unlink(missing_ok=True)
-            raise
+        replace_file(self.dataset, Path(path))
 
     @property
     def input_hash(self) -> str:
         """Hash of the input the table was computed from."""
         return str(self.dataset.attrs["input_hash"])
+
+    @property
+    def static_state(self) -> xr.Dataset:
+        """The mesh cycle at the static torque, the pair's own centre distance and without misalignment.
+
+        An axis with one value gives that value.
+
+        Raises
+        ------
+        TableError
+            If an axis has several values and not this one.
+        """
+        chosen = self.dataset
+        for axis in ("torque", "centre_distance", "misalignment"):
+            values = chosen[axis].to_numpy()
+            wanted = float(chosen.attrs.get(f"static_{axis}", math.nan))
+            at = np.flatnonzero(values == wanted) if len(values) > 1 else np.array([0])
+            if not len(at):
+                raise TableError(f"table of {chosen.attrs['pair']}: no {axis} of the static state among its values")
+            chosen = chosen.isel({axis: int(at[0])})
+        return chosen
 
     @property
     def failures(self) -> list[str]:
@@ -195,6 +233,9 @@ def _attributes(wanted: TableInput, compliance: PairCompliance) -> dict[str, str
     for role, flank in zip(("pinion", "gear"), compliance.flanks, strict=True):
         figures |= {f"{role}_{name}": value for name, value in flank.figures.items()}
         figures[f"{role}_held_diameter"] = flank.gear.held_diameter
+    static = {"static_centre_distance": wanted.pair.centre_distance, "static_misalignment": 0.0}
+    if wanted.static_torque is not None:
+        static["static_torque"] = wanted.static_torque
     packages = ("exugear", "numpy", "scipy", "scikit-fem", "numba")
     return {
         "title": f"static transmission error of gear pair {wanted.pair.name}",
@@ -204,6 +245,7 @@ def _attributes(wanted: TableInput, compliance: PairCompliance) -> dict[str, str
         "boundary": "pinion hub held; gear hub (or ring's outer rim) rigid and turning about its axis only",
         "method": "closed ring of 8-node hexahedra with incompatible modes, half-space near field, linear elastic, "
         "frictionless contact on the exact rigid gap",
+        **static,
         **figures,
         "versions": json.dumps({package: version(package) for package in packages}),
     }

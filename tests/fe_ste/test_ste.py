@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -330,14 +331,14 @@ def test_a_failed_position_leaves_its_neighbours_as_they_are(
     spur: PairCompliance, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     reference = static_transmission_error(spur, 300.0, 4)
-    solve = fe_ste.ste.contact_state
+    solve = fe_ste.ste.contact_states
 
-    def failing(compliance: PairCompliance, torque: float, pmc: float, *rest: Any) -> ContactState:
-        if pmc == 0.25:
-            raise ContactError("made to fail")
-        return solve(compliance, torque, pmc, *rest)
+    def failing(
+        compliance: PairCompliance, torque: float, pmc: float, *rest: Any
+    ) -> Sequence[ContactState | ContactError]:
+        return [ContactError("made to fail")] if pmc == 0.25 else solve(compliance, torque, pmc, *rest)
 
-    monkeypatch.setattr(fe_ste.ste, "contact_state", failing)
+    monkeypatch.setattr(fe_ste.ste, "contact_states", failing)
     curve = static_transmission_error(spur, 300.0, 4)
     assert curve.converged.values.ravel().tolist() == [True, False, True, True]
     assert curve.ste.values.ravel()[[0, 2, 3]] == pytest.approx(reference.ste.values.ravel()[[0, 2, 3]], rel=1e-12)

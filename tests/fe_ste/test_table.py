@@ -39,6 +39,7 @@ CHANGES: dict[str, Any] = {
     "contact": ContactSettings(slices=9),
     "pinion_modification": FlankModification(lead_crowning=1e-6),
     "gear_modification": FlankModification(profile_crowning=1e-6),
+    "static_torque": 50.0,
 }
 
 
@@ -60,6 +61,16 @@ def test_table_has_all_axes_and_is_labelled(table: MeshTable) -> None:
     assert json.loads(data.attrs["input"])["torque"] == [50.0, 100.0]
     # The compliance depends on what holds the gears, so the table says it.
     assert data.attrs["pinion_held_diameter"] == data.attrs["gear_held_diameter"] == GEAR.held_diameter
+
+
+def test_static_state_is_chosen_by_value_not_by_place(table: MeshTable) -> None:
+    with pytest.raises(TableError, match="torque"):
+        _ = table.static_state  # of two torques none is named
+    named = MeshTable(table.dataset.assign_attrs(static_torque=100.0))
+    assert float(named.static_state.torque) == 100.0
+    assert float(named.static_state.misalignment) == 0.0
+    assert named.static_state.ste.dims == ("pmc",)
+    assert np.array_equal(named.static_state.ste, table.dataset.ste.isel(torque=1, centre_distance=0, misalignment=0))
 
 
 def test_saved_table_opens_with_the_same_numbers_and_by_xarray_alone(table: MeshTable, tmp_path: Path) -> None:

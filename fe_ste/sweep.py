@@ -1,0 +1,243 @@
+"""Grids of contact states on an executor: split by position, stored while they grow, taken up again.
+
+The unit of work is all states of one or a few positions of the mesh cycle, because these share what is costly. It can
+be sent to any executor of `concurrent.futures` or with its protocol: a block carries all it needs and returns arrays.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import pickle
+import signal
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+import xarray as xr
+
+from fe_ste.ste import PairCompliance, StateAxes, StateResults, solve_positions
+
+#: States of a block: some seconds of work, so that little is lost and the time left is known.
+_BLOCK_STATES = 150
+#: Seconds between two writings of what is finished.
+_STORE_EVERY = 10.0
+#: Attribute that ties a file of finished positions to its input.
+_PARTIAL_OF = "partial_of"
+
+
+class SweepError(RuntimeError):
+    """A sweep whose workers were lost; the message says what is kept."""
+
+
+class Submits(Protocol):
+    """What a sweep asks of an executor."""
+
+    def submit(self, fn: Callable[..., StateResults], /, *args: object) -> Future[StateResults]:
+        """Schedule a call and return its future."""
+        ...
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """File in which a sweep keeps the positions that are finished.
+
+    Parameters
+    ----------
+    path : Path
+        Replaced as a whole at each writing, so that it can be read at any time, by xarray too.
+    input_hash : str
+        Hash of the sweep's input; a file of another input is not taken up.
+    """
+
+    path: Path
+    input_hash: str
+
+    def load(self, results: StateResults) -> set[int]:
+        """Fill `results` with what the file holds and return the finished positions; none if it does not fit."""
+        try:
+            stored = xr.load_dataset(self.path, engine="h5netcdf")
+        except (OSError, ValueError, KeyError):
+            return set()
+        if stored.attrs.get(_PARTIAL_OF) != self.input_hash:
+            return set()
+        rows = np.flatnonzero(stored["solved"].to_numpy())
+        results.insert(rows.tolist(), StateResults.from_dataset(results, stored.isel(pmc=rows)))
+        return set(rows.tolist())
+
+    def store(self, results: StateResults, axes: StateAxes, finished: set[int]) -> None:
+        """Write the finished positions; the others are not a number."""
+        dataset = results.dataset(axes, all_teeth=True)
+        solved = np.isin(np.arange(axes.positions), sorted(finished))
+        attributes = {"units": "1", "long_name": "whether all states of the position are finished"}
+        dataset["solved"] = ("pmc", solved.astype(np.int8), attributes)
+        dataset.attrs[_PARTIAL_OF] = self.input_hash
+        replace_file(dataset, self.path)
+
+
+def replace_file(dataset: xr.Dataset, path: Path) -> None:
+    """Write a netCDF file; a file of that name is replaced only by a complete one.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+    path : Path
+        Its directory is made if need be.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
+    os.close(handle)
+    try:
+        dataset.to_netcdf(Path(temporary), engine="h5netcdf")
+        Path(temporary).chmod(0o644)
+        os.replace(temporary, path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def process_pool(workers: int = 2) -> Executor:
+    """Return worker processes for a sweep; the process that starts them is the one that Ctrl-C stops.
+
+    Parameters
+    ----------
+    workers : int
+
+    Notes
+    -----
+    Workers are started afresh, not forked: a script that sweeps needs the usual ``if __name__ == "__main__":``.
+    """
+    return ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_leave_interrupts)
+
+
+def _leave_interrupts() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def sweep_states(
+    compliance: PairCompliance,
+    axes: StateAxes,
+    *,
+    executor: Submits | None = None,
+    checkpoint: Checkpoint | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> xr.Dataset:
+    """Solve a grid of states.
+
+    Parameters
+    ----------
+    compliance : PairCompliance
+    axes : StateAxes
+    executor : optional
+        Anything with ``submit`` of `concurrent.futures`; without it this process does the work.
+    checkpoint : Checkpoint, optional
+        Where finished positions are kept, and looked for first.
+    progress : callable, optional
+        Called with the number of finished states and of all states. What it raises, such as Ctrl-C, ends the sweep
+        after the finished positions are stored.
+
+    Returns
+    -------
+    xarray.Dataset
+        As of `fe_ste.static_transmission_error`.
+
+    Raises
+    ------
+    SweepError
+        If workers are lost.
+    """
+    results = StateResults.empty(compliance, axes.shape)
+    finished = checkpoint.load(results) if checkpoint else set()
+    states_each = math.prod(axes.shape[1:])
+    total = math.prod(axes.shape)
+
+    def tell(within_block: int = 0) -> None:
+        if progress is not None:
+            progress(len(finished) * states_each + within_block, total)
+
+    stored = time.monotonic()
+    try:
+        blocks = _blocks(axes, finished)
+        done = _here(compliance, axes, blocks, tell) if executor is None else _sent(compliance, axes, blocks, executor)
+        for positions, part in done:
+            results.insert(positions, part)
+            finished.update(positions)
+            if executor is not None:
+                tell()
+            if checkpoint and time.monotonic() - stored > _STORE_EVERY:
+                checkpoint.store(results, axes, finished)
+                stored = time.monotonic()
+    except BaseException:
+        if checkpoint and finished:
+            checkpoint.store(results, axes, finished)
+        raise
+    return results.dataset(axes)
+
+
+def _blocks(axes: StateAxes, finished: set[int]) -> list[list[int]]:
+    """Positions still to solve, in runs of neighbours."""
+    length = max(1, _BLOCK_STATES // math.prod(axes.shape[1:]))
+    left = [position for position in range(axes.positions) if position not in finished]
+    return [left[start : start + length] for start in range(0, len(left), length)]
+
+
+def _here(
+    compliance: PairCompliance, axes: StateAxes, blocks: list[list[int]], tell: Callable[[int], None]
+) -> Iterator[tuple[list[int], StateResults]]:
+    for positions in blocks:
+        yield positions, solve_positions(compliance, axes, positions, tell)
+
+
+def _sent(
+    compliance: PairCompliance, axes: StateAxes, blocks: list[list[int]], executor: Submits
+) -> Iterator[tuple[list[int], StateResults]]:
+    """Yield blocks in the order in which workers finish them."""
+    packed = pickle.dumps((compliance.pair, compliance.flanks, compliance.contact, compliance.modifications))
+    with _cancelled_on_error() as waiting:
+        for positions in blocks:
+            waiting[executor.submit(solve_block, packed, axes, positions)] = positions
+        while waiting:
+            for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+                try:
+                    yield waiting.pop(future), future.result()
+                except BrokenExecutor as error:
+                    raise SweepError(
+                        f"a worker of the sweep ended before its work was done ({error}); finished positions are kept"
+                    ) from error
+
+
+@contextmanager
+def _cancelled_on_error() -> Iterator[dict[Future[StateResults], list[int]]]:
+    waiting: dict[Future[StateResults], list[int]] = {}
+    try:
+        yield waiting
+    finally:
+        for future in waiting:
+            future.cancel()
+
+
+def solve_block(packed: bytes, axes: StateAxes, positions: list[int]) -> StateResults:
+    """Solve some positions in a worker, which unpacks the compliance of a pair once.
+
+    Parameters
+    ----------
+    packed : bytes
+        Pickled pair, flanks, contact settings and modifications.
+    axes : StateAxes
+    positions : list of int
+    """
+    return solve_positions(_unpacked(packed), axes, positions)
+
+
+@lru_cache(maxsize=1)
+def _unpacked(packed: bytes) -> PairCompliance:
+    pair, flanks, contact, modifications = pickle.loads(packed)
+    return PairCompliance.from_flanks(pair, flanks, contact).with_modifications(*modifications)

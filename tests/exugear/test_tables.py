@@ -1,0 +1,133 @@
+"""Tables over axes: named by the file, kept where they serve, and read at the static state."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from typer.testing import CliRunner
+
+import exugear.tables
+from exugear.casefile import CaseError
+from exugear.cli import app
+from exugear.gearbox import Gearbox
+from exugear.mesh_stiffness import mesh_stiffness
+from exugear.report import write_report
+from exugear.tables import missing_tables, order_tables, wanted_table
+
+from .spur_case import COARSE_INPUT, SPUR_CASE
+
+AXES = """ste = { positions = 8, torque_factors = [0.2, 1.0], centre_distance_offsets_um = [0.0, 50.0],
+  misalignment_um = [0.0, 20.0] }"""
+CASE = SPUR_CASE.replace("ste = { positions = 8 }", AXES.replace("\n", ""))
+
+
+@pytest.fixture(scope="module")
+def computed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A file with two values on each axis and its grid table."""
+    folder = tmp_path_factory.mktemp("grid")
+    case = folder / "spur.toml"
+    case.write_text(CASE, encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(exugear.tables, "TableInput", COARSE_INPUT)
+        outcome = CliRunner().invoke(app, ["ste", str(case), "--grid", "--out", str(folder / "out")])
+    assert outcome.exit_code == 0, outcome.stderr
+    assert "64/64" in outcome.stdout
+    return case, folder / "out"
+
+
+@pytest.fixture(autouse=True)
+def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(exugear.tables, "TableInput", COARSE_INPUT)
+
+
+def test_axes_are_those_of_the_file_and_the_static_state_lies_on_them_exactly(computed: tuple[Path, Path]) -> None:
+    case, out = computed
+    gearbox = Gearbox.from_toml(case)
+    data = xr.open_dataset(out / "tables" / "spur.nc")
+    torque = gearbox.pairs["spur"].static_torque
+    assert data["torque"].values == pytest.approx([0.2 * torque, torque], rel=1e-12)
+    assert data["centre_distance"].values == pytest.approx([75e-3, 75.05e-3], rel=1e-12)
+    assert data["centre_distance"].values[0] == gearbox.pairs["spur"].pair.centre_distance
+    # 20 um over 15 mm of face.
+    assert data["misalignment"].values == pytest.approx([0.0, 20e-6 / 15e-3], rel=1e-12)
+    assert not list(out.rglob("*partial*"))
+
+
+def test_a_grid_serves_where_only_the_static_state_is_needed(computed: tuple[Path, Path]) -> None:
+    case, out = computed
+    gearbox = Gearbox.from_toml(case)
+    assert order_tables(gearbox, out)[0].stored
+    assert missing_tables(gearbox, out) == missing_tables(gearbox, out, grid=True) == []
+    alone = order_tables(gearbox, out.parent / "alone")[0].fill()
+    stiffness = alone.static_state["mesh_stiffness"].to_numpy()
+    # One solution of one problem, found from other starts.
+    assert mesh_stiffness(gearbox, "line_of_action", out)["spur"] == pytest.approx(stiffness, rel=1e-9)
+
+
+def test_one_state_does_not_serve_where_a_grid_is_needed_nor_a_grid_with_other_axes(
+    computed: tuple[Path, Path], tmp_path: Path
+) -> None:
+    case, out = computed
+    other = tmp_path / "other.toml"
+    other.write_text(case.read_text(encoding="utf-8").replace("[0.2, 1.0]", "[0.3, 1.0]"), encoding="utf-8")
+    gearbox = Gearbox.from_toml(other)
+    assert missing_tables(gearbox, out) == []
+    assert [order.name for order in missing_tables(gearbox, out, grid=True)] == ["spur"]
+    order_tables(gearbox, tmp_path)[0].fill()
+    assert missing_tables(gearbox, tmp_path) == []
+    assert missing_tables(gearbox, tmp_path, grid=True)[0].wanted == wanted_table(gearbox, "spur", 8, grid=True)
+
+
+def test_file_may_ask_for_the_axes(tmp_path: Path) -> None:
+    case = tmp_path / "spur.toml"
+    case.write_text(CASE.replace("ste = { ", "ste = { grid = true, "), encoding="utf-8")
+    (order,) = order_tables(Gearbox.from_toml(case), tmp_path)
+    assert len(order.wanted.torque) == 2
+    assert order.wanted.static_torque == order.wanted.torque[1]
+
+
+def test_default_axes_have_7500_states(grc: Gearbox) -> None:
+    wanted = wanted_table(grc, "sun_planet", grc.ste.positions, grid=True)
+    sizes = [len(axis) for axis in (wanted.torque, wanted.centre_distance, wanted.misalignment)]
+    assert [wanted.positions, *sizes] == [50, 6, 5, 5]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("[0.2, 1.0]", "[0.2, 0.9]", "torque_factors"),
+        ("[0.2, 1.0]", "[1.0, 0.2]", "must rise"),
+        ("[0.2, 1.0]", "[0.0, 1.0]", "torque_factors"),
+        ("[0.0, 50.0]", "[-50.0, 50.0]", "centre_distance_offsets_um"),
+        ("[0.0, 20.0]", "[0.0, nan]", "misalignment_um"),
+    ],
+)
+def test_axes_without_the_static_state_or_out_of_order_are_refused(
+    old: str, new: str, words: str, tmp_path: Path
+) -> None:
+    case = tmp_path / "spur.toml"
+    case.write_text(CASE.replace(old, new), encoding="utf-8")
+    with pytest.raises(CaseError, match=words):
+        Gearbox.from_toml(case)
+
+
+def test_a_centre_distance_at_which_flanks_overlap_is_refused_with_its_key(tmp_path: Path) -> None:
+    case = tmp_path / "spur.toml"
+    case.write_text(CASE.replace("[0.0, 50.0]", "[-50.0, 0.0]"), encoding="utf-8")
+    outcome = CliRunner().invoke(app, ["ste", str(case), "--grid", "--out", str(tmp_path / "out")])
+    assert outcome.exit_code == 2
+    assert "centre_distance_offsets_um: -50" in outcome.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_pictures_and_report_show_the_static_state_of_a_grid(computed: tuple[Path, Path]) -> None:
+    _, out = computed
+    assert (out / "pictures" / "ste.png").is_file()
+    text = write_report(out).path.read_text(encoding="utf-8")
+    with xr.open_dataset(out / "tables" / "spur.nc") as data:
+        mean = 1e6 * float(data["ste"].isel(torque=1, centre_distance=0, misalignment=0).mean())
+    assert np.isfinite(mean)
+    assert f"{mean:.2f}" in text
