@@ -18,12 +18,13 @@ from typing import Literal, get_args
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from exugear import bearings as rolling
 from exugear.casefile import CatalogueSection, StiffnessSection
 from exugear.gearbox import Bearing, Body, Gearbox
 from exugear.kernels import (
+    STATE_SIZE,
     ConnectorArrays,
     InertiaArrays,
     MeshArrays,
@@ -34,9 +35,10 @@ from exugear.kernels import (
     add_mesh_jacobian,
     add_spring_forces,
     connector_load,
+    gear_positions,
     mesh_state,
 )
-from exugear.mesh_element import Angles, MeshElement, mesh_elements, node_position, pack
+from exugear.mesh_element import Angles, MeshData, MeshElement, mesh_elements, node_position, pack
 
 Floats = NDArray[np.float64]
 Variant = Literal["rigid", "bushing", "jointed"]
@@ -96,8 +98,22 @@ class Assembly:
 
     @cached_property
     def mean_meshes(self) -> MeshArrays:
-        """Mesh arrays with k(PMC) replaced by its mean over the cycle."""
+        """Mesh arrays with stiffness and tables replaced by their mean over the cycle."""
         return pack(self.elements, self.coordinates, averaged=True)
+
+    def linear_meshes(self, reversed_flanks: NDArray[np.bool_] | None = None) -> MeshArrays:
+        """Mesh arrays that are linear and bilateral, tables replaced by the mean stiffness at their static load.
+
+        Parameters
+        ----------
+        reversed_flanks : (meshes,) array of bool, optional
+            Meshes that press the other flank: their deflection counts from there.
+        """
+        meshes = pack(self.elements, self.coordinates, averaged=True, tables=False)
+        for m, element in enumerate(self.elements):
+            if reversed_flanks is not None and reversed_flanks[m] and element.table is not None:
+                meshes.table.nominal[m, 0] += element.table.backlash
+        return meshes
 
     def forces(self, q: Floats, v: Floats, meshes: MeshArrays | None = None) -> Floats:
         """Generalized forces of meshes, bearings and couplings, shape (size,), N and N m."""
@@ -182,10 +198,16 @@ class Assembly:
             connector_load(q, v, n, self.connectors, arms, load)
         return loads
 
-    def mesh_states(self, q: Floats, v: Floats) -> Floats:
-        """State of each mesh, (meshes, 6): see `exugear.kernels.mesh_state`."""
-        out = np.zeros((len(self.elements), 6))
-        mesh_state(q, v, self.meshes, out)
+    def mesh_states(self, q: Floats, v: Floats, meshes: MeshArrays | None = None) -> Floats:
+        """State of each mesh, (meshes, 9): see `exugear.kernels.mesh_state`."""
+        out = np.zeros((len(self.elements), STATE_SIZE))
+        mesh_state(q, v, self.meshes if meshes is None else meshes, out)
+        return out
+
+    def gear_positions(self, q: Floats) -> Floats:
+        """Centre distance (m) and misalignment (rad) of each mesh, (meshes, 2)."""
+        out = np.zeros((len(self.elements), 2))
+        gear_positions(q, self.meshes, out)
         return out
 
     def inertia_forces(self, q: Floats, v: Floats, a: Floats) -> Floats:
@@ -207,7 +229,7 @@ class Assembly:
 def assemble(
     gearbox: Gearbox,
     variant: str,
-    stiffness: Mapping[str, ArrayLike],
+    stiffness: Mapping[str, MeshData],
     law: str = "line_of_action",
     inertias: str | None = None,
     flanks: Mapping[str, int] | None = None,

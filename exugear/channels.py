@@ -9,17 +9,16 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from exugear.assembly import Assembly
+from exugear.compilation import compiled
 from exugear.gearbox import GROUND
 from exugear.kernels import (
-    ROW_SIZE,
+    STATE_SIZE,
     ConnectorArrays,
     InertiaArrays,
     MeshArrays,
     SpringArrays,
-    compiled,
     connector_load,
     connector_motion,
-    frame_row,
     kinetic_energies,
     mesh_state,
 )
@@ -56,7 +55,7 @@ def energy_residual(data: xr.Dataset) -> float:
 def mesh_signals(q: Floats, v: Floats, meshes: MeshArrays, out: Floats) -> None:
     """Fill (samples, 2 m): deflection (m), then F_bt (N) of each mesh; q and v (samples, size)."""
     count = meshes.cycles.size
-    state = np.empty((count, 6))
+    state = np.empty((count, STATE_SIZE))
     for n in range(q.shape[0]):
         mesh_state(q[n], v[n], meshes, state)
         for m in range(count):
@@ -87,18 +86,20 @@ def joint_signals(
     hosts : (j,) joint of the body that a joint sits on (the carrier's for a planet), -1 for ground
     planets : (j, 4) mass, x and y from the carrier's axis, coordinate of the carrier's spin; mass 0 else
     """
-    state = np.empty((meshes.cycles.size, 6))
+    state = np.empty((meshes.cycles.size, STATE_SIZE))
     for n in range(q.shape[0]):
         mesh_state(q[n], v[n], meshes, state)
         out[n, :] = 0.0
         for m in range(meshes.cycles.size):
             psi = q[n, meshes.coordinates[m, 12]] if meshes.coordinates[m, 12] >= 0 else 0.0
             cosine, sine = math.cos(psi), math.sin(psi)
-            scalar = state[m, 4] / meshes.line_of_action[m]
+            scalar, row = state[m, 4] / meshes.line_of_action[m], meshes.force[m]
+            if scalar < 0.0 and meshes.table.shape[m, 0] > 0:  # the other flank pushes
+                scalar, row = -scalar, meshes.table.back[m]
             for end in range(2):
                 j = ends[m, end]
                 if j >= 0:
-                    x, y, z = meshes.force[m, 6 * end : 6 * end + 3]
+                    x, y, z = row[6 * end : 6 * end + 3]
                     out[n, 3 * j] += scalar * (cosine * x - sine * y)
                     out[n, 3 * j + 1] += scalar * (sine * x + cosine * y)
                     out[n, 3 * j + 2] += scalar * z
@@ -118,20 +119,9 @@ def joint_signals(
 def mesh_energies(q: Floats, v: Floats, meshes: MeshArrays, state: Floats, out: Floats) -> None:
     """Add elastic energy (J) and the powers (W) damped, of k(PMC), non-conservative to out (5,)."""
     mesh_state(q, v, meshes, state)
-    gradient, turning = np.empty(ROW_SIZE), np.empty(ROW_SIZE)
     for m in range(meshes.cycles.size):
-        index = meshes.coordinates[m]
-        delta, rate, k = state[m, 0], state[m, 1], state[m, 3]
-        force = state[m, 4] / meshes.line_of_action[m]
-        frame_row(q, index, meshes.place[m], meshes.force[m], gradient, turning)
-        acting_rate = 0.0
-        for i in range(ROW_SIZE):
-            if index[i] >= 0:
-                acting_rate += gradient[i] * v[index[i]]
-        out[0] += 0.5 * k * delta * delta
-        out[1] += meshes.damping[m] * rate * rate
-        out[2] -= 0.5 * state[m, 5] * delta * delta
-        out[3] += force * (acting_rate - rate)
+        for i in range(4):
+            out[i] += state[m, 5 + i]
 
 
 @compiled
@@ -170,7 +160,7 @@ def energy_signals(
     out: Floats,
 ) -> None:
     """Fill (samples, 6): kinetic and elastic energy (J); powers (W) as the last four of `BALANCE_TERMS`."""
-    state = np.empty((meshes.cycles.size, 6))
+    state = np.empty((meshes.cycles.size, STATE_SIZE))
     kinetic = np.empty(inertia.body.size + inertia.spin.size)
     for n in range(q.shape[0]):
         kinetic_energies(q[n], v[n], inertia, kinetic)

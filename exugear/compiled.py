@@ -31,6 +31,7 @@ from exugear.equations import (
 from exugear.gearbox import GROUND
 from exugear.kernels import ConnectorArrays
 from exugear.modes import linearise, overall_row
+from exugear.table_law import scratch_memory
 
 Floats = NDArray[np.float64]
 
@@ -94,7 +95,7 @@ def refusal(assembly: Assembly) -> str:
 
 def eigenvalues(assembly: Assembly) -> NDArray[np.complex128]:
     """Eigenvalues (1/s) of the system linearised at rest, mean mesh stiffness, damping included."""
-    linear = linearise(assembly, np.zeros(assembly.size))
+    linear = linearise(assembly, np.zeros(assembly.size), assembly.linear_meshes())
     free = assembly.motions
     root = np.sqrt(np.diag(linear.mass))
     basis = scipy.linalg.orth(root[:, None] * free) / root[:, None]  # free motions of unit mass
@@ -233,6 +234,9 @@ def _meshes(numbers: _Numbers) -> Meshes:
         stiffness=given.stiffness,
         damping=given.damping,
         line_of_action=given.line_of_action,
+        error_pieces=given.error_pieces,
+        error=given.error,
+        table=given.table,
     )
 
 
@@ -323,9 +327,12 @@ def work_for(equations: Equations, q: Floats, v: Floats) -> Work:
         frames=frames,
         wrench=np.zeros((equations.bodies.start.size, 6)),
         motion=np.zeros((4, 6)),
-        gradient=np.zeros((2, 13)),
+        gradient=np.zeros((3, 13)),
         series=equations.loads.first[:-1].copy(),
-        states=np.zeros((equations.meshes.slot.size, 5)),
+        states=np.zeros((equations.meshes.slot.size, 4)),
+        pieces=np.zeros((equations.meshes.slot.size, 2), dtype=np.int64),
+        law=scratch_memory(),
+        row=np.zeros(12),
     )
 
 

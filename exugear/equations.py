@@ -9,33 +9,16 @@ the loops need no exceptions.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from exugear.compilation import kernel
+from exugear.table_law import FIRST_TWO, Scratch, TableArrays, surface_law
+
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
-Function = TypeVar("Function", bound=Callable[..., object])
-
-OPTIONS: dict[str, Any] = {
-    "cache": True,
-    "nogil": True,
-    "error_model": "numpy",
-    "forceinline": True,
-    "_nrt": False,
-}
-
-
-def kernel(function: Function) -> Function:
-    """Compile to machine code kept on disk; exact floating-point order, division without checks.
-
-    Nothing is allocated here, so reference counts of arrays are left out (they cost ten times the arithmetic), and
-    everything becomes one function (which saves handing over tuples of arrays).
-    """
-    return cast(Function, numba.njit(**OPTIONS)(function))
 
 
 class Bodies(NamedTuple):
@@ -116,6 +99,9 @@ class Meshes(NamedTuple):
     stiffness: Floats
     damping: Floats
     line_of_action: Floats
+    error_pieces: Integers
+    error: Floats
+    table: TableArrays
 
 
 class Loads(NamedTuple):
@@ -187,9 +173,12 @@ class Work(NamedTuple):
     frames : (b + 1, 16) rotation matrix, angular velocity, sine and cosine of the tilts
     wrench : (b + 1, 6) force and moment on each body, global axes
     motion : (4, 6) strain, its rate, the true rate of change, force of a connector in its own axes
-    gradient : (2, 13) gradients of the deflection and of the force row
+    gradient : (3, 13) gradients of the deflection and of the force row, and the force of a mesh with a table
     series : (s,) line of each torque series that was used last
-    states : (m, 5) deflection, its rate, k, slope of k per cycle, scalar force
+    states : (m, 4) deflection and its rate, 1 where a table's axis was left, scalar force
+    pieces : (m, 2) load piece of each flank's table that was used last
+    law : memory of the law `table`
+    row : (12,) row of the push between the axes and the moment of misalignment
     """
 
     q: Floats
@@ -206,6 +195,9 @@ class Work(NamedTuple):
     gradient: Floats
     series: Integers
     states: Floats
+    pieces: Integers
+    law: Scratch
+    row: Floats
 
 
 @kernel
@@ -389,13 +381,43 @@ def mesh_stiffness(q: Floats, m: int, meshes: Meshes) -> tuple[float, float]:
 
 
 @kernel
+def error_at(m: int, end: int, angle: float, meshes: Meshes) -> tuple[float, float]:
+    """Error (m) of one gear of mesh m at its angle (rad) seen from the frame, and its slope per rad."""
+    pieces = meshes.error_pieces[m, end]
+    turns = angle / (2.0 * math.pi)
+    scaled = (turns - math.floor(turns)) * pieces
+    piece = min(int(scaled), pieces - 1)
+    t = scaled - piece
+    c = meshes.error[m, end, piece]
+    slope = (c[1] + t * (2.0 * c[2] + t * 3.0 * c[3])) * pieces / (2.0 * math.pi)
+    return c[0] + t * (c[1] + t * (c[2] + t * c[3])), slope
+
+
+@kernel
+def take_off_errors(q: Floats, v: Floats, m: int, side: float, meshes: Meshes, gradient: Floats) -> tuple[float, float]:
+    """Change of a deflection and its rate by the gears' errors; changes its gradient too."""
+    delta, rate = 0.0, 0.0
+    index = meshes.coordinates[m]
+    for end in range(2):
+        if meshes.error_pieces[m, end] > 0:
+            spin, frame = index[6 * end + 5], index[12]
+            error, slope = error_at(m, end, q[spin] - q[frame], meshes)
+            delta -= side * error
+            rate -= side * slope * (v[spin] - v[frame])
+            gradient[6 * end + 5] -= side * slope
+            gradient[12] += side * slope
+    return delta, rate
+
+
+@kernel
 def mesh_motion(q: Floats, v: Floats, m: int, meshes: Meshes, work: Work) -> tuple[float, float, float]:
     """Deflection of mesh m, its rate, and the rate along the force row; fills `work.gradient`."""
     index = meshes.coordinates[m]
-    if meshes.spinning[m] == 1:
+    clean = meshes.error_pieces[m, 0] + meshes.error_pieces[m, 1] == 0
+    if meshes.spinning[m] == 1 and clean:
         one, two = meshes.deflection[m, 5], meshes.deflection[m, 11]
         i, j, k = index[5], index[11], index[12]
-        delta = one * (q[i] - q[k]) + two * (q[j] - q[k])
+        delta = meshes.table.nominal[m, 0] + one * (q[i] - q[k]) + two * (q[j] - q[k])
         rate = one * (v[i] - v[k]) + two * (v[j] - v[k])
         if meshes.conjugate[m] == 1:
             return delta, rate, rate
@@ -403,10 +425,85 @@ def mesh_motion(q: Floats, v: Floats, m: int, meshes: Meshes, work: Work) -> tup
         return delta, rate, one * (v[i] - v[k]) + two * (v[j] - v[k])
     c, s = work.turns[meshes.slot[m], 0], work.turns[meshes.slot[m], 1]
     delta, rate = mesh_row(q, v, index, meshes.place[m], meshes.deflection[m], c, s, work.gradient[0])
+    delta += meshes.table.nominal[m, 0]
+    if not clean:
+        less, slower = take_off_errors(q, v, m, 1.0, meshes, work.gradient[0])
+        delta, rate = delta + less, rate + slower
     if meshes.conjugate[m] == 1:
         return delta, rate, rate
     _, acting = mesh_row(q, v, index, meshes.place[m], meshes.force[m], c, s, work.gradient[1])
+    if not clean:
+        _, slower = take_off_errors(q, v, m, 1.0, meshes, work.gradient[1])
+        acting += slower
     return delta, rate, acting
+
+
+@kernel
+def table_flank(
+    q: Floats, v: Floats, m: int, side: int, centre: float, count: int, meshes: Meshes, work: Work, energy: Floats
+) -> float:
+    """Add the negative generalized force of one flank (1, -1) of a mesh with a table to `work.gradient[2]`.
+
+    Its scalar force is returned; with all four derivatives asked for (`count`), energy and powers are added to
+    `energy` as in `observe`.
+    """
+    table, index, place = meshes.table, meshes.coordinates[m], meshes.place[m]
+    c, s = work.turns[meshes.slot[m], 0], work.turns[meshes.slot[m], 1]
+    gradient, total = work.gradient[0], work.gradient[2]
+    if side > 0:
+        row, tilt, offset = meshes.deflection[m], table.tilt[m], table.nominal[m, 0]
+        phase, cycles, number = meshes.phase[m], meshes.cycles[m], 0
+    else:
+        row, tilt, offset = table.back[m], table.back_tilt[m], -table.nominal[m, 0] - table.backlash[m]
+        phase, cycles, number = table.back_phase[m], -meshes.cycles[m], 1
+    delta, rate = mesh_row(q, v, index, place, row, c, s, gradient)
+    less, slower = take_off_errors(q, v, m, float(side), meshes, gradient)
+    delta, rate = delta + offset + less, rate + slower
+    if side > 0:
+        work.states[m, 0], work.states[m, 1] = delta, rate
+    if delta <= table.lowest[m]:
+        return 0.0
+    misalignment = table.nominal[m, 2]
+    spinning = meshes.spinning[m] == 1
+    if not spinning:
+        misalignment += side * mesh_row(q, v, index, place, tilt, c, s, work.gradient[1])[0]
+    position = phase + cycles * (q[index[5]] - q[index[12]])
+    guess = work.pieces[m, number]
+    piece, _ = surface_law(delta, position, centre, misalignment, m, table, guess, count, work.law)
+    work.pieces[m, number] = piece
+    law = work.law.law
+    damping = table.damping_time[m] * law[1]
+    force: float = law[0] + damping * rate
+    for i in range(13):
+        total[i] += force * gradient[i]
+    if not spinning:
+        for i in range(12):
+            work.row[i] = law[3] * table.centre[m, i] + law[4] * side * tilt[i]
+        mesh_row(q, v, index, place, work.row, c, s, work.gradient[1])
+        for i in range(13):
+            total[i] += work.gradient[1, i]
+    work.states[m, 2] = max(work.states[m, 2], law[6])
+    if count > FIRST_TWO:
+        energy[1] += law[2]
+        energy[3] += damping * rate * rate
+        energy[4] -= law[5] * cycles * (v[index[5]] - v[index[12]])
+    return force
+
+
+@kernel
+def table_mesh(q: Floats, v: Floats, m: int, count: int, meshes: Meshes, work: Work, energy: Floats) -> float:
+    """Fill `work.gradient[2]` with the negative generalized force of a mesh with a table; F_bt is returned."""
+    table = meshes.table
+    work.gradient[2, :] = 0.0
+    work.states[m, 2] = 0.0
+    centre = table.nominal[m, 1]
+    if meshes.spinning[m] == 0:
+        c, s = work.turns[meshes.slot[m], 0], work.turns[meshes.slot[m], 1]
+        index = meshes.coordinates[m]
+        centre += mesh_row(q, v, index, meshes.place[m], table.centre[m], c, s, work.gradient[1])[0]
+    force: float = table_flank(q, v, m, 1, centre, count, meshes, work, energy)
+    force -= table_flank(q, v, m, -1, centre, count, meshes, work, energy)
+    return force
 
 
 @kernel
@@ -414,11 +511,16 @@ def add_meshes(q: Floats, v: Floats, meshes: Meshes, work: Work) -> None:
     """Add the generalized forces of all meshes to `work.force`."""
     f = work.force
     for m in range(meshes.coordinates.shape[0]):
+        index = meshes.coordinates[m]
+        if meshes.table.shape[m, 0] > 0:
+            table_mesh(q, v, m, FIRST_TWO, meshes, work, work.total)
+            for i in range(13):
+                f[index[i]] -= work.gradient[2, i]
+            continue
         delta, rate, _ = mesh_motion(q, v, m, meshes, work)
         k, _ = mesh_stiffness(q, m, meshes)
         force = k * delta + meshes.damping[m] * rate
-        index = meshes.coordinates[m]
-        if meshes.spinning[m] == 1:
+        if meshes.spinning[m] == 1 and meshes.error_pieces[m, 0] + meshes.error_pieces[m, 1] == 0:
             one, two = force * meshes.force[m, 5], force * meshes.force[m, 11]
             f[index[5]] -= one
             f[index[11]] -= two
@@ -538,13 +640,21 @@ def advance(first: int, step: float, equations: Equations, work: Work, out_q: Fl
 
 @kernel
 def observe_meshes(q: Floats, v: Floats, meshes: Meshes, work: Work, signals: Floats, energy: Floats) -> None:
-    """Fill deflection and F_bt of each mesh into signals (2 m,); add energy and powers (see `observe`)."""
+    """Fill deflection and F_bt of each mesh into signals (2 m,); add energy and powers (see `observe`).
+
+    The scalar force of each mesh, or that along its line of action, is left in `work.states[:, 3]`.
+    """
     count = meshes.coordinates.shape[0]
     for m in range(count):
+        if meshes.table.shape[m, 0] > 0:
+            force = table_mesh(q, v, m, FIRST_TWO + 1, meshes, work, energy)
+            work.states[m, 3] = force
+            signals[m], signals[count + m] = work.states[m, 0], force
+            continue
         delta, rate, acting = mesh_motion(q, v, m, meshes, work)
         k, slope = mesh_stiffness(q, m, meshes)
         force = k * delta + meshes.damping[m] * rate
-        work.states[m, 0] = force
+        work.states[m, 3] = force
         signals[m], signals[count + m] = delta, force * meshes.line_of_action[m]
         cycling = meshes.cycles[m] * (v[meshes.coordinates[m, 5]] - v[meshes.coordinates[m, 12]])
         energy[1] += 0.5 * k * delta * delta
@@ -603,10 +713,14 @@ def observe_joints(v: Floats, meshes: Meshes, joints: Joints, work: Work, signal
         for end in range(2):
             j = joints.ends[m, end]
             if j >= 0:
-                x, y, z = meshes.force[m, 6 * end], meshes.force[m, 6 * end + 1], meshes.force[m, 6 * end + 2]
-                signals[3 * j] += work.states[m, 0] * (c * x - s * y)
-                signals[3 * j + 1] += work.states[m, 0] * (s * x + c * y)
-                signals[3 * j + 2] += work.states[m, 0] * z
+                force = work.states[m, 3]
+                row = meshes.force[m]
+                if force < 0.0 and meshes.table.shape[m, 0] > 0:  # the other flank pushes
+                    force, row = -force, meshes.table.back[m]
+                x, y, z = row[6 * end], row[6 * end + 1], row[6 * end + 2]
+                signals[3 * j] += force * (c * x - s * y)
+                signals[3 * j + 1] += force * (s * x + c * y)
+                signals[3 * j + 2] += force * z
     for j in range(joints.host.size):
         if joints.planet[j, 0] > 0.0:
             c, s = work.turns[joints.slot[j], 0], work.turns[joints.slot[j], 1]

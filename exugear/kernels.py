@@ -15,32 +15,32 @@ rotation by psi, p a gear's place relative to the frame's axis and S = z x,
     F     = k(pmc) delta + c d delta/dt                                    scalar mesh force
     f     = -F dg/dq,  g = sum_b V_b . z_b                                 generalized force
 
-    z_b   = R^T (p_b + x_b) - p_b,  tilts likewise,  spin_b - psi        displacements seen from the frame
 g does not change when everything turns with psi, the carrier's share of the force balances moments exactly.
+
+A mesh with a table follows `exugear.table_law` instead: its potential depends on delta, on the centre distance a and
+the misalignment gamma, each a row of the same coordinates, and f = -(F d delta/dq + U_a da/dq + U_gamma d gamma/dq).
+Errors of pitch and run-out, given over a revolution of each gear, are taken off the deflection of any law.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import NamedTuple, TypeVar, cast
+from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from exugear.compilation import compiled
+from exugear.table_law import ORDERS, TableArrays, scratch_memory, surface_law, surface_tangent
+
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
-Function = TypeVar("Function", bound=Callable[..., object])
 
 END_SIZE = 6
 ROW_SIZE = 13
 """Local coordinates of a mesh: six of gear 1, six of gear 2, the spin of the frame."""
-
-
-def compiled(function: Function) -> Function:
-    """Compile a function to machine code, kept on disk between processes; exact floating-point order."""
-    return cast(Function, numba.njit(cache=True, nogil=True)(function))
+STATE_SIZE = 9
+"""Columns of `mesh_state`."""
 
 
 class MeshArrays(NamedTuple):
@@ -57,6 +57,9 @@ class MeshArrays(NamedTuple):
     stiffness : (m, n, 4) coefficients of k over each piece, N/m
     damping : (m,) N s/m
     line_of_action : (m,) F_bt per scalar mesh force
+    error_pieces : (m, 2) number of equal cubic pieces of each gear's error over its revolution; 0 for no error
+    error : (m, 2, e, 4) coefficients of the error over each piece, m along the transverse line of action
+    table : tables of the meshes that follow one
     """
 
     coordinates: Integers
@@ -69,6 +72,15 @@ class MeshArrays(NamedTuple):
     stiffness: Floats
     damping: Floats
     line_of_action: Floats
+    error_pieces: Integers
+    error: Floats
+    table: TableArrays
+
+    def one(self, n: int) -> MeshArrays:
+        """Arrays of mesh n alone."""
+        table = TableArrays._make(values[n : n + 1] for values in self.table)
+        others = {name: values[n : n + 1] for name, values in self._asdict().items() if name != "table"}
+        return MeshArrays(**others, table=table)
 
 
 class ConnectorArrays(NamedTuple):
@@ -191,6 +203,43 @@ def frame_row(q: Floats, index: Integers, place: Floats, row: Floats, gradient: 
 
 
 @compiled
+def error_at(m: int, end: int, angle: float, meshes: MeshArrays) -> tuple[float, float, float]:
+    """Error (m) of one gear of mesh m at its angle (rad) seen from the frame, with two derivatives by the angle."""
+    pieces = meshes.error_pieces[m, end]
+    if pieces == 0:
+        return 0.0, 0.0, 0.0
+    turns = angle / (2.0 * math.pi)
+    scaled = (turns - math.floor(turns)) * pieces
+    piece = min(int(scaled), pieces - 1)
+    t = scaled - piece
+    c = meshes.error[m, end, piece]
+    per_rad = pieces / (2.0 * math.pi)
+    value: float = c[0] + t * (c[1] + t * (c[2] + t * c[3]))
+    return value, (c[1] + t * (2.0 * c[2] + t * 3.0 * c[3])) * per_rad, (2.0 * c[2] + 6.0 * t * c[3]) * per_rad**2
+
+
+@compiled
+def approach(
+    q: Floats, m: int, meshes: MeshArrays, row: Floats, side: float, gradient: Floats, turning: Floats, bend: Floats
+) -> float:
+    """Value of a row less the gears' errors (side 1; plus them for the other flank, -1), gradient as `frame_row`.
+
+    The errors' second derivatives by the two spins go to `bend` (2,).
+    """
+    index = meshes.coordinates[m]
+    value: float = frame_row(q, index, meshes.place[m], row, gradient, turning)
+    psi = q[index[12]] if index[12] >= 0 else 0.0
+    for end in range(2):
+        spin = q[index[6 * end + 5]] if index[6 * end + 5] >= 0 else 0.0
+        error, slope, curvature = error_at(m, end, spin - psi, meshes)
+        value -= side * error
+        gradient[6 * end + 5] -= side * slope
+        gradient[12] += side * slope
+        bend[end] = -side * curvature
+    return value
+
+
+@compiled
 def mesh_position(q: Floats, m: int, meshes: MeshArrays) -> float:
     """Position in the mesh cycle of mesh m, unwrapped."""
     spin = q[meshes.coordinates[m, 5]] if meshes.coordinates[m, 5] >= 0 else 0.0
@@ -210,73 +259,250 @@ def along(index: Integers, row: Floats, v: Floats) -> float:
 
 
 @compiled
+def relative_spin(v: Floats, index: Integers, end: int) -> float:
+    """Spin of a gear of a mesh seen from the mesh's frame; of coordinates or of their rates."""
+    spin = v[index[6 * end + 5]] if index[6 * end + 5] >= 0 else 0.0
+    psi = v[index[12]] if index[12] >= 0 else 0.0
+    difference: float = spin - psi
+    return difference
+
+
+@compiled
+def linear_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, out: Floats, acting: Floats) -> None:
+    """State of a mesh with a stiffness k(pmc), as a line of `mesh_state`, and its generalized force, negative, (13,)."""
+    gradient, turning, bend = np.empty(ROW_SIZE), np.empty(ROW_SIZE), np.empty(2)
+    index = meshes.coordinates[m]
+    delta = meshes.table.nominal[m, 0]
+    delta += approach(q, m, meshes, meshes.deflection[m], 1.0, gradient, turning, bend)
+    rate = along(index, gradient, v)
+    pmc = mesh_position(q, m, meshes)
+    k, k_slope = stiffness_at(meshes.stiffness[m], meshes.pieces[m], pmc)
+    approach(q, m, meshes, meshes.force[m], 1.0, acting, turning, bend)
+    force = k * delta + meshes.damping[m] * rate
+    cycling = meshes.cycles[m] * relative_spin(v, index, 0)
+    out[0], out[1], out[2], out[3] = delta, rate, pmc - math.floor(pmc), k
+    out[4] = force * meshes.line_of_action[m]
+    out[5] = 0.5 * k * delta * delta
+    out[6] = meshes.damping[m] * rate * rate
+    out[7] = -0.5 * k_slope * cycling * delta * delta
+    out[8] = force * (along(index, acting, v) - rate)
+    acting *= force
+
+
+@compiled
+def gear_position(q: Floats, m: int, meshes: MeshArrays, row: Floats, nominal: float) -> float:
+    """Centre distance (m) or misalignment (rad) of mesh m by its row."""
+    gradient, turning = np.empty(ROW_SIZE), np.empty(ROW_SIZE)
+    index = meshes.coordinates[m]
+    value: float = nominal + frame_row(q, index, meshes.place[m], row, gradient, turning)
+    return value
+
+
+@compiled
+def flank_of(side: int, m: int, meshes: MeshArrays) -> tuple[Floats, Floats, float, float, float]:
+    """Rows of deflection and misalignment, deflection at zero coordinates, phase and cycles of one flank (1, -1)."""
+    table = meshes.table
+    if side > 0:
+        return (
+            meshes.deflection[m], table.tilt[m], table.nominal[m, 0], meshes.phase[m], meshes.cycles[m],
+        )  # fmt: skip
+    return (
+        table.back[m], table.back_tilt[m], -table.nominal[m, 0] - table.backlash[m], table.back_phase[m],
+        -meshes.cycles[m],
+    )  # fmt: skip
+
+
+@compiled
+def table_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, out: Floats, acting: Floats) -> None:
+    """State of a mesh with a table, as a line of `mesh_state`, and its generalized force, negative, (13,)."""
+    table, memory = meshes.table, scratch_memory()
+    gradient, turning, bend = np.empty(ROW_SIZE), np.empty(ROW_SIZE), np.empty(2)
+    index, place = meshes.coordinates[m], meshes.place[m]
+    centre = gear_position(q, m, meshes, table.centre[m], table.nominal[m, 1])
+    spin, cycling = relative_spin(q, index, 0), relative_spin(v, index, 0)
+    pmc = mesh_position(q, m, meshes)
+    out[:] = 0.0
+    acting[:] = 0.0
+    out[2] = pmc - math.floor(pmc)
+    for side in (1, -1):
+        row, tilt, offset, phase, cycles = flank_of(side, m, meshes)
+        delta = offset + approach(q, m, meshes, row, float(side), gradient, turning, bend)
+        rate = along(index, gradient, v)
+        if side > 0:
+            out[0], out[1] = delta, rate
+        if delta <= table.lowest[m]:
+            continue
+        misalignment = gear_position(q, m, meshes, tilt, side * table.nominal[m, 2])
+        pmc = phase + cycles * spin
+        surface_law(delta, pmc, centre, side * misalignment, m, table, 0, ORDERS.shape[0], memory)
+        law = memory.law
+        damping = table.damping_time[m] * law[1]
+        force = law[0] + damping * rate
+        for i in range(ROW_SIZE):
+            acting[i] += force * gradient[i]
+        frame_row(q, index, place, law[3] * table.centre[m] + law[4] * side * tilt, gradient, turning)
+        for i in range(ROW_SIZE):
+            acting[i] += gradient[i]
+        out[3] += law[1]
+        out[4] += side * force
+        out[5] += law[2]
+        out[6] += damping * rate * rate
+        out[7] -= law[5] * cycles * cycling
+
+
+@compiled
 def add_mesh_forces(q: Floats, v: Floats, meshes: MeshArrays, f: Floats) -> None:
     """Add the generalized forces of all meshes to f, shape of q."""
-    gradient, turning = np.empty(ROW_SIZE), np.empty(ROW_SIZE)
-    acting, acting_turning = np.empty(ROW_SIZE), np.empty(ROW_SIZE)
+    state, acting = np.empty(STATE_SIZE), np.empty(ROW_SIZE)
     for m in range(meshes.coordinates.shape[0]):
-        index, place = meshes.coordinates[m], meshes.place[m]
-        delta = frame_row(q, index, place, meshes.deflection[m], gradient, turning)
-        frame_row(q, index, place, meshes.force[m], acting, acting_turning)
-        k, _ = stiffness_at(meshes.stiffness[m], meshes.pieces[m], mesh_position(q, m, meshes))
-        force = k * delta + meshes.damping[m] * along(index, gradient, v)
+        if meshes.table.shape[m, 0] > 0:
+            table_force(q, v, m, meshes, state, acting)
+        else:
+            linear_force(q, v, m, meshes, state, acting)
+        index = meshes.coordinates[m]
         for i in range(ROW_SIZE):
             if index[i] >= 0:
-                f[index[i]] -= force * acting[i]
+                f[index[i]] -= acting[i]
 
 
 @compiled
 def add_mesh_jacobian(q: Floats, v: Floats, meshes: MeshArrays, jq: Floats, jv: Floats) -> None:
     """Add d f/dq and d f/dv of `add_mesh_forces` to jq and jv, each (n, n)."""
-    gradient, turning = np.empty(ROW_SIZE), np.empty(ROW_SIZE)
-    acting, acting_turning = np.empty(ROW_SIZE), np.empty(ROW_SIZE)
-    slope_row = np.empty(ROW_SIZE)
+    local_q, local_v = np.empty((ROW_SIZE, ROW_SIZE)), np.empty((ROW_SIZE, ROW_SIZE))
     for m in range(meshes.coordinates.shape[0]):
-        index, place = meshes.coordinates[m], meshes.place[m]
-        delta = frame_row(q, index, place, meshes.deflection[m], gradient, turning)
-        frame_row(q, index, place, meshes.force[m], acting, acting_turning)
-        k, k_slope = stiffness_at(meshes.stiffness[m], meshes.pieces[m], mesh_position(q, m, meshes))
-        c = meshes.damping[m]
-        force = k * delta + c * along(index, gradient, v)
-        psi_rate = v[index[12]] if index[12] >= 0 else 0.0
-        for j in range(ROW_SIZE):
-            slope_row[j] = k * gradient[j] + c * turning[j] * psi_rate
-        slope_row[12] = k * gradient[12] + c * along(index, turning, v)
-        slope_row[5] += delta * k_slope * meshes.cycles[m]
-        slope_row[12] -= delta * k_slope * meshes.cycles[m]
+        local_q[:] = 0.0
+        local_v[:] = 0.0
+        if meshes.table.shape[m, 0] > 0:
+            for side in (1, -1):
+                table_tangent(q, v, m, side, meshes, local_q, local_v)
+        else:
+            linear_tangent(q, v, m, meshes, local_q, local_v)
+        index = meshes.coordinates[m]
         for i in range(ROW_SIZE):
-            if index[i] < 0:
-                continue
             for j in range(ROW_SIZE):
-                if index[j] < 0:
-                    continue
-                jq[index[i], index[j]] -= acting[i] * slope_row[j]
-                jv[index[i], index[j]] -= acting[i] * c * gradient[j]
-            if index[12] >= 0:
-                jq[index[i], index[12]] -= force * acting_turning[i]
-                if i != 12:
-                    jq[index[12], index[i]] -= force * acting_turning[i]
+                if index[i] >= 0 and index[j] >= 0:
+                    jq[index[i], index[j]] -= local_q[i, j]
+                    jv[index[i], index[j]] -= local_v[i, j]
+
+
+@compiled
+def turn_rows(turning: Floats, bend: Floats, factor: float, out: Floats) -> None:
+    """Add factor times the second derivatives of a row's value, (13, 13)."""
+    for i in range(ROW_SIZE):
+        out[i, 12] += factor * turning[i]
+        if i != 12:
+            out[12, i] += factor * turning[i]
+    for end in range(2):
+        o = 6 * end + 5
+        out[o, o] += factor * bend[end]
+        out[12, 12] += factor * bend[end]
+        out[o, 12] -= factor * bend[end]
+        out[12, o] -= factor * bend[end]
+
+
+@compiled
+def rate_gradient(v: Floats, index: Integers, turning: Floats, bend: Floats, out: Floats) -> None:
+    """Differentiate a row's rate by the coordinates, (13,)."""
+    psi_rate = v[index[12]] if index[12] >= 0 else 0.0
+    for i in range(ROW_SIZE):
+        out[i] = turning[i] * psi_rate
+    out[12] = along(index, turning, v)
+    for end in range(2):
+        change = bend[end] * relative_spin(v, index, end)
+        out[6 * end + 5] += change
+        out[12] -= change
+
+
+@compiled
+def linear_tangent(q: Floats, v: Floats, m: int, meshes: MeshArrays, jq: Floats, jv: Floats) -> None:
+    """Add the derivatives of the negative force of a mesh with a stiffness k(pmc), (13, 13)."""
+    gradient, turning, bend = np.empty(ROW_SIZE), np.empty(ROW_SIZE), np.empty(2)
+    acting, acting_turning = np.empty(ROW_SIZE), np.empty(ROW_SIZE)
+    slope = np.empty(ROW_SIZE)
+    index = meshes.coordinates[m]
+    delta = meshes.table.nominal[m, 0]
+    delta += approach(q, m, meshes, meshes.deflection[m], 1.0, gradient, turning, bend)
+    k, k_slope = stiffness_at(meshes.stiffness[m], meshes.pieces[m], mesh_position(q, m, meshes))
+    c = meshes.damping[m]
+    force = k * delta + c * along(index, gradient, v)
+    rate_gradient(v, index, turning, bend, slope)
+    slope *= c
+    slope += k * gradient
+    slope[5] += delta * k_slope * meshes.cycles[m]
+    slope[12] -= delta * k_slope * meshes.cycles[m]
+    approach(q, m, meshes, meshes.force[m], 1.0, acting, acting_turning, bend)
+    for i in range(ROW_SIZE):
+        for j in range(ROW_SIZE):
+            jq[i, j] += acting[i] * slope[j]
+            jv[i, j] += acting[i] * c * gradient[j]
+    turn_rows(acting_turning, bend, force, jq)
+
+
+@compiled
+def table_tangent(q: Floats, v: Floats, m: int, side: int, meshes: MeshArrays, jq: Floats, jv: Floats) -> None:
+    """Add the derivatives of the negative force of one flank of a mesh with a table, (13, 13)."""
+    table, memory = meshes.table, scratch_memory()
+    index, place = meshes.coordinates[m], meshes.place[m]
+    row, tilt, offset, phase, cycles = flank_of(side, m, meshes)
+    gradients, slopes = np.zeros((4, ROW_SIZE)), np.zeros((4, ROW_SIZE))
+    turning, bend, changing = np.empty(ROW_SIZE), np.empty(2), np.empty(ROW_SIZE)
+    delta = offset + approach(q, m, meshes, row, float(side), gradients[0], turning, bend)
+    if delta <= table.lowest[m]:
+        return
+    centre = table.nominal[m, 1] + frame_row(q, index, place, table.centre[m], gradients[1], changing)
+    tilting = side * tilt
+    misalignment = table.nominal[m, 2] + frame_row(q, index, place, tilting, gradients[2], changing)
+    pmc = phase + cycles * relative_spin(q, index, 0)
+    gradients[3, 5], gradients[3, 12] = cycles, -cycles
+    piece, t = surface_law(delta, pmc, centre, misalignment, m, table, 0, ORDERS.shape[0], memory)
+    if t < 0.0:
+        return
+    second = np.empty((4, 4))
+    surface_tangent(t, piece, m, table, memory, second)
+    law, time = memory.law, table.damping_time[m]
+    rate = along(index, gradients[0], v)
+    for a in range(3):
+        for b in range(4):
+            slopes[a] += second[a, b] * gradients[b]
+    rate_gradient(v, index, turning, bend, changing)
+    for b in range(4):
+        slopes[0] += time * rate * second[3, b] * gradients[b]
+    slopes[0] += time * law[1] * changing
+    for a in range(3):
+        for i in range(ROW_SIZE):
+            for j in range(ROW_SIZE):
+                jq[i, j] += gradients[a, i] * slopes[a, j]
+    for i in range(ROW_SIZE):
+        for j in range(ROW_SIZE):
+            jv[i, j] += time * law[1] * gradients[0, i] * gradients[0, j]
+    turn_rows(turning, bend, law[0] + time * law[1] * rate, jq)
+    bend[:] = 0.0
+    frame_row(q, index, place, law[3] * table.centre[m] + law[4] * tilting, gradients[0], turning)
+    turn_rows(turning, bend, 1.0, jq)
 
 
 @compiled
 def mesh_state(q: Floats, v: Floats, meshes: MeshArrays, out: Floats) -> None:
-    """Fill (m, 6): deflection (m), its rate (m/s), pmc in [0, 1), k (N/m), F_bt (N), dk/dt (N/m/s).
+    """Fill (m, 9): what each mesh does.
 
-    The last column times half the squared deflection is the power that k(pmc) puts into the mesh.
+    Deflection (m), its rate (m/s), pmc in [0, 1), tangent stiffness (N/m), F_bt (N, negative on the other flank),
+    elastic energy (J); powers (W): damped, of the stiffness that changes with pmc, of a force that is not conjugate.
     """
-    gradient, turning = np.empty(ROW_SIZE), np.empty(ROW_SIZE)
+    acting = np.empty(ROW_SIZE)
     for m in range(meshes.coordinates.shape[0]):
-        index = meshes.coordinates[m]
-        delta = frame_row(q, index, meshes.place[m], meshes.deflection[m], gradient, turning)
-        rate = along(index, gradient, v)
-        pmc = mesh_position(q, m, meshes)
-        k, k_slope = stiffness_at(meshes.stiffness[m], meshes.pieces[m], pmc)
-        spin_rate = v[index[5]] if index[5] >= 0 else 0.0
-        psi_rate = v[index[12]] if index[12] >= 0 else 0.0
-        out[m, 0], out[m, 1] = delta, rate
-        out[m, 2], out[m, 3] = pmc - math.floor(pmc), k
-        out[m, 4] = (k * delta + meshes.damping[m] * rate) * meshes.line_of_action[m]
-        out[m, 5] = k_slope * meshes.cycles[m] * (spin_rate - psi_rate)
+        if meshes.table.shape[m, 0] > 0:
+            table_force(q, v, m, meshes, out[m], acting)
+        else:
+            linear_force(q, v, m, meshes, out[m], acting)
+
+
+@compiled
+def gear_positions(q: Floats, meshes: MeshArrays, out: Floats) -> None:
+    """Fill (m, 2): centre distance (m) and misalignment of the loaded flank (rad) of each mesh."""
+    table = meshes.table
+    for m in range(meshes.coordinates.shape[0]):
+        out[m, 0] = gear_position(q, m, meshes, table.centre[m], table.nominal[m, 1])
+        out[m, 1] = gear_position(q, m, meshes, table.tilt[m], table.nominal[m, 2])
 
 
 @compiled

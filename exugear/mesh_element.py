@@ -24,7 +24,13 @@ Laws
 ``seed``            tangential deflection at the pitch point; force T = (1, tan phi_n / cos beta, -tan beta)
 ``constant``        as line_of_action with the table's mean stiffness
 ``iso6336``         as line_of_action with the mean stiffness of ISO 6336-1 method B
+``table``           potential of the table over deflection, centre distance and misalignment (`exugear.table_law`);
+                    apart in the backlash, the other flank beyond it
 ``rigid``           no deflection and no element: the gears roll, only couplings twist (variant `rigid`)
+
+Where the gears stand: the centre distance is along the line of centres at mid-face; misalignment is the turning of
+gear 1's axis against gear 2's in the loaded flank's plane of action, positive where it opens the gap at the +z end.
+The other flank is the loaded one turned by pi about the line of centres: the same table with misalignment reversed.
 """
 
 from __future__ import annotations
@@ -39,9 +45,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from exugear.gearbox import GROUND, Body, Gearbox, Mesh
 from exugear.kernels import MeshArrays, periodic_cubic
+from exugear.table_law import TableArrays
+from fe_ste.interpolation import SteSurface, axis_weights
 
 Floats = NDArray[np.float64]
-MeshLaw = Literal["rigid", "constant", "iso6336", "seed", "line_of_action"]
+MeshData = ArrayLike | SteSurface
+"""What a law knows of a pair: stiffness over the mesh cycle (N/m), or the table's surface."""
+MeshLaw = Literal["rigid", "constant", "iso6336", "seed", "line_of_action", "table"]
 MESH_LAWS: tuple[str, ...] = get_args(MeshLaw)
 Angles = Literal["reference", "operating"]
 
@@ -51,6 +61,27 @@ PHASE_TOLERANCE = 5e-3
 
 class MeshError(ValueError):
     """A mesh that the element cannot represent."""
+
+
+@dataclass(frozen=True)
+class TableFlanks:
+    """What the law `table` needs of a mesh beyond its rows.
+
+    Attributes
+    ----------
+    surface : SteSurface of the loaded flank
+    back, back_tilt : (12,) rows of the other flank's deflection and misalignment
+    backlash : approach from flank to flank along the transverse line of action, m
+    back_phase : PMC of the other flank at zero angles
+    damping_time : damping over tangent stiffness, s
+    """
+
+    surface: SteSurface
+    back: Floats
+    back_tilt: Floats
+    backlash: float
+    back_phase: float
+    damping_time: float
 
 
 @dataclass(frozen=True)
@@ -68,6 +99,8 @@ class MeshElement:
     stiffness : (n,) k over the mesh cycle, in the law's own coordinate, N/m
     damping : N s/m, in the law's own coordinate
     line_of_action : F_bt per scalar force of the law
+    centre, tilt : (12,) rows of the centre distance and of the misalignment
+    table : for the law `table`; `stiffness` and `damping` are then what it has at the static load
     """
 
     mesh: Mesh
@@ -80,6 +113,9 @@ class MeshElement:
     stiffness: Floats
     damping: float
     line_of_action: float
+    centre: Floats
+    tilt: Floats
+    table: TableFlanks | None = None
 
 
 @dataclass(frozen=True)
@@ -108,6 +144,10 @@ class MeshGeometry:
             gear_radius=pair.gear.base_radius / math.cos(angle),
         )
 
+    def plane_of_action(self, flank: int) -> Floats:
+        """Transverse direction (3,), a unit vector, along which a flank of gear 1 pushes."""
+        return flank * math.cos(self.pressure_angle) * self.tangential + math.sin(self.pressure_angle) * self.radial
+
     @property
     def polar_angle(self) -> float:
         """Polar angle of u, rad."""
@@ -132,21 +172,31 @@ def rows_of_law(
     """Deflection row and force row (12,) of a mesh law about the two bodies' nodes."""
     geometry = MeshGeometry.of(mesh)
     along, across, axial = geometry.tangential, geometry.radial, np.array([0.0, 0.0, 1.0])
-    first_axis = np.array([nodes[0][0], nodes[0][1], mesh.z])
-    pitch_point = first_axis + geometry.pinion_radius * across
+    pitch_point = _pitch_point(mesh, geometry, nodes)
     if law != "seed":
-        helix = mesh.pair.pinion.base_helix_angle
-        direction = (
-            flank * math.cos(geometry.pressure_angle) * along
-            + math.sin(geometry.pressure_angle) * across
-            - flank * math.tan(helix) * axial
-        )
+        direction = geometry.plane_of_action(flank) - flank * math.tan(mesh.pair.pinion.base_helix_angle) * axial
         row = wrench_row(direction, pitch_point, nodes)
         return row, row
     pressure, helix = seed_angles(mesh, angles)
     tangent = flank * along
     pushing = tangent + math.tan(pressure) * across - flank * math.tan(helix) * axial
     return wrench_row(tangent, pitch_point, nodes), wrench_row(pushing, pitch_point, nodes)
+
+
+def _pitch_point(mesh: Mesh, geometry: MeshGeometry, nodes: tuple[Floats, Floats]) -> Floats:
+    first_axis = np.array([nodes[0][0], nodes[0][1], mesh.z])
+    return np.asarray(first_axis + geometry.pinion_radius * geometry.radial)
+
+
+def rows_of_place(mesh: Mesh, flank: int, nodes: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    """Rows (12,) of the centre distance and of the misalignment of a flank about the two bodies' nodes."""
+    geometry = MeshGeometry.of(mesh)
+    towards = np.array([math.cos(mesh.position_angle), math.sin(mesh.position_angle), 0.0])
+    centre = -wrench_row(towards, _pitch_point(mesh, geometry, nodes), nodes)
+    x, y, _ = geometry.plane_of_action(flank)
+    tilt = np.zeros(12)
+    tilt[[3, 4, 9, 10]] = y, -x, -y, x
+    return centre, tilt
 
 
 def seed_angles(mesh: Mesh, angles: Angles) -> tuple[float, float]:
@@ -166,7 +216,7 @@ def law_stiffness(mesh: Mesh, law: str, line_of_action: Floats, angles: Angles) 
     """
     if law in ("constant", "iso6336"):
         return np.array([np.mean(line_of_action)]), 1.0
-    if law == "line_of_action":
+    if law in ("line_of_action", "table"):
         return line_of_action, 1.0
     pressure, _ = seed_angles(mesh, angles)
     return math.cos(pressure) ** 2 * line_of_action, 1.0 / math.cos(MeshGeometry.of(mesh).pressure_angle)
@@ -174,7 +224,7 @@ def law_stiffness(mesh: Mesh, law: str, line_of_action: Floats, angles: Angles) 
 
 def mesh_elements(
     gearbox: Gearbox,
-    stiffness: Mapping[str, ArrayLike],
+    stiffness: Mapping[str, MeshData],
     law: str = "line_of_action",
     inertias: str | None = None,
     flanks: Mapping[str, int] | None = None,
@@ -185,8 +235,8 @@ def mesh_elements(
     Parameters
     ----------
     gearbox : Gearbox
-    stiffness : mapping of pair name to (n,) array
-        F_bt / STE at pmc = 0, 1/n, ..., N/m; a single value for a constant.
+    stiffness : mapping of pair name to (n,) array, or to the table's surface
+        F_bt / STE at pmc = 0, 1/n, ..., N/m; a single value for a constant. The law `table` needs surfaces.
     law : str
         One of `MESH_LAWS` but ``rigid``, which has no force.
     inertias : str, optional
@@ -208,25 +258,51 @@ def mesh_elements(
     phases = mesh_phases(gearbox, flanks)
     bodies = {body.name: body for body in gearbox.bodies(inertias)}
     time = gearbox.case.damping.mesh_time_s
+    static = gearbox.static_mesh_forces()
     elements = []
     for mesh in gearbox.meshes:
         if mesh.pair.name not in stiffness:
             raise MeshError(f"mesh {mesh.name}: no stiffness for pair {mesh.pair.name!r}; compute its table")
-        samples = np.atleast_1d(np.asarray(stiffness[mesh.pair.name], dtype=np.float64))
+        data = stiffness[mesh.pair.name]
+        flank, phase = flanks[mesh.name], phases[mesh.name]
+        nodes = (node_position(bodies[mesh.pinion]), node_position(bodies[mesh.gear]))
+        table = None
+        if law == "table":
+            table = _table_flanks(mesh, flank, nodes, phase, data, time)
+            data = table.surface.mean_stiffness(abs(static[mesh.name]), mesh.centre_distance)
+        samples = np.atleast_1d(np.asarray(data, dtype=np.float64))
         if not (np.all(np.isfinite(samples)) and np.all(samples > 0.0)):
             raise MeshError(f"pair {mesh.pair.name}: mesh stiffness must be positive and finite")
-        flank = flanks[mesh.name]
-        nodes = (node_position(bodies[mesh.pinion]), node_position(bodies[mesh.gear]))
         deflection, force = rows_of_law(mesh, flank, nodes, law, angles)
+        centre, tilt = rows_of_place(mesh, flank, nodes)
         own, factor = law_stiffness(mesh, law, samples, angles)
         elements.append(
             MeshElement(
                 mesh, flank, deflection, force, _places(mesh, bodies),
-                flank * mesh.pair.pinion.teeth / (2.0 * math.pi), phases[mesh.name], own,
-                time * float(np.mean(own)), factor,
+                flank * mesh.pair.pinion.teeth / (2.0 * math.pi), phase, own,
+                time * float(np.mean(own)), factor, centre, tilt, table,
             )
         )  # fmt: skip
     return tuple(elements)
+
+
+def _table_flanks(
+    mesh: Mesh, flank: int, nodes: tuple[Floats, Floats], phase: float, data: MeshData, time: float
+) -> TableFlanks:
+    if not isinstance(data, SteSurface):
+        raise MeshError(f"pair {mesh.pair.name}: the law table needs its table, not a stiffness")
+    back, _ = rows_of_law(mesh, -flank, nodes, "table")
+    _, back_tilt = rows_of_place(mesh, -flank, nodes)
+    pair = mesh.pair.with_centre_distance(mesh.centre_distance)
+    orientation = ToothContact(mesh, flank, 1).orientation(phase)
+    return TableFlanks(
+        surface=data,
+        back=back,
+        back_tilt=back_tilt,
+        backlash=pair.circumferential_backlash * math.cos(pair.working_pressure_angle),
+        back_phase=ToothContact(mesh, -flank, 1).cycle(orientation) % 1.0,
+        damping_time=time,
+    )
 
 
 def node_position(body: Body) -> Floats:
@@ -349,7 +425,10 @@ class ToothContact:
 
 
 def pack(
-    elements: tuple[MeshElement, ...], coordinates: Mapping[str, tuple[int, ...]], averaged: bool = False
+    elements: tuple[MeshElement, ...],
+    coordinates: Mapping[str, tuple[int, ...]],
+    averaged: bool = False,
+    tables: bool = True,
 ) -> MeshArrays:
     """Arrays for the kernel.
 
@@ -358,7 +437,9 @@ def pack(
     elements : tuple of MeshElement
     coordinates : mapping of body name to its six state indices (-1 where there is none)
     averaged : bool
-        Replace k(PMC) by its mean over the cycle, as eigenmodes need it.
+        Replace stiffness and tables by their mean over the cycle, as eigenmodes need it.
+    tables : bool
+        False replaces tables by the stiffness they have at the static load.
     """
     count = len(elements)
     samples = [np.array([np.mean(e.stiffness)]) if averaged else e.stiffness for e in elements]
@@ -383,4 +464,69 @@ def pack(
         stiffness=stiffness,
         damping=np.array([e.damping for e in elements]),
         line_of_action=np.array([e.line_of_action for e in elements]),
+        error_pieces=np.zeros((count, 2), dtype=np.int64),
+        error=np.zeros((count, 2, 1, 4)),
+        table=_pack_tables(elements, index, averaged, tables),
     )
+
+
+def _pack_tables(
+    elements: tuple[MeshElement, ...], index: NDArray[np.int64], averaged: bool, tables: bool
+) -> TableArrays:
+    """Arrays of all tables; those of gears that stay where they are hold that place only."""
+    surfaces = [
+        _surface(element, row, averaged) if tables and element.table is not None else None
+        for element, row in zip(elements, index, strict=True)
+    ]
+    found = [surface for surface in surfaces if surface is not None]
+    count = len(elements)
+    size = max((s.coefficients.size for s in found), default=0)
+    loads = max((s.root_force.size for s in found), default=0)
+    longest = max((len(knots) for s in found for knots in (s.centre_distance, s.misalignment)), default=0)
+    arrays = TableArrays(
+        shape=np.zeros((count, 4), dtype=np.int64),
+        values=np.zeros((count, size)),
+        root=np.zeros((count, loads)),
+        knots=np.zeros((count, 2, longest)),
+        first=np.zeros((count, 2, longest), dtype=np.int64),
+        weights=np.zeros((count, 2, longest, 4, 4)),
+        lowest=np.zeros(count),
+        centre=np.array([e.centre for e in elements]).reshape(count, 12),
+        tilt=np.array([e.tilt for e in elements]).reshape(count, 12),
+        back=np.zeros((count, 12)),
+        back_tilt=np.zeros((count, 12)),
+        nominal=np.array([(0.0, e.mesh.centre_distance, 0.0) for e in elements]).reshape(count, 3),
+        backlash=np.zeros(count),
+        back_phase=np.zeros(count),
+        damping_time=np.zeros(count),
+    )
+    for m, (element, surface) in enumerate(zip(elements, surfaces, strict=True)):
+        if surface is not None and element.table is not None:
+            _fill_table(arrays, m, element.table, surface)
+    return arrays
+
+
+def _surface(element: MeshElement, row: NDArray[np.int64], averaged: bool) -> SteSurface | None:
+    if element.table is None:
+        return None
+    surface = element.table.surface
+    if np.all(np.delete(row[:12], [5, 11]) < 0):
+        surface = surface.at_nominal(element.mesh.centre_distance)
+    return surface.averaged() if averaged else surface
+
+
+def _fill_table(arrays: TableArrays, m: int, flanks: TableFlanks, surface: SteSurface) -> None:
+    flat = np.ascontiguousarray(surface.coefficients).ravel()
+    arrays.shape[m] = surface.coefficients.shape[:4]
+    arrays.values[m, : flat.size] = flat
+    arrays.root[m, : surface.root_force.size] = surface.root_force
+    for axis, knots in enumerate((surface.centre_distance, surface.misalignment)):
+        first, weights = axis_weights(knots)
+        arrays.knots[m, axis, : len(knots)] = knots
+        arrays.first[m, axis, : len(first)] = first
+        arrays.weights[m, axis, : len(first)] = weights
+    unloaded = surface.coefficients[..., 0, 0]
+    arrays.lowest[m] = unloaded.min() - np.ptp(unloaded)  # weights may carry the surface below its nodes
+    arrays.back[m], arrays.back_tilt[m] = flanks.back, flanks.back_tilt
+    arrays.backlash[m], arrays.back_phase[m] = flanks.backlash, flanks.back_phase
+    arrays.damping_time[m] = flanks.damping_time

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from exugear.assembly import Assembly, assemble
 from exugear.gearbox import Gearbox
@@ -27,7 +27,7 @@ from exugear.kernels import (
     add_mesh_jacobian,
     add_spring_forces,
 )
-from exugear.mesh_element import Angles
+from exugear.mesh_element import Angles, MeshData
 from exugear.results import input_hash
 from exugear.statics import locked_equilibrium
 
@@ -64,16 +64,15 @@ class Linearised:
         return sum(self.damping.values(), start=np.zeros_like(self.mass))
 
 
-def linearise(assembly: Assembly, q: Floats) -> Linearised:
-    """Matrices about the coordinates q at rest, mesh stiffness averaged over the cycle."""
+def linearise(assembly: Assembly, q: Floats, meshes: MeshArrays | None = None) -> Linearised:
+    """Matrices about the coordinates q at rest, mesh stiffness averaged over the cycle or that of other `meshes`."""
     stiffness: dict[str, Floats] = {}
     damping: dict[str, Floats] = {}
     rest = np.zeros(assembly.size)
-    averaged = assembly.mean_meshes
+    averaged = assembly.mean_meshes if meshes is None else meshes
     for n, name in enumerate(assembly.mesh_names):
-        one = MeshArrays._make(values[n : n + 1] for values in averaged)
         jq, jv = np.zeros((assembly.size,) * 2), np.zeros((assembly.size,) * 2)
-        add_mesh_jacobian(q, rest, one, jq, jv)
+        add_mesh_jacobian(q, rest, averaged.one(n), jq, jv)
         stiffness[name], damping[name] = -jq, -jv
     for n, name in enumerate(assembly.connector_names):
         connector = ConnectorArrays._make(values[n : n + 1] for values in assembly.connectors)
@@ -192,7 +191,7 @@ def coordinate_labels(assembly: Assembly) -> list[str]:
 def eigenmodes(
     gearbox: Gearbox,
     variant: str,
-    stiffness: Mapping[str, ArrayLike],
+    stiffness: Mapping[str, MeshData],
     mesh_law: str = "line_of_action",
     inertias: str | None = None,
     angles: Angles = "reference",

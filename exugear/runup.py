@@ -22,7 +22,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from exugear.assembly import Assembly, assemble
 from exugear.channels import BALANCE_TERMS, Channels
@@ -37,7 +37,7 @@ from exugear.compiled import (
     unstable,
 )
 from exugear.gearbox import CaseError, Gearbox, LoadCase
-from exugear.mesh_element import Angles
+from exugear.mesh_element import Angles, MeshData
 from exugear.results import input_hash
 from exugear.runfile import Checkpoint, Decimator, RunFile
 from exugear.statics import accelerating_start
@@ -96,7 +96,7 @@ def run_directory(out: str | Path, variant: str, load_case: str, law: str, inert
 def simulate(
     gearbox: Gearbox,
     variant: str,
-    stiffness: Mapping[str, ArrayLike],
+    stiffness: Mapping[str, MeshData],
     out: str | Path,
     *,
     load_case: str = "reference",

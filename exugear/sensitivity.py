@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.optimize
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from exugear.assembly import Assembly, assemble
 from exugear.gearbox import Body, Gearbox
+from exugear.mesh_element import MeshData
 from exugear.modes import Modes, modes_of
 
 FloatArray = NDArray[np.float64]
@@ -137,7 +138,7 @@ def followers(before: Modes, after: Modes, order: NDArray[np.int64]) -> NDArray[
 
 
 def parameters_of(
-    gearbox: Gearbox, variant: str, stiffness: Mapping[str, ArrayLike], law: str, inertias: str
+    gearbox: Gearbox, variant: str, stiffness: Mapping[str, MeshData], law: str, inertias: str
 ) -> tuple[Parameter, ...]:
     """Parameters of a gearbox that were assumed: those that the variant has.
 

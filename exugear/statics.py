@@ -84,12 +84,29 @@ def locked_equilibrium(
     applied = assembly.torque_vector(torques)
     rest = np.zeros(assembly.size)
 
-    def residual(x: Floats) -> Floats:
-        return free.T @ (assembly.forces(free @ x, rest, meshes) + applied)
+    def solve(start: Floats, meshes: MeshArrays | None) -> Floats:
+        def residual(x: Floats) -> Floats:
+            return free.T @ (assembly.forces(free @ x, rest, meshes) + applied)
 
-    count = free.shape[1]
-    scale = np.full(count, _load_scale(applied))
-    return free @ _newton(residual, np.zeros(count), scale, "static state")
+        return _newton(residual, start, np.full(free.shape[1], _load_scale(applied)), "static state")
+
+    start = _touching(assembly, np.zeros(free.shape[1]), lambda x: np.asarray(free @ x), solve)
+    return np.asarray(free @ solve(start, meshes))
+
+
+def _touching(
+    assembly: Assembly,
+    start: Floats,
+    place: Callable[[Floats], Floats],
+    solve: Callable[[Floats, MeshArrays | None], Floats],
+) -> Floats:
+    """Begin with tables where linear teeth would be, on the flanks that these press: flanks apart hold nothing."""
+    if assembly.law != "table":
+        return start
+    x = solve(start, assembly.linear_meshes())
+    q = place(x)
+    reversed_flanks = assembly.mesh_states(q, np.zeros_like(q), assembly.linear_meshes())[:, 4] < 0.0
+    return solve(x, assembly.linear_meshes(reversed_flanks)) if reversed_flanks.any() else x
 
 
 def _load_scale(applied: Floats) -> float:
@@ -138,14 +155,16 @@ def accelerating_start(
         torque = size * float(x[-1]) if driven is not None else 0.0
         return motions @ x[:-1], {name: value * rate for name, value in unit.items()}, torque
 
-    def residual(x: Floats) -> Floats:
-        q, rates, torque = split(x)
-        v = assembly.rolling_velocity(q, speeds)
-        needed = assembly.inertia_forces(q, v, assembly.rolling_acceleration(q, speeds, rates))
-        unbalanced = assembly.forces(q, v) + applied + torque * direction - needed
-        return np.append(motions.T @ unbalanced, size * q[pinned])
+    def solve(start: Floats, meshes: MeshArrays | None) -> Floats:
+        def residual(x: Floats) -> Floats:
+            q, rates, torque = split(x)
+            v = assembly.rolling_velocity(q, speeds)
+            needed = assembly.inertia_forces(q, v, assembly.rolling_acceleration(q, speeds, rates))
+            unbalanced = assembly.forces(q, v, meshes) + applied + torque * direction - needed
+            return np.append(motions.T @ unbalanced, size * q[pinned])
 
-    count = motions.shape[1] + 1
-    x = _newton(residual, np.zeros(count), np.full(count, size), "start of the run")
-    q, rates, torque = split(x)
+        return _newton(residual, start, np.full(start.size, size), "start of the run")
+
+    x = _touching(assembly, np.zeros(motions.shape[1] + 1), lambda x: split(x)[0], solve)
+    q, rates, torque = split(solve(x, None))
     return StartState(q, assembly.rolling_velocity(q, speeds), rates, torque)

@@ -333,7 +333,7 @@ class ExudynSystem:
     def _add_mesh_loads(self) -> None:
         """Add per mesh and body one force and one torque load whose user functions read the nodes."""
         for n, element in enumerate(self.assembly.elements):
-            one = MeshArrays._make(values[n : n + 1] for values in self._meshes)
+            one = self._meshes.one(n)
             mesh = element.mesh
             involved = [name for name in (mesh.pinion, mesh.gear, mesh.frame) if name in self._nodes]
             for name in involved:

@@ -9,7 +9,7 @@ import pytest
 
 from exugear.assembly import Assembly, assemble
 from exugear.gearbox import Gearbox
-from exugear.kernels import add_mesh_forces, mesh_state, periodic_cubic, stiffness_at
+from exugear.kernels import STATE_SIZE, add_mesh_forces, mesh_state, periodic_cubic, stiffness_at
 from exugear.mesh_element import MeshError, MeshGeometry, loaded_flanks, mesh_elements, mesh_phases
 
 LAWS = ["line_of_action", "seed", "constant", "iso6336"]
@@ -44,7 +44,7 @@ def mesh_forces(assembly: Assembly, q: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 
 def states(assembly: Assembly, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    out = np.zeros((len(assembly.elements), 6))
+    out = np.zeros((len(assembly.elements), STATE_SIZE))
     mesh_state(q, v, assembly.meshes, out)
     return out
 

@@ -1,0 +1,188 @@
+"""Law `table`: one potential gives force, push between the axes and moment; contact, loss of it, the other flank."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from exugear.assembly import Assembly, assemble
+from exugear.channels import Channels
+from exugear.compiled import CompiledSystem, LoadTable, Observer
+from exugear.gearbox import Gearbox
+from exugear.mesh_element import pack
+from exugear.statics import locked_equilibrium
+
+from .table_case import surfaces
+
+VARIANTS = ["rigid", "bushing"]
+
+
+@pytest.fixture(scope="module")
+def tables(grc: Gearbox) -> dict:
+    return surfaces(grc)
+
+
+def in_contact(assembly: Assembly, seed: int, flank: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """Loaded state with the places of all gears disturbed; `flank` -1 takes the teeth to their other flanks."""
+    load = assembly.gearbox.case.static_load
+    q = locked_equilibrium(assembly, load.torques_N_m, load.locked)
+    random = np.random.default_rng(seed)
+    if flank < 0:  # opposite torques at the same locks
+        q = locked_equilibrium(assembly, {name: -value for name, value in load.torques_N_m.items()}, load.locked)
+    return q + 1e-6 * random.normal(size=assembly.size), 1e-3 * random.normal(size=assembly.size)
+
+
+def frozen(assembly: Assembly) -> Assembly:
+    """The same with pmc frozen: the law is then conservative."""
+    return replace(assembly, meshes=assembly.meshes._replace(cycles=np.zeros(len(assembly.elements))))
+
+
+def without_meshes(assembly: Assembly) -> Assembly:
+    """The same with its bearings and couplings only."""
+    return replace(assembly, meshes=pack((), assembly.coordinates))
+
+
+def cases(grc: Gearbox, tables: dict) -> Iterator[tuple[Assembly, np.ndarray, np.ndarray]]:
+    for variant in VARIANTS:
+        assembly = assemble(grc, variant, tables, "table")
+        for flank in (1, -1):
+            yield assembly, *in_contact(assembly, 3, flank)
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+@pytest.mark.parametrize("flank", [1, -1])
+def test_jacobian_equals_finite_differences(grc: Gearbox, tables: dict, variant: str, flank: int) -> None:
+    assembly = assemble(grc, variant, tables, "table")
+    q, v = in_contact(assembly, 2, flank)
+    assert np.all(flank * assembly.mesh_states(q, v)[:, 4] > 0.0)
+    jq, jv = assembly.mesh_jacobians(q, v)
+
+    bare = without_meshes(assembly)
+
+    def force(at: np.ndarray, speed: np.ndarray) -> np.ndarray:
+        return np.asarray(assembly.forces(at, speed) - bare.forces(at, speed))
+
+    h = 2e-8  # of 50 um of deflection: the law bends within a micrometre
+    found_q = np.array([(force(q + h * e, v) - force(q - h * e, v)) / (2 * h) for e in np.eye(assembly.size)]).T
+    found_v = np.array([(force(q, v + e) - force(q, v - e)) / 2.0 for e in np.eye(assembly.size)]).T
+    # Round-off of 1e5 N over 2e-8 m, against 1e10 N/m.
+    assert np.abs(jq - found_q).max() < 1e-6 * np.abs(jq).max()
+    assert np.abs(jv - found_v).max() < 1e-6 * np.abs(jv).max()
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+@pytest.mark.parametrize("flank", [1, -1])
+def test_force_is_the_gradient_of_the_potential_at_frozen_position(
+    grc: Gearbox, tables: dict, variant: str, flank: int
+) -> None:
+    assembly = frozen(assemble(grc, variant, tables, "table"))
+    bare = without_meshes(assembly)
+    q, _ = in_contact(assembly, 2, flank)
+    rest = np.zeros(assembly.size)
+
+    def energy(at: np.ndarray) -> float:
+        return float(assembly.mesh_states(at, rest)[:, 5].sum())
+
+    h = 1e-7
+    gradient = np.array([(energy(q + h * e) - energy(q - h * e)) / (2 * h) for e in np.eye(assembly.size)])
+    force = assembly.forces(q, rest) - bare.forces(q, rest)
+    # 1e-7 m of 50 um, squared, and the round-off of some joules over it.
+    assert np.abs(force + gradient).max() < 2e-5 * np.abs(force).max()
+
+
+def test_compiled_solver_has_the_same_forces_signals_and_energies(grc: Gearbox, tables: dict) -> None:
+    load = {"carrier": 2.4e5, "hss": -3.0e3}
+    for assembly, q, v in cases(grc, tables):
+        found = CompiledSystem(assembly, q, v, LoadTable(load), 1e-5).accelerations()
+        expected = assembly.accelerations(q, v, assembly.torque_vector(load))
+        assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
+        channels = Channels(assembly)
+        signals, energies, powers = Observer(channels, LoadTable(load)).observe(np.zeros(1), q[None], v[None])
+        sample = channels.sample(q[None], v[None])
+        assert np.abs(signals - sample).max() < 1e-9 * np.abs(sample).max()
+        plain = channels.energies(q[None], v[None])
+        scale = np.abs(plain).max()
+        assert np.abs(np.column_stack([energies, powers[:, 1:]]) - plain).max() < 1e-9 * scale
+
+
+def test_flanks_apart_feel_nothing(grc: Gearbox, tables: dict) -> None:
+    assembly = assemble(grc, "bushing", tables, "table")
+    q = np.zeros(assembly.size)
+    load = grc.case.static_load
+    q = locked_equilibrium(assembly, load.torques_N_m, load.locked)
+    element = assembly.elements[-1]
+    assert element.table is not None
+    turn = -element.flank * 0.5 * element.table.backlash / element.mesh.pair.pinion.base_radius
+    q[assembly.spin[element.mesh.pinion]] += turn
+    found = assembly.mesh_states(q, np.ones(assembly.size))[-1]
+    assert found[0] < 0.0
+    assert not found[3:].any()
+
+
+def test_other_flank_touches_after_the_backlash(grc: Gearbox, tables: dict) -> None:
+    assembly = assemble(grc, "rigid", tables, "table")
+    element = assembly.elements[-1]
+    assert element.table is not None
+    pair = element.mesh.pair.with_centre_distance(element.mesh.centre_distance)
+    # Free angle of the pinion from tooth thicknesses and space width on its working circle.
+    radius = pair.pinion_working_radius
+    free = pair.circumferential_backlash / radius
+    unloaded = element.table.surface.coefficients[..., 0, 0]
+    for extra, touches in ((-2e-6, False), (unloaded.max() + 1e-6, True)):
+        q = np.zeros(assembly.size)
+        q[assembly.spin[element.mesh.pinion]] = -element.flank * (free + extra / pair.pinion.base_radius)
+        force = assembly.mesh_states(q, 0 * q)[-1, 4]
+        assert (force < 0.0) == touches
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_static_deflection_is_the_tables(grc: Gearbox, tables: dict, variant: str) -> None:
+    """Against the surface evaluated apart from the kernel, at the place where the gears really stand."""
+    assembly = assemble(grc, variant, tables, "table")
+    load = grc.case.static_load
+    q = locked_equilibrium(assembly, load.torques_N_m, load.locked)
+    found = assembly.mesh_states(q, 0 * q)
+    places = assembly.gear_positions(q)
+    for element, state, (centre, misalignment) in zip(assembly.elements, found, places, strict=True):
+        assert element.table is not None
+        ste = element.table.surface.ste(state[4], state[2], centre, misalignment)
+        assert state[0] == pytest.approx(ste, rel=1e-9)
+
+
+def test_no_energy_is_gained_on_a_closed_path_at_frozen_position(grc: Gearbox, tables: dict) -> None:
+    """Work along a closed path of all coordinates, through contact and its loss, by fine trapezoids."""
+    assembly = frozen(assemble(grc, "bushing", tables, "table"))
+    bare = without_meshes(assembly)
+    q, _ = in_contact(assembly, 5)
+    random = np.random.default_rng(11)
+    one, two = 2e-5 * random.normal(size=(2, assembly.size))
+    rest = np.zeros(assembly.size)
+    angles = 2.0 * np.pi * np.arange(4001) / 4000
+    path = q + np.cos(angles)[:, None] * one + np.sin(angles)[:, None] * two
+    force = np.array([assembly.forces(x, rest) - bare.forces(x, rest) for x in path])
+    step = np.diff(path, axis=0)
+    work = 0.5 * np.sum((force[1:] + force[:-1]) * step, axis=1)
+    # The trapezoidal rule is exact to 1e-6 on a path that is smooth but for the touching of single meshes.
+    assert abs(work.sum()) < 1e-5 * np.abs(work).sum()
+
+
+def test_misalignment_is_positive_where_it_opens_the_gap_at_the_plus_z_end(grc: Gearbox, tables: dict) -> None:
+    """Against the flanks' approach computed at two planes of the gear."""
+    assembly = assemble(grc, "bushing", tables, "table")
+    random = np.random.default_rng(4)
+    q = 1e-5 * random.normal(size=assembly.size)
+    element = assembly.elements[-1]
+    q[[assembly.spin[element.mesh.pinion], assembly.spin[element.mesh.gear]]] = 0.0
+    first, second = (np.array(assembly.coordinates[name][:6]) for name in (element.mesh.pinion, element.mesh.gear))
+    direction = element.deflection[:2] / math.hypot(*element.deflection[:2])
+
+    def closing(z: float) -> float:
+        moved = [q[c[:2]] + z * np.array([q[c[4]], -q[c[3]]]) for c in (first, second)]
+        return float(direction @ (moved[0] - moved[1]))
+
+    misalignment = assembly.gear_positions(q)[-1, 1]
+    assert misalignment == pytest.approx(-(closing(0.1) - closing(0.0)) / 0.1, rel=1e-9)
