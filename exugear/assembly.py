@@ -199,7 +199,7 @@ class Assembly:
         return loads
 
     def mesh_states(self, q: Floats, v: Floats, meshes: MeshArrays | None = None) -> Floats:
-        """State of each mesh, (meshes, 9): see `exugear.kernels.mesh_state`."""
+        """State of each mesh, (meshes, 10): see `exugear.kernels.mesh_state`."""
         out = np.zeros((len(self.elements), STATE_SIZE))
         mesh_state(q, v, self.meshes if meshes is None else meshes, out)
         return out

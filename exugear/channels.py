@@ -175,7 +175,8 @@ class Channels:
     """The signals of an assembly, in the order of the columns of :meth:`sample`.
 
     Columns: spin of the overall input (rad/s), overall DTE (rad), DTE and F_bt of each mesh, force (x, y, z) of
-    each support: bearings, or the ideal joints of the variant `rigid`.
+    each support: bearings, or the ideal joints of the variant `rigid`. With the law `table` each mesh has three more:
+    change of the centre distance (m), misalignment (rad), and 1 where it is outside its table.
     """
 
     def __init__(self, assembly: Assembly) -> None:
@@ -188,7 +189,12 @@ class Channels:
         joints = assembly.gearbox.joints if assembly.variant == "rigid" else ()
         self.support_names = assembly.connector_names or tuple(joint.name for joint in joints)
         self._joints = _joint_arrays(assembly) if joints else None
-        self.count = 2 + 2 * len(self.mesh_names) + 3 * len(self.support_names)
+        self.has_places = assembly.law == "table"
+        first = 2 + 2 * len(self.mesh_names) + 3 * len(self.support_names)
+        places = 3 * len(self.mesh_names) if self.has_places else 0
+        self.count = first + places
+        self.supports = slice(2 + 2 * len(self.mesh_names), first)
+        self.places = slice(first, first + places)
 
     def sample(self, q: Floats, v: Floats) -> Floats:
         """Signals of states q, v (samples, size), shape (samples, count)."""
@@ -197,16 +203,36 @@ class Channels:
         out[:, 0] = v[:, self._input]
         out[:, 1] = q @ self._overall
         mesh_signals(q, v, self.assembly.meshes, out[:, 2 : 2 + 2 * meshes])
-        supports = out[:, 2 + 2 * meshes :]
+        supports = out[:, self.supports]
         if self._joints is not None:
             joint_signals(q, v, self.assembly.meshes, *self._joints, supports)
         else:
             bearing_signals(q, v, self.assembly.connectors, supports)
+        if self.has_places:
+            for row, x, u in zip(out, q, v, strict=True):
+                row[self.places] = self._places(x, u).ravel()
         return out
+
+    def _places(self, q: Floats, v: Floats) -> Floats:
+        """Change of centre distance, misalignment, and whether outside the table, (3, meshes)."""
+        centre, misalignment = self.assembly.gear_positions(q).T
+        nominal = [element.mesh.centre_distance for element in self.assembly.elements]
+        return np.array([centre - nominal, misalignment, self.assembly.mesh_states(q, v)[:, 9]])
 
     def mesh_deflections(self, signals: Floats) -> Floats:
         """DTE of each mesh among the columns of `sample`, (samples, meshes), m."""
         return signals[:, 2 : 2 + len(self.mesh_names)]
+
+    def mesh_times(self, signals: Floats) -> Floats:
+        """Count the samples, (3, meshes), in which the deflection pulls, teeth are apart, and a table is left."""
+        meshes = len(self.mesh_names)
+        times = np.zeros((3, meshes))
+        if self.has_places:
+            times[1] = np.sum(signals[:, 2 + meshes : 2 + 2 * meshes] == 0.0, axis=0)
+            times[2] = np.sum(signals[:, self.places][:, 2 * meshes :] > 0.0, axis=0)
+        else:
+            times[0] = np.sum(self.mesh_deflections(signals) < 0.0, axis=0)
+        return times
 
     def energies(self, q: Floats, v: Floats) -> Floats:
         """Energies and powers of states q, v (samples, size), shape (samples, 6): see `energy_signals`."""

@@ -69,6 +69,7 @@ class MeshLaw(StrEnum):
     iso6336 = "iso6336"
     seed = "seed"
     line_of_action = "line_of_action"
+    table = "table"
 
 
 class Solver(StrEnum):
@@ -554,6 +555,7 @@ def _report_run(case: Path, finished: Run, as_json: bool) -> None:
     from exugear.gearbox import RPM
 
     with xr.open_dataset(finished.path, engine="h5netcdf") as data:
+        outside = float(data["outside_time"].max())
         summary = {
             "case": str(case),
             **{key: str(data.attrs[key]) for key in ("variant", "load_case", "mesh_law", "inertias", "solver")},
@@ -563,6 +565,8 @@ def _report_run(case: Path, finished: Run, as_json: bool) -> None:
             "input_speed_rpm": float(data["input_speed"][-1]) / RPM,
             "energy_not_accounted_for": energy_residual(data),
             "longest_pull_of_a_mesh_s": float(data["pulling_time"].max()),
+            "longest_time_apart_s": float(data["apart_time"].max()),
+            "longest_time_outside_table_s": outside,
         }
     if as_json:
         print_json({key: None if value != value else value for key, value in summary.items()})
@@ -574,6 +578,13 @@ def _report_run(case: Path, finished: Run, as_json: bool) -> None:
         highlight=False,
         soft_wrap=True,
     )
+    if outside > 0.0:
+        results.print(
+            f"A mesh was outside its table for {outside:.3g} s, where the table goes on in a straight line: "
+            "outside_time in the results names the mesh; widen the axes of [ste]",
+            highlight=False,
+            soft_wrap=True,
+        )
     results.print(f"Results in {finished.path}", highlight=False, soft_wrap=True)
 
 

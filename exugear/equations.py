@@ -639,8 +639,21 @@ def advance(first: int, step: float, equations: Equations, work: Work, out_q: Fl
 
 
 @kernel
+def place_signals(q: Floats, v: Floats, m: int, meshes: Meshes, work: Work, places: Floats) -> None:
+    """Fill change of centre distance (m) and misalignment (rad) of mesh m."""
+    table, index, place = meshes.table, meshes.coordinates[m], meshes.place[m]
+    c, s = work.turns[meshes.slot[m], 0], work.turns[meshes.slot[m], 1]
+    count = meshes.coordinates.shape[0]
+    places[m] = mesh_row(q, v, index, place, table.centre[m], c, s, work.gradient[1])[0]
+    tilted = mesh_row(q, v, index, place, table.tilt[m], c, s, work.gradient[1])[0]
+    places[count + m] = table.nominal[m, 2] + tilted
+
+
+@kernel
 def observe_meshes(q: Floats, v: Floats, meshes: Meshes, work: Work, signals: Floats, energy: Floats) -> None:
     """Fill deflection and F_bt of each mesh into signals (2 m,); add energy and powers (see `observe`).
+
+    With tables, change of centre distance, misalignment and whether outside the table follow at the end (3 m,).
 
     The scalar force of each mesh, or that along its line of action, is left in `work.states[:, 3]`.
     """
@@ -650,6 +663,10 @@ def observe_meshes(q: Floats, v: Floats, meshes: Meshes, work: Work, signals: Fl
             force = table_mesh(q, v, m, FIRST_TWO + 1, meshes, work, energy)
             work.states[m, 3] = force
             signals[m], signals[count + m] = work.states[m, 0], force
+            places = signals[signals.size - 3 * count :]
+            places[m], places[count + m], places[2 * count + m] = 0.0, meshes.table.nominal[m, 2], work.states[m, 2]
+            if meshes.spinning[m] == 0:
+                place_signals(q, v, m, meshes, work, places)
             continue
         delta, rate, acting = mesh_motion(q, v, m, meshes, work)
         k, slope = mesh_stiffness(q, m, meshes)
@@ -751,8 +768,9 @@ def observe(
 ) -> None:
     """Fill signals (samples, 2 m + 3 supports) and energies (samples, 7) of states q, v (samples, size).
 
-    Signals: deflection and F_bt of each mesh, force of each bearing or ideal joint. Energies: kinetic and elastic (J);
-    powers (W) of the loads, damped, of k(PMC), non-conservative of meshes and of bearings.
+    Signals: deflection and F_bt of each mesh, force of each bearing or ideal joint, with tables where the gears stand
+    (`exugear.channels`). Energies: kinetic and elastic (J); powers (W) of the loads, damped, of k(PMC),
+    non-conservative of meshes and of bearings.
     """
     size = q.shape[1]
     meshes, springs = equations.meshes, equations.springs
@@ -765,10 +783,10 @@ def observe(
             x[i], u[i] = q[n, i], v[n, i]
         place_bodies(x, u, equations.bodies, work)
         observe_bodies(x, u, equations.bodies, work, energy)
-        observe_meshes(x, u, meshes, work, signals[n, :two], energy)
+        observe_meshes(x, u, meshes, work, signals[n], energy)
         observe_connectors(x, u, equations.bodies, equations.connectors, work, signals[n, two:], energy)
         if equations.joints.host.size > 0:
-            observe_joints(u, meshes, equations.joints, work, signals[n, two:])
+            observe_joints(u, meshes, equations.joints, work, signals[n, two : two + 3 * equations.joints.host.size])
         for s in range(springs.ends.shape[0]):
             i, j = springs.ends[s, 0], springs.ends[s, 1]
             energy[1] += 0.5 * springs.stiffness[s] * (x[j] - x[i]) ** 2

@@ -39,7 +39,7 @@ Integers = NDArray[np.int64]
 END_SIZE = 6
 ROW_SIZE = 13
 """Local coordinates of a mesh: six of gear 1, six of gear 2, the spin of the frame."""
-STATE_SIZE = 9
+STATE_SIZE = 10
 """Columns of `mesh_state`."""
 
 
@@ -269,7 +269,7 @@ def relative_spin(v: Floats, index: Integers, end: int) -> float:
 
 @compiled
 def linear_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, out: Floats, acting: Floats) -> None:
-    """State of a mesh with a stiffness k(pmc), as a line of `mesh_state`, and its generalized force, negative, (13,)."""
+    """Fill the state of a mesh with a stiffness, as in `mesh_state`, and its generalized force, negative (13,)."""
     gradient, turning, bend = np.empty(ROW_SIZE), np.empty(ROW_SIZE), np.empty(2)
     index = meshes.coordinates[m]
     delta = meshes.table.nominal[m, 0]
@@ -286,6 +286,7 @@ def linear_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, out: Floats, 
     out[6] = meshes.damping[m] * rate * rate
     out[7] = -0.5 * k_slope * cycling * delta * delta
     out[8] = force * (along(index, acting, v) - rate)
+    out[9] = 0.0
     acting *= force
 
 
@@ -314,7 +315,7 @@ def flank_of(side: int, m: int, meshes: MeshArrays) -> tuple[Floats, Floats, flo
 
 @compiled
 def table_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, out: Floats, acting: Floats) -> None:
-    """State of a mesh with a table, as a line of `mesh_state`, and its generalized force, negative, (13,)."""
+    """Fill the state of a mesh with a table, as in `mesh_state`, and its generalized force, negative (13,)."""
     table, memory = meshes.table, scratch_memory()
     gradient, turning, bend = np.empty(ROW_SIZE), np.empty(ROW_SIZE), np.empty(2)
     index, place = meshes.coordinates[m], meshes.place[m]
@@ -348,6 +349,7 @@ def table_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, out: Floats, a
         out[5] += law[2]
         out[6] += damping * rate * rate
         out[7] -= law[5] * cycles * cycling
+        out[9] = max(out[9], law[6])
 
 
 @compiled
@@ -483,10 +485,11 @@ def table_tangent(q: Floats, v: Floats, m: int, side: int, meshes: MeshArrays, j
 
 @compiled
 def mesh_state(q: Floats, v: Floats, meshes: MeshArrays, out: Floats) -> None:
-    """Fill (m, 9): what each mesh does.
+    """Fill (m, 10): what each mesh does.
 
     Deflection (m), its rate (m/s), pmc in [0, 1), tangent stiffness (N/m), F_bt (N, negative on the other flank),
-    elastic energy (J); powers (W): damped, of the stiffness that changes with pmc, of a force that is not conjugate.
+    elastic energy (J); powers (W): damped, of the stiffness that changes with pmc, of a force that is not conjugate;
+    1 where the mesh is outside its table.
     """
     acting = np.empty(ROW_SIZE)
     for m in range(meshes.coordinates.shape[0]):

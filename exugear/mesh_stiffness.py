@@ -10,14 +10,15 @@ from numpy.typing import NDArray
 from exugear.gearbox import Gearbox, PairSpec
 from exugear.mesh_element import MeshError
 from exugear.tables import fitting_table, table_path
+from fe_ste.interpolation import InterpolationError, SteSurface
 from fe_ste.iso6336 import mesh_stiffness as iso_stiffness
 from fe_ste.table import TableError
 
 Floats = NDArray[np.float64]
 
 
-def mesh_stiffness(gearbox: Gearbox, law: str, directory: str | Path | None = None) -> dict[str, Floats]:
-    """Stiffness F_bt / STE (N/m) at pmc = 0, 1/n, ... of each pair at work.
+def mesh_stiffness(gearbox: Gearbox, law: str, directory: str | Path | None = None) -> dict[str, Floats | SteSurface]:
+    """Stiffness F_bt / STE (N/m) at pmc = 0, 1/n, ... of each pair at work; for the law ``table`` its surface.
 
     Parameters
     ----------
@@ -44,13 +45,15 @@ def mesh_stiffness(gearbox: Gearbox, law: str, directory: str | Path | None = No
     if law == "rigid":
         return {}
     if law == "iso6336":
-        return {name: np.array([_iso(spec)]) for name, spec in specs.items()}
+        return {name: np.array([iso6336_stiffness(spec)]) for name, spec in specs.items()}
     if directory is None:
         raise MeshError(f"mesh law {law!r} needs STE tables: give the directory they were written to")
-    return {name: table_stiffness(gearbox, name, Path(directory)) for name in specs}
+    read = table_surface if law == "table" else table_stiffness
+    return {name: read(gearbox, name, Path(directory)) for name in specs}
 
 
-def _iso(spec: PairSpec) -> float:
+def iso6336_stiffness(spec: PairSpec) -> float:
+    """Mean mesh stiffness of a pair by ISO 6336-1 method B at its static load, N/m."""
     force = spec.static_torque / spec.pair.pinion.reference_radius
     return iso_stiffness(spec.pair, tangential_force=force or None).stiffness
 
@@ -65,3 +68,13 @@ def table_stiffness(gearbox: Gearbox, name: str, directory: Path) -> Floats:
         unsolved = int(np.sum(~point["converged"].to_numpy().astype(bool)))
         raise MeshError(f"pair {name}: {table_path(directory, name)} holds {unsolved} unsolved positions")
     return np.asarray(point["mesh_stiffness"].to_numpy(), dtype=np.float64)
+
+
+def table_surface(gearbox: Gearbox, name: str, directory: Path) -> SteSurface:
+    """Surface through a pair's whole table, which must have been computed from exactly this case."""
+    try:
+        return SteSurface.from_table(fitting_table(gearbox, name, directory).dataset)
+    except TableError as error:
+        raise MeshError(f"pair {name}: {error} (exugear ste)") from None
+    except InterpolationError as error:
+        raise MeshError(f"pair {name}: {table_path(directory, name)}: {error}") from None

@@ -32,15 +32,17 @@ from exugear.comparison import (
 )
 from exugear.gearbox import CaseError, Gearbox
 from exugear.mesh_element import MeshError
-from exugear.mesh_stiffness import mesh_stiffness
+from exugear.mesh_stiffness import iso6336_stiffness, mesh_stiffness
 from exugear.modes import Modes, modes_of
 from exugear.orders import order_lines
 from exugear.plots import Sensitivity, plot_mode_energies, plot_order_levels, plot_sensitivities, plot_waterfalls
 from exugear.results import REPORT_FILE, input_hash, kept_case, times_spent
+from exugear.runfile import MESH_TIMES
 from exugear.scene import draw_mode
 from exugear.sensitivity import Remedy, Sweep, parameters_of, remedies, sweep_modes
 from exugear.shapes import bodies_of, mode_scene, motions_of
 from exugear.tables import PICTURE_FOLDER, fitting_table
+from fe_ste.interpolation import SteSurface
 from fe_ste.scene import RenderingError
 from fe_ste.table import MeshTable, TableError
 
@@ -52,6 +54,8 @@ SEEN = 0.01
 """Least share of the overall transmission error's mobility for a mode to be called seen by it."""
 DRAWN = 0.001
 """Least share for a mode to be drawn in a diagram of sensitivities."""
+MESH_TIME_LABELS = ("longest pull of a mesh", "longest time teeth are apart", "longest time outside a table")
+"""Labels of `exugear.runfile.MESH_TIMES`, in their order."""
 PACKAGES = ("exugear", "exudyn", "numpy", "scipy", "numba", "scikit-fem", "xarray", "h5netcdf", "matplotlib", "pyvista")
 
 
@@ -116,9 +120,9 @@ class _Writer:
     left_out: list[str] = field(default_factory=list)
     pictures: list[Path] = field(default_factory=list)
     models: dict[Model, Assembly] = field(default_factory=dict)
-    stiffnesses: dict[str, dict[str, FloatArray]] = field(default_factory=dict)
+    stiffnesses: dict[str, dict[str, FloatArray | SteSurface]] = field(default_factory=dict)
 
-    def stiffness(self, law: str) -> dict[str, FloatArray]:
+    def stiffness(self, law: str) -> dict[str, FloatArray | SteSurface]:
         """Mesh stiffness of a law from the tables of the folder, read once."""
         if law not in self.stiffnesses:
             self.stiffnesses[law] = mesh_stiffness(self.gearbox, law, self.folder)
@@ -360,7 +364,7 @@ def _levels_picture(writer: _Writer, runs: Sequence[VariantRun], label: str, fil
 
 def _run_row(run: VariantRun) -> dict[str, object]:
     with xr.open_dataset(run.path, engine="h5netcdf") as data:
-        pulling = float(data["pulling_time"].max())
+        times = [float(data[name].max()) for name in MESH_TIMES]
         figures = energy_residual(data)
         end = float(data["time"][-1])
     return {
@@ -370,7 +374,7 @@ def _run_row(run: VariantRun) -> dict[str, object]:
         "simulated / s": f"{end:.2f}" + ("" if int(run.attributes["complete"]) else " (stopped)"),
         "fastest / rpm": f"{float(run.spectra.speed.max()) / RPM:.1f}",
         "energy not accounted for": f"{figures:.1e}",
-        "longest pull of a mesh / s": f"{pulling:.3g}",
+        **{f"{what} / s": f"{time:.3g}" for what, time in zip(MESH_TIME_LABELS, times, strict=True)},
     }
 
 
@@ -636,7 +640,6 @@ def _motions(assembly: Assembly, shape: Any) -> dict[str, Any]:
 def _tables_section(writer: _Writer, tables: Mapping[str, MeshTable]) -> str:
     if not tables:
         return ""
-    iso = mesh_stiffness(writer.gearbox, "iso6336")
     rows = [
         {
             "pair": name,
@@ -645,7 +648,7 @@ def _tables_section(writer: _Writer, tables: Mapping[str, MeshTable]) -> str:
             "mean / µm": f"{1e6 * float(state['ste'].mean()):.2f}",
             "peak to peak / µm": f"{1e6 * float(state['ste'].max() - state['ste'].min()):.3f}",
             "mean stiffness / (N/µm)": f"{1e-6 * float(state['mesh_stiffness'].mean()):.0f}",
-            "ISO 6336-1 B / (N/µm)": f"{1e-6 * float(iso[name].mean()):.0f}",
+            "ISO 6336-1 B / (N/µm)": f"{1e-6 * iso6336_stiffness(writer.gearbox.pairs[name]):.0f}",
         }
         for name, state in ((name, table.static_state) for name, table in tables.items())
     ]

@@ -17,6 +17,7 @@ import numpy as np
 
 from exugear.assembly import Assembly
 from exugear.gearbox import CaseError, Gearbox
+from fe_ste.interpolation import SteSurface
 
 CASE_FILE = "case.json"
 TIMES_FILE = "times.jsonl"
@@ -55,8 +56,20 @@ def input_hash(assembly: Assembly, load_case: str | None = None) -> str:
             element.mesh.name: [f"{value:.9g}" for value in np.atleast_1d(element.stiffness)]
             for element in assembly.elements
         },
+        "tables": {
+            element.mesh.name: _digest(element.table.surface)
+            for element in assembly.elements
+            if element.table is not None
+        },
     }
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _digest(surface: SteSurface) -> str:
+    """Hash of a table's surface, rounded likewise."""
+    arrays = (surface.centre_distance, surface.misalignment, surface.root_force, surface.coefficients)
+    text = ",".join(f"{value:.9g}" for values in arrays for value in values.ravel())
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def keep_case(gearbox: Gearbox, folder: Path) -> None:

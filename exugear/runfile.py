@@ -58,6 +58,15 @@ def low_pass(factor: int, half: int) -> Floats:
     return taps
 
 
+MESH_TIMES = {
+    "pulling_time": "time in which the deflection had the sign that teeth cannot carry (where the law is bilateral)",
+    "apart_time": "time in which the teeth were apart (law table)",
+    "outside_time": "time in which load, centre distance or misalignment lay outside the table, which then goes on in "
+    "a straight line",
+}
+"""Times (s) that a run adds up for each mesh."""
+
+
 class Decimator:
     """Linear-phase low pass and decimation of a stream of rows.
 
@@ -116,7 +125,7 @@ class Checkpoint:
     pending_first: int
     balance: Floats
     start_angle: float
-    pulling_time: Floats
+    mesh_times: Floats
 
 
 class RunFile:
@@ -154,9 +163,12 @@ class RunFile:
         _add(file, "mesh_dte", (*series, "mesh"), "m", "f4")
         _add(file, "mesh_force", (*series, "mesh"), "N", "f4")
         _add(file, "support_force", (*series, "support", "axis"), "N", "f4")
-        _add(file, "pulling_time", ("mesh",), "s")
-        note = "time in which the deflection had the sign that teeth cannot carry (the laws are bilateral)"
-        file.variables["pulling_time"].attrs["long_name"] = note
+        for name, note in MESH_TIMES.items():
+            _add(file, name, ("mesh",), "s")
+            file.variables[name].attrs["long_name"] = note
+        if channels.has_places:
+            _add(file, "centre_distance_change", (*series, "mesh"), "m", "f4")
+            _add(file, "misalignment", (*series, "mesh"), "rad", "f4")
         _add(file, "balance_time", balance, "s")
         for term in BALANCE_TERMS:
             _add(file, term, balance, "J")
@@ -185,7 +197,8 @@ class RunFile:
             file.variables["state_q"][:] = state.q
             file.variables["state_v"][:] = state.v
             file.variables["state_balance"][:] = state.balance
-            file.variables["pulling_time"][:] = state.pulling_time
+            for name, times in zip(MESH_TIMES, state.mesh_times, strict=True):
+                file.variables[name][:] = times
             file.attrs["state_step"] = state.step
             file.attrs["state_pending_first"] = state.pending_first
             file.attrs["start_angle"] = state.start_angle
@@ -205,8 +218,12 @@ class RunFile:
         file.variables["mesh_dte"][begin:end] = rows[:, 2 : 2 + meshes]
         file.variables["mesh_force"][begin:end] = rows[:, 2 + meshes : 2 + 2 * meshes]
         if supports:
-            forces = rows[:, 2 + 2 * meshes :].reshape(-1, supports, 3)
+            forces = rows[:, channels.supports].reshape(-1, supports, 3)
             file.variables["support_force"][begin:end] = forces
+        if channels.has_places:
+            places = rows[:, channels.places].reshape(-1, 3, meshes)
+            file.variables["centre_distance_change"][begin:end] = places[:, 0]
+            file.variables["misalignment"][begin:end] = places[:, 1]
 
     def last_checkpoint(self) -> Checkpoint:
         """Read the state that the file was left with."""
@@ -219,7 +236,7 @@ class RunFile:
                 pending_first=int(file.attrs["state_pending_first"]),
                 balance=np.array(file.variables["state_balance"][:]),
                 start_angle=float(file.attrs["start_angle"]),
-                pulling_time=np.array(file.variables["pulling_time"][:]),
+                mesh_times=np.array([file.variables[name][:] for name in MESH_TIMES]),
             )
 
     @property

@@ -39,7 +39,7 @@ from exugear.compiled import (
 from exugear.gearbox import CaseError, Gearbox, LoadCase
 from exugear.mesh_element import Angles, MeshData
 from exugear.results import input_hash
-from exugear.runfile import Checkpoint, Decimator, RunFile
+from exugear.runfile import MESH_TIMES, Checkpoint, Decimator, RunFile
 from exugear.statics import accelerating_start
 
 if TYPE_CHECKING:
@@ -208,7 +208,7 @@ class Recorder:
         self.partial_path = directory / "run.partial.nc"
         self.progress = progress
         self.balance = np.zeros(len(BALANCE_TERMS))
-        self._pulling_time = np.zeros(len(self.channels.mesh_names))
+        self._mesh_times = np.zeros((len(MESH_TIMES), len(self.channels.mesh_names)))
         self._powers: Floats | None = None
         rows = max(1, round(FLUSH_FACTOR[solver] * FLUSH_INTERVAL / step))
         self._q = np.empty((rows, assembly.size))
@@ -232,7 +232,7 @@ class Recorder:
             state = self.file.last_checkpoint()
             self.first_step, self.q, self.v = state.step, state.q, state.v
             self.decimator.pending, self.decimator.first = state.pending, state.pending_first
-            self.balance, self._pulling_time = state.balance, state.pulling_time
+            self.balance, self._mesh_times = state.balance, state.mesh_times
             offset = state.start_angle
         else:
             self.first_step = 0
@@ -369,7 +369,7 @@ class Recorder:
         t, q, v = self._t[:n], self._q[:n], self._v[:n]
         signals, energies, powers = self.observer.observe(t, q, v)
         balance_times, balances = self._account(t, energies, powers)
-        self._pulling_time += self.step * np.sum(self.channels.mesh_deflections(signals) < 0.0, axis=0)
+        self._mesh_times = self._mesh_times + self.step * self.channels.mesh_times(signals)
         centre, rows = self.decimator.push(signals)
         times = self.step * (centre + self.decimator.factor * np.arange(len(rows), dtype=np.float64))
         state = Checkpoint(
@@ -380,7 +380,7 @@ class Recorder:
             pending_first=self.decimator.first,
             balance=self.balance,
             start_angle=self._offset,
-            pulling_time=self._pulling_time,
+            mesh_times=self._mesh_times,
         )
         self.file.append(times, rows, balance_times, balances, state)
         self._filled = 0

@@ -80,6 +80,7 @@ class Scratch(NamedTuple):
     ----------
     basis : (3, 3, 4) weights of the nodes by axis and order of derivative
     node : (3,) first node on each axis
+    part : (2, 5) sums over one axis
     cubic : (9, 5) the surface's derivatives in the order of `ORDERS`, over one load piece
     law : (7,) force (N), tangent stiffness (N/m), potential (J), its derivatives by centre distance (N), by
         misalignment (N m) and by pmc (J), 1 where an axis was left
@@ -87,6 +88,7 @@ class Scratch(NamedTuple):
 
     basis: Floats
     node: Integers
+    part: Floats
     cubic: Floats
     law: Floats
 
@@ -94,7 +96,7 @@ class Scratch(NamedTuple):
 @compiled
 def scratch_memory() -> Scratch:
     """Memory for `surface_law`."""
-    return Scratch(np.zeros((3, 3, 4)), np.zeros(3, dtype=np.int64), np.zeros((9, 5)), np.zeros(7))
+    return Scratch(np.zeros((3, 3, 4)), np.zeros(3, dtype=np.int64), np.zeros((2, 5)), np.zeros((9, 5)), np.zeros(7))
 
 
 @kernel
@@ -108,7 +110,7 @@ def place_in_cycle(pmc: float, positions: int, node: Integers, basis: Floats) ->
     scaled = (pmc - math.floor(pmc)) * positions
     piece = min(int(scaled), positions - 1)
     t = scaled - piece
-    node[0] = piece - 1 + positions
+    node[0] = piece - 1 if piece > 0 else positions - 1
     basis[0, 0] = 0.5 * t * (2.0 * t - 1.0 - t * t)
     basis[0, 1] = 0.5 * (2.0 + t * t * (3.0 * t - 5.0))
     basis[0, 2] = 0.5 * t * (1.0 + t * (4.0 - 3.0 * t))
@@ -143,15 +145,51 @@ def place_on_axis(x: float, count: int, knots: Floats, first: Integers, weights:
 
 
 @kernel
+def contract_for_force(values: Floats, shape: Integers, piece: int, memory: Scratch) -> None:
+    """Fill `cubic` with the surface and its slopes over centre distance and misalignment, one axis after the other."""
+    basis, node, cubic, part = memory.basis, memory.node, memory.cubic, memory.part
+    stride = 5 * shape[3]
+    for d in range(3):
+        for j in range(5):
+            cubic[d, j] = 0.0
+    for p in range(4 if shape[0] > 1 else 1):
+        position = node[0] + p
+        while position >= shape[0]:
+            position -= shape[0]
+        place = basis[0, 0, p]
+        for c in range(min(4, shape[1])):
+            start = 5 * (((position * shape[1] + node[1] + c) * shape[2] + node[2]) * shape[3] + piece)
+            for j in range(5):
+                part[0, j], part[1, j] = 0.0, 0.0
+            for a in range(min(4, shape[2])):
+                straight, sloping = basis[2, 0, a], basis[2, 1, a]
+                for j in range(5):
+                    value = values[start + j]
+                    part[0, j] += straight * value
+                    part[1, j] += sloping * value
+                start += stride
+            straight, sloping = place * basis[1, 0, c], place * basis[1, 1, c]
+            for j in range(5):
+                cubic[0, j] += straight * part[0, j]
+                cubic[1, j] += sloping * part[0, j]
+                cubic[2, j] += straight * part[1, j]
+
+
+@kernel
 def contract(values: Floats, shape: Integers, piece: int, count: int, memory: Scratch) -> None:
     """Fill `cubic` with the first `count` derivatives of the surface over one load piece."""
+    if count == FIRST_TWO:
+        contract_for_force(values, shape, piece, memory)
+        return
     cubic, basis, node = memory.cubic, memory.basis, memory.node
     for d in range(count):
         for j in range(5):
             cubic[d, j] = 0.0
     across, along = min(4, shape[1]), min(4, shape[2])
-    for p in range(min(4, shape[0])):
-        position = (node[0] + p) % shape[0]
+    for p in range(4 if shape[0] > 1 else 1):
+        position = node[0] + p
+        while position >= shape[0]:
+            position -= shape[0]
         for c in range(across):
             start = ((position * shape[1] + node[1] + c) * shape[2] + node[2]) * shape[3] + piece
             for a in range(along):
