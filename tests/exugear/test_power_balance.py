@@ -18,8 +18,8 @@ from exugear.channels import Channels
 from exugear.compiled import CompiledSystem, LoadTable, choose_step
 from exugear.gearbox import Gearbox
 from exugear.kernels import (
+    STATE_SIZE,
     ConnectorArrays,
-    MeshArrays,
     add_connector_forces,
     add_mesh_forces,
     add_spring_forces,
@@ -39,14 +39,14 @@ passes through; so the limit is lower, and the law's account has one in terms of
 @numba.njit
 def mesh_powers(q, v, mesh, damping, out):
     """Fill (samples, 4) of one mesh: power into the bodies, damped, that of k(PMC) (W); elastic energy (J)."""
-    f, state = np.empty(q.shape[1]), np.empty((1, 6))
+    f, state = np.empty(q.shape[1]), np.empty((1, STATE_SIZE))
     for n in range(q.shape[0]):
         f[:] = 0.0
         add_mesh_forces(q[n], v[n], mesh, f)
         mesh_state(q[n], v[n], mesh, state)
         out[n, 0] = np.dot(f, v[n])
         out[n, 1] = damping * state[0, 1] ** 2
-        out[n, 2] = 0.5 * state[0, 5] * state[0, 0] ** 2
+        out[n, 2] = -state[0, 7]
         out[n, 3] = 0.5 * state[0, 3] * state[0, 0] ** 2
 
 
@@ -95,7 +95,7 @@ def account_of(assembly: Assembly, start_speed: float, duration: float) -> Accou
     start = accelerating_start(assembly, LOAD, start_speed)
     step = choose_step(assembly, 20e3, 6.4e3)
     channels = Channels(assembly)
-    meshes = [MeshArrays._make(a[m : m + 1] for a in assembly.meshes) for m in range(len(assembly.elements))]
+    meshes = [assembly.meshes.one(m) for m in range(len(assembly.elements))]
     bearings = [
         ConnectorArrays._make(a[n : n + 1] for a in assembly.connectors) for n in range(len(assembly.connector_names))
     ]
