@@ -12,23 +12,29 @@ from fe_ste.profile import ToothProfile, tooth_profile
 if TYPE_CHECKING:
     from fe_ste.contact import ContactSettings
     from fe_ste.hexmesh import MeshSettings
+    from fe_ste.nonlinear import NonlinearSettings, nonlinear_position
+    from fe_ste.sectors import ContactMesh
     from fe_ste.ste import PairCompliance, pair_compliance, static_transmission_error
     from fe_ste.table import MeshTable, TableError, TableInput
 
 #: Names whose modules load the finite-element libraries: imported when first asked for.
 _LATER = {
+    "ContactMesh": "sectors",
     "ContactSettings": "contact",
     "MeshSettings": "hexmesh",
     "MeshTable": "table",
+    "NonlinearSettings": "nonlinear",
     "PairCompliance": "ste",
     "TableError": "table",
     "TableInput": "table",
+    "nonlinear_position": "nonlinear",
     "pair_compliance": "ste",
     "static_transmission_error": "ste",
 }
 
 __all__ = [
     "BasicRack",
+    "ContactMesh",
     "ContactSettings",
     "FlankModification",
     "Gear",
@@ -37,12 +43,14 @@ __all__ = [
     "Material",
     "MeshSettings",
     "MeshTable",
+    "NonlinearSettings",
     "PairCompliance",
     "Relief",
     "ReliefShape",
     "TableError",
     "TableInput",
     "ToothProfile",
+    "nonlinear_position",
     "pair_compliance",
     "static_transmission_error",
     "tooth_profile",

@@ -71,22 +71,57 @@ def stiffness_matrix(
     ----------
     R. L. Taylor, P. J. Beresford, E. L. Wilson, Int. J. Num. Meth. Eng. 10 (1976) 1211-1219.
     """
-    basis = skfem.Basis(skfem_mesh(points, hexahedra), skfem.ElementHex1(), intorder=3)
-    determinant = basis.mapping.detDF(basis.X)
-    if determinant.min() <= 0:
-        element = int(np.argmin(determinant.min(axis=1)))
-        raise ValueError(f"element {element} has a Gauss point with Jacobian {determinant.min():.3e}: the mesh folds")
-    gradients = np.stack([field[0].grad for field in basis.basis])
-    nodes = basis.element_dofs.T
-    element_stiffness = _gradient_products(gradients, basis.dx, material)
+    nodes, gradients, volumes = brick_gradients(points, hexahedra)
     if incompatible_modes:
-        bubbles = np.concatenate([gradients, _incompatible_gradients(basis, determinant)])
-        element_stiffness = _condense_bubbles(_gradient_products(bubbles, basis.dx, material))
+        element_stiffness = _condense_bubbles(_gradient_products(gradients, volumes, material))
+    else:
+        element_stiffness = _gradient_products(gradients[:8], volumes, material)
     unknowns = (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), 24)
     rows = np.repeat(unknowns, 24, axis=1).ravel()
     columns = np.tile(unknowns, (1, 24)).ravel()
     size = 3 * len(points)
     return scipy.sparse.csr_matrix((element_stiffness.ravel(), (rows, columns)), shape=(size, size))
+
+
+def brick_gradients(points: FloatArray, hexahedra: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Gradients of the brick's eight shape functions and three incompatible modes at its Gauss points.
+
+    Parameters
+    ----------
+    points : ndarray (n, 3)
+        Nodes, m.
+    hexahedra : ndarray (m, 8)
+        Connectivity in VTK order.
+
+    Returns
+    -------
+    nodes : ndarray (m, 8)
+        Nodes of each element in the order of the gradients.
+    gradients : ndarray (11, 3, m, 8)
+        By function, direction, element and Gauss point; the last three functions are the incompatible modes, 1/m.
+    volumes : ndarray (m, 8)
+        Of the Gauss points, m^3.
+
+    Raises
+    ------
+    ValueError
+        If an element has a Gauss point with no positive volume.
+    """
+    basis = skfem.Basis(skfem_mesh(points, hexahedra), skfem.ElementHex1(), intorder=3)
+    determinant = basis.mapping.detDF(basis.X)
+    if determinant.min() <= 0:
+        element = int(np.argmin(determinant.min(axis=1)))
+        raise ValueError(f"element {element} has a Gauss point with Jacobian {determinant.min():.3e}: the mesh folds")
+    compatible = np.stack([field[0].grad for field in basis.basis])
+    gradients = np.concatenate([compatible, _incompatible_gradients(basis, determinant)])
+    return basis.element_dofs.T.astype(np.int64), gradients, np.asarray(basis.dx)
+
+
+def brick_values() -> FloatArray:
+    """Return the brick's eight shape functions at its Gauss points, (function, point), ordered as `brick_gradients`."""
+    element = skfem.ElementHex1()
+    points, _ = skfem.quadrature.get_quadrature(element, 3)
+    return np.stack([element.lbasis(points, number)[0] for number in range(8)])
 
 
 def _incompatible_gradients(basis: skfem.CellBasis, determinant: FloatArray) -> FloatArray:

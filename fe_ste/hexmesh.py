@@ -129,12 +129,15 @@ class SectorMesh:
     section : SectionMesh
     axial_positions : ndarray (layers + 1,)
         z of the node layers from the middle of the face width, m.
+    layer_points : ndarray (layers + 1, n, 2), optional
+        Nodes of the section of each layer, before it is turned, where they are not those of `section`, m.
     """
 
     gear: Gear
     settings: MeshSettings
     section: SectionMesh
     axial_positions: FloatArray
+    layer_points: FloatArray | None = None
 
     @cached_property
     def twist_rate(self) -> float:
@@ -144,7 +147,8 @@ class SectorMesh:
     @cached_property
     def points(self) -> FloatArray:
         """Node coordinates (n, 3), m."""
-        x, y = self.section.points.T
+        layers = self.section.points if self.layer_points is None else self.layer_points
+        x, y = layers[..., 0], layers[..., 1]
         angle = self.twist_rate * self.axial_positions[:, None]
         turned_x = np.cos(angle) * x - np.sin(angle) * y
         turned_y = np.sin(angle) * x + np.cos(angle) * y
@@ -213,21 +217,75 @@ def sector_mesh(gear: Gear, settings: MeshSettings | None = None) -> SectorMesh:
     True
     """
     settings = settings or MeshSettings()
-    section = _section_mesh(gear, settings)
+    section = _section_mesh(
+        gear,
+        settings,
+        tooth_profile(gear),
+        np.linspace(0.0, 1.0, settings.flank + 1),
+        _symmetric_grading(settings.thickness, settings.grading),
+    )
     half_width = gear.face_width / 2
-    mesh = SectorMesh(gear, settings, section, np.linspace(-half_width, half_width, settings.layers + 1))
+    return _checked(SectorMesh(gear, settings, section, np.linspace(-half_width, half_width, settings.layers + 1)))
+
+
+def _checked(mesh: SectorMesh) -> SectorMesh:
     if mesh.scaled_jacobian.min() <= 0:
         raise GeometryError(
-            f"gear {gear.name}: the tooth section cannot be meshed (scaled Jacobian "
-            f"{mesh.scaled_jacobian.min():.3f}); held_diameter = {gear.held_diameter:.6g} m may be too near the root"
+            f"gear {mesh.gear.name}: the tooth section cannot be meshed (scaled Jacobian "
+            f"{mesh.scaled_jacobian.min():.3f}); held_diameter = {mesh.gear.held_diameter:.6g} m may be too near "
+            "the root"
         )
     return mesh
 
 
-def _section_mesh(gear: Gear, settings: MeshSettings) -> SectionMesh:
+def refined_sector_mesh(
+    gear: Gear, settings: MeshSettings, flank_places: FloatArray, across_places: FloatArray
+) -> SectorMesh:
+    """Mesh one tooth sector with flank nodes at places of one's own in each layer.
+
+    Parameters
+    ----------
+    gear : Gear
+    settings : MeshSettings
+        Its numbers `flank` and `thickness` must be those of the places.
+    flank_places : ndarray (layers + 1, flank + 1)
+        Arc length of the flank nodes as part of the involute's from form to tip circle, ascending from 0 to 1.
+    across_places : ndarray (thickness + 1,)
+        Places through the tooth, ascending from 0 on its clockwise to 1 on its counter-clockwise flank.
+
+    Returns
+    -------
+    SectorMesh
+        The cut faces and the held surface are those of `sector_mesh`, whatever the places.
+
+    Raises
+    ------
+    GeometryError
+        If a section folds.
+    """
     profile = tooth_profile(gear)
-    flank_roll, upper, lower = _half_boundary(gear, profile, settings)
-    core = _core_block(gear, upper, settings)
+    sections = [_section_mesh(gear, settings, profile, places, across_places) for places in flank_places]
+    half_width = gear.face_width / 2
+    return _checked(
+        SectorMesh(
+            gear,
+            settings,
+            sections[0],
+            np.linspace(-half_width, half_width, settings.layers + 1),
+            np.stack([section.points for section in sections]),
+        )
+    )
+
+
+def _section_mesh(
+    gear: Gear,
+    settings: MeshSettings,
+    profile: ToothProfile,
+    flank_places: FloatArray,
+    across_places: FloatArray,
+) -> SectionMesh:
+    flank_roll, upper, lower = _half_boundary(gear, profile, settings, flank_places)
+    core = _core_block(gear, upper, across_places)
     rim_centre, rim_plus = _rim_blocks(gear, core, upper[0], lower, settings)
     rim_minus = rim_plus[::-1] * np.array([1.0, -1.0])
 
@@ -250,13 +308,13 @@ def _section_mesh(gear: Gear, settings: MeshSettings) -> SectionMesh:
 
 
 def _half_boundary(
-    gear: Gear, profile: ToothProfile, settings: MeshSettings
+    gear: Gear, profile: ToothProfile, settings: MeshSettings, flank_places: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Roll angles from form to tip, boundary of the tooth core from split to tip, of the root from split to pi/z."""
     roll_form, roll_tip = (
         np.sqrt((radius / gear.base_radius) ** 2 - 1.0) for radius in (profile.form_radius, profile.tip_radius)
     )
-    roll = np.sqrt(np.linspace(roll_form**2, roll_tip**2, settings.flank + 1))
+    roll = np.sqrt(roll_form**2 + flank_places * (roll_tip**2 - roll_form**2))
     radius = gear.base_radius * np.sqrt(1.0 + roll**2)
     angle = gear.half_angle(radius)
     involute = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
@@ -280,9 +338,8 @@ def _along(curve: FloatArray, length: FloatArray, at: FloatArray) -> FloatArray:
     return np.stack([np.interp(at, length, curve[:, 0]), np.interp(at, length, curve[:, 1])], axis=-1)
 
 
-def _core_block(gear: Gear, plus_edge: FloatArray, settings: MeshSettings) -> FloatArray:
+def _core_block(gear: Gear, plus_edge: FloatArray, across: FloatArray) -> FloatArray:
     """Nodes (thickness + 1, fillet + flank + 1, 2) of the tooth core, from the minus to the plus flank, root to tip."""
-    across = _symmetric_grading(settings.thickness, settings.grading)
     minus_edge = plus_edge * np.array([1.0, -1.0])
     step = np.hypot(*np.diff(plus_edge, axis=0).T)
     along = np.concatenate([[0.0], np.cumsum(step)]) / step.sum()

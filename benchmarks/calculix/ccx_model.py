@@ -1,13 +1,12 @@
 """CalculiX model of a gear pair: open sectors of the meshes of `fe_ste`, contact, and the turning of gear 2.
 
-The pose is that of `fe_ste.contact`: gear 1 at the origin, the pitch point on +x, an external gear 2 at +x, an
-internal one at -x. Gear 1's hub is held; gear 2's hub is a rigid body that turns about its axis under the torque.
+The pose is that of `fe_ste.sectors`, whose numbers of a brick's faces are those of CalculiX. Gear 1's hub is held;
+gear 2's hub is a rigid body that turns about its axis under the torque.
 Units in the input file: mm, N, MPa.
 """
 
 from __future__ import annotations
 
-import math
 import os
 import re
 import resource
@@ -17,19 +16,11 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
-from fe_ste.gears import Gear, GearPair
-from fe_ste.hexmesh import MeshSettings, SectorMesh, sector_mesh
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from fe_ste.gears import GearPair
+from fe_ste.sectors import OpenSector
 
 _M_TO_MM = 1e3
 _PA_TO_MPA = 1e-6
-#: Corner numbers of the faces S1 to S6 of an 8-node brick in the order of CalculiX.
-_BRICK_FACES = np.array([[0, 1, 2, 3], [4, 7, 6, 5], [0, 4, 5, 1], [1, 5, 6, 2], [2, 6, 7, 3], [3, 7, 4, 0]])
 
 
 class CalculixError(RuntimeError):
@@ -56,27 +47,6 @@ class CalculixSettings:
 
 
 @dataclass(frozen=True)
-class OpenSector:
-    """Bricks of some neighbouring teeth of one gear, in its place in the pair.
-
-    Attributes
-    ----------
-    points : ndarray (n, 3)
-        m.
-    hexahedra : ndarray (m, 8)
-    held : ndarray
-        Nodes of the hub or rim surface.
-    contact_faces : ndarray (k, 2)
-        Element and face number (0 to 5) of the loaded flanks of all teeth.
-    """
-
-    points: FloatArray
-    hexahedra: IntArray
-    held: IntArray
-    contact_faces: IntArray
-
-
-@dataclass(frozen=True)
 class CalculixResult:
     """What a run gave.
 
@@ -99,59 +69,6 @@ class CalculixResult:
     processor_time: float
     iterations: int
     version: str
-
-
-def open_sector(gear: Gear, settings: MeshSettings, teeth: int, side: int, angle: float, axis_x: float) -> OpenSector:
-    """Join `teeth` copies of the tooth sector around the tooth at `angle`, about an axis through ``(axis_x, 0)``."""
-    mesh = sector_mesh(gear, settings)
-    count = len(mesh.points)
-    numbers = np.arange(teeth) - teeth // 2
-    points = np.concatenate([_turned(mesh.points, angle + number * gear.angular_pitch) for number in numbers])
-    hexahedra = np.concatenate([mesh.hexahedra + count * copy for copy in range(teeth)])
-    held = np.concatenate([mesh.held_nodes + count * copy for copy in range(teeth)])
-    own = _flank_faces(mesh, side)
-    elements = len(mesh.hexahedra)
-    faces = np.concatenate([own + np.array([elements * copy, 0]) for copy in range(teeth)])
-
-    target = np.arange(len(points))
-    plus, minus = _cut_face(mesh, 1), _cut_face(mesh, -1)
-    for copy in range(1, teeth):
-        target[minus + count * copy] = target[plus + count * (copy - 1)]
-        apart = np.abs(points[minus + count * copy] - points[plus + count * (copy - 1)]).max()
-        if apart > 1e-9 * gear.tip_radius:
-            raise ValueError(f"gear {gear.name}: neighbouring sectors are {apart:.3g} m apart")
-    kept, number = np.unique(target, return_inverse=True)
-    return OpenSector(points[kept] + np.array([axis_x, 0.0, 0.0]), number[hexahedra], np.unique(number[held]), faces)
-
-
-def placed_sectors(pair: GearPair, settings: MeshSettings, teeth: int, pmc: float) -> tuple[OpenSector, OpenSector]:
-    """Both gears in the conjugate position `pmc`, the flanks of tooth pair 0 at the pitch point for ``pmc = 0``."""
-    one, two = pair.pinion, pair.gear
-    rotation = pmc * one.angular_pitch
-    first = open_sector(one, settings, teeth, 1, rotation - one.half_angle(pair.pinion_working_radius), 0.0)
-    half_angle = two.half_angle(pair.gear_working_radius)
-    rolled = pmc * two.angular_pitch
-    if two.internal:
-        return first, open_sector(two, settings, teeth, -1, rolled + half_angle, -pair.centre_distance)
-    return first, open_sector(two, settings, teeth, 1, math.pi - rolled - half_angle, pair.centre_distance)
-
-
-def _turned(points: FloatArray, angle: float) -> FloatArray:
-    cosine, sine = math.cos(angle), math.sin(angle)
-    return np.asarray(points @ np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]]))
-
-
-def _cut_face(mesh: SectorMesh, side: int) -> IntArray:
-    """Nodes of a cut face with those of the held surface, ordered alike on both sides."""
-    section = mesh.section.plus_cut if side > 0 else mesh.section.minus_cut
-    layers = np.arange(len(mesh.axial_positions)) * len(mesh.section.points)
-    return np.asarray((layers[:, None] + section).ravel())
-
-
-def _flank_faces(mesh: SectorMesh, side: int) -> IntArray:
-    on_flank = np.isin(mesh.hexahedra, mesh.flank_nodes(side))
-    whole = on_flank[:, _BRICK_FACES].all(axis=2)
-    return np.argwhere(whole)
 
 
 def write_input(

@@ -18,11 +18,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ccx_model import CalculixSettings, placed_sectors, run_calculix, write_input
+from ccx_model import CalculixSettings, run_calculix, write_input
 
 from fe_ste.contact import ContactSettings
 from fe_ste.gears import BasicRack, Gear, GearPair
 from fe_ste.hexmesh import MeshSettings
+from fe_ste.sectors import placed_sectors
 from fe_ste.ste import contact_state, pair_compliance
 
 RESULTS = Path(__file__).with_name("results.json")

@@ -8,9 +8,12 @@ diameters and a backlash of 0.04 normal modules, shared by both gears, are assum
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from fe_ste.gears import BasicRack, Gear, GearPair
 
@@ -116,3 +119,21 @@ def intermediate() -> GearPair:
 def high_speed() -> GearPair:
     """High-speed stage, 22/88."""
     return grc_pair("high_speed")
+
+
+Block = tuple[NDArray[np.float64], NDArray[np.int64]]
+
+
+def _block(*axes: Sequence[float]) -> Block:
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    ids = np.arange(len(points)).reshape([len(axis) for axis in axes])
+    near, far = ids[:-1], ids[1:]
+    corners = [near[:, :-1], far[:, :-1], far[:, 1:], near[:, 1:]]
+    bottom, top = [c[:, :, :-1] for c in corners], [c[:, :, 1:] for c in corners]
+    return points, np.stack([*bottom, *top], axis=-1).reshape(-1, 8)
+
+
+@pytest.fixture
+def block() -> Callable[..., Block]:
+    """Nodes and VTK hexahedra of a block from the coordinates along x, y and z."""
+    return _block
