@@ -612,7 +612,7 @@ def solve_positions(
     """Solve all states of some positions of a grid.
 
     Misalignments share the compliance of the contact cells; a solved position hands its contact on to the next, and a
-    torque to the next one at the first position.
+    torque to the next smaller one at the first position.
 
     Parameters
     ----------
@@ -634,15 +634,19 @@ def solve_positions(
     with one_dense_thread():
         for c, distance in enumerate(axes.centre_distance):
             placed = compliance.at_centre_distance(float(distance))
-            first = [new_start(placed, float(axes.torque[0])) for _ in axes.misalignment]
-            for t, torque in enumerate(axes.torque):
-                starts = [start.scaled(float(torque / axes.torque[max(t - 1, 0)])) for start in first]
+            descending = np.argsort(-axes.torque, kind="stable")  # contact that shrinks is found in fewer steps
+            known = float(axes.torque[descending[0]])
+            first = [new_start(placed, known) for _ in axes.misalignment]
+            for t in descending:
+                torque = axes.torque[t]
+                starts = [start.scaled(float(torque) / known) for start in first]
+                known = float(torque)
                 for p, position in enumerate(chosen):
                     pmc = position / axes.positions
                     states = contact_states(placed, float(torque), pmc, axes.misalignment, starts)
                     first = list(starts) if p == 0 else first
                     for m, state in enumerate(states):
-                        results.put((p, t, c, m), placed, float(torque), pmc, float(axes.misalignment[m]), state)
+                        results.put((p, int(t), c, m), placed, float(torque), pmc, float(axes.misalignment[m]), state)
                         finished += 1
                         if progress is not None:
                             progress(finished)

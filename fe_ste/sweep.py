@@ -27,7 +27,7 @@ import xarray as xr
 from fe_ste.ste import PairCompliance, StateAxes, StateResults, solve_positions
 
 #: States of a block: some seconds of work, so that little is lost and the time left is known.
-_BLOCK_STATES = 150
+_BLOCK_STATES = 300
 #: Seconds between two writings of what is finished.
 _STORE_EVERY = 10.0
 #: Attribute that ties a file of finished positions to its input.
