@@ -44,6 +44,37 @@ class MaterialSection(_Section):
     density_kg_per_m3: Positive = 7850.0
 
 
+class ModificationSection(_Section):
+    """Material removed from both flanks of every tooth; lengths in roll length, +z as in the gearbox."""
+
+    tip_relief_um: NonNegative = 0.0
+    tip_relief_length_mm: Positive | None = None
+    tip_relief_start_roll_deg: Positive | None = None
+    tip_relief_shape: Literal["linear", "parabolic"] = "linear"
+    root_relief_um: NonNegative = 0.0
+    root_relief_length_mm: Positive | None = None
+    root_relief_start_roll_deg: Positive | None = None
+    root_relief_shape: Literal["linear", "parabolic"] = "linear"
+    profile_crowning_um: NonNegative = 0.0
+    lead_crowning_um: NonNegative = 0.0
+    profile_slope_um: Finite = 0.0
+    helix_slope_um: Finite = 0.0
+    twist_um: Finite = 0.0
+    topography: str | None = None
+
+    @model_validator(mode="after")
+    def _starts(self) -> ModificationSection:
+        for kind in ("tip", "root"):
+            given = (getattr(self, f"{kind}_relief_length_mm"), getattr(self, f"{kind}_relief_start_roll_deg"))
+            wanted = 1 if getattr(self, f"{kind}_relief_um") > 0.0 else 0
+            if sum(value is not None for value in given) != wanted:
+                raise ValueError(
+                    f"a {kind} relief needs {kind}_relief_um and one of {kind}_relief_length_mm and "
+                    f"{kind}_relief_start_roll_deg"
+                )
+        return self
+
+
 class GearSection(_Section):
     """One toothed wheel; helix angle signed, right hand positive."""
 
@@ -60,6 +91,7 @@ class GearSection(_Section):
     root_diameter_mm: Positive | None = None
     rack: RackSection = RackSection()
     material: MaterialSection = MaterialSection()
+    modification: ModificationSection | None = None
 
 
 class PairSection(_Section):

@@ -8,7 +8,7 @@ numbered from 1 (`planet_1`, `sun_planet_1`).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -27,12 +27,21 @@ from exugear.casefile import (
     GearSection,
     LoadCaseSection,
     MeshSection,
+    ModificationSection,
     SteSection,
     StiffnessSection,
     parse_case,
     read_toml,
 )
 from fe_ste.gears import BasicRack, Gear, GearPair, GeometryError, Material
+from fe_ste.modifications import (
+    FlankModification,
+    Relief,
+    ReliefShape,
+    radius_at_roll_length_from_root,
+    radius_at_roll_length_from_tip,
+)
+from fe_ste.topography import FlankTopography
 
 __all__ = [
     "GROUND",
@@ -166,12 +175,29 @@ class LoadCase:
 
 @dataclass(frozen=True)
 class PairSpec:
-    """What the STE table of a pair needs: geometry and the static torque on gear 1, N m."""
+    """What the STE table of a pair needs.
+
+    Attributes
+    ----------
+    name : str
+    pair : GearPair
+    static_torque : float
+        On gear 1, N m, positive.
+    table : bool
+        Whether the file wants a table of it.
+    flank : int
+        Loaded flank of gear 1 in the static state: +1 if it faces the sense of +z rotation, else -1. A table is that
+        of flank +1; turned about the line of centres it is that of flank -1, with the ends of the face exchanged.
+    modifications : tuple of FlankModification
+        Gear 1, gear 2, in the axes of the gearbox.
+    """
 
     name: str
     pair: GearPair
     static_torque: float
     table: bool
+    flank: int
+    modifications: tuple[FlankModification, FlankModification]
 
 
 @dataclass(frozen=True)
@@ -261,6 +287,21 @@ class Gearbox:
         return {name: self._guard(f"gears.{name}", _gear, name, section) for name, section in self.case.gears.items()}
 
     @cached_property
+    def modifications(self) -> dict[str, FlankModification]:
+        """Flank modifications of all gears by name.
+
+        Raises
+        ------
+        CaseError
+            A modification that does not fit its gear, or a topography that cannot be read.
+        """
+        folder = Path(self.source).parent
+        return {
+            name: self._guard(f"gears.{name}.modification", _modification, self.gears[name], section, folder)
+            for name, section in self.case.gears.items()
+        }
+
+    @cached_property
     def gear_pairs(self) -> dict[str, GearPair]:
         """All gear pairs by name."""
         found = {}
@@ -287,9 +328,13 @@ class Gearbox:
         forces = self.static_mesh_forces()
         found = {}
         for name, pair in self.gear_pairs.items():
-            at_work = [abs(forces[mesh.name]) for mesh in self.meshes if mesh.pair.name == name]
-            force = sum(at_work) / len(at_work) if at_work else 0.0
-            found[name] = PairSpec(name, pair, force * pair.pinion.base_radius, self.case.pairs[name].table)
+            section = self.case.pairs[name]
+            at_work = [forces[mesh.name] for mesh in self.meshes if mesh.pair.name == name]
+            force = sum(abs(one) for one in at_work) / len(at_work) if at_work else 0.0
+            flank = -1 if sum(at_work) < 0.0 else 1
+            modifications = (self.modifications[section.pinion], self.modifications[section.gear])
+            torque = force * pair.pinion.base_radius
+            found[name] = PairSpec(name, pair, torque, section.table, flank, modifications)
         return found
 
     def bodies(self, inertias: str | None = None) -> tuple[Body, ...]:
@@ -664,6 +709,40 @@ def _gear(name: str, section: GearSection) -> Gear:
     )
 
 
+def _modification(gear: Gear, section: GearSection, folder: Path) -> FlankModification:
+    """Modification of a gear from its section, tried on the gear."""
+    given = section.modification
+    if given is None:
+        return FlankModification()
+    modification = FlankModification(
+        tip_relief=_relief(gear, given, "tip", radius_at_roll_length_from_tip),
+        root_relief=_relief(gear, given, "root", radius_at_roll_length_from_root),
+        profile_crowning=1e-6 * given.profile_crowning_um,
+        lead_crowning=1e-6 * given.lead_crowning_um,
+        profile_slope=1e-6 * given.profile_slope_um,
+        helix_slope=1e-6 * given.helix_slope_um,
+        twist=1e-6 * given.twist_um,
+        topography=None if given.topography is None else FlankTopography.from_csv(folder / given.topography),
+    )
+    modification.gap(gear, np.array(gear.tip_radius), np.array(0.0))  # refuses a relief that starts off the involute
+    return modification
+
+
+def _relief(
+    gear: Gear, given: ModificationSection, kind: str, from_end: Callable[[Gear, float], float]
+) -> Relief | None:
+    length_mm = getattr(given, f"{kind}_relief_length_mm")
+    start_roll_deg = getattr(given, f"{kind}_relief_start_roll_deg")
+    if length_mm is not None:
+        radius = from_end(gear, 1e-3 * length_mm)
+    elif start_roll_deg is not None:
+        radius = gear.base_radius * math.hypot(1.0, math.radians(start_roll_deg))
+    else:
+        return None
+    shape = ReliefShape(getattr(given, f"{kind}_relief_shape"))
+    return Relief(1e-6 * getattr(given, f"{kind}_relief_um"), radius, shape)
+
+
 def check(gearbox: Gearbox) -> None:
     """Check the parts of a gearbox against each other.
 
@@ -697,7 +776,7 @@ def check(gearbox: Gearbox) -> None:
             f"overall.output_gear = {overall.output_gear!r}: no such gear; gears are {', '.join(gearbox.gears)}"
         )
     gearbox.static_mesh_forces()
-    for collection in (gearbox.bearings, gearbox.couplings, gearbox.load_cases):
+    for collection in (gearbox.modifications, gearbox.bearings, gearbox.couplings, gearbox.load_cases):
         list(collection)
 
 

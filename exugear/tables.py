@@ -132,16 +132,23 @@ def wanted_table(gearbox: Gearbox, name: str, positions: int, grid: bool = False
     spec = gearbox.pairs[name]
     # Statics leave rounding in the torque; another machine's must not make another hash of it.
     torque = _rounded(spec.static_torque)
-    if not grid:
-        return TableInput(pair=spec.pair, torque=(torque,), positions=positions, static_torque=torque)
-    width = spec.pair.face_width
-    return TableInput(
+    pinion, gear = (one if spec.flank > 0 else one.mirrored() for one in spec.modifications)
+    static = TableInput(
         pair=spec.pair,
-        torque=tuple(torque if factor == 1.0 else _rounded(torque * factor) for factor in gearbox.ste.torque_factors),
+        torque=(torque,),
         positions=positions,
-        centre_distance=tuple(_distance(gearbox, spec.pair, um) for um in gearbox.ste.centre_distance_offsets_um),
-        misalignment=tuple(1e-6 * opening / width for opening in gearbox.ste.misalignment_um),
+        pinion_modification=pinion,
+        gear_modification=gear,
         static_torque=torque,
+    )
+    if not grid:
+        return static
+    axes, width = gearbox.ste, spec.pair.face_width
+    return replace(
+        static,
+        torque=tuple(torque if factor == 1.0 else _rounded(torque * factor) for factor in axes.torque_factors),
+        centre_distance=tuple(_distance(gearbox, spec.pair, um) for um in axes.centre_distance_offsets_um),
+        misalignment=tuple(1e-6 * opening / width for opening in axes.misalignment_um),
     )
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from fe_ste.gears import BasicRack, Gear, GearPair, GeometryError, Material
 from fe_ste.modifications import FlankModification, Relief, ReliefShape
 from fe_ste.profile import ToothProfile, tooth_profile
+from fe_ste.topography import FlankTopography
 
 if TYPE_CHECKING:
     from fe_ste.contact import ContactSettings
@@ -37,6 +38,7 @@ __all__ = [
     "ContactMesh",
     "ContactSettings",
     "FlankModification",
+    "FlankTopography",
     "Gear",
     "GearPair",
     "GeometryError",

@@ -464,12 +464,20 @@ class ContactSolution:
         Its derivative by the normal load, m/N.
     force : ndarray (n,)
         Normal force on each cell, N.
+    force_per_load : ndarray (n,)
+        Its derivative by the normal load, which is the derivative of the approach by the gap at the cell, too.
     iterations : int
+
+    Notes
+    -----
+    The energy force C force / 2 + gap force is least under the sum of the forces. Its least value has the derivative
+    `force` by the gap and the approach by the load, so that the mixed derivatives are the same.
     """
 
     approach: float
     approach_per_load: float
     force: FloatArray
+    force_per_load: FloatArray
     iterations: int
 
 
@@ -564,7 +572,7 @@ def solve_complementarity(
             active = gap == gap.min()
         numbers = np.flatnonzero(active)
         rows = compliance[numbers]
-        closing, approach, per_load = _solve_active(rows[:, numbers], gap[numbers], load)
+        closing, closing_per_load, approach, per_load = _solve_active(rows[:, numbers], gap[numbers], load)
         force = np.zeros(len(gap))
         force[numbers] = closing
         clearance = closing @ rows + gap - approach
@@ -573,7 +581,9 @@ def solve_complementarity(
         tolerance = 1e-12 * max(abs(approach), 1e-12)
         wrong = np.where(active, force < 0.0, clearance < -tolerance)
         if not wrong.any():
-            return ContactSolution(approach, per_load, force, iteration)
+            force_per_load = np.zeros(len(gap))
+            force_per_load[numbers] = closing_per_load
+            return ContactSolution(approach, per_load, force, force_per_load, iteration)
         count = int(wrong.sum())
         if count < fewest:
             fewest, patience = count, 5
@@ -587,8 +597,8 @@ def solve_complementarity(
     raise ContactError(f"the active set did not settle in {max_iterations} iterations ({count} cells still change)")
 
 
-def _solve_active(compliance: FloatArray, gap: FloatArray, load: float) -> tuple[FloatArray, float, float]:
-    """Solve for contact on all cells given: forces, approach, derivative of the approach by the load.
+def _solve_active(compliance: FloatArray, gap: FloatArray, load: float) -> tuple[FloatArray, FloatArray, float, float]:
+    """Solve for contact on all cells given: forces, their derivatives by the load, approach, its derivative.
 
     Overwrites ``compliance``.
     """
@@ -600,4 +610,4 @@ def _solve_active(compliance: FloatArray, gap: FloatArray, load: float) -> tuple
     right = np.stack([np.ones(len(gap)), gap])
     unit, closed = scipy.linalg.cho_solve(factor, right.T, overwrite_b=True, check_finite=False).T
     approach = (load + closed.sum()) / unit.sum()
-    return unit * approach - closed, float(approach), float(1.0 / unit.sum())
+    return unit * approach - closed, unit / unit.sum(), float(approach), float(1.0 / unit.sum())

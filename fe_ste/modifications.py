@@ -1,20 +1,21 @@
 """Flank modifications: material removed from the involute flank, as a gap over the flank.
 
-Every modification is a gap along the flank normal, zero or above, so that the gaps of both gears and of
-several modifications add up. Heights are measured in roll length (ISO 21771), because a relief that is linear
-in roll length is linear along the path of contact.
+Every modification is a gap along the flank normal, zero or above (but for a topography as measured), so that the gaps
+of both gears and of several modifications add up. Heights are measured in roll length (ISO 21771), because a relief
+that is linear in roll length is linear along the path of contact.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fe_ste.gears import Gear, GeometryError
+from fe_ste.topography import FlankTopography
 
 FloatArray = NDArray[np.float64]
 
@@ -73,6 +74,11 @@ class FlankModification:
         Linear over the roll length; m removed at the tip, or at the form circle if negative.
     helix_slope : float
         Linear over the face width; m removed at the +z end, or at the -z end if negative.
+    twist : float
+        Helix slope that turns over along the profile: m removed at the tip of the +z end and at the form circle of the
+        -z end, nothing at the other two corners, half at mid-flank; the other way round if negative.
+    topography : FlankTopography, optional
+        A measured or designed grid, which may also hold material that stands proud.
 
     Raises
     ------
@@ -94,6 +100,8 @@ class FlankModification:
     lead_crowning: float = 0.0
     profile_slope: float = 0.0
     helix_slope: float = 0.0
+    twist: float = 0.0
+    topography: FlankTopography | None = None
 
     def __post_init__(self) -> None:
         """Refuse amounts that make no sense."""
@@ -101,6 +109,12 @@ class FlankModification:
         _check_removal("lead_crowning", self.lead_crowning)
         _check_removal("profile_slope", abs(self.profile_slope))
         _check_removal("helix_slope", abs(self.helix_slope))
+        _check_removal("twist", abs(self.twist))
+
+    def mirrored(self) -> FlankModification:
+        """Return the modification with the ends of the face exchanged, as the other flank's table needs it."""
+        topography = self.topography.mirrored() if self.topography else None
+        return replace(self, helix_slope=-self.helix_slope, twist=-self.twist, topography=topography)
 
     def gap(self, gear: Gear, radius: FloatArray, z: FloatArray) -> FloatArray:
         """Material removed at points of the flank.
@@ -132,11 +146,14 @@ class FlankModification:
             + _slope(self.profile_slope, from_form)
             + self.lead_crowning * (2.0 * along_face) ** 2
             + _slope(self.helix_slope, along_face + 0.5)
+            + 0.5 * (abs(self.twist) + self.twist * (2.0 * from_form - 1.0) * 2.0 * along_face)
         )
         if self.tip_relief is not None:
             gap = gap + _relief_gap(gear, "tip_relief", self.tip_relief, roll_length, tip)
         if self.root_relief is not None:
             gap = gap + _relief_gap(gear, "root_relief", self.root_relief, roll_length, form)
+        if self.topography is not None:
+            gap = gap + self.topography.gap(gear, radius, z)
         return gap
 
 
@@ -180,13 +197,18 @@ def radius_at_roll_length_from_tip(gear: Gear, roll_length: float) -> float:
     float
         Radius, m.
 
+    Raises
+    ------
+    GeometryError
+        If there is no involute so far from the end.
+
     Examples
     --------
     >>> gear = Gear(name="pinion", teeth=50, normal_module=3e-3, face_width=20e-3, held_diameter=100e-3)
     >>> round(1e3 * radius_at_roll_length_from_tip(gear, 4e-3), 4)
     76.3716
     """
-    return math.hypot(gear.base_radius, gear.tip_roll_length - gear.outward * roll_length)
+    return _radius_at(gear, gear.tip_roll_length - gear.outward * roll_length)
 
 
 def radius_at_roll_length_from_root(gear: Gear, roll_length: float) -> float:
@@ -204,10 +226,21 @@ def radius_at_roll_length_from_root(gear: Gear, roll_length: float) -> float:
     float
         Radius, m.
 
+    Raises
+    ------
+    GeometryError
+        If there is no involute so far from the end.
+
     Examples
     --------
     >>> gear = Gear(name="pinion", teeth=50, normal_module=3e-3, face_width=20e-3, held_diameter=100e-3)
     >>> radius_at_roll_length_from_root(gear, 0.0) == gear.form_radius
     True
     """
-    return math.hypot(gear.base_radius, gear.form_roll_length + gear.outward * roll_length)
+    return _radius_at(gear, gear.form_roll_length + gear.outward * roll_length)
+
+
+def _radius_at(gear: Gear, roll_length: float) -> float:
+    if roll_length < 0.0:
+        raise GeometryError(f"gear '{gear.name}': a roll length of {1e3 * roll_length:.4g} mm lies off the involute")
+    return math.hypot(gear.base_radius, roll_length)

@@ -10,7 +10,7 @@ face width.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
@@ -69,6 +69,8 @@ class PairCompliance:
     sliced : tuple of SlicedCompliance
     modifications : tuple of FlankModification
         Gear 1, gear 2.
+    tooth_gap : ndarray, optional
+        Gap of each of `teeth` on the transverse line of action, m.
     """
 
     pair: GearPair
@@ -79,6 +81,7 @@ class PairCompliance:
     reach: int
     sliced: tuple[SlicedCompliance, SlicedCompliance]
     modifications: tuple[FlankModification, FlankModification] = (FlankModification(), FlankModification())
+    tooth_gap: FloatArray | None = None
 
     @classmethod
     def from_flanks(
@@ -107,6 +110,28 @@ class PairCompliance:
     def with_modifications(self, pinion: FlankModification, gear: FlankModification) -> PairCompliance:
         """Return the same gears with modified flanks."""
         return replace(self, modifications=(pinion, gear))
+
+    def with_tooth_gaps(self, gaps: Mapping[int, float]) -> PairCompliance:
+        """Return the same gears with some tooth pairs out of place.
+
+        Parameters
+        ----------
+        gaps : mapping of int to float
+            Number of the tooth pair, counted ahead of the one that touches at the pitch point at pmc 0 -> gap of its
+            flanks, m on the transverse line of action, negative where they touch before the others; see
+            `fe_ste.deviations`.
+
+        Raises
+        ------
+        ValueError
+            If a pair cannot touch in the mesh cycle.
+        """
+        unknown = sorted(set(gaps) - set(self.teeth.tolist()))
+        if unknown:
+            raise ValueError(
+                f"tooth pair {unknown[0]}: only pairs {self.teeth[0]} to {self.teeth[-1]} may touch in the mesh cycle"
+            )
+        return replace(self, tooth_gap=np.array([gaps.get(tooth, 0.0) for tooth in self.teeth.tolist()]))
 
     @property
     def slice_width(self) -> float:
@@ -437,9 +462,12 @@ class _Search:
 
 
 def _modification_gap(compliance: PairCompliance, cells: Cells) -> FloatArray:
-    """Gap over the cells, along the normal, that modifications add to the conjugate flanks."""
+    """Gap over the cells, along the normal, that modifications and deviations add to the conjugate flanks."""
     axial = compliance.axial[cells.layer]
     gap = np.zeros(len(axial))
+    if compliance.tooth_gap is not None:
+        cosine = math.cos(compliance.pair.pinion.base_helix_angle)
+        gap = gap + cosine * compliance.tooth_gap[cells.tooth - compliance.teeth[0]]
     gears = (compliance.pair.pinion, compliance.pair.gear)
     for gear, roll, modification in zip(gears, (cells.roll, cells.gear_roll), compliance.modifications, strict=True):
         radius = gear.base_radius * np.sqrt(1.0 + roll**2)
@@ -515,10 +543,11 @@ def static_transmission_error(
     -------
     xarray.Dataset
         Over (pmc, torque, centre_distance, misalignment): ste (m), mesh_stiffness and tangent_stiffness (N/m),
-        line_of_action_force (N), load_centre (m, the derivative of ste by misalignment), load_share by ``tooth``,
-        line_load (N/m of contact line) by ``tooth`` and ``axial_position``, max_pressure and edge_pressure (Pa; inside
-        the flank, and in cells at a tip edge, where it depends on the cells), iterations, converged. Positions that
-        failed are not a number; ``failures`` says why.
+        line_of_action_force (N), load_centre and tangent_load_centre (m), load_share and tangent_load_share by
+        ``tooth``, line_load (N/m of contact line) by ``tooth`` and ``axial_position``, max_pressure and edge_pressure
+        (Pa; inside the flank, and in cells at a tip edge, where it depends on the cells), iterations, converged.
+        What is tangent belongs to a little more load, and is the derivative of ste by misalignment or by a gap of one
+        tooth pair under constant load. Positions that failed are not a number; ``failures`` says why.
 
     Raises
     ------
@@ -671,7 +700,9 @@ _UNITS = {
     "line_of_action_force": ("N", "torque on gear 1 over its base radius"),
     "load_share": ("1", "part of the normal load that a tooth pair carries"),
     "line_load": ("N/m", "normal load per length of contact line"),
-    "load_centre": ("m", "axial position of the resultant normal load: derivative of ste by misalignment"),
+    "load_centre": ("m", "axial position of the resultant normal load"),
+    "tangent_load_centre": ("m", "axial position of the resultant of a little more load: slope of ste by misalignment"),
+    "tangent_load_share": ("1", "part of a little more load that a tooth pair carries: slope of ste by a gap there"),
     "max_pressure": ("Pa", "largest contact pressure away from tip edges"),
     "edge_pressure": ("Pa", "largest contact pressure in cells at a tip edge; depends on their size"),
     "iterations": ("1", "active-set iterations"),
@@ -679,7 +710,7 @@ _UNITS = {
 }
 
 
-_RESULTS = ("ste", "tangent_stiffness", "load_centre", "max_pressure", "edge_pressure")
+_RESULTS = ("ste", "tangent_stiffness", "load_centre", "tangent_load_centre", "max_pressure", "edge_pressure")
 
 
 @dataclass
@@ -696,7 +727,8 @@ class StateResults:
         Of gear 1, m.
     values : dict
         Name of a result -> ndarray over the axes.
-    line_load, load_share : ndarray (..., t, k), (..., t)
+    line_load : ndarray (..., t, k)
+    load_share, tangent_load_share : ndarray (..., t)
     iterations : ndarray
     failures : list of str
         Why states failed.
@@ -708,6 +740,7 @@ class StateResults:
     values: dict[str, FloatArray]
     line_load: FloatArray
     load_share: FloatArray
+    tangent_load_share: FloatArray
     iterations: NDArray[np.int32]
     failures: list[str] = field(default_factory=list)
 
@@ -722,6 +755,7 @@ class StateResults:
             {name: np.full(shape, np.nan) for name in _RESULTS},
             np.full((*shape, len(teeth), len(axial)), np.nan),
             np.full((*shape, len(teeth)), np.nan),
+            np.full((*shape, len(teeth)), np.nan),
             np.zeros(shape, dtype=np.int32),
         )
 
@@ -735,6 +769,7 @@ class StateResults:
             {name: dataset[name].to_numpy() for name in _RESULTS},
             dataset["line_load"].to_numpy(),
             dataset["load_share"].to_numpy(),
+            dataset["tangent_load_share"].to_numpy(),
             dataset["iterations"].to_numpy(),
             [line for line in str(dataset.attrs["failures"]).splitlines() if line],
         )
@@ -760,13 +795,17 @@ class StateResults:
         cells, solution = state.cells, state.solution
         self.values["ste"][index] = solution.approach / cosine
         self.values["tangent_stiffness"][index] = cosine**2 / solution.approach_per_load
-        self.values["load_centre"][index] = solution.force @ compliance.axial[cells.layer] / state.normal_load
+        axial = compliance.axial[cells.layer]
+        self.values["load_centre"][index] = solution.force @ axial / state.normal_load
+        self.values["tangent_load_centre"][index] = solution.force_per_load @ axial
         self.values["max_pressure"][index] = state.pressure[~cells.cut].max(initial=0.0)
         self.values["edge_pressure"][index] = state.pressure[cells.cut].max(initial=0.0)
         loads = np.zeros((len(self.teeth), len(self.axial)))
         np.add.at(loads, (cells.tooth - self.teeth[0], cells.layer), solution.force)
         self.line_load[index] = loads * cosine / compliance.slice_width
         self.load_share[index] = loads.sum(axis=1) / state.normal_load
+        pair_number = cells.tooth - self.teeth[0]
+        self.tangent_load_share[index] = np.bincount(pair_number, solution.force_per_load, len(self.teeth))
         self.iterations[index] = solution.iterations
 
     def insert(self, positions: Sequence[int], part: StateResults) -> None:
@@ -774,7 +813,7 @@ class StateResults:
         rows = np.asarray(positions)
         for name, values in part.values.items():
             self.values[name][rows] = values
-        for name in ("line_load", "load_share", "iterations"):
+        for name in ("line_load", "load_share", "tangent_load_share", "iterations"):
             getattr(self, name)[rows] = getattr(part, name)
         self.failures += part.failures
 
@@ -791,6 +830,7 @@ class StateResults:
             "mesh_stiffness": (names, force / self.values["ste"]),
             "line_of_action_force": (names, force),
             "load_share": ((*names, "tooth"), self.load_share[..., shown]),
+            "tangent_load_share": ((*names, "tooth"), self.tangent_load_share[..., shown]),
             "line_load": ((*names, "tooth", "axial_position"), self.line_load[..., shown, :]),
             "iterations": (names, self.iterations),
             "converged": (names, np.isfinite(self.values["ste"])),

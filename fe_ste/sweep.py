@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from multiprocessing import get_context
 from pathlib import Path
@@ -200,7 +200,8 @@ def _sent(
     compliance: PairCompliance, axes: StateAxes, blocks: list[list[int]], executor: Submits
 ) -> Iterator[tuple[list[int], StateResults]]:
     """Yield blocks in the order in which workers finish them."""
-    packed = pickle.dumps((compliance.pair, compliance.flanks, compliance.contact, compliance.modifications))
+    one = compliance
+    packed = pickle.dumps((one.pair, one.flanks, one.contact, one.modifications, one.tooth_gap))
     with _cancelled_on_error() as waiting:
         for positions in blocks:
             waiting[executor.submit(solve_block, packed, axes, positions)] = positions
@@ -230,7 +231,7 @@ def solve_block(packed: bytes, axes: StateAxes, positions: list[int]) -> StateRe
     Parameters
     ----------
     packed : bytes
-        Pickled pair, flanks, contact settings and modifications.
+        Pickled pair, flanks, contact settings, modifications and gaps of the teeth.
     axes : StateAxes
     positions : list of int
     """
@@ -239,5 +240,5 @@ def solve_block(packed: bytes, axes: StateAxes, positions: list[int]) -> StateRe
 
 @lru_cache(maxsize=1)
 def _unpacked(packed: bytes) -> PairCompliance:
-    pair, flanks, contact, modifications = pickle.loads(packed)
-    return PairCompliance.from_flanks(pair, flanks, contact).with_modifications(*modifications)
+    pair, flanks, contact, modifications, tooth_gap = pickle.loads(packed)
+    return replace(PairCompliance.from_flanks(pair, flanks, contact), modifications=modifications, tooth_gap=tooth_gap)

@@ -95,6 +95,93 @@ def test_default_axes_have_7500_states(grc: Gearbox) -> None:
     assert [wanted.positions, *sizes] == [50, 6, 5, 5]
 
 
+MODIFICATION = """
+[gears.pinion.modification]
+tip_relief_um = 10.0
+tip_relief_length_mm = 2.0
+root_relief_um = 5.0
+root_relief_start_roll_deg = 16.0
+root_relief_shape = "parabolic"
+lead_crowning_um = 3.0
+helix_slope_um = 8.0
+twist_um = 2.0
+topography = "pinion.csv"
+"""
+TOPOGRAPHY = "radius_mm, -5.0, 5.0\n29.0, 0.0, 1.0\n32.0, 2.0, 4.0\n"
+
+
+def modified(folder: Path, change: tuple[str, str] = ("", "")) -> Path:
+    """Write the case with a modified pinion and its topography beside it."""
+    (folder / "pinion.csv").write_text(TOPOGRAPHY, encoding="utf-8")
+    case = folder / "spur.toml"
+    tables, rest = CASE.split("[pairs]")
+    pinion = "held_diameter_mm = 30.0 }"
+    inline = ", ".join(MODIFICATION.replace(*change).strip().splitlines()[1:])
+    tables = tables.replace(pinion, f"held_diameter_mm = 30.0, modification = {{ {inline} }} }}")
+    case.write_text(f"{tables}[pairs]{rest}", encoding="utf-8")
+    return case
+
+
+def test_modifications_of_the_file_enter_the_table_and_its_hash(tmp_path: Path) -> None:
+    gearbox = Gearbox.from_toml(modified(tmp_path))
+    wanted = wanted_table(gearbox, "spur", 8)
+    pinion = wanted.pair.pinion
+    tip, root = wanted.pinion_modification.tip_relief, wanted.pinion_modification.root_relief
+    assert tip is not None
+    assert root is not None
+    assert pinion.tip_roll_length - np.sqrt(tip.start_radius**2 - pinion.base_radius**2) == pytest.approx(2e-3)
+    assert np.degrees(np.sqrt((root.start_radius / pinion.base_radius) ** 2 - 1.0)) == pytest.approx(16.0)
+    assert (tip.amount, root.amount) == pytest.approx((10e-6, 5e-6), rel=1e-12)
+    assert (tip.shape, root.shape) == ("linear", "parabolic")
+    assert wanted.gear_modification == type(wanted.gear_modification)()
+    (tmp_path / "plain.toml").write_text(CASE, encoding="utf-8")
+    plain = wanted_table(Gearbox.from_toml(tmp_path / "plain.toml"), "spur", 8)
+    assert wanted.hash != plain.hash
+    (tmp_path / "pinion.csv").write_text(TOPOGRAPHY.replace("4.0", "5.0"), encoding="utf-8")
+    assert wanted_table(Gearbox.from_toml(tmp_path / "spur.toml"), "spur", 8).hash != wanted.hash
+
+
+def test_table_of_the_other_flank_sees_the_modification_from_the_other_end(tmp_path: Path) -> None:
+    """Turned about the line of centres, a pair that is loaded on its other flanks is the table's."""
+    case = modified(tmp_path)
+    here = wanted_table(Gearbox.from_toml(case), "spur", 8).pinion_modification
+    case.write_text(
+        case.read_text(encoding="utf-8").replace("shaft_1 = 100.0 }, locked", "shaft_1 = -100.0 }, locked"),
+        encoding="utf-8",
+    )
+    there = wanted_table(Gearbox.from_toml(case), "spur", 8).pinion_modification
+    assert here.helix_slope == -there.helix_slope == pytest.approx(8e-6, rel=1e-12)
+    assert there == here.mirrored()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("tip_relief_length_mm = 2.0", "tip_relief_shape = 'linear'"), "tip relief needs"),
+        (
+            ("tip_relief_length_mm = 2.0", "tip_relief_length_mm = 20.0"),
+            "gears.pinion.modification: .* off the involute",
+        ),
+        (("tip_relief_length_mm = 2.0", "tip_relief_length_mm = 16.5"), "tip_relief.start_radius"),
+        (("pinion.csv", "other.csv"), r"gears.pinion.modification: .*other.csv: cannot be read"),
+        (("lead_crowning_um = 3.0", "lead_crowning_um = -3.0"), "lead_crowning_um"),
+        (("twist_um", "twist_mm"), "twist_um"),
+    ],
+)
+def test_modifications_that_make_no_sense_are_refused_with_their_key(
+    change: tuple[str, str], words: str, tmp_path: Path
+) -> None:
+    with pytest.raises(CaseError, match=words):
+        Gearbox.from_toml(modified(tmp_path, change))
+
+
+def test_bad_topography_names_file_line_and_value(tmp_path: Path) -> None:
+    case = modified(tmp_path)
+    (tmp_path / "pinion.csv").write_text(TOPOGRAPHY.replace(" 2.0", " two"), encoding="utf-8")
+    with pytest.raises(CaseError, match=r"gears.pinion.modification: .*pinion.csv: line 3: 'two'"):
+        Gearbox.from_toml(case)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [

@@ -148,7 +148,29 @@ def test_crowning_that_would_add_material_is_refused(key: str, amount: float) ->
         FlankModification(**{key: amount})
 
 
-@pytest.mark.parametrize("key", ["profile_slope", "helix_slope"])
+def test_twist_is_a_helix_slope_that_turns_over_along_the_profile(any_grc_gear: Gear) -> None:
+    gear = any_grc_gear
+    form, middle, tip = flank_radii(gear, np.array([0.0, 0.5, 1.0]))
+    low, high = -gear.face_width / 2, gear.face_width / 2
+    twist = FlankModification(twist=6 * MICRON)
+    corners = [float(twist.gap(gear, np.array(r), np.array(z))) for r, z in ((tip, high), (form, low))]
+    assert corners == pytest.approx([6 * MICRON] * 2, rel=1e-12)
+    others = [float(twist.gap(gear, np.array(r), np.array(z))) for r, z in ((tip, low), (form, high))]
+    assert others == pytest.approx([0.0, 0.0], abs=ROUNDING)
+    assert twist.gap(gear, np.array([middle] * 3), np.array([low, 0.0, high])) == pytest.approx([3 * MICRON] * 3)
+    reverse = FlankModification(twist=-6 * MICRON)
+    assert float(reverse.gap(gear, np.array(tip), np.array(low))) == pytest.approx(6 * MICRON, rel=1e-12)
+
+
+def test_mirrored_modification_is_itself_seen_from_the_other_end(any_grc_gear: Gear) -> None:
+    gear = any_grc_gear
+    radius = flank_radii(gear, np.linspace(0.0, 1.0, 5))[:, None]
+    z = gear.face_width * np.linspace(-0.5, 0.5, 7)
+    whole = full_modification(gear)
+    np.testing.assert_allclose(whole.mirrored().gap(gear, radius, z), whole.gap(gear, radius, -z), atol=ROUNDING)
+
+
+@pytest.mark.parametrize("key", ["profile_slope", "helix_slope", "twist"])
 def test_slopes_may_be_negative_but_not_nonsense(key: str) -> None:
     FlankModification(**{key: -1e-6})
     with pytest.raises(GeometryError, match=rf"{key} = nan"):
