@@ -46,7 +46,7 @@ from numpy.typing import ArrayLike, NDArray
 from exugear.gearbox import GROUND, Body, Gearbox, Mesh
 from exugear.kernels import MeshArrays, periodic_cubic
 from exugear.table_law import TableArrays
-from fe_ste.interpolation import SteSurface, axis_weights
+from fe_ste.interpolation import SteSurface, axis_weights, slope_axis_weights
 
 Floats = NDArray[np.float64]
 MeshData = ArrayLike | SteSurface
@@ -485,6 +485,7 @@ def _pack_tables(
     longest = max((len(knots) for s in found for knots in (s.centre_distance, s.misalignment)), default=0)
     arrays = TableArrays(
         shape=np.zeros((count, 4), dtype=np.int64),
+        axes=np.zeros((count, 2), dtype=np.int64),
         values=np.zeros((count, size)),
         root=np.zeros((count, loads)),
         knots=np.zeros((count, 2, longest)),
@@ -520,12 +521,15 @@ def _fill_table(arrays: TableArrays, m: int, flanks: TableFlanks, surface: SteSu
     arrays.shape[m] = surface.coefficients.shape[:4]
     arrays.values[m, : flat.size] = flat
     arrays.root[m, : surface.root_force.size] = surface.root_force
-    for axis, knots in enumerate((surface.centre_distance, surface.misalignment)):
-        first, weights = axis_weights(knots)
+    axes = (surface.centre_distance, axis_weights), (surface.misalignment, slope_axis_weights)
+    for axis, (knots, weights_of) in enumerate(axes):
+        first, weights = weights_of(knots)
+        arrays.axes[m, axis] = len(knots)
         arrays.knots[m, axis, : len(knots)] = knots
         arrays.first[m, axis, : len(first)] = first
         arrays.weights[m, axis, : len(first)] = weights
-    unloaded = surface.coefficients[..., 0, 0]
+    step = 1 if surface.misalignment.size == 1 else 2
+    unloaded = surface.coefficients[:, :, ::step, 0, 0]
     arrays.lowest[m] = unloaded.min() - np.ptp(unloaded)  # weights may carry the surface below its nodes
     arrays.back[m], arrays.back_tilt[m] = flanks.back, flanks.back_tilt
     arrays.backlash[m], arrays.back_phase[m] = flanks.backlash, flanks.back_phase

@@ -41,7 +41,8 @@ class TableArrays(NamedTuple):
 
     Attributes
     ----------
-    shape : (m, 4) positions, centre distances, misalignments, load pieces
+    shape : (m, 4) positions, centre distances, values and slopes along misalignment, load pieces
+    axes : (m, 2) number of knots of centre distance and misalignment
     values : (m, n) `fe_ste.interpolation.SteSurface.coefficients`, flat
     root : (m, l + 1) knots of the root of F_bt, sqrt(N)
     knots : (m, 2, k) knots of centre distance (m) and misalignment (rad)
@@ -57,6 +58,7 @@ class TableArrays(NamedTuple):
     """
 
     shape: Integers
+    axes: Integers
     values: Floats
     root: Floats
     knots: Floats
@@ -267,7 +269,7 @@ def surface_law(
     for axis in range(2):
         x = centre if axis == 0 else misalignment
         i = place_on_axis(
-            x, shape[1 + axis], tables.knots[m, axis], tables.first[m, axis], tables.weights[m, axis],
+            x, tables.axes[m, axis], tables.knots[m, axis], tables.first[m, axis], tables.weights[m, axis],
             memory.basis[1 + axis],
         )  # fmt: skip
         if i < 0:

@@ -4,7 +4,8 @@ The surface is a cubic in each axis, so that it and its slopes are continuous, a
 periodic. The load axis is the root of the line-of-action force: a flank that touches with a line yields in proportion
 to the force, one that touches in a point faster, and both are smooth in the root. Slopes along it are the table's own
 tangent stiffness, limited where needed so that more load never means less deflection (Fritsch and Carlson, SIAM J.
-Numer. Anal. 17 (1980) 238-246); the other axes take their slopes from parabolas through three nodes.
+Numer. Anal. 17 (1980) 238-246); along misalignment they are the axial position of a little more load, which is exactly
+what s changes by; the other axes take their slopes from parabolas through three nodes.
 """
 
 from __future__ import annotations
@@ -76,6 +77,30 @@ def axis_weights(knots: ArrayLike) -> tuple[IntArray, FloatArray]:
     return first, weights
 
 
+def slope_axis_weights(knots: ArrayLike) -> tuple[IntArray, FloatArray]:
+    """Weights in each interval of an axis whose nodes have a value and a slope each, one after the other.
+
+    As `axis_weights`: the four weights of an interval belong to value and slope at its start and at its end.
+
+    Examples
+    --------
+    >>> first, weights = slope_axis_weights([0.0, 2.0])
+    >>> nodes = np.array([0.0, 0.0, 4.0, 4.0])  # x^2 with its slope
+    >>> float(nodes @ (weights[0] @ 0.5 ** np.arange(4)))
+    1.0
+    """
+    x = np.atleast_1d(np.asarray(knots, dtype=np.float64))
+    if x.size == 1:
+        return axis_weights(x)
+    if not np.all(np.diff(x) > 0.0):
+        raise InterpolationError(f"the values of an axis must increase: {x.tolist()}")
+    step = np.diff(x)[:, None]
+    none = np.zeros((x.size - 1, 4))
+    value, rise = none + [1.0, 0.0, -3.0, 2.0], none + [0.0, 0.0, 3.0, -2.0]
+    start, end = step * [0.0, 1.0, -2.0, 1.0], step * [0.0, 0.0, -1.0, 1.0]
+    return 2 * np.arange(x.size - 1), np.stack([value, start, rise, end], axis=1)
+
+
 def _slope_matrix(x: FloatArray) -> FloatArray:
     """Slope at each node as a combination of the nodal values: of the parabola through three neighbours."""
     count = x.size
@@ -103,9 +128,10 @@ class SteSurface:
         Knots, rad.
     root_force : (l + 1,) array
         Knots of the root of the line-of-action force, sqrt(N), from zero.
-    coefficients : (p, c, a, l, 5) array
+    coefficients : (p, c, 2 a or 1, l, 5) array
         At each node of the other axes, on each piece of the load axis: cubic of s in t from 0 to 1 (m), and the
-        integral of s over the force from zero to the start of the piece (J).
+        integral of s over the force from zero to the start of the piece (J). Along misalignment the same of the
+        slope follows each node, unless there is one node only.
     """
 
     centre_distance: FloatArray
@@ -127,14 +153,16 @@ class SteSurface:
         if not bool(table["converged"].all()):
             unsolved = int((~table["converged"].astype(bool)).sum())
             raise InterpolationError(f"the table holds {unsolved} unsolved states")
-        unloaded = table["unloaded_ste"].to_numpy() if "unloaded_ste" in table else 0.0
+        places = axes[:3]
         return cls.from_nodes(
             table["centre_distance"].to_numpy(),
             table["misalignment"].to_numpy(),
             table["line_of_action_force"].to_numpy().reshape(-1, table.sizes["torque"])[0],
             table["ste"].to_numpy(),
             table["tangent_stiffness"].to_numpy(),
-            unloaded,
+            table["tangent_load_centre"].to_numpy(),
+            table["unloaded_ste"].transpose(*places).to_numpy(),
+            table["unloaded_centre"].transpose(*places).to_numpy(),
         )
 
     @classmethod
@@ -145,7 +173,9 @@ class SteSurface:
         force: ArrayLike,
         ste: ArrayLike,
         tangent_stiffness: ArrayLike,
+        tangent_load_centre: ArrayLike = 0.0,
         unloaded: ArrayLike = 0.0,
+        unloaded_centre: ArrayLike = 0.0,
     ) -> SteSurface:
         """Lay the surface through values at the nodes.
 
@@ -155,10 +185,10 @@ class SteSurface:
             m, rad.
         force : (l,) array
             Line-of-action forces, N, positive and increasing.
-        ste, tangent_stiffness : (p, c, a, l) arrays
-            m, N/m.
-        unloaded : (p, c, a) array or float
-            Transmission error at no load, m.
+        ste, tangent_stiffness, tangent_load_centre : (p, c, a, l) arrays
+            m, N/m, m: the last is the derivative of the first by misalignment.
+        unloaded, unloaded_centre : (p, c, a) arrays or floats
+            Transmission error at no load, and its derivative by misalignment, m.
 
         Raises
         ------
@@ -177,23 +207,23 @@ class SteSurface:
             raise InterpolationError(f"the forces of the load axis must be positive and increase: {loads.tolist()}")
         values = np.asarray(ste, dtype=np.float64)
         root = np.concatenate([[0.0], np.sqrt(loads)])
-        start = np.broadcast_to(np.asarray(unloaded, dtype=np.float64), values.shape[:3])
-        nodes = np.concatenate([start[..., None], values], axis=-1)
+        nodes = _from_no_load(unloaded, values)
         slopes = _load_slopes(root, nodes, np.asarray(tangent_stiffness, dtype=np.float64))
-        surface = cls(
-            np.atleast_1d(np.asarray(centre_distance, dtype=np.float64)),
-            np.atleast_1d(np.asarray(misalignment, dtype=np.float64)),
-            root,
-            _load_pieces(root, nodes, slopes),
-        )
+        pieces = _load_pieces(root, nodes, slopes)
+        tilts = np.atleast_1d(np.asarray(misalignment, dtype=np.float64))
+        if tilts.size > 1:
+            centres = _from_no_load(unloaded_centre, np.broadcast_to(tangent_load_centre, values.shape))
+            turning = _load_pieces(root, centres, centres @ _slope_matrix(root).T)
+            pieces = np.stack([pieces, turning], axis=3).reshape(*values.shape[:2], -1, *pieces.shape[3:])
+        surface = cls(np.atleast_1d(np.asarray(centre_distance, dtype=np.float64)), tilts, root, pieces)
         surface._check_rising()
         return surface
 
     def at_nominal(self, centre_distance: float, misalignment: float = 0.0) -> SteSurface:
         """Surface of gears that stay where they are: the same without the two axes of their position."""
         values = self.coefficients
-        for axis, knots, x in ((1, self.centre_distance, centre_distance), (2, self.misalignment, misalignment)):
-            values = np.moveaxis(np.tensordot(values, _weights_at(knots, x), (axis, 0))[None], 0, axis)
+        values = np.einsum("pcalj,c->palj", values, _weights_at(self.centre_distance, centre_distance))
+        values = np.einsum("palj,a->plj", values, _slope_weights_at(self.misalignment, misalignment))[:, None, None]
         return SteSurface(np.array([centre_distance]), np.array([misalignment]), self.root_force, values)
 
     def averaged(self) -> SteSurface:
@@ -228,26 +258,25 @@ class SteSurface:
         """Coefficients (l, 5) at one place of the other axes."""
         values = np.tensordot(_periodic_weights(len(self.coefficients), pmc), self.coefficients, 1)
         values = np.tensordot(_weights_at(self.centre_distance, centre_distance), values, 1)
-        return np.asarray(np.tensordot(_weights_at(self.misalignment, misalignment), values, 1))
+        return np.asarray(np.tensordot(_slope_weights_at(self.misalignment, misalignment), values, 1))
 
     def _check_rising(self) -> None:
         """Make sure that s rises with the load between the nodes too, where weights may be negative."""
         powers = np.arange(1, 4) * _CHECKS[:, None] ** np.arange(3)
         count = len(self.coefficients)
-        halves = np.array([_periodic_weights(count, (p + 0.5) / count) for p in range(count)])
-        between = [self.coefficients, np.tensordot(halves, self.coefficients, 1)]
-        for axis, knots in ((1, self.centre_distance), (2, self.misalignment)):
-            if len(knots) > 1:
-                middle = np.array([_weights_at(knots, x) for x in 0.5 * (knots[1:] + knots[:-1])])
-                between += [np.moveaxis(np.tensordot(middle, values, (1, axis)), 0, axis) for values in between]
-        for values in between:
+        cycle = np.array([_periodic_weights(count, 0.5 * p / count) for p in range(2 * count)])
+        centre = np.array([_weights_at(self.centre_distance, x) for x in _halved(self.centre_distance)])
+        tilt = np.array([_slope_weights_at(self.misalignment, x) for x in _halved(self.misalignment)])
+        for rows in cycle:  # a position at a time: the whole would be large
+            values = np.tensordot(rows, self.coefficients, 1)
+            values = np.tensordot(tilt, np.tensordot(centre, values, 1), (1, 1))
             falling = np.argwhere((values[..., 1:4] @ powers.T).min(axis=-1) < 0.0)
             if falling.size:
-                p, _, _, piece = falling[0]
-                force = self.root_force[piece] ** 2
+                a, c, piece = falling[0]
                 raise InterpolationError(
-                    f"at pmc = {p / count:.3f} more load than {force:.6g} N gives less deflection between the nodes; "
-                    "lay more of them"
+                    f"more load than {self.root_force[piece] ** 2:.6g} N gives less deflection at centre distance "
+                    f"{_halved(self.centre_distance)[c]:.6g} m, misalignment {_halved(self.misalignment)[a]:.4g} rad, "
+                    "between the nodes of the table: lay more of them"
                 )
 
 
@@ -283,19 +312,36 @@ def _load_pieces(root: FloatArray, nodes: FloatArray, slopes: FloatArray) -> Flo
     return np.concatenate([cubic, before[..., None]], axis=-1)
 
 
+def _from_no_load(unloaded: ArrayLike, values: FloatArray) -> FloatArray:
+    """Nodes of the load axis with the one at no load before them, (..., l + 1)."""
+    start = np.broadcast_to(np.asarray(unloaded, dtype=np.float64), values.shape[:-1])
+    return np.concatenate([start[..., None], values], axis=-1)
+
+
+def _halved(knots: FloatArray) -> FloatArray:
+    """Knots and the places half-way between them."""
+    return np.sort(np.concatenate([knots, 0.5 * (knots[1:] + knots[:-1])]))
+
+
 def _weights_at(knots: FloatArray, x: float) -> FloatArray:
     """Weight of every knot at x, continued along the slope outside."""
-    if len(knots) == 1:
-        return np.ones(1)
-    first, weights = axis_weights(knots)
+    return np.ones(1) if len(knots) == 1 else _weights_between(knots, x, *axis_weights(knots), len(knots))
+
+
+def _slope_weights_at(knots: FloatArray, x: float) -> FloatArray:
+    """Weights of value and slope of every knot at x, continued along the slope outside."""
+    return np.ones(1) if len(knots) == 1 else _weights_between(knots, x, *slope_axis_weights(knots), 2 * len(knots))
+
+
+def _weights_between(knots: FloatArray, x: float, first: IntArray, weights: FloatArray, count: int) -> FloatArray:
     i = int(np.clip(np.searchsorted(knots, x, side="right") - 1, 0, len(knots) - 2))
     step = knots[i + 1] - knots[i]
     t = (x - knots[i]) / step
     inside = min(max(t, 0.0), 1.0)
     powers = np.arange(4)
     near = weights[i] @ inside**powers + (t - inside) * (weights[i, :, 1:] @ (powers[1:] * inside ** powers[:3]))
-    full = np.zeros(len(knots))
-    width = min(STENCIL, len(knots))
+    full = np.zeros(count)
+    width = min(STENCIL, count)
     full[first[i] : first[i] + width] = near[:width]
     return full
 

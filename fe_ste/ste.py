@@ -45,6 +45,10 @@ IntArray = NDArray[np.int64]
 _GAP_REACH = 1.3
 #: Part of its cells by which a window that contact fills grows at either side.
 _WINDOW_GROWTH = 0.2
+#: Cells across a contact line among which the first touch is looked for, odd: the middle one is on the line.
+_UNLOADED_CELLS = 41
+#: Gaps this close to the least one touch at the same time, m.
+_TOUCHING = 1e-12
 _WINDOW_ATTEMPTS = 10
 #: Places across the window that an address tells apart.
 _PLACES = 64
@@ -473,6 +477,40 @@ def _modification_gap(compliance: PairCompliance, cells: Cells) -> FloatArray:
         radius = gear.base_radius * np.sqrt(1.0 + roll**2)
         gap = gap + modification.gap(gear, np.clip(radius, *_flank_radii(gear)), axial)
     return gap
+
+
+def unloaded_states(compliance: PairCompliance, axes: StateAxes) -> xr.Dataset:
+    """Compute where the rigid flanks first touch, the limit of the transmission error at no load.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over (pmc, centre_distance, misalignment): unloaded_ste (m) and unloaded_centre (m, axial position).
+    """
+    shape = (axes.positions, len(axes.centre_distance), len(axes.misalignment))
+    ste, centre = np.empty(shape), np.empty(shape)
+    pair, roll = compliance.pair, compliance.flanks[0].roll
+    cosine = math.cos(pair.pinion.base_helix_angle)
+    width = _UNLOADED_CELLS * _cell_width(compliance, _normal_load(pair, float(axes.torque.max())))
+    for c, distance in enumerate(axes.centre_distance):
+        placed = compliance.at_centre_distance(float(distance))
+        kinematics = FlankPair.from_pair(placed.pair, roll[0], roll[-1])
+        for p in range(axes.positions):
+            rotation = p / axes.positions * pair.pinion.angular_pitch
+            cells = lay_cells(kinematics, rotation, placed.teeth, placed.axial, width / 2, _UNLOADED_CELLS)
+            removed = cells.gap + _modification_gap(placed, cells)
+            place = placed.axial[cells.layer]
+            for m, misalignment in enumerate(axes.misalignment):
+                gap = removed + misalignment * place * cosine
+                ste[p, c, m] = gap.min() / cosine
+                centre[p, c, m] = place[gap < gap.min() + _TOUCHING].mean()
+    names = ("pmc", "centre_distance", "misalignment")
+    meaning = {
+        "unloaded_ste": "transmission error at which the flanks first touch, on the transverse line of action",
+        "unloaded_centre": "axial position of the first touch: derivative of unloaded_ste by misalignment",
+    }
+    values = {"unloaded_ste": ste, "unloaded_centre": centre}
+    return xr.Dataset({n: (names, v, {"units": "m", "long_name": meaning[n]}) for n, v in values.items()})
 
 
 def _flank_radii(gear: Gear) -> tuple[float, float]:

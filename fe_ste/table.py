@@ -25,7 +25,7 @@ from fe_ste.elasticity import HANDOVER_DEPTH, FlankCompliance, flank_compliance
 from fe_ste.gears import Gear, GearPair
 from fe_ste.hexmesh import MeshSettings
 from fe_ste.modifications import FlankModification
-from fe_ste.ste import PairCompliance, StateAxes
+from fe_ste.ste import PairCompliance, StateAxes, unloaded_states
 from fe_ste.sweep import Checkpoint, Submits, process_pool, replace_file, sweep_states
 
 #: Raised when a change of the method changes the numbers, so that tables of the old method are not used.
@@ -139,6 +139,7 @@ class MeshTable:
             if executor is None and math.prod(axes.shape) > _STATES_IN_PROCESS:
                 executor = owned.enter_context(process_pool())
             dataset = sweep_states(compliance, axes, executor=executor, checkpoint=checkpoint, progress=progress)
+        dataset = dataset.assign(unloaded_states(compliance, axes))
         dataset.attrs |= _attributes(wanted, compliance)
         return cls(dataset)
 
