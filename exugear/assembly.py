@@ -254,7 +254,8 @@ def assemble(
     six = [body for body in moving if variant != "rigid" and not body.spin_only]
     alone = [body for body in moving if body not in six]
     coordinates = _coordinates(six, alone)
-    elements = () if law == "rigid" else mesh_elements(gearbox, stiffness, law, inertias, flanks, angles)
+    displaced = gearbox.pin_offsets if variant != "bushing" else {}  # bearings carry the planets along
+    elements = () if law == "rigid" else mesh_elements(gearbox, stiffness, law, inertias, flanks, angles, displaced)
     bodies = {body.name: body for body in gearbox.bodies(inertias)}
     return Assembly(
         gearbox=gearbox,
@@ -340,6 +341,8 @@ def _connectors(
         nodes = [np.zeros(3) if body is None else node_position(body) for body in ends]
         starts.append([-1 if body is None else coordinates[body.name][0] for body in ends])
         local.append([np.array(bearing.place) - node for node in nodes])
+        if bearing.body in gearbox.pin_offsets:
+            local[-1][0] = local[-1][0] + [*gearbox.pin_offsets[bearing.body], 0.0]
         places.append(nodes)
     matrices = [bearing_matrices(bearing, gearbox.case.damping.bearing_time_s) for bearing in supports]
     return ConnectorArrays(

@@ -231,6 +231,30 @@ class MeshSection(_Section):
     phase: Finite | tuple[Finite, ...] | None = None
 
 
+class DeviationSection(_Section):
+    """Errors of one wheel that return with each of its revolutions."""
+
+    body: Name
+    gear: Name | None = None
+    cumulative_pitch_um: tuple[Finite, ...] = ()
+    runout_um: NonNegative = 0.0
+    runout_angle_deg: Finite = 0.0
+
+    @model_validator(mode="after")
+    def _something(self) -> DeviationSection:
+        if not self.cumulative_pitch_um and not self.runout_um:
+            raise ValueError("give cumulative_pitch_um, one number for each tooth, or runout_um")
+        return self
+
+
+class PinSection(_Section):
+    """Position error of a planet's pin in its carrier."""
+
+    body: Name
+    radial_um: Finite = 0.0
+    tangential_um: Finite = 0.0
+
+
 class LoadCaseSection(_Section):
     """Torques on the gearbox and, when speed-driven, the prescribed speed of one body."""
 
@@ -331,6 +355,8 @@ class CaseFile(_Section):
     joints: dict[Name, JointSection] = {}
     bearings: dict[Name, BearingSection] = {}
     couplings: dict[Name, CouplingSection] = {}
+    deviations: dict[Name, DeviationSection] = {}
+    pins: dict[Name, PinSection] = {}
     damping: DampingSection = DampingSection()
     housing: HousingSection = HousingSection()
     gravity: GravitySection = GravitySection()

@@ -402,8 +402,8 @@ def _model_errors() -> Iterator[None]:
     from exugear.assembly import VariantError
     from exugear.bearings import BearingError
     from exugear.gearbox import CaseError
-    from exugear.mesh_element import MeshError
     from exugear.statics import BalanceError
+    from exugear.tooth_contact import MeshError
 
     try:
         yield

@@ -159,6 +159,25 @@ class Mesh:
 
 
 @dataclass(frozen=True)
+class WheelDeviation:
+    """Errors of one wheel that return with each of its revolutions.
+
+    Attributes
+    ----------
+    teeth : number of teeth
+    pitch : (teeth,) by which each loaded flank stands back on the transverse line of action, m; tooth 0 is the first at
+        a positive polar angle at zero body angle, the others follow in the positive sense
+    eccentricity : distance of the teeth's axis from the body's, m
+    eccentricity_angle : its polar angle at zero body angle, rad
+    """
+
+    teeth: int
+    pitch: NDArray[np.float64]
+    eccentricity: float
+    eccentricity_angle: float
+
+
+@dataclass(frozen=True)
 class LoadCase:
     """Loads of a run: torques by body (N m), duration (s), speeds (rad/s) and the drive, if any."""
 
@@ -393,6 +412,44 @@ class Gearbox:
             if self._known(f"meshes.{name}", section.pinion_body, section.gear_body):
                 found.extend(self._mesh_instances(name, section))
         return tuple(found)
+
+    @cached_property
+    def deviations(self) -> dict[tuple[str, str], WheelDeviation]:
+        """Errors of wheels by body and gear; a pitch deviation is cumulative, positive into the tooth (ISO 1328-1)."""
+        found = {}
+        for name, section in self.case.deviations.items():
+            key = f"deviations.{name}"
+            if section.body not in self._named_bodies:
+                known = ", ".join(self._named_bodies)
+                raise self.fault(f"{key}.body = {section.body!r}: no such body; bodies are {known}")
+            wheels = self._named_bodies[section.body].wheels
+            gear = section.gear or next(iter(wheels), "")
+            if gear not in wheels or (section.gear is None and len(wheels) > 1):
+                raise self.fault(f"{key}.gear = {section.gear!r}: name one of {', '.join(wheels) or 'no gears'}")
+            toothed, pitch = self.gears[gear], np.array(section.cumulative_pitch_um) * 1e-6
+            if len(pitch) not in (0, toothed.teeth):
+                raise self.fault(f"{key}.cumulative_pitch_um: {len(pitch)} values; {gear} has {toothed.teeth} teeth")
+            found[section.body, gear] = WheelDeviation(
+                teeth=toothed.teeth,
+                pitch=pitch * toothed.base_radius / toothed.reference_radius,
+                eccentricity=0.5e-6 * section.runout_um,
+                eccentricity_angle=math.radians(section.runout_angle_deg),
+            )
+        return found
+
+    @cached_property
+    def pin_offsets(self) -> dict[str, tuple[float, float]]:
+        """Position error of planets in their carrier at zero angles, x and y, m."""
+        found = {}
+        for name, section in self.case.pins.items():
+            body = self._named_bodies.get(section.body)
+            if body is None or body.carrier is None:
+                planets = ", ".join(b.name for b in self._named_bodies.values() if b.carrier) or "none"
+                raise self.fault(f"pins.{name}.body = {section.body!r}: no planet; planets are {planets}")
+            error = 1e-6 * complex(section.radial_um, section.tangential_um)
+            error *= complex(math.cos(body.orbit_angle), math.sin(body.orbit_angle))
+            found[section.body] = error.real, error.imag
+        return found
 
     @cached_property
     def load_cases(self) -> dict[str, LoadCase]:
@@ -776,7 +833,10 @@ def check(gearbox: Gearbox) -> None:
             f"overall.output_gear = {overall.output_gear!r}: no such gear; gears are {', '.join(gearbox.gears)}"
         )
     gearbox.static_mesh_forces()
-    for collection in (gearbox.modifications, gearbox.bearings, gearbox.couplings, gearbox.load_cases):
+    for collection in (
+        gearbox.modifications, gearbox.bearings, gearbox.couplings, gearbox.load_cases, gearbox.deviations,
+        gearbox.pin_offsets,
+    ):  # fmt: skip
         list(collection)
 
 

@@ -43,9 +43,11 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from exugear.deviations import wheel_errors
 from exugear.gearbox import GROUND, Body, Gearbox, Mesh
 from exugear.kernels import MeshArrays, periodic_cubic
 from exugear.table_law import TableArrays
+from exugear.tooth_contact import MeshError, MeshGeometry, ToothContact, tooth_places
 from fe_ste.interpolation import SteSurface, axis_weights, slope_axis_weights
 
 Floats = NDArray[np.float64]
@@ -54,13 +56,6 @@ MeshData = ArrayLike | SteSurface
 MeshLaw = Literal["rigid", "constant", "iso6336", "seed", "line_of_action", "table"]
 MESH_LAWS: tuple[str, ...] = get_args(MeshLaw)
 Angles = Literal["reference", "operating"]
-
-PHASE_TOLERANCE = 5e-3
-"""Allowed misfit of a closed chain of meshes, in mesh cycles: file angles and positions are rounded."""
-
-
-class MeshError(ValueError):
-    """A mesh that the element cannot represent."""
 
 
 @dataclass(frozen=True)
@@ -100,6 +95,8 @@ class MeshElement:
     damping : N s/m, in the law's own coordinate
     line_of_action : F_bt per scalar force of the law
     centre, tilt : (12,) rows of the centre distance and of the misalignment
+    errors : errors of gear 1 and gear 2 over a revolution of each from zero angle, m; empty for none
+    offset : (3,) deflection (m), change of centre distance (m) and misalignment (rad) at zero coordinates
     table : for the law `table`; `stiffness` and `damping` are then what it has at the static load
     """
 
@@ -115,43 +112,9 @@ class MeshElement:
     line_of_action: float
     centre: Floats
     tilt: Floats
+    errors: tuple[Floats, Floats]
+    offset: Floats
     table: TableFlanks | None = None
-
-
-@dataclass(frozen=True)
-class MeshGeometry:
-    """Directions and angles of a mesh at zero angles, from the bodies' positions."""
-
-    radial: Floats
-    tangential: Floats
-    pressure_angle: float
-    pinion_radius: float
-    gear_radius: float
-
-    @classmethod
-    def of(cls, mesh: Mesh) -> MeshGeometry:
-        """Geometry at the operating centre distance of the bodies."""
-        pair = mesh.pair
-        sign = -1.0 if pair.gear.internal else 1.0
-        base_sum = pair.gear.base_radius + sign * pair.pinion.base_radius
-        angle = math.acos(base_sum / mesh.centre_distance)
-        radial = sign * np.array([math.cos(mesh.position_angle), math.sin(mesh.position_angle), 0.0])
-        return cls(
-            radial=radial,
-            tangential=np.array([-radial[1], radial[0], 0.0]),
-            pressure_angle=angle,
-            pinion_radius=pair.pinion.base_radius / math.cos(angle),
-            gear_radius=pair.gear.base_radius / math.cos(angle),
-        )
-
-    def plane_of_action(self, flank: int) -> Floats:
-        """Transverse direction (3,), a unit vector, along which a flank of gear 1 pushes."""
-        return flank * math.cos(self.pressure_angle) * self.tangential + math.sin(self.pressure_angle) * self.radial
-
-    @property
-    def polar_angle(self) -> float:
-        """Polar angle of u, rad."""
-        return math.atan2(self.radial[1], self.radial[0])
 
 
 def loaded_flanks(gearbox: Gearbox, torques: Mapping[str, float] | None = None) -> dict[str, int]:
@@ -229,6 +192,7 @@ def mesh_elements(
     inertias: str | None = None,
     flanks: Mapping[str, int] | None = None,
     angles: Angles = "reference",
+    displaced: Mapping[str, tuple[float, float]] | None = None,
 ) -> tuple[MeshElement, ...]:
     """Elements of all meshes.
 
@@ -245,6 +209,8 @@ def mesh_elements(
         Loaded flank of each mesh; from the static load by default.
     angles : {"reference", "operating"}
         Angles of the law `seed`.
+    displaced : mapping, optional
+        Place of bodies at zero coordinates against their nominal one, x and y seen from the mesh's frame, m.
 
     Raises
     ------
@@ -255,7 +221,7 @@ def mesh_elements(
         known = ", ".join(name for name in MESH_LAWS if name != "rigid")
         raise MeshError(f"mesh law {law!r} has no force element; laws are {known}")
     flanks = loaded_flanks(gearbox) if flanks is None else flanks
-    phases = mesh_phases(gearbox, flanks)
+    phases, orientation = tooth_places(gearbox, flanks)
     bodies = {body.name: body for body in gearbox.bodies(inertias)}
     time = gearbox.case.damping.mesh_time_s
     static = gearbox.static_mesh_forces()
@@ -278,12 +244,33 @@ def mesh_elements(
         own, factor = law_stiffness(mesh, law, samples, angles)
         elements.append(
             MeshElement(
-                mesh, flank, deflection, force, _places(mesh, bodies),
-                flank * mesh.pair.pinion.teeth / (2.0 * math.pi), phase, own,
-                time * float(np.mean(own)), factor, centre, tilt, table,
+                mesh=mesh,
+                flank=flank,
+                deflection=deflection,
+                force=force,
+                place=_places(mesh, bodies),
+                cycles=flank * mesh.pair.pinion.teeth / (2.0 * math.pi),
+                phase=phase,
+                stiffness=own,
+                damping=time * float(np.mean(own)),
+                line_of_action=factor,
+                centre=centre,
+                tilt=tilt,
+                errors=wheel_errors(gearbox, mesh, flank, phase, orientation),
+                offset=_offset(mesh, displaced or {}, deflection, centre),
+                table=table,
             )
-        )  # fmt: skip
+        )
     return tuple(elements)
+
+
+def _offset(mesh: Mesh, displaced: Mapping[str, tuple[float, float]], deflection: Floats, centre: Floats) -> Floats:
+    """Deflection, change of centre distance and misalignment at zero coordinates, (3,)."""
+    offset = np.zeros(3)
+    for first, body in ((0, mesh.pinion), (6, mesh.gear)):
+        way = np.array(displaced.get(body, (0.0, 0.0)))
+        offset[:2] += deflection[first : first + 2] @ way, centre[first : first + 2] @ way
+    return offset
 
 
 def _table_flanks(
@@ -319,109 +306,6 @@ def _places(mesh: Mesh, bodies: Mapping[str, Body]) -> Floats:
             if bodies[name].carrier is None and math.hypot(*place) > 1e-6:
                 raise MeshError(f"mesh {mesh.name}: body {name} is not on the axis of its frame {mesh.frame}")
     return places
-
-
-def mesh_phases(gearbox: Gearbox, flanks: Mapping[str, int]) -> dict[str, float]:
-    """Compute the PMC of each mesh at zero angles from tooth numbers, planet places and tooth thickness.
-
-    The wheels' tooth orientations follow from one another: a mesh whose loaded flanks touch fixes gear 2
-    once gear 1 is placed. A mesh between two wheels not yet placed starts at PMC = 0. Wheels on one shaft
-    that belong to
-    different stages are timed independently of each other.
-
-    Raises
-    ------
-    MeshError
-        A closed chain of meshes (sun, planets, ring) does not fit with its loaded flanks in contact.
-    """
-    orientation: dict[tuple[str, str], float] = {}
-    phases: dict[str, float] = {}
-    waiting = list(gearbox.meshes)
-    while waiting:
-        mesh = next((m for m in waiting if any(end in orientation for end in _wheels(m))), waiting[0])
-        waiting.remove(mesh)
-        phases[mesh.name] = _place_wheels(mesh, flanks[mesh.name], orientation)
-    for mesh in gearbox.meshes:
-        if mesh.phase is not None:
-            phases[mesh.name] = mesh.phase % 1.0
-    return phases
-
-
-def _wheels(mesh: Mesh) -> tuple[tuple[str, str], tuple[str, str]]:
-    return (mesh.pinion, mesh.pair.pinion.name), (mesh.gear, mesh.pair.gear.name)
-
-
-def _place_wheels(mesh: Mesh, flank: int, orientation: dict[tuple[str, str], float]) -> float:
-    """PMC of a mesh from the wheels already placed; places those that are not."""
-    first, second = _wheels(mesh)
-    found = [
-        ToothContact(mesh, flank, number).cycle(orientation[wheel])
-        for number, wheel in ((1, first), (2, second))
-        if wheel in orientation
-    ]
-    misfit = math.remainder(found[0] - found[1], 1.0) if len(found) == 2 else 0.0
-    if abs(misfit) > PHASE_TOLERANCE:
-        raise MeshError(
-            f"mesh {mesh.name}: the gears do not fit, loaded flanks miss each other by {misfit:.4f} of a "
-            "mesh cycle; check planet angles and tooth thicknesses"
-        )
-    phase = found[0] % 1.0 if found else 0.0
-    for number, wheel in ((1, first), (2, second)):
-        if wheel not in orientation:
-            orientation[wheel] = ToothContact(mesh, flank, number).orientation(phase)
-    return phase
-
-
-@dataclass(frozen=True)
-class ToothContact:
-    """How PMC and the orientation of one wheel's teeth hang together in a mesh.
-
-    The orientation is the polar angle of a tooth's middle at zero body angle, in the wheel's own middle
-    plane. With eta the tooth's half angle at the working radius, the loaded flank is at +s eta from it, on
-    an internal wheel at
-    -s eta; in the pitch point it stands at u (gear 1, internal gear 2) or opposite (external gear 2).
-    """
-
-    mesh: Mesh
-    flank: int
-    number: int
-
-    def cycle(self, orientation: float) -> float:
-        """PMC at zero angles of a wheel so oriented."""
-        return (orientation + self._flank_offset - self._pitch_point) / self._pitch
-
-    def orientation(self, cycle: float) -> float:
-        """Orientation of the wheel at a given PMC."""
-        return cycle * self._pitch - self._flank_offset + self._pitch_point
-
-    @property
-    def _wheel_is_internal(self) -> bool:
-        return self.number == 2 and self.mesh.pair.gear.internal
-
-    @property
-    def _pitch(self) -> float:
-        """Angle by which the wheel turns per mesh cycle; an external gear 2 turns against gear 1."""
-        pair = self.mesh.pair
-        if self.number == 1:
-            return self.flank * pair.pinion.angular_pitch
-        return (self.flank if pair.gear.internal else -self.flank) * pair.gear.angular_pitch
-
-    @property
-    def _flank_offset(self) -> float:
-        """Angle from the orientation to the loaded flank at the working radius, in the plane of the mesh."""
-        pair = self.mesh.pair
-        gear, radius = (
-            (pair.pinion, pair.pinion_working_radius) if self.number == 1 else (pair.gear, pair.gear_working_radius)
-        )
-        side = -self.flank if self._wheel_is_internal else self.flank
-        twist = self.mesh.offsets[self.number - 1] * math.tan(gear.helix_angle) / gear.reference_radius
-        return side * float(gear.half_angle(radius)) + twist
-
-    @property
-    def _pitch_point(self) -> float:
-        """Polar angle of the pitch point about the wheel's axis."""
-        angle = MeshGeometry.of(self.mesh).polar_angle
-        return angle + math.pi if self.number == 2 and not self._wheel_is_internal else angle
 
 
 def pack(
@@ -464,10 +348,20 @@ def pack(
         stiffness=stiffness,
         damping=np.array([e.damping for e in elements]),
         line_of_action=np.array([e.line_of_action for e in elements]),
-        error_pieces=np.zeros((count, 2), dtype=np.int64),
-        error=np.zeros((count, 2, 1, 4)),
+        error_pieces=np.array([[len(error) for error in e.errors] for e in elements], dtype=np.int64).reshape(count, 2),
+        error=_pack_errors(elements),
         table=_pack_tables(elements, index, averaged, tables),
     )
+
+
+def _pack_errors(elements: tuple[MeshElement, ...]) -> Floats:
+    longest = max((len(error) for element in elements for error in element.errors), default=0)
+    coefficients = np.zeros((len(elements), 2, longest, 4))
+    for block, element in zip(coefficients, elements, strict=True):
+        for end, error in enumerate(element.errors):
+            if len(error):
+                block[end, : len(error)] = periodic_cubic(error)
+    return coefficients
 
 
 def _pack_tables(
@@ -496,7 +390,7 @@ def _pack_tables(
         tilt=np.array([e.tilt for e in elements]).reshape(count, 12),
         back=np.zeros((count, 12)),
         back_tilt=np.zeros((count, 12)),
-        nominal=np.array([(0.0, e.mesh.centre_distance, 0.0) for e in elements]).reshape(count, 3),
+        nominal=np.array([e.offset + [0.0, e.mesh.centre_distance, 0.0] for e in elements]).reshape(count, 3),
         backlash=np.zeros(count),
         back_phase=np.zeros(count),
         damping_time=np.zeros(count),

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exugear.gearbox import Gearbox, PairSpec
-from exugear.mesh_element import MeshError
 from exugear.tables import fitting_table, table_path
+from exugear.tooth_contact import MeshError
 from fe_ste.interpolation import InterpolationError, SteSurface
 from fe_ste.iso6336 import mesh_stiffness as iso_stiffness
 from fe_ste.table import TableError

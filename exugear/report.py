@@ -31,7 +31,6 @@ from exugear.comparison import (
     report_mode,
 )
 from exugear.gearbox import CaseError, Gearbox
-from exugear.mesh_element import MeshError
 from exugear.mesh_stiffness import iso6336_stiffness, mesh_stiffness
 from exugear.modes import Modes, modes_of
 from exugear.orders import order_lines
@@ -42,6 +41,7 @@ from exugear.scene import draw_mode
 from exugear.sensitivity import Remedy, Sweep, parameters_of, remedies, sweep_modes
 from exugear.shapes import bodies_of, mode_scene, motions_of
 from exugear.tables import PICTURE_FOLDER, fitting_table
+from exugear.tooth_contact import MeshError
 from fe_ste.interpolation import SteSurface
 from fe_ste.scene import RenderingError
 from fe_ste.table import MeshTable, TableError

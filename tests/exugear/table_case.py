@@ -29,8 +29,17 @@ def surface_of(gearbox: Gearbox, name: str, positions: int = 50) -> SteSurface:
     bend = 4e-6 * softer * p
     ste = unloaded[..., None] + per_force * force + bend * (force / static) ** 0.75
     slope = per_force + 0.75 * bend * (force / static) ** -0.25 / static
+    tilting = (1.0 + 0.03 * c) * (0.4 * a + 0.05) / 4e-4
+    centre_of_load = -2e-6 * a / 4e-4 + (ste - unloaded[..., None]) * tilting / softer
     return SteSurface.from_nodes(
-        centre, misalignment, force, ste, 1.0 / slope, np.broadcast_to(unloaded, ste.shape[:3])
+        centre,
+        misalignment,
+        force,
+        ste,
+        1.0 / slope,
+        tangent_load_centre=centre_of_load,
+        unloaded=np.broadcast_to(unloaded, ste.shape[:3]),
+        unloaded_centre=np.broadcast_to(-2e-6 * a[..., 0] / 4e-4, ste.shape[:3]),
     )
 
 

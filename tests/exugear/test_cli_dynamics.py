@@ -15,11 +15,12 @@ from typer.testing import CliRunner
 from exugear import cli
 from exugear.assembly import VARIANTS
 from exugear.gearbox import Gearbox
-from exugear.mesh_element import MESH_LAWS, MeshError
+from exugear.mesh_element import MESH_LAWS
 from exugear.mesh_stiffness import mesh_stiffness
 from exugear.runup import SOLVERS, RunError
 from exugear.runup import simulate as real_simulate
 from exugear.tables import missing_tables, order_tables
+from exugear.tooth_contact import MeshError
 from fe_ste.scene import RenderingError
 
 from .spur_case import COARSE_INPUT, SPUR_CASE

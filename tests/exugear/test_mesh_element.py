@@ -10,7 +10,8 @@ import pytest
 from exugear.assembly import Assembly, assemble
 from exugear.gearbox import Gearbox
 from exugear.kernels import STATE_SIZE, add_mesh_forces, mesh_state, periodic_cubic, stiffness_at
-from exugear.mesh_element import MeshError, MeshGeometry, loaded_flanks, mesh_elements, mesh_phases
+from exugear.mesh_element import loaded_flanks, mesh_elements
+from exugear.tooth_contact import MeshError, MeshGeometry, mesh_phases
 
 LAWS = ["line_of_action", "seed", "constant", "iso6336"]
 RATED = 22.1 * math.pi / 30
