@@ -322,9 +322,9 @@ class SteSection(_Section):
     positions: Annotated[int, Field(ge=8, le=2000)] = 50
     method: Literal["superelement", "nonlinear"] = "superelement"
     grid: bool = False
-    torque_factors: tuple[Positive, ...] = (0.05, 0.2, 0.5, 1.0, 1.5, 2.0)
-    centre_distance_offsets_um: tuple[Finite, ...] = (-200.0, -100.0, 0.0, 100.0, 200.0)
-    misalignment_um: tuple[Finite, ...] = (-80.0, -40.0, 0.0, 40.0, 80.0)
+    torque_factors: tuple[Positive, ...] = (0.05, 0.2, 0.5, 1.0, 2.0, 3.0)
+    centre_distance_offsets_um: tuple[Finite, ...] = (-100.0, -50.0, 0.0, 50.0, 100.0)
+    misalignment_um: tuple[Finite, ...] = (-60.0, -30.0, 0.0, 30.0, 60.0)
 
     @model_validator(mode="after")
     def _axes(self) -> SteSection:

@@ -45,11 +45,13 @@ IntArray = NDArray[np.int64]
 _GAP_REACH = 1.3
 #: Part of its cells by which a window that contact fills grows at either side.
 _WINDOW_GROWTH = 0.2
-#: Cells across a contact line among which the first touch is looked for, odd: the middle one is on the line.
-_UNLOADED_CELLS = 41
+#: Cells across a contact line among which the first touch is looked for, odd: the middle one is on the line; and their
+#: width in normal modules, which misses the first touch of modified flanks by some nanometres.
+_UNLOADED_CELLS = 101
+_UNLOADED_WIDTH = 3e-3
 #: Gaps this close to the least one touch at the same time, m.
 _TOUCHING = 1e-12
-_WINDOW_ATTEMPTS = 10
+_WINDOW_ATTEMPTS = 20
 #: Places across the window that an address tells apart.
 _PLACES = 64
 
@@ -491,7 +493,7 @@ def unloaded_states(compliance: PairCompliance, axes: StateAxes) -> xr.Dataset:
     ste, centre = np.empty(shape), np.empty(shape)
     pair, roll = compliance.pair, compliance.flanks[0].roll
     cosine = math.cos(pair.pinion.base_helix_angle)
-    width = _UNLOADED_CELLS * _cell_width(compliance, _normal_load(pair, float(axes.torque.max())))
+    width = _UNLOADED_CELLS * _UNLOADED_WIDTH * pair.pinion.normal_module
     for c, distance in enumerate(axes.centre_distance):
         placed = compliance.at_centre_distance(float(distance))
         kinematics = FlankPair.from_pair(placed.pair, roll[0], roll[-1])

@@ -29,7 +29,7 @@ from fe_ste.ste import PairCompliance, StateAxes, unloaded_states
 from fe_ste.sweep import Checkpoint, Submits, process_pool, replace_file, sweep_states
 
 #: Raised when a change of the method changes the numbers, so that tables of the old method are not used.
-METHOD_VERSION = 3
+METHOD_VERSION = 4
 #: Beyond this many states the start of processes is repaid.
 _STATES_IN_PROCESS = 1000
 

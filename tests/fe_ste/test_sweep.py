@@ -19,7 +19,8 @@ from fe_ste.contact import ContactSettings
 from fe_ste.elasticity import flank_compliance
 from fe_ste.gears import Gear, GearPair
 from fe_ste.hexmesh import MeshSettings
-from fe_ste.ste import PairCompliance, StateAxes, StateResults, contact_state, solve_positions
+from fe_ste.modifications import FlankModification
+from fe_ste.ste import PairCompliance, StateAxes, StateResults, contact_state, solve_positions, unloaded_states
 from fe_ste.sweep import Checkpoint, SweepError, process_pool, sweep_states
 from fe_ste.table import MeshTable, TableError
 
@@ -79,6 +80,21 @@ def test_a_state_depends_on_no_other(compliance: PairCompliance, grid: xr.Datase
     turned = dataclasses.replace(AXES, torque=AXES.torque[::-1], misalignment=AXES.misalignment[::-1])
     again = solve_positions(compliance, turned, [2, 1, 0]).values["ste"]
     assert again[::-1, ::-1, :, ::-1] == pytest.approx(grid.ste.values, rel=1e-9)
+
+
+def test_transmission_error_falls_to_the_unloaded_one_with_the_load(compliance: PairCompliance) -> None:
+    """Where the flanks touch first, from the gaps alone; crowned and tilted flanks and one tooth out of place."""
+    crowned = FlankModification(lead_crowning=6e-6, profile_crowning=4e-6)
+    modified = compliance.with_modifications(crowned, FlankModification()).with_tooth_gaps({0: 3e-6})
+    axes = StateAxes.checked(PAIR, [1e-3, 250.0], 4, misalignment=[0.0, 8e-4])
+    for one in (compliance, modified):
+        results = solve_positions(one, axes, range(4))
+        unloaded = unloaded_states(one, axes)["unloaded_ste"].to_numpy()[:, 0]
+        light, loaded = results.values["ste"][:, 0, 0], results.values["ste"][:, 1, 0]
+        # 4e-6 of the load turns the gear by some 1e-4 of what the load does; a point touches softer than a line.
+        assert light == pytest.approx(unloaded, abs=2e-3 * float(loaded.max()))
+        assert (light > unloaded).all()
+    assert unloaded[:, 0].max() > 1e-6
 
 
 def test_more_load_always_turns_the_gear_further(grid: xr.Dataset) -> None:
