@@ -17,22 +17,32 @@ CASE := cases/grc750/gearbox.toml
 RESULTS := results/grc750
 EXUGEAR := $(RUN)/exugear
 
-# Both variants run up side by side as two processes, then modes, then the report, which compares them.
+# The inertia sets side by side: each runs up both variants and takes their modes, one process after the other; the
+# first shows its progress, the others speak when all are done. Then the report, which compares them.
 #   $(call dynamics,FOLDER,INERTIA SETS,OPTIONS OF run)
 define dynamics
 @mkdir -p $(1)
-@for inertias in $(2); do \
-	$(EXUGEAR) run $(CASE) --variant rigid --inertias $$inertias --out $(1) $(3) >$(1)/rigid.log 2>&1 & rigid=$$!; \
-	$(EXUGEAR) run $(CASE) --variant bushing --inertias $$inertias --out $(1) $(3); bushing=$$?; \
-	wait $$rigid; code=$$?; tail -n 2 $(1)/rigid.log; \
-	test $$code -eq 0 && test $$bushing -eq 0 || exit 1; \
+@of_set() { \
 	for variant in rigid bushing; do \
-		$(EXUGEAR) modes $(CASE) --variant $$variant --inertias $$inertias --out $(1) >$(1)/modes-$$variant-$$inertias.txt \
-		|| exit 1; \
+		$(EXUGEAR) run $(CASE) --variant $$variant --inertias $$1 --out $(1) $(3) || return; \
 	done; \
-done
+	for variant in rigid bushing; do \
+		$(EXUGEAR) modes $(CASE) --variant $$variant --inertias $$1 --out $(1) >$(1)/modes-$$variant-$$1.txt || return; \
+	done; \
+}; \
+others=; \
+for inertias in $(wordlist 2,9,$(2)); do of_set $$inertias >$(1)/run-$$inertias.log 2>&1 & others="$$others $$!"; done; \
+of_set $(firstword $(2)); code=$$?; \
+for other in $$others; do wait $$other || code=1; done; \
+for inertias in $(wordlist 2,9,$(2)); do cat $(1)/run-$$inertias.log; done; \
+exit $$code
 $(EXUGEAR) report $(1)
 endef
+
+# The first and the last line of a target whose time is told.
+#   $(call begin,FOLDER)  $(call end,FOLDER)
+begin = @mkdir -p $(1); date +%s >$(1)/.begin
+end = @echo "$@ took $$(( $$(date +%s) - $$(cat $(1)/.begin) )) s in all, installation aside."; rm $(1)/.begin
 
 # Prints the first interpreter that fits: the one asked for, or else whichever of the usual names runs.
 FIND_PYTHON := for candidate in $(if $(PYTHON),"$(PYTHON)",python3 python3.13 python3.12 python3.11 python); do \
@@ -41,13 +51,14 @@ FIND_PYTHON := for candidate in $(if $(PYTHON),"$(PYTHON)",python3 python3.13 py
 	echo "exugear needs Python 3.11, 3.12 or 3.13; found: $$($(or $(PYTHON),python3) --version 2>&1)." >&2; \
 	echo "Install one, or name it: make PYTHON=/path/to/python3.12 TARGET" >&2; exit 1
 
-.PHONY: help demo demo-short test validate check lock clean
+.PHONY: help demo demo-short test validate benchmarks check lock clean
 
 help:
 	@echo "make demo        GRC 750 from gear data to waterfalls, modes and a report, into $(RESULTS)"
 	@echo "make demo-short  the same with 10 positions of the mesh cycle and 4 s of the run-up"
 	@echo "make test        tests and documentation examples"
 	@echo "make validate    the long comparisons with references"
+	@echo "make benchmarks  what all of it costs, into benchmarks/results.md and what README and docs quote"
 	@echo "make check       ruff and mypy"
 	@echo "make lock        renew requirements.lock from what installs today"
 	@echo "make clean       remove all that make made, results and $(VENV) too"
@@ -61,18 +72,25 @@ $(INSTALLED): pyproject.toml requirements.lock
 	@touch $@
 
 demo: $(INSTALLED)
+	$(call begin,$(RESULTS))
 	$(EXUGEAR) ste $(CASE) --out $(RESULTS)
 	$(call dynamics,$(RESULTS),assemblies gears,)
+	$(call end,$(RESULTS))
 
 demo-short: $(INSTALLED)
+	$(call begin,$(RESULTS)-short)
 	$(EXUGEAR) ste $(CASE) --positions 10 --out $(RESULTS)-short
 	$(call dynamics,$(RESULTS)-short,assemblies,--duration 4)
+	$(call end,$(RESULTS)-short)
 
 test: $(INSTALLED)
 	$(RUN)/python -m pytest
 
 validate: $(INSTALLED)
 	$(RUN)/python -m pytest -m validation
+
+benchmarks: $(INSTALLED)
+	$(RUN)/python benchmarks/run_all.py
 
 check: $(INSTALLED)
 	$(RUN)/ruff check .

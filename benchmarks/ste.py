@@ -1,31 +1,29 @@
-"""What a transmission error table costs: each GRC pair from nothing, in a process of its own.
+"""What a transmission error table costs: each GRC pair from nothing, growth with the states, CalculiX beside it.
 
-    python benchmarks/ste.py [--rounds N]
-
-Writes ``ste.json`` and ``ste.md`` beside this file. Compiled kernels are in their cache on disk, as after any first
-use; no superelement and no table is. Medians of the rounds; beside wall time stands processor time, which other
-programs on the machine do not change much.
+Measured by ``python benchmarks/run_all.py``. Every table is computed in a fresh process; compiled kernels are in their
+cache on disk, as after any first use, no superelement and no table is.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import os
-import platform
-import resource
-import statistics
-import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
-HERE = Path(__file__).parent
-CASE = HERE.parent / "cases" / "grc750" / "gearbox.toml"
+from timing import CASE, median, median_row, peak_memory, result, say, start, timed
+
+CALCULIX = Path(__file__).with_name("calculix")
+CALCULIX_CASE = "spur 0.5 coarse"
 PAIRS = ("sun_planet", "ring_planet", "intermediate", "high_speed")
+GROWING = "high_speed"
+POSITIONS = (10, 25, 50, 100)
+TORQUES = (1, 2, 4)
 
 
-def measure(name: str) -> dict[str, float | int | str]:
+def measure_pair(name: str, positions: int) -> dict[str, float | int | str]:
     """Compute one pair's table from nothing in this process, imports included."""
     started, processor = time.perf_counter(), time.process_time()
     from exugear.gearbox import Gearbox
@@ -35,88 +33,101 @@ def measure(name: str) -> dict[str, float | int | str]:
     imported = time.perf_counter()
     compliance = pair_compliance(spec.pair)
     offline = time.perf_counter()
-    curve = static_transmission_error(compliance, spec.static_torque, 50)
+    static_transmission_error(compliance, spec.static_torque, positions)
     finished = time.perf_counter()
     return {
         "pair": name,
-        "imports_s": imported - started,
-        "offline_s": offline - imported,
-        "position_ms": 1e3 * (finished - offline) / 50,
-        "total_s": finished - started,
-        "processor_s": time.process_time() - processor,
-        "peak_memory_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+        "positions": positions,
         "unknowns": sum(int(flank.figures["unknowns"]) for flank in compliance.flanks),
         "sparse_solver": str(compliance.flanks[0].figures["sparse_solver"]),
-        "ste_mean_um": 1e6 * float(curve["ste"].mean()),
+        "imports_s": imported - started,
+        "once_s": offline - imported,
+        "position_s": (finished - offline) / positions,
+        "curve_s": finished - started,
+        "processor_s": time.process_time() - processor,
+        "peak_memory_MB": peak_memory(),
     }
 
 
-def median_of(rounds: list[dict[str, float | int | str]]) -> dict[str, float | int | str]:
-    """Median of each figure over the rounds of one pair."""
-    first = rounds[0]
+def measure_states(rounds: int) -> list[dict[str, float | int]]:
+    """Cost of the states of a table, its gears prepared: over positions at one torque, over torques."""
+    from exugear.gearbox import Gearbox
+    from fe_ste.ste import pair_compliance, static_transmission_error
+
+    spec = Gearbox.from_toml(CASE).pairs[GROWING]
+    compliance = pair_compliance(spec.pair)
+    static_transmission_error(compliance, spec.static_torque, 2)
+    sizes = [(positions, 1) for positions in POSITIONS] + [(25, torques) for torques in TORQUES[1:]]
+    costs: dict[tuple[int, int], list[float]] = {size: [] for size in sizes}
+    for _ in range(rounds):
+        for positions, torques in sizes:
+            loads = [spec.static_torque * (n + 1) / torques for n in range(torques)]
+            cost = timed(lambda p=positions, t=loads: static_transmission_error(compliance, t, p))
+            costs[positions, torques].append(cost.wall)
+    return [
+        {
+            "positions": positions,
+            "torques": torques,
+            "states": positions * torques,
+            "wall_s": median(walls),
+            "per_state_s": median(walls) / (positions * torques),
+        }
+        for (positions, torques), walls in costs.items()
+    ]
+
+
+def measure_calculix() -> dict[str, Any]:
+    """One position by CalculiX and by the superelement; as stored where ``ccx`` is not installed."""
+    sys.path.insert(0, str(CALCULIX))
+    from ccx_model import find_calculix
+    from cross_check import CASES, compare, stored
+
+    installed = find_calculix() is not None
+    entry = compare(CASES[CALCULIX_CASE]) if installed else stored()[CALCULIX_CASE]
+    theirs, ours = entry["calculix"], entry["superelement"]
     return {
-        key: statistics.median(float(entry[key]) for entry in rounds) if isinstance(value, float) else value
-        for key, value in first.items()
+        "case": CALCULIX_CASE,
+        "measured_now": installed,
+        "version": theirs["version"],
+        "unknowns": theirs["unknowns"],
+        "calculix_s": theirs["position_cpu_s"],
+        "once_s": ours["offline_cpu_s"],
+        "position_s": ours["position_cpu_s"],
+        "ratio": theirs["position_cpu_s"] / ours["position_cpu_s"],
+        "difference_percent": entry["difference_percent"],
     }
 
 
-def as_markdown(results: dict[str, object]) -> str:
-    """Table of the results."""
-    rows = [
-        "# Cost of the transmission error tables",
-        "",
-        f"Written by `python benchmarks/ste.py`. {results['machine']}; load average at the start "
-        f"{results['load_average']:.1f}. 50 positions at the default mesh, from nothing (imports included, kernels "
-        f"compiled before); medians of {results['rounds']} rounds.",
-        "",
-        "| pair | unknowns of both sectors | imports s | both gears once s | per position ms | all s | processor s | "
-        "peak memory MB |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- |",
-    ]
-    pairs = results["pairs"]
-    assert isinstance(pairs, list)
-    for entry in pairs:
-        rows.append(
-            "| {pair} | {unknowns} | {imports_s:.1f} | {offline_s:.1f} | {position_ms:.0f} | {total_s:.1f} | "
-            "{processor_s:.1f} | {peak_memory_MB:.0f} |".format(**entry)
-        )
-    rows += [
-        "",
-        "What bounds it: once per gear, the right-hand sides of the sector (its cut faces and flank nodes) take most; "
-        "per position, the Cholesky factors of the cells in contact (five iterations of some 700 cells) take "
-        "two thirds, filling their compliance the rest. The time of the same position in CalculiX stands in "
-        "[calculix/README.md](calculix/README.md).",
-        "",
-    ]
-    return "\n".join(rows)
+def measure(quick: bool) -> dict[str, Any]:
+    """Everything."""
+    rounds, positions = (1, 10) if quick else (3, 50)
+    pairs = []
+    for name in PAIRS[-1:] if quick else PAIRS:
+        found = [result(start("ste.py", "--pair", name, "--positions", str(positions))) for _ in range(rounds)]
+        pairs.append(median_row(found, "curve_s"))
+        say(f"tables: {name}")
+    states = result(start("ste.py", "--states", str(rounds)))
+    say("growth with the states of a table: done")
+    calculix = result(start("ste.py", "--calculix"))
+    return {"rounds": rounds, "pairs": pairs, "growing": GROWING, "states": states, "calculix": calculix}
 
 
 def main() -> None:
-    """Run all pairs and write the results."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--pair", choices=PAIRS, help="measure one pair in this process and print it")
-    arguments = parser.parse_args()
-    if arguments.pair:
-        sys.stdout.write(json.dumps(measure(arguments.pair)))
-        return
-    load = os.getloadavg()[0]
-    command = [sys.executable, __file__, "--pair"]
-    pairs = []
-    for name in PAIRS:
-        rounds = [
-            json.loads(subprocess.run([*command, name], check=True, capture_output=True, text=True).stdout)
-            for _ in range(arguments.rounds)
-        ]
-        pairs.append(median_of(rounds))
-    results = {
-        "machine": f"{os.cpu_count()} cores ({platform.machine()}), Python {platform.python_version()}",
-        "load_average": load,
-        "rounds": arguments.rounds,
-        "pairs": pairs,
-    }
-    (HERE / "ste.json").write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
-    (HERE / "ste.md").write_text(as_markdown(results), encoding="utf-8")
+    """Measure what needs a process of its own."""
+    parser = argparse.ArgumentParser(description="Parts of run_all.py that need a process of their own.")
+    parser.add_argument("--pair", choices=PAIRS)
+    parser.add_argument("--positions", type=int, default=50)
+    parser.add_argument("--states", type=int, metavar="ROUNDS")
+    parser.add_argument("--calculix", action="store_true")
+    options = parser.parse_args()
+    found: object
+    if options.pair:
+        found = measure_pair(options.pair, options.positions)
+    elif options.states:
+        found = measure_states(options.states)
+    else:
+        found = measure_calculix()
+    sys.stdout.write(json.dumps(found))
 
 
 if __name__ == "__main__":
