@@ -30,6 +30,9 @@ RATED = {"carrier": 240e3, "hss": -2945.12}
 START_SPEED = -4.8
 STEP = 1.0 / 60e3
 FREQUENCIES = (1e3, 3e3, 6.4e3)
+FULL_NEWTON = "generalized-alpha, full Newton"
+MODIFIED_NEWTON = "generalized-alpha, modified Newton"
+RUNGE_KUTTA = "RK44 of Exudyn"
 
 
 def stiffness_of(gearbox: Gearbox) -> dict[str, np.ndarray]:
@@ -88,17 +91,17 @@ def by_compiled_solver(assembly: Assembly) -> Callable[[int], Cost]:
 def ways(assembly: Assembly, quick: bool) -> list[Way]:
     """All ways, slowest first."""
     share = 4 if quick else 1
-    alpha, runge = "generalized-alpha", "RK4"
+    full, modified, runge = FULL_NEWTON, MODIFIED_NEWTON, "RK4"
     python = "Python function per mesh, numerical jacobian, generalized-alpha"
     return [
-        Way(f"{python}, full Newton", in_exudyn(assembly, "full", "python"), 80 // share, alpha),
-        Way(f"{python}, modified Newton", in_exudyn(assembly, "modified", "python"), 400 // share, alpha),
+        Way(f"{python}, full Newton", in_exudyn(assembly, "full", "python"), 80 // share, full),
+        Way(f"{python}, modified Newton", in_exudyn(assembly, "modified", "python"), 400 // share, modified),
         Way("user-function loads, RK44", in_exudyn(assembly, "RK44", "loads"), 400 // share, runge),
         Way(
             "one GenericODE2, compiled, generalized-alpha, modified Newton",
             in_exudyn(assembly, "modified", "element"),
             4000 // share,
-            alpha,
+            modified,
         ),
         Way("one GenericODE2, compiled, RK44", in_exudyn(assembly, "RK44", "element"), 2000 // share, runge),
         Way("no meshes at all, Exudyn RK44", in_exudyn(assembly, "RK44", "bare"), 2000 // share, ""),
@@ -143,7 +146,7 @@ def shares_of_a_step(assembly: Assembly, rounds: int) -> dict[str, float]:
     bare = {
         "all": assembly,
         "bearings": replace(assembly, connectors=assembly.connectors._replace(bodies=assembly.connectors.bodies[:0])),
-        "meshes": replace(assembly, meshes=type(assembly.meshes)._make(values[:0] for values in assembly.meshes)),
+        "meshes": replace(assembly, meshes=assembly.meshes.one(len(assembly.elements))),
     }
     costs: dict[str, list[float]] = {name: [] for name in bare}
     for _ in range(rounds):
@@ -171,7 +174,8 @@ def states(assembly: Assembly, rpm: float, step: float, method: str) -> tuple[np
     import exudyn_ways
 
     system = exudyn_ways.system_of(assembly, begin.q, begin.v, RATED)
-    return exudyn_ways.trajectory(system, steps, step, "full" if method == "generalized-alpha" else "RK44")
+    solver = {FULL_NEWTON: "full", MODIFIED_NEWTON: "modified", RUNGE_KUTTA: "RK44"}[method]
+    return exudyn_ways.trajectory(system, steps, step, solver)
 
 
 def excitation_amplitudes(assembly: Assembly, rpm: float, step: float, method: str) -> np.ndarray:
@@ -190,7 +194,7 @@ def excitation_amplitudes(assembly: Assembly, rpm: float, step: float, method: s
     return np.abs(2.0 * (window * np.exp(-2j * np.pi * cycle)) @ values) / window.sum()
 
 
-def amplitude_errors(gearbox: Gearbox, quick: bool) -> list[dict[str, Any]]:
+def amplitude_errors(gearbox: Gearbox) -> list[dict[str, Any]]:
     """Error of the overall and of the high-speed DTE at 1, 3 and 6.4 kHz against RK4 at 2.5 us."""
     order = gearbox.mesh_frequencies(math.pi / 30.0)["high_speed"]
     rows = []
@@ -198,7 +202,8 @@ def amplitude_errors(gearbox: Gearbox, quick: bool) -> list[dict[str, Any]]:
         assembly = assemble(gearbox, variant, stiffness_of(gearbox))
         exact = {f: excitation_amplitudes(assembly, f / order, 2.5e-6, "RK4") for f in FREQUENCIES}
         kinds = [("RK4", step) for step in (5e-5, 2.5e-5, STEP, 1.25e-5)]
-        for method, step in kinds if quick else [*kinds, ("RK44 of Exudyn", STEP), ("generalized-alpha", STEP)]:
+        others = [(method, STEP) for method in (RUNGE_KUTTA, FULL_NEWTON, MODIFIED_NEWTON)]
+        for method, step in [*kinds, *others]:
             errors = [excitation_amplitudes(assembly, f / order, step, method) / exact[f] - 1.0 for f in FREQUENCIES]
             say(f"amplitudes: {variant}, {method} {1e6 * step:.4g} us")
             rows.append(
@@ -404,7 +409,7 @@ def measure(quick: bool) -> dict[str, Any]:
         "shares": shares_of_a_step(assembly, rounds),
         "run_up_rounds": 1 if quick else 3,
         "run_ups": run_ups(1, 1.0) if quick else run_ups(3, 30.0),
-        "amplitudes": amplitude_errors(gearbox, quick),
+        "amplitudes": amplitude_errors(gearbox),
         "growth": growth(rounds),
     }
 

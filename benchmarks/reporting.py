@@ -11,8 +11,8 @@ HERE = Path(__file__).parent
 RESULTS = HERE / "results.json"
 PAGE = HERE / "results.md"
 QUOTE = re.compile(r"(<!-- figures of benchmarks/run_all.py: (\w+) -->\n).*?(<!-- end of figures -->)", re.DOTALL)
-QUIET = 0.5
-"""Load average up to which a machine counts as free for a benchmark that needs one core or two."""
+QUIET = 0.1
+"""Cores that others may use on a machine that counts as quiet."""
 
 Results = dict[str, Any]
 
@@ -52,12 +52,14 @@ def duration(seconds: float) -> str:
 
 def circumstances(part: Results) -> str:
     """When and on what a part was measured."""
-    machine, load = part["machine"], part["load_at_start"]
-    kept = "quiet" if load <= QUIET else "busy: other work ran beside it, so wall times are too long"
+    machine, busy = part["machine"], part["cores_busy_before"]
+    others = "" if busy is None else f"; before this part others kept {busy:.2f} cores busy"
+    if busy is not None and busy > QUIET:
+        others += ", so that wall times are too long"
     return (
         f"Measured {part['measured'][:10]} on {machine['cores']} cores ({machine['processor']}), Python "
         f"{machine['python']}, Exudyn {machine['exudyn']}, numba {machine['numba']}, pypardiso {machine['pypardiso']}; "
-        f"load average at the start {load:.2f} ({kept})."
+        f"load average when the command began {part['load_at_start']:.2f}{others}."
     )
 
 
@@ -200,18 +202,18 @@ def way_of(part: Results, name: str) -> Results:
 
 
 def errors_of(part: Results, method: str, step: float, variant: str = "bushing") -> list[float | None]:
-    """Amplitude errors of the overall DTE at the three frequencies; unknown where it was not measured."""
-    for row in part["amplitudes"]:
-        same = row["variant"] == variant and abs(row["step"] / step - 1.0) < 1e-9
-        if same and row["method"] == method:
-            errors: list[float | None] = row["overall"]
-            return errors
-    return [None, None, None]
+    """Amplitude errors of the overall DTE at the three frequencies; None where Exudyn cut the step."""
+    errors: list[float | None] = next(
+        row["overall"]
+        for row in part["amplitudes"]
+        if row["variant"] == variant and row["method"] == method and abs(row["step"] / step - 1.0) < 1e-9
+    )
+    return errors
 
 
 def percent(value: float | None) -> str:
     """Error as shown."""
-    return "-" if value is None else f"{100 * value:.3f} %"
+    return "step cut" if value is None else f"{100 * value:.3f} %"
 
 
 def ways_table(part: Results) -> str:
@@ -228,7 +230,7 @@ def ways_table(part: Results) -> str:
             number(row["ratio"]),
             duration(row["run_up_s"]),
             f"{row['peak_memory_MB']:.0f} MB",
-            percent(errors_of(part, row["method"], part["step"])[-1]),
+            percent(errors_of(part, row["method"], part["step"])[-1]) if row["method"] else "-",
         ]
         for row in part["ways"]
     ]
@@ -400,7 +402,8 @@ def dynamics_section(part: Results) -> str:
             "### Ways to solve the same equations\n",
             f"Step {1e6 * part['step']:.2f} µs for all, in turns in one process; medians of {part['rounds']} rounds, "
             "ratios within a round, µs per step of processor time. Peak memory in a process of its own. Ways with the "
-            "same time integration and step have its amplitude error, measured on one of them.\n",
+            "same time integration and step have its amplitude error, measured on one of them; "
+            "step cut: Newton failed, and Exudyn went on with half the step.\n",
             ways_table(part),
             ways_bounds(part),
             "### Run-ups with results stored at 20 kHz\n",
@@ -448,7 +451,8 @@ def in_short(results: Results) -> str:
     curves = [row["curve_s"] for row in tables["pairs"]]
     calculix = tables["calculix"]
     errors = [errors_of(dynamics, "RK4", row["step"], row["variant"])[-1] or 0.0 for row in (rigid, bushing)]
-    loads = [part["load_at_start"] for part in (startup, tables, dynamics)]
+    parts = startup, tables, dynamics
+    load, busy = (max(part[key] or 0.0 for part in parts) for key in ("load_at_start", "cores_busy_before"))
     return "\n".join(
         [
             table(
@@ -475,8 +479,8 @@ def in_short(results: Results) -> str:
                     ["`exugear --help`", duration(start_of(startup, "--help")["wall_s"])],
                 ],
             ),
-            f"Two cores ({dynamics['machine']['processor']}), load average at the start of each measurement "
-            f"{min(loads):.2f} to {max(loads):.2f}. All of it, what bounds it, and growth with planets, stages and "
+            f"Two cores ({dynamics['machine']['processor']}), load average at the start {load:.2f}, others kept up to "
+            f"{busy:.2f} cores busy. All of it, what bounds it, and growth with planets, stages and "
             "table size: [benchmarks/results.md](benchmarks/results.md).\n",
         ]
     )

@@ -1,6 +1,6 @@
 """All benchmarks by one command, and the tables made of them.
 
-    make benchmarks                              # all, about seven minutes on two free cores
+    make benchmarks                              # all, about eight minutes on two free cores
     python benchmarks/run_all.py --quick         # shows in two minutes that everything runs; writes nothing
     python benchmarks/run_all.py --part startup  # measures one part again, keeps the others
     python benchmarks/run_all.py --render        # makes the tables anew of what is stored
@@ -24,7 +24,7 @@ from typing import Any
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import reporting
-from timing import ROOT, load, machine, say
+from timing import ROOT, cores_busy, load, machine, say
 
 
 def measure_dynamics(quick: bool) -> dict[str, Any]:
@@ -55,14 +55,15 @@ PARTS: dict[str, Callable[[bool], dict[str, Any]]] = {
 }
 
 
-def measure(name: str, quick: bool) -> dict[str, Any]:
-    """Measure one part, with the load of the machine before it and what it took."""
-    before, begin = load(), time.perf_counter()
+def measure(name: str, quick: bool, at_start: float) -> dict[str, Any]:
+    """Measure one part, with what else the machine did before it and what it took."""
+    busy, begin = cores_busy(), time.perf_counter()
     found = PARTS[name](quick)
     now = datetime.now(UTC).isoformat(timespec="seconds")
     return {
         "measured": now,
-        "load_at_start": before,
+        "load_at_start": at_start,
+        "cores_busy_before": busy,
         "took_s": round(time.perf_counter() - begin, 1),
         "machine": machine(),
         **found,
@@ -98,10 +99,10 @@ def main() -> int:
     if options.render:
         render()
         return 0
-    results, failed = ({} if options.quick else reporting.stored()), []
+    results, failed, at_start = ({} if options.quick else reporting.stored()), [], load()
     for name in [options.part] if options.part else PARTS:
         try:
-            results[name] = measure(name, options.quick)
+            results[name] = measure(name, options.quick, at_start)
         except Exception as error:  # whatever stops one part must not lose the others
             say(f"{name} failed: {type(error).__name__}: {error}")
             failed.append(name)

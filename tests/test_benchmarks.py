@@ -62,5 +62,6 @@ def test_every_part_says_what_it_ran_on(results: dict) -> None:
     assert set(results) == {"startup", "tables", "dynamics"}
     for part in results.values():
         assert part["load_at_start"] >= 0.0
+        assert part["cores_busy_before"] is None or part["cores_busy_before"] >= 0.0
         assert part["took_s"] > 0.0
         assert part["machine"]["cores"] >= 1
