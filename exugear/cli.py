@@ -34,10 +34,16 @@ if TYPE_CHECKING:
 
     from exugear.gearbox import Gearbox, PairSpec
     from exugear.modes import Modes
+    from exugear.reference import ReferenceOrder
     from exugear.runup import Progress as RunProgress
     from exugear.runup import Run
     from exugear.tables import TableOrder
+    from fe_ste.newton import Iteration
+    from fe_ste.nonlinear_table import NonlinearTable
     from fe_ste.table import MeshTable
+
+#: Fewer positions of the mesh cycle would not show the harmonics that dynamics ask of a table.
+_LEAST_TABLE_POSITIONS = 8
 
 app = typer.Typer(
     help="Transmission error of gear pairs by finite elements, and gearbox dynamics in Exudyn.",
@@ -87,9 +93,10 @@ InertiasOption = Annotated[
 
 
 class Method(StrEnum):
-    """How the teeth deflect: by condensed finite elements."""
+    """How the teeth deflect: by condensed finite elements, or by the full non-linear analysis they are checked by."""
 
     superelement = "superelement"
+    nonlinear = "nonlinear"
 
 
 def main() -> None:
@@ -140,9 +147,13 @@ def ste(
     ] = None,
     positions: Annotated[
         int | None,
-        typer.Option(min=8, max=2000, help="Positions of the mesh cycle. (default: as the file says, 50)"),
+        typer.Option(
+            min=1, max=2000, help="Positions of the mesh cycle. (default: as the file says, 50; nonlinear: 10)"
+        ),
     ] = None,
-    method: Annotated[Method, typer.Option(help="How the teeth deflect.")] = Method.superelement,
+    method: Annotated[
+        Method, typer.Option(help="How the teeth deflect; nonlinear takes a minute or two a position.")
+    ] = Method.superelement,
     grid: Annotated[
         bool,
         typer.Option("--grid", help="Over load, centre distance and misalignment too, with the axes of the file."),
@@ -152,12 +163,22 @@ def ste(
 ) -> None:
     """Compute the static transmission error of the gear pairs, with pictures.
 
-    Tables already there are kept if they were computed from the same input.
+    Tables already there are kept if they were computed from the same input. Those of the method nonlinear lie beside
+    the others and serve to check them; dynamics do not use them.
     """
     with exit_codes():
         from exugear.tables import draw_curves, stored_tables
 
         gearbox = read_gearbox(case)
+        if method is Method.nonlinear:
+            if grid:
+                raise BadInputError("--grid: the method nonlinear computes the static state alone; leave --grid out")
+            _compute_references(gearbox, case, out, mesh or [], positions, as_json)
+            return
+        if positions is not None and positions < _LEAST_TABLE_POSITIONS:
+            raise BadInputError(
+                f"--positions {positions}: a table for dynamics needs at least {_LEAST_TABLE_POSITIONS}"
+            )
         orders, folder = _order_tables(gearbox, case, out, mesh or [], positions, grid)
         with _time_noted(folder, "tables of transmission error"):
             tables = _fill_tables(orders)
@@ -312,6 +333,57 @@ def _order_tables(
         elif order.replaces:
             note(order.replaces)
     return orders, folder
+
+
+def _compute_references(
+    gearbox: Gearbox, case: Path, out: Path | None, names: list[str], positions: int | None, as_json: bool
+) -> None:
+    """Run the reference analysis of the pairs and report; each position is kept as soon as it is solved."""
+    from exugear.gearbox import CaseError
+    from exugear.reference import order_references, summarise_reference
+    from exugear.results import keep_case
+
+    folder = out or Path("results") / case.resolve().parent.name
+    try:
+        orders = order_references(gearbox, folder, names, positions)
+    except CaseError as error:
+        raise BadInputError(error) from error
+    make_results_folder(folder)
+    keep_case(gearbox, folder)
+    tables = {}
+    with _time_noted(folder, "reference analysis"), progress_bar() as bar:
+        task = bar.add_task("", total=sum(order.wanted.positions for order in orders))
+        for order in orders:
+            tables[order.name] = _fill_reference(order, bar, task)
+    summaries = [summarise_reference(order, tables[order.name]) for order in orders]
+    if as_json:
+        print_json({"case": str(case), "tables": summaries})
+    else:
+        print_table("Static transmission error, non-linear finite elements", [_ste_row(row) for row in summaries])
+        results.print(f"Tables in {folder / 'tables'}", highlight=False)
+    failures = [f"{name}: {line}" for name, table in tables.items() for line in table.failures]
+    if failures:
+        raise FailedError("\n".join(["positions that are not solved:", *failures]))
+
+
+def _fill_reference(order: ReferenceOrder, bar: Progress, task: TaskID) -> NonlinearTable:
+    from fe_ste.gears import GeometryError
+
+    before = bar.tasks[task].completed
+
+    def at_iteration(done: int, of: int, iteration: Iteration | None) -> None:
+        interruption.check()
+        text = f"{order.name}: {done} of {of} positions"
+        if iteration is not None:
+            text += f", {100 * iteration.load:.3g} % of the load, iteration {iteration.number}"
+        bar.update(task, completed=before + done, description=text)
+
+    try:
+        return order.fill(at_iteration)
+    except GeometryError as error:
+        raise BadInputError(f"pairs.{order.name}: {error}") from error
+    except OSError as error:
+        raise FailedError(f"{order.name}: {error}") from error
 
 
 def _fill_tables(orders: list[TableOrder]) -> dict[str, MeshTable]:

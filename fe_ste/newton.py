@@ -219,54 +219,48 @@ class _Evaluation:
 
 @dataclass
 class _Numbering:
-    """Places of the element entries in the matrix of the free unknowns; the hub is the last unknown."""
+    """Places of the bricks' node pairs in the matrix, and which unknowns are free; the hub is the last unknown."""
 
     model: ContactModel
     free: IntArray = field(init=False)
     count: int = field(init=False)
-    _pattern: SparseMatrix = field(init=False)
     _place: IntArray = field(init=False)
-    _taken: BoolArray = field(init=False)
+    _columns: IntArray = field(init=False)
+    _starts: IntArray = field(init=False)
     _hub_elements: IntArray = field(init=False)
 
     def __post_init__(self) -> None:
-        """Sort out which displacements are unknown, and where their entries go."""
-        bricks, hub = self.model.bricks, self.model.hub
-        bound = self.model.held.copy()
+        """Sort out which displacements are unknown, and where the entries of the bricks go."""
+        nodes, hub, size = self.model.bricks.nodes, self.model.hub, len(self.model.bricks.points)
+        bound, on_hub = self.model.held.copy(), np.zeros(size, dtype=np.bool_)
         if hub is not None:
             bound[hub.nodes] = True
+            on_hub[hub.nodes] = True
         self.free = np.flatnonzero(~bound.ravel())
         self.count = len(self.free)
-        number = np.full(bound.size, -1, dtype=np.int64)
-        number[self.free] = np.arange(self.count)
-        unknowns = number[bricks.unknowns]
-        rows, columns = np.repeat(unknowns, 24, axis=1).ravel(), np.tile(unknowns, (1, 24)).ravel()
-        self._taken = (rows >= 0) & (columns >= 0)
-        key = rows[self._taken] * self.count + columns[self._taken]
-        unique, self._place = np.unique(key, return_inverse=True)
-        pattern_rows = unique // self.count
-        pointers = np.searchsorted(pattern_rows, np.arange(self.count + 1))
-        self._pattern = scipy.sparse.csr_matrix(
-            (np.zeros(len(unique)), (unique % self.count).astype(np.int32), pointers.astype(np.int32)),
-            shape=(self.count, self.count),
-        )
-        on_hub = np.zeros(len(bricks.points), dtype=np.bool_)
-        if hub is not None:
-            on_hub[hub.nodes] = True
-        self._hub_elements = np.flatnonzero(on_hub[bricks.nodes].any(axis=1))
+        self._hub_elements = np.flatnonzero(on_hub[nodes].any(axis=1))
+        pairs, self._place = np.unique(nodes[:, :, None] * size + nodes[:, None, :], return_inverse=True)
+        self._columns = pairs % size
+        self._starts = np.searchsorted(pairs // size, np.arange(size + 1))
 
     def matrix(self, tangent: BrickTangent, motion: FloatArray, curvature: float) -> SparseMatrix:
         """Tangent matrix of the free unknowns, and of the hub where there is one.
 
         ``motion`` (n, 3) are the displacements per unit of the hub's, ``curvature`` its geometric stiffness.
         """
-        stiffness = self._pattern.copy()
-        stiffness.data = summed(self._place, tangent.stiffness.ravel()[self._taken], len(stiffness.data))
+        blocks = np.empty((len(self._columns), 3, 3))
+        by_node = tangent.stiffness.reshape(-1, 8, 3, 8, 3)
+        for a in range(3):
+            for b in range(3):
+                blocks[:, a, b] = summed(self._place, by_node[:, :, a, :, b], len(blocks))
+        size = motion.size
+        whole: SparseMatrix = scipy.sparse.bsr_matrix((blocks, self._columns, self._starts), shape=(size, size)).tocsr()
+        stiffness: SparseMatrix = whole[self.free][:, self.free]
         if self.model.hub is None:
             return stiffness
         unknowns = self.model.bricks.unknowns[self._hub_elements]
         forces = np.einsum("eij,ej->ei", tangent.stiffness[self._hub_elements], motion.ravel()[unknowns])
-        coupling = summed(unknowns, forces, motion.size)
+        coupling = summed(unknowns, forces, size)
         column: SparseMatrix = scipy.sparse.csr_matrix(coupling[self.free][:, None])
         corner: SparseMatrix = scipy.sparse.csr_matrix([[float(motion.ravel() @ coupling) + curvature]])
         return scipy.sparse.bmat([[stiffness, column], [column.T, corner]], format="csr")

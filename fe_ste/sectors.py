@@ -47,18 +47,18 @@ class ContactMesh:
     Examples
     --------
     >>> ContactMesh().refined(1.5).layers
-    12
+    9
     """
 
-    layers: int = 8
-    contact_elements: float = 6.0
+    layers: int = 6
+    contact_elements: float = 5.0
     band: float = 1.6
-    growth: float = 0.45
-    thickness: int = 11
+    growth: float = 0.6
+    thickness: int = 9
     fillet: int = 4
-    root: int = 4
-    rim: int = 12
-    far_flank: int = 8
+    root: int = 3
+    rim: int = 10
+    far_flank: int = 6
 
     def __post_init__(self) -> None:
         """Refuse what no mesh can have; the counts are checked with the mesh."""
@@ -104,8 +104,9 @@ class OpenSector:
 
 @dataclass(frozen=True)
 class _Place:
-    """Where a gear of a pair stands: loaded side, angle of tooth 0, sense of the tooth numbers, axis."""
+    """Where a gear of a pair stands: which it is, loaded side, angle of tooth 0, sense of the tooth numbers, axis."""
 
+    number: int
     gear: Gear
     side: int
     angle: float
@@ -115,11 +116,11 @@ class _Place:
 
 def _places(pair: GearPair, pmc: float) -> tuple[_Place, _Place]:
     one, two = pair.pinion, pair.gear
-    first = _Place(one, 1, pmc * one.angular_pitch - one.half_angle(pair.pinion_working_radius), 1, 0.0)
+    first = _Place(0, one, 1, pmc * one.angular_pitch - one.half_angle(pair.pinion_working_radius), 1, 0.0)
     half_angle, rolled = two.half_angle(pair.gear_working_radius), pmc * two.angular_pitch
     if two.internal:
-        return first, _Place(two, -1, rolled + half_angle, 1, -pair.centre_distance)
-    return first, _Place(two, 1, math.pi - rolled - half_angle, -1, pair.centre_distance)
+        return first, _Place(1, two, -1, rolled + half_angle, 1, -pair.centre_distance)
+    return first, _Place(1, two, 1, math.pi - rolled - half_angle, -1, pair.centre_distance)
 
 
 def placed_sectors(pair: GearPair, settings: MeshSettings, teeth: int, pmc: float) -> tuple[OpenSector, OpenSector]:
@@ -168,18 +169,16 @@ def refined_sectors(
     return sectors[0], sectors[1]
 
 
-def contact_line_roll(pair: GearPair, gear: Gear, tooth: int, pmc: float, axial: FloatArray) -> FloatArray:
-    """Roll angle on `gear` of the rigid contact line of a tooth pair at axial positions (m), rad.
+def contact_line_rolls(pair: GearPair, tooth: int, pmc: float, axial: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Roll angles on gear 1 and gear 2 of the rigid contact line of a tooth pair at axial positions (m), rad.
 
-    Below zero where the line lies beyond the base circle.
+    Below zero where the line lies beyond a base circle.
     """
     one = pair.pinion
     twist = math.tan(one.base_helix_angle) / one.base_radius
     roll = math.tan(pair.working_pressure_angle) + (pmc + tooth) * one.angular_pitch + twist * axial
-    if gear is one:
-        return roll
     tangent, length = pair.base_tangent_length, one.base_radius * roll
-    return np.asarray((tangent + length if pair.gear.internal else tangent - length) / gear.base_radius)
+    return roll, (tangent + length if pair.gear.internal else tangent - length) / pair.gear.base_radius
 
 
 def _refined_tooth(
@@ -187,7 +186,7 @@ def _refined_tooth(
 ) -> SectorMesh:
     gear = place.gear
     axial = np.linspace(-gear.face_width / 2, gear.face_width / 2, settings.layers + 1)
-    roll = np.maximum(contact_line_roll(pair, gear, tooth, pmc, axial), 0.0)
+    roll = np.maximum(contact_line_rolls(pair, tooth, pmc, axial)[place.number], 0.0)
     form, tip = ((radius / gear.base_radius) ** 2 - 1.0 for radius in (gear.form_radius, gear.tip_radius))
     length = gear.base_radius * abs(tip - form) / 2.0
     place_on_flank = (roll**2 - form) / (tip - form)

@@ -24,6 +24,9 @@ from exugear.gearbox import Gearbox
 from exugear.tables import order_tables
 from fe_ste.contact import ContactSettings
 from fe_ste.hexmesh import MeshSettings
+from fe_ste.nonlinear import NonlinearSettings
+from fe_ste.nonlinear_table import NonlinearInput
+from fe_ste.sectors import ContactMesh
 from fe_ste.table import MeshTable, TableInput
 
 CASE = Path(__file__).parents[2] / "cases" / "grc750" / "gearbox.toml"
@@ -216,7 +219,9 @@ def test_a_damaged_table_is_computed_again(spur_case, tmp_path):
     ("options", "said"),
     [
         (["--mesh", "bevel"], "'bevel'; the pairs are spur"),
-        (["--positions", "3"], "greater than or equal to 8"),
+        (["--positions", "3"], "--positions 3: a table for dynamics needs at least 8"),
+        (["--method", "nonlinear", "--grid"], "leave --grid out"),
+        (["--method", "nonlinear", "--mesh", "bevel"], "'bevel'; the pairs are spur"),
         (["--method", "guess"], "superelement"),
     ],
 )
@@ -227,6 +232,27 @@ def test_ste_with_bad_options_writes_nothing(spur_case, tmp_path, options, said)
     assert said in outcome.stderr
     assert outcome.stdout == ""
     assert not out.exists()
+
+
+def test_the_nonlinear_method_writes_a_table_of_its_own_and_goes_on_from_it(spur_case, tmp_path, monkeypatch):
+    mesh = ContactMesh(layers=3, contact_elements=3, growth=1.0, thickness=4, fillet=2, root=1, rim=3, far_flank=4)
+    coarse = functools.partial(NonlinearInput, settings=NonlinearSettings(teeth=3, mesh=mesh))
+    monkeypatch.setattr("exugear.reference.NonlinearInput", coarse)
+    command = ("ste", spur_case, "--method", "nonlinear", "--positions", 1, "--out", tmp_path)
+    outcome = exugear(*command, "--json")
+    assert outcome.exit_code == 0, outcome.stderr
+    (summary,) = json.loads(outcome.stdout)["tables"]
+    assert summary["method"] == "nonlinear" and summary["not_converged"] == 0
+    path = tmp_path / "tables" / "spur-nonlinear.nc"
+    assert Path(summary["table"]) == path and path.exists()
+    assert not (tmp_path / "tables" / "spur.nc").exists()
+    # Steel teeth: 14 to 20 N/(mm um) by ISO 6336, softer on an open sector.
+    assert 5e9 < summary["mesh_stiffness_mean_N_per_m"] / 15e-3 < 25e9
+    before = path.stat().st_mtime_ns
+    again = exugear(*command)
+    assert again.exit_code == 0 and "1/1" in again.stdout
+    assert path.stat().st_mtime_ns == before
+    assert not order_tables(Gearbox.from_toml(spur_case), tmp_path)[0].stored
 
 
 def test_a_results_folder_that_is_a_file_is_told_before_the_work(spur_case):

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from fe_ste.elasticity import brick_gradients
-from fe_ste.gears import GearPair
+from fe_ste.gears import Gear, GearPair
 from fe_ste.hexmesh import MeshSettings
-from fe_ste.sectors import ContactMesh, OpenSector, contact_line_roll, placed_sectors, refined_sectors
+from fe_ste.sectors import ContactMesh, OpenSector, contact_line_rolls, placed_sectors, refined_sectors
 
 UNIFORM = MeshSettings(layers=3, flank=6, thickness=2, fillet=1, root=1, rim=6)
 COARSE = ContactMesh(layers=4, contact_elements=3, growth=0.8, thickness=5, fillet=2, root=2, rim=4, far_flank=4)
@@ -43,34 +43,39 @@ def test_flanks_stand_in_the_conjugate_position(any_grc_pair, refined):
 
 def test_contact_lines_of_both_gears_meet_in_the_line_of_action(any_grc_pair):
     pair, axial = any_grc_pair, np.linspace(-0.05, 0.05, 5)
-    one, two = (contact_line_roll(pair, gear, 1, 0.2, axial) for gear in (pair.pinion, pair.gear))
+    one, two = contact_line_rolls(pair, 1, 0.2, axial)
     # In the frame of the line of action: the distance of the two tangent points is a sin(alpha_w).
     sign = -1 if pair.gear.internal else 1
     total = one * pair.pinion.base_radius + sign * two * pair.gear.base_radius
     assert np.allclose(total, sign**2 * pair.centre_distance * math.sin(pair.working_pressure_angle) * sign)
 
 
-def test_flank_nodes_gather_about_the_contact_line_of_each_layer(sun_planet):
-    pmc = 0.1
-    _, two = refined_sectors(sun_planet, COARSE, 3, pmc, HALF_WIDTH)
-    roll, axial, teeth = roll_on_gear_2(sun_planet, two, pmc)
-    on_middle = np.abs(teeth) < 0.5
-    for z in np.unique(np.round(axial[on_middle], 9)):
-        here = np.sort(roll[on_middle & (np.abs(axial - z) < 1e-8)])
-        arc = sun_planet.gear.base_radius * here**2 / 2
-        line = (
-            sun_planet.gear.base_radius
-            * contact_line_roll(sun_planet, sun_planet.gear, 0, pmc, np.array([z]))[0] ** 2
-            / 2
-        )
-        if not arc[0] < line < arc[-1]:
-            continue
-        steps, middles = np.diff(arc), (arc[1:] + arc[:-1]) / 2
-        near = np.abs(middles - line) < 1.3 * HALF_WIDTH
-        # Three elements across the contact width of twice the half width, and no larger ones nearby.
-        assert near.sum() >= 3
-        assert steps[near].max() < 1.3 * 2 * HALF_WIDTH / 3
-        assert steps.max() > 3 * steps[near].max()
+TWIN = Gear(name="twin", teeth=50, normal_module=3e-3, face_width=20e-3, held_diameter=100e-3)
+
+
+@pytest.mark.parametrize("name", ["sun_planet", "ring_planet", "twins"])
+def test_flank_nodes_of_gear_2_gather_about_the_contact_line_of_each_layer(name, request):
+    # A gear that meshes with its like must not be taken for gear 1.
+    twins = GearPair(name="twins", pinion=TWIN, gear=TWIN, centre_distance=150e-3)
+    pair = twins if name == "twins" else request.getfixturevalue(name)
+    pmc, base, checked = 0.2, pair.gear.base_radius, 0
+    sector = refined_sectors(pair, COARSE, 3, pmc, HALF_WIDTH)[1]
+    roll, axial, tooth = roll_on_gear_2(pair, sector, pmc)
+    tooth = np.round(tooth) * (1 if pair.gear.internal else -1)  # teeth of an external gear 2 count backwards
+    for number in (-1, 0):
+        for z in np.unique(np.round(axial, 9)):
+            arc = np.sort(base * roll[(tooth == number) & (np.abs(axial - z) < 1e-8)] ** 2 / 2)
+            line = base * contact_line_rolls(pair, number, pmc, np.array([z]))[1][0] ** 2 / 2
+            steps, middles = np.diff(arc), (arc[1:] + arc[:-1]) / 2
+            near = np.abs(middles - line) < 1.3 * HALF_WIDTH
+            if not arc[0] + 2 * HALF_WIDTH < line < arc[-1] - 2 * HALF_WIDTH:
+                continue
+            checked += 1
+            # Three elements across the contact width of twice the half width, and no larger ones nearby.
+            assert near.sum() >= 3
+            assert steps[near].max() < 1.3 * 2 * HALF_WIDTH / 3
+            assert steps.max() > 3 * steps[near].max()
+    assert checked >= 5
 
 
 def test_refined_sectors_are_one_sound_mesh(any_grc_pair):
