@@ -142,6 +142,52 @@ def plot_ste_curves(datasets: Mapping[str, xr.Dataset], path: str | Path | None 
         return finish_figure(figure, path)
 
 
+def plot_ripple(
+    datasets: Mapping[str, xr.Dataset], path: str | Path | None = None, design: Mapping[str, float] | None = None
+) -> Figure:
+    """Draw the peak-to-peak transmission error of one or several tables over the load.
+
+    Parameters
+    ----------
+    datasets : mapping of str to xarray.Dataset
+        Title of the curve and table: ``ste`` (m) over ``pmc`` and ``torque``.
+    path : path-like, optional
+        Where to write the picture.
+    design : mapping of str to float, optional
+        Torque (N m) for which a curve's flanks were designed: marked on it.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    ValueError
+        If there is nothing to draw, or a table is swept over more than position and load.
+    """
+    if not datasets:
+        raise ValueError("plot_ripple: no dataset given")
+    with drawing_style():
+        figure = new_figure(5.0, 3.2)
+        panel = figure.subplots()
+        for (name, dataset), colour in zip(datasets.items(), itertools.cycle(COLOURS), strict=False):
+            torque = dataset["torque"].to_numpy().astype(np.float64)
+            ripple = np.array([_cycle(_at_load(dataset, t), "ste", 1e6).peak_to_peak for t in range(len(torque))])
+            panel.plot(torque, ripple, color=colour, label=name)
+            if design and name in design:
+                panel.plot(design[name], np.interp(design[name], torque, ripple), "o", color=colour)
+        panel.set_xlabel("torque on gear 1 / N m")
+        panel.set_ylabel("peak-to-peak STE / µm")
+        panel.set_ylim(bottom=0.0)
+        panel.set_xlim(left=0.0)
+        panel.legend()
+        return finish_figure(figure, path)
+
+
+def _at_load(dataset: xr.Dataset, number: int) -> xr.Dataset:
+    return single_load_case(dataset.isel(torque=[number]))
+
+
 @dataclass(frozen=True)
 class _Cycle:
     """A quantity over the mesh cycle, in the unit of the picture."""

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from fe_ste.plots import plot_load_share, plot_ste_curves, single_load_case
+from fe_ste.plots import plot_load_share, plot_ripple, plot_ste_curves, single_load_case
 
 POSITIONS = np.arange(50) / 50
 
@@ -130,3 +130,13 @@ def test_swept_tables_are_refused_with_the_dimension():
 def test_missing_data_is_named(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+def test_ripple_over_load_shows_peak_to_peak_values_and_marks_the_design_load():
+    loads = [table(swing=swing).assign_coords(torque=[load]) for load, swing in ((100.0, 2e-6), (200.0, 5e-6))]
+    figure = plot_ripple({"pair": xr.concat(loads, "torque")}, design={"pair": 150.0})
+    curve, mark = figure.axes[0].lines
+    np.testing.assert_allclose(curve.get_xydata(), [[100.0, 2.0], [200.0, 5.0]])
+    np.testing.assert_allclose(mark.get_xydata(), [[150.0, 3.5]])
+    with pytest.raises(ValueError, match="no dataset"):
+        plot_ripple({})

@@ -1,0 +1,147 @@
+"""What a table over load, centre distance and misalignment costs: each GRC pair from nothing, in a process of its own.
+
+    python benchmarks/grid.py [--pairs NAME ...]
+
+Writes ``grid.json`` and ``grid.md`` beside this file. The grid is the case's default one, shared by two worker
+processes; some of its states are also solved alone, for time and result. Compiled kernels are in their cache on disk.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import resource
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from fe_ste.table import TableInput
+
+HERE = Path(__file__).parent
+CASE = HERE.parent / "cases" / "grc750" / "gearbox.toml"
+PAIRS = ("sun_planet", "ring_planet", "intermediate", "high_speed")
+#: Every so many states one is solved alone.
+ALONE_EVERY = 251
+
+
+def measure(name: str) -> dict[str, float | int | str]:
+    """Compute one pair's grid in this process and two workers, and some of its states alone."""
+    from exugear.gearbox import Gearbox
+    from exugear.tables import wanted_table
+    from fe_ste.table import MeshTable, prepared_compliance
+
+    gearbox = Gearbox.from_toml(CASE)
+    wanted = wanted_table(gearbox, name, gearbox.ste.positions, grid=True)
+    started = time.perf_counter()
+    prepared_compliance(wanted)  # kept: the table takes it from there
+    offline = time.perf_counter()
+    processor = time.process_time()
+    data = MeshTable.compute(wanted).dataset
+    finished = time.perf_counter()
+    workers = resource.getrusage(resource.RUSAGE_CHILDREN)
+    states = data["ste"].size
+    alone_ms, deviation = solved_alone(wanted, data)
+    return {
+        "pair": name,
+        "states": states,
+        "unsolved": int((~data["converged"]).sum()),
+        "offline_s": offline - started,
+        "grid_s": finished - offline,
+        "total_s": finished - started,
+        "state_ms": 1e3 * (finished - offline) / states,
+        "state_processor_ms": 1e3 * (time.process_time() - processor + workers.ru_utime + workers.ru_stime) / states,
+        "alone_ms": alone_ms,
+        "largest_deviation": deviation,
+        "worker_memory_MB": workers.ru_maxrss / 1024,
+    }
+
+
+def solved_alone(wanted: TableInput, data: xr.Dataset) -> tuple[float, float]:
+    """Processor time of a state that no other helps, ms, and the largest relative deviation of its result."""
+    import math
+
+    import numpy as np
+
+    from fe_ste.ste import contact_state
+    from fe_ste.table import prepared_compliance
+    from fe_ste.threads import one_dense_thread
+
+    compliance = prepared_compliance(wanted)
+    cosine = math.cos(wanted.pair.pinion.base_helix_angle)
+    deviation, started, numbers = 0.0, time.process_time(), range(0, data["ste"].size, ALONE_EVERY)
+    for number in numbers:
+        p, t, c, m = (int(i) for i in np.unravel_index(number, data["ste"].shape))
+        placed = compliance.at_centre_distance(wanted.centre_distance[c])
+        with one_dense_thread():
+            state = contact_state(placed, wanted.torque[t], p / wanted.positions, wanted.misalignment[m])
+        stored = float(data["ste"][p, t, c, m])
+        deviation = max(deviation, abs(state.solution.approach / cosine / stored - 1.0))
+    return 1e3 * (time.process_time() - started) / len(numbers), deviation
+
+
+def as_markdown(results: dict[str, object]) -> str:
+    """Table of the results."""
+    rows = [
+        "# Cost of tables over load, centre distance and misalignment",
+        "",
+        f"Written by `python benchmarks/grid.py`. {results['machine']}; load average at the start "
+        f"{results['load_average']:.1f}, at the end {results['load_average_end']:.1f}. Default axes, 2 worker "
+        "processes; kernels compiled before.",
+        "",
+        "| pair | states | both gears once s | grid s | all s | per state ms | processor ms per state | alone ms | "
+        "largest deviation from alone | worker's memory MB |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    pairs = results["pairs"]
+    assert isinstance(pairs, list)
+    for entry in pairs:
+        rows.append(
+            "| {pair} | {states} | {offline_s:.1f} | {grid_s:.1f} | {total_s:.1f} | {state_ms:.1f} | "
+            "{state_processor_ms:.1f} | {alone_ms:.1f} | {largest_deviation:.1e} | {worker_memory_MB:.0f} |".format(
+                **entry
+            )
+        )
+    rows += [
+        "",
+        "What bounds it: half of a state's time fills the compliance of the cells, shared by its misalignments, half "
+        "factorises the cells in contact, four times a state. Processor time per state includes the start of the "
+        "workers.",
+        "",
+    ]
+    return "\n".join(rows)
+
+
+def main() -> None:
+    """Run the pairs and write the results."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--pairs", nargs="+", choices=PAIRS, default=PAIRS)
+    parser.add_argument("--pair", choices=PAIRS, help="measure one pair in this process and print it")
+    arguments = parser.parse_args()
+    if arguments.pair:
+        sys.stdout.write(json.dumps(measure(arguments.pair)))
+        return
+    load = os.getloadavg()[0]
+    command = [sys.executable, __file__, "--pair"]
+    pairs = [
+        json.loads(subprocess.run([*command, name], check=True, capture_output=True, text=True).stdout)
+        for name in arguments.pairs
+    ]
+    results = {
+        "machine": f"{os.cpu_count()} cores ({platform.machine()}), Python {platform.python_version()}",
+        "load_average": load,
+        "load_average_end": os.getloadavg()[0],
+        "pairs": pairs,
+    }
+    (HERE / "grid.json").write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+    (HERE / "grid.md").write_text(as_markdown(results), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
