@@ -5,7 +5,8 @@ from the same assembly, so they solve the same equations in the same coordinates
 
 Bodies with six coordinates come first, in the order of the file, then those with their spin alone. In the
 variant `rigid` every body has its spin alone: ideal joints leave nothing else, and a planet rides on its
-carrier's spin.
+carrier's spin. In the variant `flexible` elastic bodies follow, with six coordinates at each seat and their inner
+amplitudes: a gear or a bearing sits on a seat as it would on a rigid body.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
@@ -22,6 +24,13 @@ from numpy.typing import NDArray
 
 from exugear import bearings as rolling
 from exugear.casefile import CatalogueSection, StiffnessSection
+from exugear.elastic import (
+    ElasticArrays,
+    add_elastic_forces,
+    no_elastic,
+    scratch_for,
+    set_elastic_accelerations,
+)
 from exugear.gearbox import Bearing, Body, Gearbox
 from exugear.kernels import (
     STATE_SIZE,
@@ -38,11 +47,14 @@ from exugear.kernels import (
     gear_positions,
     mesh_state,
 )
-from exugear.mesh_element import Angles, MeshData, MeshElement, mesh_elements, node_position, pack
+from exugear.mesh_element import Angles, MeshData, MeshElement, mesh_elements, node_position, pack, seat_key
+from exugear.shafts import ElasticShaft, elastic_names, elastic_shafts
 
 Floats = NDArray[np.float64]
-Variant = Literal["rigid", "bushing", "jointed"]
+Variant = Literal["rigid", "bushing", "flexible", "jointed"]
 VARIANTS: tuple[str, ...] = get_args(Variant)
+ON_BEARINGS = ("bushing", "flexible")
+"""Variants whose bodies sit on bearings."""
 
 
 class VariantError(ValueError):
@@ -57,12 +69,15 @@ class Assembly:
     ----------
     gearbox, variant, law, inertias : what was assembled
     bodies : moving bodies in the order of their coordinates
-    coordinates : the six state indices of each body by name, -1 where there is none
+    coordinates : the six state indices of each body by name, -1 where there is none; of an elastic body those of
+        its main seat, and those of each seat under `exugear.mesh_element.seat_key`
     size : number of coordinates
     elements, meshes : mesh elements and their arrays
     connector_names, connectors : bearings (none in the variant `rigid`)
     spring_names, springs : torsional couplings
-    inertia : mass properties; in the variant `rigid` the planets' orbit is in the carrier's
+    inertia : mass properties of rigid bodies; in the variant `rigid` the planets' orbit is in the carrier's
+    shafts : elastic bodies by name, in the order of their coordinates
+    elastic : their matrices
     motions : (size, n) motions that are free; the identity, but for the law `rigid` the rolling ones
     """
 
@@ -80,11 +95,22 @@ class Assembly:
     spring_names: tuple[str, ...]
     springs: SpringArrays
     inertia: InertiaArrays
+    shafts: Mapping[str, ElasticShaft]
+    elastic: ElasticArrays
     motions: Floats
 
     def has_six(self, body: Body) -> bool:
-        """Tell whether a body has all six coordinates."""
-        return self.coordinates[body.name][0] >= 0
+        """Tell whether a body is rigid with all six coordinates."""
+        return self.coordinates[body.name][0] >= 0 and body.name not in self.shafts
+
+    @cached_property
+    def shaft_slices(self) -> dict[str, slice]:
+        """Coordinates of each elastic body."""
+        begin, found = self.size - sum(shaft.reduced.size for shaft in self.shafts.values()), {}
+        for name, shaft in self.shafts.items():
+            found[name] = slice(begin, begin + shaft.reduced.size)
+            begin += shaft.reduced.size
+        return found
 
     @cached_property
     def spin(self) -> dict[str, int]:
@@ -121,6 +147,7 @@ class Assembly:
         add_mesh_forces(q, v, self.meshes if meshes is None else meshes, f)
         add_connector_forces(q, v, self.connectors, f)
         add_spring_forces(q, v, self.springs, f)
+        add_elastic_forces(q, v, self.elastic, scratch_for(self.elastic), f)
         return f + self.weight
 
     @cached_property
@@ -131,6 +158,9 @@ class Assembly:
         for body in self.bodies:
             if self.has_six(body):
                 f[list(self.coordinates[body.name][:3])] = body.mass * acceleration
+        for name, place in self.shaft_slices.items():
+            reduced = self.shafts[name].reduced
+            f[place] = reduced.mass @ reduced.rigid_motions(reduced.seats[0].place)[:, :3] @ acceleration
         return f
 
     def torque_vector(self, torques: Mapping[str, float]) -> Floats:
@@ -145,7 +175,9 @@ class Assembly:
     def accelerations(self, q: Floats, v: Floats, applied: Floats) -> Floats:
         """Accelerations under all forces and the applied generalized forces, shape (size,)."""
         out = np.zeros(self.size)
-        accelerations(q, v, self.inertia, self.forces(q, v) + applied, out)
+        forces = self.forces(q, v) + applied
+        accelerations(q, v, self.inertia, forces, out)
+        set_elastic_accelerations(forces, self.elastic, scratch_for(self.elastic), out)
         return out
 
     def mesh_jacobians(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
@@ -156,17 +188,21 @@ class Assembly:
 
     @cached_property
     def mass_matrix(self) -> Floats:
-        """Mass matrix at zero tilts, diagonal, (size, size)."""
+        """Mass matrix at zero tilts, diagonal but for elastic bodies, (size, size)."""
         m = np.zeros((self.size, self.size))
         for n, o in enumerate(self.inertia.body):
             values = [self.inertia.mass[n]] * 3 + [self.inertia.transverse[n]] * 2 + [self.inertia.axial[n]]
             m[range(o, o + 6), range(o, o + 6)] = values
         m[self.inertia.spin, self.inertia.spin] = self.inertia.spin_inertia
+        for name, place in self.shaft_slices.items():
+            m[place, place] = self.shafts[name].reduced.mass
         return m
 
     def rolling_velocity(self, q: Floats, speeds: Mapping[str, float]) -> Floats:
         """Velocities when the train rolls at the given spins and the planets orbit with their carriers."""
         v = np.zeros(self.size)
+        for name, place in self.shaft_slices.items():
+            v[place] = speeds[name] * self.shafts[name].reduced.spin
         for body in self.bodies:
             v[self.spin[body.name]] = speeds[body.name]
             if self.has_six(body) and body.carrier is not None:
@@ -178,6 +214,8 @@ class Assembly:
     def rolling_acceleration(self, q: Floats, speeds: Mapping[str, float], rates: Mapping[str, float]) -> Floats:
         """Accelerations of a train that rolls at given spins and spin rates, planets' orbit included."""
         a = np.zeros(self.size)
+        for name, place in self.shaft_slices.items():
+            a[place] = rates[name] * self.shafts[name].reduced.spin
         for body in self.bodies:
             a[self.spin[body.name]] = rates[body.name]
             if self.has_six(body) and body.carrier is not None:
@@ -223,6 +261,8 @@ class Assembly:
             f[o + 3] = jt * cb**2 * a[o + 3] + f[o + 5] * sb + p * db * cb - 2.0 * jt * da * db * sb * cb
             f[o + 4] = jt * a[o + 4] + jt * da**2 * sb * cb - p * da * cb
         f[self.inertia.spin] = self.inertia.spin_inertia * a[self.inertia.spin]
+        for name, place in self.shaft_slices.items():
+            f[place] = self.shafts[name].reduced.mass @ a[place]
         return f
 
 
@@ -234,8 +274,11 @@ def assemble(
     inertias: str | None = None,
     flanks: Mapping[str, int] | None = None,
     angles: Angles = "reference",
+    folder: Path | None = None,
 ) -> Assembly:
     """Assemble a variant; arguments as in `exugear.mesh_element.mesh_elements`.
+
+    Elastic bodies are reduced for the variant `flexible`; in `folder` their reductions are kept and found again.
 
     Raises
     ------
@@ -251,28 +294,101 @@ def assemble(
     _check_supports(gearbox, variant, moving)
     if law == "rigid" and variant != "rigid":
         raise VariantError(f"mesh law rigid: its gears only roll, which needs the variant rigid, not {variant}")
-    six = [body for body in moving if variant != "rigid" and not body.spin_only]
-    alone = [body for body in moving if body not in six]
-    coordinates = _coordinates(six, alone)
-    displaced = gearbox.pin_offsets if variant != "bushing" else {}  # bearings carry the planets along
-    elements = () if law == "rigid" else mesh_elements(gearbox, stiffness, law, inertias, flanks, angles, displaced)
-    bodies = {body.name: body for body in gearbox.bodies(inertias)}
+    shafts = elastic_shafts(gearbox, inertias, folder) if variant == "flexible" else {}
+    rigid = [body for body in moving if body.name not in shafts]
+    six = [body for body in rigid if variant != "rigid" and not body.spin_only]
+    alone = [body for body in rigid if body not in six]
+    coordinates, nodes = _coordinates(six, alone), {body.name: node_position(body) for body in moving}
+    size = 6 * len(six) + len(alone)
+    for name, shaft in shafts.items():
+        size = _take_seats(name, shaft, size, coordinates, nodes)
+    displaced = gearbox.pin_offsets if variant not in ON_BEARINGS else {}  # bearings carry the planets along
+    settings = (law, inertias, flanks, angles, displaced, nodes)
+    elements = () if law == "rigid" else mesh_elements(gearbox, stiffness, *settings)
     return Assembly(
         gearbox=gearbox,
         variant=variant,
         law=law,
         inertias=inertias,
-        bodies=(*six, *alone),
+        bodies=(*six, *alone, *(body for body in moving if body.name in shafts)),
         coordinates=coordinates,
-        size=6 * len(six) + len(alone),
+        size=size,
         elements=elements,
         meshes=pack(elements, coordinates),
-        connector_names=tuple(b.name for b in gearbox.bearings) if variant == "bushing" else (),
-        connectors=_connectors(gearbox, bodies, coordinates) if variant == "bushing" else no_connectors(),
+        connector_names=tuple(b.name for b in gearbox.bearings) if variant in ON_BEARINGS else (),
+        connectors=_connectors(gearbox, nodes, coordinates) if variant in ON_BEARINGS else no_connectors(),
         spring_names=tuple(coupling.name for coupling in gearbox.couplings),
         springs=_springs(gearbox, coordinates),
         inertia=_inertia(variant, six, alone),
-        motions=_rolling_motions(gearbox, coordinates) if law == "rigid" else np.eye(6 * len(six) + len(alone)),
+        shafts=shafts,
+        elastic=elastic_arrays(shafts, size, gearbox.case.damping.body_time_s),
+        motions=_rolling_motions(gearbox, coordinates) if law == "rigid" else np.eye(size),
+    )
+
+
+def _take_seats(
+    name: str,
+    shaft: ElasticShaft,
+    first: int,
+    coordinates: dict[str, tuple[int, ...]],
+    nodes: dict[str, Floats],
+) -> int:
+    """Enter the seats of an elastic body whose coordinates begin at `first`; return where the next one begins."""
+    for n, seat in enumerate(shaft.reduced.seats):
+        key = seat_key(name, seat.name)
+        coordinates[key] = tuple(range(first + 6 * n, first + 6 * n + 6))
+        nodes[key] = np.array(seat.place)
+    coordinates[name] = coordinates[seat_key(name, shaft.main)]
+    nodes[name] = nodes[seat_key(name, shaft.main)]
+    return first + shaft.reduced.size
+
+
+def elastic_arrays(shafts: Mapping[str, ElasticShaft], size: int, damping_time: float) -> ElasticArrays:
+    """Arrays of elastic bodies whose coordinates are the last of `size`; damping is `damping_time` (s) times stiffness.
+
+    Each body falls into blocks that neither its mass nor its stiffness couples.
+    """
+    blocks: list[NDArray[np.int64]] = []
+    turning, partner = [], []
+    parts: dict[str, list[Floats]] = {"stiffness": [], "mass": [], "inverse": [], "gyroscopic": []}
+    spin, momentum = [], []
+    begin = size - sum(shaft.reduced.size for shaft in shafts.values())
+    for shaft in shafts.values():
+        body = shaft.reduced
+        own = body.blocks
+        carried = body.mass @ body.spin
+        spinning = next(n for n, block in enumerate(own) if body.spin[block].any())
+        for block in own:
+            others = [n for n, other in enumerate(own) if body.gyroscopic[np.ix_(block, other)].any()]
+            if len(others) > 1:
+                raise VariantError(f"body {body.name}: gyroscopic forces tie one block to {len(others)} others")
+            turning.append(len(blocks) + spinning)
+            partner.append(len(blocks) + others[0] if others else -1)
+            parts["stiffness"].append(body.stiffness[np.ix_(block, block)])
+            parts["mass"].append(body.mass[np.ix_(block, block)])
+            parts["inverse"].append(np.asarray(np.linalg.inv(body.mass[np.ix_(block, block)]), dtype=np.float64))
+            parts["gyroscopic"].append(body.gyroscopic[np.ix_(block, own[others[0]])] if others else np.zeros((0, 0)))
+            spin.append(body.spin[block])
+            momentum.append(carried[block] / float(body.spin @ carried))
+        blocks += [block + begin for block in own]
+        begin += body.size
+    if not blocks:
+        return no_elastic()
+    flat = {name: np.concatenate([matrix.T.ravel() for matrix in values]) for name, values in parts.items()}
+    return ElasticArrays(
+        first=np.cumsum([0, *map(len, blocks)]).astype(np.int64),
+        coordinate=np.concatenate(blocks).astype(np.int64),
+        spin=np.concatenate(spin),
+        momentum=np.concatenate(momentum),
+        turning=np.array(turning, dtype=np.int64),
+        partner=np.array(partner, dtype=np.int64),
+        square=np.cumsum([0, *(m.size for m in parts["mass"][:-1])]).astype(np.int64),
+        stiffness=flat["stiffness"],
+        mass=flat["mass"],
+        inverse=flat["inverse"],
+        across=np.cumsum([0, *(m.size for m in parts["gyroscopic"][:-1])]).astype(np.int64),
+        gyroscopic=flat["gyroscopic"],
+        damping_time=np.full(len(blocks), damping_time),
     )
 
 
@@ -280,10 +396,12 @@ def _check_supports(gearbox: Gearbox, variant: str, moving: list[Body]) -> None:
     """Every body of the variant `rigid` needs its joint: without one it would not turn on a fixed axis."""
     held = {joint.body for joint in gearbox.joints}
     missing = [body.name for body in moving if not body.spin_only and body.name not in held]
-    if variant != "bushing" and missing:
+    if variant not in ON_BEARINGS and missing:
         raise VariantError(f"variant {variant}: no joint holds {', '.join(missing)}; add one under [joints]")
-    if variant == "bushing" and not gearbox.bearings:
-        raise VariantError("variant bushing: the gearbox file has no [bearings]")
+    if variant in ON_BEARINGS and not gearbox.bearings:
+        raise VariantError(f"variant {variant}: the gearbox file has no [bearings]")
+    if variant == "flexible" and not elastic_names(gearbox):
+        raise VariantError('variant flexible: no body is elastic; give one a shape and flexibility = "nonrotating"')
 
 
 def _coordinates(six: list[Body], alone: list[Body]) -> dict[str, tuple[int, ...]]:
@@ -332,18 +450,18 @@ def _springs(gearbox: Gearbox, coordinates: Mapping[str, tuple[int, ...]]) -> Sp
 
 
 def _connectors(
-    gearbox: Gearbox, bodies: Mapping[str, Body], coordinates: Mapping[str, tuple[int, ...]]
+    gearbox: Gearbox, nodes: Mapping[str, Floats], coordinates: Mapping[str, tuple[int, ...]]
 ) -> ConnectorArrays:
     supports = gearbox.bearings
     starts, local, places = [], [], []
     for bearing in supports:
-        ends = [bodies[name] if name in coordinates else None for name in (bearing.on, bearing.body)]
-        nodes = [np.zeros(3) if body is None else node_position(body) for body in ends]
-        starts.append([-1 if body is None else coordinates[body.name][0] for body in ends])
-        local.append([np.array(bearing.place) - node for node in nodes])
+        keys = [_attached(coordinates, body, bearing.name) for body in (bearing.on, bearing.body)]
+        at = [np.zeros(3) if key is None else nodes[key] for key in keys]
+        starts.append([-1 if key is None else coordinates[key][0] for key in keys])
+        local.append([np.array(bearing.place) - node for node in at])
         if bearing.body in gearbox.pin_offsets:
             local[-1][0] = local[-1][0] + [*gearbox.pin_offsets[bearing.body], 0.0]
-        places.append(nodes)
+        places.append(at)
     matrices = [bearing_matrices(bearing, gearbox.case.damping.bearing_time_s) for bearing in supports]
     return ConnectorArrays(
         bodies=np.array(starts, dtype=np.int64),
@@ -352,6 +470,14 @@ def _connectors(
         stiffness=np.array([stiffness for stiffness, _ in matrices]),
         damping=np.array([damping for _, damping in matrices]),
     )
+
+
+def _attached(coordinates: Mapping[str, tuple[int, ...]], body: str, item: str) -> str | None:
+    """Key of what carries an item on a body: its seat, else the rigid body, None for the ground."""
+    key = seat_key(body, item)
+    if key in coordinates:
+        return key
+    return body if body in coordinates else None
 
 
 def no_connectors() -> ConnectorArrays:

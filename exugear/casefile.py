@@ -121,6 +121,35 @@ class InertiaSection(_Section):
         return self
 
 
+class ShaftSectionSection(_Section):
+    """A cylindrical piece of a shaft."""
+
+    length_mm: Positive
+    outer_diameter_mm: Positive
+    inner_diameter_mm: NonNegative = 0.0
+
+
+class BlankSection(_Section):
+    """What a gear or bearing puts on its seat beyond the shaft itself: a rigid ring about the seat's centre."""
+
+    mass_kg: Positive
+    axial_kg_m2: Positive
+    transverse_kg_m2: Positive
+
+
+class ShapeSection(_Section):
+    """A stepped shaft, from `start_z_mm` on; its gears and bearings, and where torques act, become its seats.
+
+    `blanks` are by the name of the gear or bearing.
+    """
+
+    start_z_mm: Finite
+    sections: Annotated[tuple[ShaftSectionSection, ...], Field(min_length=1)]
+    torque_z_mm: Finite | None = None
+    material: MaterialSection = MaterialSection()
+    blanks: dict[Name, BlankSection] = {}
+
+
 class BodySection(_Section):
     """A rigid body turning about +z, a set of equal planets, a spin-only inertia or a fixed housing."""
 
@@ -133,9 +162,15 @@ class BodySection(_Section):
     spin_only: bool = False
     enabled: bool = True
     inertia: dict[Name, InertiaSection] = {}
+    flexibility: Literal["none", "nonrotating"] = "none"
+    shape: ShapeSection | None = None
 
     @model_validator(mode="after")
     def _place(self) -> BodySection:
+        if self.flexibility != "none" and self.shape is None:
+            raise ValueError(f"flexibility {self.flexibility!r} needs a shape: give a [.shape] table")
+        if self.shape is not None and (self.fixed or self.spin_only or self.carrier is not None):
+            raise ValueError("a shape is for a turning body on a fixed axis, not a fixed, spin-only or planet body")
         planet = (self.carrier is not None, self.orbit_radius_mm is not None, bool(self.planet_angles_deg))
         if any(planet) and not all(planet):
             raise ValueError("a planet needs all of carrier, orbit_radius_mm and planet_angles_deg")
@@ -302,6 +337,24 @@ class DampingSection(_Section):
     bearing_time_s: NonNegative = 4e-6
     mesh_time_s: NonNegative = 4e-6
     coupling_time_s: NonNegative = 4e-6
+    body_time_s: NonNegative = 1e-6
+
+
+class ElasticitySection(_Section):
+    """How finely elastic bodies are described (variant `flexible`).
+
+    Vibrations of each body up to `band_Hz` are kept exactly; what vibrates above `limit_Hz` is slowed down to it, so
+    that a solver's step is not ruled by it.
+    """
+
+    band_Hz: Positive = 6000.0
+    limit_Hz: Positive = 12000.0
+
+    @model_validator(mode="after")
+    def _order(self) -> ElasticitySection:
+        if self.limit_Hz <= self.band_Hz:
+            raise ValueError(f"limit_Hz must be above band_Hz = {self.band_Hz:g}")
+        return self
 
 
 class HousingSection(_Section):
@@ -358,6 +411,7 @@ class CaseFile(_Section):
     deviations: dict[Name, DeviationSection] = {}
     pins: dict[Name, PinSection] = {}
     damping: DampingSection = DampingSection()
+    elasticity: ElasticitySection = ElasticitySection()
     housing: HousingSection = HousingSection()
     gravity: GravitySection = GravitySection()
     ste: SteSection = SteSection()

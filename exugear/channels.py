@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from exugear.assembly import Assembly
 from exugear.compilation import compiled
+from exugear.elastic import ElasticArrays, elastic_energies, scratch_for
 from exugear.gearbox import GROUND
 from exugear.kernels import (
     STATE_SIZE,
@@ -171,6 +172,16 @@ def energy_signals(
         spring_energies(q[n], v[n], springs, out[n, 1:])
 
 
+@compiled
+def add_elastic_signals(q: Floats, v: Floats, elastic: ElasticArrays, scratch: Floats, out: Floats) -> None:
+    """Add kinetic and elastic energy (J) and the damped power (W) of elastic bodies to out (samples, 6)."""
+    for n in range(q.shape[0]):
+        kinetic, stored, damped = elastic_energies(q[n], v[n], elastic, scratch)
+        out[n, 0] += kinetic
+        out[n, 1] += stored
+        out[n, 2] += damped
+
+
 class Channels:
     """The signals of an assembly, in the order of the columns of :meth:`sample`.
 
@@ -239,6 +250,7 @@ class Channels:
         out = np.empty((q.shape[0], 6))
         a = self.assembly
         energy_signals(q, v, a.meshes, a.connectors, a.springs, a.inertia, out)
+        add_elastic_signals(q, v, a.elastic, scratch_for(a.elastic), out)
         return out
 
 

@@ -1,4 +1,4 @@
-"""How numerical loops are compiled: to machine code kept on disk between processes, exact floating-point order."""
+"""How numerical loops are compiled: kept on disk between processes, sums in the order written unless said."""
 
 from __future__ import annotations
 
@@ -30,3 +30,8 @@ def kernel(function: Function) -> Function:
     (which saves handing over tuples of arrays).
     """
     return cast(Function, numba.njit(**WITHOUT_MEMORY)(function))
+
+
+def summing_kernel(function: Function) -> Function:
+    """Compile as `kernel`, with sums taken in parts: the same in every run, but not in the order that is written."""
+    return cast(Function, numba.njit(**WITHOUT_MEMORY, fastmath={"reassoc", "contract", "nsz"})(function))

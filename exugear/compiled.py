@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from exugear.assembly import Assembly
 from exugear.channels import Channels
+from exugear.elastic import elastic_motion, scratch_for
 from exugear.equations import (
     Bodies,
     Connectors,
@@ -97,8 +98,8 @@ def eigenvalues(assembly: Assembly) -> NDArray[np.complex128]:
     """Eigenvalues (1/s) of the system linearised at rest, mean mesh stiffness, damping included."""
     linear = linearise(assembly, np.zeros(assembly.size), assembly.linear_meshes())
     free = assembly.motions
-    root = np.sqrt(np.diag(linear.mass))
-    basis = scipy.linalg.orth(root[:, None] * free) / root[:, None]  # free motions of unit mass
+    root = np.linalg.cholesky(linear.mass)
+    basis = np.linalg.solve(root.T, scipy.linalg.orth(root.T @ free))  # free motions of unit mass
     size = free.shape[1]
     lower = np.hstack([-basis.T @ linear.total_stiffness @ basis, -basis.T @ linear.total_damping @ basis])
     return scipy.linalg.eigvals(np.vstack([np.eye(size, 2 * size, size), lower])).astype(np.complex128)
@@ -157,6 +158,9 @@ class _Numbers:
         self.assembly = assembly
         self.size = assembly.size
         self.starts = [int(start) for start in assembly.inertia.body]
+        # Of elastic bodies only seats in bearings turn anything out of their own coordinates.
+        seats = np.setdiff1d(assembly.connectors.bodies, [-1, *self.starts])
+        self.starts += [int(start) for start in seats]
         self.turning = [assembly.size]
 
     def body(self, start: int) -> int:
@@ -283,7 +287,7 @@ def equations_of(assembly: Assembly, loads: LoadTable) -> Equations:
     meshes, joints = _meshes(numbers), _joints(numbers)
     inertia, springs = assembly.inertia, assembly.springs
     bodies = Bodies(
-        start=np.append(inertia.body, numbers.size),
+        start=np.append(np.array(numbers.starts, dtype=np.int64), numbers.size),
         slot=slots,
         mass=inertia.mass,
         transverse=inertia.transverse,
@@ -300,6 +304,8 @@ def equations_of(assembly: Assembly, loads: LoadTable) -> Equations:
         springs=Springs(springs.coordinates, springs.stiffness, springs.damping),
         loads=_loads(assembly, loads),
         joints=joints,
+        elastic=assembly.elastic,
+        motion=elastic_motion(assembly.elastic),
     )
 
 
@@ -330,6 +336,7 @@ def work_for(equations: Equations, q: Floats, v: Floats) -> Work:
         gradient=np.zeros((3, 13)),
         series=equations.loads.first[:-1].copy(),
         states=np.zeros((equations.meshes.slot.size, 4)),
+        scratch=scratch_for(equations.elastic),
         pieces=np.zeros((equations.meshes.slot.size, 2), dtype=np.int64),
         law=scratch_memory(),
         row=np.zeros(12),

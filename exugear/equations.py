@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exugear.compilation import kernel
+from exugear.elastic import ElasticArrays, ElasticMotion, elastic_energies, set_elastic_motion
 from exugear.table_law import FIRST_TWO, Scratch, TableArrays, surface_law
 
 Floats = NDArray[np.float64]
@@ -22,12 +23,12 @@ Integers = NDArray[np.int64]
 
 
 class Bodies(NamedTuple):
-    """Bodies with six coordinates, the ground behind them as the last; then bodies with their spin alone.
+    """Bodies with six coordinates, seats of elastic bodies, the ground; then bodies with their spin alone.
 
     Attributes
     ----------
-    start : (b + 1,) first coordinate
-    slot : (b + 1,) where `Work.turns` has the sine of the spin, 0 where no law needs it
+    start : (b + e + 1,) first coordinate, of the rigid ones, then of seats, then one that stays zero for the ground
+    slot : (b + e + 1,) where `Work.turns` has the sine of the spin, 0 where no law needs it
     mass, transverse, axial : (b,) kg, kg m2
     spin, spin_inertia : (s,) coordinate and kg m2 of bodies with their spin alone
     inverse : (s, s) inverse mass matrix of these spins where gears only roll, else (0, 0)
@@ -160,6 +161,8 @@ class Equations(NamedTuple):
     springs: Springs
     loads: Loads
     joints: Joints
+    elastic: ElasticArrays
+    motion: ElasticMotion
 
 
 class Work(NamedTuple):
@@ -170,12 +173,13 @@ class Work(NamedTuple):
     q, v : (size + 6,) state at the present step
     stage_q, stage_v, force, rate, total : (size + 6,) stage, generalized forces, accelerations and their sum
     turns : (k, 2) cosine and sine of `Bodies.turning`
-    frames : (b + 1, 16) rotation matrix, angular velocity, sine and cosine of the tilts
-    wrench : (b + 1, 6) force and moment on each body, global axes
+    frames : (b + e + 1, 16) rotation matrix, angular velocity, sine and cosine of the tilts
+    wrench : (b + e + 1, 6) force and moment on each body, global axes
     motion : (4, 6) strain, its rate, the true rate of change, force of a connector in its own axes
     gradient : (3, 13) gradients of the deflection and of the force row, and the force of a mesh with a table
     series : (s,) line of each torque series that was used last
     states : (m, 4) deflection and its rate, 1 where a table's axis was left, scalar force
+    scratch : (2, n) memory of the elastic bodies
     pieces : (m, 2) load piece of each flank's table that was used last
     law : memory of the law `table`
     row : (12,) row of the push between the axes and the moment of misalignment
@@ -195,6 +199,7 @@ class Work(NamedTuple):
     gradient: Floats
     series: Integers
     states: Floats
+    scratch: Floats
     pieces: Integers
     law: Scratch
     row: Floats
@@ -206,7 +211,7 @@ def place_bodies(q: Floats, v: Floats, bodies: Bodies, work: Work) -> None:
     for n in range(bodies.turning.size):
         angle = q[bodies.turning[n]]
         work.turns[n, 0], work.turns[n, 1] = math.cos(angle), math.sin(angle)
-    for n in range(bodies.mass.size):
+    for n in range(bodies.start.size - 1):
         o = bodies.start[n]
         a, b = q[o + 3], q[o + 4]
         ca, sa, cb, sb = math.cos(a), math.sin(a), math.cos(b), math.sin(b)
@@ -245,7 +250,7 @@ def move_connector(
     uz = v[p + 2] + (wx * by - wy * bx)
     ax, ay, az = connectors.local[n, 0]
     strain, rate = work.motion[0], work.motion[1]
-    if i == bodies.mass.size:
+    if i == bodies.start.size - 1:
         strain[0], strain[1], strain[2] = dx, dy, dz
         rate[0], rate[1], rate[2] = ux, uy, uz
         if connectors.repeated[n] == 1:
@@ -326,7 +331,7 @@ def add_connectors(q: Floats, v: Floats, bodies: Bodies, connectors: Connectors,
         two[4] -= my + (bz * fx - bx * fz)
         two[5] -= mz + (bx * fy - by * fx)
     f = work.force
-    for n in range(bodies.mass.size):
+    for n in range(bodies.start.size - 1):
         o, load, frame = bodies.start[n], work.wrench[n], work.frames[n]
         sa, ca, sb, cb = frame[12], frame[13], frame[14], frame[15]
         f[o] += load[0]
@@ -594,6 +599,7 @@ def evaluate(t: float, q: Floats, v: Floats, equations: Equations, work: Work) -
     add_meshes(q, v, equations.meshes, work)
     add_springs(q, v, equations.springs, work.force)
     set_accelerations(v, equations.bodies, work)
+    set_elastic_motion(q, v, work.force, equations.motion, work.scratch[0], work.rate)
 
 
 @kernel
@@ -791,6 +797,10 @@ def observe(
             i, j = springs.ends[s, 0], springs.ends[s, 1]
             energy[1] += 0.5 * springs.stiffness[s] * (x[j] - x[i]) ** 2
             energy[3] += springs.damping[s] * (u[j] - u[i]) ** 2
+        kinetic, stored, damped = elastic_energies(x, u, equations.elastic, work.scratch)
+        energy[0] += kinetic
+        energy[1] += stored
+        energy[3] += damped
         set_loads(time[n], x, u, equations.loads, work.series, f)
         for i in range(size):
             energy[2] += f[i] * u[i]

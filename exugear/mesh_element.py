@@ -48,6 +48,7 @@ from exugear.gearbox import GROUND, Body, Gearbox, Mesh
 from exugear.kernels import MeshArrays, periodic_cubic
 from exugear.table_law import TableArrays
 from exugear.tooth_contact import MeshError, MeshGeometry, ToothContact, tooth_places
+from fe_ste.gears import Gear
 from fe_ste.interpolation import SteSurface, axis_weights, slope_axis_weights
 
 Floats = NDArray[np.float64]
@@ -193,6 +194,7 @@ def mesh_elements(
     flanks: Mapping[str, int] | None = None,
     angles: Angles = "reference",
     displaced: Mapping[str, tuple[float, float]] | None = None,
+    nodes: Mapping[str, Floats] | None = None,
 ) -> tuple[MeshElement, ...]:
     """Elements of all meshes.
 
@@ -211,6 +213,8 @@ def mesh_elements(
         Angles of the law `seed`.
     displaced : mapping, optional
         Place of bodies at zero coordinates against their nominal one, x and y seen from the mesh's frame, m.
+    nodes : mapping, optional
+        Position (3,) of the node that carries a gear, by `seat_key` of body and gear; the body's own otherwise.
 
     Raises
     ------
@@ -231,16 +235,16 @@ def mesh_elements(
             raise MeshError(f"mesh {mesh.name}: no stiffness for pair {mesh.pair.name!r}; compute its table")
         data = stiffness[mesh.pair.name]
         flank, phase = flanks[mesh.name], phases[mesh.name]
-        nodes = (node_position(bodies[mesh.pinion]), node_position(bodies[mesh.gear]))
+        ends = (_node(mesh.pinion, mesh.pair.pinion, bodies, nodes), _node(mesh.gear, mesh.pair.gear, bodies, nodes))
         table = None
         if law == "table":
-            table = _table_flanks(mesh, flank, nodes, phase, data, time)
+            table = _table_flanks(mesh, flank, ends, phase, data, time)
             data = table.surface.mean_stiffness(abs(static[mesh.name]), mesh.centre_distance)
         samples = np.atleast_1d(np.asarray(data, dtype=np.float64))
         if not (np.all(np.isfinite(samples)) and np.all(samples > 0.0)):
             raise MeshError(f"pair {mesh.pair.name}: mesh stiffness must be positive and finite")
-        deflection, force = rows_of_law(mesh, flank, nodes, law, angles)
-        centre, tilt = rows_of_place(mesh, flank, nodes)
+        deflection, force = rows_of_law(mesh, flank, ends, law, angles)
+        centre, tilt = rows_of_place(mesh, flank, ends)
         own, factor = law_stiffness(mesh, law, samples, angles)
         elements.append(
             MeshElement(
@@ -292,6 +296,23 @@ def _table_flanks(
     )
 
 
+def seat_key(body: str, item: str) -> str:
+    """Name of the seat of a gear or bearing on an elastic body.
+
+    Examples
+    --------
+    >>> seat_key("lss", "sun")
+    'lss.sun'
+    """
+    return f"{body}.{item}"
+
+
+def _node(body: str, gear: Gear, bodies: Mapping[str, Body], nodes: Mapping[str, Floats] | None) -> Floats:
+    """Position of the node that carries a gear of a body, m."""
+    found = None if nodes is None else nodes.get(seat_key(body, gear.name))
+    return node_position(bodies[body]) if found is None else found
+
+
 def node_position(body: Body) -> Floats:
     """Position of a body's node, its centre of mass, at zero angles, m."""
     return np.array([*body.axis, body.centre_of_mass_z])
@@ -319,7 +340,7 @@ def pack(
     Parameters
     ----------
     elements : tuple of MeshElement
-    coordinates : mapping of body name to its six state indices (-1 where there is none)
+    coordinates : mapping of body name, or of `seat_key`, to six state indices (-1 where there is none)
     averaged : bool
         Replace stiffness and tables by their mean over the cycle, as eigenmodes need it.
     tables : bool
@@ -334,8 +355,9 @@ def pack(
     index = np.full((count, 13), -1, dtype=np.int64)
     for row, element in zip(index, elements, strict=True):
         mesh = element.mesh
-        row[:6] = coordinates.get(mesh.pinion, (-1,) * 6)
-        row[6:12] = coordinates.get(mesh.gear, (-1,) * 6)
+        for end, body, gear in ((0, mesh.pinion, mesh.pair.pinion), (6, mesh.gear, mesh.pair.gear)):
+            own = coordinates.get(body, (-1,) * 6)
+            row[end : end + 6] = coordinates.get(seat_key(body, gear.name), own)
         row[12] = coordinates.get(mesh.frame, (-1,) * 6)[5]
     return MeshArrays(
         coordinates=index,

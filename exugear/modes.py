@@ -28,6 +28,7 @@ from exugear.kernels import (
     add_spring_forces,
 )
 from exugear.mesh_element import Angles, MeshData
+from exugear.reduction import ReducedBody
 from exugear.results import input_hash
 from exugear.statics import locked_equilibrium
 
@@ -35,8 +36,10 @@ Floats = NDArray[np.float64]
 DIFFERENCE_STEP = 1e-6
 RIGID_BODY_LIMIT = 0.1
 """Modes below this frequency (Hz) are motions of the whole train without deflection."""
+RIGID_COORDINATES = ("x", "y", "z", "tilt_x", "tilt_y", "spin")
 FREE_ROTATION = "free rotation of the train"
-MOTIONS = ("spin", "radial", "axial", "tilt")
+MOTIONS = ("spin", "radial", "axial", "tilt", "bending", "twist", "stretch")
+"""What a body does: four motions as a rigid body, three deformations of an elastic one."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,7 @@ class Linearised:
     Attributes
     ----------
     mass : (size, size)
-    stiffness, damping : element name -> matrix; elements are meshes, bearings, couplings
+    stiffness, damping : element name -> matrix; elements are meshes, bearings, couplings, shafts
     """
 
     mass: Floats
@@ -80,6 +83,11 @@ def linearise(assembly: Assembly, q: Floats, meshes: MeshArrays | None = None) -
     for n, name in enumerate(assembly.spring_names):
         spring = SpringArrays._make(values[n : n + 1] for values in assembly.springs)
         stiffness[name], damping[name] = _tangents(assembly.size, q, spring, add_spring_forces)
+    for name, place in assembly.shaft_slices.items():
+        own = np.zeros((assembly.size,) * 2)
+        own[place, place] = assembly.shafts[name].reduced.stiffness
+        stiffness[f"{name}_shaft"] = own
+        damping[f"{name}_shaft"] = assembly.gearbox.case.damping.body_time_s * own
     return Linearised(assembly.mass_matrix, stiffness, damping)
 
 
@@ -102,7 +110,7 @@ def _tangents(
 
 @dataclass(frozen=True)
 class Modes:
-    """Eigenmodes in order of frequency; n modes.
+    """Eigenmodes in order of frequency; n modes, in the variant `flexible` those in the band of its elastic bodies.
 
     Attributes
     ----------
@@ -110,8 +118,8 @@ class Modes:
     frequency : (n,) undamped, Hz
     damping_ratio : (n,) share of critical damping, from the damping matrix in the mode
     shapes : (size, n) real, unit modal mass
-    strain : (n, elements) share of strain energy by mesh, bearing and coupling
-    kinetic : (n, bodies, 4) share of kinetic energy by body and motion (spin, radial, axial, tilt)
+    strain : (n, elements) share of strain energy by mesh, bearing, coupling and elastic shaft
+    kinetic : (n, bodies, 7) share of kinetic energy by body and motion, see `MOTIONS`
     overall : (n,) overall DTE of the mode at unit modal mass, m / sqrt(kg)
     amplification : (n, meshes) overall DTE at resonance per amplitude of STE in one mesh, m/m
     names : what moves, in words
@@ -177,14 +185,17 @@ class Modes:
 
 
 def coordinate_labels(assembly: Assembly) -> list[str]:
-    """Name of each coordinate, such as `hss.spin`."""
+    """Name of each coordinate, such as `hss.spin`, or `hss.hs_pinion.spin` at a seat of an elastic body."""
     labels = [""] * assembly.size
     for body in assembly.bodies:
-        for motion, index in zip(
-            ("x", "y", "z", "tilt_x", "tilt_y", "spin"), assembly.coordinates[body.name], strict=True
-        ):
+        for motion, index in zip(RIGID_COORDINATES, assembly.coordinates[body.name], strict=True):
             if index >= 0:
                 labels[index] = f"{body.name}.{motion}"
+    for name, place in assembly.shaft_slices.items():
+        reduced = assembly.shafts[name].reduced
+        own = [f"{seat.name}.{motion}" for seat in reduced.seats for motion in RIGID_COORDINATES]
+        own += [f"{group.replace(' ', '_')}_{n}" for n, group in enumerate(reduced.groups, start=1)]
+        labels[place] = [f"{name}.{label}" for label in own]
     return labels
 
 
@@ -195,13 +206,14 @@ def eigenmodes(
     mesh_law: str = "line_of_action",
     inertias: str | None = None,
     angles: Angles = "reference",
+    folder: Path | None = None,
 ) -> Modes:
     """Eigenmodes of a gearbox variant at its static load.
 
     Parameters
     ----------
     gearbox : Gearbox
-    variant : {"rigid", "bushing"}
+    variant : {"rigid", "bushing", "flexible"}
     stiffness : mapping of pair name to (n,) array
         Mesh stiffness F_bt / STE over the cycle, N/m, for example from the STE tables.
     mesh_law : str
@@ -210,6 +222,8 @@ def eigenmodes(
         Inertia set; the file's default otherwise.
     angles : {"reference", "operating"}
         Angles of the law `seed`.
+    folder : Path, optional
+        Where reductions of elastic bodies are kept and found again.
 
     Examples
     --------
@@ -219,7 +233,7 @@ def eigenmodes(
     >>> len(modes.frequency), modes.names[0]
     (8, 'free rotation of the train')
     """
-    assembly = assemble(gearbox, variant, stiffness, mesh_law, inertias, angles=angles)
+    assembly = assemble(gearbox, variant, stiffness, mesh_law, inertias, angles=angles, folder=folder)
     return modes_of(assembly)
 
 
@@ -231,6 +245,9 @@ def modes_of(assembly: Assembly, preload: bool = True) -> Modes:
         q = locked_equilibrium(assembly, load.torques_N_m, load.locked, assembly.mean_meshes)
     linear = linearise(assembly, q)
     frequency, shapes = undamped_modes(linear.mass, linear.total_stiffness, assembly.motions)
+    if assembly.shafts:  # beyond the band the shafts' own vibrations are only what keeps their statics right
+        inside = frequency <= assembly.gearbox.case.elasticity.band_Hz
+        frequency, shapes = frequency[inside], shapes[:, inside]
     masses = np.einsum("im,ij,jm->m", shapes, linear.mass, shapes)
     shapes = shapes / np.sqrt(masses)
     omega = 2.0 * np.pi * frequency
@@ -261,26 +278,26 @@ def modes_of(assembly: Assembly, preload: bool = True) -> Modes:
 
 
 def undamped_modes(mass: Floats, stiffness: Floats, motions: Floats | None = None) -> tuple[Floats, Floats]:
-    """Solve M x'' + K x = 0 for frequencies (Hz, ascending) and real shapes; M diagonal, K any.
+    """Solve M x'' + K x = 0 for frequencies (Hz, ascending) and real shapes; M symmetric, K any.
 
     A preloaded connector or the law `seed` makes K unsymmetric. Equal frequencies may then come out as a complex pair
     that differs from real by round-off; its real and imaginary parts span the same plane. `motions` (size, n) are
     those that are free, all by default.
     """
-    root = np.sqrt(np.diag(mass))
-    basis = scipy.linalg.orth(root[:, None] * (np.eye(len(mass)) if motions is None else motions))
-    values, vectors = scipy.linalg.eig(basis.T @ (stiffness / np.outer(root, root)) @ basis)
-    shapes = basis @ np.where(values.imag < 0.0, vectors.imag, vectors.real)
+    root = np.linalg.cholesky(mass)
+    basis = scipy.linalg.orth(root.T @ (np.eye(len(mass)) if motions is None else motions))
+    free = np.linalg.solve(root.T, basis)
+    values, vectors = scipy.linalg.eig(free.T @ stiffness @ free)
+    shapes = free @ np.where(values.imag < 0.0, vectors.imag, vectors.real)
     order = np.argsort(values.real)
     frequency = np.sqrt(np.maximum(values.real[order], 0.0)) / (2.0 * np.pi)
-    return frequency, shapes[:, order] / root[:, None]
+    return frequency, shapes[:, order]
 
 
 def growth_rate(linear: Linearised) -> float:
     """Largest real part of the eigenvalues of M x'' + D x' + K x = 0, 1/s, the free rotation left out."""
     size = len(linear.mass)
-    mass = np.diag(linear.mass)[:, None]
-    lower = np.hstack([-linear.total_stiffness / mass, -linear.total_damping / mass])
+    lower = np.linalg.solve(linear.mass, np.hstack([-linear.total_stiffness, -linear.total_damping]))
     values = scipy.linalg.eigvals(np.vstack([np.eye(size, 2 * size, size), lower]))
     elastic = np.abs(values.imag) > 2.0 * np.pi * RIGID_BODY_LIMIT
     return float(values.real[elastic].max(initial=-np.inf))
@@ -297,10 +314,14 @@ def overall_row(assembly: Assembly) -> Floats:
 
 
 def _kinetic_shares(assembly: Assembly, shapes: Floats) -> Floats:
-    """Share of kinetic energy (n, bodies, 4)."""
+    """Share of kinetic energy (n, bodies, motions)."""
     energy = np.diag(assembly.mass_matrix)[:, None] * shapes**2
     shares = np.zeros((shapes.shape[1], len(assembly.bodies), len(MOTIONS)))
     for n, body in enumerate(assembly.bodies):
+        if body.name in assembly.shafts:
+            own = shapes[assembly.shaft_slices[body.name]]
+            shares[:, n] = _shaft_energies(assembly.shafts[body.name].reduced, own)
+            continue
         index = assembly.coordinates[body.name]
         for motion, members in enumerate(((5,), (0, 1), (2,), (3, 4))):
             for member in members:
@@ -308,6 +329,25 @@ def _kinetic_shares(assembly: Assembly, shapes: Floats) -> Floats:
                     shares[:, n, motion] += energy[index[member]]
     whole: Floats = shares.sum(axis=(1, 2), keepdims=True)
     return shares / whole
+
+
+def _shaft_energies(body: ReducedBody, shapes: Floats) -> Floats:
+    """Twice the kinetic energy (n, motions) of an elastic shaft: of its rigid part, and of each deformation.
+
+    The rigid part is what the momentum of the whole tells; the rest is orthogonal to it.
+    """
+    rigid = body.rigid_motions(body.rigid_inertia.centre)
+    inertia = np.diag(rigid.T @ body.mass @ rigid)
+    amount = (rigid.T @ body.mass @ shapes) / inertia[:, None]
+    moved = inertia[:, None] * amount**2
+    energies = np.zeros((shapes.shape[1], len(MOTIONS)))
+    energies[:, :4] = np.stack([moved[5], moved[0] + moved[1], moved[2], moved[3] + moved[4]], axis=1)
+    deformed = shapes - rigid @ amount
+    for block in body.blocks:
+        motion = 5 if body.spin[block].any() else 6 if rigid[block, 2].any() else 4
+        own = body.mass[np.ix_(block, block)]
+        energies[:, motion] += np.einsum("im,ij,jm->m", deformed[block], own, deformed[block])
+    return energies
 
 
 def _amplification(
@@ -336,8 +376,8 @@ def mode_name(assembly: Assembly, element_names: tuple[str, ...], kinetic: Float
 
     Parameters
     ----------
-    kinetic : (bodies, 4) share by body and motion
-    strain : (elements,) share by mesh, bearing and coupling
+    kinetic : (bodies, motions) share by body and motion
+    strain : (elements,) share by mesh, bearing, coupling and shaft
     """
     moving: dict[str, float] = {}
     for body, shares in zip(assembly.bodies, kinetic, strict=True):

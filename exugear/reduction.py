@@ -27,6 +27,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import scipy.linalg
 import scipy.sparse
+import scipy.sparse.csgraph
 from numpy.typing import NDArray
 
 from exugear import meridian
@@ -164,6 +165,13 @@ class ReducedBody:
             if seat.name == name:
                 return 6 * n
         raise ReductionError(f"body {self.name}: no seat {name!r}; seats are {', '.join(s.name for s in self.seats)}")
+
+    @cached_property
+    def blocks(self) -> tuple[NDArray[np.int64], ...]:
+        """Coordinates that neither mass nor stiffness couples to others: both bending planes, torsion, stretching."""
+        joined = scipy.sparse.csr_array((self.mass != 0.0) | (self.stiffness != 0.0))
+        count, label = scipy.sparse.csgraph.connected_components(joined, directed=False)
+        return tuple(np.flatnonzero(label == n) for n in range(count))
 
     def rigid_motions(self, centre: Sequence[float] | Floats) -> Floats:
         """Rigid motions (n, 6): translations, and turns about a centre (3,) in the gearbox's coordinates."""

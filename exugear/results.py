@@ -111,6 +111,11 @@ def modes_path(folder: str | Path, variant: str, law: str, inertias: str) -> Pat
     return Path(folder) / variant / f"{law}-{inertias}" / "modes.nc"
 
 
+def bodies_folder(folder: Path) -> Path:
+    """Place of the reductions of elastic bodies: ``bodies``."""
+    return folder / "bodies"
+
+
 @dataclass(frozen=True)
 class Spent:
     """What a step of the work took.

@@ -38,7 +38,7 @@ from exugear.compiled import (
 )
 from exugear.gearbox import CaseError, Gearbox, LoadCase
 from exugear.mesh_element import Angles, MeshData
-from exugear.results import input_hash
+from exugear.results import bodies_folder, input_hash
 from exugear.runfile import MESH_TIMES, Checkpoint, Decimator, RunFile
 from exugear.statics import accelerating_start
 
@@ -117,7 +117,7 @@ def simulate(
     Parameters
     ----------
     gearbox : Gearbox
-    variant : {"rigid", "bushing", "jointed"}
+    variant : {"rigid", "bushing", "flexible", "jointed"}
     stiffness : mapping of pair name to (n,) array
         Mesh stiffness over the cycle, see `exugear.mesh_stiffness.mesh_stiffness`.
     out : path
@@ -153,7 +153,8 @@ def simulate(
     if load_case not in gearbox.load_cases:
         raise gearbox.fault(f"no load case {load_case!r}; load cases are {', '.join(gearbox.load_cases)}")
     case = gearbox.load_cases[load_case]
-    assembly = assemble(gearbox, variant, stiffness, mesh_law, inertias, angles=angles)
+    folder = bodies_folder(Path(out))
+    assembly = assemble(gearbox, variant, stiffness, mesh_law, inertias, angles=angles, folder=folder)
     directory = run_directory(out, variant, load_case, mesh_law, assembly.inertias)
     total = case.duration if duration is None else duration
     chosen = _solver(solver, assembly, mesh_route)

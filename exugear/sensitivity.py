@@ -131,8 +131,8 @@ def followers(before: Modes, after: Modes, order: NDArray[np.int64]) -> NDArray[
     order : (m,) array of int
         Places of the followed modes in `before`.
     """
-    mass = np.sqrt(np.diag(before.assembly.mass_matrix) * np.diag(after.assembly.mass_matrix))
-    overlap = (before.shapes[:, order].T @ (mass[:, None] * after.shapes)) ** 2
+    roots = [np.linalg.cholesky(modes.assembly.mass_matrix) for modes in (before, after)]
+    overlap = ((roots[0].T @ before.shapes[:, order]).T @ (roots[1].T @ after.shapes)) ** 2
     _, place = scipy.optimize.linear_sum_assignment(overlap, maximize=True)
     return np.asarray(place, dtype=np.int64)
 

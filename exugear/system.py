@@ -34,7 +34,8 @@ from exugear.kernels import (
     add_mesh_forces,
     add_mesh_jacobian,
 )
-from exugear.mesh_element import node_position
+from exugear.mesh_element import node_position, seat_key
+from exugear.reduction import ReducedBody
 
 Floats = NDArray[np.float64]
 MeshRoute = Literal["element", "loads"]
@@ -139,12 +140,16 @@ class ExudynSystem:
         self.mbs = self._container.AddSystem()
         self._nodes: dict[str, Any] = {}
         self._bodies: dict[str, Any] = {}
+        self._shaft_nodes: dict[str, list[Any]] = {}
+        if assembly.shafts and mesh_route != "element":
+            raise VariantError("mesh_route 'loads' needs rigid bodies: use the variant jointed or bushing")
         if assembly.variant == "rigid":
             if mesh_route != "element":
                 raise VariantError("mesh_route 'loads' needs bodies: use the variant jointed or bushing")
             self._add_minimal(q, v, with_meshes)
         else:
             self._add_bodies(q, v)
+            self._add_shafts(q, v)
             self._add_connectors()
             self._add_couplings()
             self._add_loading()
@@ -208,7 +213,7 @@ class ExudynSystem:
         for body in self.assembly.bodies:
             if self.assembly.has_six(body):
                 self._add_rigid_body(body, q, v)
-            else:
+            elif body.name not in self.assembly.shafts:
                 i = self.assembly.spin[body.name]
                 self._nodes[body.name] = self.mbs.AddNode(
                     items.Node1D(referenceCoordinates=[0.0], initialCoordinates=[q[i]], initialVelocities=[v[i]])
@@ -236,8 +241,51 @@ class ExudynSystem:
             marker = self.mbs.AddMarker(items.MarkerBodyMass(bodyNumber=self._bodies[body.name]))
             self.mbs.AddLoad(items.LoadMassProportional(markerNumber=marker, loadVector=list(acceleration)))
 
-    def _point(self, body: str, place: Floats) -> Any:
-        """Marker at a place (m, at zero angles) on a body or on the ground."""
+    def _add_shafts(self, q: Floats, v: Floats) -> None:
+        """Add elastic bodies: a rigid-body node at each seat, one node for the amplitudes, their matrices on all."""
+        for name, place in self.assembly.shaft_slices.items():
+            reduced = self.assembly.shafts[name].reduced
+            nodes = []
+            for n, seat in enumerate(reduced.seats):
+                first = place.start + 6 * n
+                nodes.append(
+                    self.mbs.AddNode(
+                        items.NodeRigidBodyRxyz(
+                            referenceCoordinates=[*seat.place, 0.0, 0.0, 0.0],
+                            initialCoordinates=q[first : first + 6].tolist(),
+                            initialVelocities=v[first : first + 6].tolist(),
+                        )
+                    )
+                )
+                self._nodes[seat_key(name, seat.name)] = nodes[-1]
+            inner = slice(place.start + 6 * len(reduced.seats), place.stop)
+            nodes.append(
+                self.mbs.AddNode(
+                    items.NodeGenericODE2(
+                        referenceCoordinates=[0.0] * len(reduced.groups),
+                        initialCoordinates=q[inner].tolist(),
+                        initialCoordinates_t=v[inner].tolist(),
+                        numberOfODE2Coordinates=len(reduced.groups),
+                    )
+                )
+            )
+            self._shaft_nodes[name] = nodes
+            self._nodes[name] = self._nodes[seat_key(name, self.assembly.shafts[name].main)]
+            self.mbs.AddObject(
+                items.ObjectGenericODE2(
+                    nodeNumbers=nodes,
+                    massMatrix=reduced.mass,
+                    stiffnessMatrix=reduced.stiffness,
+                    dampingMatrix=self.assembly.gearbox.case.damping.body_time_s * reduced.stiffness,
+                    forceVector=self.assembly.weight[place],
+                    forceUserFunction=_gyroscopic_function(reduced),
+                )
+            )
+
+    def _point(self, body: str, item: str, place: Floats) -> Any:
+        """Marker of a support at a place (m, at zero angles) on a body, its seat on an elastic one, or the ground."""
+        if seat_key(body, item) in self._nodes:
+            return self.mbs.AddMarker(items.MarkerNodeRigid(nodeNumber=self._nodes[seat_key(body, item)]))
         if body in self._bodies:
             found = next(b for b in self.assembly.bodies if b.name == body)
             number, place = self._bodies[body], place - node_position(found)
@@ -258,7 +306,7 @@ class ExudynSystem:
             place = np.array(bearing.place)
             self.mbs.AddObject(
                 items.RigidBodySpringDamper(
-                    markerNumbers=[self._point(bearing.on, place), self._point(bearing.body, place)],
+                    markerNumbers=[self._point(body, bearing.name, place) for body in (bearing.on, bearing.body)],
                     stiffness=connectors.stiffness[n],
                     damping=connectors.damping[n],
                 )
@@ -268,13 +316,13 @@ class ExudynSystem:
         place = np.array(joint.place)
         self.mbs.AddObject(
             items.GenericJoint(
-                markerNumbers=[self._point(joint.on, place), self._point(joint.body, place)],
+                markerNumbers=[self._point(body, joint.name, place) for body in (joint.on, joint.body)],
                 constrainedAxes=[1, 1, 1, 1, 1, 0],
             )
         )
 
     def _spin_marker(self, body: str) -> Any:
-        six = next(self.assembly.has_six(b) for b in self.assembly.bodies if b.name == body)
+        six = self.assembly.coordinates[body][0] >= 0
         return self.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=self._nodes[body], coordinate=5 if six else 0))
 
     def _add_couplings(self) -> None:
@@ -312,9 +360,11 @@ class ExudynSystem:
             )
 
     def _add_mesh_element(self) -> None:
-        """Add the one object for all meshes, on the nodes of the bodies with six coordinates."""
-        bodies = [body for body in self.assembly.bodies if self.assembly.has_six(body)]
-        size = 6 * len(bodies)
+        """Add the one object for all meshes, on all nodes in the order of the assembly's coordinates."""
+        size = self.assembly.size
+        rigid = [body.name for body in self.assembly.bodies if body.name not in self._shaft_nodes]
+        nodes = [self._nodes[name] for name in rigid]
+        nodes += [node for own in self._shaft_nodes.values() for node in own]
         add_forces, jacobian = _mesh_functions(self._meshes, size)
 
         def force(mbs: Any, t: float, item: int, q: Any, v: Any) -> Floats:
@@ -324,7 +374,7 @@ class ExudynSystem:
 
         self.mbs.AddObject(
             items.ObjectGenericODE2(
-                nodeNumbers=[self._nodes[body.name] for body in bodies],
+                nodeNumbers=nodes,
                 forceUserFunction=force,
                 jacobianUserFunction=jacobian,
             )
@@ -352,7 +402,15 @@ class ExudynSystem:
         if "*" in self._nodes:
             return np.arange(self.assembly.size, dtype=np.int64)
         order = np.zeros(self.assembly.size, dtype=np.int64)
+        for name, place in self.assembly.shaft_slices.items():
+            begin = place.start
+            for node in self._shaft_nodes[name]:
+                count = len(self.mbs.GetNodeOutput(node, exudyn.OutputVariableType.Coordinates))
+                order[begin : begin + count] = self.mbs.GetNodeODE2Index(node) + np.arange(count)
+                begin += count
         for body in self.assembly.bodies:
+            if body.name in self._shaft_nodes:
+                continue
             first = self.mbs.GetNodeODE2Index(self._nodes[body.name])
             own = [index for index in self.assembly.coordinates[body.name] if index >= 0]
             order[own] = first + np.arange(len(own))
@@ -449,6 +507,19 @@ def _mesh_functions(
         return -(factor_q * jq + factor_v * jv)
 
     return add_forces, jacobian
+
+
+def _gyroscopic_function(body: ReducedBody) -> Callable[..., Floats]:
+    """Force - Omega G v of an elastic body that turns."""
+    momentum = body.mass @ body.spin / float(body.spin @ body.mass @ body.spin)
+    gyroscopic = body.gyroscopic
+
+    def force(mbs: Any, t: float, item: int, q: Any, v: Any) -> Floats:
+        rates = np.array(v)
+        opposing: Floats = gyroscopic @ rates
+        return -float(momentum @ rates) * opposing
+
+    return force
 
 
 def _load_function(torque: Callable[[float], float]) -> Callable[[Any, float, float], float]:

@@ -31,7 +31,7 @@ def balance_residual(data: xr.Dataset) -> float:
     return (2 * change["work_of_loads"] - sum(change.values())) / kinetic
 
 
-@pytest.mark.parametrize("variant", ["rigid", "bushing"])
+@pytest.mark.parametrize("variant", ["rigid", "bushing", "flexible"])
 @pytest.mark.parametrize("case", ["reference", "generating"])
 def test_work_of_the_loads_is_accounted_for(
     grc: Gearbox, stiffness: dict, tmp_path: Path, variant: str, case: str
