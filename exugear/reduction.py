@@ -18,7 +18,7 @@ import os
 import tempfile
 import time
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from exugear import meridian
 from exugear.meridian import STANDARD_SIZE, Harmonic, MeshSize, Motion, SeatBand, Shaft, ShaftSection
 from fe_ste.gears import Material
-from fe_ste.sparse import factorise
+from fe_ste.sparse import Backend, Factorisation, factorise
 
 Floats: TypeAlias = NDArray[np.float64]
 SparseMatrix: TypeAlias = Any
@@ -82,9 +82,9 @@ class Surface:
     Attributes
     ----------
     points : (p, 3) at zero angles, m
-    quads : (f, 4) corners of each face
+    quads : (f, 4) corners of each face; a triangle repeats its last
     displacement : (p, 3, n) per coordinate
-    strain : (f, 6, n) per coordinate, in axes of each face, engineering shear strains
+    strain : (f, 6, n) per coordinate, in orthogonal axes (those of each face, or x y z), engineering shear strains
     elasticity : (6, 6) stress by strain, Pa
     """
 
@@ -132,7 +132,7 @@ class ReducedBody:
     gyroscopic : (n, n) antisymmetric G of M q'' + Omega G q' + K q = f
     spin : (n,) rigid spin: 1 on every seat's thz
     frame : where the coordinates are seen from: a frame that does not turn, the carrier's, or the ground
-    groups : names of the inner amplitudes: bending x, bending y, torsion or stretching
+    groups : names of the inner amplitudes: bending x, bending y, torsion or stretching; of a solid mesh, inner
     surface : for pictures
     figures : what the reduction took and found
     """
@@ -227,7 +227,13 @@ class ReducedPart:
 
 
 def reduce_part(
-    mass: SparseMatrix, stiffness: SparseMatrix, seats: Floats, rigid: Floats, blanks: Floats, band: float
+    mass: SparseMatrix,
+    stiffness: SparseMatrix,
+    seats: Floats,
+    rigid: Floats,
+    blanks: Floats,
+    band: float,
+    backend: Backend | None = "superlu",
 ) -> ReducedPart:
     """Reduce a free elastic structure to its seats' coordinates and amplitudes of free vibrations.
 
@@ -240,6 +246,8 @@ def reduce_part(
     band : float
         All free vibrations up to this frequency (Hz) become exact; those on bearings come out to 1e-4 up to two
         thirds of it.
+    backend : {"superlu", "pardiso"}, optional
+        SuperLU gives the same digits in every run, PARDISO's threads do not; None is the fastest installed.
 
     Raises
     ------
@@ -249,10 +257,10 @@ def reduce_part(
     moved = seats @ rigid
     if np.linalg.matrix_rank(moved) < rigid.shape[1]:
         raise ReductionError("the seats do not hold all rigid motions; give at least one more seat")
-    static, relief = static_shapes(mass, stiffness, seats, rigid)
+    static, relief = static_shapes(mass, stiffness, seats, rigid, backend)
     rows = scipy.sparse.csr_array(seats)
     whole = scipy.sparse.csr_array(mass + rows.T @ scipy.sparse.csr_array(blanks) @ rows)
-    vibrations, frequencies = free_vibrations(whole, stiffness, rigid, (np.pi * band) ** 2, band)
+    vibrations, frequencies = free_vibrations(whole, stiffness, rigid, (np.pi * band) ** 2, band, backend)
     inner = np.hstack([vibrations - static @ (seats @ vibrations), relief])
     basis = np.hstack([static, _amplitude_shapes(mass, stiffness, inner)])
     count = len(seats)
@@ -266,61 +274,100 @@ def reduce_part(
     return ReducedPart(_symmetric(reduced_mass), _symmetric(reduced_stiffness), basis, frequencies)
 
 
-def static_shapes(mass: SparseMatrix, stiffness: SparseMatrix, seats: Floats, rigid: Floats) -> tuple[Floats, Floats]:
+def static_shapes(
+    mass: SparseMatrix, stiffness: SparseMatrix, seats: Floats, rigid: Floats, backend: Backend | None = "superlu"
+) -> tuple[Floats, Floats]:
     """Shapes (n, s) of least strain energy, each with one seat coordinate at 1, and (n, k) sag between fixed seats.
 
-    With the seats held by springs, K + B^T a B, the first are F B^T (B F B^T)^-1 for any a, F the inverse. The sag is
-    what each rigid acceleration does, B u = 0; without it the shapes know only loads in balance among the seats.
+    Loads at the seats and rigid accelerations that balance each other act on the body held by springs at as many
+    unknowns as it has rigid motions, F the inverse: these springs then carry nothing. The forces at the seats follow
+    from the motion of the seats, B (F B^T l + R a) = d with R^T B^T l = 0. The sag is what each rigid acceleration
+    does, B u = 0; without it the shapes know only loads in balance among the seats.
     """
-    rows = scipy.sparse.csr_array(seats)
-    springs = scipy.sparse.diags_array(stiffness.diagonal().mean() / rows.multiply(rows).sum(axis=1))
-    # SuperLU gives the same digits in every run, PARDISO's threads do not.
-    with factorise(scipy.sparse.csr_array(stiffness + rows.T @ springs @ rows), "superlu") as held:
+    held_at = scipy.linalg.qr(rigid.T, mode="r", pivoting=True)[1][: rigid.shape[1]]
+    springs = np.zeros(len(rigid))
+    springs[held_at] = stiffness.diagonal().mean()
+    with factorise(scipy.sparse.csr_array(stiffness + scipy.sparse.diags_array(springs)), backend) as held:
         pulled = held.solve(np.hstack([seats.T, mass @ rigid]))
     pulled, sag = pulled[:, : len(seats)], pulled[:, len(seats) :]
-    shapes = pulled @ np.linalg.inv(seats @ pulled)
     moved = seats @ rigid
-    shapes += (rigid - shapes @ moved) @ np.linalg.lstsq(moved, np.eye(len(seats)))[0]
-    return shapes, sag - shapes @ (seats @ sag)
+    count, modes = moved.shape
+    # Compliances and rigid motions differ by ten powers of ten: both unknowns are scaled to one.
+    scale = np.sqrt(np.diag(seats @ pulled))
+    saddle = np.zeros((count + modes, count + modes))
+    saddle[:count, :count] = (seats @ pulled) / np.outer(scale, scale)
+    saddle[:count, count:] = moved / scale[:, None]
+    saddle[count:, :count] = saddle[:count, count:].T
+    wanted = np.zeros((count + modes, count + modes))
+    wanted[:count, :count] = np.diag(1.0 / scale)
+    wanted[:count, count:] = -(seats @ sag) / scale[:, None]
+    wanted[count:, count:] = -(rigid.T @ (mass @ rigid))
+    found = np.linalg.solve(saddle, wanted)
+    shapes = pulled @ (found[:count] / scale[:, None]) + rigid @ found[count:]
+    relief = sag + shapes[:, count:]
+    shapes = shapes[:, :count]
+    shapes += (rigid - shapes @ moved) @ np.linalg.lstsq(moved, np.eye(count))[0]
+    return shapes, relief - shapes @ (seats @ relief)
 
 
 def free_vibrations(
-    mass: SparseMatrix, stiffness: SparseMatrix, rigid: Floats, shift: float, band: float
+    mass: SparseMatrix,
+    stiffness: SparseMatrix,
+    rigid: Floats,
+    shift: float,
+    band: float,
+    backend: Backend | None = "superlu",
 ) -> tuple[Floats, tuple[float, ...]]:
     """Shapes (n, a) of the elastic free vibrations up to `band` (Hz), and their frequencies and the next one.
 
-    Lanczos steps with (K + shift M)^-1, every vector held orthogonal to the rigid motions and to all before it.
+    Lanczos steps with (K + shift M)^-1, every vector held orthogonal to the rigid motions and to all before it. They
+    find one vibration of each frequency; equal ones come in further sweeps, until one finds none in the band.
 
     Raises
     ------
     ReductionError
         More vibrations in the band than `MOST_STEPS` can find.
     """
-    carried = mass @ rigid
-    rigid = rigid @ np.linalg.inv(np.linalg.cholesky(rigid.T @ carried)).T
-    basis, images = [*rigid.T], [*(mass @ rigid).T]
+    known = rigid @ np.linalg.inv(np.linalg.cholesky(rigid.T @ (mass @ rigid))).T
+    frequencies: list[float] = []
+    random = np.random.default_rng(1)
+    with factorise(scipy.sparse.csr_array(stiffness + shift * mass), backend) as shifted:
+        while True:
+            start = random.standard_normal(len(rigid))
+            found, shapes = _lanczos_sweep(mass, shifted, known, start, shift, band)
+            kept = found < band
+            frequencies += found[kept].tolist()
+            known = np.hstack([known, shapes[:, kept]])
+            if not kept.any():
+                order = np.argsort(frequencies)
+                return known[:, rigid.shape[1] :][:, order], (*sorted(frequencies), float(found[0]))
+
+
+def _lanczos_sweep(
+    mass: SparseMatrix, shifted: Factorisation, known: Floats, start: Floats, shift: float, band: float
+) -> tuple[Floats, Floats]:
+    """Frequencies (Hz) up to the first beyond the band, and shapes, of what is orthogonal to the known ones."""
+    basis, images = [*known.T], [*(mass @ known).T]
     count = len(basis)
     diagonal: list[float] = []
     beside: list[float] = []
-    with factorise(scipy.sparse.csr_array(stiffness + shift * mass), "superlu") as shifted:
-        vector = np.random.default_rng(1).standard_normal(len(rigid))
-        while len(diagonal) < MOST_STEPS:
-            before, image = np.array(basis), np.array(images)
-            for _ in range(2):  # once leaves round-off of the first pass
-                vector = vector - before.T @ (image @ vector)
-            own = mass @ vector
-            length = float(np.sqrt(vector @ own))
-            if diagonal:
-                beside.append(length)
-                found = _converged(diagonal, beside, shift, band)
-                if found is not None:
-                    frequencies, turned = found
-                    kept = int(np.count_nonzero(frequencies < band))
-                    return np.array(basis[count:]).T @ turned[:, :kept], tuple(float(f) for f in frequencies)
-            basis.append(vector / length)
-            images.append(own / length)
-            vector = shifted.solve(images[-1])
-            diagonal.append(float(images[-1] @ vector))
+    vector = start
+    while len(diagonal) < MOST_STEPS:
+        before, image = np.array(basis), np.array(images)
+        for _ in range(2):  # once leaves round-off of the first pass
+            vector = vector - before.T @ (image @ vector)
+        own = mass @ vector
+        length = float(np.sqrt(vector @ own))
+        if diagonal:
+            beside.append(length)
+            found = _converged(diagonal, beside, shift, band)
+            if found is not None:
+                frequencies, turned = found
+                return frequencies, np.array(basis[count:]).T @ turned
+        basis.append(vector / length)
+        images.append(own / length)
+        vector = shifted.solve(images[-1])
+        diagonal.append(float(images[-1] @ vector))
     raise ReductionError(f"more vibrations below {band:g} Hz than {MOST_STEPS} steps find; lower the band")
 
 
@@ -454,11 +501,15 @@ def reduce_shaft(model: ShaftModel) -> ReducedBody:
 
 def load_or_reduce(model: ShaftModel, folder: Path) -> ReducedBody:
     """Reduced shaft from a folder if it is there for exactly these inputs, else reduced and kept there."""
-    path = folder / f"{model.name}-{model.key[:16]}.npz"
+    return kept(folder / f"{model.name}-{model.key[:16]}.npz", lambda: reduce_shaft(model))
+
+
+def kept(path: Path, reduce: Callable[[], ReducedBody]) -> ReducedBody:
+    """Body from a file, or reduced and kept there if the file is missing, cut short or of another making."""
     try:
         return _loaded(path)
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
-        body = reduce_shaft(model)  # not there, cut short or of another making
+        body = reduce()
         _keep(body, path)
         return body
 

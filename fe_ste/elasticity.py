@@ -73,9 +73,9 @@ def stiffness_matrix(
     """
     nodes, gradients, volumes = brick_gradients(points, hexahedra)
     if incompatible_modes:
-        element_stiffness = _condense_bubbles(_gradient_products(gradients, volumes, material))
+        element_stiffness = _condense_bubbles(gradient_products(gradients, volumes, material))
     else:
-        element_stiffness = _gradient_products(gradients[:8], volumes, material)
+        element_stiffness = gradient_products(gradients[:8], volumes, material)
     unknowns = (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), 24)
     rows = np.repeat(unknowns, 24, axis=1).ravel()
     columns = np.tile(unknowns, (1, 24)).ravel()
@@ -133,8 +133,17 @@ def _incompatible_gradients(basis: skfem.CellBasis, determinant: FloatArray) -> 
     return np.asarray(np.einsum("iae,iq,eq->iaeq", inverse, slope, ratio))
 
 
-def _gradient_products(gradients: FloatArray, volume: FloatArray, material: Material) -> FloatArray:
-    """Element matrices (elements, 3 m, 3 m) of isotropic elasticity from gradients (m, 3, elements, points)."""
+def gradient_products(gradients: FloatArray, volume: FloatArray, material: Material) -> FloatArray:
+    """Element matrices (elements, 3 m, 3 m) of isotropic elasticity.
+
+    Parameters
+    ----------
+    gradients : ndarray (m, 3, elements, points)
+        Of the shape functions at the integration points, 1/m.
+    volume : ndarray (elements, points)
+        Of the integration points, m^3.
+    material : Material
+    """
     count, _, elements, points = gradients.shape
     flat = np.ascontiguousarray(gradients.transpose(2, 0, 1, 3)).reshape(elements, 3 * count, points)
     products = ((flat * volume[:, None, :]) @ flat.transpose(0, 2, 1)).reshape(elements, count, 3, count, 3)

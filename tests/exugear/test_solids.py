@@ -1,0 +1,280 @@
+"""Solid finite elements and their reduction, against closed forms, turned shafts and the whole model."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.linalg
+import scipy.sparse
+import scipy.sparse.linalg
+import skfem
+
+from exugear import solid_mesh
+from exugear.meridian import MeshSize, SeatBand, Shaft, ShaftSection
+from exugear.reduction import Blank, ReducedBody, ReductionError, ShaftModel, reduce_shaft
+from exugear.solid_mesh import SolidError, read_solid, tetrahedra, turned_hexahedra
+from exugear.solids import (
+    SolidModel,
+    SolidSeat,
+    assemble,
+    gyroscopic_matrix,
+    load_or_reduce_solid,
+    reduce_matrices,
+    reduce_solid,
+    seat_rows,
+)
+from fe_ste.gears import Material
+from fe_ste.sparse import factorise
+
+STEEL = Material(210e9, 0.3, 7850.0)
+SECTIONS = (ShaftSection(0.2, 0.06), ShaftSection(0.2, 0.1), ShaftSection(0.2, 0.08, 0.04))
+BANDS = (SeatBand("left", 0.0), SeatBand("gear", 0.3, 0.06), SeatBand("right", 0.58, 0.04))
+SEATS = (
+    SolidSeat("left", (0.0, 0.0, 0.0), 0.03),
+    SolidSeat("gear", (0.0, 0.0, 0.3), 0.05, 0.06),
+    SolidSeat("right", (0.0, 0.0, 0.58), 0.04, 0.04),
+)
+SIZE = MeshSize(0.1, 0.05, 0)
+BLANKS = {"gear": Blank(12.0, 0.08, 0.15)}
+BAND = 3000.0
+
+
+@pytest.fixture(scope="module")
+def model() -> SolidModel:
+    mesh = turned_hexahedra(Shaft(SECTIONS, STEEL, BANDS, SIZE), 8)
+    return SolidModel("shaft", mesh, STEEL, SEATS, "nonrotating", BAND, 1e6, BLANKS)
+
+
+@pytest.fixture(scope="module")
+def body(model) -> ReducedBody:
+    return reduce_solid(model)
+
+
+@pytest.fixture(scope="module")
+def turned() -> ReducedBody:
+    """The same shaft by harmonics on the same lines."""
+    return reduce_shaft(ShaftModel("shaft", SECTIONS, STEEL, (0.0, 0.0, 0.0), BANDS, BLANKS, BAND, 1e6, SIZE))
+
+
+def test_mass_and_inertia_are_those_of_the_cylinders(body):
+    # Closed form. Circles are piecewise parabolas: with 8 segments the area is 7.8e-4 short, its square twice that.
+    inertia = body.rigid_inertia
+    mass, axial = 12.0, 0.15
+    for s in SECTIONS:
+        own = STEEL.density * math.pi / 4 * (s.outer_diameter**2 - s.inner_diameter**2) * s.length
+        mass, axial = mass + own, axial + own * (s.outer_diameter**2 + s.inner_diameter**2) / 8
+    assert [inertia.mass, inertia.axial] == pytest.approx([mass, axial], rel=1e-3)
+
+
+def test_rigid_motion_stores_no_energy(model, body):
+    rigid = body.rigid_motions((0.1, 0.2, -0.3))
+    assert np.abs(body.stiffness @ rigid).max() < 1e-10 * np.abs(body.stiffness).max()
+    whole = assemble(model.mesh, STEEL)
+    moved = whole.stiffness @ whole.rigid_motions((0.1, 0.2, -0.3))
+    assert np.abs(moved).max() < 1e-10 * np.abs(whole.stiffness).max()
+
+
+def test_seats_follow_rigid_motion(model):
+    solid = assemble(model.mesh, STEEL)
+    rows = seat_rows(solid, SEATS)
+    motion = solid.rigid_motions((0.0, 0.0, 0.0)) @ np.array([1e-3, 2e-3, 3e-3, 4e-3, -5e-3, 6e-3])
+    for number, seat in enumerate(SEATS):
+        turn = np.array([4e-3, -5e-3, 6e-3])
+        expected = np.concatenate([np.array([1e-3, 2e-3, 3e-3]) + np.cross(turn, seat.centre), turn])
+        assert rows[6 * number : 6 * number + 6] @ motion == pytest.approx(expected, rel=1e-10)
+
+
+def test_both_bending_planes_are_alike(body):
+    quarter = np.kron(np.eye(6), np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]))
+    for matrix in (body.mass, body.stiffness):
+        own = matrix[:18, :18]
+        assert quarter @ own @ quarter.T == pytest.approx(own, abs=1e-9 * np.abs(own).max())
+
+
+def test_solid_and_turned_shaft_agree_on_the_same_lines(body, turned):
+    # Second method. What differs are the circles and the finer core of the solid mesh; the matrices of seats know the
+    # circles' missing mass and stiffness (1.6e-3 with 8 segments), the frequencies its ratio alone.
+    count = int(np.count_nonzero(turned.free_frequencies < BAND))
+    assert count >= 4
+    assert body.free_frequencies[:count] == pytest.approx(turned.free_frequencies[:count], rel=1e-3)
+    for one, two in ((body.mass, turned.mass), (body.stiffness, turned.stiffness)):
+        scale = np.sqrt(np.outer(two.diagonal()[:18], two.diagonal()[:18]))
+        assert (one[:18, :18] / scale) == pytest.approx(two[:18, :18] / scale, abs=3e-3)
+
+
+def test_gyroscopic_matrices_of_solid_and_turned_shaft_agree(body, turned):
+    # Beyond the turned shaft's, a solid has Coriolis forces between stretching (it gets thinner) and torsion.
+    bending = [i for i in range(18) if i % 6 in (0, 1, 3, 4)]
+    one, two = (b.gyroscopic[np.ix_(bending, bending)] for b in (body, turned))
+    assert one == pytest.approx(two, abs=3e-3 * np.abs(two).max())
+    rigid = body.rigid_motions(body.rigid_inertia.centre)
+    expected = np.zeros((6, 6))
+    expected[3, 4], expected[4, 3] = body.rigid_inertia.axial, -body.rigid_inertia.axial
+    assert rigid.T @ body.gyroscopic @ rigid == pytest.approx(expected, abs=1e-10 * body.rigid_inertia.axial)
+
+
+def test_reduced_vibrations_are_those_of_the_whole_model(model):
+    # Free ones up to the band are exact, on bearings, which no kept vibration has seen, up to half of it.
+    body = reduce_solid(replace(model, blanks={}, band=4500.0))
+    solid = assemble(model.mesh, STEEL)
+    rows = scipy.sparse.csr_array(seat_rows(solid, SEATS))
+    for bearing, band, tolerance in ((0.0, 4500.0, 1e-7), (2e8, 2500.0, 1e-4)):
+        springs = np.zeros(18)
+        springs[[0, 1, 12, 13]] = bearing
+        held = solid.stiffness + rows.T @ scipy.sparse.diags_array(springs) @ rows
+        with factorise(scipy.sparse.csr_array(held + 1e6 * solid.mass)) as shifted:
+            inverse = scipy.sparse.linalg.LinearOperator(held.shape, shifted.solve)
+            values = scipy.sparse.linalg.eigsh(
+                held, 13, solid.mass, sigma=-1e6, OPinv=inverse, return_eigenvectors=False, v0=np.ones(held.shape[0])
+            )
+        expected = np.sqrt(np.maximum(np.sort(values), 0.0)) / (2 * np.pi)
+        stiffness = body.stiffness.copy()
+        stiffness[range(18), range(18)] += springs
+        found = np.sqrt(np.maximum(scipy.linalg.eigh(stiffness, body.mass, eigvals_only=True), 0.0)) / (2 * np.pi)
+        inside = (expected > 1.0) & (expected < band)
+        assert inside.sum() >= 4
+        assert found[:13][inside] == pytest.approx(expected[inside], rel=tolerance)
+
+
+def test_a_body_in_its_own_turning_frame_has_the_coriolis_matrix_of_a_rigid_body(model, body):
+    # int rho phi_i . (e_z x phi_j) twice, for rigid motions in closed form: translations 2 m, tilts -(Ix + Iy - Iz).
+    reduced = reduce_matrices(model)
+    coriolis = gyroscopic_matrix(replace(model, frame="carrier"), reduced)
+    inertia = body.rigid_inertia
+    rigid = body.rigid_motions(inertia.centre)
+    expected = np.zeros((6, 6))
+    expected[0, 1], expected[1, 0] = -2 * inertia.mass, 2 * inertia.mass
+    tilt = inertia.axial - 2 * inertia.transverse
+    expected[3, 4], expected[4, 3] = tilt, -tilt
+    assert rigid.T @ coriolis @ rigid == pytest.approx(expected, abs=1e-9 * inertia.mass)
+    assert not gyroscopic_matrix(replace(model, frame="ground"), reduced).any()
+
+
+def test_the_surface_moves_and_strains_with_the_seats(body):
+    surface = body.surface
+    moved = surface.displacement @ body.rigid_motions((0.0, 0.0, 0.0))
+    for axis in range(3):
+        unit = np.eye(3)[axis]
+        assert np.allclose(moved[:, :, axis], unit, atol=1e-6)  # stored in single precision
+        assert np.allclose(moved[:, :, 3 + axis], np.cross(unit, surface.points), atol=1e-6)
+    bend = np.zeros(body.size)
+    bend[6] = 1e-3
+    assert surface.energy_density(body.rigid_motions((0.0, 0.0, 0.0))[:, 3]).max() < 1.0
+    assert surface.energy_density(bend).max() > 1e3
+
+
+def tube(occ: Any) -> None:
+    """Tube 0.4 m long, 120 over 60 mm."""
+    outer, bore = (occ.addCylinder(0.0, 0.0, 0.0, 0.0, 0.0, 0.4, r) for r in (0.06, 0.03))
+    occ.cut([(3, outer)], [(3, bore)])
+
+
+TUBE_SEATS = (
+    SolidSeat("front", (0.0, 0.0, 0.0), 0.06, inner_radius=0.03),
+    SolidSeat("bore", (0.0, 0.0, 0.2), 0.03, 0.4),
+)
+
+
+def test_tetrahedra_and_hexahedra_of_a_tube_agree():
+    # Finer meshes of either kind move the first three frequencies by less than 0.1 %.
+    shaft = Shaft((ShaftSection(0.4, 0.12, 0.06),), STEEL, (), MeshSize(0.04, 0.015, 0))
+    frequencies = []
+    for mesh in (turned_hexahedra(shaft, 8), tetrahedra(tube, 0.06, curvature=8)):
+        found = reduce_solid(SolidModel("tube", mesh, STEEL, TUBE_SEATS, "ground", 4000.0, 1e6))
+        frequencies.append(found.figures.free_frequencies["whole"][:3])
+    assert frequencies[1] == pytest.approx(frequencies[0], rel=2e-3)
+
+
+@pytest.mark.parametrize(("suffix", "options"), [(".msh", {"file_format": "gmsh"}), (".inp", {}), (".vtu", {})])
+@pytest.mark.parametrize("kind", ["tetra10", "tetra", "hexahedron20", "hexahedron"])
+def test_meshes_are_read_from_files(tmp_path, suffix, options, kind):
+    # A box of 2 x 1 x 1, in mm in the file; its rigid motions and its volume come out whatever the element.
+    meshio = importlib.import_module("meshio")
+    straight = skfem.MeshTet.init_tensor(*[np.linspace(0, s, 2) for s in (2, 1, 1)])
+    cells, points = straight.t.T, straight.p.T
+    if kind.startswith("hexa"):
+        straight = skfem.MeshHex.init_tensor(*[np.linspace(0, s, 2) for s in (2, 1, 1)])
+        cells, points = straight.t.T[:, np.argsort([6, 2, 5, 7, 1, 3, 4, 0])], straight.p.T
+    edges = solid_mesh._TET_EDGES if kind == "tetra10" else solid_mesh._HEX_EDGES
+    if kind in ("tetra10", "hexahedron20"):
+        middles = points[cells[:, edges]].mean(axis=2).reshape(-1, 3)
+        extra = len(points) + np.arange(len(middles)).reshape(len(cells), -1)
+        cells, points = np.hstack([cells, extra]), np.vstack([points, middles])
+    file = tmp_path / f"box{suffix}"
+    meshio.Mesh(1e3 * points, [(kind, cells)]).write(file, **options)
+    solid = assemble(read_solid(file, unit=1e-3), Material(density=1.0))
+    assert solid.scalar_mass.sum() == pytest.approx(2.0, rel=1e-12)
+    moved = solid.stiffness @ solid.rigid_motions((0.0, 0.0, 0.0))
+    assert np.abs(moved).max() < 1e-10 * np.abs(solid.stiffness).max()
+
+
+def test_a_file_without_solid_elements_is_refused(tmp_path):
+    meshio = importlib.import_module("meshio")
+    file = tmp_path / "sheet.vtu"
+    meshio.Mesh(np.eye(3), [("triangle", np.array([[0, 1, 2]]))]).write(file)
+    with pytest.raises(SolidError, match=r"sheet\.vtu: found triangle; a solid needs elements of one kind among tetra"):
+        read_solid(file)
+    with pytest.raises(SolidError, match="no such file"):
+        read_solid(tmp_path / "none.msh")
+    broken = tmp_path / "broken.vtu"
+    broken.write_text("<VTKFile", encoding="utf-8")
+    with pytest.raises(SolidError, match=r"broken\.vtu: meshio cannot read it"):
+        read_solid(broken)
+
+
+def test_a_missing_system_library_is_named(monkeypatch):
+    def missing(name: str) -> Any:
+        raise OSError("libGLU.so.1: cannot open shared object file")
+
+    monkeypatch.setattr(solid_mesh.importlib, "import_module", missing)
+    with pytest.raises(SolidError, match=r"libGLU\.so\.1.*install libglu1-mesa"):
+        tetrahedra(tube, 0.1)
+
+
+def test_faults_name_body_and_seat(model):
+    with pytest.raises(SolidError, match="seat lost: no face of the mesh lies on it"):
+        reduce_solid(replace(model, seats=(*SEATS, SolidSeat("lost", (0.0, 0.0, 0.35), 0.07, 0.05))))
+    with pytest.raises(SolidError, match="seats gear and again share faces"):
+        reduce_solid(replace(model, seats=(*SEATS, replace(SEATS[1], name="again"))))
+    with pytest.raises(ReductionError, match="body shaft: blank on 'gaer', but the seats are left, gear, right"):
+        reduce_solid(replace(model, blanks={"gaer": BLANKS["gear"]}))
+    with pytest.raises(SolidError, match="at least one seat"):
+        reduce_solid(replace(model, seats=(), blanks={}))
+    with pytest.raises(SolidError, match="multiple of 8"):
+        turned_hexahedra(Shaft(SECTIONS, STEEL, BANDS, SIZE), 12)
+
+
+def test_only_bodies_of_revolution_turn_in_a_frame_that_does_not():
+    mesh = tetrahedra(lambda occ: occ.addBox(-0.05, -0.1, 0.0, 0.1, 0.2, 0.3), 0.1)
+    seats = tuple(SolidSeat(name, (0.0, 0.0, z), 0.2) for name, z in (("low", 0.0), ("high", 0.3)))
+    with pytest.raises(ReductionError, match="body bar: a quarter turn changes its"):
+        reduce_solid(SolidModel("bar", mesh, STEEL, seats, "nonrotating", 1000.0, 1e6))
+
+
+def test_a_reduction_is_kept_and_every_input_has_its_own_key(tmp_path: Path):
+    mesh = tetrahedra(lambda occ: occ.addBox(-0.1, -0.1, 0.0, 0.2, 0.2, 0.3), 0.15)
+    seats = tuple(SolidSeat(name, (0.0, 0.0, z), 0.2) for name, z in (("low", 0.0), ("high", 0.3)))
+    bar = SolidModel("bar", mesh, STEEL, seats, "carrier", 3000.0, 12e3)
+    first = load_or_reduce_solid(bar, tmp_path)
+    stamps = [file.stat().st_mtime_ns for file in tmp_path.iterdir()]
+    again = load_or_reduce_solid(bar, tmp_path)
+    assert [file.stat().st_mtime_ns for file in tmp_path.iterdir()] == stamps
+    assert np.array_equal(first.mass, again.mass)
+    assert np.array_equal(first.surface.quads, again.surface.quads)
+    assert first.figures.unknowns == again.figures.unknowns == {"whole": 3 * mesh.doflocs.shape[1]}
+    others = [
+        replace(bar, mesh=tetrahedra(lambda occ: occ.addBox(-0.1, -0.1, 0.0, 0.2, 0.2, 0.3), 0.1)),
+        replace(bar, frame="ground"),
+        replace(bar, band=2000.0),
+        replace(bar, axis=(0.1, 0.0)),
+        replace(bar, seats=seats[::-1]),
+        replace(bar, material=replace(STEEL, density=7800.0)),
+        replace(bar, blanks={"low": Blank(1.0, 1.0, 1.0)}),
+    ]
+    assert len({one.key for one in (bar, *others)}) == len(others) + 1
