@@ -468,10 +468,11 @@ def table_flank(
         work.states[m, 0], work.states[m, 1] = delta, rate
     if delta <= table.lowest[m]:
         return 0.0
-    misalignment = table.nominal[m, 2]
+    sense = side * table.sense[m]
+    misalignment = sense * table.nominal[m, 2]
     spinning = meshes.spinning[m] == 1
     if not spinning:
-        misalignment += side * mesh_row(q, v, index, place, tilt, c, s, work.gradient[1])[0]
+        misalignment += sense * mesh_row(q, v, index, place, tilt, c, s, work.gradient[1])[0]
     position = phase + cycles * (q[index[5]] - q[index[12]])
     guess = work.pieces[m, number]
     piece, _ = surface_law(delta, position, centre, misalignment, m, table, guess, count, work.law)
@@ -483,7 +484,7 @@ def table_flank(
         total[i] += force * gradient[i]
     if not spinning:
         for i in range(12):
-            work.row[i] = law[3] * table.centre[m, i] + law[4] * side * tilt[i]
+            work.row[i] = law[3] * table.centre[m, i] + law[4] * sense * tilt[i]
         mesh_row(q, v, index, place, work.row, c, s, work.gradient[1])
         for i in range(13):
             total[i] += work.gradient[1, i]
@@ -506,8 +507,9 @@ def table_mesh(q: Floats, v: Floats, m: int, count: int, meshes: Meshes, work: W
         c, s = work.turns[meshes.slot[m], 0], work.turns[meshes.slot[m], 1]
         index = meshes.coordinates[m]
         centre += mesh_row(q, v, index, meshes.place[m], table.centre[m], c, s, work.gradient[1])[0]
-    force: float = table_flank(q, v, m, 1, centre, count, meshes, work, energy)
-    force -= table_flank(q, v, m, -1, centre, count, meshes, work, energy)
+    force = 0.0
+    for side in (1, -1):
+        force += side * table_flank(q, v, m, side, centre, count, meshes, work, energy)
     return force
 
 
@@ -613,29 +615,23 @@ def advance(first: int, step: float, equations: Equations, work: Work, out_q: Fl
     half = 0.5 * step
     for n in range(out_q.shape[0]):
         begin = (first + n) * step
-        evaluate(begin, q, v, equations, work)
         for i in range(size):
-            total[i] = a[i]
-            out_q[n, i] = a[i]
-            x[i] = q[i] + half * v[i]
-            u[i] = v[i] + half * a[i]
-        evaluate(begin + half, x, u, equations, work)
-        for i in range(size):
-            total[i] += 2.0 * a[i]
-            out_q[n, i] += a[i]
-            x[i] = q[i] + half * u[i]
-            u[i] = v[i] + half * a[i]
-        evaluate(begin + half, x, u, equations, work)
-        for i in range(size):
-            total[i] += 2.0 * a[i]
-            out_q[n, i] += a[i]
-            x[i] = q[i] + step * u[i]
-            u[i] = v[i] + step * a[i]
-        evaluate(begin + step, x, u, equations, work)
+            x[i], u[i] = q[i], v[i]
+            total[i], out_q[n, i] = 0.0, 0.0
+        for stage in range(4):  # a loop, so that the equations are compiled once
+            evaluate(begin + (0.0 if stage == 0 else half if stage < 3 else step), x, u, equations, work)
+            weight = 2.0 if stage == 1 or stage == 2 else 1.0
+            ahead = half if stage < 2 else step
+            for i in range(size):
+                total[i] += weight * a[i]
+                if stage < 3:
+                    out_q[n, i] += a[i]
+                    x[i] = q[i] + ahead * u[i]
+                    u[i] = v[i] + ahead * a[i]
         check = 0.0
         for i in range(size):
             q[i] += step * (v[i] + step / 6.0 * out_q[n, i])
-            v[i] += step / 6.0 * (total[i] + a[i])
+            v[i] += step / 6.0 * total[i]
             out_q[n, i], out_v[n, i] = q[i], v[i]
             check += abs(q[i]) + abs(v[i])
         if not math.isfinite(check):

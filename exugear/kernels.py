@@ -333,15 +333,16 @@ def table_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, out: Floats, a
             out[0], out[1] = delta, rate
         if delta <= table.lowest[m]:
             continue
-        misalignment = gear_position(q, m, meshes, tilt, side * table.nominal[m, 2])
+        sense = side * table.sense[m]
+        misalignment = sense * gear_position(q, m, meshes, tilt, table.nominal[m, 2])
         pmc = phase + cycles * spin
-        surface_law(delta, pmc, centre, side * misalignment, m, table, 0, ORDERS.shape[0], memory)
+        surface_law(delta, pmc, centre, misalignment, m, table, 0, ORDERS.shape[0], memory)
         law = memory.law
         damping = table.damping_time[m] * law[1]
         force = law[0] + damping * rate
         for i in range(ROW_SIZE):
             acting[i] += force * gradient[i]
-        frame_row(q, index, place, law[3] * table.centre[m] + law[4] * side * tilt, gradient, turning)
+        frame_row(q, index, place, law[3] * table.centre[m] + law[4] * sense * tilt, gradient, turning)
         for i in range(ROW_SIZE):
             acting[i] += gradient[i]
         out[3] += law[1]
@@ -452,8 +453,9 @@ def table_tangent(q: Floats, v: Floats, m: int, side: int, meshes: MeshArrays, j
     if delta <= table.lowest[m]:
         return
     centre = table.nominal[m, 1] + frame_row(q, index, place, table.centre[m], gradients[1], changing)
-    tilting = side * tilt
-    misalignment = table.nominal[m, 2] + frame_row(q, index, place, tilting, gradients[2], changing)
+    sense = side * table.sense[m]
+    tilting = sense * tilt
+    misalignment = sense * table.nominal[m, 2] + frame_row(q, index, place, tilting, gradients[2], changing)
     pmc = phase + cycles * relative_spin(q, index, 0)
     gradients[3, 5], gradients[3, 12] = cycles, -cycles
     piece, t = surface_law(delta, pmc, centre, misalignment, m, table, 0, ORDERS.shape[0], memory)

@@ -30,7 +30,8 @@ Laws
 
 Where the gears stand: the centre distance is along the line of centres at mid-face; misalignment is the turning of
 gear 1's axis against gear 2's in the loaded flank's plane of action, positive where it opens the gap at the +z end.
-The other flank is the loaded one turned by pi about the line of centres: the same table with misalignment reversed.
+A table is that of the flank s = +1; the flank s = -1 is it turned by pi about the line of centres: the same table
+with misalignment reversed.
 """
 
 from __future__ import annotations
@@ -416,6 +417,7 @@ def _pack_tables(
         backlash=np.zeros(count),
         back_phase=np.zeros(count),
         damping_time=np.zeros(count),
+        sense=np.array([e.flank for e in elements], dtype=np.float64),
     )
     for m, (element, surface) in enumerate(zip(elements, surfaces, strict=True)):
         if surface is not None and element.table is not None:

@@ -6,8 +6,8 @@ load the flanks are apart. With the complementary energy U*(F) = int_0^F s dF
 
     U = F delta - U*,   dU/d delta = F,   dU/da = -dU*/da,   dU/d gamma = -dU*/d gamma,   dF/d delta = 1 / (ds/dF)
 
-so that one potential gives the force, the push between the axes and the moment that misalignment raises. A flank of
-the other side has the same surface seen from the other end of the gear: gamma changes its sign.
+so that one potential gives the force, the push between the axes and the moment that misalignment raises. A
+flank of the other side has the same surface seen from the other end of the gear: gamma changes its sign.
 
 Nothing is allocated here but the memory handed in.
 """
@@ -55,6 +55,7 @@ class TableArrays(NamedTuple):
     backlash : (m,) approach from flank to flank along the transverse line of action, m
     back_phase : (m,) position of the other flank in its mesh cycle at zero angles
     damping_time : (m,) damping over tangent stiffness, s
+    sense : (m,) the loaded flank of gear 1, 1 or -1: the table is that of 1, or of -1 turned about the line of centres
     """
 
     shape: Integers
@@ -73,6 +74,7 @@ class TableArrays(NamedTuple):
     backlash: Floats
     back_phase: Floats
     damping_time: Floats
+    sense: Floats
 
 
 class Scratch(NamedTuple):
@@ -278,10 +280,10 @@ def surface_law(
         memory.node[1 + axis] = tables.first[m, axis, i]
     last = shape[3] - 1
     piece = min(max(guess, 0), last)
-    contract(tables.values[m], shape, piece, count, memory)
     c = cubic[0]
     moved = 0
     while True:
+        contract(tables.values[m], shape, piece, count, memory)
         if delta < c[0] and piece > 0 and moved <= 0:
             moved = -1
         elif delta > c[0] + c[1] + c[2] + c[3] and piece < last and moved >= 0:
@@ -289,7 +291,6 @@ def surface_law(
         else:
             break
         piece += moved
-        contract(tables.values[m], shape, piece, count, memory)
     start = tables.root[m, piece]
     step = tables.root[m, piece + 1] - start
     if delta <= c[0] and piece == 0:

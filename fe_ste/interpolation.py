@@ -21,6 +21,8 @@ IntArray = NDArray[np.int64]
 
 STENCIL = 4
 """Nodes of an axis that act between two of them."""
+_ROUND_OFF = 1e-9
+"""Slopes of this part of a piece's mean slope are none."""
 _CHECKS = np.linspace(0.0, 1.0, 9)
 """Places within a piece at which the surface is checked to rise with the load."""
 
@@ -270,7 +272,8 @@ class SteSurface:
         for rows in cycle:  # a position at a time: the whole would be large
             values = np.tensordot(rows, self.coefficients, 1)
             values = np.tensordot(tilt, np.tensordot(centre, values, 1), (1, 1))
-            falling = np.argwhere((values[..., 1:4] @ powers.T).min(axis=-1) < 0.0)
+            rise = values[..., 1:4].sum(axis=-1)
+            falling = np.argwhere((values[..., 1:4] @ powers.T).min(axis=-1) < -_ROUND_OFF * rise)
             if falling.size:
                 a, c, piece = falling[0]
                 raise InterpolationError(

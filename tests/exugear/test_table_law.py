@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import math
+import tomllib
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -15,10 +17,13 @@ from exugear.assembly import Assembly, assemble
 from exugear.channels import Channels
 from exugear.compiled import CompiledSystem, LoadTable, Observer
 from exugear.gearbox import Gearbox
+from exugear.kernels import add_mesh_forces
 from exugear.mesh_element import pack
 from exugear.runup import simulate
 from exugear.statics import locked_equilibrium
+from fe_ste.interpolation import SteSurface
 
+from .spur_case import SPUR_CASE
 from .table_case import surfaces
 
 VARIANTS = ["rigid", "bushing"]
@@ -152,8 +157,45 @@ def test_static_deflection_is_the_tables(grc: Gearbox, tables: dict, variant: st
     places = assembly.gear_positions(q)
     for element, state, (centre, misalignment) in zip(assembly.elements, found, places, strict=True):
         assert element.table is not None
-        ste = element.table.surface.ste(state[4], state[2], centre, misalignment)
+        ste = element.table.surface.ste(state[4], state[2], centre, element.flank * misalignment)
         assert state[0] == pytest.approx(ste, rel=1e-9)
+
+
+def test_other_sense_of_load_is_the_same_pair_turned_about_the_line_of_centres() -> None:
+    """Turned by pi about the line of centres (here x) a spur pair is itself, loaded on its other flanks."""
+    content = tomllib.loads(SPUR_CASE)
+    reversed_load = copy.deepcopy(content)
+    reversed_load["static_load"]["torques_N_m"] = {"shaft_1": -100.0}
+    forces = []
+    random = np.random.default_rng(6)
+    turn = np.tile([1.0, -1.0, -1.0, 1.0, -1.0, -1.0], 2)
+    disturbance = random.normal(size=12) * np.tile([2e-6, 2e-6, 2e-6, 2e-4, 2e-4, 0.0], 2)
+    for case, sign in ((content, np.ones(12)), (reversed_load, turn)):
+        gearbox = Gearbox.from_dict(case)
+        surface = asymmetric_surface(gearbox)
+        assembly = assemble(gearbox, "bushing", {"spur": surface}, "table")
+        element = assembly.elements[0]
+        assert element.flank == (1 if sign[1] > 0 else -1)
+        q = disturbance.copy()
+        q[5] = 30e-6 / element.mesh.pair.pinion.base_radius  # loaded deflection
+        found = np.zeros(12)
+        add_mesh_forces(sign * q, np.zeros(12), assembly.meshes, found)
+        forces.append(sign * found)
+        compiled = CompiledSystem(assembly, sign * q, np.zeros(12), LoadTable({}), 1e-5).accelerations()
+        expected = assembly.accelerations(sign * q, np.zeros(12), np.zeros(12))
+        assert np.abs(compiled - expected).max() < 1e-9 * np.abs(expected).max()
+    assert np.abs(forces[0]).max() > 1e3
+    assert np.abs(forces[1] - forces[0]).max() < 1e-9 * np.abs(forces[0]).max()
+
+
+def asymmetric_surface(gearbox: Gearbox) -> SteSurface:
+    """Softer the more the gap opens at the +z end."""
+    force = gearbox.pairs["spur"].static_torque / gearbox.gears["pinion"].base_radius * np.array([0.5, 1.0, 2.0])
+    tilts = np.array([-1e-3, 0.0, 1e-3])
+    soft = 1.0 + 300.0 * tilts[None, None, :, None] + 0.1 * np.cos(2 * np.pi * np.arange(8) / 8)[:, None, None, None]
+    per_load = soft / 2e8
+    slopes = np.broadcast_to(300.0 / 2e8 * force, (*soft.shape[:3], 3))
+    return SteSurface.from_nodes([0.075], tilts, force, per_load * force, 1.0 / per_load * np.ones(3), slopes)
 
 
 def test_no_energy_is_gained_on_a_closed_path_at_frozen_position(grc: Gearbox, tables: dict) -> None:
