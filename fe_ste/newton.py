@@ -535,6 +535,22 @@ def solve_contact(
         return _Search(model, settings or NewtonSettings(), report).solve()
 
 
+def fixed_body_displacement(model: ContactModel) -> tuple[FloatArray, FloatArray]:
+    """Displacement (n, 3) and modes of held bodies under their nodal forces alone, to first order, without contact.
+
+    Raises
+    ------
+    FactorisationError
+        If a rigid-body motion is left free.
+    """
+    bricks, numbering = model.bricks, _Numbering(model)
+    displacement, modes = np.zeros_like(bricks.points), bricks.modes_at_rest()
+    tangent = bricks.evaluate(displacement, modes)
+    with factorise(numbering.matrix(tangent, displacement, 0.0)) as factor:
+        displacement.ravel()[numbering.free] = factor.solve(numbering.reduced(model.forces, displacement))
+    return displacement, bricks.stepped_modes(modes, tangent, displacement, 1.0)
+
+
 def convergence_table(iterations: Sequence[Iteration]) -> str:
     """Lay out the iterations of an analysis as text, one a line."""
     head = "load %  iteration  in contact  changed  step  force error  gap error     hub um"

@@ -79,8 +79,8 @@ class NonlinearPosition:
     model : ContactModel
         Gear 1's nodes and bricks first.
     equilibrium : Equilibrium
-    pinion_nodes, pinion_bricks : int
-        How many of them are gear 1's.
+    sectors : tuple of OpenSector
+        Gear 1, gear 2.
     load_share : dict
         Tooth pair -> part of the normal load.
     wall_time : float
@@ -93,10 +93,14 @@ class NonlinearPosition:
     ste: float
     model: ContactModel
     equilibrium: Equilibrium
-    pinion_nodes: int
-    pinion_bricks: int
+    sectors: tuple[OpenSector, OpenSector]
     load_share: dict[int, float]
     wall_time: float
+
+    @property
+    def pinion_nodes(self) -> int:
+        """Number of nodes of gear 1, which come first in the model."""
+        return len(self.sectors[0].points)
 
     @property
     def unknowns(self) -> int:
@@ -155,8 +159,7 @@ def nonlinear_position(
         ste=equilibrium.hub,
         model=model,
         equilibrium=equilibrium,
-        pinion_nodes=len(sectors[0].points),
-        pinion_bricks=len(sectors[0].hexahedra),
+        sectors=sectors,
         load_share=_load_share(sectors[0], model, equilibrium),
         wall_time=time.perf_counter() - started,
     )

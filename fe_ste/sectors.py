@@ -87,6 +87,8 @@ class OpenSector:
         Element and number in `HEXAHEDRON_FACES` of the loaded flanks' faces.
     tooth : ndarray (k,)
         Tooth pair of each of these faces.
+    brick_tooth : ndarray (m,)
+        Tooth pair of the sector each hexahedron belongs to.
     """
 
     points: FloatArray
@@ -94,6 +96,7 @@ class OpenSector:
     held: IntArray
     contact_faces: IntArray
     tooth: IntArray
+    brick_tooth: IntArray
 
     @property
     def facets(self) -> IntArray:
@@ -252,7 +255,7 @@ def _joined(place: _Place, meshes: list[SectorMesh]) -> OpenSector:
     numbers = np.arange(len(meshes)) - len(meshes) // 2
     first_point = np.cumsum([0] + [len(mesh.points) for mesh in meshes])
     first_brick = np.cumsum([0] + [len(mesh.hexahedra) for mesh in meshes])
-    points, bricks, held, faces, tooth = [], [], [], [], []
+    points, bricks, held, faces, tooth, brick_tooth = [], [], [], [], [], []
     for copy, (mesh, number) in enumerate(zip(meshes, numbers, strict=True)):
         points.append(_turned(mesh.points, place.angle + number * gear.angular_pitch))
         bricks.append(mesh.hexahedra + first_point[copy])
@@ -260,6 +263,7 @@ def _joined(place: _Place, meshes: list[SectorMesh]) -> OpenSector:
         own = _flank_faces(mesh, place.side)
         faces.append(own + np.array([first_brick[copy], 0]))
         tooth.append(np.full(len(own), place.sense * number))
+        brick_tooth.append(np.full(len(mesh.hexahedra), place.sense * number))
     all_points = np.concatenate(points)
     target = np.arange(len(all_points))
     for copy in range(1, len(meshes)):
@@ -276,6 +280,7 @@ def _joined(place: _Place, meshes: list[SectorMesh]) -> OpenSector:
         held=np.unique(renumbered[np.concatenate(held)]),
         contact_faces=np.concatenate(faces),
         tooth=np.concatenate(tooth),
+        brick_tooth=np.concatenate(brick_tooth),
     )
 
 

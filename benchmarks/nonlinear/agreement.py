@@ -1,0 +1,143 @@
+"""Static transmission error by the superelement and by the full non-linear analysis on the same open sectors.
+
+Run ``python benchmarks/nonlinear/agreement.py`` for all cases, or with names of cases; it renews their entries in
+``results.json``. See README.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import math
+import platform
+import sys
+import time
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+RESULTS = Path(__file__).with_name("results.json")
+sys.path.insert(0, str(Path(__file__).parents[1] / "calculix"))
+
+from cross_check import PAIRS  # noqa: E402
+
+from fe_ste.hexmesh import MeshSettings  # noqa: E402
+from fe_ste.nonlinear import NonlinearSettings, nonlinear_position  # noqa: E402
+from fe_ste.sectors import ContactMesh  # noqa: E402
+from fe_ste.ste import PairCompliance, contact_state, pair_compliance  # noqa: E402
+
+TORQUES = {"spur": 340.0, "helical": 5400.0, "internal": 10000.0}
+POSITIONS = (0.0, 0.2, 0.4, 0.6, 0.8)
+#: Mesh of the superelement: finer than the default one.
+SUPERELEMENT = MeshSettings(layers=14, flank=24, thickness=14, fillet=6, root=4, rim=18)
+MESHES = {"coarse": ContactMesh().refined(0.6), "default": ContactMesh(), "fine": ContactMesh().refined(1.5)}
+
+
+@dataclass(frozen=True)
+class Case:
+    """One position of one pair on one mesh.
+
+    Parameters
+    ----------
+    pair : str
+        Key of the pairs of the CalculiX benchmark.
+    pmc : float
+    mesh : str
+        Key of `MESHES`.
+    teeth : int
+    finite_deformation : bool
+    """
+
+    pair: str
+    pmc: float
+    mesh: str = "default"
+    teeth: int = 3
+    finite_deformation: bool = True
+
+
+def _cases() -> dict[str, Case]:
+    cases = {}
+    for pair in TORQUES:
+        for pmc in POSITIONS:
+            cases[f"{pair} {pmc:g}"] = Case(pair, pmc)
+        for pmc in (0.0, 0.6):
+            cases[f"{pair} {pmc:g} small strain"] = Case(pair, pmc, finite_deformation=False)
+        for mesh in ("coarse", "fine"):
+            cases[f"{pair} 0 {mesh}"] = Case(pair, 0.0, mesh=mesh)
+        for teeth in (5, 7):
+            cases[f"{pair} 0 {teeth} teeth"] = Case(pair, 0.0, teeth=teeth)
+    return cases
+
+
+CASES = _cases()
+
+
+@lru_cache(maxsize=4)
+def compliance(pair: str, teeth: int | None) -> PairCompliance:
+    """Superelement of a pair on open sectors, or on closed rings without a number of teeth."""
+    return pair_compliance(PAIRS[pair](), SUPERELEMENT, open_teeth=teeth)
+
+
+def superelement(pair: str, pmc: float, teeth: int | None) -> dict[str, float]:
+    """Solve a position by the superelement: static transmission error and wall time."""
+    prepared = compliance(pair, teeth)
+    started = time.perf_counter()
+    state = contact_state(prepared, TORQUES[pair], pmc)
+    elapsed = time.perf_counter() - started
+    ste = state.solution.approach / math.cos(prepared.pair.pinion.base_helix_angle)
+    return {"ste_um": 1e6 * ste, "position_wall_s": elapsed}
+
+
+def compare(case: Case) -> dict[str, Any]:
+    """Both methods on one case, as stored."""
+    ours = superelement(case.pair, case.pmc, case.teeth)
+    settings = NonlinearSettings(case.teeth, MESHES[case.mesh], case.finite_deformation)
+    found = nonlinear_position(PAIRS[case.pair](), TORQUES[case.pair], case.pmc, settings)
+    entry = {
+        "case": dataclasses.asdict(case),
+        "torque_N_m": TORQUES[case.pair],
+        "contact_mesh": dataclasses.asdict(MESHES[case.mesh]),
+        "nonlinear": {
+            "ste_um": 1e6 * found.ste,
+            "unknowns": found.unknowns,
+            "iterations": len(found.equilibrium.iterations),
+            "position_wall_s": found.wall_time,
+            "load_share": {str(tooth): share for tooth, share in found.load_share.items()},
+        },
+        "superelement": ours,
+        "difference_percent": 100.0 * (ours["ste_um"] / (1e6 * found.ste) - 1.0),
+        "machine": f"{platform.system()} {platform.machine()}",
+    }
+    if case.teeth > 3 or case.pmc == 0.0:
+        entry["closed_ring_um"] = superelement(case.pair, case.pmc, None)["ste_um"]
+    return entry
+
+
+def stored() -> dict[str, dict[str, Any]]:
+    """Results by name of the case."""
+    if not RESULTS.exists():
+        return {}
+    results: dict[str, dict[str, Any]] = json.loads(RESULTS.read_text(encoding="utf-8"))
+    return results
+
+
+def main() -> None:
+    """Run the cases named on the command line and store their results."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("cases", nargs="*", help="names of cases; all, if none is given")
+    arguments = parser.parse_args()
+    for name in arguments.cases or CASES:
+        entry = compare(CASES[name])
+        RESULTS.write_text(json.dumps(stored() | {name: entry}, indent=1) + "\n", encoding="utf-8")
+        ours, theirs = entry["superelement"]["ste_um"], entry["nonlinear"]["ste_um"]
+        sys.stdout.write(
+            f"{name}: superelement {ours:.3f} um, non-linear {theirs:.3f} um, {entry['difference_percent']:+.2f} %, "
+            f"{entry['nonlinear']['unknowns']} unknowns, {entry['nonlinear']['position_wall_s']:.0f} s\n"
+        )
+        sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()
