@@ -112,6 +112,19 @@ class Assembly:
             begin += shaft.reduced.size
         return found
 
+    def rigid_part(self, vector: Floats) -> Floats:
+        """Copy of a vector of coordinates in which a shaft's main seat has the mean motion of the whole shaft.
+
+        It is that of the body's centre of mass, as `coordinates` of a rigid body are.
+        """
+        out = vector.copy()
+        for name, place in self.shaft_slices.items():
+            body = self.shafts[name].reduced
+            motions = body.rigid_motions(body.rigid_inertia.centre)
+            carried = motions.T @ body.mass
+            out[list(self.coordinates[name])] = np.linalg.solve(carried @ motions, carried @ vector[place])
+        return out
+
     @cached_property
     def spin(self) -> dict[str, int]:
         """Coordinate of each body's spin."""

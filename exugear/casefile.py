@@ -347,8 +347,8 @@ class ElasticitySection(_Section):
     that a solver's step is not ruled by it.
     """
 
-    band_Hz: Positive = 6000.0
-    limit_Hz: Positive = 12000.0
+    band_Hz: Positive = 4500.0
+    limit_Hz: Positive = 9000.0
 
     @model_validator(mode="after")
     def _order(self) -> ElasticitySection:

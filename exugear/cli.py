@@ -679,7 +679,7 @@ def _draw_modes(found: Modes, folder: Path, first: int, animation: bool) -> list
     drawn = {body.name for body in bodies}
     scenes = {}
     for place, name in enumerate(found.names):
-        motions = motions_of(assembly.bodies, assembly.coordinates, found.shapes[:, place])
+        motions = motions_of(assembly.bodies, assembly.coordinates, assembly.rigid_part(found.shapes[:, place]))
         moving = {body: motion for body, motion in motions.items() if body in drawn}
         if found.frequency[place] > 0.0 and any(motion.any() for motion in moving.values()):
             scenes[place] = mode_scene(bodies, moving, title=f"{found.frequency[place]:.0f} Hz: {name}")

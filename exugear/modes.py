@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg
+import scipy.optimize
 import xarray as xr
 from numpy.typing import NDArray
 
@@ -396,3 +397,34 @@ def mode_name(assembly: Assembly, element_names: tuple[str, ...], kinetic: Float
         told += share
     most = max(strained, key=lambda name: strained[name])
     return f"{', '.join(words)}; strained: {most} {100 * strained[most]:.0f} %"
+
+
+def counterparts(rigid: Modes, flexible: Modes) -> tuple[NDArray[np.int64], Floats]:
+    """Find for each mode on rigid shafts the one on elastic shafts that it becomes.
+
+    Parameters
+    ----------
+    rigid, flexible : Modes
+        Of the variants `bushing` and `flexible` of one gearbox.
+
+    Returns
+    -------
+    place : (n,) array of int
+        Its place among the modes of `flexible`, each used once; the sum of the shares is largest.
+    share : (n,) array
+        Squared overlap, 1 for the same motion: the kinetic energy that both shapes share, shafts taken as rigid.
+    """
+    one, other = rigid.assembly, flexible.assembly
+    carried = np.zeros((other.size, one.size))
+    for body in one.bodies:
+        index = [i for i in one.coordinates[body.name] if i >= 0]
+        if body.name in other.shafts:
+            centre = (*body.axis, body.centre_of_mass_z)
+            carried[other.shaft_slices[body.name], index[0] : index[-1] + 1] = other.shafts[
+                body.name
+            ].reduced.rigid_motions(centre)
+        else:
+            carried[[i for i in other.coordinates[body.name] if i >= 0], index] = 1.0
+    share = (flexible.shapes.T @ other.mass_matrix @ carried @ rigid.shapes) ** 2
+    _, place = scipy.optimize.linear_sum_assignment(share.T, maximize=True)
+    return np.asarray(place, dtype=np.int64), share[place, np.arange(len(place))]

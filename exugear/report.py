@@ -630,7 +630,7 @@ def _drawn_mode(writer: _Writer, assembly: Assembly, shape: Any, title: str, nam
 def _motions(assembly: Assembly, shape: Any) -> dict[str, Any]:
     """Motions of the bodies that have a shape to draw."""
     drawn = {body.name for body in bodies_of(assembly.gearbox)}
-    motions = motions_of(assembly.bodies, assembly.coordinates, shape)
+    motions = motions_of(assembly.bodies, assembly.coordinates, assembly.rigid_part(shape))
     return {name: motion for name, motion in motions.items() if name in drawn}
 
 

@@ -68,7 +68,7 @@ def draw_gearbox(
         for body in bodies:
             mesh = _polydata(body.surface.points, body.surface.triangles)
             plotter.add_mesh(mesh, color=colours[body.family], opacity=_opacity(body), ambient=0.3, diffuse=0.7)
-        _look(plotter)
+        look(plotter)
         image, pixel = rendered_image(plotter)
     image = without_margins(image)
     with drawing_style():
@@ -103,7 +103,7 @@ def draw_mode(scene: ModeScene, path: str | Path | None = None, *, size: tuple[i
     """
     with offscreen_plotter(*size) as plotter:
         _add_mode(plotter, scene)
-        _look(plotter)
+        look(plotter)
         image, pixel = rendered_image(plotter)
     figure = _mode_figure(without_margins(image), pixel, scene.title)
     return finish_figure(figure, path)
@@ -138,15 +138,29 @@ def animate_mode(
     fe_ste.scene.RenderingError
         If this machine cannot render off-screen.
     """
+    target = Path(path)
+    if target.suffix.lower() != ".gif":
+        raise ValueError(f"animation {target}: the suffix must be .gif")
+    images = _mode_images(scene, frames // 2 + 1, size)
+    return write_animation([_mode_figure(image, pixel, scene.title) for image, pixel in images], target, duration)
+
+
+def write_animation(way_out: Sequence[Figure], target: Path, duration: float) -> Path:
+    """Write a standing wave as an animated picture (``.gif``) from figures of half a period; `duration` in s.
+
+    Raises
+    ------
+    ValueError
+        If the suffix is another.
+    """
     from PIL import Image
 
-    target = Path(path)
     if target.suffix.lower() != ".gif":
         raise ValueError(f"animation {target}: the suffix must be .gif")
     target.parent.mkdir(parents=True, exist_ok=True)
     # A standing wave: the way back shows the pictures of the way out.
-    way_out = [_set_picture(image, pixel, scene.title) for image, pixel in _mode_images(scene, frames // 2 + 1, size)]
-    pictures = way_out + way_out[-2:0:-1]
+    finished = [_set_picture(figure) for figure in way_out]
+    pictures = finished + finished[-2:0:-1]
     # One palette for all frames, else colours flicker.
     palette = _with_white(pictures[0].quantize(colors=255, method=Image.Quantize.MEDIANCUT))
     indexed = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
@@ -160,7 +174,7 @@ def _mode_images(scene: ModeScene, count: int, size: tuple[int, int]) -> list[tu
     images = []
     with offscreen_plotter(*size) as plotter:
         meshes = _add_mode(plotter, scene)
-        _look(plotter)
+        look(plotter)
         for number in range(count):
             part = math.cos(math.pi * number / (count - 1))
             for mesh, body, motion in zip(meshes, scene.bodies, scene.motions, strict=True):
@@ -172,12 +186,12 @@ def _mode_images(scene: ModeScene, count: int, size: tuple[int, int]) -> list[tu
     return [(image[rows, columns], pixel) for image, pixel in images]
 
 
-def _set_picture(image: ImageArray, pixel: float, title: str) -> PIL.Image.Image:
-    """Finish a frame with title and colour bar."""
+def _set_picture(figure: Figure) -> PIL.Image.Image:
+    """Turn a figure into a frame."""
     from PIL import Image
 
     finished = io.BytesIO()
-    _mode_figure(image, pixel, title).savefig(finished, format="png", dpi=100)
+    figure.savefig(finished, format="png", dpi=100)
     return Image.open(finished).convert("RGB")
 
 
@@ -215,10 +229,10 @@ def _polydata(points: FloatArray, triangles: IntArray) -> pyvista.PolyData:
     return pyvista.PolyData(points, faces=faces.ravel())
 
 
-def _look(plotter: pyvista.Plotter) -> None:
-    """Look from the input side, from above and the side, y up."""
+def look(plotter: pyvista.Plotter, direction: tuple[float, float, float] = _VIEW) -> None:
+    """Look at everything, y up, with a direction from the bodies to the eye; the input side, above and the side."""
     centre = np.asarray(plotter.center)
-    plotter.camera_position = [centre + np.asarray(_VIEW), centre, (0.0, 1.0, 0.0)]
+    plotter.camera_position = [centre + np.asarray(direction), centre, (0.0, 1.0, 0.0)]
     plotter.renderer.ResetCamera()
 
 

@@ -12,7 +12,8 @@ from exugear.casefile import CaseError
 from exugear.channels import Channels
 from exugear.compiled import CompiledSystem, LoadTable, Observer
 from exugear.gearbox import Gearbox
-from exugear.modes import eigenmodes, linearise, modes_of
+from exugear.modes import counterparts, eigenmodes, linearise, modes_of
+from exugear.shaft_scene import animate_shafts, draw_shafts, shaft_scene
 from exugear.shafts import elastic_shafts, shaft_model
 from exugear.statics import accelerating_start, locked_equilibrium
 from exugear.system import ExudynSystem, Loading
@@ -226,3 +227,45 @@ def test_damping_of_shafts_is_a_key_of_the_case(grc: Gearbox, stiffness: dict) -
     assembly = assemble(quiet, "flexible", stiffness)
     linear = linearise(assembly, np.zeros(assembly.size))
     assert not linear.damping["lss_shaft"].any()
+
+
+def test_modes_on_rigid_shafts_are_found_again_on_stiff_ones(grc: Gearbox, stiffness: dict) -> None:
+    rigid = eigenmodes(grc, "bushing", stiffness)
+    moduli = {f"bodies.{name}.shape.material.youngs_modulus_GPa": 206e3 for name in SHAFTS}
+    stiff = eigenmodes(grc.varied({**moduli, "elasticity.limit_Hz": 1e6}), "flexible", stiffness)
+    place, share = counterparts(rigid, stiff)
+    # Equal frequencies share a plane of shapes, in which overlaps are free to mix.
+    gaps = np.diff(rigid.frequency) > 0.01 * rigid.frequency[1:]
+    alone = np.append(True, gaps) & np.append(gaps, True)
+    assert np.array_equal(place[alone], np.flatnonzero(alone))
+    assert share[alone].min() > 0.99
+
+
+def test_the_rigid_part_of_a_rigid_motion_is_that_of_the_centre(flexible: Assembly) -> None:
+    vector = np.zeros(flexible.size)
+    for name, place in flexible.shaft_slices.items():
+        body = flexible.shafts[name].reduced
+        vector[place] = body.rigid_motions(body.rigid_inertia.centre) @ np.arange(1.0, 7.0)
+    found = flexible.rigid_part(vector)
+    for name in SHAFTS:
+        assert found[list(flexible.coordinates[name])] == pytest.approx(np.arange(1.0, 7.0), rel=1e-9)
+
+
+def test_a_scene_shows_every_shaft_with_its_gears(flexible: Assembly, tmp_path: Path) -> None:
+    modes = modes_of(flexible)
+    bending = next(n for n, name in enumerate(modes.names) if name.startswith("ims bending"))
+    scene = shaft_scene(flexible, modes.shapes[:, bending], title="a mode", amplitude=0.05)
+    assert [gear.name for gear in scene.gears] == ["sun", "im_gear", "im_pinion", "hs_gear", "hs_pinion"]
+    largest = max(np.linalg.norm(shaft.displacement, axis=1).max() for shaft in scene.shafts)
+    assert largest == pytest.approx(0.05 * 0.8795, rel=1e-6)  # the low-speed shaft is the longest
+    assert [shaft.energy.max() for shaft in scene.shafts].index(1.0) == 1
+    draw_shafts(scene, tmp_path / "mode.png", size=(400, 300))
+    animate_shafts(scene, tmp_path / "mode.gif", frames=4, size=(200, 150))
+    assert {file.name for file in tmp_path.iterdir()} == {"mode.png", "mode.gif"}
+    with pytest.raises(ValueError, match="suffix must be .gif"):
+        animate_shafts(scene, tmp_path / "mode.png", frames=4, size=(200, 150))
+
+
+def test_a_variant_without_elastic_shafts_has_no_such_scene(grc: Gearbox, stiffness: dict) -> None:
+    with pytest.raises(ValueError, match="variant bushing has no elastic shafts"):
+        shaft_scene(assemble(grc, "bushing", stiffness), np.zeros(43))

@@ -1,0 +1,231 @@
+"""Pictures and animations of elastic shafts in a mode, deformed and coloured by strain energy."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exugear.assembly import Assembly
+from exugear.mesh_element import seat_key
+from exugear.scene import displacement_map, look, write_animation
+from exugear.shapes import BodyShape, gear_surface, placed
+from fe_ste.plots import drawing_style, finish_figure, new_figure
+from fe_ste.scene import drawn_part, offscreen_plotter, place_picture, rendered_image, without_margins
+
+if TYPE_CHECKING:
+    import pyvista
+    from matplotlib.figure import Figure
+
+FloatArray = NDArray[np.float64]
+ImageArray = NDArray[np.uint8]
+
+SIDE = (1.0, 0.35, -0.4)
+"""From the shafts to the eye: mostly from the side, where bending shows."""
+BRIGHTEST = 99.0
+"""Share of the surface (%) below the density of the last colour: at sharp shoulders it grows without bound."""
+
+
+@dataclass(frozen=True)
+class DeformedShaft:
+    """A shaft in a mode: points (p, 3) at rest, quads (f, 4), displacement (p, 3) as drawn, energy (f,) from 0 to 1."""
+
+    points: FloatArray
+    quads: NDArray[np.int64]
+    displacement: FloatArray
+    energy: FloatArray
+
+
+@dataclass(frozen=True)
+class ShaftScene:
+    """Elastic shafts in a mode, and their gears, which ride on their seats.
+
+    Attributes
+    ----------
+    shafts : tuple of DeformedShaft
+    gears : tuple of BodyShape
+    motions : tuple of (6,) arrays
+        Motion of each gear as drawn.
+    title : str
+    """
+
+    shafts: tuple[DeformedShaft, ...]
+    gears: tuple[BodyShape, ...]
+    motions: tuple[FloatArray, ...]
+    title: str
+
+
+def shaft_scene(assembly: Assembly, shape: FloatArray, *, title: str = "", amplitude: float = 0.06) -> ShaftScene:
+    """Arrange the elastic shafts of an assembly in a mode.
+
+    Parameters
+    ----------
+    assembly : Assembly
+        Of the variant `flexible`.
+    shape : (size,) array
+        Mode shape.
+    title : str
+    amplitude : float
+        Largest displacement drawn, as a share of the longest shaft.
+
+    Raises
+    ------
+    ValueError
+        The assembly has no elastic shafts, or the mode does not move them.
+    """
+    if not assembly.shafts:
+        raise ValueError(f"variant {assembly.variant} has no elastic shafts to draw; use the variant flexible")
+    found = []
+    for name, place in assembly.shaft_slices.items():
+        surface = assembly.shafts[name].reduced.surface
+        found.append((surface, surface.displacement @ shape[place], surface.energy_density(shape[place])))
+    largest = max(float(np.linalg.norm(moved, axis=1).max()) for _, moved, _ in found)
+    if not largest > 0.0:
+        raise ValueError("the mode does not move the elastic shafts")
+    factor = amplitude * max(float(np.ptp(surface.points[:, 2])) for surface, _, _ in found) / largest
+    brightest = _density_below(
+        np.concatenate([density for _, _, density in found]),
+        np.concatenate([_areas(surface.points, surface.quads) for surface, _, _ in found]),
+    )
+    gears, motions = _gears(assembly, factor * shape)
+    return ShaftScene(
+        shafts=tuple(
+            DeformedShaft(surface.points, surface.quads, factor * moved, np.minimum(density / brightest, 1.0))
+            for surface, moved, density in found
+        ),
+        gears=gears,
+        motions=motions,
+        title=title,
+    )
+
+
+def _areas(points: FloatArray, quads: NDArray[np.int64]) -> FloatArray:
+    """Area of each quad, m2."""
+    one, two = points[quads[:, 2]] - points[quads[:, 0]], points[quads[:, 3]] - points[quads[:, 1]]
+    areas: FloatArray = 0.5 * np.linalg.norm(np.cross(one, two), axis=1)
+    return areas
+
+
+def _density_below(density: FloatArray, area: FloatArray) -> float:
+    """Density that all but the brightest part of the surface stays below."""
+    order = np.argsort(density)
+    share = np.cumsum(area[order]) / area.sum()
+    return float(density[order][np.searchsorted(share, BRIGHTEST / 100.0)]) or 1.0
+
+
+def _gears(assembly: Assembly, shape: FloatArray) -> tuple[tuple[BodyShape, ...], tuple[FloatArray, ...]]:
+    gears, motions = [], []
+    for body in assembly.bodies:
+        if body.name not in assembly.shafts:
+            continue
+        for gear, z in body.wheels.items():
+            place = np.array([*body.axis, z])
+            gears.append(BodyShape(gear, gear, gear_surface(assembly.gearbox.gears[gear]).moved(place), place))
+            motions.append(shape[list(assembly.coordinates[seat_key(body.name, gear)])])
+    return tuple(gears), tuple(motions)
+
+
+def draw_shafts(scene: ShaftScene, path: str | Path | None = None, *, size: tuple[int, int] = (1600, 1200)) -> Figure:
+    """Draw elastic shafts at their largest deflection, coloured by strain energy density; gears translucent.
+
+    Parameters
+    ----------
+    scene : ShaftScene
+    path : path-like, optional
+        Where to write the picture.
+    size : (int, int)
+        Width and height of the rendered image, pixels.
+
+    Raises
+    ------
+    fe_ste.scene.RenderingError
+        If this machine cannot render off-screen.
+    """
+    with offscreen_plotter(*size) as plotter:
+        _add(plotter, scene)
+        look(plotter, SIDE)
+        image, pixel = rendered_image(plotter)
+    return finish_figure(_figure(without_margins(image), pixel, scene.title), path)
+
+
+def animate_shafts(
+    scene: ShaftScene, path: str | Path, *, frames: int = 24, duration: float = 1.6, size: tuple[int, int] = (900, 700)
+) -> Path:
+    """Write one period of a mode as an animated picture that repeats for ever.
+
+    Parameters
+    ----------
+    scene : ShaftScene
+    path : path-like
+        Where to write; the suffix must be ``.gif``.
+    frames : int
+        Pictures per period, an even number.
+    duration : float
+        Length of a period, s.
+    size : (int, int)
+        Width and height of the rendered image, pixels.
+
+    Raises
+    ------
+    ValueError
+        If the suffix is another.
+    fe_ste.scene.RenderingError
+        If this machine cannot render off-screen.
+    """
+    images = []
+    with offscreen_plotter(*size) as plotter:
+        shafts, gears = _add(plotter, scene)
+        look(plotter, SIDE)
+        count = frames // 2 + 1
+        for number in range(count):
+            part = math.cos(math.pi * number / (count - 1))
+            for mesh, shaft in zip(shafts, scene.shafts, strict=True):
+                mesh.points = shaft.points + part * shaft.displacement
+                mesh.cell_data["energy"] = part**2 * shaft.energy
+            for mesh, gear, motion in zip(gears, scene.gears, scene.motions, strict=True):
+                mesh.points = placed(gear, part * motion)
+            images.append(rendered_image(plotter))
+    together = np.min([image for image, _ in images], axis=0)
+    rows, columns = drawn_part(together)
+    return write_animation(
+        [_figure(image[rows, columns], pixel, scene.title) for image, pixel in images], Path(path), duration
+    )
+
+
+def _add(plotter: pyvista.Plotter, scene: ShaftScene) -> tuple[list[pyvista.PolyData], list[pyvista.PolyData]]:
+    import pyvista
+
+    shafts, gears = [], []
+    for shaft in scene.shafts:
+        faces = np.column_stack([np.full(len(shaft.quads), 4), shaft.quads])
+        mesh = pyvista.PolyData(shaft.points + shaft.displacement, faces=faces.ravel())
+        mesh.cell_data["energy"] = shaft.energy
+        plotter.add_mesh(
+            mesh, scalars="energy", clim=(0.0, 1.0), cmap=displacement_map(), show_scalar_bar=False, ambient=0.3
+        )
+        shafts.append(mesh)
+    for gear, motion in zip(scene.gears, scene.motions, strict=True):
+        triangles = gear.surface.triangles
+        faces = np.column_stack([np.full(len(triangles), 3), triangles])
+        mesh = pyvista.PolyData(placed(gear, motion), faces=faces.ravel())
+        plotter.add_mesh(mesh, color="#8A97A8", opacity=0.25)
+        gears.append(mesh)
+    return shafts, gears
+
+
+def _figure(image: ImageArray, pixel: float, title: str) -> Figure:
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    with drawing_style():
+        figure = new_figure(7.6, 6.6 * image.shape[0] / image.shape[1] + 0.7)
+        panel = figure.add_subplot()
+        place_picture(panel, image, pixel, title)
+        scale = ScalarMappable(Normalize(0.0, 1.0), displacement_map())
+        label = f"Strain energy density / that of {BRIGHTEST:g} % of the surface"
+        figure.colorbar(scale, ax=panel, label=label, shrink=0.7, aspect=26)
+        return figure
