@@ -495,7 +495,7 @@ def _fill_missing_tables(gearbox: Gearbox, folder: Path, law: MeshLaw) -> None:
     if law in (MeshLaw.rigid, MeshLaw.iso6336):
         return
     with _model_errors():
-        orders = missing_tables(gearbox, folder)
+        orders = missing_tables(gearbox, folder, grid=law is MeshLaw.table)
     for order in orders:
         note(order.replaces or f"{order.name}: no table in {folder}; it is computed first")
     with _time_noted(folder, "tables, computed before dynamics") if orders else nullcontext():

@@ -71,10 +71,10 @@ def table_stiffness(gearbox: Gearbox, name: str, directory: Path) -> Floats:
 
 
 def table_surface(gearbox: Gearbox, name: str, directory: Path) -> SteSurface:
-    """Surface through a pair's whole table, which must have been computed from exactly this case."""
+    """Surface through a pair's table over all axes, which must have been computed from exactly this case."""
     try:
-        return SteSurface.from_table(fitting_table(gearbox, name, directory).dataset)
+        return SteSurface.from_table(fitting_table(gearbox, name, directory, grid=True).dataset)
     except TableError as error:
-        raise MeshError(f"pair {name}: {error} (exugear ste)") from None
+        raise MeshError(f"pair {name}: {error} (exugear ste --grid)") from None
     except InterpolationError as error:
         raise MeshError(f"pair {name}: {table_path(directory, name)}: {error}") from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from exugear.gearbox import Gearbox
 from exugear.mesh_stiffness import mesh_stiffness
 from exugear.report import write_report
 from exugear.tables import missing_tables, order_tables, wanted_table
+from exugear.tooth_contact import MeshError
 
 from .spur_case import COARSE_INPUT, SPUR_CASE
 
@@ -79,6 +81,25 @@ def test_one_state_does_not_serve_where_a_grid_is_needed_nor_a_grid_with_other_a
     order_tables(gearbox, tmp_path)[0].fill()
     assert missing_tables(gearbox, tmp_path) == []
     assert missing_tables(gearbox, tmp_path, grid=True)[0].wanted == wanted_table(gearbox, "spur", 8, grid=True)
+
+
+def test_law_table_runs_from_the_command_line_on_its_grid(computed: tuple[Path, Path], tmp_path: Path) -> None:
+    case, out = computed
+    arguments = ["--mesh-law", "table", "--variant", "bushing", "--json", "--out", str(out)]
+    outcome = CliRunner().invoke(app, ["run", str(case), "--duration", "0.05", *arguments])
+    assert outcome.exit_code == 0, outcome.stderr
+    summary = json.loads(outcome.stdout)
+    assert summary["mesh_law"] == "table"
+    data = xr.open_dataset(summary["file"])
+    assert {"misalignment", "centre_distance_change"} <= set(data)
+    # A grid of one load beside the static one ends there, and the gears tilt both ways.
+    assert summary["longest_time_outside_table_s"] > 0.0
+    outcome = CliRunner().invoke(app, ["modes", str(case), *arguments])
+    assert outcome.exit_code == 0, outcome.stderr
+    write_report(out)
+    order_tables(Gearbox.from_toml(case), tmp_path)[0].fill()
+    with pytest.raises(MeshError, match="exugear ste --grid"):
+        mesh_stiffness(Gearbox.from_toml(case), "table", tmp_path)
 
 
 def test_file_may_ask_for_the_axes(tmp_path: Path) -> None:
