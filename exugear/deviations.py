@@ -49,7 +49,7 @@ def contact_line_shares(pair: GearPair, pmc: Floats) -> tuple[NDArray[np.int64],
     >>> pair = GearPair(name="pair", pinion=gear, gear=gear, centre_distance=90e-3)
     >>> teeth, shares = contact_line_shares(pair, np.array([0.0, 0.5]))
     >>> teeth.tolist(), shares.tolist()
-    ([-1, 0, 1], [[0.0, 1.0, 0.0], [0.5, 0.5, 0.0]])
+    ([-1, 0], [[0.0, 1.0], [0.5, 0.5]])
     """
     reach = math.ceil(pair.total_contact_ratio / 2.0) + 1
     teeth = np.arange(-reach, reach + 1)
