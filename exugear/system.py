@@ -304,9 +304,11 @@ class ExudynSystem:
         connectors = self.assembly.connectors
         for n, bearing in enumerate(self.assembly.gearbox.bearings):
             place = np.array(bearing.place)
+            pin = np.array([*self.assembly.gearbox.pin_offsets.get(bearing.body, (0.0, 0.0)), 0.0])
+            ends = ((bearing.on, place + pin), (bearing.body, place))
             self.mbs.AddObject(
                 items.RigidBodySpringDamper(
-                    markerNumbers=[self._point(body, bearing.name, place) for body in (bearing.on, bearing.body)],
+                    markerNumbers=[self._point(body, bearing.name, at) for body, at in ends],
                     stiffness=connectors.stiffness[n],
                     damping=connectors.damping[n],
                 )

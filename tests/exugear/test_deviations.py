@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from exugear.assembly import Assembly, assemble
 from exugear.compiled import CompiledSystem, LoadTable
 from exugear.deviations import contact_line_shares
 from exugear.gearbox import CaseError, Gearbox
+from exugear.runup import simulate
 from exugear.statics import accelerating_start, locked_equilibrium
 
 from .table_case import surfaces
@@ -178,6 +181,23 @@ def test_bearings_carry_a_displaced_planet_along(grc: Gearbox, stiffness: dict) 
     found = CompiledSystem(assembly, q, 0 * q, LoadTable({}), 1e-5).accelerations()
     expected = assembly.accelerations(q, 0 * q, np.zeros(q.size))
     assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
+
+
+def test_exudyn_has_the_same_pins_and_errors(pitched: Gearbox, stiffness: dict, tmp_path: Path) -> None:
+    case = pitched.varied({"pins": {"late": {"body": "planet_2", "tangential_um": 25.0, "radial_um": -5.0}}})
+    one, two = (
+        xr.load_dataset(
+            simulate(case, "bushing", stiffness, tmp_path / solver, duration=0.01, solver=solver).path,
+            engine="h5netcdf",
+        )
+        for solver in ("compiled", "exudyn")
+    )
+    for name in ("overall_dte", "mesh_force", "support_force", "elastic_energy"):
+        expected = two[name].to_numpy()
+        # Stored signals have seven digits.
+        assert np.abs(one[name].to_numpy() - expected).max() < 1e-6 * np.abs(expected).max(), name
+    shares = two["mesh_force"].sel(mesh=[f"sun_planet_{n}" for n in (1, 2, 3)]).mean("time").to_numpy()
+    assert np.ptp(shares) > 0.1 * shares.mean()
 
 
 def test_a_displaced_planet_gives_the_sidebands_of_its_orbit(grc: Gearbox, stiffness: dict) -> None:
