@@ -105,7 +105,7 @@ def draw_mode(scene: ModeScene, path: str | Path | None = None, *, size: tuple[i
         _add_mode(plotter, scene)
         look(plotter)
         image, pixel = rendered_image(plotter)
-    figure = _mode_figure(without_margins(image), pixel, scene.title)
+    figure = mode_figure(without_margins(image), pixel, scene.title)
     return finish_figure(figure, path)
 
 
@@ -236,7 +236,8 @@ def look(plotter: pyvista.Plotter, direction: tuple[float, float, float] = _VIEW
     plotter.renderer.ResetCamera()
 
 
-def _mode_figure(image: ImageArray, pixel: float, title: str) -> Figure:
+def mode_figure(image: ImageArray, pixel: float, title: str) -> Figure:
+    """Set the rendered image of a mode, with its scale of colours and of length (m per pixel)."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 

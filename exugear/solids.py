@@ -46,7 +46,7 @@ from exugear.reduction import (
     lowered,
     reduce_part,
 )
-from exugear.solid_mesh import SolidError
+from exugear.solid_mesh import SolidError, entity_numbers
 from fe_ste.elasticity import gradient_products
 from fe_ste.gears import Material
 from fe_ste.sparse import Backend
@@ -138,9 +138,8 @@ def assemble(mesh: Any, material: Material, axis: tuple[float, float] = (0.0, 0.
 
     Examples
     --------
-    >>> from exugear.solid_mesh import tetrahedra
-    >>> box = tetrahedra(lambda occ: occ.addBox(0.0, 0.0, 0.0, 0.4, 0.2, 0.1), 0.1)
-    >>> solid = assemble(box, Material(density=1000.0))
+    >>> box = skfem.MeshHex.init_tensor([0.0, 0.2, 0.4], [0.0, 0.2], [0.0, 0.1])
+    >>> solid = assemble(skfem.MeshHex2.from_mesh(box), Material(density=1000.0))
     >>> round(float(solid.scalar_mass.sum()), 9)
     8.0
     """
@@ -247,14 +246,19 @@ def _facets(mesh: Any, seat: SolidSeat) -> Integers:
 
 def _rows(mesh: Any, facets: Integers, centre: Floats) -> Floats:
     """Averages over facets, (6, 3 n): displacement of the centre and turns."""
-    basis = skfem.FacetBasis(mesh, mesh.elem(), intorder=4, facets=facets)
-    weight = np.asarray(basis.dx)
-    arm = np.asarray(basis.global_coordinates()) - centre[:, None, None]
-    nodes = np.asarray(basis.element_dofs)
+    nodes = _facet_nodes(mesh, facets)
+    element = skfem.ElementTriP2() if nodes.shape[1] == 6 else skfem.ElementQuad2()
+    points, weights = skfem.quadrature.get_quadrature(element, 5)
+    functions = [element.lbasis(points, number) for number in range(nodes.shape[1])]
+    values = np.stack([value for value, _ in functions])
+    places = np.asarray(mesh.doflocs).T[nodes]
+    tangents = np.einsum("fka,kbq->bfqa", places, np.stack([slope for _, slope in functions]), optimize=True)
+    weight = np.linalg.norm(np.cross(tangents[0], tangents[1]), axis=2) * weights
+    arm = np.einsum("fka,kq->afq", places, values, optimize=True) - centre[:, None, None]
     share = np.zeros((4, mesh.doflocs.shape[1]))  # integrals of the shape functions, and of them times the arm
-    for number, function in enumerate(basis.basis):
-        for row, factor in enumerate((1.0, *arm)):
-            share[row] += np.bincount(nodes[number], (function[0] * factor * weight).sum(axis=1), share.shape[1])
+    for row, factor in enumerate((np.ones_like(weight), *arm)):
+        integrals = np.einsum("fq,kq->fk", factor * weight, values)
+        share[row] = np.bincount(nodes.ravel(), integrals.ravel(), share.shape[1])
     motions = np.zeros((6, 3, *weight.shape))
     motions[:3] = np.eye(3)[:, :, None, None]
     loads = np.zeros((6, 3, share.shape[1]))
@@ -265,6 +269,20 @@ def _rows(mesh: Any, facets: Integers, centre: Floats) -> Floats:
     inertia = np.einsum("idfq,jdfq,fq->ij", motions, motions, weight)
     rows: Floats = np.linalg.solve(inertia, loads.transpose(0, 2, 1).reshape(6, -1))
     return rows
+
+
+def _facet_nodes(mesh: Any, facets: Integers) -> Integers:
+    """Nodes of facets, (f, 6) or (f, 9): corners around each, middles of its edges, its own middle if it has one."""
+    corners = _ordered_corners(mesh, facets)[:, : 3 if mesh.t.shape[0] == 4 else 4]
+    sides = [corners, np.roll(corners, -1, axis=1)]
+    if corners.shape[1] == 3:  # the element's edges are 01, 12, 02; a quadrilateral's 01, 12, 23, 03
+        sides = [corners[:, [0, 1, 0]], corners[:, [1, 2, 2]]]
+    edges = entity_numbers(mesh.edges, np.stack(sides, axis=2).reshape(-1, 2)).reshape(corners.shape)
+    vertices = int(np.max(mesh.t)) + 1
+    nodes = [corners, vertices + edges]
+    if corners.shape[1] == 4:
+        nodes.append(vertices + mesh.edges.shape[1] + facets[:, None])
+    return np.hstack(nodes)
 
 
 @dataclass(frozen=True)
@@ -443,20 +461,19 @@ def _check_revolution(model: SolidModel, part: ReducedPart) -> None:
 
 
 def _surface(model: SolidModel, reduced: ReducedSolid) -> Surface:
-    """Boundary of the mesh with displacement and strain per coordinate."""
+    """Boundary of the mesh with displacement, and strain in the middle of the element below, per coordinate."""
     mesh, shapes = model.mesh, reduced.part.shapes
     facets = np.asarray(mesh.boundary_facets())
     corners = _ordered_corners(mesh, facets)
-    used, faces = np.unique(corners, return_inverse=True)
-    numbering = skfem.assembly.Dofs(mesh, mesh.elem())
-    nodes = np.asarray(numbering.nodal_dofs)[0, used]
-    triangular = mesh.t.shape[0] == 4
-    place = np.array([[1 / 3], [1 / 3]]) if triangular else np.array([[0.5], [0.5]])
-    basis = skfem.FacetBasis(mesh, mesh.elem(), facets=facets, quadrature=(place, np.ones(1)), dofs=numbering)
-    slopes = np.stack([b[0].grad[..., 0] for b in basis.basis])  # (shape functions, 3, faces)
+    nodes, faces = np.unique(corners, return_inverse=True)
+    dofs = np.asarray(skfem.assembly.Dofs(mesh, mesh.elem()).element_dofs).T[np.asarray(mesh.f2t)[0, facets]]
+    middle = np.full((3, 1), 0.25 if mesh.t.shape[0] == 4 else 0.5)
+    functions = [mesh.elem().lbasis(middle, number) for number in range(dofs.shape[1])]
+    values, local = (np.stack(part) for part in zip(*functions, strict=True))
+    slopes = _fields(np.asarray(mesh.doflocs).T[dofs], values[:, None, :], local, np.ones(1))[2][..., 0]
     by_node = shapes.reshape(-1, 3, shapes.shape[1])
     gradient = np.zeros((len(facets), 3, 3, shapes.shape[1]))  # of displacement component by direction
-    for function, slope in zip(np.asarray(basis.element_dofs), slopes, strict=True):
+    for function, slope in zip(dofs.T, slopes, strict=True):
         gradient += by_node[function][:, :, None, :] * slope.T[:, None, :, None]
     strain = [gradient[:, i, i] for i in range(3)]
     strain += [gradient[:, i, j] + gradient[:, j, i] for i, j in ((0, 2), (0, 1), (1, 2))]
@@ -474,16 +491,26 @@ def _surface(model: SolidModel, reduced: ReducedSolid) -> Surface:
 
 
 def _ordered_corners(mesh: Any, facets: Integers) -> Integers:
-    """Corners (f, 4) of facets in the order around each; a triangle repeats its last."""
+    """Corners (f, 4) of facets, seen from outside of their first element counter-clockwise; a triangle repeats one."""
     corners = np.asarray(mesh.facets)[:, facets].T
-    if corners.shape[1] == 3:
-        return np.asarray(np.column_stack([corners, corners[:, 2]]))
-    points = np.asarray(mesh.p).T[corners]
-    middle = points.mean(axis=1, keepdims=True)
-    first = points[:, 0] - middle[:, 0]
-    normal = np.cross(first, points[:, 1] - middle[:, 0]) + np.cross(first, points[:, 2] - middle[:, 0])
+    places = np.asarray(mesh.doflocs).T
+    if corners.shape[1] == 4:
+        corners = _around(corners, places)
+    points = places[corners]
+    normal = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
+    inside = places[np.asarray(mesh.t)[:, np.asarray(mesh.f2t)[0, facets]].T].mean(axis=1)
+    inward = np.einsum("fd,fd->f", normal, points.mean(axis=1) - inside) < 0.0
+    corners = np.where(inward[:, None], corners[:, ::-1], corners)
+    return np.asarray(np.column_stack([corners, corners[:, 2]]) if corners.shape[1] == 3 else corners)
+
+
+def _around(corners: Integers, places: Floats) -> Integers:
+    """Corners (f, 4) of quadrilaterals, put in the order around each."""
+    points = places[corners]
+    away = points - points.mean(axis=1, keepdims=True)
+    first = away[:, 0]
+    normal = np.cross(first, away[:, 1]) + np.cross(first, away[:, 2])
     other = np.cross(normal, first)
-    away = points - middle
     angle = np.arctan2(
         np.einsum("fcd,fd->fc", away, other) * np.linalg.norm(first, axis=1)[:, None],
         np.einsum("fcd,fd->fc", away, first) * np.linalg.norm(other, axis=1)[:, None],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -43,6 +44,19 @@ SEATS = (
 SIZE = MeshSize(0.1, 0.05, 0)
 BLANKS = {"gear": Blank(12.0, 0.08, 0.15)}
 BAND = 3000.0
+
+
+def works(library: str) -> bool:
+    """Tell whether an optional library and what it needs of the system is there."""
+    try:
+        importlib.import_module(library)
+    except (ImportError, OSError):
+        return False
+    return True
+
+
+needs_gmsh = pytest.mark.skipif(not works("gmsh"), reason="gmsh (extra mesh) or its system libraries are missing")
+needs_meshio = pytest.mark.skipif(not works("meshio"), reason="meshio (extra mesh) is missing")
 
 
 @pytest.fixture(scope="module")
@@ -181,6 +195,7 @@ TUBE_SEATS = (
 )
 
 
+@needs_gmsh
 def test_tetrahedra_and_hexahedra_of_a_tube_agree():
     # Finer meshes of either kind move the first three frequencies by less than 0.1 %.
     shaft = Shaft((ShaftSection(0.4, 0.12, 0.06),), STEEL, (), MeshSize(0.04, 0.015, 0))
@@ -191,6 +206,7 @@ def test_tetrahedra_and_hexahedra_of_a_tube_agree():
     assert frequencies[1] == pytest.approx(frequencies[0], rel=2e-3)
 
 
+@needs_meshio
 @pytest.mark.parametrize(("suffix", "options"), [(".msh", {"file_format": "gmsh"}), (".inp", {}), (".vtu", {})])
 @pytest.mark.parametrize("kind", ["tetra10", "tetra", "hexahedron20", "hexahedron"])
 def test_meshes_are_read_from_files(tmp_path, suffix, options, kind):
@@ -214,6 +230,7 @@ def test_meshes_are_read_from_files(tmp_path, suffix, options, kind):
     assert np.abs(moved).max() < 1e-10 * np.abs(solid.stiffness).max()
 
 
+@needs_meshio
 def test_a_file_without_solid_elements_is_refused(tmp_path):
     meshio = importlib.import_module("meshio")
     file = tmp_path / "sheet.vtu"
@@ -250,6 +267,7 @@ def test_faults_name_body_and_seat(model):
         turned_hexahedra(Shaft(SECTIONS, STEEL, BANDS, SIZE), 12)
 
 
+@needs_gmsh
 def test_only_bodies_of_revolution_turn_in_a_frame_that_does_not():
     mesh = tetrahedra(lambda occ: occ.addBox(-0.05, -0.1, 0.0, 0.1, 0.2, 0.3), 0.1)
     seats = tuple(SolidSeat(name, (0.0, 0.0, z), 0.2) for name, z in (("low", 0.0), ("high", 0.3)))
@@ -257,6 +275,7 @@ def test_only_bodies_of_revolution_turn_in_a_frame_that_does_not():
         reduce_solid(SolidModel("bar", mesh, STEEL, seats, "nonrotating", 1000.0, 1e6))
 
 
+@needs_gmsh
 def test_a_reduction_is_kept_and_every_input_has_its_own_key(tmp_path: Path):
     mesh = tetrahedra(lambda occ: occ.addBox(-0.1, -0.1, 0.0, 0.2, 0.2, 0.3), 0.15)
     seats = tuple(SolidSeat(name, (0.0, 0.0, z), 0.2) for name, z in (("low", 0.0), ("high", 0.3)))
@@ -278,3 +297,41 @@ def test_a_reduction_is_kept_and_every_input_has_its_own_key(tmp_path: Path):
         replace(bar, blanks={"low": Blank(1.0, 1.0, 1.0)}),
     ]
     assert len({one.key for one in (bar, *others)}) == len(others) + 1
+
+
+@pytest.fixture(scope="module")
+def shapes() -> Any:
+    """The script with the GRC's carrier, ring rim and housing."""
+    file = Path(__file__).parents[2] / "cases" / "grc750" / "shapes.py"
+    spec = importlib.util.spec_from_file_location("grc750_shapes", file)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@needs_gmsh
+def test_the_ring_of_the_grc_turns_oval_as_a_thin_ring(shapes):
+    # Closed form, inextensional ring: w^2 = n^2 (n^2 - 1)^2 / (n^2 + 1) E I / (rho A R^4), n = 2. The rim is an eighth
+    # of its radius thick; shear and rotary inertia take about 1.5 (t / R)^2 / 2, 1 %.
+    mesh = tetrahedra(shapes.ring_rim, 0.08, 24)
+    ring = reduce_solid(SolidModel("rim", mesh, shapes.STEEL, shapes.ring_seats(), "ground", 200.0, 12e3))
+    radius = (shapes.RING_OUTER + shapes.RING_ROOT) / 2
+    gyration = (shapes.RING_OUTER - shapes.RING_ROOT) / math.sqrt(12)
+    speed = math.sqrt(shapes.STEEL.youngs_modulus / shapes.STEEL.density)
+    expected = 6 / math.sqrt(5) * gyration * speed / radius**2 / (2 * math.pi)
+    assert ring.figures.free_frequencies["whole"][:2] == pytest.approx([expected, expected], rel=1e-2)
+    assert ring.free_frequencies[:2] == pytest.approx(ring.figures.free_frequencies["whole"][:2], rel=1e-6)
+
+
+@needs_gmsh
+@pytest.mark.validation
+def test_shapes_of_the_grc_weigh_what_is_printed_and_have_all_seats(shapes):
+    # Printed: carrier 691 kg, its pins with inner races 3 x 55; front housing, ring and rear housing 2064 kg together.
+    # Their dimensions are invented, so this holds the files, not the physics: 10 %.
+    models = {model.name: model for model in shapes.solid_models()}
+    for name, printed in (("carrier", 857.0), ("housing", 2064.0)):
+        model = models[name]
+        solid = assemble(model.mesh, model.material)
+        assert solid.scalar_mass.sum() == pytest.approx(printed, rel=0.1)
+        rows = seat_rows(solid, model.seats)
+        assert np.linalg.matrix_rank(rows @ solid.rigid_motions((0.0, 0.0, 0.0))) == 6
