@@ -142,7 +142,7 @@ def animate_mode(
     if target.suffix.lower() != ".gif":
         raise ValueError(f"animation {target}: the suffix must be .gif")
     images = _mode_images(scene, frames // 2 + 1, size)
-    return write_animation([_mode_figure(image, pixel, scene.title) for image, pixel in images], target, duration)
+    return write_animation([mode_figure(image, pixel, scene.title) for image, pixel in images], target, duration)
 
 
 def write_animation(way_out: Sequence[Figure], target: Path, duration: float) -> Path:
