@@ -1,8 +1,8 @@
 """What a table over load, centre distance and misalignment costs: each GRC pair from nothing, in a process of its own.
 
-    python benchmarks/grid.py [--pairs NAME ...]
+    python benchmarks/grid.py --pair NAME
 
-Writes ``grid.json`` and ``grid.md`` beside this file. The grid is the case's default one, shared by two worker
+measures one and prints it; `run_all.py` measures all. The grid is the case's default one, shared by two worker
 processes; some of its states are also solved alone, for time and result. Compiled kernels are in their cache on disk.
 """
 
@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
-import platform
 import resource
 import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from timing import say
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -86,61 +86,22 @@ def solved_alone(wanted: TableInput, data: xr.Dataset) -> tuple[float, float]:
     return 1e3 * (time.process_time() - started) / len(numbers), deviation
 
 
-def as_markdown(results: dict[str, object]) -> str:
-    """Table of the results."""
-    rows = [
-        "# Cost of tables over load, centre distance and misalignment",
-        "",
-        f"Written by `python benchmarks/grid.py`. {results['machine']}; load average at the start "
-        f"{results['load_average']:.1f}, at the end {results['load_average_end']:.1f}. Default axes, 2 worker "
-        "processes; kernels compiled before.",
-        "",
-        "| pair | states | both gears once s | grid s | all s | per state ms | processor ms per state | alone ms | "
-        "largest deviation from alone | worker's memory MB |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
-    ]
-    pairs = results["pairs"]
-    assert isinstance(pairs, list)
-    for entry in pairs:
-        rows.append(
-            "| {pair} | {states} | {offline_s:.1f} | {grid_s:.1f} | {total_s:.1f} | {state_ms:.1f} | "
-            "{state_processor_ms:.1f} | {alone_ms:.1f} | {largest_deviation:.1e} | {worker_memory_MB:.0f} |".format(
-                **entry
-            )
-        )
-    rows += [
-        "",
-        "What bounds it: half of a state's time fills the compliance of the cells, shared by its misalignments, half "
-        "factorises the cells in contact, four times a state. Processor time per state includes the start of the "
-        "workers.",
-        "",
-    ]
-    return "\n".join(rows)
+def measure_all(quick: bool) -> dict[str, Any]:
+    """Measure every pair, or the first one alone."""
+    command = [sys.executable, __file__, "--pair"]
+    pairs = []
+    for name in PAIRS[:1] if quick else PAIRS:
+        say(f"grid of {name}")
+        run = subprocess.run([*command, name], check=True, capture_output=True, text=True)
+        pairs.append(json.loads(run.stdout))
+    return {"pairs": pairs}
 
 
 def main() -> None:
-    """Run the pairs and write the results."""
+    """Measure one pair in this process and print it."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--pairs", nargs="+", choices=PAIRS, default=PAIRS)
-    parser.add_argument("--pair", choices=PAIRS, help="measure one pair in this process and print it")
-    arguments = parser.parse_args()
-    if arguments.pair:
-        sys.stdout.write(json.dumps(measure(arguments.pair)))
-        return
-    load = os.getloadavg()[0]
-    command = [sys.executable, __file__, "--pair"]
-    pairs = [
-        json.loads(subprocess.run([*command, name], check=True, capture_output=True, text=True).stdout)
-        for name in arguments.pairs
-    ]
-    results = {
-        "machine": f"{os.cpu_count()} cores ({platform.machine()}), Python {platform.python_version()}",
-        "load_average": load,
-        "load_average_end": os.getloadavg()[0],
-        "pairs": pairs,
-    }
-    (HERE / "grid.json").write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
-    (HERE / "grid.md").write_text(as_markdown(results), encoding="utf-8")
+    parser.add_argument("--pair", choices=PAIRS, required=True)
+    sys.stdout.write(json.dumps(measure(parser.parse_args().pair)))
 
 
 if __name__ == "__main__":

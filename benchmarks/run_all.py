@@ -41,6 +41,13 @@ def measure_tables(quick: bool) -> dict[str, Any]:
     return ste.measure(quick)
 
 
+def measure_grids(quick: bool) -> dict[str, Any]:
+    """See `grid`."""
+    import grid
+
+    return grid.measure_all(quick)
+
+
 def measure_startup(quick: bool) -> dict[str, Any]:
     """See `startup`."""
     import startup
@@ -52,6 +59,7 @@ PARTS: dict[str, Callable[[bool], dict[str, Any]]] = {
     "startup": measure_startup,
     "tables": measure_tables,
     "dynamics": measure_dynamics,
+    "grids": measure_grids,
 }
 
 
