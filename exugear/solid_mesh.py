@@ -9,6 +9,8 @@ gmsh (under the GPL) and meshio are loaded only where used.
 from __future__ import annotations
 
 import importlib
+import signal
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -174,12 +176,19 @@ def tetrahedra(build: Callable[[Any], None], size: float, curvature: int = 12) -
         kinds, _, nodes = gmsh.model.mesh.getElements(3)
     finally:
         gmsh.finalize()
+        _keep_broken_pipes()
     if not len(kinds):
         raise SolidError("the shape has no volume to mesh")
     order = np.argsort(tags)
     cells = order[np.searchsorted(tags[order], nodes[0])].reshape(-1, 10)
     # gmsh numbers the last two edges of a tetrahedron the other way round than VTK.
     return second_order(places.reshape(-1, 3), cells[:, [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]], "tetra10")
+
+
+def _keep_broken_pipes() -> None:
+    """Make a broken pipe an error again: gmsh leaves it to end the process, and with it a sweep that lost a worker."""
+    if hasattr(signal, "SIGPIPE") and threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGPIPE, signal.SIG_IGN)
 
 
 def read_solid(path: Path, unit: float = 1.0) -> Any:

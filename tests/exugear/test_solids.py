@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import math
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -193,6 +195,20 @@ TUBE_SEATS = (
     SolidSeat("front", (0.0, 0.0, 0.0), 0.06, inner_radius=0.03),
     SolidSeat("bore", (0.0, 0.0, 0.2), 0.03, 0.4),
 )
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such signal")
+def test_a_broken_pipe_stays_an_error_after_meshing():
+    """Else a process that meshed a solid would end without a word when a worker of its sweep is lost."""
+    pytest.importorskip("gmsh")
+    code = (
+        "import os\nfrom exugear.solid_mesh import tetrahedra\n"
+        "tetrahedra(lambda occ: occ.addBox(0.0, 0.0, 0.0, 1.0, 0.5, 0.25), 0.5)\n"
+        "reader, writer = os.pipe()\nos.close(reader)\n"
+        "try:\n    os.write(writer, b'x')\nexcept BrokenPipeError:\n    print('an error')\n"
+    )
+    outcome = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert outcome.stdout == "an error\n", outcome.stderr
 
 
 @needs_gmsh
