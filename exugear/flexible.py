@@ -9,9 +9,9 @@ What the object of Exudyn 1.13 gets wrong, and what is done about it:
 
 - It softens a spinning body by the centrifugal forces of its deformation without the tension that they make: torsion
   falls to sqrt(w^2 - Omega^2). The missing stiffness Omega^2 int rho d_phi phi_i . d_phi phi_j, d_phi = x d_y - y d_x,
-  is added (`stiffening`). It is that of a body of revolution that spins about z, follows the speed from instant to
-  instant, and leaves out, as all of this does, what an angular acceleration does to the deformation: the error is
-  about the angular acceleration over speed times frequency.
+  is added (`stiffening`). It is that of a body of revolution that spins about z and follows the speed from instant to
+  instant. Forces of angular acceleration are Exudyn's own; the frame that does not turn leaves them out (Omega' C q),
+  which is about the angular acceleration over speed times frequency: nothing in a run-up of seconds.
 - On Tait-Bryan angles its gyroscopic moments are wrong. It is built on Euler parameters, whose angle is not unwrapped:
   the spin at a seat is the elastic twist alone.
 """
