@@ -32,6 +32,9 @@ BEARINGS[[0, 1, 2, 6, 7], [0, 1, 2, 6, 7]] = 2e5
 VELOCITY = np.array([0.05, 0.03, 0.0])
 TWIST = (17, 23)
 """Turns of both discs."""
+VIBRATION = np.zeros(24)
+VIBRATION[[0, 7, 12, 13, 17, 18, 19, 23]] = 0.05, -0.04, 0.03, -0.02, 0.4, -0.03, 0.02, -0.65
+"""Seat velocities, m/s and rad/s: both bending planes and torsion."""
 
 
 @dataclass(frozen=True)
@@ -74,16 +77,18 @@ class Rotor:
         return FloatingSystem(self.body, law, speed, VELOCITY, self.rates, **choices)
 
 
-def on_bearings(model: SolidModel, bearings: np.ndarray, rates: np.ndarray | None = None) -> Rotor:
-    """Both descriptions of a body whose elastic vibrations begin with given rates, at rest by default."""
+def on_bearings(model: SolidModel, bearings: np.ndarray, vibration: np.ndarray | None = None) -> Rotor:
+    """Both descriptions of a body whose elastic vibrations begin with what the modes have of given seat velocities."""
     reduced, body = reduce_matrices(model), floating_body(model)
     mass, stiffness = reduced.part.mass, reduced.part.stiffness
     turned = scipy.linalg.eigh(stiffness, mass)[1][:, : 6 + len(body.frequencies)]
     seats = 6 * len(model.seats)
     moved = np.kron(np.ones((len(model.seats), 1)), np.eye(6))[:, :3] @ VELOCITY
     initial = turned.T @ mass @ np.concatenate([moved, np.zeros(len(mass) - seats)])
-    rates = np.zeros(len(body.frequencies)) if rates is None else rates
-    initial[6:] += rates
+    # Signs of modes, and directions in a pair of equal frequencies, are each description's own.
+    wanted = np.zeros(seats) if vibration is None else vibration
+    rates = np.linalg.lstsq(body.at_seats, wanted)[0]
+    initial[6:] += np.linalg.lstsq(turned[:seats, 6:], wanted)[0]
     return Rotor(
         model=model,
         body=body,
@@ -101,8 +106,7 @@ def rotor() -> Rotor:
     bands = tuple(SeatBand(s.name, s.centre[2], s.width) for s in SEATS)
     mesh = turned_hexahedra(Shaft(SECTIONS, STEEL, bands, MeshSize(0.1, 0.05, 0)))
     model = SolidModel("rotor", mesh, STEEL, SEATS, "nonrotating", band=800.0, limit=1000.0)
-    rates = 0.05 * np.array([1.0, 0.5, -0.7, 0.4, 0.3])  # torsion and the first two pairs of bending
-    return on_bearings(model, BEARINGS, rates)
+    return on_bearings(model, BEARINGS, VIBRATION)
 
 
 def found_frequencies(signals: np.ndarray, step: float, count: int) -> np.ndarray:
