@@ -13,8 +13,10 @@ from exugear.assembly import Assembly, assemble
 from exugear.compiled import CompiledSystem, LoadTable
 from exugear.deviations import contact_line_shares
 from exugear.gearbox import CaseError, Gearbox
+from exugear.mesh_element import loaded_flanks, pack
 from exugear.runup import simulate
 from exugear.statics import accelerating_start, locked_equilibrium
+from exugear.tooth_contact import MeshGeometry, tooth_places
 
 from .table_case import surfaces
 
@@ -78,11 +80,13 @@ def test_a_tooth_standing_back_shows_once_a_revolution(grc: Gearbox, stiffness: 
     # Over the cycles in which the tooth touches, its shares add up to those of one pair of teeth in every position.
     assert error.mean() == pytest.approx(full / teeth, rel=1e-3)
     assert np.mean(error > 1e-9) == pytest.approx(pair.total_contact_ratio / teeth, rel=0.03)
-    middle = pair.pinion_working_radius
-    # It peaks when the tooth, numbered from the first at a positive polar angle, passes the pitch point.
-    first = error.argmax() * 2.0 * math.pi / len(error)
-    assert 0.0 <= first < 2.0 * math.pi
-    assert middle > 0.0
+    # It acts while tooth 5 faces the wheel: the flank is a quarter of a pitch from its middle, the path of contact a
+    # little to one side of the pitch point; the next tooth would be a whole pitch off.
+    pitch = 2.0 * math.pi / teeth
+    orientation = tooth_places(case, loaded_flanks(case))[1]["hss", "hs_pinion"]
+    middle = orientation % pitch + 5 * pitch + float(np.angle(error @ np.exp(1j * angles)))
+    towards = MeshGeometry.of(assembly.elements[mesh].mesh).polar_angle
+    assert abs(math.remainder(middle - towards, 2.0 * math.pi)) < 0.5 * pitch
 
 
 def test_run_out_is_the_way_of_the_axis_along_the_line_of_action(grc: Gearbox, stiffness: dict) -> None:
@@ -131,8 +135,6 @@ def test_compiled_solver_and_tangent_know_the_errors(pitched: Gearbox, stiffness
 
 def _other_elements(assembly: Assembly, q: np.ndarray, v: np.ndarray, j: int, step: float) -> np.ndarray:
     """Column of the stiffness of bearings and couplings by differences."""
-    from exugear.mesh_element import pack
-
     none = pack((), assembly.coordinates)
     unit = step * np.eye(q.size)[j]
     return np.asarray((assembly.forces(q + unit, v, none) - assembly.forces(q - unit, v, none)) / (2.0 * step))
