@@ -31,6 +31,7 @@ from exugear.elastic import (
     scratch_for,
     set_elastic_accelerations,
 )
+from exugear.elastic_bodies import ElasticBody, elastic_names, reduced_bodies
 from exugear.gearbox import Bearing, Body, Gearbox
 from exugear.kernels import (
     STATE_SIZE,
@@ -48,7 +49,6 @@ from exugear.kernels import (
     mesh_state,
 )
 from exugear.mesh_element import Angles, MeshData, MeshElement, mesh_elements, node_position, pack, seat_key
-from exugear.shafts import ElasticShaft, elastic_names, elastic_shafts
 
 Floats = NDArray[np.float64]
 Variant = Literal["rigid", "bushing", "flexible", "jointed"]
@@ -76,7 +76,7 @@ class Assembly:
     connector_names, connectors : bearings (none in the variant `rigid`)
     spring_names, springs : torsional couplings
     inertia : mass properties of rigid bodies; in the variant `rigid` the planets' orbit is in the carrier's
-    shafts : elastic bodies by name, in the order of their coordinates
+    elastic_bodies : elastic bodies by name, in the order of their coordinates
     elastic : their matrices
     motions : (size, n) motions that are free; the identity, but for the law `rigid` the rolling ones
     """
@@ -95,19 +95,19 @@ class Assembly:
     spring_names: tuple[str, ...]
     springs: SpringArrays
     inertia: InertiaArrays
-    shafts: Mapping[str, ElasticShaft]
+    elastic_bodies: Mapping[str, ElasticBody]
     elastic: ElasticArrays
     motions: Floats
 
     def has_six(self, body: Body) -> bool:
         """Tell whether a body is rigid with all six coordinates."""
-        return self.coordinates[body.name][0] >= 0 and body.name not in self.shafts
+        return self.coordinates[body.name][0] >= 0 and body.name not in self.elastic_bodies
 
     @cached_property
-    def shaft_slices(self) -> dict[str, slice]:
+    def elastic_slices(self) -> dict[str, slice]:
         """Coordinates of each elastic body."""
-        begin, found = self.size - sum(shaft.reduced.size for shaft in self.shafts.values()), {}
-        for name, shaft in self.shafts.items():
+        begin, found = self.size - sum(shaft.reduced.size for shaft in self.elastic_bodies.values()), {}
+        for name, shaft in self.elastic_bodies.items():
             found[name] = slice(begin, begin + shaft.reduced.size)
             begin += shaft.reduced.size
         return found
@@ -118,8 +118,8 @@ class Assembly:
         It is that of the body's centre of mass, as `coordinates` of a rigid body are.
         """
         out = vector.copy()
-        for name, place in self.shaft_slices.items():
-            body = self.shafts[name].reduced
+        for name, place in self.elastic_slices.items():
+            body = self.elastic_bodies[name].reduced
             motions = body.rigid_motions(body.rigid_inertia.centre)
             carried = motions.T @ body.mass
             out[list(self.coordinates[name])] = np.linalg.solve(carried @ motions, carried @ vector[place])
@@ -171,8 +171,8 @@ class Assembly:
         for body in self.bodies:
             if self.has_six(body):
                 f[list(self.coordinates[body.name][:3])] = body.mass * acceleration
-        for name, place in self.shaft_slices.items():
-            reduced = self.shafts[name].reduced
+        for name, place in self.elastic_slices.items():
+            reduced = self.elastic_bodies[name].reduced
             f[place] = reduced.mass @ reduced.rigid_motions(reduced.seats[0].place)[:, :3] @ acceleration
         return f
 
@@ -207,15 +207,15 @@ class Assembly:
             values = [self.inertia.mass[n]] * 3 + [self.inertia.transverse[n]] * 2 + [self.inertia.axial[n]]
             m[range(o, o + 6), range(o, o + 6)] = values
         m[self.inertia.spin, self.inertia.spin] = self.inertia.spin_inertia
-        for name, place in self.shaft_slices.items():
-            m[place, place] = self.shafts[name].reduced.mass
+        for name, place in self.elastic_slices.items():
+            m[place, place] = self.elastic_bodies[name].reduced.mass
         return m
 
     def rolling_velocity(self, q: Floats, speeds: Mapping[str, float]) -> Floats:
         """Velocities when the train rolls at the given spins and the planets orbit with their carriers."""
         v = np.zeros(self.size)
-        for name, place in self.shaft_slices.items():
-            v[place] = speeds[name] * self.shafts[name].reduced.spin
+        for name, place in self.elastic_slices.items():
+            v[place] = speeds[name] * self.elastic_bodies[name].reduced.spin
         for body in self.bodies:
             v[self.spin[body.name]] = speeds[body.name]
             if self.has_six(body) and body.carrier is not None:
@@ -227,8 +227,8 @@ class Assembly:
     def rolling_acceleration(self, q: Floats, speeds: Mapping[str, float], rates: Mapping[str, float]) -> Floats:
         """Accelerations of a train that rolls at given spins and spin rates, planets' orbit included."""
         a = np.zeros(self.size)
-        for name, place in self.shaft_slices.items():
-            a[place] = rates[name] * self.shafts[name].reduced.spin
+        for name, place in self.elastic_slices.items():
+            a[place] = rates[name] * self.elastic_bodies[name].reduced.spin
         for body in self.bodies:
             a[self.spin[body.name]] = rates[body.name]
             if self.has_six(body) and body.carrier is not None:
@@ -274,8 +274,8 @@ class Assembly:
             f[o + 3] = jt * cb**2 * a[o + 3] + f[o + 5] * sb + p * db * cb - 2.0 * jt * da * db * sb * cb
             f[o + 4] = jt * a[o + 4] + jt * da**2 * sb * cb - p * da * cb
         f[self.inertia.spin] = self.inertia.spin_inertia * a[self.inertia.spin]
-        for name, place in self.shaft_slices.items():
-            f[place] = self.shafts[name].reduced.mass @ a[place]
+        for name, place in self.elastic_slices.items():
+            f[place] = self.elastic_bodies[name].reduced.mass @ a[place]
         return f
 
 
@@ -307,13 +307,13 @@ def assemble(
     _check_supports(gearbox, variant, moving)
     if law == "rigid" and variant != "rigid":
         raise VariantError(f"mesh law rigid: its gears only roll, which needs the variant rigid, not {variant}")
-    shafts = elastic_shafts(gearbox, inertias, folder) if variant == "flexible" else {}
-    rigid = [body for body in moving if body.name not in shafts]
+    flexible = reduced_bodies(gearbox, inertias, folder) if variant == "flexible" else {}
+    rigid = [body for body in moving if body.name not in flexible]
     six = [body for body in rigid if variant != "rigid" and not body.spin_only]
     alone = [body for body in rigid if body not in six]
     coordinates, nodes = _coordinates(six, alone), {body.name: node_position(body) for body in moving}
     size = 6 * len(six) + len(alone)
-    for name, shaft in shafts.items():
+    for name, shaft in flexible.items():
         size = _take_seats(name, shaft, size, coordinates, nodes)
     displaced = gearbox.pin_offsets if variant not in ON_BEARINGS else {}  # bearings carry the planets along
     settings = (law, inertias, flanks, angles, displaced, nodes)
@@ -323,7 +323,7 @@ def assemble(
         variant=variant,
         law=law,
         inertias=inertias,
-        bodies=(*six, *alone, *(body for body in moving if body.name in shafts)),
+        bodies=(*six, *alone, *(body for body in moving if body.name in flexible)),
         coordinates=coordinates,
         size=size,
         elements=elements,
@@ -333,30 +333,30 @@ def assemble(
         spring_names=tuple(coupling.name for coupling in gearbox.couplings),
         springs=_springs(gearbox, coordinates),
         inertia=_inertia(variant, six, alone),
-        shafts=shafts,
-        elastic=elastic_arrays(shafts, size, gearbox.case.damping.body_time_s),
+        elastic_bodies=flexible,
+        elastic=elastic_arrays(flexible, size, gearbox.case.damping.body_time_s),
         motions=_rolling_motions(gearbox, coordinates) if law == "rigid" else np.eye(size),
     )
 
 
 def _take_seats(
     name: str,
-    shaft: ElasticShaft,
+    body: ElasticBody,
     first: int,
     coordinates: dict[str, tuple[int, ...]],
     nodes: dict[str, Floats],
 ) -> int:
     """Enter the seats of an elastic body whose coordinates begin at `first`; return where the next one begins."""
-    for n, seat in enumerate(shaft.reduced.seats):
+    for n, seat in enumerate(body.reduced.seats):
         key = seat_key(name, seat.name)
         coordinates[key] = tuple(range(first + 6 * n, first + 6 * n + 6))
         nodes[key] = np.array(seat.place)
-    coordinates[name] = coordinates[seat_key(name, shaft.main)]
-    nodes[name] = nodes[seat_key(name, shaft.main)]
-    return first + shaft.reduced.size
+    coordinates[name] = coordinates[seat_key(name, body.main)]
+    nodes[name] = nodes[seat_key(name, body.main)]
+    return first + body.reduced.size
 
 
-def elastic_arrays(shafts: Mapping[str, ElasticShaft], size: int, damping_time: float) -> ElasticArrays:
+def elastic_arrays(flexible: Mapping[str, ElasticBody], size: int, damping_time: float) -> ElasticArrays:
     """Arrays of elastic bodies whose coordinates are the last of `size`; damping is `damping_time` (s) times stiffness.
 
     Each body falls into blocks that neither its mass nor its stiffness couples.
@@ -365,9 +365,9 @@ def elastic_arrays(shafts: Mapping[str, ElasticShaft], size: int, damping_time: 
     turning, partner = [], []
     parts: dict[str, list[Floats]] = {"stiffness": [], "mass": [], "inverse": [], "gyroscopic": []}
     spin, momentum = [], []
-    begin = size - sum(shaft.reduced.size for shaft in shafts.values())
-    for shaft in shafts.values():
-        body = shaft.reduced
+    begin = size - sum(body.reduced.size for body in flexible.values())
+    for flexible_body in flexible.values():
+        body = flexible_body.reduced
         own = body.blocks
         carried = body.mass @ body.spin
         spinning = next(n for n, block in enumerate(own) if body.spin[block].any())

@@ -514,7 +514,7 @@ def _compute_modes(gearbox: Gearbox, folder: Path, variant: str, law: str, inert
         found = eigenmodes(
             gearbox, variant, mesh_stiffness(gearbox, law, folder), law, inertias, folder=bodies_folder(folder)
         )
-    for name, shaft in found.assembly.shafts.items():
+    for name, shaft in found.assembly.elastic_bodies.items():
         figures = shaft.reduced.figures
         unknowns, took = sum(figures.unknowns.values()), figures.seconds
         note(f"{name}: {unknowns} unknowns reduced to {shaft.reduced.size} coordinates in {took:.1f} s")

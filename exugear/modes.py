@@ -50,7 +50,7 @@ class Linearised:
     Attributes
     ----------
     mass : (size, size)
-    stiffness, damping : element name -> matrix; elements are meshes, bearings, couplings, shafts
+    stiffness, damping : element name -> matrix; elements are meshes, bearings, couplings, elastic bodies
     """
 
     mass: Floats
@@ -84,11 +84,11 @@ def linearise(assembly: Assembly, q: Floats, meshes: MeshArrays | None = None) -
     for n, name in enumerate(assembly.spring_names):
         spring = SpringArrays._make(values[n : n + 1] for values in assembly.springs)
         stiffness[name], damping[name] = _tangents(assembly.size, q, spring, add_spring_forces)
-    for name, place in assembly.shaft_slices.items():
+    for name, place in assembly.elastic_slices.items():
         own = np.zeros((assembly.size,) * 2)
-        own[place, place] = assembly.shafts[name].reduced.stiffness
-        stiffness[f"{name}_shaft"] = own
-        damping[f"{name}_shaft"] = assembly.gearbox.case.damping.body_time_s * own
+        own[place, place] = assembly.elastic_bodies[name].reduced.stiffness
+        stiffness[f"{name}_body"] = own
+        damping[f"{name}_body"] = assembly.gearbox.case.damping.body_time_s * own
     return Linearised(assembly.mass_matrix, stiffness, damping)
 
 
@@ -119,7 +119,7 @@ class Modes:
     frequency : (n,) undamped, Hz
     damping_ratio : (n,) share of critical damping, from the damping matrix in the mode
     shapes : (size, n) real, unit modal mass
-    strain : (n, elements) share of strain energy by mesh, bearing, coupling and elastic shaft
+    strain : (n, elements) share of strain energy by mesh, bearing, coupling and elastic body
     kinetic : (n, bodies, 7) share of kinetic energy by body and motion, see `MOTIONS`
     overall : (n,) overall DTE of the mode at unit modal mass, m / sqrt(kg)
     amplification : (n, meshes) overall DTE at resonance per amplitude of STE in one mesh, m/m
@@ -192,8 +192,8 @@ def coordinate_labels(assembly: Assembly) -> list[str]:
         for motion, index in zip(RIGID_COORDINATES, assembly.coordinates[body.name], strict=True):
             if index >= 0:
                 labels[index] = f"{body.name}.{motion}"
-    for name, place in assembly.shaft_slices.items():
-        reduced = assembly.shafts[name].reduced
+    for name, place in assembly.elastic_slices.items():
+        reduced = assembly.elastic_bodies[name].reduced
         own = [f"{seat.name}.{motion}" for seat in reduced.seats for motion in RIGID_COORDINATES]
         own += [f"{group.replace(' ', '_')}_{n}" for n, group in enumerate(reduced.groups, start=1)]
         labels[place] = [f"{name}.{label}" for label in own]
@@ -246,7 +246,7 @@ def modes_of(assembly: Assembly, preload: bool = True) -> Modes:
         q = locked_equilibrium(assembly, load.torques_N_m, load.locked, assembly.mean_meshes)
     linear = linearise(assembly, q)
     frequency, shapes = undamped_modes(linear.mass, linear.total_stiffness, assembly.motions)
-    if assembly.shafts:  # beyond the band the shafts' own vibrations are only what keeps their statics right
+    if assembly.elastic_bodies:  # beyond the band the shafts' own vibrations are only what keeps their statics right
         inside = frequency <= assembly.gearbox.case.elasticity.band_Hz
         frequency, shapes = frequency[inside], shapes[:, inside]
     masses = np.einsum("im,ij,jm->m", shapes, linear.mass, shapes)
@@ -319,9 +319,9 @@ def _kinetic_shares(assembly: Assembly, shapes: Floats) -> Floats:
     energy = np.diag(assembly.mass_matrix)[:, None] * shapes**2
     shares = np.zeros((shapes.shape[1], len(assembly.bodies), len(MOTIONS)))
     for n, body in enumerate(assembly.bodies):
-        if body.name in assembly.shafts:
-            own = shapes[assembly.shaft_slices[body.name]]
-            shares[:, n] = _shaft_energies(assembly.shafts[body.name].reduced, own)
+        if body.name in assembly.elastic_bodies:
+            own = shapes[assembly.elastic_slices[body.name]]
+            shares[:, n] = _elastic_energies(assembly.elastic_bodies[body.name].reduced, own)
             continue
         index = assembly.coordinates[body.name]
         for motion, members in enumerate(((5,), (0, 1), (2,), (3, 4))):
@@ -332,7 +332,7 @@ def _kinetic_shares(assembly: Assembly, shapes: Floats) -> Floats:
     return shares / whole
 
 
-def _shaft_energies(body: ReducedBody, shapes: Floats) -> Floats:
+def _elastic_energies(body: ReducedBody, shapes: Floats) -> Floats:
     """Twice the kinetic energy (n, motions) of an elastic shaft: of its rigid part, and of each deformation.
 
     The rigid part is what the momentum of the whole tells; the rest is orthogonal to it.
@@ -378,7 +378,7 @@ def mode_name(assembly: Assembly, element_names: tuple[str, ...], kinetic: Float
     Parameters
     ----------
     kinetic : (bodies, motions) share by body and motion
-    strain : (elements,) share by mesh, bearing, coupling and shaft
+    strain : (elements,) share by mesh, bearing, coupling and elastic body
     """
     moving: dict[str, float] = {}
     for body, shares in zip(assembly.bodies, kinetic, strict=True):
@@ -418,9 +418,9 @@ def counterparts(rigid: Modes, flexible: Modes) -> tuple[NDArray[np.int64], Floa
     carried = np.zeros((other.size, one.size))
     for body in one.bodies:
         index = [i for i in one.coordinates[body.name] if i >= 0]
-        if body.name in other.shafts:
+        if body.name in other.elastic_bodies:
             centre = (*body.axis, body.centre_of_mass_z)
-            carried[other.shaft_slices[body.name], index[0] : index[-1] + 1] = other.shafts[
+            carried[other.elastic_slices[body.name], index[0] : index[-1] + 1] = other.elastic_bodies[
                 body.name
             ].reduced.rigid_motions(centre)
         else:

@@ -140,8 +140,8 @@ class ExudynSystem:
         self.mbs = self._container.AddSystem()
         self._nodes: dict[str, Any] = {}
         self._bodies: dict[str, Any] = {}
-        self._shaft_nodes: dict[str, list[Any]] = {}
-        if assembly.shafts and mesh_route != "element":
+        self._elastic_nodes: dict[str, list[Any]] = {}
+        if assembly.elastic_bodies and mesh_route != "element":
             raise VariantError("mesh_route 'loads' needs rigid bodies: use the variant jointed or bushing")
         if assembly.variant == "rigid":
             if mesh_route != "element":
@@ -149,7 +149,7 @@ class ExudynSystem:
             self._add_minimal(q, v, with_meshes)
         else:
             self._add_bodies(q, v)
-            self._add_shafts(q, v)
+            self._add_elastic_bodies(q, v)
             self._add_connectors()
             self._add_couplings()
             self._add_loading()
@@ -213,7 +213,7 @@ class ExudynSystem:
         for body in self.assembly.bodies:
             if self.assembly.has_six(body):
                 self._add_rigid_body(body, q, v)
-            elif body.name not in self.assembly.shafts:
+            elif body.name not in self.assembly.elastic_bodies:
                 i = self.assembly.spin[body.name]
                 self._nodes[body.name] = self.mbs.AddNode(
                     items.Node1D(referenceCoordinates=[0.0], initialCoordinates=[q[i]], initialVelocities=[v[i]])
@@ -241,10 +241,10 @@ class ExudynSystem:
             marker = self.mbs.AddMarker(items.MarkerBodyMass(bodyNumber=self._bodies[body.name]))
             self.mbs.AddLoad(items.LoadMassProportional(markerNumber=marker, loadVector=list(acceleration)))
 
-    def _add_shafts(self, q: Floats, v: Floats) -> None:
+    def _add_elastic_bodies(self, q: Floats, v: Floats) -> None:
         """Add elastic bodies: a rigid-body node at each seat, one node for the amplitudes, their matrices on all."""
-        for name, place in self.assembly.shaft_slices.items():
-            reduced = self.assembly.shafts[name].reduced
+        for name, place in self.assembly.elastic_slices.items():
+            reduced = self.assembly.elastic_bodies[name].reduced
             nodes = []
             for n, seat in enumerate(reduced.seats):
                 first = place.start + 6 * n
@@ -269,8 +269,8 @@ class ExudynSystem:
                     )
                 )
             )
-            self._shaft_nodes[name] = nodes
-            self._nodes[name] = self._nodes[seat_key(name, self.assembly.shafts[name].main)]
+            self._elastic_nodes[name] = nodes
+            self._nodes[name] = self._nodes[seat_key(name, self.assembly.elastic_bodies[name].main)]
             self.mbs.AddObject(
                 items.ObjectGenericODE2(
                     nodeNumbers=nodes,
@@ -364,9 +364,9 @@ class ExudynSystem:
     def _add_mesh_element(self) -> None:
         """Add the one object for all meshes, on all nodes in the order of the assembly's coordinates."""
         size = self.assembly.size
-        rigid = [body.name for body in self.assembly.bodies if body.name not in self._shaft_nodes]
+        rigid = [body.name for body in self.assembly.bodies if body.name not in self._elastic_nodes]
         nodes = [self._nodes[name] for name in rigid]
-        nodes += [node for own in self._shaft_nodes.values() for node in own]
+        nodes += [node for own in self._elastic_nodes.values() for node in own]
         add_forces, jacobian = _mesh_functions(self._meshes, size)
 
         def force(mbs: Any, t: float, item: int, q: Any, v: Any) -> Floats:
@@ -404,14 +404,14 @@ class ExudynSystem:
         if "*" in self._nodes:
             return np.arange(self.assembly.size, dtype=np.int64)
         order = np.zeros(self.assembly.size, dtype=np.int64)
-        for name, place in self.assembly.shaft_slices.items():
+        for name, place in self.assembly.elastic_slices.items():
             begin = place.start
-            for node in self._shaft_nodes[name]:
+            for node in self._elastic_nodes[name]:
                 count = len(self.mbs.GetNodeOutput(node, exudyn.OutputVariableType.Coordinates))
                 order[begin : begin + count] = self.mbs.GetNodeODE2Index(node) + np.arange(count)
                 begin += count
         for body in self.assembly.bodies:
-            if body.name in self._shaft_nodes:
+            if body.name in self._elastic_nodes:
                 continue
             first = self.mbs.GetNodeODE2Index(self._nodes[body.name])
             own = [index for index in self.assembly.coordinates[body.name] if index >= 0]

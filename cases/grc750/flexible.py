@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from exugear.elastic_scene import animate_elastic_bodies, draw_elastic_bodies, elastic_scene
 from exugear.gearbox import Gearbox
 from exugear.mesh_stiffness import mesh_stiffness
 from exugear.modes import MOTIONS, Modes, counterparts, eigenmodes
@@ -20,7 +21,6 @@ from exugear.orders import order_lines, run_waterfall
 from exugear.plots import plot_waterfalls
 from exugear.results import bodies_folder, modes_path
 from exugear.runup import Progress, simulate
-from exugear.shaft_scene import animate_shafts, draw_shafts, shaft_scene
 from exugear.spectra import group_by_frequency, match_eigenfrequencies, pick_resonances
 from exugear.statics import locked_equilibrium
 from exugear.tables import order_tables
@@ -89,9 +89,9 @@ def draw_flexible_mode(modes: Modes, folder: Path) -> None:
     meshes = modes.strain[:, [name in modes.assembly.mesh_names for name in modes.element_names]].sum(axis=1)
     chosen = int(np.argmax(bending * meshes))
     title = f"{modes.frequency[chosen]:.0f} Hz: {modes.names[chosen]}"
-    scene = shaft_scene(modes.assembly, modes.shapes[:, chosen], title=title)
-    draw_shafts(scene, folder / "flexible-mode.png")
-    animate_shafts(scene, folder / "flexible-mode.gif")
+    scene = elastic_scene(modes.assembly, modes.shapes[:, chosen], title=title)
+    draw_elastic_bodies(scene, folder / "flexible-mode.png")
+    animate_elastic_bodies(scene, folder / "flexible-mode.gif")
 
 
 def show(progress: Progress) -> None:

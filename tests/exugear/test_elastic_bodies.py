@@ -11,10 +11,10 @@ from exugear.assembly import Assembly, VariantError, assemble
 from exugear.casefile import CaseError
 from exugear.channels import Channels
 from exugear.compiled import CompiledSystem, LoadTable, Observer
+from exugear.elastic_bodies import reduced_bodies, shaft_model
+from exugear.elastic_scene import animate_elastic_bodies, draw_elastic_bodies, elastic_scene
 from exugear.gearbox import Gearbox
 from exugear.modes import counterparts, eigenmodes, linearise, modes_of
-from exugear.shaft_scene import animate_shafts, draw_shafts, shaft_scene
-from exugear.shafts import elastic_shafts, shaft_model
 from exugear.statics import accelerating_start, locked_equilibrium
 from exugear.system import ExudynSystem, Loading
 
@@ -58,7 +58,7 @@ def test_stiffer_shafts_tend_to_the_variant_bushing(grc: Gearbox, stiffness: dic
 
 
 def test_a_shaft_has_the_rigid_inertia_of_its_body(flexible: Assembly, grc: Gearbox) -> None:
-    for name, shaft in flexible.shafts.items():
+    for name, shaft in flexible.elastic_bodies.items():
         body, found = grc.body(name), shaft.reduced.rigid_inertia
         assert (found.mass, found.transverse, found.axial) == pytest.approx(
             (body.mass, body.transverse, body.axial), rel=1e-9
@@ -69,8 +69,8 @@ def test_a_shaft_has_the_rigid_inertia_of_its_body(flexible: Assembly, grc: Gear
 def test_shapes_of_the_grc_weigh_about_what_is_printed(flexible: Assembly, grc: Gearbox) -> None:
     # Without what bearings and couplings add: 30 % on the light high-speed shaft, 10 % on the others.
     for name, share in (("lss", 0.02), ("ims", 0.11), ("hss", 0.27)):
-        assert flexible.shafts[name].own.mass == pytest.approx(grc.body(name).mass, rel=share)
-        assert flexible.shafts[name].own.axial == pytest.approx(grc.body(name).axial, rel=0.15)
+        assert flexible.elastic_bodies[name].own.mass == pytest.approx(grc.body(name).mass, rel=share)
+        assert flexible.elastic_bodies[name].own.axial == pytest.approx(grc.body(name).axial, rel=0.15)
 
 
 def test_turning_the_whole_train_stores_nothing(flexible: Assembly) -> None:
@@ -99,7 +99,7 @@ def test_a_shaft_strains_most_in_modes_that_only_it_has(grc: Gearbox, flexible: 
     assert modes.frequency.max() <= grc.case.elasticity.band_Hz
     bending = [n for n, name in enumerate(modes.names) if name.startswith("lss bending 9")]
     assert bending
-    assert modes.strain[bending, modes.element_names.index("lss_shaft")].min() > 0.5
+    assert modes.strain[bending, modes.element_names.index("lss_body")].min() > 0.5
     assert np.allclose(modes.kinetic.sum(axis=(1, 2)), 1.0)
     assert modes.kinetic.min() > -1e-9
 
@@ -129,8 +129,8 @@ def test_accelerations_are_those_of_the_plain_kernels(flexible: Assembly, grc: G
 
 def test_gyroscopic_forces_follow_the_actual_speed(flexible: Assembly) -> None:
     rest = np.zeros(flexible.size)
-    for name, place in flexible.shaft_slices.items():
-        body = flexible.shafts[name].reduced
+    for name, place in flexible.elastic_slices.items():
+        body = flexible.elastic_bodies[name].reduced
         tilting = np.zeros(flexible.size)
         tilting[place] = body.rigid_motions(body.rigid_inertia.centre)[:, 4]
         for speed in (0.0, 50.0, -120.0):
@@ -197,9 +197,9 @@ def test_the_compiled_solver_follows_exudyn(flexible: Assembly) -> None:
 
 
 def test_reductions_are_kept_in_a_folder(grc: Gearbox, tmp_path: Path) -> None:
-    kept = elastic_shafts(grc, "assemblies", tmp_path)
+    kept = reduced_bodies(grc, "assemblies", tmp_path)
     assert sorted(file.name.split("-")[0] for file in tmp_path.iterdir()) == sorted(SHAFTS)
-    for name, shaft in elastic_shafts(grc, "assemblies").items():
+    for name, shaft in reduced_bodies(grc, "assemblies").items():
         assert np.array_equal(shaft.reduced.stiffness, kept[name].reduced.stiffness)
 
 
@@ -217,8 +217,8 @@ def test_a_bearing_longer_than_its_seat_is_refused_by_name(grc: Gearbox, stiffne
 
 def test_weight_is_that_of_the_bodies(grc: Gearbox, stiffness: dict) -> None:
     heavy = assemble(grc.varied({"gravity.acceleration_m_per_s2": [0.0, -9.81, 0.0]}), "flexible", stiffness)
-    for name, place in heavy.shaft_slices.items():
-        down = heavy.shafts[name].reduced.rigid_motions((0.0, 0.0, 0.0))[:, 1]
+    for name, place in heavy.elastic_slices.items():
+        down = heavy.elastic_bodies[name].reduced.rigid_motions((0.0, 0.0, 0.0))[:, 1]
         assert down @ heavy.weight[place] == pytest.approx(-9.81 * grc.body(name).mass, rel=1e-9)
 
 
@@ -226,7 +226,7 @@ def test_damping_of_shafts_is_a_key_of_the_case(grc: Gearbox, stiffness: dict) -
     quiet = grc.varied({"damping.body_time_s": 0.0})
     assembly = assemble(quiet, "flexible", stiffness)
     linear = linearise(assembly, np.zeros(assembly.size))
-    assert not linear.damping["lss_shaft"].any()
+    assert not linear.damping["lss_body"].any()
 
 
 def test_modes_on_rigid_shafts_are_found_again_on_stiff_ones(grc: Gearbox, stiffness: dict) -> None:
@@ -243,8 +243,8 @@ def test_modes_on_rigid_shafts_are_found_again_on_stiff_ones(grc: Gearbox, stiff
 
 def test_the_rigid_part_of_a_rigid_motion_is_that_of_the_centre(flexible: Assembly) -> None:
     vector = np.zeros(flexible.size)
-    for name, place in flexible.shaft_slices.items():
-        body = flexible.shafts[name].reduced
+    for name, place in flexible.elastic_slices.items():
+        body = flexible.elastic_bodies[name].reduced
         vector[place] = body.rigid_motions(body.rigid_inertia.centre) @ np.arange(1.0, 7.0)
     found = flexible.rigid_part(vector)
     for name in SHAFTS:
@@ -254,18 +254,18 @@ def test_the_rigid_part_of_a_rigid_motion_is_that_of_the_centre(flexible: Assemb
 def test_a_scene_shows_every_shaft_with_its_gears(flexible: Assembly, tmp_path: Path) -> None:
     modes = modes_of(flexible)
     bending = next(n for n, name in enumerate(modes.names) if name.startswith("ims bending"))
-    scene = shaft_scene(flexible, modes.shapes[:, bending], title="a mode", amplitude=0.05)
+    scene = elastic_scene(flexible, modes.shapes[:, bending], title="a mode", amplitude=0.05)
     assert [gear.name for gear in scene.gears] == ["sun", "im_gear", "im_pinion", "hs_gear", "hs_pinion"]
-    largest = max(np.linalg.norm(shaft.displacement, axis=1).max() for shaft in scene.shafts)
+    largest = max(np.linalg.norm(shaft.displacement, axis=1).max() for shaft in scene.bodies)
     assert largest == pytest.approx(0.05 * 0.8795, rel=1e-6)  # the low-speed shaft is the longest
-    assert [shaft.energy.max() for shaft in scene.shafts].index(1.0) == 1
-    draw_shafts(scene, tmp_path / "mode.png", size=(400, 300))
-    animate_shafts(scene, tmp_path / "mode.gif", frames=4, size=(200, 150))
+    assert [shaft.energy.max() for shaft in scene.bodies].index(1.0) == 1
+    draw_elastic_bodies(scene, tmp_path / "mode.png", size=(400, 300))
+    animate_elastic_bodies(scene, tmp_path / "mode.gif", frames=4, size=(200, 150))
     assert {file.name for file in tmp_path.iterdir()} == {"mode.png", "mode.gif"}
     with pytest.raises(ValueError, match="suffix must be .gif"):
-        animate_shafts(scene, tmp_path / "mode.png", frames=4, size=(200, 150))
+        animate_elastic_bodies(scene, tmp_path / "mode.png", frames=4, size=(200, 150))
 
 
-def test_a_variant_without_elastic_shafts_has_no_such_scene(grc: Gearbox, stiffness: dict) -> None:
-    with pytest.raises(ValueError, match="variant bushing has no elastic shafts"):
-        shaft_scene(assemble(grc, "bushing", stiffness), np.zeros(43))
+def test_a_variant_without_elastic_bodies_has_no_such_scene(grc: Gearbox, stiffness: dict) -> None:
+    with pytest.raises(ValueError, match="variant bushing has no elastic bodies"):
+        elastic_scene(assemble(grc, "bushing", stiffness), np.zeros(43))

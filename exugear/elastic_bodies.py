@@ -1,4 +1,4 @@
-"""The elastic shafts of a gearbox: shapes from the gearbox file, seats where gears and bearings sit.
+"""The elastic bodies of a gearbox: shapes from the gearbox file, seats where gears and bearings sit.
 
 A shaft's mass comes from its shape and the blanks on it. What the body's inertia set says beyond that (or short of
 it) is spread over the rigid part of the motion, so that an elastic body accelerates and orbits exactly as the rigid
@@ -32,7 +32,7 @@ TORQUE_SEAT = "torque"
 
 
 @dataclass(frozen=True)
-class ElasticShaft:
+class ElasticBody:
     """A reduced shaft of a gearbox.
 
     Attributes
@@ -118,7 +118,7 @@ def elastic_names(gearbox: Gearbox) -> tuple[str, ...]:
     )
 
 
-def elastic_shafts(gearbox: Gearbox, inertias: str, folder: Path | None = None) -> dict[str, ElasticShaft]:
+def reduced_bodies(gearbox: Gearbox, inertias: str, folder: Path | None = None) -> dict[str, ElasticBody]:
     """Reduce all elastic shafts of a gearbox, or take them from where they were kept.
 
     Parameters
@@ -144,7 +144,7 @@ def elastic_shafts(gearbox: Gearbox, inertias: str, folder: Path | None = None) 
         wanted = RigidInertia(body.mass, (*body.axis, body.centre_of_mass_z), body.transverse, body.axial)
         seats = [seat.name for seat in plain.seats]
         main = TORQUE_SEAT if TORQUE_SEAT in seats else seats[0]
-        found[name] = ElasticShaft(with_rigid_inertia(plain, wanted), plain.rigid_inertia, main)
+        found[name] = ElasticBody(with_rigid_inertia(plain, wanted), plain.rigid_inertia, main)
     return found
 
 

@@ -1,4 +1,4 @@
-"""Pictures and animations of elastic shafts in a mode, deformed and coloured by strain energy."""
+"""Pictures and animations of elastic bodies in a mode, deformed and coloured by strain energy."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ FloatArray = NDArray[np.float64]
 ImageArray = NDArray[np.uint8]
 
 SIDE = (1.0, 0.35, -0.4)
-"""From the shafts to the eye: mostly from the side, where bending shows."""
+"""From the bodies to the eye: mostly from the side, where bending shows."""
 BRIGHTEST = 99.0
 """Share of the surface (%) below the density of the last colour: at sharp shoulders it grows without bound."""
 
 
 @dataclass(frozen=True)
-class DeformedShaft:
-    """A shaft in a mode: points (p, 3) at rest, quads (f, 4), displacement (p, 3) as drawn, energy (f,) from 0 to 1."""
+class DeformedBody:
+    """A body in a mode: points (p, 3) at rest, quads (f, 4), displacement (p, 3) as drawn, energy (f,) from 0 to 1."""
 
     points: FloatArray
     quads: NDArray[np.int64]
@@ -41,26 +41,26 @@ class DeformedShaft:
 
 
 @dataclass(frozen=True)
-class ShaftScene:
-    """Elastic shafts in a mode, and their gears, which ride on their seats.
+class ElasticScene:
+    """Elastic bodies in a mode, and their gears, which ride on their seats.
 
     Attributes
     ----------
-    shafts : tuple of DeformedShaft
+    bodies : tuple of DeformedBody
     gears : tuple of BodyShape
     motions : tuple of (6,) arrays
         Motion of each gear as drawn.
     title : str
     """
 
-    shafts: tuple[DeformedShaft, ...]
+    bodies: tuple[DeformedBody, ...]
     gears: tuple[BodyShape, ...]
     motions: tuple[FloatArray, ...]
     title: str
 
 
-def shaft_scene(assembly: Assembly, shape: FloatArray, *, title: str = "", amplitude: float = 0.06) -> ShaftScene:
-    """Arrange the elastic shafts of an assembly in a mode.
+def elastic_scene(assembly: Assembly, shape: FloatArray, *, title: str = "", amplitude: float = 0.06) -> ElasticScene:
+    """Arrange the elastic bodies of an assembly in a mode.
 
     Parameters
     ----------
@@ -70,31 +70,31 @@ def shaft_scene(assembly: Assembly, shape: FloatArray, *, title: str = "", ampli
         Mode shape.
     title : str
     amplitude : float
-        Largest displacement drawn, as a share of the longest shaft.
+        Largest displacement drawn, as a share of the longest body.
 
     Raises
     ------
     ValueError
-        The assembly has no elastic shafts, or the mode does not move them.
+        The assembly has no elastic bodies, or the mode does not move them.
     """
-    if not assembly.shafts:
-        raise ValueError(f"variant {assembly.variant} has no elastic shafts to draw; use the variant flexible")
+    if not assembly.elastic_bodies:
+        raise ValueError(f"variant {assembly.variant} has no elastic bodies to draw; use the variant flexible")
     found = []
-    for name, place in assembly.shaft_slices.items():
-        surface = assembly.shafts[name].reduced.surface
+    for name, place in assembly.elastic_slices.items():
+        surface = assembly.elastic_bodies[name].reduced.surface
         found.append((surface, surface.displacement @ shape[place], surface.energy_density(shape[place])))
     largest = max(float(np.linalg.norm(moved, axis=1).max()) for _, moved, _ in found)
     if not largest > 0.0:
-        raise ValueError("the mode does not move the elastic shafts")
+        raise ValueError("the mode does not move the elastic bodies")
     factor = amplitude * max(float(np.ptp(surface.points[:, 2])) for surface, _, _ in found) / largest
     brightest = _density_below(
         np.concatenate([density for _, _, density in found]),
         np.concatenate([_areas(surface.points, surface.quads) for surface, _, _ in found]),
     )
     gears, motions = _gears(assembly, factor * shape)
-    return ShaftScene(
-        shafts=tuple(
-            DeformedShaft(surface.points, surface.quads, factor * moved, np.minimum(density / brightest, 1.0))
+    return ElasticScene(
+        bodies=tuple(
+            DeformedBody(surface.points, surface.quads, factor * moved, np.minimum(density / brightest, 1.0))
             for surface, moved, density in found
         ),
         gears=gears,
@@ -120,7 +120,7 @@ def _density_below(density: FloatArray, area: FloatArray) -> float:
 def _gears(assembly: Assembly, shape: FloatArray) -> tuple[tuple[BodyShape, ...], tuple[FloatArray, ...]]:
     gears, motions = [], []
     for body in assembly.bodies:
-        if body.name not in assembly.shafts:
+        if body.name not in assembly.elastic_bodies:
             continue
         for gear, z in body.wheels.items():
             place = np.array([*body.axis, z])
@@ -129,12 +129,14 @@ def _gears(assembly: Assembly, shape: FloatArray) -> tuple[tuple[BodyShape, ...]
     return tuple(gears), tuple(motions)
 
 
-def draw_shafts(scene: ShaftScene, path: str | Path | None = None, *, size: tuple[int, int] = (1600, 1200)) -> Figure:
-    """Draw elastic shafts at their largest deflection, coloured by strain energy density; gears translucent.
+def draw_elastic_bodies(
+    scene: ElasticScene, path: str | Path | None = None, *, size: tuple[int, int] = (1600, 1200)
+) -> Figure:
+    """Draw elastic bodies at their largest deflection, coloured by strain energy density; gears translucent.
 
     Parameters
     ----------
-    scene : ShaftScene
+    scene : ElasticScene
     path : path-like, optional
         Where to write the picture.
     size : (int, int)
@@ -152,14 +154,19 @@ def draw_shafts(scene: ShaftScene, path: str | Path | None = None, *, size: tupl
     return finish_figure(_figure(without_margins(image), pixel, scene.title), path)
 
 
-def animate_shafts(
-    scene: ShaftScene, path: str | Path, *, frames: int = 24, duration: float = 1.6, size: tuple[int, int] = (900, 700)
+def animate_elastic_bodies(
+    scene: ElasticScene,
+    path: str | Path,
+    *,
+    frames: int = 24,
+    duration: float = 1.6,
+    size: tuple[int, int] = (900, 700),
 ) -> Path:
     """Write one period of a mode as an animated picture that repeats for ever.
 
     Parameters
     ----------
-    scene : ShaftScene
+    scene : ElasticScene
     path : path-like
         Where to write; the suffix must be ``.gif``.
     frames : int
@@ -178,14 +185,14 @@ def animate_shafts(
     """
     images = []
     with offscreen_plotter(*size) as plotter:
-        shafts, gears = _add(plotter, scene)
+        bodies, gears = _add(plotter, scene)
         look(plotter, SIDE)
         count = frames // 2 + 1
         for number in range(count):
             part = math.cos(math.pi * number / (count - 1))
-            for mesh, shaft in zip(shafts, scene.shafts, strict=True):
-                mesh.points = shaft.points + part * shaft.displacement
-                mesh.cell_data["energy"] = part**2 * shaft.energy
+            for mesh, body in zip(bodies, scene.bodies, strict=True):
+                mesh.points = body.points + part * body.displacement
+                mesh.cell_data["energy"] = part**2 * body.energy
             for mesh, gear, motion in zip(gears, scene.gears, scene.motions, strict=True):
                 mesh.points = placed(gear, part * motion)
             images.append(rendered_image(plotter))
@@ -196,25 +203,25 @@ def animate_shafts(
     )
 
 
-def _add(plotter: pyvista.Plotter, scene: ShaftScene) -> tuple[list[pyvista.PolyData], list[pyvista.PolyData]]:
+def _add(plotter: pyvista.Plotter, scene: ElasticScene) -> tuple[list[pyvista.PolyData], list[pyvista.PolyData]]:
     import pyvista
 
-    shafts, gears = [], []
-    for shaft in scene.shafts:
-        faces = np.column_stack([np.full(len(shaft.quads), 4), shaft.quads])
-        mesh = pyvista.PolyData(shaft.points + shaft.displacement, faces=faces.ravel())
-        mesh.cell_data["energy"] = shaft.energy
+    bodies, gears = [], []
+    for body in scene.bodies:
+        faces = np.column_stack([np.full(len(body.quads), 4), body.quads])
+        mesh = pyvista.PolyData(body.points + body.displacement, faces=faces.ravel())
+        mesh.cell_data["energy"] = body.energy
         plotter.add_mesh(
             mesh, scalars="energy", clim=(0.0, 1.0), cmap=displacement_map(), show_scalar_bar=False, ambient=0.3
         )
-        shafts.append(mesh)
+        bodies.append(mesh)
     for gear, motion in zip(scene.gears, scene.motions, strict=True):
         triangles = gear.surface.triangles
         faces = np.column_stack([np.full(len(triangles), 3), triangles])
         mesh = pyvista.PolyData(placed(gear, motion), faces=faces.ravel())
         plotter.add_mesh(mesh, color="#8A97A8", opacity=0.25)
         gears.append(mesh)
-    return shafts, gears
+    return bodies, gears
 
 
 def _figure(image: ImageArray, pixel: float, title: str) -> Figure:
