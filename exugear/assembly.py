@@ -49,6 +49,13 @@ from exugear.kernels import (
     mesh_state,
 )
 from exugear.mesh_element import Angles, MeshData, MeshElement, mesh_elements, node_position, pack, seat_key
+from exugear.travelling import (
+    TravellingArrays,
+    follow,
+    no_travelling,
+    share_travelling_forces,
+    travelling_tangent,
+)
 
 Floats = NDArray[np.float64]
 Variant = Literal["rigid", "bushing", "flexible", "jointed"]
@@ -73,6 +80,7 @@ class Assembly:
         its main seat, and those of each seat under `exugear.mesh_element.seat_key`
     size : number of coordinates
     elements, meshes : mesh elements and their arrays
+    travelling : seats of meshes on an elastic ring; their coordinates follow those of the system
     connector_names, connectors : bearings (none in the variant `rigid`)
     spring_names, springs : torsional couplings
     inertia : mass properties of rigid bodies; in the variant `rigid` the planets' orbit is in the carrier's
@@ -90,6 +98,7 @@ class Assembly:
     size: int
     elements: tuple[MeshElement, ...]
     meshes: MeshArrays
+    travelling: TravellingArrays
     connector_names: tuple[str, ...]
     connectors: ConnectorArrays
     spring_names: tuple[str, ...]
@@ -156,8 +165,7 @@ class Assembly:
 
     def forces(self, q: Floats, v: Floats, meshes: MeshArrays | None = None) -> Floats:
         """Generalized forces of meshes, bearings and couplings, shape (size,), N and N m."""
-        f = np.zeros(self.size)
-        add_mesh_forces(q, v, self.meshes if meshes is None else meshes, f)
+        f = self.mesh_forces(q, v, self.meshes if meshes is None else meshes)
         add_connector_forces(q, v, self.connectors, f)
         add_spring_forces(q, v, self.springs, f)
         add_elastic_forces(q, v, self.elastic, scratch_for(self.elastic), f)
@@ -193,11 +201,33 @@ class Assembly:
         set_elastic_accelerations(forces, self.elastic, scratch_for(self.elastic), out)
         return out
 
-    def mesh_jacobians(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """Differentiate the mesh forces to q and to v, each (size, size)."""
-        jq, jv = np.zeros((self.size, self.size)), np.zeros((self.size, self.size))
-        add_mesh_jacobian(q, v, self.meshes, jq, jv)
-        return jq, jv
+    def with_travelling(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """States (..., size) as the laws of meshes read them: with the travelling seats' coordinates, if any."""
+        if not self.travelling.first.size:
+            return q, v
+        x, u = follow(np.atleast_2d(q), np.atleast_2d(v), self.travelling)
+        return (x, u) if q.ndim > 1 else (x[0], u[0])
+
+    def mesh_forces(self, q: Floats, v: Floats, meshes: MeshArrays) -> Floats:
+        """Generalized forces of meshes, shape (size,), N and N m."""
+        x, u = self.with_travelling(q, v)
+        f = np.zeros(x.size)
+        add_mesh_forces(x, u, meshes, f)
+        share_travelling_forces(x, self.travelling, f)
+        return f[: self.size]
+
+    def mesh_jacobians(self, q: Floats, v: Floats, meshes: MeshArrays | None = None) -> tuple[Floats, Floats]:
+        """Differentiate the forces of the meshes, or others, to q and to v, each (size, size)."""
+        meshes = self.meshes if meshes is None else meshes
+        x, u = self.with_travelling(q, v)
+        jq, jv = np.zeros((x.size, x.size)), np.zeros((x.size, x.size))
+        add_mesh_jacobian(x, u, meshes, jq, jv)
+        if not self.travelling.first.size:
+            return jq, jv
+        f = np.zeros(x.size)
+        add_mesh_forces(x, u, meshes, f)
+        place, rate, turning = travelling_tangent(x, u, f, self.travelling)
+        return place.T @ (jq @ place + jv @ rate) + turning, place.T @ jv @ place
 
     @cached_property
     def mass_matrix(self) -> Floats:
@@ -252,13 +282,13 @@ class Assembly:
     def mesh_states(self, q: Floats, v: Floats, meshes: MeshArrays | None = None) -> Floats:
         """State of each mesh, (meshes, 10): see `exugear.kernels.mesh_state`."""
         out = np.zeros((len(self.elements), STATE_SIZE))
-        mesh_state(q, v, self.meshes if meshes is None else meshes, out)
+        mesh_state(*self.with_travelling(q, v), self.meshes if meshes is None else meshes, out)
         return out
 
     def gear_positions(self, q: Floats) -> Floats:
         """Centre distance (m) and misalignment (rad) of each mesh, (meshes, 2)."""
         out = np.zeros((len(self.elements), 2))
-        gear_positions(q, self.meshes, out)
+        gear_positions(self.with_travelling(q, q)[0], self.meshes, out)
         return out
 
     def inertia_forces(self, q: Floats, v: Floats, a: Floats) -> Floats:
@@ -315,6 +345,7 @@ def assemble(
     size = 6 * len(six) + len(alone)
     for name, shaft in flexible.items():
         size = _take_seats(name, shaft, size, coordinates, nodes)
+    travelling = _travelling(gearbox, flexible, size, coordinates, nodes)
     displaced = gearbox.pin_offsets if variant not in ON_BEARINGS else {}  # bearings carry the planets along
     settings = (law, inertias, flanks, angles, displaced, nodes)
     elements = () if law == "rigid" else mesh_elements(gearbox, stiffness, *settings)
@@ -328,6 +359,7 @@ def assemble(
         size=size,
         elements=elements,
         meshes=pack(elements, coordinates),
+        travelling=travelling,
         connector_names=tuple(b.name for b in gearbox.bearings) if variant in ON_BEARINGS else (),
         connectors=_connectors(gearbox, nodes, coordinates) if variant in ON_BEARINGS else no_connectors(),
         spring_names=tuple(coupling.name for coupling in gearbox.couplings),
@@ -354,6 +386,41 @@ def _take_seats(
     coordinates[name] = coordinates[seat_key(name, body.main)]
     nodes[name] = nodes[seat_key(name, body.main)]
     return first + body.reduced.size
+
+
+def _travelling(
+    gearbox: Gearbox,
+    flexible: Mapping[str, ElasticBody],
+    size: int,
+    coordinates: dict[str, tuple[int, ...]],
+    nodes: dict[str, Floats],
+) -> TravellingArrays:
+    """Enter a travelling seat, with coordinates after all `size` others, for each mesh of a gear with sectors."""
+    seats: list[tuple[int, float, list[int]]] = []
+    bodies = {body.name: body for body in gearbox.bodies()}
+    for mesh in gearbox.meshes:
+        sectors = flexible[mesh.gear].sectors.get(mesh.pair.gear.name, ()) if mesh.gear in flexible else ()
+        if not sectors:
+            continue
+        keys = [seat_key(mesh.gear, sector) for sector in sectors]
+        first = size + 6 * len(seats)
+        coordinates[seat_key(mesh.gear, mesh.name)] = tuple(range(first, first + 6))
+        nodes[seat_key(mesh.gear, mesh.pair.gear.name)] = nodes[keys[0]]
+        x, y = np.array(bodies[mesh.pinion].axis) - bodies[mesh.gear].axis
+        seats.append((coordinates.get(mesh.frame, (-1,) * 6)[5], math.atan2(y, x), [coordinates[k][0] for k in keys]))
+    if not seats:
+        return no_travelling()
+    count = np.array([len(sectors) for _, _, sectors in seats], dtype=np.int64)
+    most = int(count.max())
+    middles = 2.0 * np.pi * np.arange(most) / count[:, None]
+    return TravellingArrays(
+        first=size + 6 * np.arange(len(seats), dtype=np.int64),
+        frame=np.array([frame if frame >= 0 else size + 6 * len(seats) for frame, _, _ in seats], dtype=np.int64),
+        angle=np.array([angle for _, angle, _ in seats]),
+        number=count,
+        sectors=np.array([starts + [-1] * (most - len(starts)) for _, _, starts in seats], dtype=np.int64),
+        axes=np.stack([np.cos(middles), np.sin(middles)], axis=2),
+    )
 
 
 def elastic_arrays(flexible: Mapping[str, ElasticBody], size: int, damping_time: float) -> ElasticArrays:

@@ -213,7 +213,7 @@ class Channels:
         out = np.empty((q.shape[0], self.count))
         out[:, 0] = v[:, self._input]
         out[:, 1] = q @ self._overall
-        mesh_signals(q, v, self.assembly.meshes, out[:, 2 : 2 + 2 * meshes])
+        mesh_signals(*self.assembly.with_travelling(q, v), self.assembly.meshes, out[:, 2 : 2 + 2 * meshes])
         supports = out[:, self.supports]
         if self._joints is not None:
             joint_signals(q, v, self.assembly.meshes, *self._joints, supports)
@@ -249,7 +249,7 @@ class Channels:
         """Energies and powers of states q, v (samples, size), shape (samples, 6): see `energy_signals`."""
         out = np.empty((q.shape[0], 6))
         a = self.assembly
-        energy_signals(q, v, a.meshes, a.connectors, a.springs, a.inertia, out)
+        energy_signals(*a.with_travelling(q, v), a.meshes, a.connectors, a.springs, a.inertia, out)
         add_elastic_signals(q, v, a.elastic, scratch_for(a.elastic), out)
         return out
 

@@ -151,17 +151,22 @@ def unstable(rate: float, step: float) -> str:
     return f"step = {step:g} s is not stable: the fastest motion has {rate:.4g} rad/s; use {longest:.2g} s or less"
 
 
+def extended_size(assembly: Assembly) -> int:
+    """Count the coordinates with those of travelling seats."""
+    return assembly.size + 6 * assembly.travelling.first.size
+
+
 class _Numbers:
     """Numbering of bodies and of the coordinates whose sine is needed."""
 
     def __init__(self, assembly: Assembly) -> None:
         self.assembly = assembly
-        self.size = assembly.size
+        self.size = extended_size(assembly)
         self.starts = [int(start) for start in assembly.inertia.body]
         # Of elastic bodies only seats in bearings turn anything out of their own coordinates.
         seats = np.setdiff1d(assembly.connectors.bodies, [-1, *self.starts])
         self.starts += [int(start) for start in seats]
-        self.turning = [assembly.size]
+        self.turning = [self.size]
 
     def body(self, start: int) -> int:
         """Find the number of the body that starts at a coordinate; the ground (-1) comes last."""
@@ -269,8 +274,9 @@ def _joints(numbers: _Numbers) -> Joints:
 def _loads(assembly: Assembly, loads: LoadTable) -> Loads:
     series = list(loads.series.values())
     drive = () if loads.drive is None else (loads.drive,)
+    following = np.zeros(extended_size(assembly) - assembly.size)
     return Loads(
-        steady=assembly.torque_vector(loads.constant) + assembly.weight,
+        steady=np.append(assembly.torque_vector(loads.constant) + assembly.weight, following),
         coordinate=np.array([assembly.spin[name] for name in loads.series], dtype=np.int64),
         first=np.cumsum([0] + [len(times) for times, _ in series]).astype(np.int64),
         time=np.concatenate([np.zeros(0)] + [times for times, _ in series]),
@@ -301,6 +307,7 @@ def equations_of(assembly: Assembly, loads: LoadTable) -> Equations:
         bodies=bodies,
         connectors=connectors,
         meshes=meshes,
+        travelling=assembly.travelling,
         springs=Springs(springs.coordinates, springs.stiffness, springs.damping),
         loads=_loads(assembly, loads),
         joints=joints,
@@ -318,17 +325,17 @@ def _rolling_inverse(assembly: Assembly) -> Floats:
 
 def work_for(equations: Equations, q: Floats, v: Floats) -> Work:
     """Memory for the compiled loops, at the state q, v (size,)."""
-    none = np.zeros(6)
+    size = equations.loads.steady.size + 6
     frames = np.zeros((equations.bodies.start.size, 16))
     frames[-1, [0, 4, 8, 13, 15]] = 1.0  # the ground neither turns nor tilts
     return Work(
-        q=np.append(q, none),
-        v=np.append(v, none),
-        stage_q=np.zeros(q.size + 6),
-        stage_v=np.zeros(q.size + 6),
-        force=np.zeros(q.size + 6),
-        rate=np.zeros(q.size + 6),
-        total=np.zeros(q.size + 6),
+        q=np.append(q, np.zeros(size - q.size)),
+        v=np.append(v, np.zeros(size - q.size)),
+        stage_q=np.zeros(size),
+        stage_v=np.zeros(size),
+        force=np.zeros(size),
+        rate=np.zeros(size),
+        total=np.zeros(size),
         turns=np.zeros((equations.bodies.turning.size, 2)),
         frames=frames,
         wrench=np.zeros((equations.bodies.start.size, 6)),

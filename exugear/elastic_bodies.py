@@ -7,8 +7,8 @@ one does and only its deformation is new.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
@@ -40,11 +40,13 @@ class ElasticBody:
     reduced : with the rigid inertia of the body's inertia set
     own : rigid inertia of shape and blanks by themselves
     main : seat whose spin stands for the body: where torques act, else the first gear
+    sectors : seats on equal sectors by internal gear, an odd number, the first about +x, then on towards +y
     """
 
     reduced: ReducedBody
     own: RigidInertia
     main: str
+    sectors: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 def shaft_model(gearbox: Gearbox, name: str) -> ShaftModel:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from exugear.compilation import kernel
 from exugear.elastic import ElasticArrays, ElasticMotion, elastic_energies, set_elastic_motion
 from exugear.table_law import FIRST_TWO, Scratch, TableArrays, surface_law
+from exugear.travelling import TravellingArrays, place_travelling, share_travelling_forces
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -110,7 +111,7 @@ class Loads(NamedTuple):
 
     Attributes
     ----------
-    steady : (size,) constant generalized forces, weight included
+    steady : (size + 6 t,) constant generalized forces, weight included; zero on travelling seats
     coordinate : (s,) coordinates with a torque given over time
     first : (s + 1,) first line of each series in `time` (s) and `torque` (N m), linear between the lines
     drive : (d,) coordinates driven behind a spring and damper
@@ -158,6 +159,7 @@ class Equations(NamedTuple):
     bodies: Bodies
     connectors: Connectors
     meshes: Meshes
+    travelling: TravellingArrays
     springs: Springs
     loads: Loads
     joints: Joints
@@ -166,12 +168,14 @@ class Equations(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Memory of the right-hand side; state vectors have six entries more, which stay zero.
+    """Memory of the right-hand side.
+
+    State vectors have e entries: the system's own, those of travelling seats, and six that stay zero.
 
     Attributes
     ----------
-    q, v : (size + 6,) state at the present step
-    stage_q, stage_v, force, rate, total : (size + 6,) stage, generalized forces, accelerations and their sum
+    q, v : (e,) state at the present step
+    stage_q, stage_v, force, rate, total : (e,) stage, generalized forces, accelerations and their sum
     turns : (k, 2) cosine and sine of `Bodies.turning`
     frames : (b + e + 1, 16) rotation matrix, angular velocity, sine and cosine of the tilts
     wrench : (b + e + 1, 6) force and moment on each body, global axes
@@ -594,11 +598,13 @@ def set_accelerations(v: Floats, bodies: Bodies, work: Work) -> None:
 
 @kernel
 def evaluate(t: float, q: Floats, v: Floats, equations: Equations, work: Work) -> None:
-    """Fill `work.rate` with the accelerations at time t (s) and state q, v (size + 6,)."""
+    """Fill `work.rate` with the accelerations at time t (s) and state q, v (e,)."""
     place_bodies(q, v, equations.bodies, work)
     set_loads(t, q, v, equations.loads, work.series, work.force)
     add_connectors(q, v, equations.bodies, equations.connectors, work)
+    place_travelling(q, v, equations.travelling)
     add_meshes(q, v, equations.meshes, work)
+    share_travelling_forces(q, equations.travelling, work.force)
     add_springs(q, v, equations.springs, work.force)
     set_accelerations(v, equations.bodies, work)
     set_elastic_motion(q, v, work.force, equations.motion, work.scratch[0], work.rate)
@@ -785,6 +791,7 @@ def observe(
             x[i], u[i] = q[n, i], v[n, i]
         place_bodies(x, u, equations.bodies, work)
         observe_bodies(x, u, equations.bodies, work, energy)
+        place_travelling(x, u, equations.travelling)
         observe_meshes(x, u, meshes, work, signals[n], energy)
         observe_connectors(x, u, equations.bodies, equations.connectors, work, signals[n, two:], energy)
         if equations.joints.host.size > 0:

@@ -357,8 +357,8 @@ def pack(
     for row, element in zip(index, elements, strict=True):
         mesh = element.mesh
         for end, body, gear in ((0, mesh.pinion, mesh.pair.pinion), (6, mesh.gear, mesh.pair.gear)):
-            own = coordinates.get(body, (-1,) * 6)
-            row[end : end + 6] = coordinates.get(seat_key(body, gear.name), own)
+            keys = (seat_key(body, mesh.name), seat_key(body, gear.name), body)  # a travelling seat, a seat, the body
+            row[end : end + 6] = next((coordinates[key] for key in keys if key in coordinates), (-1,) * 6)
         row[12] = coordinates.get(mesh.frame, (-1,) * 6)[5]
     return MeshArrays(
         coordinates=index,

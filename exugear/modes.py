@@ -25,7 +25,6 @@ from exugear.kernels import (
     MeshArrays,
     SpringArrays,
     add_connector_forces,
-    add_mesh_jacobian,
     add_spring_forces,
 )
 from exugear.mesh_element import Angles, MeshData
@@ -75,8 +74,7 @@ def linearise(assembly: Assembly, q: Floats, meshes: MeshArrays | None = None) -
     rest = np.zeros(assembly.size)
     averaged = assembly.mean_meshes if meshes is None else meshes
     for n, name in enumerate(assembly.mesh_names):
-        jq, jv = np.zeros((assembly.size,) * 2), np.zeros((assembly.size,) * 2)
-        add_mesh_jacobian(q, rest, averaged.one(n), jq, jv)
+        jq, jv = assembly.mesh_jacobians(q, rest, averaged.one(n))
         stiffness[name], damping[name] = -jq, -jv
     for n, name in enumerate(assembly.connector_names):
         connector = ConnectorArrays._make(values[n : n + 1] for values in assembly.connectors)

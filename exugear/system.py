@@ -32,7 +32,6 @@ from exugear.kernels import (
     ROW_SIZE,
     MeshArrays,
     add_mesh_forces,
-    add_mesh_jacobian,
 )
 from exugear.mesh_element import node_position, seat_key
 from exugear.reduction import ReducedBody
@@ -185,15 +184,14 @@ class ExudynSystem:
             pattern = np.ix_([i, j], [i, j])
             k[pattern] += stiffness * np.array([[1.0, -1.0], [-1.0, 1.0]])
             d[pattern] += damping * np.array([[1.0, -1.0], [-1.0, 1.0]])
-        add_forces, jacobian = _mesh_functions(self._meshes, size)
-        loading = self.loading
+        meshes, loading = self._meshes, self.loading
         steady = loading.generalized(assembly, 0.0, q, v) if loading.is_constant else None
 
         def force(mbs: Any, t: float, item: int, y: Any, rate: Any) -> Floats:
             q, v = motions @ np.array(y), motions @ np.array(rate)
             f = loading.generalized(assembly, t, q, v) if steady is None else steady.copy()
             if with_meshes:
-                add_forces(q, v, f)
+                f += assembly.mesh_forces(q, v, meshes)
             return f @ motions
 
         has_jacobian = loading.drive is None and with_meshes and assembly.law != "rigid"
@@ -204,7 +202,7 @@ class ExudynSystem:
                 stiffnessMatrix=motions.T @ k @ motions,
                 dampingMatrix=motions.T @ d @ motions,
                 forceUserFunction=force,
-                jacobianUserFunction=jacobian if has_jacobian else 0,
+                jacobianUserFunction=_mesh_jacobian(assembly, meshes) if has_jacobian else 0,
             )
         )
         self._nodes["*"] = node
@@ -363,22 +361,19 @@ class ExudynSystem:
 
     def _add_mesh_element(self) -> None:
         """Add the one object for all meshes, on all nodes in the order of the assembly's coordinates."""
-        size = self.assembly.size
+        assembly, meshes = self.assembly, self._meshes
         rigid = [body.name for body in self.assembly.bodies if body.name not in self._elastic_nodes]
         nodes = [self._nodes[name] for name in rigid]
         nodes += [node for own in self._elastic_nodes.values() for node in own]
-        add_forces, jacobian = _mesh_functions(self._meshes, size)
 
         def force(mbs: Any, t: float, item: int, q: Any, v: Any) -> Floats:
-            f = np.zeros(size)
-            add_forces(np.array(q), np.array(v), f)
-            return f
+            return assembly.mesh_forces(np.array(q), np.array(v), meshes)
 
         self.mbs.AddObject(
             items.ObjectGenericODE2(
                 nodeNumbers=nodes,
                 forceUserFunction=force,
-                jacobianUserFunction=jacobian,
+                jacobianUserFunction=_mesh_jacobian(assembly, meshes),
             )
         )
 
@@ -495,20 +490,14 @@ class ExudynSystem:
         return basis @ to_spins, to_spins.T @ np.array(mass) @ to_spins
 
 
-def _mesh_functions(
-    meshes: MeshArrays, size: int
-) -> tuple[Callable[[Floats, Floats, Floats], None], Callable[..., Floats]]:
-    """Force adder and Exudyn jacobian of all meshes on `size` coordinates."""
-
-    def add_forces(q: Floats, v: Floats, f: Floats) -> None:
-        add_mesh_forces(q, v, meshes, f)
+def _mesh_jacobian(assembly: Assembly, meshes: MeshArrays) -> Callable[..., Floats]:
+    """Exudyn's jacobian function of all meshes on the coordinates of an assembly."""
 
     def jacobian(mbs: Any, t: float, item: int, q: Any, v: Any, factor_q: float, factor_v: float) -> Floats:
-        jq, jv = np.zeros((size, size)), np.zeros((size, size))
-        add_mesh_jacobian(np.array(q), np.array(v), meshes, jq, jv)
+        jq, jv = assembly.mesh_jacobians(np.array(q), np.array(v), meshes)
         return -(factor_q * jq + factor_v * jv)
 
-    return add_forces, jacobian
+    return jacobian
 
 
 def _gyroscopic_function(body: ReducedBody) -> Callable[..., Floats]:
