@@ -130,7 +130,7 @@ class ReducedBody:
     name, seats : what it is, and its seats in the order of the coordinates
     mass, stiffness : (n, n)
     gyroscopic : (n, n) antisymmetric G of M q'' + Omega G q' + K q = f
-    spin : (n,) rigid spin: 1 on every seat's thz
+    spin : (n,) rigid spin about the axis: 1 on every seat's thz, and how it displaces seats off the axis, m
     frame : where the coordinates are seen from: a frame that does not turn, the carrier's, or the ground
     groups : names of the inner amplitudes: bending x, bending y, torsion or stretching; of a solid mesh, inner
     surface : for pictures
@@ -185,12 +185,16 @@ class ReducedBody:
     @cached_property
     def rigid_inertia(self) -> RigidInertia:
         """Mass, centre of mass and inertias of the rigid body that this is."""
-        x, y, origin = self.seats[0].place
-        about = self.rigid_motions((x, y, origin))
-        inertia = about.T @ self.mass @ about
-        mass = float(inertia[0, 0])
-        z = float(inertia[0, 4]) / mass
-        return RigidInertia(mass, (x, y, origin + z), float(inertia[4, 4]) - mass * z**2, float(inertia[5, 5]))
+        origin = np.array(self.seats[0].place)
+        about = self.rigid_motions(origin)
+        moments = about.T @ self.mass @ about
+        mass = float(moments[0, 0])
+        x, y, z = (float(moments[i, j]) / mass for i, j in ((1, 5), (2, 3), (0, 4)))
+        about = self.rigid_motions(origin + (x, y, z))
+        inertia = np.diag(about.T @ self.mass @ about)
+        transverse = float(inertia[3] + inertia[4]) / 2.0
+        place = tuple((origin + (x, y, z)).tolist())
+        return RigidInertia(mass, (place[0], place[1], place[2]), transverse, float(inertia[5]))
 
     @cached_property
     def free_frequencies(self) -> Floats:
@@ -201,7 +205,7 @@ class ReducedBody:
 
 @dataclass(frozen=True)
 class RigidInertia:
-    """Mass properties of a rigid body of revolution: kg, centre (3,) m, kg m2 about the centre."""
+    """Mass properties of a rigid body: kg, centre (3,) m, kg m2 about the centre across z (mean) and about z."""
 
     mass: float
     centre: tuple[float, float, float]
@@ -675,8 +679,22 @@ def _surface(
     )
 
 
+def rigid_gyroscopics(inertia: RigidInertia, frame: Frame) -> Floats:
+    """Matrix G (6, 6) of a rigid body's translations and tilts about its centre of mass, seen from a frame.
+
+    In a frame that does not turn a tilt has the axial inertia. In its own, 2 int rho phi_i . (e_z x phi_j): a
+    translation has twice the mass, a tilt -(Ix + Iy - Iz).
+    """
+    matrix = np.zeros((6, 6))
+    if frame == "nonrotating":
+        matrix[3, 4] = inertia.axial
+    elif frame == "carrier":
+        matrix[0, 1], matrix[3, 4] = -2.0 * inertia.mass, inertia.axial - 2.0 * inertia.transverse
+    return matrix - matrix.T
+
+
 def with_rigid_inertia(body: ReducedBody, wanted: RigidInertia) -> ReducedBody:
-    """Give a turning body the rigid inertia of another model of it; its free elastic vibrations stay as they are.
+    """Give a body the rigid inertia of another model of it; its free elastic vibrations stay as they are.
 
     The difference rides on the rigid part of the motion, M + M R A R' M with R the rigid motions about the wanted
     centre and A so that R' M R becomes the wanted inertia; elastic vibrations are orthogonal to R.
@@ -686,8 +704,7 @@ def with_rigid_inertia(body: ReducedBody, wanted: RigidInertia) -> ReducedBody:
     present = np.linalg.inv(motions.T @ carried)
     target = np.diag([wanted.mass] * 3 + [wanted.transverse] * 2 + [wanted.axial])
     mass = body.mass + carried @ (present @ target @ present - present) @ carried.T
-    turning = np.zeros((6, 6))
-    turning[3, 4], turning[4, 3] = wanted.axial, -wanted.axial
+    turning = rigid_gyroscopics(wanted, body.frame)
     missing = turning - motions.T @ body.gyroscopic @ motions
     gyroscopic = body.gyroscopic + carried @ (present @ missing @ present) @ carried.T
     return replace(body, mass=_symmetric(mass), gyroscopic=0.5 * (gyroscopic - gyroscopic.T))

@@ -388,7 +388,9 @@ def reduce_solid(model: SolidModel, backend: Backend | None = None) -> ReducedBo
     part, size = reduced.part, reduced.part.shapes.shape[1]
     mass, slowed = lowered(part.mass, part.stiffness, model.limit)
     spin = np.zeros(size)
-    spin[5 : 6 * len(model.seats) : 6] = 1.0
+    for number, seat in enumerate(model.seats):
+        x, y = np.array(seat.centre[:2]) - model.axis
+        spin[6 * number : 6 * number + 6] = [-y, x, 0.0, 0.0, 0.0, 1.0]
     return ReducedBody(
         name=model.name,
         seats=tuple(Seat(seat.name, seat.centre) for seat in model.seats),
