@@ -44,6 +44,8 @@ ACCURATE = 1.02
 """Allowed w h at the top of the band: the response to an excitation there is then 0.15 % in error."""
 RESONANCE_ERROR = 1e-3
 """Allowed error on the slope of a resonance, as a share of its peak."""
+MEANT = 2.0 / 3.0
+"""Share of elastic bodies' band up to which they vibrate as they should on bearings (`exugear.reduction`)."""
 LIGHTEST_DAMPING = 2e-3
 """Damping ratio that lighter ones count as: an undamped resonance would ask for no error at all."""
 ROUND_OFF = 1e-14
@@ -115,7 +117,8 @@ def choose_step(assembly: Assembly, sample_rate: float, band: float) -> float:
 
     The method answers an excitation of frequency w with a relative error of about 0.0015 (w h)^4, and shifts an
     eigenfrequency by (w h)^4 / 120, which on the slope of its resonance with the damping ratio zeta costs up to
-    0.5 / zeta of that.
+    0.5 / zeta of that. Resonances count where they are meant: with elastic bodies up to two thirds of the frequency to
+    which these are described exactly.
 
     Examples
     --------
@@ -129,8 +132,9 @@ def choose_step(assembly: Assembly, sample_rate: float, band: float) -> float:
     values = eigenvalues(assembly)
     rates = np.maximum(np.abs(values), 1e-9)
     ratio = np.maximum(-values.real / rates, LIGHTEST_DAMPING)
-    resonant = rates[rates < 2.0 * np.pi * band], ratio[rates < 2.0 * np.pi * band]
-    slopes = (240.0 * resonant[1] * RESONANCE_ERROR) ** 0.25 / resonant[0]
+    meant = min(band, MEANT * assembly.gearbox.case.elasticity.band_Hz) if assembly.elastic_bodies else band
+    resonant = rates < 2.0 * np.pi * meant
+    slopes = (240.0 * ratio[resonant] * RESONANCE_ERROR) ** 0.25 / rates[resonant]
     longest = min(STABLE / rates.max(), ACCURATE / (2.0 * np.pi * band), slopes.min(initial=np.inf))
     return float(1.0 / (sample_rate * np.ceil(1.0 / (sample_rate * longest) - 1e-9)))
 
@@ -312,8 +316,16 @@ def equations_of(assembly: Assembly, loads: LoadTable) -> Equations:
         loads=_loads(assembly, loads),
         joints=joints,
         elastic=assembly.elastic,
-        motion=elastic_motion(assembly.elastic),
+        motion=elastic_motion(assembly.elastic, _acted(assembly)),
     )
+
+
+def _acted(assembly: Assembly) -> NDArray[np.bool_]:
+    """Coordinates that forces act on: of what goes on between an elastic body's seats only its weight."""
+    acted = assembly.weight != 0.0
+    for name, place in assembly.elastic_slices.items():
+        acted[place.start : place.start + 6 * len(assembly.elastic_bodies[name].reduced.seats)] = True
+    return np.asarray(acted)
 
 
 def _rolling_inverse(assembly: Assembly) -> Floats:

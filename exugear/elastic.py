@@ -7,6 +7,7 @@ spin speed Omega = s . v that the body's momentum about its axis defines. Nothin
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -71,9 +72,11 @@ class ElasticMotion(NamedTuple):
     Attributes
     ----------
     first, coordinate, spin, momentum, turning, partner, damping_time : as in `ElasticArrays`
+    acted : (b,) number of each block's first coordinates beyond which no outer force acts
     columns : (b,) columns of each block's matrix, filled up with zeros to a multiple of `LANES`
     begin : (b,) first entry of each block in `matrix`
-    matrix : blocks row by row: M^-1, -M^-1 K, -M^-1 G, which act on forces, q + time v and Omega v of the partner
+    matrix : blocks row by row: M^-1 (its first columns), -M^-1 K, -M^-1 G, which act on outer forces, q + time v and
+        Omega v of the partner
     """
 
     first: Integers
@@ -83,20 +86,30 @@ class ElasticMotion(NamedTuple):
     turning: Integers
     partner: Integers
     damping_time: Floats
+    acted: Integers
     columns: Integers
     begin: Integers
     matrix: Floats
 
 
-LANES = 16
-"""Products taken together: what the registers of a processor hold; left-overs would cost as much as all others."""
+LANES = 8
+"""Products taken together: what two registers of a processor hold."""
 
 
-def elastic_motion(elastic: ElasticArrays) -> ElasticMotion:
-    """Solve all blocks for their accelerations."""
+def elastic_motion(elastic: ElasticArrays, acted: NDArray[np.bool_]) -> ElasticMotion:
+    """Solve all blocks for their accelerations.
+
+    Parameters
+    ----------
+    elastic : ElasticArrays
+    acted : (size,) array of bool
+        Coordinates of the system that forces act on from outside: seats, not what goes on between them.
+    """
     sizes = np.diff(elastic.first)
     across = np.where(elastic.partner >= 0, sizes[elastic.partner], 0)
-    columns = -(-(2 * sizes + across) // LANES) * LANES
+    places = [np.flatnonzero(acted[elastic.coordinate[begin:end]]) for begin, end in pairwise(elastic.first)]
+    forces = np.array([place.max(initial=-1) + 1 for place in places], dtype=np.int64)
+    columns = -(-(forces + sizes + across) // LANES) * LANES
     blocks: list[Floats] = [np.zeros(0)]
     for b, size in enumerate(sizes):
         inverse, stiffness = (
@@ -106,7 +119,8 @@ def elastic_motion(elastic: ElasticArrays) -> ElasticMotion:
         begin = elastic.across[b]
         gyroscopic = elastic.gyroscopic[begin : begin + size * across[b]].reshape(across[b], size).T
         whole = np.zeros((size, columns[b]))
-        whole[:, : 2 * size + across[b]] = np.hstack([inverse, -inverse @ stiffness, -inverse @ gyroscopic])
+        known = np.hstack([inverse[:, : forces[b]], -inverse @ stiffness, -inverse @ gyroscopic])
+        whole[:, : known.shape[1]] = known
         blocks.append(whole.ravel())
     return ElasticMotion(
         first=elastic.first,
@@ -116,6 +130,7 @@ def elastic_motion(elastic: ElasticArrays) -> ElasticMotion:
         turning=elastic.turning,
         partner=elastic.partner,
         damping_time=elastic.damping_time,
+        acted=forces,
         columns=columns.astype(np.int64),
         begin=np.cumsum([block.size for block in blocks])[:-1].astype(np.int64),
         matrix=np.concatenate(blocks),
@@ -123,7 +138,7 @@ def elastic_motion(elastic: ElasticArrays) -> ElasticMotion:
 
 
 @summing_kernel
-def row_product(matrix: Floats, begin: int, given: Floats, count: int) -> float:
+def row_product(matrix: Floats, begin: int | np.uint64, given: Floats, count: int | np.uint64) -> float:
     """Scalar product of entries of a flat matrix, from `begin` on, with the first entries of a vector.
 
     Places without a sign spare the processor the question whether they count from the end, so that it takes several
@@ -143,31 +158,34 @@ def set_elastic_motion(q: Floats, v: Floats, f: Floats, elastic: ElasticMotion, 
     As `add_elastic_forces` and `set_elastic_accelerations` together, in one pass over one matrix for each block.
     `given` has room for three times the largest block and `LANES`.
     """
-    for b in range(elastic.turning.size):
-        first = elastic.first[b]
-        size = elastic.first[b + 1] - first
-        common = q[elastic.coordinate[first]] * elastic.spin[first]
+    at = np.uint64  # places without a sign spare the question whether they count from the end: a third of the time
+    for b in range(at(elastic.turning.size)):
+        first, size, acted = at(elastic.first[b]), at(elastic.first[b + 1] - elastic.first[b]), at(elastic.acted[b])
+        common = q[at(elastic.coordinate[first])] * elastic.spin[first]
         time = elastic.damping_time[b]
+        for i in range(acted):
+            given[i] = f[at(elastic.coordinate[first + i])]
         for i in range(size):
-            j = elastic.coordinate[first + i]
-            given[i] = f[j]
-            given[size + i] = (q[j] - common * elastic.spin[first + i]) + time * v[j]
-        known = 2 * size
-        partner = elastic.partner[b]
-        if partner >= 0:
+            j = at(elastic.coordinate[first + i])
+            given[acted + i] = (q[j] - common * elastic.spin[first + i]) + time * v[j]
+        known = acted + size
+        if elastic.partner[b] >= 0:
             speed = 0.0
-            block = elastic.turning[b]
-            for i in range(elastic.first[block], elastic.first[block + 1]):
-                speed += elastic.momentum[i] * v[elastic.coordinate[i]]
-            for j in range(elastic.first[partner], elastic.first[partner + 1]):
-                given[known] = speed * v[elastic.coordinate[j]]
-                known += 1
-        columns = elastic.columns[b]
+            block = at(elastic.turning[b])
+            for i in range(at(elastic.first[block]), at(elastic.first[block + at(1)])):
+                speed += elastic.momentum[i] * v[at(elastic.coordinate[i])]
+            partner = at(elastic.partner[b])
+            begin = at(elastic.first[partner])
+            across = at(elastic.first[partner + at(1)]) - begin
+            for i in range(across):
+                given[known + i] = speed * v[at(elastic.coordinate[begin + i])]
+            known += across
+        columns = at(elastic.columns[b])
         for i in range(known, columns):
             given[i] = 0.0
-        row = elastic.begin[b]
+        row = at(elastic.begin[b])
         for i in range(size):
-            out[elastic.coordinate[first + i]] = row_product(elastic.matrix, row, given, columns)
+            out[at(elastic.coordinate[first + i])] = row_product(elastic.matrix, row, given, columns)
             row += columns
 
 
