@@ -205,10 +205,10 @@ def deformation(b: int, q: Floats, v: Floats, time: float, elastic: ElasticArray
 
     Angles grow without bound in a run; taking their common part out keeps their differences.
     """
-    begin = elastic.first[b]
+    begin = np.uint64(elastic.first[b])
     common = q[elastic.coordinate[begin]] * elastic.spin[begin]
-    for i in range(begin, elastic.first[b + 1]):
-        j = elastic.coordinate[i]
+    for i in range(begin, np.uint64(elastic.first[b + 1])):
+        j = np.uint64(elastic.coordinate[i])
         out[i - begin] = (q[j] - common * elastic.spin[i]) + time * v[j]
 
 
@@ -263,14 +263,11 @@ def set_elastic_accelerations(f: Floats, elastic: ElasticArrays, scratch: Floats
 @kernel
 def block_energy(b: int, x: Floats, matrix: Floats, elastic: ElasticArrays) -> float:
     """Scalar x' A x of a block's matrix with its own vector x."""
-    size = elastic.first[b + 1] - elastic.first[b]
+    size = np.uint64(elastic.first[b + 1] - elastic.first[b])
     total = 0.0
-    column = elastic.square[b]
-    for j in range(size):
-        value = 0.0
-        for i in range(size):
-            value += matrix[column + i] * x[i]
-        total += value * x[j]
+    column = np.uint64(elastic.square[b])
+    for i in range(size):
+        total += x[i] * row_product(matrix, column, x, size)
         column += size
     return total
 
