@@ -6,14 +6,15 @@ from the same assembly, so they solve the same equations in the same coordinates
 Bodies with six coordinates come first, in the order of the file, then those with their spin alone. In the
 variant `rigid` every body has its spin alone: ideal joints leave nothing else, and a planet rides on its
 carrier's spin. In the variant `flexible` elastic bodies follow, with six coordinates at each seat and their inner
-amplitudes: a gear or a bearing sits on a seat as it would on a rigid body.
+amplitudes: a gear or a bearing sits on a seat as it would on a rigid body. A fixed body, such as the housing, is the
+ground itself unless it is elastic; then it moves on its mounts, and what sits in it sits on its seats.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Literal, get_args
@@ -31,7 +32,7 @@ from exugear.elastic import (
     scratch_for,
     set_elastic_accelerations,
 )
-from exugear.elastic_bodies import ElasticBody, elastic_names, reduced_bodies
+from exugear.elastic_bodies import ElasticBody, elastic_names, frame_of, mounts_at_work, reduced_bodies
 from exugear.gearbox import Bearing, Body, Gearbox
 from exugear.kernels import (
     STATE_SIZE,
@@ -75,13 +76,13 @@ class Assembly:
     Attributes
     ----------
     gearbox, variant, law, inertias : what was assembled
-    bodies : moving bodies in the order of their coordinates
+    bodies : moving bodies in the order of their coordinates, elastic fixed ones among them
     coordinates : the six state indices of each body by name, -1 where there is none; of an elastic body those of
         its main seat, and those of each seat under `exugear.mesh_element.seat_key`
     size : number of coordinates
     elements, meshes : mesh elements and their arrays
     travelling : seats of meshes on an elastic ring; their coordinates follow those of the system
-    connector_names, connectors : bearings (none in the variant `rigid`)
+    supports, connectors : bearings and mounts (none in the variant `rigid`)
     spring_names, springs : torsional couplings
     inertia : mass properties of rigid bodies; in the variant `rigid` the planets' orbit is in the carrier's
     elastic_bodies : elastic bodies by name, in the order of their coordinates
@@ -99,7 +100,7 @@ class Assembly:
     elements: tuple[MeshElement, ...]
     meshes: MeshArrays
     travelling: TravellingArrays
-    connector_names: tuple[str, ...]
+    supports: tuple[Bearing, ...]
     connectors: ConnectorArrays
     spring_names: tuple[str, ...]
     springs: SpringArrays
@@ -136,8 +137,13 @@ class Assembly:
 
     @cached_property
     def spin(self) -> dict[str, int]:
-        """Coordinate of each body's spin."""
-        return {body.name: self.coordinates[body.name][5] for body in self.bodies}
+        """Coordinate of the spin of each body that turns."""
+        return {body.name: self.coordinates[body.name][5] for body in self.bodies if not body.fixed}
+
+    @cached_property
+    def connector_names(self) -> tuple[str, ...]:
+        """Names of bearings and mounts in the order of the arrays."""
+        return tuple(support.name for support in self.supports)
 
     @cached_property
     def mesh_names(self) -> tuple[str, ...]:
@@ -245,8 +251,10 @@ class Assembly:
         """Velocities when the train rolls at the given spins and the planets orbit with their carriers."""
         v = np.zeros(self.size)
         for name, place in self.elastic_slices.items():
-            v[place] = speeds[name] * self.elastic_bodies[name].reduced.spin
+            v[place] = speeds.get(name, 0.0) * self.elastic_bodies[name].reduced.spin
         for body in self.bodies:
+            if body.fixed:
+                continue
             v[self.spin[body.name]] = speeds[body.name]
             if self.has_six(body) and body.carrier is not None:
                 x, y = self._from_carrier_axis(body, q)
@@ -258,8 +266,10 @@ class Assembly:
         """Accelerations of a train that rolls at given spins and spin rates, planets' orbit included."""
         a = np.zeros(self.size)
         for name, place in self.elastic_slices.items():
-            a[place] = rates[name] * self.elastic_bodies[name].reduced.spin
+            a[place] = rates.get(name, 0.0) * self.elastic_bodies[name].reduced.spin
         for body in self.bodies:
+            if body.fixed:
+                continue
             a[self.spin[body.name]] = rates[body.name]
             if self.has_six(body) and body.carrier is not None:
                 x, y = self._from_carrier_axis(body, q)
@@ -333,7 +343,8 @@ def assemble(
     if variant not in VARIANTS:
         raise VariantError(f"variant {variant!r} is unknown; variants are {', '.join(VARIANTS)}")
     inertias = inertias or gearbox.case.default_inertias
-    moving = [body for body in gearbox.bodies(inertias) if not body.fixed]
+    elastic = elastic_names(gearbox) if variant == "flexible" else ()
+    moving = [body for body in gearbox.bodies(inertias) if not body.fixed or body.name in elastic]
     _check_supports(gearbox, variant, moving)
     if law == "rigid" and variant != "rigid":
         raise VariantError(f"mesh law rigid: its gears only roll, which needs the variant rigid, not {variant}")
@@ -346,6 +357,7 @@ def assemble(
     for name, shaft in flexible.items():
         size = _take_seats(name, shaft, size, coordinates, nodes)
     travelling = _travelling(gearbox, flexible, size, coordinates, nodes)
+    supports = _supports(gearbox, flexible) if variant in ON_BEARINGS else ()
     displaced = gearbox.pin_offsets if variant not in ON_BEARINGS else {}  # bearings carry the planets along
     settings = (law, inertias, flanks, angles, displaced, nodes)
     elements = () if law == "rigid" else mesh_elements(gearbox, stiffness, *settings)
@@ -360,8 +372,8 @@ def assemble(
         elements=elements,
         meshes=pack(elements, coordinates),
         travelling=travelling,
-        connector_names=tuple(b.name for b in gearbox.bearings) if variant in ON_BEARINGS else (),
-        connectors=_connectors(gearbox, nodes, coordinates) if variant in ON_BEARINGS else no_connectors(),
+        supports=supports,
+        connectors=_connectors(gearbox, supports, nodes, coordinates),
         spring_names=tuple(coupling.name for coupling in gearbox.couplings),
         springs=_springs(gearbox, coordinates),
         inertia=_inertia(variant, six, alone),
@@ -383,6 +395,9 @@ def _take_seats(
         key = seat_key(name, seat.name)
         coordinates[key] = tuple(range(first + 6 * n, first + 6 * n + 6))
         nodes[key] = np.array(seat.place)
+    for item, seat_name in body.shared.items():
+        key = seat_key(name, seat_name)
+        coordinates[seat_key(name, item)], nodes[seat_key(name, item)] = coordinates[key], nodes[key]
     coordinates[name] = coordinates[seat_key(name, body.main)]
     nodes[name] = nodes[seat_key(name, body.main)]
     return first + body.reduced.size
@@ -426,7 +441,8 @@ def _travelling(
 def elastic_arrays(flexible: Mapping[str, ElasticBody], size: int, damping_time: float) -> ElasticArrays:
     """Arrays of elastic bodies whose coordinates are the last of `size`; damping is `damping_time` (s) times stiffness.
 
-    Each body falls into blocks that neither its mass nor its stiffness couples.
+    Each body falls into blocks that neither its mass nor its stiffness couples. Coordinates that turn with the body
+    come first in their block; a body on the ground has no spin speed, and no gyroscopic forces.
     """
     blocks: list[NDArray[np.int64]] = []
     turning, partner = [], []
@@ -435,9 +451,10 @@ def elastic_arrays(flexible: Mapping[str, ElasticBody], size: int, damping_time:
     begin = size - sum(body.reduced.size for body in flexible.values())
     for flexible_body in flexible.values():
         body = flexible_body.reduced
-        own = body.blocks
+        own = [block[np.argsort(-body.spin[block], kind="stable")] for block in body.blocks]
         carried = body.mass @ body.spin
-        spinning = next(n for n, block in enumerate(own) if body.spin[block].any())
+        spinning = next((n for n, block in enumerate(own) if body.spin[block].any()), 0)
+        inertia = float(body.spin @ carried) or 1.0
         for block in own:
             others = [n for n, other in enumerate(own) if body.gyroscopic[np.ix_(block, other)].any()]
             if len(others) > 1:
@@ -449,7 +466,7 @@ def elastic_arrays(flexible: Mapping[str, ElasticBody], size: int, damping_time:
             parts["inverse"].append(np.asarray(np.linalg.inv(body.mass[np.ix_(block, block)]), dtype=np.float64))
             parts["gyroscopic"].append(body.gyroscopic[np.ix_(block, own[others[0]])] if others else np.zeros((0, 0)))
             spin.append(body.spin[block])
-            momentum.append(carried[block] / float(body.spin @ carried))
+            momentum.append(carried[block] / inertia)
         blocks += [block + begin for block in own]
         begin += body.size
     if not blocks:
@@ -481,7 +498,18 @@ def _check_supports(gearbox: Gearbox, variant: str, moving: list[Body]) -> None:
     if variant in ON_BEARINGS and not gearbox.bearings:
         raise VariantError(f"variant {variant}: the gearbox file has no [bearings]")
     if variant == "flexible" and not elastic_names(gearbox):
-        raise VariantError('variant flexible: no body is elastic; give one a shape and flexibility = "nonrotating"')
+        raise VariantError('variant flexible: no body is elastic; give one a shape and flexibility = "elastic"')
+    if variant == "flexible":
+        _check_elastic(gearbox, moving)
+
+
+def _check_elastic(gearbox: Gearbox, moving: list[Body]) -> None:
+    """Elastic bodies that a variant can take in, fixed ones held on the ground."""
+    for body in moving:
+        if body.name in elastic_names(gearbox) and frame_of(gearbox, body) == "carrier":
+            raise VariantError(f"body {body.name}: a body that carries planets cannot be elastic yet; set it to 'none'")
+        if body.fixed and not any(mount.body == body.name for mount in mounts_at_work(gearbox)):
+            raise VariantError(f"body {body.name}: it is elastic, but nothing holds it; add [mounts] on the ground")
 
 
 def _coordinates(six: list[Body], alone: list[Body]) -> dict[str, tuple[int, ...]]:
@@ -529,10 +557,23 @@ def _springs(gearbox: Gearbox, coordinates: Mapping[str, tuple[int, ...]]) -> Sp
     )
 
 
+def _supports(gearbox: Gearbox, flexible: Mapping[str, ElasticBody]) -> tuple[Bearing, ...]:
+    """Bearings and the mounts at work; the housing factor stands for seats that no elastic body has."""
+    fixed = {body.name for body in gearbox.bodies() if body.fixed and body.name in flexible}
+    bearings = [
+        replace(bearing, factor=1.0) if fixed & {bearing.on, bearing.body} else bearing for bearing in gearbox.bearings
+    ]
+    return (*bearings, *(mounts_at_work(gearbox) if flexible else ()))
+
+
 def _connectors(
-    gearbox: Gearbox, nodes: Mapping[str, Floats], coordinates: Mapping[str, tuple[int, ...]]
+    gearbox: Gearbox,
+    supports: tuple[Bearing, ...],
+    nodes: Mapping[str, Floats],
+    coordinates: Mapping[str, tuple[int, ...]],
 ) -> ConnectorArrays:
-    supports = gearbox.bearings
+    if not supports:
+        return no_connectors()
     starts, local, places = [], [], []
     for bearing in supports:
         keys = [_attached(coordinates, body, bearing.name) for body in (bearing.on, bearing.body)]

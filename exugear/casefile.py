@@ -150,8 +150,60 @@ class ShapeSection(_Section):
     blanks: dict[Name, BlankSection] = {}
 
 
+class SolidSeatSection(_Section):
+    """Where something sits on a solid: a band of a cylinder along z, or a flat ring across z (`inner_diameter_mm`).
+
+    The seat of a gear, bearing or mount takes its place, and as far as they are known its diameter and width, from
+    there. `sectors` divides the cylinder into equal seats, the first in the middle of +x. `same_as` names the seat
+    that a second bearing in the same bore sits on.
+    """
+
+    diameter_mm: Positive | None = None
+    width_mm: Positive | None = None
+    inner_diameter_mm: NonNegative | None = None
+    position_mm: tuple[Finite, Finite, Finite] | None = None
+    sectors: Annotated[int, Field(ge=3)] | None = None
+    same_as: Name | None = None
+
+    @model_validator(mode="after")
+    def _kind(self) -> SolidSeatSection:
+        if self.same_as is not None and self.model_fields_set != {"same_as"}:
+            raise ValueError("same_as stands alone: the seat that it names has the dimensions")
+        if self.inner_diameter_mm is not None:
+            if self.width_mm is not None:
+                raise ValueError("a flat seat (inner_diameter_mm) has no width_mm")
+            if self.diameter_mm is None or self.diameter_mm <= self.inner_diameter_mm:
+                raise ValueError("a flat seat needs a diameter_mm above its inner_diameter_mm")
+        if self.sectors is not None and self.sectors % 2 == 0:
+            raise ValueError("sectors must be odd: what lies between them is then smooth")
+        return self
+
+
+class SolidSection(_Section):
+    """A body of any shape from a file beside the gearbox file, in the gearbox's axes.
+
+    Geometry (.geo, .step, .stp, .brep) is meshed with tetrahedra by gmsh; a mesh (.msh, .inp, .vtu and what else
+    meshio reads) is taken as it is. `torque_seat` names the seat where torques act. `blanks` are by seat.
+    """
+
+    file: str
+    length_unit_mm: Positive = 1.0
+    element_size_mm: Positive | None = None
+    elements_around: Annotated[int, Field(ge=6)] = 12
+    band_Hz: Positive | None = None
+    torque_seat: Name | None = None
+    material: MaterialSection = MaterialSection()
+    seats: dict[Name, SolidSeatSection] = {}
+    blanks: dict[Name, BlankSection] = {}
+
+
 class BodySection(_Section):
-    """A rigid body turning about +z, a set of equal planets, a spin-only inertia or a fixed housing."""
+    """A rigid body turning about +z, a set of equal planets, a spin-only inertia or a fixed housing.
+
+    `flexibility` says what the variant `flexible` makes of it: "elastic" takes its shape or solid in the frame that
+    suits it, on the ground for a fixed body, turning with it for one that carries planets, and for all others one
+    that does not turn. "nonrotating" names the last and is refused for the others.
+    """
 
     axis_position_mm: tuple[Finite, Finite] | None = None
     carrier: Name | None = None
@@ -162,15 +214,22 @@ class BodySection(_Section):
     spin_only: bool = False
     enabled: bool = True
     inertia: dict[Name, InertiaSection] = {}
-    flexibility: Literal["none", "nonrotating"] = "none"
+    flexibility: Literal["none", "elastic", "nonrotating"] = "none"
     shape: ShapeSection | None = None
+    solid: SolidSection | None = None
 
     @model_validator(mode="after")
     def _place(self) -> BodySection:
-        if self.flexibility != "none" and self.shape is None:
-            raise ValueError(f"flexibility {self.flexibility!r} needs a shape: give a [.shape] table")
+        if self.shape is not None and self.solid is not None:
+            raise ValueError("give a shape or a solid, not both")
+        if self.flexibility != "none" and self.shape is None and self.solid is None:
+            raise ValueError(f"flexibility {self.flexibility!r} needs a shape: give a [.shape] or a [.solid] table")
+        if self.flexibility == "nonrotating" and self.fixed:
+            raise ValueError("flexibility 'nonrotating' is for bodies that turn: a fixed body takes 'elastic'")
         if self.shape is not None and (self.fixed or self.spin_only or self.carrier is not None):
             raise ValueError("a shape is for a turning body on a fixed axis, not a fixed, spin-only or planet body")
+        if self.solid is not None and (self.spin_only or self.carrier is not None):
+            raise ValueError("a solid is for a body on a fixed axis or a fixed body, not a spin-only or planet body")
         planet = (self.carrier is not None, self.orbit_radius_mm is not None, bool(self.planet_angles_deg))
         if any(planet) and not all(planet):
             raise ValueError("a planet needs all of carrier, orbit_radius_mm and planet_angles_deg")
@@ -245,6 +304,15 @@ class BearingSection(_Section):
         if self.stiffness is None and self.catalogue is None:
             raise ValueError("give a [.stiffness] table or a [.catalogue] table")
         return self
+
+
+class MountSection(_Section):
+    """Elastic support of the gearbox on the ground; there where a fixed body is elastic, which else is the ground."""
+
+    body: Name
+    position_mm: tuple[Finite, Finite, Finite]
+    stiffness: StiffnessSection
+    damping: StiffnessSection | None = None
 
 
 class CouplingSection(_Section):
@@ -358,7 +426,7 @@ class ElasticitySection(_Section):
 
 
 class HousingSection(_Section):
-    """Factor on bearing stiffness that stands for the housing seat in series."""
+    """Factor on bearing stiffness that stands for the housing seat in series; not where the housing is elastic."""
 
     factor: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
 
@@ -407,6 +475,7 @@ class CaseFile(_Section):
     load_cases: dict[Name, LoadCaseSection]
     joints: dict[Name, JointSection] = {}
     bearings: dict[Name, BearingSection] = {}
+    mounts: dict[Name, MountSection] = {}
     couplings: dict[Name, CouplingSection] = {}
     deviations: dict[Name, DeviationSection] = {}
     pins: dict[Name, PinSection] = {}

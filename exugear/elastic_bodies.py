@@ -1,22 +1,24 @@
-"""The elastic bodies of a gearbox: shapes from the gearbox file, seats where gears and bearings sit.
+"""The elastic bodies of a gearbox: shapes and solids from the gearbox file, seats where gears and bearings sit.
 
-A shaft's mass comes from its shape and the blanks on it. What the body's inertia set says beyond that (or short of
-it) is spread over the rigid part of the motion, so that an elastic body accelerates and orbits exactly as the rigid
-one does and only its deformation is new.
+The mass of a body that turns comes from its shape and the blanks on it. What the body's inertia set says beyond that
+(or short of it) is spread over the rigid part of the motion, so that an elastic body accelerates and orbits exactly as
+the rigid one does and only its deformation is new. A fixed body has no inertia set: its mass is that of its solid.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
-from exugear.casefile import ShapeSection
+from exugear.casefile import BlankSection, MaterialSection, ShapeSection, SolidSeatSection, SolidSection
 from exugear.gearbox import Bearing, Body, Gearbox
 from exugear.meridian import SeatBand, ShaftError, ShaftSection
 from exugear.reduction import (
     Blank,
+    Frame,
     ReducedBody,
     ReductionError,
     RigidInertia,
@@ -25,6 +27,8 @@ from exugear.reduction import (
     reduce_shaft,
     with_rigid_inertia,
 )
+from exugear.solid_mesh import SolidError, SolidFile
+from exugear.solids import SolidModel, SolidSeat, load_or_reduce_solid, reduce_solid
 from fe_ste.gears import Material
 
 TORQUE_SEAT = "torque"
@@ -33,7 +37,7 @@ TORQUE_SEAT = "torque"
 
 @dataclass(frozen=True)
 class ElasticBody:
-    """A reduced shaft of a gearbox.
+    """A reduced body of a gearbox.
 
     Attributes
     ----------
@@ -41,12 +45,14 @@ class ElasticBody:
     own : rigid inertia of shape and blanks by themselves
     main : seat whose spin stands for the body: where torques act, else the first gear
     sectors : seats on equal sectors by internal gear, an odd number, the first about +x, then on towards +y
+    shared : seat that a second bearing sits on, by the bearing
     """
 
     reduced: ReducedBody
     own: RigidInertia
     main: str
     sectors: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    shared: Mapping[str, str] = field(default_factory=dict)
 
 
 def shaft_model(gearbox: Gearbox, name: str) -> ShaftModel:
@@ -61,6 +67,8 @@ def shaft_model(gearbox: Gearbox, name: str) -> ShaftModel:
     shape = gearbox.case.bodies[body.family].shape
     if shape is None:
         raise gearbox.fault(f"bodies.{body.family}: no shape; give a [bodies.{body.family}.shape] table")
+    if frame_of(gearbox, body) == "carrier":
+        raise gearbox.fault(f"bodies.{body.family}.shape: the body carries planets; give a .solid table instead")
     start = shape.start_z_mm * 1e-3
     seats = tuple(SeatBand(seat, z - start, width) for seat, z, width in _seats(gearbox, body, shape))
     names = [seat.name for seat in seats]
@@ -71,24 +79,16 @@ def shaft_model(gearbox: Gearbox, name: str) -> ShaftModel:
     unknown = next((blank for blank in shape.blanks if blank not in names), None)
     if unknown is not None:
         raise gearbox.fault(f"{key}.blanks.{unknown}: no such seat; seats are {', '.join(names)}")
-    material = shape.material
     return ShaftModel(
         name=name,
         sections=tuple(
             ShaftSection(s.length_mm * 1e-3, s.outer_diameter_mm * 1e-3, s.inner_diameter_mm * 1e-3)
             for s in shape.sections
         ),
-        material=Material(
-            youngs_modulus=material.youngs_modulus_GPa * 1e9,
-            poissons_ratio=material.poissons_ratio,
-            density=material.density_kg_per_m3,
-        ),
+        material=_material(shape.material),
         origin=(*body.axis, start),
         seats=seats,
-        blanks={
-            seat: Blank(blank.mass_kg, blank.transverse_kg_m2, blank.axial_kg_m2)
-            for seat, blank in shape.blanks.items()
-        },
+        blanks={seat: _blank(blank) for seat, blank in shape.blanks.items()},
         band=gearbox.case.elasticity.band_Hz,
         limit=gearbox.case.elasticity.limit_Hz,
     )
@@ -101,6 +101,9 @@ def _seats(gearbox: Gearbox, body: Body, shape: ShapeSection) -> Iterator[tuple[
     for bearing in gearbox.bearings:
         if body.name in (bearing.body, bearing.on):
             yield bearing.name, bearing.place[2], _width(bearing)
+    for mount in mounts_at_work(gearbox):
+        if mount.body == body.name:
+            yield mount.name, mount.place[2], 0.0
     if shape.torque_z_mm is not None:
         yield TORQUE_SEAT, shape.torque_z_mm * 1e-3, 0.0
 
@@ -113,56 +116,271 @@ def _width(bearing: Bearing) -> float:
     return rows * bearing.catalogue.width_mm * 1e-3
 
 
+def _material(section: MaterialSection) -> Material:
+    return Material(section.youngs_modulus_GPa * 1e9, section.poissons_ratio, section.density_kg_per_m3)
+
+
+def _blank(section: BlankSection) -> Blank:
+    return Blank(section.mass_kg, section.transverse_kg_m2, section.axial_kg_m2)
+
+
+def frame_of(gearbox: Gearbox, body: Body) -> Frame:
+    """Frame that an elastic body is seen from: the ground, its own that turns, or one that does not."""
+    if body.fixed:
+        return "ground"
+    return "carrier" if any(other.carrier == body.name for other in gearbox.bodies()) else "nonrotating"
+
+
+@dataclass(frozen=True)
+class SolidBody:
+    """A solid of the gearbox file.
+
+    Attributes
+    ----------
+    model : all that its reduction depends on
+    main, sectors, shared : as in `ElasticBody`
+    """
+
+    model: SolidModel
+    main: str
+    sectors: Mapping[str, tuple[str, ...]]
+    shared: Mapping[str, str]
+
+
+def solid_body(gearbox: Gearbox, name: str) -> SolidBody:
+    """Everything that the gearbox file says of a body's solid; its file is not read yet.
+
+    Raises
+    ------
+    CaseError
+        The body has no solid, or a seat of something on it is missing or not known well enough.
+    """
+    body = gearbox.body(name)
+    section = gearbox.case.bodies[body.family]
+    key, solid = f"bodies.{body.family}.solid", section.solid
+    if solid is None:
+        raise gearbox.fault(f"bodies.{body.family}: no solid; give a [{key}] table")
+    frame = frame_of(gearbox, body)
+    if section.flexibility == "nonrotating" and frame != "nonrotating":
+        raise gearbox.fault(
+            f"bodies.{body.family}.flexibility = 'nonrotating': the body carries planets and is seen from its own "
+            "turning frame; use 'elastic'"
+        )
+    file = SolidFile(
+        Path(gearbox.source).parent / solid.file,
+        solid.length_unit_mm * 1e-3,
+        (solid.element_size_mm or 0.0) * 1e-3,
+        solid.elements_around,
+    )
+    if file.is_geometry and solid.element_size_mm is None:
+        raise gearbox.fault(f"{key}.element_size_mm: this key is missing; {solid.file} has to be meshed")
+    band = solid.band_Hz or gearbox.case.elasticity.band_Hz
+    if band >= gearbox.case.elasticity.limit_Hz:
+        raise gearbox.fault(f"{key}.band_Hz = {band:g}: it must be below elasticity.limit_Hz")
+    seats, sectors, shared = _solid_seats(gearbox, body, solid)
+    names = [seat.name for seat in seats]
+    if solid.torque_seat is not None and solid.torque_seat not in names:
+        raise gearbox.fault(f"{key}.torque_seat = {solid.torque_seat!r}: no such seat; seats are {', '.join(names)}")
+    model = SolidModel(
+        name=name,
+        mesh=file,
+        material=_material(solid.material),
+        seats=tuple(seats),
+        frame=frame,
+        band=band,
+        limit=gearbox.case.elasticity.limit_Hz,
+        blanks=_solid_blanks(gearbox, body, solid, names),
+        axis=body.axis,
+    )
+    return SolidBody(model, solid.torque_seat or names[0], sectors, shared)
+
+
+@dataclass(frozen=True)
+class _Item:
+    """What sits on a solid: its place (m), and diameter and width (m) of its seat where they are known.
+
+    `family` is its name in the file, `noun` what it is, `needed` whether there must be a seat for it.
+    """
+
+    family: str
+    noun: str
+    place: tuple[float, float, float]
+    diameter: float | None
+    width: float | None
+    needed: bool = True
+
+
+def _items(gearbox: Gearbox, body: Body) -> dict[str, _Item]:
+    """All that sits on a body, by the name of its seat."""
+    found = {}
+    for name, z in body.wheels.items():
+        gear = gearbox.gears[name]
+        found[name] = _Item(name, "gear", (*body.axis, z), gear.held_diameter, gear.face_width)
+    planets = {other.name: other.carrier for other in gearbox.bodies()}
+    for bearing in gearbox.bearings:
+        if body.name not in (bearing.body, bearing.on):
+            continue
+        diameter, width = None, None
+        if bearing.catalogue is not None:
+            on_pin = planets[bearing.body] == bearing.on  # a planet turns about its bearing, all others in it
+            inside = (bearing.body == body.name) != on_pin
+            diameter = 1e-3 * (bearing.catalogue.bore_mm if inside else bearing.catalogue.outer_diameter_mm)
+            width = _width(bearing)
+        found[bearing.name] = _Item(bearing.family, "bearing", bearing.place, diameter, width)
+    at_work = {mount.name for mount in mounts_at_work(gearbox)}
+    for mount in gearbox.mounts:
+        if mount.body == body.name:
+            found[mount.name] = _Item(mount.name, "mount", mount.place, None, None, mount.name in at_work)
+    return found
+
+
+def _solid_seats(
+    gearbox: Gearbox, body: Body, solid: SolidSection
+) -> tuple[list[SolidSeat], dict[str, tuple[str, ...]], dict[str, str]]:
+    """Seats of a solid, the sectors of its gears, and the seats that bearings share."""
+    key = f"bodies.{body.family}.solid.seats"
+    items = _items(gearbox, body)
+    families = {item.family for item in items.values()}
+    sections = {name: solid.seats.get(name, solid.seats.get(item.family)) for name, item in items.items()}
+    others = {name: section for name, section in solid.seats.items() if name not in items and name not in families}
+    seats: list[SolidSeat] = []
+    sectors: dict[str, tuple[str, ...]] = {}
+    shared: dict[str, str] = {}
+    for name, section in (sections | others).items():
+        item = items.get(name)
+        if section is not None and section.same_as is not None:
+            shared[name] = section.same_as
+        elif item is None or section is not None or item.needed:
+            seat = _solid_seat(gearbox, f"{key}.{name}", name, item, section or SolidSeatSection())
+            count = None if section is None else section.sectors
+            if count is not None and (item is None or item.noun != "gear"):
+                raise gearbox.fault(f"{key}.{name}.sectors = {count}: only the seat of a gear has sectors")
+            parts = [seat] if count is None else _parts(seat, count)
+            seats += parts
+            if count is not None:
+                sectors[name] = tuple(part.name for part in parts)
+    names = [seat.name for seat in seats]
+    doubled = next((name for name in names if names.count(name) > 1), None)
+    if doubled is not None:
+        raise gearbox.fault(f"{key}: two seats are both named {doubled!r}; rename one")
+    for name, other in shared.items():
+        if other not in names:
+            raise gearbox.fault(f"{key}.{name}.same_as = {other!r}: no such seat; seats are {', '.join(names)}")
+    if not seats:
+        raise gearbox.fault(f"{key}: nothing sits on the body; give at least one seat")
+    return seats, sectors, shared
+
+
+def _solid_seat(gearbox: Gearbox, key: str, name: str, item: _Item | None, section: SolidSeatSection) -> SolidSeat:
+    """One seat, from what the file says of it and what is known of the item on it."""
+    diameter, width = (None, None) if item is None else (item.diameter, item.width)
+    if section.diameter_mm is not None:
+        diameter = 1e-3 * section.diameter_mm
+    if section.width_mm is not None:
+        width = 1e-3 * section.width_mm
+    if section.inner_diameter_mm is not None:
+        width = 0.0
+    place = None if item is None else item.place
+    if section.position_mm is not None:
+        x, y, z = section.position_mm
+        place = (1e-3 * x, 1e-3 * y, 1e-3 * z)
+    given = (("diameter_mm", diameter), ("width_mm", width), ("position_mm", place))
+    missing = [word for word, value in given if value is None]
+    if missing or diameter is None or width is None or place is None:
+        what = "a seat that no gear, bearing or mount of the body has the name of" if item is None else item.noun
+        raise gearbox.fault(f"{key}: {what} {name!r} needs its seat; give {' and '.join(missing)} in [{key}]")
+    return SolidSeat(name, place, diameter / 2.0, width, 0.5e-3 * (section.inner_diameter_mm or 0.0))
+
+
+def _parts(seat: SolidSeat, count: int) -> list[SolidSeat]:
+    """Equal sectors of a seat, numbered from 1, the first in the middle of +x."""
+    extent = 2.0 * math.pi / count
+    return [
+        SolidSeat(f"{seat.name}_{n + 1}", seat.centre, seat.radius, seat.width, seat.inner_radius, (n * extent, extent))
+        for n in range(count)
+    ]
+
+
+def _solid_blanks(gearbox: Gearbox, body: Body, solid: SolidSection, names: list[str]) -> dict[str, Blank]:
+    """Blanks by seat; one given for a bearing of all planets goes on each of its seats."""
+    families = {name: item.family for name, item in _items(gearbox, body).items()}
+    found: dict[str, Blank] = {}
+    for name, section in solid.blanks.items():
+        on = [seat for seat in names if name in (seat, families.get(seat))]
+        if not on:
+            raise gearbox.fault(f"bodies.{body.family}.solid.blanks.{name}: no such seat; seats are {', '.join(names)}")
+        found |= dict.fromkeys(on, _blank(section))
+    return found
+
+
 def elastic_names(gearbox: Gearbox) -> tuple[str, ...]:
     """Names of the bodies that the variant `flexible` takes as elastic."""
-    return tuple(
-        body.name for body in gearbox.bodies() if gearbox.case.bodies[body.family].flexibility == "nonrotating"
-    )
+    return tuple(body.name for body in gearbox.bodies() if gearbox.case.bodies[body.family].flexibility != "none")
+
+
+def mounts_at_work(gearbox: Gearbox) -> tuple[Bearing, ...]:
+    """Mounts that hold the gearbox in the variant `flexible`: none where no fixed body is elastic.
+
+    A fixed body that is rigid is the ground itself, and so needs no mount.
+    """
+    elastic, bodies = elastic_names(gearbox), {body.name: body for body in gearbox.bodies()}
+    if not any(bodies[name].fixed for name in elastic):
+        return ()
+    return tuple(mount for mount in gearbox.mounts if mount.body in elastic or not bodies[mount.body].fixed)
 
 
 def reduced_bodies(gearbox: Gearbox, inertias: str, folder: Path | None = None) -> dict[str, ElasticBody]:
-    """Reduce all elastic shafts of a gearbox, or take them from where they were kept.
+    """Reduce all elastic bodies of a gearbox, or take them from where they were kept.
 
     Parameters
     ----------
     gearbox : Gearbox
     inertias : str
-        Inertia set whose rigid inertias the shafts get.
+        Inertia set whose rigid inertias the bodies get that turn.
     folder : Path, optional
         Folder of a results folder in which reductions are kept; only the process remembers them otherwise.
 
     Raises
     ------
     CaseError
-        A shape that cannot be, or that its gears and bearings do not fit on.
+        A shape or solid that cannot be, or that its gears and bearings do not fit on.
     """
-    found = {}
-    for name in elastic_names(gearbox):
-        body = gearbox.body(name, inertias)
-        try:
-            plain = _reduced(_Hashed(shaft_model(gearbox, name)), folder)
-        except (ShaftError, ReductionError) as error:
-            raise gearbox.fault(f"bodies.{body.family}.shape: {error}") from None
-        wanted = RigidInertia(body.mass, (*body.axis, body.centre_of_mass_z), body.transverse, body.axial)
-        seats = [seat.name for seat in plain.seats]
-        main = TORQUE_SEAT if TORQUE_SEAT in seats else seats[0]
-        found[name] = ElasticBody(with_rigid_inertia(plain, wanted), plain.rigid_inertia, main)
-    return found
+    return {name: _elastic_body(gearbox, gearbox.body(name, inertias), folder) for name in elastic_names(gearbox)}
+
+
+def _elastic_body(gearbox: Gearbox, body: Body, folder: Path | None) -> ElasticBody:
+    solid = None if gearbox.case.bodies[body.family].solid is None else solid_body(gearbox, body.name)
+    kind = "shape" if solid is None else "solid"
+    try:
+        plain = _reduced(_Hashed(shaft_model(gearbox, body.name) if solid is None else solid.model), folder)
+    except (ShaftError, SolidError, ReductionError) as error:
+        raise gearbox.fault(f"bodies.{body.family}.{kind}: {error}") from None
+    own = plain.rigid_inertia
+    wanted = RigidInertia(body.mass, (*body.axis, body.centre_of_mass_z), body.transverse, body.axial)
+    reduced = plain if body.fixed else with_rigid_inertia(plain, wanted)
+    if solid is not None:
+        return ElasticBody(reduced, own, solid.main, solid.sectors, solid.shared)
+    seats = [seat.name for seat in plain.seats]
+    return ElasticBody(reduced, own, TORQUE_SEAT if TORQUE_SEAT in seats else seats[0])
 
 
 class _Hashed:
-    """A shaft model by its key, so that it can be looked up."""
+    """A model of a body by its key, so that it can be looked up."""
 
-    def __init__(self, model: ShaftModel) -> None:
+    def __init__(self, model: ShaftModel | SolidModel) -> None:
         self.model = model
+        self.key = model.key
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Hashed) and self.model.key == other.model.key
+        return isinstance(other, _Hashed) and self.key == other.key
 
     def __hash__(self) -> int:
-        return hash(self.model.key)
+        return hash(self.key)
 
 
 @lru_cache(maxsize=64)
 def _reduced(hashed: _Hashed, folder: Path | None) -> ReducedBody:
-    return reduce_shaft(hashed.model) if folder is None else load_or_reduce(hashed.model, folder)
+    model = hashed.model
+    if isinstance(model, SolidModel):
+        return reduce_solid(model) if folder is None else load_or_reduce_solid(model, folder)
+    return reduce_shaft(model) if folder is None else load_or_reduce(model, folder)

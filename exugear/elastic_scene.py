@@ -120,7 +120,7 @@ def _density_below(density: FloatArray, area: FloatArray) -> float:
 def _gears(assembly: Assembly, shape: FloatArray) -> tuple[tuple[BodyShape, ...], tuple[FloatArray, ...]]:
     gears, motions = [], []
     for body in assembly.bodies:
-        if body.name not in assembly.elastic_bodies:
+        if body.name not in assembly.elastic_bodies or body.fixed:  # a housing has its ring in its own surface
             continue
         for gear, z in body.wheels.items():
             place = np.array([*body.axis, z])

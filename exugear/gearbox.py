@@ -392,6 +392,25 @@ class Gearbox:
         return tuple(found)
 
     @cached_property
+    def mounts(self) -> tuple[Bearing, ...]:
+        """Supports of the gearbox on the ground, at work where a fixed body is elastic."""
+        found = []
+        for name, section in self.case.mounts.items():
+            key = f"mounts.{name}"
+            if name in self.case.bearings:
+                raise self.fault(f"{key}: a bearing has this name, too; rename one")
+            if section.body == GROUND or not self._known(key, section.body):
+                raise self.fault(f"{key}.body = {section.body!r}: name an enabled body that the mount holds")
+            body = self.case.bodies[section.body]
+            if body.carrier is not None or body.spin_only:
+                raise self.fault(f"{key}.body = {section.body!r}: a planet or a spin-only body cannot be mounted")
+            x, y, z = (1e-3 * value for value in section.position_mm)
+            found.append(
+                Bearing(name, name, section.body, GROUND, (x, y, z), section.stiffness, None, section.damping, 1.0)
+            )
+        return tuple(found)
+
+    @cached_property
     def couplings(self) -> tuple[Coupling, ...]:
         """Torsional springs between spins."""
         found = []
@@ -834,8 +853,8 @@ def check(gearbox: Gearbox) -> None:
         )
     gearbox.static_mesh_forces()
     for collection in (
-        gearbox.modifications, gearbox.bearings, gearbox.couplings, gearbox.load_cases, gearbox.deviations,
-        gearbox.pin_offsets,
+        gearbox.modifications, gearbox.bearings, gearbox.mounts, gearbox.couplings, gearbox.load_cases,
+        gearbox.deviations, gearbox.pin_offsets,
     ):  # fmt: skip
         list(collection)
 
@@ -918,7 +937,7 @@ def _check_connected(gearbox: Gearbox) -> None:
     links = [(mesh.pinion, mesh.gear) for mesh in gearbox.meshes]
     links += [(coupling.first, coupling.second) for coupling in gearbox.couplings]
     links += [(body.name, body.carrier) for body in gearbox.bodies() if body.carrier]
-    names = [body.name for body in gearbox.bodies()]
+    names = [body.name for body in gearbox.bodies() if not body.fixed]
     reached = {gearbox.case.overall.input}
     while True:
         more = {b for pair in links for a, b in (pair, pair[::-1]) if a in reached} - reached

@@ -38,8 +38,8 @@ RIGID_BODY_LIMIT = 0.1
 """Modes below this frequency (Hz) are motions of the whole train without deflection."""
 RIGID_COORDINATES = ("x", "y", "z", "tilt_x", "tilt_y", "spin")
 FREE_ROTATION = "free rotation of the train"
-MOTIONS = ("spin", "radial", "axial", "tilt", "bending", "twist", "stretch")
-"""What a body does: four motions as a rigid body, three deformations of an elastic one."""
+MOTIONS = ("spin", "radial", "axial", "tilt", "bending", "twist", "stretch", "deformation")
+"""What a body does: four motions as a rigid body, three deformations of an elastic shaft, the last of other bodies."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ class Modes:
     damping_ratio : (n,) share of critical damping, from the damping matrix in the mode
     shapes : (size, n) real, unit modal mass
     strain : (n, elements) share of strain energy by mesh, bearing, coupling and elastic body
-    kinetic : (n, bodies, 7) share of kinetic energy by body and motion, see `MOTIONS`
+    kinetic : (n, bodies, 8) share of kinetic energy by body and motion, see `MOTIONS`
     overall : (n,) overall DTE of the mode at unit modal mass, m / sqrt(kg)
     amplification : (n, meshes) overall DTE at resonance per amplitude of STE in one mesh, m/m
     names : what moves, in words
@@ -331,19 +331,24 @@ def _kinetic_shares(assembly: Assembly, shapes: Floats) -> Floats:
 
 
 def _elastic_energies(body: ReducedBody, shapes: Floats) -> Floats:
-    """Twice the kinetic energy (n, motions) of an elastic shaft: of its rigid part, and of each deformation.
+    """Twice the kinetic energy (n, motions) of an elastic body: of its rigid part, and of each deformation.
 
-    The rigid part is what the momentum of the whole tells; the rest is orthogonal to it.
+    The rigid part is what the momentum of the whole tells; the rest is orthogonal to it. Turns about all three axes
+    share their energy in the proportion that each has alone: a housing's products of inertia couple them.
     """
     rigid = body.rigid_motions(body.rigid_inertia.centre)
-    inertia = np.diag(rigid.T @ body.mass @ rigid)
-    amount = (rigid.T @ body.mass @ shapes) / inertia[:, None]
-    moved = inertia[:, None] * amount**2
+    inertia = rigid.T @ body.mass @ rigid
+    amount = np.linalg.solve(inertia, rigid.T @ body.mass @ shapes)
+    moved = np.diag(inertia)[:, None] * amount**2
+    turning = np.einsum("im,ij,jm->m", amount[3:], inertia[3:, 3:], amount[3:])
+    moved[3:] *= turning / np.maximum(moved[3:].sum(axis=0), 1e-300)
     energies = np.zeros((shapes.shape[1], len(MOTIONS)))
     energies[:, :4] = np.stack([moved[5], moved[0] + moved[1], moved[2], moved[3] + moved[4]], axis=1)
     deformed = shapes - rigid @ amount
     for block in body.blocks:
         motion = 5 if body.spin[block].any() else 6 if rigid[block, 2].any() else 4
+        if len(body.blocks) == 1:  # a solid, which falls into no planes
+            motion = 7
         own = body.mass[np.ix_(block, block)]
         energies[:, motion] += np.einsum("im,ij,jm->m", deformed[block], own, deformed[block])
     return energies

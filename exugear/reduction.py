@@ -130,7 +130,8 @@ class ReducedBody:
     name, seats : what it is, and its seats in the order of the coordinates
     mass, stiffness : (n, n)
     gyroscopic : (n, n) antisymmetric G of M q'' + Omega G q' + K q = f
-    spin : (n,) rigid spin about the axis: 1 on every seat's thz, and how it displaces seats off the axis, m
+    spin : (n,) rigid spin about the axis: 1 on every seat's thz, and how it displaces seats off the axis, m; 0 for a
+        body on the ground, which does not turn
     frame : where the coordinates are seen from: a frame that does not turn, the carrier's, or the ground
     groups : names of the inner amplitudes: bending x, bending y, torsion or stretching; of a solid mesh, inner
     surface : for pictures
@@ -697,7 +698,8 @@ def with_rigid_inertia(body: ReducedBody, wanted: RigidInertia) -> ReducedBody:
     """Give a body the rigid inertia of another model of it; its free elastic vibrations stay as they are.
 
     The difference rides on the rigid part of the motion, M + M R A R' M with R the rigid motions about the wanted
-    centre and A so that R' M R becomes the wanted inertia; elastic vibrations are orthogonal to R.
+    centre and A so that R' M R becomes the wanted inertia; elastic vibrations are orthogonal to R. Gyroscopic forces
+    become those of the wanted inertia likewise, in the frame of the body.
     """
     motions = body.rigid_motions(wanted.centre)
     carried = body.mass @ motions

@@ -25,7 +25,7 @@ REPORT_FILE = "report.html"
 
 
 def input_hash(assembly: Assembly, load_case: str | None = None) -> str:
-    """SHA-256 of all that the equations of a variant depend on: gearbox file, choices, mesh stiffness.
+    """SHA-256 of all that the equations of a variant depend on: gearbox file with its solids, choices, mesh stiffness.
 
     Parameters
     ----------
@@ -51,6 +51,11 @@ def input_hash(assembly: Assembly, load_case: str | None = None) -> str:
         "inertias": assembly.inertias,
         "load_case": load_case,
         "torque_series": hashlib.sha256(series.read_bytes()).hexdigest() if series else None,
+        "solids": {
+            name: hashlib.sha256((Path(gearbox.source).parent / solid.file).read_bytes()).hexdigest()
+            for name in assembly.elastic_bodies
+            if (solid := gearbox.case.bodies[name].solid) is not None
+        },
         # Rounded: another machine's last digits must not make another hash.
         "stiffness": {
             element.mesh.name: [f"{value:.9g}" for value in np.atleast_1d(element.stiffness)]

@@ -8,10 +8,13 @@ gmsh (under the GPL) and meshio are loaded only where used.
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import signal
 import threading
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -36,6 +39,8 @@ _HEX_FACES = np.array([[0, 4, 7, 3], [1, 2, 6, 5], [0, 1, 5, 4], [3, 7, 6, 2], [
 _HEX_FACE_EDGES = np.array([[3, 8, 7, 11], [1, 9, 5, 10], [0, 9, 4, 8], [2, 11, 6, 10], [0, 1, 2, 3], [4, 5, 6, 7]])
 """Corners of edges and faces, and edges of faces, in the order of VTK."""
 _CORNERS = {"tetra": 4, "tetra10": 4, "hexahedron": 8, "hexahedron20": 8, "hexahedron27": 8}
+GEOMETRY = (".geo", ".step", ".stp", ".brep")
+"""Endings of files that gmsh meshes; all others hold a mesh."""
 
 
 class SolidError(ValueError):
@@ -158,15 +163,54 @@ def tetrahedra(build: Callable[[Any], None], size: float, curvature: int = 12) -
     >>> tetrahedra(lambda occ: occ.addBox(0.0, 0.0, 0.0, 1.0, 0.5, 0.25), 0.25)  # doctest: +SKIP
     <skfem MeshTet2 object>
     """
+
+    def load(gmsh: Any) -> None:
+        build(gmsh.model.occ)
+        gmsh.model.occ.synchronize()
+
+    return _meshed(load, size, curvature)
+
+
+def mesh_geometry(path: Path, size: float, curvature: int = 12, unit: float = 1e-3) -> Any:
+    """Mesh a gmsh script (.geo, OpenCASCADE kernel) or a STEP or BREP file with tetrahedra of second order.
+
+    Parameters
+    ----------
+    path : Path
+        A script is one file: what it includes is not noticed when a reduction is looked up.
+    size, curvature : float, int
+        As in `tetrahedra`; m.
+    unit : float
+        Length of the file's unit, m. gmsh reads STEP in mm whatever its unit is.
+
+    Returns
+    -------
+    skfem.MeshTet2
+
+    Raises
+    ------
+    SolidError
+        As `tetrahedra`; also a file that is missing or that gmsh cannot read. After a syntax error in a script gmsh
+        reads no other one in the same process.
+    """
+    if not path.is_file():
+        raise SolidError(f"{path}: no such file")
+    try:
+        return _meshed(lambda gmsh: gmsh.open(str(path)), size / unit, curvature, unit)
+    except SolidError as error:
+        raise SolidError(f"{path}: {error}") from None
+
+
+def _meshed(load: Callable[[Any], None], size: float, curvature: int, unit: float = 1.0) -> Any:
+    """Mesh what `load` puts into gmsh, in lengths of `unit` (m)."""
     gmsh = _library("gmsh")
     gmsh.initialize(["exugear", "-nopopup"], readConfigFiles=False, interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.option.setNumber("Geometry.OCCUnionUnify", 0)  # edges between fused pieces stay: bands end on them
+        load(gmsh)
         gmsh.option.setNumber("Mesh.MeshSizeMax", size)
         gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", curvature)
-        gmsh.option.setNumber("Geometry.OCCUnionUnify", 0)  # edges between fused pieces stay: bands end on them
-        build(gmsh.model.occ)
-        gmsh.model.occ.synchronize()
         # Without a size at the corners gmsh takes a tenth of the whole.
         gmsh.model.mesh.setSize(gmsh.model.getEntities(0), size)
         gmsh.model.mesh.generate(3)
@@ -174,6 +218,8 @@ def tetrahedra(build: Callable[[Any], None], size: float, curvature: int = 12) -
         gmsh.model.mesh.optimize("HighOrder")  # edges laid on coarse curves may turn an element inside out
         tags, places, _ = gmsh.model.mesh.getNodes()
         kinds, _, nodes = gmsh.model.mesh.getElements(3)
+    except Exception as error:  # gmsh raises nothing narrower
+        raise SolidError(f"gmsh cannot mesh it ({str(error).strip()})") from error
     finally:
         gmsh.finalize()
         _keep_broken_pipes()
@@ -182,7 +228,7 @@ def tetrahedra(build: Callable[[Any], None], size: float, curvature: int = 12) -
     order = np.argsort(tags)
     cells = order[np.searchsorted(tags[order], nodes[0])].reshape(-1, 10)
     # gmsh numbers the last two edges of a tetrahedron the other way round than VTK.
-    return second_order(places.reshape(-1, 3), cells[:, [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]], "tetra10")
+    return second_order(unit * places.reshape(-1, 3), cells[:, [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]], "tetra10")
 
 
 def _keep_broken_pipes() -> None:
@@ -225,6 +271,49 @@ def read_solid(path: Path, unit: float = 1.0) -> Any:
         raise SolidError(f"{path}: found {found}; a solid needs elements of one kind among {', '.join(_CORNERS)}")
     kind, blocks = solid.popitem()
     return second_order(unit * np.asarray(content.points), np.concatenate(blocks).astype(np.int64), kind)
+
+
+@dataclass(frozen=True)
+class SolidFile:
+    """A solid in a file, meshed or read when its mesh is asked for.
+
+    Attributes
+    ----------
+    path : geometry (`GEOMETRY`) or mesh
+    unit : length of the file's unit, m
+    size, curvature : largest element (m) and elements around a circle, for a geometry
+    """
+
+    path: Path
+    unit: float
+    size: float = 0.0
+    curvature: int = 12
+
+    @property
+    def is_geometry(self) -> bool:
+        """Tell whether gmsh has to mesh it."""
+        return self.path.suffix.lower() in GEOMETRY
+
+    @cached_property
+    def mesh(self) -> Any:
+        """Mesh of the file.
+
+        Raises
+        ------
+        SolidError
+            As `mesh_geometry` and `read_solid`.
+        """
+        if self.is_geometry:
+            return mesh_geometry(self.path, self.size, self.curvature, self.unit)
+        return read_solid(self.path, self.unit)
+
+    @property
+    def digest(self) -> bytes:
+        """Hash of the file's content and of how it is meshed; the mesh is not needed for it."""
+        if not self.path.is_file():
+            raise SolidError(f"{self.path}: no such file")
+        how = f"{self.path.suffix.lower()} {self.unit!r} {self.size!r} {self.curvature}"
+        return hashlib.sha256(self.path.read_bytes() + how.encode()).digest()
 
 
 def second_order(points: Floats, cells: Integers, kind: str) -> Any:

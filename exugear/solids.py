@@ -46,7 +46,7 @@ from exugear.reduction import (
     lowered,
     reduce_part,
 )
-from exugear.solid_mesh import SolidError, entity_numbers
+from exugear.solid_mesh import SolidError, SolidFile, entity_numbers
 from fe_ste.elasticity import gradient_products
 from fe_ste.gears import Material
 from fe_ste.sparse import Backend
@@ -292,7 +292,7 @@ class SolidModel:
     Attributes
     ----------
     name : str
-    mesh : skfem.MeshTet2 or skfem.MeshHex2, in the gearbox's coordinates, m
+    mesh : skfem.MeshTet2 or skfem.MeshHex2, in the gearbox's coordinates, m; or the file with it
     material : Material
     seats : where other things sit
     frame : where its coordinates are seen from
@@ -322,8 +322,16 @@ class SolidModel:
             "rest": [self.name, self.frame, self.band, self.limit, self.axis],
         }
         code = [Path(str(file)).read_bytes() for file in (__file__, reduction.__file__, solid_mesh.__file__)]
-        arrays = [np.ascontiguousarray(a).tobytes() for a in (self.mesh.doflocs, self.mesh.t)]
-        return hashlib.sha256(b"".join([json.dumps(words, sort_keys=True).encode(), *arrays, *code])).hexdigest()
+        if isinstance(self.mesh, SolidFile):
+            shape = [self.mesh.digest]
+        else:
+            shape = [np.ascontiguousarray(a).tobytes() for a in (self.mesh.doflocs, self.mesh.t)]
+        return hashlib.sha256(b"".join([json.dumps(words, sort_keys=True).encode(), *shape, *code])).hexdigest()
+
+    @property
+    def elements(self) -> Any:
+        """The mesh itself, read from its file if it is in one."""
+        return self.mesh.mesh if isinstance(self.mesh, SolidFile) else self.mesh
 
 
 @dataclass(frozen=True)
@@ -352,7 +360,7 @@ def reduce_matrices(model: SolidModel, backend: Backend | None = None) -> Reduce
     for name in model.blanks:
         if name not in names:
             raise ReductionError(f"body {model.name}: blank on {name!r}, but the seats are {', '.join(names)}")
-    solid = assemble(model.mesh, model.material, model.axis)
+    solid = assemble(model.elements, model.material, model.axis)
     rings = [model.blanks.get(name, Blank(0.0, 0.0, 0.0)) for name in names]
     masses = np.diag([m for b in rings for m in (*[b.mass] * 3, b.transverse, b.transverse, b.axial)])
     part = reduce_part(
@@ -388,7 +396,7 @@ def reduce_solid(model: SolidModel, backend: Backend | None = None) -> ReducedBo
     part, size = reduced.part, reduced.part.shapes.shape[1]
     mass, slowed = lowered(part.mass, part.stiffness, model.limit)
     spin = np.zeros(size)
-    for number, seat in enumerate(model.seats):
+    for number, seat in enumerate(model.seats if model.frame != "ground" else ()):
         x, y = np.array(seat.centre[:2]) - model.axis
         spin[6 * number : 6 * number + 6] = [-y, x, 0.0, 0.0, 0.0, 1.0]
     return ReducedBody(
@@ -464,7 +472,7 @@ def _check_revolution(model: SolidModel, part: ReducedPart) -> None:
 
 def _surface(model: SolidModel, reduced: ReducedSolid) -> Surface:
     """Boundary of the mesh with displacement, and strain in the middle of the element below, per coordinate."""
-    mesh, shapes = model.mesh, reduced.part.shapes
+    mesh, shapes = reduced.solid.mesh, reduced.part.shapes
     facets = np.asarray(mesh.boundary_facets())
     corners = _ordered_corners(mesh, facets)
     nodes, faces = np.unique(corners, return_inverse=True)

@@ -140,6 +140,7 @@ class ExudynSystem:
         self._nodes: dict[str, Any] = {}
         self._bodies: dict[str, Any] = {}
         self._elastic_nodes: dict[str, list[Any]] = {}
+        self._seat_places: dict[str, Floats] = {}
         if assembly.elastic_bodies and mesh_route != "element":
             raise VariantError("mesh_route 'loads' needs rigid bodies: use the variant jointed or bushing")
         if assembly.variant == "rigid":
@@ -256,6 +257,7 @@ class ExudynSystem:
                     )
                 )
                 self._nodes[seat_key(name, seat.name)] = nodes[-1]
+                self._seat_places[seat_key(name, seat.name)] = np.array(seat.place)
             inner = slice(place.start + 6 * len(reduced.seats), place.stop)
             nodes.append(
                 self.mbs.AddNode(
@@ -268,7 +270,11 @@ class ExudynSystem:
                 )
             )
             self._elastic_nodes[name] = nodes
-            self._nodes[name] = self._nodes[seat_key(name, self.assembly.elastic_bodies[name].main)]
+            elastic = self.assembly.elastic_bodies[name]
+            self._nodes[name] = self._nodes[seat_key(name, elastic.main)]
+            for item, seat_name in elastic.shared.items():
+                key, shared = seat_key(name, item), seat_key(name, seat_name)
+                self._nodes[key], self._seat_places[key] = self._nodes[shared], self._seat_places[shared]
             self.mbs.AddObject(
                 items.ObjectGenericODE2(
                     nodeNumbers=nodes,
@@ -276,15 +282,19 @@ class ExudynSystem:
                     stiffnessMatrix=reduced.stiffness,
                     dampingMatrix=self.assembly.gearbox.case.damping.body_time_s * reduced.stiffness,
                     forceVector=self.assembly.weight[place],
-                    forceUserFunction=_gyroscopic_function(reduced),
+                    forceUserFunction=_gyroscopic_function(reduced) if reduced.gyroscopic.any() else 0,
                 )
             )
 
     def _point(self, body: str, item: str, place: Floats) -> Any:
         """Marker of a support at a place (m, at zero angles) on a body, its seat on an elastic one, or the ground."""
-        if seat_key(body, item) in self._nodes:
-            return self.mbs.AddMarker(items.MarkerNodeRigid(nodeNumber=self._nodes[seat_key(body, item)]))
-        if body in self._bodies:
+        key = seat_key(body, item)
+        if key in self._nodes and not (place - self._seat_places[key]).any():
+            return self.mbs.AddMarker(items.MarkerNodeRigid(nodeNumber=self._nodes[key]))
+        if key in self._nodes:  # beside the seat's centre: a body without mass is the arm
+            arm = items.ObjectRigidBody(physicsMass=0.0, physicsInertia=[0.0] * 6, nodeNumber=self._nodes[key])
+            number, place = self.mbs.AddObject(arm), place - self._seat_places[key]
+        elif body in self._bodies:
             found = next(b for b in self.assembly.bodies if b.name == body)
             number, place = self._bodies[body], place - node_position(found)
         else:
@@ -300,7 +310,7 @@ class ExudynSystem:
         if not self.assembly.connector_names:
             return
         connectors = self.assembly.connectors
-        for n, bearing in enumerate(self.assembly.gearbox.bearings):
+        for n, bearing in enumerate(self.assembly.supports):
             place = np.array(bearing.place)
             pin = np.array([*self.assembly.gearbox.pin_offsets.get(bearing.body, (0.0, 0.0)), 0.0])
             ends = ((bearing.on, place + pin), (bearing.body, place))

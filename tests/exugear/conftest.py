@@ -18,6 +18,12 @@ def grc() -> Gearbox:
 
 
 @pytest.fixture(scope="session")
+def grc_shafts() -> Gearbox:
+    """Elastic shafts only: carrier and housing rigid in every variant, so that nothing has to be meshed."""
+    return Gearbox.from_toml(CASE).varied({f"bodies.{name}.flexibility": "none" for name in ("carrier", "housing")})
+
+
+@pytest.fixture(scope="session")
 def stiffness() -> dict[str, np.ndarray]:
     """Means by ISO 6336-1 as listed in the case data, N/m, with harmonics as strong as tables have them."""
     cycle = 2.0 * np.pi * np.arange(50) / 50

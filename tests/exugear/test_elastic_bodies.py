@@ -11,7 +11,7 @@ from exugear.assembly import Assembly, VariantError, assemble
 from exugear.casefile import CaseError
 from exugear.channels import Channels
 from exugear.compiled import CompiledSystem, LoadTable, Observer
-from exugear.elastic_bodies import reduced_bodies, shaft_model
+from exugear.elastic_bodies import reduced_bodies, shaft_model, solid_body
 from exugear.elastic_scene import animate_elastic_bodies, draw_elastic_bodies, elastic_scene
 from exugear.gearbox import Gearbox
 from exugear.modes import counterparts, eigenmodes, linearise, modes_of
@@ -21,6 +21,11 @@ from exugear.system import ExudynSystem, Loading
 LOAD = {"carrier": 240e3, "hss": -3000.0}
 STEP = 1e-5
 SHAFTS = ("lss", "ims", "hss")
+
+
+@pytest.fixture(scope="module")
+def grc(grc_shafts: Gearbox) -> Gearbox:
+    return grc_shafts
 
 
 @pytest.fixture(scope="module")
@@ -210,7 +215,9 @@ def test_a_bearing_longer_than_its_seat_is_refused_by_name(grc: Gearbox, stiffne
         flange = {"mass_kg": 1.0, "axial_kg_m2": 1.0, "transverse_kg_m2": 1.0}
         shaft_model(grc.varied({"bodies.hss.shape.blanks.flange": flange}), "hss")
     with pytest.raises(CaseError, match="needs a shape"):
-        grc.varied({"bodies.carrier.flexibility": "nonrotating"})
+        grc.varied({"bodies.planet.flexibility": "elastic"})
+    with pytest.raises(CaseError, match=r"bodies\.carrier\.flexibility = 'nonrotating': the body carries planets"):
+        solid_body(grc.varied({"bodies.carrier.flexibility": "nonrotating"}), "carrier")
     with pytest.raises(VariantError, match="no body is elastic"):
         assemble(grc.varied({f"bodies.{name}.flexibility": "none" for name in SHAFTS}), "flexible", stiffness)
 

@@ -34,9 +34,9 @@ def balance_residual(data: xr.Dataset) -> float:
 @pytest.mark.parametrize("variant", ["rigid", "bushing", "flexible"])
 @pytest.mark.parametrize("case", ["reference", "generating"])
 def test_work_of_the_loads_is_accounted_for(
-    grc: Gearbox, stiffness: dict, tmp_path: Path, variant: str, case: str
+    grc_shafts: Gearbox, stiffness: dict, tmp_path: Path, variant: str, case: str
 ) -> None:
-    run = simulate(grc, variant, stiffness, tmp_path, load_case=case, duration=0.3)
+    run = simulate(grc_shafts, variant, stiffness, tmp_path, load_case=case, duration=0.3)
     data = opened(run.path)
     # 0.1 % is asked for. Everything is accounted for, so only the quadrature of the powers is left.
     assert abs(balance_residual(data)) < 1e-6

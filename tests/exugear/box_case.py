@@ -1,0 +1,48 @@
+"""The spur pair of `spur_case` in an elastic plate of ten elements: the smallest housing there is."""
+
+from __future__ import annotations
+
+import importlib
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import skfem
+
+from .spur_case import SPUR_CASE
+
+THICKNESS = 12.0
+
+
+def write_plate(file: Path) -> None:
+    """Plate of 125 x 50 x 12 mm as ten hexahedra; bearings sit on its upper face, a foot is below."""
+    meshio: Any = importlib.import_module("meshio")
+    lines = [np.linspace(-25.0, 100.0, 6), np.linspace(-25.0, 25.0, 3), np.array([-THICKNESS, 0.0])]
+    mesh = skfem.MeshHex.init_tensor(*lines)
+    cells = mesh.t.T[:, np.argsort([6, 2, 5, 7, 1, 3, 4, 0])]  # order of VTK
+    meshio.Mesh(mesh.p.T, [("hexahedron", cells)]).write(file)
+
+
+def box_content(folder: Path) -> dict[str, Any]:
+    """Content of the gearbox file in `folder`, where its plate is written."""
+    write_plate(folder / "plate.vtu")
+    content = tomllib.loads(SPUR_CASE)
+    face = {"diameter_mm": 72.0, "inner_diameter_mm": 0.0}
+    content["bodies"]["box"] = {
+        "fixed": True,
+        "axis_position_mm": [0.0, 0.0],
+        "flexibility": "elastic",
+        "solid": {
+            "file": "plate.vtu",
+            "band_Hz": 8000.0,
+            "seats": {"bearing_1": face, "bearing_2": face, "foot": {**face, "position_mm": [50.0, 0.0, -THICKNESS]}},
+        },
+    }
+    for bearing in content["bearings"].values():
+        bearing["on"] = "box"
+    stiffness = {"radial_N_per_m": 5e7, "axial_N_per_m": 5e7, "tilt_N_m_per_rad": 1e5, "torsion_N_m_per_rad": 1e5}
+    # The foot stands below its seat: the support works on an arm.
+    content["mounts"] = {"foot": {"body": "box", "position_mm": [50.0, 0.0, -40.0], "stiffness": stiffness}}
+    content["elasticity"] = {"band_Hz": 8000.0, "limit_Hz": 12000.0}
+    return content
