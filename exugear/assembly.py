@@ -549,7 +549,10 @@ def _rolling_motions(gearbox: Gearbox, coordinates: Mapping[str, tuple[int, ...]
 
 
 def _springs(gearbox: Gearbox, coordinates: Mapping[str, tuple[int, ...]]) -> SpringArrays:
-    pairs = [(coordinates[c.first][5], coordinates[c.second][5]) for c in gearbox.couplings]
+    pairs = [
+        [coordinates[_attached(coordinates, body, c.seat) or body][5] for body in (c.first, c.second)]
+        for c in gearbox.couplings
+    ]
     return SpringArrays(
         coordinates=np.array(pairs, dtype=np.int64).reshape(-1, 2),
         stiffness=np.array([c.stiffness for c in gearbox.couplings]),
@@ -593,9 +596,9 @@ def _connectors(
     )
 
 
-def _attached(coordinates: Mapping[str, tuple[int, ...]], body: str, item: str) -> str | None:
+def _attached(coordinates: Mapping[str, tuple[int, ...]], body: str, item: str | None) -> str | None:
     """Key of what carries an item on a body: its seat, else the rigid body, None for the ground."""
-    key = seat_key(body, item)
+    key = seat_key(body, item or "")
     if key in coordinates:
         return key
     return body if body in coordinates else None

@@ -316,9 +316,15 @@ class MountSection(_Section):
 
 
 class CouplingSection(_Section):
-    """Torsional spring between the spins of two bodies on one axis."""
+    """Torsional spring between the spins of two bodies on one axis.
+
+    It acts at the `seat` of elastic bodies, a bearing's name, and where torques act on those without such a seat. One
+    that stands for a body (`instead_of`) steps aside when that body is enabled.
+    """
 
     bodies: tuple[Name, Name]
+    seat: Name | None = None
+    instead_of: Name | None = None
     stiffness_N_m_per_rad: Positive
     damping_N_m_s_per_rad: NonNegative | None = None
 

@@ -121,11 +121,12 @@ class Bearing:
 
 @dataclass(frozen=True)
 class Coupling:
-    """Torsional spring (N m/rad) and damper (N m s/rad) between two spins."""
+    """Torsional spring (N m/rad) and damper (N m s/rad) between two spins; `seat` is where on elastic bodies."""
 
     name: str
     first: str
     second: str
+    seat: str | None
     stiffness: float
     damping: float
 
@@ -415,12 +416,18 @@ class Gearbox:
         """Torsional springs between spins."""
         found = []
         for name, section in self.case.couplings.items():
-            if not self._known(f"couplings.{name}", *section.bodies):
+            key = f"couplings.{name}"
+            if section.instead_of is not None and self._known(f"{key}.instead_of", section.instead_of):
                 continue
+            if not self._known(key, *section.bodies):
+                continue
+            if section.seat is not None and section.seat not in {bearing.name for bearing in self.bearings}:
+                known = ", ".join(bearing.name for bearing in self.bearings)
+                raise self.fault(f"{key}.seat = {section.seat!r}: no such bearing; bearings are {known}")
             damping = section.damping_N_m_s_per_rad
             if damping is None:
                 damping = self.case.damping.coupling_time_s * section.stiffness_N_m_per_rad
-            found.append(Coupling(name, *section.bodies, section.stiffness_N_m_per_rad, damping))
+            found.append(Coupling(name, *section.bodies, section.seat, section.stiffness_N_m_per_rad, damping))
         return tuple(found)
 
     @cached_property
@@ -839,6 +846,8 @@ def check(gearbox: Gearbox) -> None:
     _check_centre_distances(gearbox)
     _check_planets(gearbox)
     _check_connected(gearbox)
+    _check_couplings(gearbox)
+    _check_names(gearbox)
     _check_joints(gearbox)
     overall = gearbox.case.overall
     for key in ("input", "output"):
@@ -946,10 +955,50 @@ def _check_connected(gearbox: Gearbox) -> None:
         reached |= more
     lost = [name for name in names if name not in reached]
     if lost:
+        aside = [
+            f"; couplings.{name} stands aside while bodies.{section.instead_of} is enabled"
+            for name, section in gearbox.case.couplings.items()
+            if section.instead_of is not None and set(section.bodies) & set(lost)
+        ]
         raise gearbox.fault(
             f"bodies {', '.join(lost)} are joined to {gearbox.case.overall.input} by no "
-            "mesh, coupling or carrier; the gear train must be one connected whole"
+            f"mesh, coupling or carrier{''.join(aside)}; the gear train must be one connected whole"
         )
+
+
+def _check_couplings(gearbox: Gearbox) -> None:
+    """Let torsion take one path: couplings form no loop, and bearings between turning bodies leave it to them."""
+    paths: dict[str, dict[str, list[str]]] = {name: {name: []} for name in gearbox.spinning}
+    for coupling in gearbox.couplings:
+        one, two = paths[coupling.first], paths[coupling.second]
+        if coupling.second in one:
+            raise gearbox.fault(
+                f"couplings {', '.join([*one[coupling.second], coupling.name])} form a loop: {coupling.first} and "
+                f"{coupling.second} are joined twice; leave one of them out"
+            )
+        for start, first in list(one.items()):
+            for end, second in list(two.items()):
+                paths[start][end] = [*first[::-1], coupling.name, *second]
+                paths[end][start] = paths[start][end][::-1]
+    for bearing in gearbox.bearings:
+        given = bearing.stiffness
+        torsion = 0.0 if given is None else given.torsion_N_m_per_rad if given.matrix is None else given.matrix[5][5]
+        if torsion and bearing.on in gearbox.spinning:
+            raise gearbox.fault(
+                f"bearings.{bearing.family}.stiffness: torsion {torsion:g} N m/rad between {bearing.on} and "
+                f"{bearing.body}, which both turn; give it in a [couplings] table, which knows that they turn together"
+            )
+
+
+def _check_names(gearbox: Gearbox) -> None:
+    """Meshes, bearings and couplings share one list in the results, where each name stands once."""
+    seen: dict[str, str] = {}
+    parts = (("meshes", gearbox.meshes), ("bearings", gearbox.bearings), ("couplings", gearbox.couplings))
+    for section, members in parts:
+        for member in members:
+            if member.name in seen:
+                raise gearbox.fault(f"{section}.{member.name}: {seen[member.name]} has this name, too; rename one")
+            seen[member.name] = f"one of [{section}]"
 
 
 def _check_joints(gearbox: Gearbox) -> None:

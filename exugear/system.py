@@ -331,15 +331,20 @@ class ExudynSystem:
             )
         )
 
-    def _spin_marker(self, body: str) -> Any:
+    def _spin_marker(self, body: str, seat: str | None = None) -> Any:
+        """Marker of a body's spin, of an elastic one at a seat or where torques act."""
+        at = seat_key(body, seat or "")
         six = self.assembly.coordinates[body][0] >= 0
-        return self.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=self._nodes[body], coordinate=5 if six else 0))
+        node = self._nodes[at if at in self._nodes else body]
+        return self.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=5 if six else 0))
 
     def _add_couplings(self) -> None:
         for coupling in self.assembly.gearbox.couplings:
             self.mbs.AddObject(
                 items.CoordinateSpringDamper(
-                    markerNumbers=[self._spin_marker(coupling.first), self._spin_marker(coupling.second)],
+                    markerNumbers=[
+                        self._spin_marker(body, coupling.seat) for body in (coupling.first, coupling.second)
+                    ],
                     stiffness=coupling.stiffness,
                     damping=coupling.damping,
                 )

@@ -78,6 +78,41 @@ def test_option_brings_the_rotor_and_its_shaft(grc: Gearbox) -> None:
     assert [coupling.name for coupling in varied.couplings] == ["brake_coupling", "main_shaft"]
 
 
+def test_option_brings_the_main_shaft_which_rolls_with_the_carrier(grc: Gearbox) -> None:
+    varied = grc.varied({"bodies.main_shaft.enabled": True})
+    assert [coupling.name for coupling in varied.couplings] == ["brake_coupling", "shrink_disc_torsion"]
+    assert {bearing.name for bearing in varied.bearings if bearing.body == "main_shaft"} == {
+        "main_bearing",
+        "shrink_disc",
+    }
+    speeds = varied.rolling_speeds("main_shaft", 2.0)
+    assert speeds["carrier"] == pytest.approx(2.0, rel=1e-12)
+    assert speeds["hss"] == pytest.approx(2.0 * grc.ratio, rel=1e-12)
+    # The torque comes in at the hub: meshes carry the same.
+    driven = varied.varied({"static_load.torques_N_m": {"main_shaft": 240e3}})
+    assert driven.static_mesh_forces() == pytest.approx(grc.static_mesh_forces(), rel=1e-9)
+
+
+def test_the_springs_that_stand_for_the_main_shaft_do_not_act_beside_it(grc: Gearbox) -> None:
+    # The body has its rotor: a second one has nothing left to hold on to.
+    with pytest.raises(CaseError, match="rotor are joined.*main_shaft stands aside while bodies.main_shaft is enabled"):
+        grc.varied({"bodies.main_shaft.enabled": True, "bodies.rotor.enabled": True})
+
+
+def test_two_paths_of_torsion_are_named(grc: Gearbox) -> None:
+    both = {"bodies.main_shaft.enabled": True, "bodies.rotor.enabled": True}
+    hub = {"bodies": ["main_shaft", "rotor"], "stiffness_N_m_per_rad": 1e9}
+    joined = {"bodies": ["rotor", "carrier"], "stiffness_N_m_per_rad": 8e7}
+    with pytest.raises(
+        CaseError,
+        match="couplings hub, shrink_disc_torsion, main_shaft form a loop: rotor and carrier are joined twice",
+    ):
+        order = {name: grc.content["couplings"][name] for name in ("brake_coupling", "shrink_disc_torsion")}
+        grc.varied({**both, "couplings": {**order, "hub": hub, "main_shaft": joined}})
+    with pytest.raises(CaseError, match="torsion 1e\\+09 N m/rad between carrier and main_shaft, which both turn"):
+        grc.varied({"bodies.main_shaft.enabled": True, "bearings.shrink_disc.stiffness": {"torsion_N_m_per_rad": 1e9}})
+
+
 def _set(content: dict, dotted: str, value: object) -> dict:
     *parents, last = dotted.split(".")
     section = content
@@ -103,6 +138,9 @@ def _set(content: dict, dotted: str, value: object) -> dict:
         ("bodies.hss.inertia.assemblies.mass_kg", 0.0, ["mass_kg = 0.0", "greater than 0"]),
         ("bodies.brake.inertia.gears", {}, ["bodies.brake.inertia.gears.axial_kg_m2", "missing"]),
         ("couplings.brake_coupling.bodies", ["hss", "hss"], ["brake", "one connected whole"]),
+        ("couplings.brake_coupling.seat", "hss_x", ["couplings.brake_coupling.seat = 'hss_x'", "hss_bc"]),
+        ("couplings.brake_coupling.instead_of", "nobody", ["couplings.brake_coupling.instead_of", "'nobody'"]),
+        ("couplings.hss_a", {"bodies": ["hss", "ims"], "stiffness_N_m_per_rad": 1.0}, ["couplings.hss_a", "rename"]),
         ("bearings.hss_a.body", "nobody", ["bearings.hss_a", "'nobody'"]),
         ("joints.hss.body", "ims", ["joints.hss.body = 'ims'", "redundant"]),
         ("meshes.high_speed.position_angle_deg", 10.0, ["position_angle_deg = 10.0", "-30.2066"]),
