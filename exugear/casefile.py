@@ -307,9 +307,13 @@ class BearingSection(_Section):
 
 
 class MountSection(_Section):
-    """Elastic support of the gearbox on the ground; there where a fixed body is elastic, which else is the ground."""
+    """Elastic support of the gearbox on the ground; there where a fixed body is elastic, which else is the ground.
+
+    One that stands for a body (`instead_of`) steps aside when that body is enabled.
+    """
 
     body: Name
+    instead_of: Name | None = None
     position_mm: tuple[Finite, Finite, Finite]
     stiffness: StiffnessSection
     damping: StiffnessSection | None = None

@@ -398,8 +398,8 @@ class Gearbox:
         found = []
         for name, section in self.case.mounts.items():
             key = f"mounts.{name}"
-            if name in self.case.bearings:
-                raise self.fault(f"{key}: a bearing has this name, too; rename one")
+            if section.instead_of is not None and self._known(f"{key}.instead_of", section.instead_of):
+                continue
             if section.body == GROUND or not self._known(key, section.body):
                 raise self.fault(f"{key}.body = {section.body!r}: name an enabled body that the mount holds")
             body = self.case.bodies[section.body]
@@ -991,14 +991,16 @@ def _check_couplings(gearbox: Gearbox) -> None:
 
 
 def _check_names(gearbox: Gearbox) -> None:
-    """Meshes, bearings and couplings share one list in the results, where each name stands once."""
+    """Meshes, supports and couplings share one list in the results, where each name stands once."""
+    names = [("meshes", mesh.name) for mesh in gearbox.meshes]
+    names += [("bearings", bearing.name) for bearing in gearbox.bearings]
+    names += [("mounts", mount.name) for mount in gearbox.mounts]
+    names += [("couplings", coupling.name) for coupling in gearbox.couplings]
     seen: dict[str, str] = {}
-    parts = (("meshes", gearbox.meshes), ("bearings", gearbox.bearings), ("couplings", gearbox.couplings))
-    for section, members in parts:
-        for member in members:
-            if member.name in seen:
-                raise gearbox.fault(f"{section}.{member.name}: {seen[member.name]} has this name, too; rename one")
-            seen[member.name] = f"one of [{section}]"
+    for section, name in names:
+        if name in seen:
+            raise gearbox.fault(f"{section}.{name}: one of [{seen[name]}] has this name, too; rename one")
+        seen[name] = section
 
 
 def _check_joints(gearbox: Gearbox) -> None:

@@ -94,6 +94,8 @@ def test_option_brings_the_main_shaft_which_rolls_with_the_carrier(grc: Gearbox)
 
 
 def test_the_springs_that_stand_for_the_main_shaft_do_not_act_beside_it(grc: Gearbox) -> None:
+    assert [mount.name for mount in grc.mounts] == ["arm_left", "arm_right", "main_shaft_support"]
+    assert [m.name for m in grc.varied({"bodies.main_shaft.enabled": True}).mounts] == ["arm_left", "arm_right"]
     # The body has its rotor: a second one has nothing left to hold on to.
     with pytest.raises(CaseError, match="rotor are joined.*main_shaft stands aside while bodies.main_shaft is enabled"):
         grc.varied({"bodies.main_shaft.enabled": True, "bodies.rotor.enabled": True})

@@ -305,7 +305,7 @@ def test_faults_name_body_key_and_what_would_be_right(box: Gearbox, tmp_path: Pa
     refused({f"{solid}.band_Hz": 2e4}, r"band_Hz = 20000: it must be below elasticity\.limit_Hz")
     refused({"mounts": {}}, "body box: it is elastic, but nothing holds it")
     refused({"mounts.foot.body": "shaft_9"}, r"mounts\.foot: no body 'shaft_9'")
-    refused({"mounts.bearing_1": box.content["mounts"]["foot"]}, "a bearing has this name, too")
+    refused({"mounts.bearing_1": box.content["mounts"]["foot"]}, "bearings. has this name, too")
     refused({"bodies.box.flexibility": "nonrotating"}, "a fixed body takes 'elastic'")
     refused({"bodies.box.flexibility": "none"}, "no body is elastic")
     shape = {"start_z_mm": 0.0, "sections": [{"length_mm": 10.0, "outer_diameter_mm": 10.0}]}
