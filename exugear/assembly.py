@@ -33,6 +33,7 @@ from exugear.elastic import (
     set_elastic_accelerations,
 )
 from exugear.elastic_bodies import ElasticBody, elastic_names, frame_of, mounts_at_work, reduced_bodies
+from exugear.floating import FloatingBody
 from exugear.gearbox import Bearing, Body, Gearbox
 from exugear.kernels import (
     STATE_SIZE,
@@ -121,6 +122,11 @@ class Assembly:
             found[name] = slice(begin, begin + shaft.reduced.size)
             begin += shaft.reduced.size
         return found
+
+    @property
+    def floating(self) -> dict[str, FloatingBody]:
+        """Bodies that move in floating frames in Exudyn."""
+        return {name: body.floating for name, body in self.elastic_bodies.items() if body.floating is not None}
 
     def rigid_part(self, vector: Floats) -> Floats:
         """Copy of a vector of coordinates in which a shaft's main seat has the mean motion of the whole shaft.

@@ -136,6 +136,15 @@ class BlankSection(_Section):
     axial_kg_m2: Positive
     transverse_kg_m2: Positive
 
+    @model_validator(mode="after")
+    def _triangle(self) -> BlankSection:
+        if self.axial_kg_m2 > 2.0 * self.transverse_kg_m2:
+            raise ValueError(
+                f"axial {self.axial_kg_m2} kg m2 exceeds twice the transverse {self.transverse_kg_m2} kg m2: "
+                "no rigid body has such inertias (triangle inequality)"
+            )
+        return self
+
 
 class ShapeSection(_Section):
     """A stepped shaft, from `start_z_mm` on; its gears and bearings, and where torques act, become its seats.
@@ -202,7 +211,8 @@ class BodySection(_Section):
 
     `flexibility` says what the variant `flexible` makes of it: "elastic" takes its shape or solid in the frame that
     suits it, on the ground for a fixed body, turning with it for one that carries planets, and for all others one
-    that does not turn. "nonrotating" names the last and is refused for the others.
+    that does not turn. "nonrotating" names the last and is refused for the others, as is "ffrf", a frame that floats
+    with the body (Exudyn only).
     """
 
     axis_position_mm: tuple[Finite, Finite] | None = None
@@ -214,7 +224,7 @@ class BodySection(_Section):
     spin_only: bool = False
     enabled: bool = True
     inertia: dict[Name, InertiaSection] = {}
-    flexibility: Literal["none", "elastic", "nonrotating"] = "none"
+    flexibility: Literal["none", "elastic", "nonrotating", "ffrf"] = "none"
     shape: ShapeSection | None = None
     solid: SolidSection | None = None
 
@@ -224,8 +234,8 @@ class BodySection(_Section):
             raise ValueError("give a shape or a solid, not both")
         if self.flexibility != "none" and self.shape is None and self.solid is None:
             raise ValueError(f"flexibility {self.flexibility!r} needs a shape: give a [.shape] or a [.solid] table")
-        if self.flexibility == "nonrotating" and self.fixed:
-            raise ValueError("flexibility 'nonrotating' is for bodies that turn: a fixed body takes 'elastic'")
+        if self.flexibility in ("nonrotating", "ffrf") and self.fixed:
+            raise ValueError(f"flexibility {self.flexibility!r} is for bodies that turn: a fixed body takes 'elastic'")
         if self.shape is not None and (self.fixed or self.spin_only or self.carrier is not None):
             raise ValueError("a shape is for a turning body on a fixed axis, not a fixed, spin-only or planet body")
         if self.solid is not None and (self.spin_only or self.carrier is not None):

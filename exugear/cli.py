@@ -247,6 +247,7 @@ def run(
         gearbox = read_gearbox(case)
         loads = load_case or next(iter(gearbox.load_cases), "")
         _check_choices(gearbox, variant, mesh_law, inertias, loads)
+        _check_solver(gearbox, variant, solver)
         inertias = inertias or gearbox.case.default_inertias
         folder = _results_folder(case, out, make=not resume)
         if resume and not _partial_run(folder, variant.value, loads, mesh_law.value, inertias).is_file():
@@ -505,6 +506,20 @@ def _fill_missing_tables(gearbox: Gearbox, folder: Path, law: MeshLaw) -> None:
         raise FailedError("\n".join(["positions of the tables that are not solved:", *failures]))
 
 
+def _check_solver(gearbox: Gearbox, variant: Variant, solver: Solver) -> None:
+    """Refuse a solver that cannot run what the file asks for, before anything is computed."""
+    floating = [name for name, body in gearbox.case.bodies.items() if body.flexibility == "ffrf"]
+    if variant is Variant.flexible and solver is Solver.compiled and floating:
+        raise BadInputError(
+            f"--solver compiled: bodies.{floating[0]}.flexibility = 'ffrf' runs in Exudyn only; "
+            "add --solver exudyn, or choose 'nonrotating'"
+        )
+
+
+def _tell_inertia(name: str, inertias: str) -> None:
+    note(f"{name}: in a floating frame with the inertia of its shape and blanks, not that of the set {inertias}")
+
+
 def _compute_modes(gearbox: Gearbox, folder: Path, variant: str, law: str, inertias: str | None) -> tuple[Modes, Path]:
     from exugear.mesh_stiffness import mesh_stiffness
     from exugear.modes import eigenmodes
@@ -518,6 +533,8 @@ def _compute_modes(gearbox: Gearbox, folder: Path, variant: str, law: str, inert
         figures = shaft.reduced.figures
         unknowns, took = sum(figures.unknowns.values()), figures.seconds
         note(f"{name}: {unknowns} unknowns reduced to {shaft.reduced.size} coordinates in {took:.1f} s")
+        if shaft.floating is not None:
+            _tell_inertia(name, found.assembly.inertias)
     return found, found.save(modes_path(folder, variant, law, found.assembly.inertias))
 
 
@@ -635,6 +652,8 @@ def _report_run(case: Path, finished: Run, as_json: bool) -> None:
 
     with xr.open_dataset(finished.path, engine="h5netcdf") as data:
         outside = float(data["outside_time"].max())
+        if "inertia_of_shape" in data.attrs:
+            _tell_inertia(str(data.attrs["inertia_of_shape"]), str(data.attrs["inertias"]))
         summary = {
             "case": str(case),
             **{key: str(data.attrs[key]) for key in ("variant", "load_case", "mesh_law", "inertias", "solver")},

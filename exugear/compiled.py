@@ -93,6 +93,9 @@ def refusal(assembly: Assembly) -> str:
     """
     if assembly.variant == "jointed":
         return "the variant jointed keeps ideal joints as constraints, which an explicit method cannot solve"
+    if assembly.floating:
+        family = assembly.gearbox.body(next(iter(assembly.floating))).family
+        return f"bodies.{family}.flexibility = 'ffrf' runs in Exudyn only, 'nonrotating' in both"
     return ""
 
 

@@ -14,8 +14,9 @@ from functools import lru_cache
 from pathlib import Path
 
 from exugear.casefile import BlankSection, MaterialSection, ShapeSection, SolidSeatSection, SolidSection
+from exugear.floating import FloatingBody, load_or_reduce_floating
 from exugear.gearbox import Bearing, Body, Gearbox
-from exugear.meridian import SeatBand, ShaftError, ShaftSection
+from exugear.meridian import MeshSize, SeatBand, Shaft, ShaftError, ShaftSection
 from exugear.reduction import (
     Blank,
     Frame,
@@ -27,10 +28,12 @@ from exugear.reduction import (
     reduce_shaft,
     with_rigid_inertia,
 )
-from exugear.solid_mesh import SolidError, SolidFile
+from exugear.solid_mesh import SolidError, SolidFile, turned_hexahedra
 from exugear.solids import SolidModel, SolidSeat, load_or_reduce_solid, reduce_solid
 from fe_ste.gears import Material
 
+SOLID_SIZE = MeshSize(0.05, 0.05, 1)
+"""Elements of a shaft as a solid: its vibrations come out up to 0.5 % too fast."""
 TORQUE_SEAT = "torque"
 """Name of the seat where torques and couplings act."""
 
@@ -46,6 +49,7 @@ class ElasticBody:
     main : seat whose spin stands for the body: where torques act, else the first gear
     sectors : seats on equal sectors by internal gear, an odd number, the first about +x, then on towards +y
     shared : seat that a second bearing sits on, by the bearing
+    floating : its modes in a frame that floats with it, for a body that moves so in Exudyn
     """
 
     reduced: ReducedBody
@@ -53,6 +57,7 @@ class ElasticBody:
     main: str
     sectors: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     shared: Mapping[str, str] = field(default_factory=dict)
+    floating: FloatingBody | None = None
 
 
 def shaft_model(gearbox: Gearbox, name: str) -> ShaftModel:
@@ -161,10 +166,10 @@ def solid_body(gearbox: Gearbox, name: str) -> SolidBody:
     if solid is None:
         raise gearbox.fault(f"bodies.{body.family}: no solid; give a [{key}] table")
     frame = frame_of(gearbox, body)
-    if section.flexibility == "nonrotating" and frame != "nonrotating":
+    if section.flexibility in ("nonrotating", "ffrf") and frame != "nonrotating":
         raise gearbox.fault(
-            f"bodies.{body.family}.flexibility = 'nonrotating': the body carries planets and is seen from its own "
-            "turning frame; use 'elastic'"
+            f"bodies.{body.family}.flexibility = {section.flexibility!r}: the body carries planets and is seen from "
+            "its own turning frame; use 'elastic'"
         )
     file = SolidFile(
         Path(gearbox.source).parent / solid.file,
@@ -349,19 +354,53 @@ def reduced_bodies(gearbox: Gearbox, inertias: str, folder: Path | None = None) 
 
 
 def _elastic_body(gearbox: Gearbox, body: Body, folder: Path | None) -> ElasticBody:
-    solid = None if gearbox.case.bodies[body.family].solid is None else solid_body(gearbox, body.name)
+    section = gearbox.case.bodies[body.family]
+    solid = None if section.solid is None else solid_body(gearbox, body.name)
     kind = "shape" if solid is None else "solid"
+    model = shaft_model(gearbox, body.name) if solid is None else solid.model
+    floating = None
     try:
-        plain = _reduced(_Hashed(shaft_model(gearbox, body.name) if solid is None else solid.model), folder)
+        if section.flexibility == "ffrf":
+            plain, floating = _floating(_Hashed(model), folder)
+        else:
+            plain = _reduced(_Hashed(model), folder)
     except (ShaftError, SolidError, ReductionError) as error:
         raise gearbox.fault(f"bodies.{body.family}.{kind}: {error}") from None
     own = plain.rigid_inertia
     wanted = RigidInertia(body.mass, (*body.axis, body.centre_of_mass_z), body.transverse, body.axial)
-    reduced = plain if body.fixed else with_rigid_inertia(plain, wanted)
+    reduced = plain if body.fixed or floating is not None else with_rigid_inertia(plain, wanted)
     if solid is not None:
-        return ElasticBody(reduced, own, solid.main, solid.sectors, solid.shared)
+        return ElasticBody(reduced, own, solid.main, solid.sectors, solid.shared, floating)
     seats = [seat.name for seat in plain.seats]
-    return ElasticBody(reduced, own, TORQUE_SEAT if TORQUE_SEAT in seats else seats[0])
+    return ElasticBody(reduced, own, TORQUE_SEAT if TORQUE_SEAT in seats else seats[0], floating=floating)
+
+
+def solid_of_shaft(model: ShaftModel, size: MeshSize = SOLID_SIZE) -> SolidModel:
+    """Return the same shaft as a solid of hexahedra with the same seats.
+
+    Raises
+    ------
+    exugear.meridian.ShaftError
+        A shaft that cannot be, or a seat that does not lie on it.
+    """
+    shaft = Shaft(model.sections, model.material, model.seats, size)
+    seats = []
+    x, y, z = model.origin
+    for seat in model.seats:
+        section = shaft.section_under(seat)
+        hole = section.inner_diameter / 2.0 if seat.width == 0.0 else 0.0
+        seats.append(SolidSeat(seat.name, (x, y, z + seat.z), section.outer_diameter / 2.0, seat.width, hole))
+    return SolidModel(
+        name=model.name,
+        mesh=turned_hexahedra(shaft).translated(model.origin),
+        material=model.material,
+        seats=tuple(seats),
+        frame="nonrotating",
+        band=model.band,
+        limit=model.limit,
+        blanks=model.blanks,
+        axis=(x, y),
+    )
 
 
 class _Hashed:
@@ -384,3 +423,9 @@ def _reduced(hashed: _Hashed, folder: Path | None) -> ReducedBody:
     if isinstance(model, SolidModel):
         return reduce_solid(model) if folder is None else load_or_reduce_solid(model, folder)
     return reduce_shaft(model) if folder is None else load_or_reduce(model, folder)
+
+
+@lru_cache(maxsize=16)
+def _floating(hashed: _Hashed, folder: Path | None) -> tuple[ReducedBody, FloatingBody]:
+    model = hashed.model
+    return load_or_reduce_floating(model if isinstance(model, SolidModel) else solid_of_shaft(model), folder)

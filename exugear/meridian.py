@@ -184,6 +184,10 @@ class Shaft:
         """Overall length, m."""
         return float(self._ends[-1])
 
+    def section_under(self, seat: SeatBand) -> ShaftSection:
+        """Return the section that a seat lies on: the thicker one where it is a plane between two."""
+        return self._locate(seat)[0]
+
     def _solid(self, r: Floats, z: Floats) -> NDArray[np.bool_]:
         """Tell which points of the half-section are steel."""
         number = np.clip(np.searchsorted(self._ends, z) - 1, 0, len(self.sections) - 1)

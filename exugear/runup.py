@@ -131,7 +131,7 @@ def simulate(
     band, sample_rate : float
         Highest frequency whose amplitude is kept, and stored rate, Hz; the rate must divide the steps.
     solver : {"compiled", "exudyn"}, optional
-        The compiled one where it applies by default.
+        The compiled one where it applies by default; a body in a floating frame needs Exudyn.
     mesh_route : {"element", "loads"}
         See `exugear.system`; "loads" is Exudyn's alone.
     resume : bool
@@ -262,17 +262,19 @@ class Recorder:
             "fastest_eigenvalue": self._rate,
             "solver": self._solver_name,
             "complete": 0,
+            **({"inertia_of_shape": ", ".join(assembly.floating)} if assembly.floating else {}),
         }
 
     @property
     def _solver_name(self) -> str:
         if self.solver == "compiled":
             return "compiled, RK4"
-        return f"Exudyn {version('exudyn')}, {'generalized-alpha' if self._is_jointed else 'RK44'}"
+        return f"Exudyn {version('exudyn')}, {'generalized-alpha' if self._is_implicit else 'RK44'}"
 
     @property
-    def _is_jointed(self) -> bool:
-        return self.assembly.variant == "jointed"
+    def _is_implicit(self) -> bool:
+        """Tell whether Exudyn solves constraints, which its explicit solvers cannot."""
+        return self.assembly.variant == "jointed" or bool(self.assembly.floating)
 
     def _check_same_run(self, case: LoadCase) -> None:
         kept = self.file.attributes
@@ -300,12 +302,13 @@ class Recorder:
         return Run(self.final_path if complete else self.partial_path, complete, self._last_time, wall)
 
     def _integrate_in_exudyn(self, mesh_route: MeshRoute) -> None:
-        from exugear.system import ExudynSystem, SolverFailure
+        from exugear.flexible import SolverFailure
+        from exugear.system import ExudynSystem
 
         system = ExudynSystem(self.assembly, self.q, self.v, _loading(self.loads), mesh_route)
         start = self.first_step * self.step
         try:
-            system.run(start, self.steps - self.first_step, self.step, self._observe, not self._is_jointed)
+            system.run(start, self.steps - self.first_step, self.step, self._observe, not self._is_implicit)
         except SolverFailure as error:
             self._fault = self._fault or f"Exudyn gave up at t = {self._last_time:.6g} s: {error}"
 

@@ -342,10 +342,12 @@ class ReducedSolid:
     ----------
     solid : the whole model
     part : reduced; shapes (3 n, coordinates)
+    seconds : wall time that it took
     """
 
     solid: Solid
     part: ReducedPart
+    seconds: float
 
 
 def reduce_matrices(model: SolidModel, backend: Backend | None = None) -> ReducedSolid:
@@ -356,6 +358,7 @@ def reduce_matrices(model: SolidModel, backend: Backend | None = None) -> Reduce
     SolidError, ReductionError
         As `reduce_solid`.
     """
+    began = time.perf_counter()
     names = [seat.name for seat in model.seats]
     for name in model.blanks:
         if name not in names:
@@ -372,7 +375,7 @@ def reduce_matrices(model: SolidModel, backend: Backend | None = None) -> Reduce
         model.band,
         backend,
     )
-    return ReducedSolid(solid, part)
+    return ReducedSolid(solid, part, time.perf_counter() - began)
 
 
 def reduce_solid(model: SolidModel, backend: Backend | None = None) -> ReducedBody:
@@ -391,8 +394,12 @@ def reduce_solid(model: SolidModel, backend: Backend | None = None) -> ReducedBo
     ReductionError
         A blank without its seat, too few seats, or a body in the frame "nonrotating" that is none of revolution.
     """
+    return reduced_body(model, reduce_matrices(model, backend))
+
+
+def reduced_body(model: SolidModel, reduced: ReducedSolid) -> ReducedBody:
+    """Reduced body from a solid's matrices; errors as `reduce_solid`."""
     began = time.perf_counter()
-    reduced = reduce_matrices(model, backend)
     part, size = reduced.part, reduced.part.shapes.shape[1]
     mass, slowed = lowered(part.mass, part.stiffness, model.limit)
     spin = np.zeros(size)
@@ -411,7 +418,7 @@ def reduce_solid(model: SolidModel, backend: Backend | None = None) -> ReducedBo
         surface=_surface(model, reduced),
         figures=Figures(
             unknowns={"whole": 3 * len(reduced.solid.nodes)},
-            seconds=time.perf_counter() - began,
+            seconds=reduced.seconds + time.perf_counter() - began,
             free_frequencies={"whole": part.frequencies},
             lowered={"whole": slowed},
         ),
@@ -451,6 +458,13 @@ def gyroscopic_matrix(model: SolidModel, reduced: ReducedSolid) -> Floats:
             if model.frame == "carrier":
                 matrix[own, own + 1] -= 2.0 * blank.mass
                 matrix[own + 1, own] += 2.0 * blank.mass
+    if model.frame == "nonrotating":
+        spin = np.zeros(size)
+        spin[5 : 6 * len(model.seats) : 6] = 1.0
+        carried = reduced.part.mass @ spin
+        # Coriolis forces of the steady spin itself would be twice the centrifugal force: only what deforms has any.
+        deforming = np.eye(size) - np.outer(spin, carried) / (spin @ carried)
+        matrix = deforming.T @ matrix @ deforming
     return 0.5 * (matrix - matrix.T)
 
 

@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exugear.assembly import Assembly, VariantError
+from exugear.flexible import FloatingBodies, SolverFailure
 from exugear.gearbox import Body, Joint
 from exugear.kernels import (
     ROW_SIZE,
@@ -45,10 +46,6 @@ Observer = Callable[[float, Floats, Floats], bool]
 exudyn: Any = importlib.import_module("exudyn")
 items: Any = importlib.import_module("exudyn.itemInterface")
 exudyn.config.suppressWarnings = True
-
-
-class SolverFailure(RuntimeError):
-    """Exudyn's solver gave up."""
 
 
 @dataclass(frozen=True)
@@ -141,6 +138,7 @@ class ExudynSystem:
         self._bodies: dict[str, Any] = {}
         self._elastic_nodes: dict[str, list[Any]] = {}
         self._seat_places: dict[str, Floats] = {}
+        self._floating: FloatingBodies | None = None
         if assembly.elastic_bodies and mesh_route != "element":
             raise VariantError("mesh_route 'loads' needs rigid bodies: use the variant jointed or bushing")
         if assembly.variant == "rigid":
@@ -149,6 +147,8 @@ class ExudynSystem:
             self._add_minimal(q, v, with_meshes)
         else:
             self._add_bodies(q, v)
+            if assembly.floating:
+                self._floating = FloatingBodies(self.mbs, assembly, q, v)
             self._add_elastic_bodies(q, v)
             self._add_connectors()
             self._add_couplings()
@@ -156,7 +156,10 @@ class ExudynSystem:
             if assembly.variant == "jointed":
                 for joint in assembly.gearbox.joints:
                     self._add_joint(joint)
-            if with_meshes and mesh_route == "element":
+            if self._floating is not None:
+                meshes_there = self._meshes if with_meshes else None
+                self._floating.add_forces(self.mbs, self._all_nodes(), meshes_there, self._applied)
+            elif with_meshes and mesh_route == "element":
                 self._add_mesh_element()
             elif with_meshes:
                 self._add_mesh_loads()
@@ -243,6 +246,9 @@ class ExudynSystem:
     def _add_elastic_bodies(self, q: Floats, v: Floats) -> None:
         """Add elastic bodies: a rigid-body node at each seat, one node for the amplitudes, their matrices on all."""
         for name, place in self.assembly.elastic_slices.items():
+            if self._floating is not None and name in self._floating.nodes:
+                self._elastic_nodes[name] = self._floating.nodes[name]
+                continue
             reduced = self.assembly.elastic_bodies[name].reduced
             nodes = []
             for n, seat in enumerate(reduced.seats):
@@ -310,7 +316,10 @@ class ExudynSystem:
         if not self.assembly.connector_names:
             return
         connectors = self.assembly.connectors
+        elsewhere = () if self._floating is None else self._floating.connectors
         for n, bearing in enumerate(self.assembly.supports):
+            if n in elsewhere:
+                continue
             place = np.array(bearing.place)
             pin = np.array([*self.assembly.gearbox.pin_offsets.get(bearing.body, (0.0, 0.0)), 0.0])
             ends = ((bearing.on, place + pin), (bearing.body, place))
@@ -339,7 +348,10 @@ class ExudynSystem:
         return self.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=5 if six else 0))
 
     def _add_couplings(self) -> None:
-        for coupling in self.assembly.gearbox.couplings:
+        elsewhere = () if self._floating is None else self._floating.couplings
+        for n, coupling in enumerate(self.assembly.gearbox.couplings):
+            if n in elsewhere:
+                continue
             self.mbs.AddObject(
                 items.CoordinateSpringDamper(
                     markerNumbers=[
@@ -351,9 +363,14 @@ class ExudynSystem:
             )
 
     def _add_loading(self) -> None:
+        elsewhere = self.assembly.floating  # loads on these are forces on the assembly's coordinates
         for name, constant in self.loading.constant.items():
+            if name in elsewhere:
+                continue
             self.mbs.AddLoad(items.LoadCoordinate(markerNumber=self._spin_marker(name), load=constant))
         for name, torque in self.loading.varying.items():
+            if name in elsewhere:
+                continue
             self.mbs.AddLoad(
                 items.LoadCoordinate(
                     markerNumber=self._spin_marker(name),
@@ -362,7 +379,7 @@ class ExudynSystem:
                 )
             )
         drive = self.loading.drive
-        if drive is not None:
+        if drive is not None and drive.body not in elsewhere:
             fixed = self.mbs.AddNode(items.NodePointGround())
             ground = self.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=fixed, coordinate=0))
             self.mbs.AddObject(
@@ -374,12 +391,18 @@ class ExudynSystem:
                 )
             )
 
+    def _all_nodes(self) -> list[Any]:
+        """Nodes of all bodies in the order of the assembly's coordinates."""
+        rigid = [body.name for body in self.assembly.bodies if body.name not in self._elastic_nodes]
+        return [self._nodes[name] for name in rigid] + [n for own in self._elastic_nodes.values() for n in own]
+
+    def _applied(self, t: float, q: Floats, v: Floats) -> Floats:
+        return self.loading.generalized(self.assembly, t, q, v)
+
     def _add_mesh_element(self) -> None:
         """Add the one object for all meshes, on all nodes in the order of the assembly's coordinates."""
         assembly, meshes = self.assembly, self._meshes
-        rigid = [body.name for body in self.assembly.bodies if body.name not in self._elastic_nodes]
-        nodes = [self._nodes[name] for name in rigid]
-        nodes += [node for own in self._elastic_nodes.values() for node in own]
+        nodes = self._all_nodes()
 
         def force(mbs: Any, t: float, item: int, q: Any, v: Any) -> Floats:
             return assembly.mesh_forces(np.array(q), np.array(v), meshes)
@@ -413,9 +436,10 @@ class ExudynSystem:
         """Position in Exudyn's coordinate vector of each coordinate of the assembly."""
         if "*" in self._nodes:
             return np.arange(self.assembly.size, dtype=np.int64)
-        order = np.zeros(self.assembly.size, dtype=np.int64)
+        floating = self._floating
+        order = np.zeros(self.assembly.size if floating is None else floating.size, dtype=np.int64)
         for name, place in self.assembly.elastic_slices.items():
-            begin = place.start
+            begin = (place if floating is None else floating.slices[name]).start
             for node in self._elastic_nodes[name]:
                 count = len(self.mbs.GetNodeOutput(node, exudyn.OutputVariableType.Coordinates))
                 order[begin : begin + count] = self.mbs.GetNodeODE2Index(node) + np.arange(count)
@@ -434,7 +458,10 @@ class ExudynSystem:
         q, v = np.array(data.GetODE2Coordinates()), np.array(data.GetODE2Coordinates_t())
         if "*" in self._nodes:
             return float(data.GetTime()), self.assembly.motions @ q, self.assembly.motions @ v
-        return float(data.GetTime()), q[self._order], v[self._order]
+        q, v = q[self._order], v[self._order]
+        if self._floating is not None:
+            q, v = self._floating.state(q, v)
+        return float(data.GetTime()), q, v
 
     # -- solving -----------------------------------------------------------------------------------------
 
@@ -450,7 +477,7 @@ class ExudynSystem:
         observe : callable, optional
             Called at the start and after each step; returning False ends the run there.
         explicit : bool
-            RK44; else generalized-alpha, which the variant `jointed` needs.
+            RK44; else generalized-alpha, which the variant `jointed` and floating frames need.
 
         Raises
         ------
@@ -465,12 +492,14 @@ class ExudynSystem:
         integration.verboseMode = 0
         integration.generalizedAlpha.spectralRadius = 0.9
         integration.newton.useModifiedNewton = True
-        integration.newton.relativeTolerance = 1e-10
-        integration.newton.absoluteTolerance = 1e-12
+        # Stiff elastic bodies leave more round-off than joints; below it Exudyn would cut its steps in vain.
+        jointed = self.assembly.variant == "jointed"
+        integration.newton.relativeTolerance = 1e-10 if jointed else 1e-8
+        integration.newton.absoluteTolerance = 1e-12 if jointed else 1e-10
         settings.linearSolverType = exudyn.LinearSolverType.EigenSparse
         settings.solutionSettings.writeSolutionToFile = False
         settings.displayStatistics = False
-        if observe is not None:
+        if observe is not None or self._floating is not None:
             self.mbs.SetPostStepUserFunction(self._post_step(observe))
         solver = exudyn.MainSolverExplicit() if explicit else exudyn.MainSolverImplicitSecondOrder()
         if explicit:
@@ -481,15 +510,25 @@ class ExudynSystem:
             raise SolverFailure(str(error).splitlines()[0]) from None
         return int(solver.it.currentStepIndex) - 1
 
-    def _post_step(self, observe: Observer) -> Callable[[Any, float], bool]:
+    def _post_step(self, observe: Observer | None) -> Callable[[Any, float], bool]:
         def after_step(mbs: Any, t: float) -> bool:
             _, q, v = self.state()
-            return observe(t, q, v)
+            if self._floating is not None:
+                self._floating.accept(q)
+            return observe is None or observe(t, q, v)
 
         return after_step
 
     def linearised(self) -> tuple[Floats, Floats, Floats]:
-        """Mass, stiffness and damping matrices of Exudyn about the initial state, in the assembly's order."""
+        """Mass, stiffness and damping matrices of Exudyn about the initial state, in the assembly's order.
+
+        Raises
+        ------
+        VariantError
+            A body moves in a floating frame, which has other coordinates.
+        """
+        if self._floating is not None:
+            raise VariantError("a floating frame has coordinates of its own; linearise the assembly")
         mass, stiffness, damping = self.mbs.ComputeLinearizedSystem()[:3]
         grid = np.ix_(self._order, self._order)
         return np.array(mass)[grid], np.array(stiffness)[grid], np.array(damping)[grid]
