@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from exugear.assembly import Assembly
 from exugear.mesh_element import seat_key
-from exugear.scene import displacement_map, look, write_animation
+from exugear.reduction import Surface
+from exugear.scene import displacement_map, look, quad_mesh, write_animation
 from exugear.shapes import BodyShape, gear_surface, placed
 from fe_ste.plots import drawing_style, finish_figure, new_figure
 from fe_ste.scene import drawn_part, offscreen_plotter, place_picture, rendered_image, without_margins
@@ -32,7 +33,10 @@ BRIGHTEST = 99.0
 
 @dataclass(frozen=True)
 class DeformedBody:
-    """A body in a mode: points (p, 3) at rest, quads (f, 4), displacement (p, 3) as drawn, energy (f,) from 0 to 1."""
+    """A body in a mode: points (p, 3) at rest, quads (f, 4), displacement (p, 3) as drawn, energy (f,) from 0 to 1.
+
+    Of a housing only the half behind its axis, so that it hides nothing.
+    """
 
     points: FloatArray
     quads: NDArray[np.int64]
@@ -80,8 +84,11 @@ def elastic_scene(assembly: Assembly, shape: FloatArray, *, title: str = "", amp
     if not assembly.elastic_bodies:
         raise ValueError(f"variant {assembly.variant} has no elastic bodies to draw; use the variant flexible")
     found = []
+    fixed = {body.name: body.axis for body in assembly.bodies if body.fixed}
     for name, place in assembly.elastic_slices.items():
         surface = assembly.elastic_bodies[name].reduced.surface
+        if name in fixed:
+            surface = _half_behind(surface, fixed[name])
         found.append((surface, surface.displacement @ shape[place], surface.energy_density(shape[place])))
     largest = max(float(np.linalg.norm(moved, axis=1).max()) for _, moved, _ in found)
     if not largest > 0.0:
@@ -101,6 +108,12 @@ def elastic_scene(assembly: Assembly, shape: FloatArray, *, title: str = "", amp
         motions=motions,
         title=title,
     )
+
+
+def _half_behind(surface: Surface, axis: tuple[float, float]) -> Surface:
+    """Faces of a surface that lie behind an axis along z, seen from `SIDE`."""
+    behind = (surface.points[surface.quads].mean(axis=1)[:, :2] - axis) @ SIDE[:2] < 0.0
+    return replace(surface, quads=surface.quads[behind], strain=surface.strain[behind])
 
 
 def _areas(points: FloatArray, quads: NDArray[np.int64]) -> FloatArray:
@@ -208,8 +221,7 @@ def _add(plotter: pyvista.Plotter, scene: ElasticScene) -> tuple[list[pyvista.Po
 
     bodies, gears = [], []
     for body in scene.bodies:
-        faces = np.column_stack([np.full(len(body.quads), 4), body.quads])
-        mesh = pyvista.PolyData(body.points + body.displacement, faces=faces.ravel())
+        mesh = quad_mesh(body.points + body.displacement, body.quads)
         mesh.cell_data["energy"] = body.energy
         plotter.add_mesh(
             mesh, scalars="energy", clim=(0.0, 1.0), cmap=displacement_map(), show_scalar_bar=False, ambient=0.3

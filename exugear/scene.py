@@ -229,6 +229,18 @@ def _polydata(points: FloatArray, triangles: IntArray) -> pyvista.PolyData:
     return pyvista.PolyData(points, faces=faces.ravel())
 
 
+def quad_mesh(points: FloatArray, quads: IntArray) -> pyvista.PolyData:
+    """Surface from faces with four corners, those with four of their own first; a triangle repeats its last."""
+    import pyvista
+
+    triangular = quads[:, 2] == quads[:, 3]
+    cells = [
+        np.column_stack([np.full(len(faces), faces.shape[1]), faces]).ravel()
+        for faces in (quads[~triangular], quads[triangular, :3])
+    ]
+    return pyvista.PolyData(points, faces=np.concatenate(cells))
+
+
 def look(plotter: pyvista.Plotter, direction: tuple[float, float, float] = _VIEW) -> None:
     """Look at everything, y up, with a direction from the bodies to the eye; the input side, above and the side."""
     centre = np.asarray(plotter.center)

@@ -10,12 +10,11 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from exugear.reduction import ReducedBody
-from exugear.scene import displacement_map, look, mode_figure
+from exugear.scene import displacement_map, look, mode_figure, quad_mesh
 from fe_ste.plots import finish_figure
 from fe_ste.scene import offscreen_plotter, rendered_image, without_margins
 
 if TYPE_CHECKING:
-    import pyvista
     from matplotlib.figure import Figure
 
 Floats: TypeAlias = NDArray[np.float64]
@@ -46,25 +45,13 @@ def draw_free_vibration(body: ReducedBody, number: int, path: str | Path | None 
     points = body.surface.points
     scale = DRAWN_DEFLECTION * float(np.ptp(points, axis=0).max()) / float(size.max())
     with offscreen_plotter(1600, 1200) as plotter:
-        mesh = _polydata(points + scale * motion, body.surface.quads)
+        mesh = quad_mesh(points + scale * motion, body.surface.quads)
         mesh.point_data["displacement"] = size / size.max()
         plotter.add_mesh(mesh, scalars="displacement", cmap=displacement_map(), clim=(0.0, 1.0), show_scalar_bar=False)
-        edges = _polydata(points, body.surface.quads).extract_feature_edges(50.0)
+        edges = quad_mesh(points, body.surface.quads).extract_feature_edges(50.0)
         plotter.add_mesh(edges, color="#8A8F96", line_width=1.5)
         look(plotter)
         image, pixel = rendered_image(plotter)
     frequency = float(np.sqrt(max(values[6 + number], 0.0)) / (2.0 * np.pi))
     title = f"{body.name}, free vibration {number + 1}: {frequency:.0f} Hz"
     return finish_figure(mode_figure(without_margins(image), pixel, title), path)
-
-
-def _polydata(points: Floats, quads: NDArray[np.int64]) -> pyvista.PolyData:
-    """Surface from faces with four corners, a triangle's last one repeated."""
-    import pyvista
-
-    triangular = quads[:, 2] == quads[:, 3]
-    cells = [
-        np.column_stack([np.full(len(faces), faces.shape[1]), faces]).ravel()
-        for faces in (quads[~triangular], quads[triangular, :3])
-    ]
-    return pyvista.PolyData(points, faces=np.concatenate(cells))
