@@ -1,0 +1,85 @@
+"""The planetary stage of the GRC by itself, its ring an elastic rim of 108 elements between two flanges."""
+
+from __future__ import annotations
+
+import copy
+import importlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import skfem
+
+from exugear.gearbox import Gearbox
+
+OUTER, INNER, FACE = 0.595, 0.5235, 0.23
+MIDDLE = -0.1045
+AROUND = 54
+PLANETARY = ("sun", "planet", "ring")
+STIFF = {"radial_N_per_m": 4e9, "axial_N_per_m": 4e9, "tilt_N_m_per_rad": 1e9, "torsion_N_m_per_rad": 1e9}
+
+
+def write_rim(file: Path) -> None:
+    """Rim of the ring as flat-sided bricks, the corners of each cross-section on two circles."""
+    meshio: Any = importlib.import_module("meshio")
+    logical = skfem.MeshHex.init_tensor(
+        np.array([INNER, OUTER]), np.arange(AROUND + 1.0), np.linspace(-FACE / 2.0, FACE / 2.0, 3)
+    )
+    radius, number, z = logical.p
+    angle = 2.0 * np.pi * number / AROUND
+    points = np.stack([radius * np.cos(angle), radius * np.sin(angle), z + MIDDLE], axis=1)
+    _, first, joined = np.unique(np.round(points, 9), axis=0, return_index=True, return_inverse=True)
+    cells = joined.ravel()[logical.t.T[:, np.argsort([6, 2, 5, 7, 1, 3, 4, 0])]]  # order of VTK
+    meshio.Mesh(1e3 * points[first], [("hexahedron", cells)]).write(file)
+
+
+def ring_content(grc: Gearbox, folder: Path) -> dict[str, Any]:
+    """Content of the gearbox file in `folder`, where its rim is written."""
+    write_rim(folder / "rim.vtu")
+    content = copy.deepcopy(dict(grc.content))
+    gears = {name: content["gears"][name] for name in PLANETARY}
+    bodies = {name: content["bodies"][name] for name in ("carrier", "planet", "lss")}
+    for body in bodies.values():
+        body["flexibility"] = "none"
+    bodies["lss"]["wheels_z_mm"] = {"sun": 1e3 * MIDDLE}
+    for key in ("shape", "solid"):
+        bodies["lss"].pop(key, None)
+        bodies["carrier"].pop(key, None)
+    bodies["housing"] = {
+        "fixed": True,
+        "axis_position_mm": [0.0, 0.0],
+        "wheels_z_mm": {"ring": 1e3 * MIDDLE},
+        "flexibility": "elastic",
+        "solid": {
+            "file": "rim.vtu",
+            "band_Hz": 800.0,
+            "seats": {
+                "ring": {"diameter_mm": 2e3 * OUTER, "sectors": 9},
+                "front": {"diameter_mm": 2e3 * OUTER, "inner_diameter_mm": 2e3 * INNER},
+                "rear": {"diameter_mm": 2e3 * OUTER, "inner_diameter_mm": 2e3 * INNER},
+            },
+        },
+    }
+    bearings = {n: b for n, b in content["bearings"].items() if b["body"] in ("carrier", "planet", "lss")}
+    for bearing in bearings.values():
+        if bearing.get("on") == "housing":
+            del bearing["on"]
+    mounts = {
+        name: {"body": "housing", "position_mm": [0.0, 0.0, 1e3 * (MIDDLE + side * FACE / 2.0)], "stiffness": STIFF}
+        for name, side in (("front", -1.0), ("rear", 1.0))
+    }
+    return {
+        "name": "planetary stage",
+        "default_inertias": "assemblies",
+        "overall": {"input": "carrier", "output": "lss", "output_gear": "sun"},
+        "static_load": {"torques_N_m": {"carrier": 240e3}, "locked": ["lss"]},
+        "gears": gears,
+        "pairs": {name: content["pairs"][name] for name in ("sun_planet", "ring_planet")},
+        "bodies": bodies,
+        "meshes": {name: content["meshes"][name] for name in ("sun_planet", "ring_planet")},
+        "bearings": bearings,
+        "mounts": mounts,
+        "load_cases": {"run_up": {"torques_N_m": {"carrier": 240e3, "lss": -38e3}}},
+        "damping": content["damping"],
+        "elasticity": content["elasticity"],
+    }
