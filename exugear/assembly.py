@@ -58,6 +58,7 @@ from exugear.travelling import (
     share_travelling_forces,
     travelling_tangent,
 )
+from exugear.turning import TurningArrays, TurningBody, turning_arrays
 
 Floats = NDArray[np.float64]
 Variant = Literal["rigid", "bushing", "flexible", "jointed"]
@@ -87,7 +88,7 @@ class Assembly:
     spring_names, springs : torsional couplings
     inertia : mass properties of rigid bodies; in the variant `rigid` the planets' orbit is in the carrier's
     elastic_bodies : elastic bodies by name, in the order of their coordinates
-    elastic : their matrices
+    elastic : matrices of those whose frame does not turn
     motions : (size, n) motions that are free; the identity, but for the law `rigid` the rolling ones
     """
 
@@ -127,6 +128,21 @@ class Assembly:
     def floating(self) -> dict[str, FloatingBody]:
         """Bodies that move in floating frames in Exudyn."""
         return {name: body.floating for name, body in self.elastic_bodies.items() if body.floating is not None}
+
+    @cached_property
+    def turning(self) -> dict[str, TurningBody]:
+        """Elastic bodies in their own turning frame."""
+        time, gravity = self.gearbox.case.damping.body_time_s, self.gearbox.case.gravity.acceleration_m_per_s2
+        return {
+            name: TurningBody(body.reduced, time, gravity)
+            for name, body in self.elastic_bodies.items()
+            if body.reduced.frame == "carrier"
+        }
+
+    @cached_property
+    def turning_arrays(self) -> TurningArrays:
+        """Arrays of the same bodies."""
+        return turning_arrays((self.elastic_slices[name].start, body) for name, body in self.turning.items())
 
     def rigid_part(self, vector: Floats) -> Floats:
         """Copy of a vector of coordinates in which a shaft's main seat has the mean motion of the whole shaft.
@@ -176,22 +192,27 @@ class Assembly:
         return meshes
 
     def forces(self, q: Floats, v: Floats, meshes: MeshArrays | None = None) -> Floats:
-        """Generalized forces of meshes, bearings and couplings, shape (size,), N and N m."""
+        """Generalized forces of meshes, bearings, couplings, elastic bodies and weight, shape (size,), N and N m."""
         f = self.mesh_forces(q, v, self.meshes if meshes is None else meshes)
         add_connector_forces(q, v, self.connectors, f)
         add_spring_forces(q, v, self.springs, f)
         add_elastic_forces(q, v, self.elastic, scratch_for(self.elastic), f)
+        for name, body in self.turning.items():
+            place = self.elastic_slices[name]
+            f[place] += body.forces(q[place], v[place])
         return f + self.weight
 
     @cached_property
     def weight(self) -> Floats:
-        """Generalized forces of gravity, shape (size,)."""
+        """Generalized forces of gravity, shape (size,); those on bodies in turning frames turn with them."""
         f = np.zeros(self.size)
         acceleration = np.array(self.gearbox.case.gravity.acceleration_m_per_s2)
         for body in self.bodies:
             if self.has_six(body):
                 f[list(self.coordinates[body.name][:3])] = body.mass * acceleration
         for name, place in self.elastic_slices.items():
+            if name in self.turning:
+                continue
             reduced = self.elastic_bodies[name].reduced
             f[place] = reduced.mass @ reduced.rigid_motions(reduced.seats[0].place)[:, :3] @ acceleration
         return f
@@ -211,6 +232,9 @@ class Assembly:
         forces = self.forces(q, v) + applied
         accelerations(q, v, self.inertia, forces, out)
         set_elastic_accelerations(forces, self.elastic, scratch_for(self.elastic), out)
+        for name, body in self.turning.items():
+            place = self.elastic_slices[name]
+            out[place] = body.accelerations(q[place], v[place], forces[place])
         return out
 
     def with_travelling(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
@@ -243,7 +267,7 @@ class Assembly:
 
     @cached_property
     def mass_matrix(self) -> Floats:
-        """Mass matrix at zero tilts, diagonal but for elastic bodies, (size, size)."""
+        """Mass matrix at zero angles, diagonal but for elastic bodies, (size, size)."""
         m = np.zeros((self.size, self.size))
         for n, o in enumerate(self.inertia.body):
             values = [self.inertia.mass[n]] * 3 + [self.inertia.transverse[n]] * 2 + [self.inertia.axial[n]]
@@ -253,11 +277,21 @@ class Assembly:
             m[place, place] = self.elastic_bodies[name].reduced.mass
         return m
 
+    def mass_at(self, q: Floats) -> Floats:
+        """Mass matrix at coordinates q and zero tilts, (size, size)."""
+        m = self.mass_matrix.copy()
+        for name, body in self.turning.items():
+            place = self.elastic_slices[name]
+            m[place, place] = body.mass_matrix(q[place])
+        return m
+
     def rolling_velocity(self, q: Floats, speeds: Mapping[str, float]) -> Floats:
         """Velocities when the train rolls at the given spins and the planets orbit with their carriers."""
         v = np.zeros(self.size)
         for name, place in self.elastic_slices.items():
             v[place] = speeds.get(name, 0.0) * self.elastic_bodies[name].reduced.spin
+            if name in self.turning:
+                v[place] = self.turning[name].rolling_velocity(q[place], speeds[name])
         for body in self.bodies:
             if body.fixed:
                 continue
@@ -273,6 +307,8 @@ class Assembly:
         a = np.zeros(self.size)
         for name, place in self.elastic_slices.items():
             a[place] = rates.get(name, 0.0) * self.elastic_bodies[name].reduced.spin
+            if name in self.turning:
+                a[place] = self.turning[name].rolling_acceleration(q[place], speeds[name], rates[name])
         for body in self.bodies:
             if body.fixed:
                 continue
@@ -322,6 +358,8 @@ class Assembly:
         f[self.inertia.spin] = self.inertia.spin_inertia * a[self.inertia.spin]
         for name, place in self.elastic_slices.items():
             f[place] = self.elastic_bodies[name].reduced.mass @ a[place]
+            if name in self.turning:
+                f[place] = self.turning[name].inertia_forces(q[place], v[place], a[place])
         return f
 
 
@@ -447,8 +485,9 @@ def _travelling(
 def elastic_arrays(flexible: Mapping[str, ElasticBody], size: int, damping_time: float) -> ElasticArrays:
     """Arrays of elastic bodies whose coordinates are the last of `size`; damping is `damping_time` (s) times stiffness.
 
-    Each body falls into blocks that neither its mass nor its stiffness couples. Coordinates that turn with the body
-    come first in their block; a body on the ground has no spin speed, and no gyroscopic forces.
+    Those in turning frames are left out (`exugear.turning`). Each body falls into blocks that neither its mass nor its
+    stiffness couples. Coordinates that turn with the body come first in their block; a body on the ground has no spin
+    speed, and no gyroscopic forces.
     """
     blocks: list[NDArray[np.int64]] = []
     turning, partner = [], []
@@ -457,6 +496,9 @@ def elastic_arrays(flexible: Mapping[str, ElasticBody], size: int, damping_time:
     begin = size - sum(body.reduced.size for body in flexible.values())
     for flexible_body in flexible.values():
         body = flexible_body.reduced
+        if body.frame == "carrier":
+            begin += body.size
+            continue
         own = [block[np.argsort(-body.spin[block], kind="stable")] for block in body.blocks]
         carried = body.mass @ body.spin
         spinning = next((n for n, block in enumerate(own) if body.spin[block].any()), 0)

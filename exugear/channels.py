@@ -24,6 +24,7 @@ from exugear.kernels import (
     mesh_state,
 )
 from exugear.modes import overall_row
+from exugear.turning import TurningArrays, turning_energies, turning_memory
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -182,6 +183,16 @@ def add_elastic_signals(q: Floats, v: Floats, elastic: ElasticArrays, scratch: F
         out[n, 2] += damped
 
 
+@compiled
+def add_turning_signals(q: Floats, v: Floats, turning: TurningArrays, memory: Floats, out: Floats) -> None:
+    """Add the same of elastic bodies in turning frames."""
+    for n in range(q.shape[0]):
+        kinetic, stored, damped, _ = turning_energies(q[n], v[n], turning, memory)
+        out[n, 0] += kinetic
+        out[n, 1] += stored
+        out[n, 2] += damped
+
+
 class Channels:
     """The signals of an assembly, in the order of the columns of :meth:`sample`.
 
@@ -251,6 +262,7 @@ class Channels:
         a = self.assembly
         energy_signals(*a.with_travelling(q, v), a.meshes, a.connectors, a.springs, a.inertia, out)
         add_elastic_signals(q, v, a.elastic, scratch_for(a.elastic), out)
+        add_turning_signals(q, v, a.turning_arrays, turning_memory(a.turning_arrays), out)
         return out
 
 

@@ -33,6 +33,7 @@ from exugear.gearbox import GROUND
 from exugear.kernels import ConnectorArrays
 from exugear.modes import linearise, overall_row
 from exugear.table_law import scratch_memory
+from exugear.turning import turning_memory
 
 Floats = NDArray[np.float64]
 
@@ -320,6 +321,7 @@ def equations_of(assembly: Assembly, loads: LoadTable) -> Equations:
         joints=joints,
         elastic=assembly.elastic,
         motion=elastic_motion(assembly.elastic, _acted(assembly)),
+        turning=assembly.turning_arrays,
     )
 
 
@@ -359,6 +361,7 @@ def work_for(equations: Equations, q: Floats, v: Floats) -> Work:
         series=equations.loads.first[:-1].copy(),
         states=np.zeros((equations.meshes.slot.size, 4)),
         scratch=scratch_for(equations.elastic),
+        memory=turning_memory(equations.turning),
         pieces=np.zeros((equations.meshes.slot.size, 2), dtype=np.int64),
         law=scratch_memory(),
         row=np.zeros(12),

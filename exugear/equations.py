@@ -18,6 +18,7 @@ from exugear.compilation import kernel
 from exugear.elastic import ElasticArrays, ElasticMotion, elastic_energies, set_elastic_motion
 from exugear.table_law import FIRST_TWO, Scratch, TableArrays, surface_law
 from exugear.travelling import TravellingArrays, place_travelling, share_travelling_forces
+from exugear.turning import TurningArrays, set_turning_motion, turning_energies
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -165,6 +166,7 @@ class Equations(NamedTuple):
     joints: Joints
     elastic: ElasticArrays
     motion: ElasticMotion
+    turning: TurningArrays
 
 
 class Work(NamedTuple):
@@ -183,7 +185,7 @@ class Work(NamedTuple):
     gradient : (3, 13) gradients of the deflection and of the force row, and the force of a mesh with a table
     series : (s,) line of each torque series that was used last
     states : (m, 4) deflection and its rate, 1 where a table's axis was left, scalar force
-    scratch : (2, n) memory of the elastic bodies
+    scratch, memory : memory of the elastic bodies, and of those in turning frames
     pieces : (m, 2) load piece of each flank's table that was used last
     law : memory of the law `table`
     row : (12,) row of the push between the axes and the moment of misalignment
@@ -204,6 +206,7 @@ class Work(NamedTuple):
     series: Integers
     states: Floats
     scratch: Floats
+    memory: Floats
     pieces: Integers
     law: Scratch
     row: Floats
@@ -608,6 +611,7 @@ def evaluate(t: float, q: Floats, v: Floats, equations: Equations, work: Work) -
     add_springs(q, v, equations.springs, work.force)
     set_accelerations(v, equations.bodies, work)
     set_elastic_motion(q, v, work.force, equations.motion, work.scratch[0], work.rate)
+    set_turning_motion(q, v, work.force, equations.turning, work.memory, work.rate)
 
 
 @kernel
@@ -803,6 +807,11 @@ def observe(
         kinetic, stored, damped = elastic_energies(x, u, equations.elastic, work.scratch)
         energy[0] += kinetic
         energy[1] += stored
+        energy[3] += damped
+        kinetic, stored, damped, weight = turning_energies(x, u, equations.turning, work.memory)
+        energy[0] += kinetic
+        energy[1] += stored
+        energy[2] += weight
         energy[3] += damped
         set_loads(time[n], x, u, equations.loads, work.series, f)
         for i in range(size):

@@ -31,6 +31,7 @@ from exugear.mesh_element import Angles, MeshData
 from exugear.reduction import ReducedBody
 from exugear.results import input_hash
 from exugear.statics import locked_equilibrium
+from exugear.turning import TurningBody
 
 Floats = NDArray[np.float64]
 DIFFERENCE_STEP = 1e-6
@@ -83,11 +84,22 @@ def linearise(assembly: Assembly, q: Floats, meshes: MeshArrays | None = None) -
         spring = SpringArrays._make(values[n : n + 1] for values in assembly.springs)
         stiffness[name], damping[name] = _tangents(assembly.size, q, spring, add_spring_forces)
     for name, place in assembly.elastic_slices.items():
+        if name in assembly.turning:
+            turning = (place, assembly.turning[name])
+            stiffness[f"{name}_body"], damping[f"{name}_body"] = _tangents(
+                assembly.size, q, turning, _add_turning_forces
+            )
+            continue
         own = np.zeros((assembly.size,) * 2)
         own[place, place] = assembly.elastic_bodies[name].reduced.stiffness
         stiffness[f"{name}_body"] = own
         damping[f"{name}_body"] = assembly.gearbox.case.damping.body_time_s * own
-    return Linearised(assembly.mass_matrix, stiffness, damping)
+    return Linearised(assembly.mass_at(q), stiffness, damping)
+
+
+def _add_turning_forces(q: Floats, v: Floats, element: tuple[slice, TurningBody], f: Floats) -> None:
+    place, body = element
+    f[place] += body.forces(q[place], v[place])
 
 
 def _tangents(
@@ -255,7 +267,7 @@ def modes_of(assembly: Assembly, preload: bool = True) -> Modes:
     ratio = np.divide(modal_damping, 2.0 * omega, out=np.zeros_like(omega), where=elastic)
     strain = np.array([np.einsum("im,ij,jm->m", shapes, k, shapes) for k in linear.stiffness.values()]).T
     strain = np.where(elastic[:, None], strain / np.maximum(strain.sum(axis=1, keepdims=True), 1e-300), 0.0)
-    kinetic = _kinetic_shares(assembly, shapes)
+    kinetic = _kinetic_shares(assembly, shapes, q)
     overall = overall_row(assembly) @ shapes
     element_names = tuple(linear.stiffness)
     return Modes(
@@ -312,13 +324,17 @@ def overall_row(assembly: Assembly) -> Floats:
     return row
 
 
-def _kinetic_shares(assembly: Assembly, shapes: Floats) -> Floats:
-    """Share of kinetic energy (n, bodies, motions)."""
+def _kinetic_shares(assembly: Assembly, shapes: Floats, q: Floats) -> Floats:
+    """Share of kinetic energy (n, bodies, motions) of modes about coordinates q."""
     energy = np.diag(assembly.mass_matrix)[:, None] * shapes**2
     shares = np.zeros((shapes.shape[1], len(assembly.bodies), len(MOTIONS)))
     for n, body in enumerate(assembly.bodies):
         if body.name in assembly.elastic_bodies:
-            own = shapes[assembly.elastic_slices[body.name]]
+            place = assembly.elastic_slices[body.name]
+            own = shapes[place]
+            if body.name in assembly.turning:
+                turning = assembly.turning[body.name]
+                own = turning.turned(own, -turning.angle(q[place]))
             shares[:, n] = _elastic_energies(assembly.elastic_bodies[body.name].reduced, own)
             continue
         index = assembly.coordinates[body.name]

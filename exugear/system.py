@@ -36,6 +36,7 @@ from exugear.kernels import (
 )
 from exugear.mesh_element import node_position, seat_key
 from exugear.reduction import ReducedBody
+from exugear.turning import TurningBody
 
 Floats = NDArray[np.float64]
 MeshRoute = Literal["element", "loads"]
@@ -281,6 +282,9 @@ class ExudynSystem:
             for item, seat_name in elastic.shared.items():
                 key, shared = seat_key(name, item), seat_key(name, seat_name)
                 self._nodes[key], self._seat_places[key] = self._nodes[shared], self._seat_places[shared]
+            if name in self.assembly.turning:
+                self._add_turning_body(self.assembly.turning[name], nodes)
+                continue
             self.mbs.AddObject(
                 items.ObjectGenericODE2(
                     nodeNumbers=nodes,
@@ -291,6 +295,25 @@ class ExudynSystem:
                     forceUserFunction=_gyroscopic_function(reduced) if reduced.gyroscopic.any() else 0,
                 )
             )
+
+    def _add_turning_body(self, body: TurningBody, nodes: list[Any]) -> None:
+        """Add the laws of a body in its own turning frame; forces without accelerations are on the right-hand side."""
+
+        def mass(mbs: Any, t: float, item: int, q: Any, v: Any) -> Floats:
+            return body.mass_matrix(np.array(q))
+
+        def force(mbs: Any, t: float, item: int, q: Any, v: Any) -> Floats:
+            q, v = np.array(q), np.array(v)
+            return np.asarray(body.forces(q, v) - body.inertia_forces(q, v, np.zeros_like(q)))
+
+        self.mbs.AddObject(
+            items.ObjectGenericODE2(
+                nodeNumbers=nodes,
+                massMatrix=body.reduced.mass,
+                massMatrixUserFunction=mass,
+                forceUserFunction=force,
+            )
+        )
 
     def _point(self, body: str, item: str, place: Floats) -> Any:
         """Marker of a support at a place (m, at zero angles) on a body, its seat on an elastic one, or the ground."""
