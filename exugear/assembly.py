@@ -32,7 +32,7 @@ from exugear.elastic import (
     scratch_for,
     set_elastic_accelerations,
 )
-from exugear.elastic_bodies import ElasticBody, elastic_names, frame_of, mounts_at_work, reduced_bodies
+from exugear.elastic_bodies import ElasticBody, elastic_names, mounts_at_work, reduced_bodies
 from exugear.floating import FloatingBody
 from exugear.gearbox import Bearing, Body, Gearbox
 from exugear.kernels import (
@@ -547,15 +547,7 @@ def _check_supports(gearbox: Gearbox, variant: str, moving: list[Body]) -> None:
         raise VariantError(f"variant {variant}: the gearbox file has no [bearings]")
     if variant == "flexible" and not elastic_names(gearbox):
         raise VariantError('variant flexible: no body is elastic; give one a shape and flexibility = "elastic"')
-    if variant == "flexible":
-        _check_elastic(gearbox, moving)
-
-
-def _check_elastic(gearbox: Gearbox, moving: list[Body]) -> None:
-    """Elastic bodies that a variant can take in, fixed ones held on the ground."""
     for body in moving:
-        if body.name in elastic_names(gearbox) and frame_of(gearbox, body) == "carrier":
-            raise VariantError(f"body {body.name}: a body that carries planets cannot be elastic yet; set it to 'none'")
         if body.fixed and not any(mount.body == body.name for mount in mounts_at_work(gearbox)):
             raise VariantError(f"body {body.name}: it is elastic, but nothing holds it; add [mounts] on the ground")
 
