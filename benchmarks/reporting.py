@@ -458,11 +458,86 @@ def grids_section(part: Results) -> str:
     )
 
 
+def elastic_section(part: Results) -> str:
+    """Tables of the cost of elastic bodies."""
+    *bodies, kept = part["reductions"]
+    steps, frames = part["steps"], part["frames"]
+    _, fixed, floating = frames
+    return "\n".join(
+        [
+            "## Elastic bodies\n",
+            f"{circumstances(part)} GRC 750 kW.\n",
+            "### Reduction, once for a shape\n",
+            table(
+                ["body", "unknowns", "coordinates", "takes"],
+                [
+                    [row["body"], number(row["unknowns"], 6), str(row["coordinates"]), duration(row["seconds"])]
+                    for row in bodies
+                ],
+            ),
+            items(
+                [
+                    f"Kept on disk ({kept['file_MB']:.0f} MB), the whole assembly takes {duration(kept['seconds'])}.",
+                    "What bounds it: factorisation of the solids, and the search for their free vibrations.",
+                ]
+            ),
+            "### A step with more and more elastic bodies, compiled solver\n",
+            f"In turns in one process, each at the step that its run chooses; medians of {part['rounds']} rounds, "
+            "ratios to the variant bushing within a round. A run takes signals and energies of every step as well, "
+            "files aside.\n",
+            table(
+                ["elastic", "coordinates", "step", "µs per step", "ratio", "run, per simulated second", "ratio"],
+                [
+                    [
+                        row["elastic"],
+                        str(row["coordinates"]),
+                        f"{1e6 * row['step']:.2f} µs",
+                        number(row["microseconds_per_step"]),
+                        number(row["ratio_of_a_step"]),
+                        duration(row["seconds_per_second"]),
+                        number(row["ratio_of_a_run"]),
+                    ]
+                    for row in steps
+                ],
+            ),
+            items(
+                [
+                    "What bounds it: matrices of the bodies, read once for each of the four stages. Vibrations of "
+                    "lightly damped bodies shorten the step; fewer seats on the housing would save most.",
+                ]
+            ),
+            "### One shaft in a floating frame\n",
+            f"Exudyn by generalized-alpha, high-speed shaft alone elastic, step {1e6 * part['exudyn_step']:.0f} µs; "
+            "processor time.\n",
+            table(
+                ["shaft", "coordinates", "µs per step", "ratio"],
+                [
+                    [
+                        row["shaft"],
+                        str(row["coordinates"]),
+                        number(row["microseconds_per_step"]),
+                        number(row["ratio"]),
+                    ]
+                    for row in frames
+                ],
+            ),
+            items(
+                [
+                    f"The floating frame costs {number(floating['ratio'] / fixed['ratio'], 2)} times the frame that "
+                    "does not turn: its forces go through Python functions and its matrices depend on the state. It is "
+                    "there to check the other by.",
+                ]
+            ),
+        ]
+    )
+
+
 SECTIONS = {
     "startup": startup_section,
     "tables": tables_section,
     "dynamics": dynamics_section,
     "grids": grids_section,
+    "elastic": elastic_section,
 }
 
 

@@ -48,6 +48,13 @@ def measure_grids(quick: bool) -> dict[str, Any]:
     return grid.measure_all(quick)
 
 
+def measure_elastic(quick: bool) -> dict[str, Any]:
+    """See `elastic`."""
+    import elastic
+
+    return elastic.measure(quick)
+
+
 def measure_startup(quick: bool) -> dict[str, Any]:
     """See `startup`."""
     import startup
@@ -60,6 +67,7 @@ PARTS: dict[str, Callable[[bool], dict[str, Any]]] = {
     "tables": measure_tables,
     "dynamics": measure_dynamics,
     "grids": measure_grids,
+    "elastic": measure_elastic,
 }
 
 
