@@ -418,32 +418,35 @@ def mode_name(assembly: Assembly, element_names: tuple[str, ...], kinetic: Float
     return f"{', '.join(words)}; strained: {most} {100 * strained[most]:.0f} %"
 
 
-def counterparts(rigid: Modes, flexible: Modes) -> tuple[NDArray[np.int64], Floats]:
-    """Find for each mode on rigid shafts the one on elastic shafts that it becomes.
+def counterparts(before: Modes, after: Modes) -> tuple[NDArray[np.int64], Floats]:
+    """Find for each mode the one that it becomes when bodies become elastic or others are added.
 
     Parameters
     ----------
-    rigid, flexible : Modes
-        Of the variants `bushing` and `flexible` of one gearbox.
+    before, after : Modes
+        Such as those of the variants `bushing` and `flexible` of one gearbox. The second has all bodies of the first;
+        one that is elastic in both has one shape.
 
     Returns
     -------
     place : (n,) array of int
-        Its place among the modes of `flexible`, each used once; the sum of the shares is largest.
+        Its place among the modes of `after`, each used once; the sum of the shares is largest.
     share : (n,) array
-        Squared overlap, 1 for the same motion: the kinetic energy that both shapes share, shafts taken as rigid.
+        Squared overlap, 1 for the same motion: the kinetic energy that both shapes share.
     """
-    one, other = rigid.assembly, flexible.assembly
+    one, other = before.assembly, after.assembly
     carried = np.zeros((other.size, one.size))
     for body in one.bodies:
+        if body.name in one.elastic_bodies:
+            own = one.elastic_slices[body.name]
+            carried[other.elastic_slices[body.name], own] = np.eye(own.stop - own.start)
+            continue
         index = [i for i in one.coordinates[body.name] if i >= 0]
         if body.name in other.elastic_bodies:
-            centre = (*body.axis, body.centre_of_mass_z)
-            carried[other.elastic_slices[body.name], index[0] : index[-1] + 1] = other.elastic_bodies[
-                body.name
-            ].reduced.rigid_motions(centre)
+            rigid = other.elastic_bodies[body.name].reduced.rigid_motions((*body.axis, body.centre_of_mass_z))
+            carried[other.elastic_slices[body.name], index[0] : index[-1] + 1] = rigid
         else:
             carried[[i for i in other.coordinates[body.name] if i >= 0], index] = 1.0
-    share = (flexible.shapes.T @ other.mass_matrix @ carried @ rigid.shapes) ** 2
+    share = (after.shapes.T @ other.mass_matrix @ carried @ before.shapes) ** 2
     _, place = scipy.optimize.linear_sum_assignment(share.T, maximize=True)
     return np.asarray(place, dtype=np.int64), share[place, np.arange(len(place))]

@@ -3,8 +3,9 @@
     python cases/grc750/flexible.py [results folder]
 
 Modes that move and modes that are new, misalignment of each mesh under 240 kN m, run-ups with their waterfalls and
-resonances, pictures of a flexible mode. Results go to results/grc750 by default; what is there already is used again.
-The housing's solid is meshed by gmsh (extra `mesh`) and reduced once, in about a minute.
+resonances, pictures of a flexible mode; and what the main shaft with hub and rotor changes. Results go to
+results/grc750 by default; what is there already is used again. The housing's solid is meshed by gmsh (extra `mesh`)
+and reduced once, in about a minute.
 """
 
 from __future__ import annotations
@@ -32,8 +33,14 @@ from exugear.tables import order_tables
 
 VARIANTS = ("rigid", "bushing", "flexible")
 LAW = "line_of_action"
+MAIN_SHAFT_MODES = 500.0
+"""Modes with the main shaft are listed up to here, Hz: above, both bend and twist for themselves."""
+MAIN_SHAFT = {"bodies.main_shaft.enabled": True, "static_load.torques_N_m": {"main_shaft": 240e3}}
+"""The option with main shaft, hub and rotor, the torque at its hub."""
+WEIGHT = {"gravity.acceleration_m_per_s2": [0.0, -9.773, -0.855]}
+"""Gravity with 5 deg of tilt."""
 SAME_MODE = 0.5
-"""Overlap with a mode on rigid shafts from which on a mode counts as the same one, moved."""
+"""Overlap from which on a mode counts as the same one, moved."""
 
 
 def main(out: Path) -> None:
@@ -45,7 +52,8 @@ def main(out: Path) -> None:
     modes = {variant: eigenmodes(gearbox, variant, stiffness, LAW, folder=bodies_folder(out)) for variant in VARIANTS}
     for variant, found in modes.items():
         found.save(modes_path(out, variant, LAW, found.assembly.inertias))
-    print_modes(modes["bushing"], modes["flexible"])
+    print_modes(modes["bushing"], modes["flexible"], "bushing -> flexible")
+    print_main_shaft(modes["flexible"], stiffness, bodies_folder(out))
     print_misalignments(gearbox, stiffness, bodies_folder(out))
     folder = modes_path(out, "flexible", LAW, modes["flexible"].assembly.inertias).parent
     draw_flexible_mode(modes["flexible"], folder)
@@ -63,31 +71,49 @@ def main(out: Path) -> None:
     print(f"pictures in {folder}")
 
 
-def print_modes(rigid: Modes, flexible: Modes) -> None:
-    """Print which modes move when bodies become elastic, and which are new."""
-    place, share = counterparts(rigid, flexible)
-    print("bushing -> flexible, Hz (overlap)")
-    for n, (mode, same) in enumerate(zip(place, share, strict=True)):
-        if same >= SAME_MODE and rigid.frequency[n] > 0.0:
-            moved = 100.0 * (flexible.frequency[mode] / rigid.frequency[n] - 1.0)
-            print(f"{rigid.frequency[n]:7.0f} {flexible.frequency[mode]:7.0f}  {moved:+5.1f} %  ({same:.2f})")
-    print("in flexible only, or too changed to tell")
-    for mode in np.setdiff1d(np.arange(len(flexible.frequency)), place[share >= SAME_MODE]):
-        print(f"{flexible.frequency[mode]:7.0f}  {flexible.names[mode]}")
+def print_modes(before: Modes, after: Modes, title: str, highest: float = np.inf) -> None:
+    """Print which modes move when bodies become elastic or are added, and which are new, up to a frequency (Hz)."""
+    place, share = counterparts(before, after)
+    print(f"{title}, Hz (overlap)")
+    for old, new, same in zip(before.frequency, after.frequency[place], share, strict=True):
+        if same >= SAME_MODE and 0.0 < new <= highest:
+            moved = f"{100.0 * (new / old - 1.0):+5.1f} %" if old > 0.0 else "        "
+            print(f"{old:7.1f} {new:7.1f}  {moved}  ({same:.2f})")
+    print("in the latter only, or too changed to tell")
+    for mode in np.setdiff1d(np.arange(len(after.frequency)), place[share >= SAME_MODE]):
+        if 0.0 < after.frequency[mode] <= highest:
+            print(f"{after.frequency[mode]:7.1f}  {after.names[mode]}")
+
+
+def print_main_shaft(without: Modes, stiffness: Mapping[str, MeshData], folder: Path) -> None:
+    """Print which modes the main shaft with hub and rotor moves and brings."""
+    gearbox = without.assembly.gearbox.varied(MAIN_SHAFT)
+    found = eigenmodes(gearbox, "flexible", stiffness, LAW, folder=folder)
+    print_modes(without, found, "flexible -> flexible with main shaft and rotor", MAIN_SHAFT_MODES)
 
 
 def print_misalignments(gearbox: Gearbox, stiffness: Mapping[str, MeshData], folder: Path) -> None:
     """Print the misalignment of each mesh under the static load, output locked, for more and more elastic bodies."""
     print("misalignment under 240 kN m, output locked, rad / 1e6")
     rigid = gearbox.varied({f"bodies.{name}.flexibility": "none" for name in ("carrier", "housing")})
-    cases = {"bushing": (rigid, "bushing"), "elastic shafts": (rigid, "flexible"), "all elastic": (gearbox, "flexible")}
-    for name, (case, variant) in cases.items():
-        assembly = assemble(case, variant, stiffness, LAW, folder=folder)
-        load = case.case.static_load
-        q = locked_equilibrium(assembly, load.torques_N_m, load.locked, assembly.mean_meshes)
-        values = 1e6 * assembly.gear_positions(q)[:, 1]
-        words = ", ".join(f"{mesh} {value:.0f}" for mesh, value in zip(assembly.mesh_names, values, strict=True))
-        print(f"{name}: {words}")
+    print_misalignment("bushing", rigid, "bushing", stiffness, folder)
+    for name, case in (("elastic shafts", rigid), ("all elastic", gearbox)):
+        for more, changes in (("", {}), (", main shaft", MAIN_SHAFT)):
+            print_misalignment(f"{name}{more}", case.varied(changes), "flexible", stiffness, folder)
+            heavy = case.varied({**changes, **WEIGHT})
+            print_misalignment(f"{name}{more}, gravity on", heavy, "flexible", stiffness, folder)
+
+
+def print_misalignment(
+    title: str, gearbox: Gearbox, variant: str, stiffness: Mapping[str, MeshData], folder: Path
+) -> None:
+    """Print the misalignment of each mesh."""
+    assembly = assemble(gearbox, variant, stiffness, LAW, folder=folder)
+    load = gearbox.case.static_load
+    q = locked_equilibrium(assembly, load.torques_N_m, load.locked, assembly.mean_meshes)
+    values = 1e6 * assembly.gear_positions(q)[:, 1]
+    words = ", ".join(f"{mesh} {value:.0f}" for mesh, value in zip(assembly.mesh_names, values, strict=True))
+    print(f"{title}: {words}")
 
 
 def draw_flexible_mode(modes: Modes, folder: Path) -> None:

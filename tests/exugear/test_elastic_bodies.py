@@ -248,6 +248,13 @@ def test_modes_on_rigid_shafts_are_found_again_on_stiff_ones(grc: Gearbox, stiff
     assert share[alone].min() > 0.99
 
 
+def test_modes_are_their_own_counterparts(flexible: Assembly) -> None:
+    modes = modes_of(flexible)
+    place, share = counterparts(modes, modes)
+    assert np.array_equal(place, np.arange(len(modes.frequency)))
+    assert share == pytest.approx(np.ones(len(share)), rel=1e-6)
+
+
 def test_the_rigid_part_of_a_rigid_motion_is_that_of_the_centre(flexible: Assembly) -> None:
     vector = np.zeros(flexible.size)
     for name, place in flexible.elastic_slices.items():
