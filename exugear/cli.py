@@ -516,10 +516,6 @@ def _check_solver(gearbox: Gearbox, variant: Variant, solver: Solver) -> None:
         )
 
 
-def _tell_inertia(name: str, inertias: str) -> None:
-    note(f"{name}: in a floating frame with the inertia of its shape and blanks, not that of the set {inertias}")
-
-
 def _compute_modes(gearbox: Gearbox, folder: Path, variant: str, law: str, inertias: str | None) -> tuple[Modes, Path]:
     from exugear.mesh_stiffness import mesh_stiffness
     from exugear.modes import eigenmodes
@@ -533,8 +529,6 @@ def _compute_modes(gearbox: Gearbox, folder: Path, variant: str, law: str, inert
         figures = shaft.reduced.figures
         unknowns, took = sum(figures.unknowns.values()), figures.seconds
         note(f"{name}: {unknowns} unknowns reduced to {shaft.reduced.size} coordinates in {took:.1f} s")
-        if shaft.floating is not None:
-            _tell_inertia(name, found.assembly.inertias)
     return found, found.save(modes_path(folder, variant, law, found.assembly.inertias))
 
 
@@ -652,8 +646,6 @@ def _report_run(case: Path, finished: Run, as_json: bool) -> None:
 
     with xr.open_dataset(finished.path, engine="h5netcdf") as data:
         outside = float(data["outside_time"].max())
-        if "inertia_of_shape" in data.attrs:
-            _tell_inertia(str(data.attrs["inertia_of_shape"]), str(data.attrs["inertias"]))
         summary = {
             "case": str(case),
             **{key: str(data.attrs[key]) for key in ("variant", "load_case", "mesh_law", "inertias", "solver")},

@@ -18,7 +18,7 @@ import math
 import os
 import tempfile
 import zipfile
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -27,7 +27,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from exugear.reduction import ReducedBody, ReductionError, kept
+from exugear.reduction import ReducedBody, ReductionError, RigidInertia, kept
 from exugear.solids import ReducedSolid, SolidModel, in_each_direction, reduce_matrices, reduced_body
 
 Floats: TypeAlias = NDArray[np.float64]
@@ -35,6 +35,7 @@ Complexes: TypeAlias = NDArray[np.complex128]
 
 WHOLE = 0.02
 """Largest distance of an eigenvalue of S from a whole number."""
+EYE = np.eye(3)
 MOST_CORRECTIONS = 20
 """Newton steps to find the coordinates of a state."""
 FOUND = 1e-14
@@ -49,7 +50,7 @@ class FloatingBody:
     ----------
     name, seats : what it is, and names of its seats
     places : (s, 3) of the seats, m
-    centre : (3,) mass centre, where the frame is, m
+    centre : (3,) where the frame is: mass centre of shape and rings, m
     mass : kg
     coordinates : (n, k) coordinates of the reduced body by mode: seats' first, then inner amplitudes
     stiffness : (k,) of modes of unit mass, 1/s2
@@ -150,6 +151,19 @@ def floating_body(model: SolidModel, matrices: ReducedSolid | None = None) -> Fl
     )
 
 
+def with_inertia(body: FloatingBody, wanted: RigidInertia) -> FloatingBody:
+    """Give a body the rigid inertia of another model of it; as `exugear.reduction.with_rigid_inertia` does.
+
+    What is added or missing moves with the frame, that is with the rigid part of the motion.
+    """
+    offset = np.array(wanted.centre) - body.centre
+    square = np.diag([wanted.axial / 2, wanted.axial / 2, wanted.transverse - wanted.axial / 2])
+    moments, first = body.moments.copy(), body.first.copy()
+    moments[:, :, 0, 0] = square + wanted.mass * np.outer(offset, offset)
+    first[:, 0] = wanted.mass * offset
+    return replace(body, mass=wanted.mass, moments=moments, first=first)
+
+
 def load_or_reduce_floating(model: SolidModel, folder: Path | None) -> tuple[ReducedBody, FloatingBody]:
     """Both descriptions of a solid of revolution, from a folder if they are there for exactly these inputs.
 
@@ -204,8 +218,9 @@ def euler_rotation(parameters: Floats) -> tuple[Floats, Floats]:
     """Rotation matrix (3, 3) of Euler parameters (4,), and matrix (3, 4) from their rates to the angular velocity."""
     scalar, vector = parameters[0], parameters[1:]
     cross = _skew(vector)
-    turn = np.eye(3) + 2.0 * scalar * cross + 2.0 * cross @ cross
-    return turn, 2.0 * np.column_stack([-vector, scalar * np.eye(3) + cross])
+    rates = np.empty((3, 4))
+    rates[:, 0], rates[:, 1:] = -2.0 * vector, 2.0 * (scalar * EYE + cross)
+    return EYE + 2.0 * scalar * cross + 2.0 * cross @ cross, rates
 
 
 @dataclass(frozen=True)
@@ -255,30 +270,28 @@ class FloatingCoordinates:
         """State of the reduced body at coordinates and rates (7 + k,); spins are those nearest to an angle (rad)."""
         amplitudes = q[7:]
         turn, to_velocity = euler_rotation(q[3:7] + [1.0, 0.0, 0.0, 0.0])
+        count = len(self._arms)
         arms = (self._arms + self._moves @ amplitudes) @ turn.T
-        small = self._turns @ amplitudes
-        cross = _skew(small)
-        rotations = turn @ (np.eye(3) + cross + 0.5 * cross @ cross)
+        small = _skew(self._turns @ amplitudes)
+        turns = np.concatenate([turn @ (EYE + small + 0.5 * small @ small), turn[None]])  # of the seats and the frame
+        angles, to_angles = _tilts_and_spin(turns, near)
         jacobian = np.zeros((self.size, self.count))
-        seats = jacobian[: 6 * len(arms)].reshape(-1, 6, self.count)
-        angles, to_angles = _tilts_and_spin(rotations, near)
-        seats[:, :3, :3] = np.eye(3)
+        seats = jacobian[: 6 * count].reshape(count, 6, self.count)
+        seats[:, :3, :3] = EYE
         seats[:, :3, 3:7] = -_skew(arms) @ to_velocity
         seats[:, :3, 7:] = turn @ self._moves
-        seats[:, 3:, 3:7] = to_angles @ to_velocity
-        seats[:, 3:, 7:] = to_angles @ turn @ ((np.eye(3) + 0.5 * cross) @ self._turns)
+        seats[:, 3:, 3:7] = to_angles[:-1] @ to_velocity
+        seats[:, 3:, 7:] = to_angles[:-1] @ turn @ ((EYE + 0.5 * small) @ self._turns)
         coordinates = np.empty(self.size)
-        at_seats = coordinates[: 6 * len(arms)].reshape(-1, 6)
+        at_seats = coordinates[: 6 * count].reshape(count, 6)
         at_seats[:, :3] = q[:3] + arms - self._arms
-        at_seats[:, 3:] = angles
-        spin, to_spin = _tilts_and_spin(turn[None], near)
-        carried = self._inner * np.exp(-1j * spin[0, 2] * self._orders)
-        resting = self._shapes @ amplitudes
-        coordinates[6 * len(arms) :] = (carried @ resting).real
-        inner = jacobian[6 * len(arms) :]
-        inner[:, 7:] = (carried @ self._shapes).real
-        turned = (carried @ (-1j * self._orders * resting)).real
-        inner[:, 3:7] = np.outer(turned, to_spin[0, 2] @ to_velocity)
+        at_seats[:, 3:] = angles[:-1]
+        carried = self._inner * np.exp(-1j * angles[-1, 2] * self._orders)
+        still = self._shapes @ amplitudes
+        coordinates[6 * count :] = (carried @ still).real
+        jacobian[6 * count :, 7:] = (carried @ self._shapes).real
+        turned = (carried @ (-1j * self._orders * still)).real
+        jacobian[6 * count :, 3:7] = np.outer(turned, to_angles[-1, 2] @ to_velocity)
         return FloatingMotion(coordinates, jacobian @ v, jacobian)
 
     def speed(self, q: Floats, v: Floats) -> float:

@@ -262,7 +262,6 @@ class Recorder:
             "fastest_eigenvalue": self._rate,
             "solver": self._solver_name,
             "complete": 0,
-            **({"inertia_of_shape": ", ".join(assembly.floating)} if assembly.floating else {}),
         }
 
     @property
