@@ -23,6 +23,7 @@ from exugear.tables import missing_tables, order_tables
 from exugear.tooth_contact import MeshError
 from fe_ste.scene import RenderingError
 
+from .floating_case import FLOATING_CASE
 from .spur_case import COARSE_INPUT, SPUR_CASE
 
 
@@ -70,6 +71,20 @@ def test_run_writes_results_and_sums_them_up(case, variant, solver):
     expected = (100 - 140 / 1.5) / (1e-2 + 3e-2 / 2.25) * 0.02 * 30 / np.pi
     assert summary["input_speed_rpm"] == pytest.approx(expected, rel=0.08)
     assert abs(summary["energy_not_accounted_for"]) < 1e-3
+
+
+def test_a_floating_frame_asks_for_exudyn_before_anything_is_computed(tmp_path):
+    case = tmp_path / "case.toml"
+    case.write_text(FLOATING_CASE, encoding="utf-8")
+    outcome = exugear("run", case, "--variant", "flexible", "--load-case", "run_up")
+    assert outcome.exit_code == 2
+    message = " ".join(outcome.stderr.split())
+    assert "bodies.shaft.flexibility = 'ffrf' runs in Exudyn only; add --solver exudyn" in message
+    assert list(tmp_path.iterdir()) == [case]
+    outcome = iso("run", case, "--variant", "flexible", "--solver", "exudyn", "--duration", 0.01, "--json")
+    assert outcome.exit_code == 0, outcome.stderr
+    summary = json.loads(outcome.stdout)
+    assert summary["solver"].endswith("generalized-alpha")
 
 
 def test_modes_are_those_of_the_closed_form(case):
