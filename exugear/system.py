@@ -166,6 +166,8 @@ class ExudynSystem:
                 self._add_mesh_loads()
         self.mbs.Assemble()
         self._order = self._coordinate_order()
+        if self._floating is not None:
+            self.mbs.SetPostStepUserFunction(self._post_step(None))
 
     # -- building ----------------------------------------------------------------------------------------
 
@@ -522,7 +524,7 @@ class ExudynSystem:
         settings.linearSolverType = exudyn.LinearSolverType.EigenSparse
         settings.solutionSettings.writeSolutionToFile = False
         settings.displayStatistics = False
-        if observe is not None or self._floating is not None:
+        if observe is not None:
             self.mbs.SetPostStepUserFunction(self._post_step(observe))
         solver = exudyn.MainSolverExplicit() if explicit else exudyn.MainSolverImplicitSecondOrder()
         if explicit:
