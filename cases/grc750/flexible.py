@@ -1,11 +1,11 @@
-"""GRC 750 kW gearbox with elastic shafts and housing on its bearings, beside the variants rigid and bushing.
+"""GRC 750 kW gearbox with elastic shafts, carrier and housing on its bearings, beside the variants rigid and bushing.
 
     python cases/grc750/flexible.py [results folder]
 
 Modes that move and modes that are new, misalignment of each mesh under 240 kN m, run-ups with their waterfalls and
 resonances, pictures of a flexible mode; and what the main shaft with hub and rotor changes. Results go to
-results/grc750 by default; what is there already is used again. The housing's solid is meshed by gmsh (extra `mesh`)
-and reduced once, in about a minute.
+results/grc750 by default; what is there already is used again. The solids of carrier and housing are meshed by gmsh
+(extra `mesh`) and reduced once, in about two minutes.
 """
 
 from __future__ import annotations
