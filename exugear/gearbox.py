@@ -8,7 +8,7 @@ numbered from 1 (`planet_1`, `sun_planet_1`).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -23,25 +23,29 @@ from exugear.casefile import (
     BodySection,
     CaseError,
     CaseFile,
-    CatalogueSection,
-    GearSection,
     LoadCaseSection,
     MeshSection,
-    ModificationSection,
     SteSection,
-    StiffnessSection,
     parse_case,
     read_toml,
 )
-from fe_ste.gears import BasicRack, Gear, GearPair, GeometryError, Material
+from exugear.gearbox_checks import check
+from exugear.parts import (
+    Bearing,
+    Body,
+    Coupling,
+    Joint,
+    LoadCase,
+    Mesh,
+    PairSpec,
+    WheelDeviation,
+    gear_from,
+    modification_from,
+)
+from fe_ste.gears import Gear, GearPair, GeometryError
 from fe_ste.modifications import (
     FlankModification,
-    Relief,
-    ReliefShape,
-    radius_at_roll_length_from_root,
-    radius_at_roll_length_from_tip,
 )
-from fe_ste.topography import FlankTopography
 
 __all__ = [
     "GROUND",
@@ -54,170 +58,10 @@ __all__ = [
     "LoadCase",
     "Mesh",
     "PairSpec",
+    "WheelDeviation",
 ]
 
-CENTRE_DISTANCE_TOLERANCE = 2e-5
-"""Allowed difference between a pair's centre distance and the positions of its bodies, m."""
-ASSEMBLY_TOLERANCE = 2e-3
-"""Allowed departure from the assembly condition, in teeth: angles in a file are rounded."""
 RPM = math.pi / 30.0
-
-
-@dataclass(frozen=True)
-class Body:
-    """A rigid body, its place at zero angles and its mass properties (about the centre of mass).
-
-    Attributes
-    ----------
-    axis : (2,) axis position x, y at zero angles, m
-    centre_of_mass_z : float, m
-    mass, axial, transverse : kg, kg m2, kg m2; mass and transverse are 0 for a spin-only body
-    carrier, orbit_angle : name of the carrier a planet rides on (None else) and its angle there, rad
-    wheels : gear name -> z of the gear's mid-plane, m
-    """
-
-    name: str
-    family: str
-    axis: tuple[float, float]
-    centre_of_mass_z: float
-    mass: float
-    axial: float
-    transverse: float
-    carrier: str | None
-    orbit_angle: float
-    spin_only: bool
-    fixed: bool
-    wheels: Mapping[str, float]
-
-
-@dataclass(frozen=True)
-class Joint:
-    """Ideal joint at `place` (m) between `on` and `body` that leaves only the spin about z."""
-
-    name: str
-    body: str
-    on: str
-    place: tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class Bearing:
-    """Compliant support at `place` (m, at zero angles); 6x6 in the axes of `on`, order x y z rx ry rz.
-
-    `stiffness` holds what the file gives (NaN-free 6x6) with None where only the catalogue is given; `given`
-    marks entries that replace catalogue values. `factor` (housing) is not yet multiplied in.
-    """
-
-    name: str
-    family: str
-    body: str
-    on: str
-    place: tuple[float, float, float]
-    stiffness: StiffnessSection | None
-    catalogue: CatalogueSection | None
-    damping: StiffnessSection | None
-    factor: float
-
-
-@dataclass(frozen=True)
-class Coupling:
-    """Torsional spring (N m/rad) and damper (N m s/rad) between two spins; `seat` is where on elastic bodies."""
-
-    name: str
-    first: str
-    second: str
-    seat: str | None
-    stiffness: float
-    damping: float
-
-
-@dataclass(frozen=True)
-class Mesh:
-    """A gear pair at work.
-
-    Attributes
-    ----------
-    pinion, gear : names of the bodies that carry gear 1 and gear 2
-    frame : body whose spin carries the line of centres, or "ground"
-    z : middle of the common face width, m
-    offsets : z of that middle from the middle of gear 1 and of gear 2, m
-    position_angle : polar angle of the line from gear 1's axis to gear 2's axis at zero angles, rad
-    centre_distance : from the bodies' positions, m (the pair's own value agrees within 20 um)
-    phase : PMC at zero angles where the file overrides what geometry gives, else None
-    """
-
-    name: str
-    family: str
-    pair: GearPair
-    pinion: str
-    gear: str
-    frame: str
-    z: float
-    offsets: tuple[float, float]
-    position_angle: float
-    centre_distance: float
-    phase: float | None
-
-
-@dataclass(frozen=True)
-class WheelDeviation:
-    """Errors of one wheel that return with each of its revolutions.
-
-    Attributes
-    ----------
-    teeth : number of teeth
-    pitch : (teeth,) by which each loaded flank stands back on the transverse line of action, m; tooth 0 is the first at
-        a positive polar angle at zero body angle, the others follow in the positive sense
-    eccentricity : distance of the teeth's axis from the body's, m
-    eccentricity_angle : its polar angle at zero body angle, rad
-    """
-
-    teeth: int
-    pitch: NDArray[np.float64]
-    eccentricity: float
-    eccentricity_angle: float
-
-
-@dataclass(frozen=True)
-class LoadCase:
-    """Loads of a run: torques by body (N m), duration (s), speeds (rad/s) and the drive, if any."""
-
-    name: str
-    torques: Mapping[str, float]
-    torque_series: Path | None
-    duration: float
-    start_speed: float
-    driven_body: str | None
-    end_speed: float | None
-    drive_stiffness: float | None
-    description: str
-
-
-@dataclass(frozen=True)
-class PairSpec:
-    """What the STE table of a pair needs.
-
-    Attributes
-    ----------
-    name : str
-    pair : GearPair
-    static_torque : float
-        On gear 1, N m, positive.
-    table : bool
-        Whether the file wants a table of it.
-    flank : int
-        Loaded flank of gear 1 in the static state: +1 if it faces the sense of +z rotation, else -1. A table is that
-        of flank +1; turned about the line of centres it is that of flank -1, with the ends of the face exchanged.
-    modifications : tuple of FlankModification
-        Gear 1, gear 2, in the axes of the gearbox.
-    """
-
-    name: str
-    pair: GearPair
-    static_torque: float
-    table: bool
-    flank: int
-    modifications: tuple[FlankModification, FlankModification]
 
 
 @dataclass(frozen=True)
@@ -304,7 +148,9 @@ class Gearbox:
         CaseError
             A gear that cannot be made, with its key.
         """
-        return {name: self._guard(f"gears.{name}", _gear, name, section) for name, section in self.case.gears.items()}
+        return {
+            name: self._guard(f"gears.{name}", gear_from, name, section) for name, section in self.case.gears.items()
+        }
 
     @cached_property
     def modifications(self) -> dict[str, FlankModification]:
@@ -317,7 +163,7 @@ class Gearbox:
         """
         folder = Path(self.source).parent
         return {
-            name: self._guard(f"gears.{name}.modification", _modification, self.gears[name], section, folder)
+            name: self._guard(f"gears.{name}.modification", modification_from, self.gears[name], section, folder)
             for name, section in self.case.gears.items()
         }
 
@@ -766,257 +612,3 @@ def _copied(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {key: _copied(entry) for key, entry in value.items()}
     return list(value) if isinstance(value, list) else value
-
-
-def _gear(name: str, section: GearSection) -> Gear:
-    """Gear from its section: millimetres to metres, degrees to radians."""
-    return Gear(
-        name=name,
-        teeth=section.teeth,
-        normal_module=section.normal_module_mm * 1e-3,
-        normal_pressure_angle=math.radians(section.normal_pressure_angle_deg),
-        helix_angle=math.radians(section.helix_angle_deg),
-        profile_shift=section.profile_shift,
-        face_width=section.face_width_mm * 1e-3,
-        held_diameter=section.held_diameter_mm * 1e-3,
-        internal=section.internal,
-        rack=BasicRack(**section.rack.model_dump()),
-        tip_diameter=None if section.tip_diameter_mm is None else section.tip_diameter_mm * 1e-3,
-        root_diameter=None if section.root_diameter_mm is None else section.root_diameter_mm * 1e-3,
-        tooth_thinning=section.tooth_thinning_mm * 1e-3,
-        material=Material(
-            youngs_modulus=section.material.youngs_modulus_GPa * 1e9,
-            poissons_ratio=section.material.poissons_ratio,
-            density=section.material.density_kg_per_m3,
-        ),
-    )
-
-
-def _modification(gear: Gear, section: GearSection, folder: Path) -> FlankModification:
-    """Modification of a gear from its section, tried on the gear."""
-    given = section.modification
-    if given is None:
-        return FlankModification()
-    modification = FlankModification(
-        tip_relief=_relief(gear, given, "tip", radius_at_roll_length_from_tip),
-        root_relief=_relief(gear, given, "root", radius_at_roll_length_from_root),
-        profile_crowning=1e-6 * given.profile_crowning_um,
-        lead_crowning=1e-6 * given.lead_crowning_um,
-        profile_slope=1e-6 * given.profile_slope_um,
-        helix_slope=1e-6 * given.helix_slope_um,
-        twist=1e-6 * given.twist_um,
-        topography=None if given.topography is None else FlankTopography.from_csv(folder / given.topography),
-    )
-    modification.gap(gear, np.array(gear.tip_radius), np.array(0.0))  # refuses a relief that starts off the involute
-    return modification
-
-
-def _relief(
-    gear: Gear, given: ModificationSection, kind: str, from_end: Callable[[Gear, float], float]
-) -> Relief | None:
-    length_mm = getattr(given, f"{kind}_relief_length_mm")
-    start_roll_deg = getattr(given, f"{kind}_relief_start_roll_deg")
-    if length_mm is not None:
-        radius = from_end(gear, 1e-3 * length_mm)
-    elif start_roll_deg is not None:
-        radius = gear.base_radius * math.hypot(1.0, math.radians(start_roll_deg))
-    else:
-        return None
-    shape = ReliefShape(getattr(given, f"{kind}_relief_shape"))
-    return Relief(1e-6 * getattr(given, f"{kind}_relief_um"), radius, shape)
-
-
-def check(gearbox: Gearbox) -> None:
-    """Check the parts of a gearbox against each other.
-
-    Raises
-    ------
-    CaseError
-        Inertia sets incomplete, positions that contradict a centre distance, planets that cannot be
-        assembled or collide, a body joined to nothing, a static load that nothing holds.
-    """
-    if gearbox.case.default_inertias not in gearbox.inertia_sets:
-        raise gearbox.fault(
-            f"default_inertias = {gearbox.case.default_inertias!r}: no such set; "
-            f"sets are {', '.join(gearbox.inertia_sets)}"
-        )
-    for inertias in gearbox.inertia_sets:
-        gearbox.bodies(inertias)
-    _check_mass_properties(gearbox)
-    _check_centre_distances(gearbox)
-    _check_planets(gearbox)
-    _check_connected(gearbox)
-    _check_couplings(gearbox)
-    _check_names(gearbox)
-    _check_joints(gearbox)
-    overall = gearbox.case.overall
-    for key in ("input", "output"):
-        if getattr(overall, key) not in gearbox.spinning:
-            raise gearbox.fault(
-                f"overall.{key} = {getattr(overall, key)!r}: no such turning body; "
-                f"bodies are {', '.join(gearbox.spinning)}"
-            )
-    if overall.output_gear not in gearbox.gears:
-        raise gearbox.fault(
-            f"overall.output_gear = {overall.output_gear!r}: no such gear; gears are {', '.join(gearbox.gears)}"
-        )
-    gearbox.static_mesh_forces()
-    for collection in (
-        gearbox.modifications, gearbox.bearings, gearbox.mounts, gearbox.couplings, gearbox.load_cases,
-        gearbox.deviations, gearbox.pin_offsets,
-    ):  # fmt: skip
-        list(collection)
-
-
-def _check_mass_properties(gearbox: Gearbox) -> None:
-    for family, section in gearbox.case.bodies.items():
-        for inertias, values in section.inertia.items():
-            if section.spin_only:
-                continue
-            for key in ("mass_kg", "transverse_kg_m2", "centre_of_mass_z_mm"):
-                if getattr(values, key) is None:
-                    raise gearbox.fault(
-                        f"bodies.{family}.inertia.{inertias}.{key}: this key is "
-                        "missing; only a spin_only body needs nothing but axial_kg_m2"
-                    )
-
-
-def _check_centre_distances(gearbox: Gearbox) -> None:
-    for mesh in gearbox.meshes:
-        difference = mesh.centre_distance - mesh.pair.centre_distance
-        if abs(difference) > CENTRE_DISTANCE_TOLERANCE:
-            raise gearbox.fault(
-                f"pairs.{mesh.pair.name}.centre_distance_mm = {mesh.pair.centre_distance * 1e3:g}: "
-                f"the bodies {mesh.pinion} and {mesh.gear} stand {mesh.centre_distance * 1e3:.4f} mm apart; "
-                f"they may differ by {CENTRE_DISTANCE_TOLERANCE * 1e3:g} mm"
-            )
-
-
-def _check_planets(gearbox: Gearbox) -> None:
-    bodies = {body.name: body for body in gearbox.bodies()}
-    for family, section in gearbox.case.bodies.items():
-        planets = [body for body in bodies.values() if body.family == family and body.carrier is not None]
-        for one, two in zip(planets, planets[1:] + planets[:1], strict=True):
-            if one is two:
-                continue
-            gap = math.dist(one.axis, two.axis)
-            needed = 2.0 * max(gearbox.gears[gear].tip_radius for gear in one.wheels)
-            if gap <= needed:
-                raise gearbox.fault(
-                    f"bodies.{family}.planet_angles_deg = {list(section.planet_angles_deg)}: "
-                    f"{one.name} and {two.name} collide, their axes are {gap * 1e3:.2f} mm apart, their tips "
-                    f"need more than {needed * 1e3:.2f} mm"
-                )
-        _check_assembly(gearbox, family, planets)
-
-
-def _check_assembly(gearbox: Gearbox, family: str, planets: list[Body]) -> None:
-    """Compare every planet with the first: going round two meshes must close on whole teeth.
-
-    With tooth numbers zp of the planet wheel and zc of the central wheel (negative for an external one),
-    (zc_b zp_a - zc_a zp_b) angle / 2 pi must be a multiple of gcd(zp_a, zp_b); for one planet wheel
-    between sun and ring this is the familiar (z_sun + z_ring) angle / 2 pi = integer.
-    """
-    for planet in planets[1:]:
-        teeth = [
-            _teeth_on_planet(mesh, planet.name) for mesh in gearbox.meshes if planet.name in (mesh.pinion, mesh.gear)
-        ]
-        angle = planet.orbit_angle - planets[0].orbit_angle
-        for planet_teeth, central_teeth in teeth[1:]:
-            whole = math.gcd(planet_teeth, teeth[0][0])
-            turns = (central_teeth * teeth[0][0] - teeth[0][1] * planet_teeth) / whole
-            off = math.remainder(turns * angle / (2.0 * math.pi), 1.0)
-            if abs(off) > ASSEMBLY_TOLERANCE:
-                raise gearbox.fault(
-                    f"bodies.{family}.planet_angles_deg: {planet.name} cannot be assembled at "
-                    f"{math.degrees(angle):.4f} deg from the first planet; angles must be multiples of "
-                    f"360/{abs(turns):g} = {360.0 / abs(turns):.4f} deg"
-                )
-
-
-def _teeth_on_planet(mesh: Mesh, planet: str) -> tuple[int, int]:
-    """(teeth of the planet's wheel, teeth of its mate, the latter negative unless internal)."""
-    pinion, gear = mesh.pair.pinion, mesh.pair.gear
-    if mesh.pinion == planet:
-        return pinion.teeth, gear.teeth if gear.internal else -gear.teeth
-    return gear.teeth, -pinion.teeth
-
-
-def _check_connected(gearbox: Gearbox) -> None:
-    links = [(mesh.pinion, mesh.gear) for mesh in gearbox.meshes]
-    links += [(coupling.first, coupling.second) for coupling in gearbox.couplings]
-    links += [(body.name, body.carrier) for body in gearbox.bodies() if body.carrier]
-    names = [body.name for body in gearbox.bodies() if not body.fixed]
-    reached = {gearbox.case.overall.input}
-    while True:
-        more = {b for pair in links for a, b in (pair, pair[::-1]) if a in reached} - reached
-        if not more:
-            break
-        reached |= more
-    lost = [name for name in names if name not in reached]
-    if lost:
-        aside = [
-            f"; couplings.{name} stands aside while bodies.{section.instead_of} is enabled"
-            for name, section in gearbox.case.couplings.items()
-            if section.instead_of is not None and set(section.bodies) & set(lost)
-        ]
-        raise gearbox.fault(
-            f"bodies {', '.join(lost)} are joined to {gearbox.case.overall.input} by no "
-            f"mesh, coupling or carrier{''.join(aside)}; the gear train must be one connected whole"
-        )
-
-
-def _check_couplings(gearbox: Gearbox) -> None:
-    """Let torsion take one path: couplings form no loop, and bearings between turning bodies leave it to them."""
-    paths: dict[str, dict[str, list[str]]] = {name: {name: []} for name in gearbox.spinning}
-    for coupling in gearbox.couplings:
-        one, two = paths[coupling.first], paths[coupling.second]
-        if coupling.second in one:
-            raise gearbox.fault(
-                f"couplings {', '.join([*one[coupling.second], coupling.name])} form a loop: {coupling.first} and "
-                f"{coupling.second} are joined twice; leave one of them out"
-            )
-        for start, first in list(one.items()):
-            for end, second in list(two.items()):
-                paths[start][end] = [*first[::-1], coupling.name, *second]
-                paths[end][start] = paths[start][end][::-1]
-    for bearing in gearbox.bearings:
-        given = bearing.stiffness
-        torsion = 0.0 if given is None else given.torsion_N_m_per_rad if given.matrix is None else given.matrix[5][5]
-        if torsion and bearing.on in gearbox.spinning:
-            raise gearbox.fault(
-                f"bearings.{bearing.family}.stiffness: torsion {torsion:g} N m/rad between {bearing.on} and "
-                f"{bearing.body}, which both turn; give it in a [couplings] table, which knows that they turn together"
-            )
-
-
-def _check_names(gearbox: Gearbox) -> None:
-    """Meshes, supports and couplings share one list in the results, where each name stands once."""
-    names = [("meshes", mesh.name) for mesh in gearbox.meshes]
-    names += [("bearings", bearing.name) for bearing in gearbox.bearings]
-    names += [("mounts", mount.name) for mount in gearbox.mounts]
-    names += [("couplings", coupling.name) for coupling in gearbox.couplings]
-    seen: dict[str, str] = {}
-    for section, name in names:
-        if name in seen:
-            raise gearbox.fault(f"{section}.{name}: one of [{seen[name]}] has this name, too; rename one")
-        seen[name] = section
-
-
-def _check_joints(gearbox: Gearbox) -> None:
-    bodies = {body.name: body for body in gearbox.bodies()}
-    seen: dict[str, str] = {}
-    for joint in gearbox.joints:
-        body = bodies[joint.body]
-        if body.fixed or body.spin_only:
-            raise gearbox.fault(f"joints.{joint.name}.body = {joint.body!r}: a fixed or spin-only body takes no joint")
-        if joint.body in seen:
-            raise gearbox.fault(
-                f"joints.{joint.name}.body = {joint.body!r}: the body already turns "
-                f"on {seen[joint.body]}; a second ideal joint on the same axis is redundant"
-            )
-        if body.carrier is not None and joint.on != body.carrier:
-            raise gearbox.fault(
-                f"joints.{joint.name}.on = {joint.on!r}: a planet turns on its carrier {body.carrier!r}"
-            )
-        seen[joint.body] = joint.name
