@@ -680,6 +680,7 @@ def _report_run(case: Path, finished: Run, as_json: bool) -> None:
 
 def _draw_modes(found: Modes, folder: Path, first: int, animation: bool) -> list[Path]:
     """Write the page of all elastic modes, and pictures of the gearbox and one mode if this machine can render."""
+    from exugear.elastic_scene import animate_elastic_bodies, draw_elastic_bodies, elastic_scene
     from exugear.scene import animate_mode, draw_gearbox, draw_mode
     from exugear.shapes import bodies_of, mode_scene, motions_of
     from exugear.viewer import write_mode_page
@@ -699,15 +700,22 @@ def _draw_modes(found: Modes, folder: Path, first: int, animation: bool) -> list
     places = list(scenes)
     shown = places.index(first) if first in scenes else 0
     heading = f"{assembly.gearbox.name}, {_label(found)}"
+    if assembly.elastic_bodies:
+        heading += "; elastic bodies move here as a whole, without their deformation"
     written = [write_mode_page(list(scenes.values()), folder / "modes.html", heading=heading, first=shown)]
     scene = scenes[places[shown]]
     stem = folder / f"mode_{places[shown] + 1}"
     try:
         draw_gearbox(bodies, folder / "gearbox.png", title=assembly.gearbox.name)
-        draw_mode(scene, stem.with_suffix(".png"))
-        written += [folder / "gearbox.png", stem.with_suffix(".png")]
-        if animation:
-            written.append(animate_mode(scene, stem.with_suffix(".gif")))
+        still, animated = stem.with_suffix(".png"), stem.with_suffix(".gif")
+        if assembly.elastic_bodies:
+            deformed = elastic_scene(assembly, found.shapes[:, places[shown]], title=scene.title)
+            draw_elastic_bodies(deformed, still)
+            written += [animate_elastic_bodies(deformed, animated)] if animation else []
+        else:
+            draw_mode(scene, still)
+            written += [animate_mode(scene, animated)] if animation else []
+        written += [folder / "gearbox.png", still]
     except RenderingError as error:
         note(f"No pictures: {error}", style="yellow")
     return written

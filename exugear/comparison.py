@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -257,13 +257,19 @@ def report_mode(modes: xr.Dataset, place: int) -> ModeReport:
         share=float(mobility_shares(modes)[place]),
         amplification=float(amplification[loudest]) if amplification.size else 0.0,
         mesh=str(modes["mesh"].to_numpy()[loudest]) if amplification.size else "",
-        strain=_labelled(modes["element"], one["strain_energy_share"].to_numpy()),
-        kinetic=_labelled(modes["body"], kinetic),
+        strain=_labelled(element_words(modes), one["strain_energy_share"].to_numpy()),
+        kinetic=_labelled(modes["body"].to_numpy(), kinetic),
     )
 
 
-def _labelled(names: xr.DataArray, values: FloatArray) -> dict[str, float]:
-    return {str(name): float(value) for name, value in zip(names.to_numpy(), values, strict=True)}
+def element_words(modes: xr.Dataset) -> list[str]:
+    """Name what is strained: meshes, bearings and couplings by their names, elastic bodies as themselves."""
+    bodies = {f"{name}_body": f"{name} itself" for name in modes["body"].to_numpy()}
+    return [bodies.get(str(name), str(name)) for name in modes["element"].to_numpy()]
+
+
+def _labelled(names: Iterable[str], values: FloatArray) -> dict[str, float]:
+    return {str(name): float(value) for name, value in zip(names, values, strict=True)}
 
 
 def nearest_mode(modes: xr.Dataset, frequency: float, least_share: float = 0.0) -> ModeReport | None:

@@ -415,7 +415,9 @@ def mode_name(assembly: Assembly, element_names: tuple[str, ...], kinetic: Float
         words.append(f"{what} {100 * share:.0f} %")
         told += share
     most = max(strained, key=lambda name: strained[name])
-    return f"{', '.join(words)}; strained: {most} {100 * strained[most]:.0f} %"
+    itself = most.removesuffix("_body")
+    what = f"{itself} itself" if itself != most and itself in assembly.elastic_bodies else most
+    return f"{', '.join(words)}; strained: {what} {100 * strained[most]:.0f} %"
 
 
 def counterparts(before: Modes, after: Modes) -> tuple[NDArray[np.int64], Floats]:

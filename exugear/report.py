@@ -30,12 +30,13 @@ from exugear.comparison import (
     read_run,
     report_mode,
 )
+from exugear.elastic_scene import draw_elastic_bodies, elastic_scene
 from exugear.gearbox import CaseError, Gearbox
 from exugear.mesh_stiffness import iso6336_stiffness, mesh_stiffness
 from exugear.modes import Modes, modes_of
 from exugear.orders import order_lines
 from exugear.plots import Sensitivity, plot_mode_energies, plot_order_levels, plot_sensitivities, plot_waterfalls
-from exugear.results import REPORT_FILE, input_hash, kept_case, times_spent
+from exugear.results import REPORT_FILE, bodies_folder, input_hash, kept_case, times_spent
 from exugear.runfile import MESH_TIMES
 from exugear.scene import draw_mode
 from exugear.sensitivity import Remedy, Sweep, parameters_of, remedies, sweep_modes
@@ -132,7 +133,9 @@ class _Writer:
         """Equations of a model, with the tables of the folder."""
         if model not in self.models:
             stiffness = self.stiffness(model.law)
-            self.models[model] = assemble(self.gearbox, model.variant, stiffness, model.law, model.inertias)
+            self.models[model] = assemble(
+                self.gearbox, model.variant, stiffness, model.law, model.inertias, folder=bodies_folder(self.folder)
+            )
         return self.models[model]
 
     def fits(self, path: Path, attributes: Mapping[str, Any]) -> bool:
@@ -198,7 +201,7 @@ def write_report(
     head = [page.paragraph(_subtitle(writer.gearbox)), page.section("In short", page.bullets(writer.statements))]
     if writer.left_out:
         head.append(page.section("Left out", page.bullets(writer.left_out)))
-    head.append(_assumptions_section(writer.gearbox))
+    head.append(_assumptions_section(writer))
     path = folder / REPORT_FILE
     path.write_text(page.whole(f"{writer.gearbox.name}: transmission error and dynamics", *head, *body), "utf-8")
     return Report(path, tuple(writer.statements), tuple(writer.left_out), tuple(writer.pictures))
@@ -479,7 +482,8 @@ def _sensitivity(writer: _Writer, modes: Mapping[Model, xr.Dataset]) -> tuple[st
     for model in sorted(compliant, key=lambda model: model.inertias != writer.gearbox.case.default_inertias):
         writer.tell(f"sensitivities of {model.words}")
         stiffness = writer.stiffness(model.law)
-        parameters = parameters_of(writer.gearbox, model.variant, stiffness, model.law, model.inertias)
+        kept = bodies_folder(writer.folder)
+        parameters = parameters_of(writer.gearbox, model.variant, stiffness, model.law, model.inertias, kept)
         sweeps = [sweep_modes(parameter) for parameter in parameters]
         found += [(model, remedy) for remedy in remedies(sweeps, writer.target, SEEN)]
         content.append(_sweeps_picture(writer, model, sweeps))
@@ -616,10 +620,12 @@ def _share(remedy: Remedy) -> float:
 
 def _drawn_mode(writer: _Writer, assembly: Assembly, shape: Any, title: str, name: str) -> str:
     writer.tell("picture of a mode")
-    scene = mode_scene(bodies_of(assembly.gearbox), _motions(assembly, shape), title=title)
     path = writer.picture(name)
     try:
-        draw_mode(scene, path)
+        if assembly.elastic_bodies:
+            draw_elastic_bodies(elastic_scene(assembly, shape, title=title), path)
+        else:
+            draw_mode(mode_scene(bodies_of(assembly.gearbox), _motions(assembly, shape), title=title), path)
     except RenderingError as error:
         writer.pictures.remove(path)
         writer.left_out.append(f"picture of a mode: {error}")
@@ -662,8 +668,8 @@ def _tables_section(writer: _Writer, tables: Mapping[str, MeshTable]) -> str:
     )
 
 
-def _assumptions_section(gearbox: Gearbox) -> str:
-    case = gearbox.case
+def _assumptions_section(writer: _Writer) -> str:
+    gearbox, case = writer.gearbox, writer.gearbox.case
     acceleration = np.linalg.norm(case.gravity.acceleration_m_per_s2)
     return page.section(
         "Assumptions",
@@ -678,10 +684,29 @@ def _assumptions_section(gearbox: Gearbox) -> str:
                 "Mesh stiffness is that at the static load of the case; meshes are bilateral, and the time in which "
                 "teeth would have to pull is counted.",
                 "Modes: linearised at the static load, mesh stiffness averaged over the mesh cycle.",
+                *_elastic_words(writer),
             ]
         ),
         page.paragraph(f"Sources and confidence of all inputs: {gearbox.source} and the README beside it."),
     )
+
+
+def _elastic_words(writer: _Writer) -> Iterator[str]:
+    """Say which bodies are elastic in the models of the report, and how finely."""
+    assembly = next((one for one in writer.models.values() if one.elastic_bodies), None)
+    if assembly is None:
+        return
+    case = writer.gearbox.case
+    parts = []
+    for name, body in assembly.elastic_bodies.items():
+        unknowns = sum(body.reduced.figures.unknowns.values())
+        parts.append(f"{name} ({unknowns} unknowns reduced to {body.reduced.size} coordinates)")
+    yield (
+        f"Elastic in the variant {assembly.variant}: {', '.join(parts)}; damping {1e6 * case.damping.body_time_s:g} µs "
+        f"times the stiffness, modes listed up to {case.elasticity.band_Hz:g} Hz."
+    )
+    if any(body.fixed for body in assembly.bodies):
+        yield f"In the variant {assembly.variant} the elastic housing takes the place of the housing factor."
 
 
 def _times_section(folder: Path) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import scipy.optimize
@@ -18,6 +19,8 @@ FloatArray = NDArray[np.float64]
 
 FRACTIONS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
 """Parts of the default value that a parameter without a natural range takes."""
+FOUND = 0.01
+"""Largest relative distance of a mode from the frequency that an assumption is said to bring it to."""
 HOUSING = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 
 
@@ -103,19 +106,20 @@ def sweep_modes(parameter: Parameter, progress: Callable[[], None] | None = None
     progress : callable, optional
         Called after each value.
     """
-    followed: list[FloatArray] = []
-    previous: Modes | None = None
-    order = np.zeros(0, dtype=np.int64)
+    found = []
     for value in parameter.values:
-        modes = modes_of(parameter.build(value))
-        order = np.arange(len(modes.names)) if previous is None else followers(previous, modes, order)
-        previous = modes
+        found.append(modes_of(parameter.build(value)))
+        if progress is not None:
+            progress()
+    followed: list[FloatArray] = []
+    # Elastic bodies have modes up to a frequency, which may pass it on the way: the least number can be followed.
+    order = np.arange(min(len(modes.names) for modes in found))
+    for n, modes in enumerate(found):
+        order = followers(found[n - 1], modes, order) if n else order
         total = max(float(np.sum(modes.overall**2)), 1e-300)
         loudest = modes.amplification.max(axis=1, initial=0.0)
         figures = np.array([modes.frequency, modes.overall**2 / total, loudest, modes.damping_ratio])
         followed.append(figures[:, order])
-        if progress is not None:
-            progress()
     frequency, share, amplification, damping = np.stack(followed, axis=1)
     return Sweep(parameter, frequency, share, amplification, damping)
 
@@ -138,7 +142,12 @@ def followers(before: Modes, after: Modes, order: NDArray[np.int64]) -> NDArray[
 
 
 def parameters_of(
-    gearbox: Gearbox, variant: str, stiffness: Mapping[str, MeshData], law: str, inertias: str
+    gearbox: Gearbox,
+    variant: str,
+    stiffness: Mapping[str, MeshData],
+    law: str,
+    inertias: str,
+    folder: Path | None = None,
 ) -> tuple[Parameter, ...]:
     """Parameters of a gearbox that were assumed: those that the variant has.
 
@@ -149,12 +158,14 @@ def parameters_of(
         The model that is varied.
     stiffness : mapping of pair name to (n,) array
         Mesh stiffness over the cycle, N/m.
+    folder : Path, optional
+        Where reductions of elastic bodies are kept and found again.
 
     Returns
     -------
     tuple of Parameter
-        Housing factor and stiffness of the planets' bearings, where there are bearings; axial inertia of the overall
-        output body; damping time of the meshes.
+        Housing factor where it is at work, stiffness of the planets' bearings where there are bearings; axial inertia
+        of the overall output body; damping time of the meshes.
 
     Examples
     --------
@@ -165,11 +176,11 @@ def parameters_of(
     """
 
     def built(changes: Mapping[str, float]) -> Assembly:
-        return assemble(gearbox.varied(changes), variant, stiffness, law, inertias)
+        return assemble(gearbox.varied(changes), variant, stiffness, law, inertias, folder=folder)
 
     found = []
-    base = assemble(gearbox, variant, stiffness, law, inertias)
-    if any(bearing.factor != 1.0 for bearing in gearbox.bearings) and base.connector_names:
+    base = assemble(gearbox, variant, stiffness, law, inertias, folder=folder)
+    if any(support.factor != 1.0 for support in base.supports):
         default = gearbox.case.housing.factor
         values = tuple(sorted({*HOUSING, default}))
         found.append(Parameter("housing factor", values, default, lambda x: built({"housing.factor": x}), False))
@@ -254,6 +265,7 @@ def remedies(sweeps: Sequence[Sweep], frequency: float, least_share: float) -> I
             modes = modes_of(sweep.parameter.build(value))
             total = max(float(np.sum(modes.overall**2)), 1e-300)
             seen = np.flatnonzero(modes.overall**2 >= least_share * total)
-            if seen.size:
-                place = int(seen[np.argmin(np.abs(modes.frequency[seen] - frequency))])
+            place = int(seen[np.argmin(np.abs(modes.frequency[seen] - frequency))]) if seen.size else 0
+            # Between two values modes may exchange their shapes: then none is there that was looked for.
+            if seen.size and abs(modes.frequency[place] - frequency) <= FOUND * frequency:
                 yield Remedy(sweep.parameter, value, modes, place)

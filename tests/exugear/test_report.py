@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
+import tomllib
 
 import numpy as np
 import pytest
@@ -14,7 +16,7 @@ from exugear.gearbox import CaseError, Gearbox
 from exugear.mesh_stiffness import mesh_stiffness
 from exugear.modes import eigenmodes
 from exugear.report import ReportError, write_report
-from exugear.results import input_hash, keep_case, kept_case, modes_path, note_time, times_spent
+from exugear.results import bodies_folder, input_hash, keep_case, kept_case, modes_path, note_time, times_spent
 from exugear.runup import simulate
 from exugear.tables import order_tables
 from fe_ste.scene import RenderingError
@@ -37,6 +39,7 @@ def no_rendering(monkeypatch):
         raise RenderingError("3-D pictures need pyvista: pip install 'exugear[pictures]'")
 
     monkeypatch.setattr("exugear.report.draw_mode", unable)
+    monkeypatch.setattr("exugear.report.draw_elastic_bodies", unable)
 
 
 @pytest.fixture(scope="module")
@@ -82,6 +85,35 @@ def test_the_page_stands_alone_and_names_its_assumptions(results):
         assert words in page, words
     assert report.left_out == ("picture of a mode: 3-D pictures need pyvista: pip install 'exugear[pictures]'",)
     assert all(path.is_file() for path in report.pictures)
+
+
+def test_flexible_runs_alone_are_reported_with_the_reductions_that_are_kept(results, tmp_path, monkeypatch):
+    shutil.copytree(results / "tables", tmp_path / "tables")
+    shaft = """
+[bodies.shaft_1.shape]
+start_z_mm = -20.0
+sections = [{ length_mm = 80.0, outer_diameter_mm = 25.0 }]
+"""
+    content = tomllib.loads(SPUR_CASE + shaft)
+    content["bodies"]["shaft_1"]["flexibility"] = "nonrotating"
+    content["bearings"]["bearing_1"]["z_mm"] = 40.0
+    content["elasticity"] = {"band_Hz": 12e3, "limit_Hz": 30e3}
+    gearbox = Gearbox.from_dict(content, str(tmp_path / "spur.toml"))
+    keep_case(gearbox, tmp_path)
+    kept = bodies_folder(tmp_path)
+    stiffness = mesh_stiffness(gearbox, LAW, tmp_path)
+    modes = eigenmodes(gearbox, "flexible", stiffness, LAW, folder=kept)
+    modes.save(modes_path(tmp_path, "flexible", LAW, "disc"))
+    simulate(gearbox, "flexible", stiffness, tmp_path, load_case="run_up", duration=0.2)
+    monkeypatch.setattr("exugear.elastic_bodies.reduce_shaft", lambda model: pytest.fail("reduced again"))
+    before = set(kept.iterdir())
+    report = write_report(tmp_path, target=1000.0)
+    assert [line for line in report.left_out if "picture" not in line] == []
+    assert set(kept.iterdir()) == before
+    page = report.path.read_text(encoding="utf-8")
+    assert "Elastic in the variant flexible: shaft_1 (" in page
+    assert "All resonances of variant flexible" in page
+    assert any("shaft_1 itself" in name for name in modes.names)
 
 
 def input_hash_of(results, variant):
