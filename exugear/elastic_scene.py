@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,6 +28,8 @@ ImageArray = NDArray[np.uint8]
 
 SIDE = (1.0, 0.35, -0.4)
 """From the bodies to the eye: mostly from the side, where bending shows."""
+LINE = 90
+"""Letters in a line of the title."""
 BRIGHTEST = 99.0
 """Share of the surface (%) below the density of the last colour: at sharp shoulders it grows without bound."""
 
@@ -224,7 +227,13 @@ def _add(plotter: pyvista.Plotter, scene: ElasticScene) -> tuple[list[pyvista.Po
         mesh = quad_mesh(body.points + body.displacement, body.quads)
         mesh.cell_data["energy"] = body.energy
         plotter.add_mesh(
-            mesh, scalars="energy", clim=(0.0, 1.0), cmap=displacement_map(), show_scalar_bar=False, ambient=0.3
+            mesh,
+            scalars="energy",
+            clim=(0.0, 1.0),
+            cmap=displacement_map(),
+            show_scalar_bar=False,
+            ambient=0.15,
+            diffuse=0.75,  # less than full: walls at rest are light, and must stand out from the page
         )
         bodies.append(mesh)
     for gear, motion in zip(scene.gears, scene.motions, strict=True):
@@ -243,7 +252,7 @@ def _figure(image: ImageArray, pixel: float, title: str) -> Figure:
     with drawing_style():
         figure = new_figure(7.6, 6.6 * image.shape[0] / image.shape[1] + 0.7)
         panel = figure.add_subplot()
-        place_picture(panel, image, pixel, title)
+        place_picture(panel, image, pixel, fill(title, LINE))
         scale = ScalarMappable(Normalize(0.0, 1.0), displacement_map())
         label = f"Strain energy density / that of {BRIGHTEST:g} % of the surface"
         figure.colorbar(scale, ax=panel, label=label, shrink=0.7, aspect=26)

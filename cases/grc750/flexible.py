@@ -13,7 +13,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from textwrap import fill
 
 import numpy as np
 
@@ -143,7 +142,7 @@ def bending_and_teeth(modes: Modes) -> int:
 
 def draw_mode(modes: Modes, chosen: int, path: Path) -> None:
     """Draw and animate a mode, coloured by strain energy."""
-    title = fill(f"{modes.frequency[chosen]:.0f} Hz: {modes.names[chosen]}", 90)
+    title = f"{modes.frequency[chosen]:.0f} Hz: {modes.names[chosen]}"
     scene = elastic_scene(modes.assembly, modes.shapes[:, chosen], title=title)
     draw_elastic_bodies(scene, path.with_suffix(".png"))
     animate_elastic_bodies(scene, path.with_suffix(".gif"))
