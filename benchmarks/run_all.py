@@ -1,6 +1,6 @@
 """All benchmarks by one command, and the tables made of them.
 
-    make benchmarks                              # all, about eight minutes on two free cores
+    make benchmarks                              # all, about fifteen minutes on two free cores
     python benchmarks/run_all.py --quick         # shows in two minutes that everything runs; writes nothing
     python benchmarks/run_all.py --part startup  # measures one part again, keeps the others
     python benchmarks/run_all.py --render        # makes the tables anew of what is stored
