@@ -61,7 +61,7 @@ OutOption = Annotated[
 
 
 class Variant(StrEnum):
-    """How the shafts are held: on ideal joints, on their rolling bearings, or these with elastic shafts."""
+    """How the shafts are held: on ideal joints, on their rolling bearings, or these with elastic bodies."""
 
     rigid = "rigid"
     bushing = "bushing"
@@ -516,19 +516,39 @@ def _check_solver(gearbox: Gearbox, variant: Variant, solver: Solver) -> None:
         )
 
 
+def _reduce_elastic_bodies(gearbox: Gearbox, folder: Path, variant: str, inertias: str | None) -> None:
+    """Reduce the elastic bodies of a variant behind a progress bar; kept, they are there at once when asked for."""
+    if variant != Variant.flexible:
+        return
+    from exugear.elastic_bodies import elastic_names, reduced_bodies
+    from exugear.results import bodies_folder
+
+    with progress_bar() as bar:
+        task = bar.add_task("", total=len(elastic_names(gearbox)))
+
+        def begin(name: str) -> None:
+            done = bar.tasks[task].completed + (bar.tasks[task].description != "")
+            bar.update(task, completed=done, description=f"{name}: finite elements, reduced to its seats")
+
+        with _model_errors():
+            reduced_bodies(gearbox, inertias or gearbox.case.default_inertias, bodies_folder(folder), begin)
+        bar.update(task, completed=bar.tasks[task].total)
+
+
 def _compute_modes(gearbox: Gearbox, folder: Path, variant: str, law: str, inertias: str | None) -> tuple[Modes, Path]:
     from exugear.mesh_stiffness import mesh_stiffness
     from exugear.modes import eigenmodes
     from exugear.results import bodies_folder, modes_path
 
+    _reduce_elastic_bodies(gearbox, folder, variant, inertias)
     with _model_errors():
         found = eigenmodes(
             gearbox, variant, mesh_stiffness(gearbox, law, folder), law, inertias, folder=bodies_folder(folder)
         )
-    for name, shaft in found.assembly.elastic_bodies.items():
-        figures = shaft.reduced.figures
+    for name, body in found.assembly.elastic_bodies.items():
+        figures = body.reduced.figures
         unknowns, took = sum(figures.unknowns.values()), figures.seconds
-        note(f"{name}: {unknowns} unknowns reduced to {shaft.reduced.size} coordinates in {took:.1f} s")
+        note(f"{name}: {unknowns} unknowns reduced to {body.reduced.size} coordinates in {took:.1f} s")
     return found, found.save(modes_path(folder, variant, law, found.assembly.inertias))
 
 
@@ -609,6 +629,7 @@ def _simulate(
     partial = _partial_run(folder, variant, load_case, law, inertias)
     if not resume and partial.is_file():
         note(f"{partial}: a stopped run is begun anew; --resume would have gone on from it")
+    _reduce_elastic_bodies(gearbox, folder, variant, inertias)
     with progress_bar() as bar:
         task = bar.add_task(f"{variant}: start in balance", total=None)
 

@@ -8,7 +8,7 @@ the rigid one does and only its deformation is new. A fixed body has no inertia 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -334,7 +334,9 @@ def mounts_at_work(gearbox: Gearbox) -> tuple[Bearing, ...]:
     return tuple(mount for mount in gearbox.mounts if mount.body in elastic or not bodies[mount.body].fixed)
 
 
-def reduced_bodies(gearbox: Gearbox, inertias: str, folder: Path | None = None) -> dict[str, ElasticBody]:
+def reduced_bodies(
+    gearbox: Gearbox, inertias: str, folder: Path | None = None, begin: Callable[[str], None] | None = None
+) -> dict[str, ElasticBody]:
     """Reduce all elastic bodies of a gearbox, or take them from where they were kept.
 
     Parameters
@@ -344,13 +346,20 @@ def reduced_bodies(gearbox: Gearbox, inertias: str, folder: Path | None = None) 
         Inertia set whose rigid inertias the bodies get that turn.
     folder : Path, optional
         Folder of a results folder in which reductions are kept; only the process remembers them otherwise.
+    begin : callable, optional
+        Called with the name of each body before it is reduced.
 
     Raises
     ------
     CaseError
         A shape or solid that cannot be, or that its gears and bearings do not fit on.
     """
-    return {name: _elastic_body(gearbox, gearbox.body(name, inertias), folder) for name in elastic_names(gearbox)}
+    found = {}
+    for name in elastic_names(gearbox):
+        if begin is not None:
+            begin(name)
+        found[name] = _elastic_body(gearbox, gearbox.body(name, inertias), folder)
+    return found
 
 
 def _elastic_body(gearbox: Gearbox, body: Body, folder: Path | None) -> ElasticBody:
