@@ -158,6 +158,12 @@ class Assembly:
         return out
 
     @cached_property
+    def housing_factor(self) -> float:
+        """Factor on bearings' stiffness that stands for their seats: 1 where an elastic housing has these itself."""
+        replaced = self.variant == "flexible" and all(support.factor == 1.0 for support in self.supports)
+        return 1.0 if replaced else self.gearbox.case.housing.factor
+
+    @cached_property
     def spin(self) -> dict[str, int]:
         """Coordinate of the spin of each body that turns."""
         return {body.name: self.coordinates[body.name][5] for body in self.bodies if not body.fixed}

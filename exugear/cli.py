@@ -578,8 +578,8 @@ def _draw_campbell(found: Modes, path: Path) -> Path:
 
 def _label(found: Modes) -> str:
     assembly = found.assembly
-    factor = assembly.gearbox.case.housing.factor
-    return f"{assembly.variant}, law {assembly.law}, inertias {assembly.inertias}, housing factor {factor:g}"
+    law = f"law {assembly.law}, inertias {assembly.inertias}"
+    return f"{assembly.variant}, {law}, housing factor {assembly.housing_factor:g}"
 
 
 def _mode_summaries(found: Modes) -> list[dict[str, Any]]:

@@ -181,7 +181,7 @@ class Modes:
             "mesh_law": assembly.law,
             "inertias": assembly.inertias,
             "input_hash": input_hash(assembly),
-            "housing_factor": assembly.gearbox.case.housing.factor,
+            "housing_factor": assembly.housing_factor,
             "growth_rate": self.growth_rate,
         }
         return xr.Dataset(variables, coordinates, attributes)

@@ -253,7 +253,7 @@ class Recorder:
             "mesh_law": assembly.law,
             "inertias": assembly.inertias,
             "input_hash": input_hash(assembly, case.name),
-            "housing_factor": gearbox.case.housing.factor,
+            "housing_factor": assembly.housing_factor,
             "ratio": gearbox.ratio,
             "output_base_radius": self.channels.radius,
             "highest_order": max(gearbox.mesh_frequencies(2.0 * math.pi).values()),

@@ -118,6 +118,7 @@ def test_the_housing_factor_is_for_housings_that_are_the_ground(box: Gearbox, ho
     assert housed.connector_names == ("bearing_1", "bearing_2", "foot")
     assert np.allclose(ground.connectors.stiffness, 0.5 * housed.connectors.stiffness[:2])
     assert not ground.elastic_bodies
+    assert (ground.housing_factor, housed.housing_factor) == (0.5, 1.0)
     assert (ground.connectors.bodies[:, 0] == -1).all()
 
 
