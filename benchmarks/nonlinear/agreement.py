@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import importlib
 import json
 import math
 import platform
@@ -18,16 +19,14 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from fe_ste.hexmesh import MeshSettings
+from fe_ste.nonlinear import NonlinearSettings, nonlinear_position
+from fe_ste.sectors import ContactMesh
+from fe_ste.ste import PairCompliance, contact_state, pair_compliance
+
 RESULTS = Path(__file__).with_name("results.json")
 sys.path.insert(0, str(Path(__file__).parents[1] / "calculix"))
-
-from cross_check import PAIRS  # noqa: E402
-
-from fe_ste.hexmesh import MeshSettings  # noqa: E402
-from fe_ste.nonlinear import NonlinearSettings, nonlinear_position  # noqa: E402
-from fe_ste.sectors import ContactMesh  # noqa: E402
-from fe_ste.ste import PairCompliance, contact_state, pair_compliance  # noqa: E402
-
+PAIRS = importlib.import_module("cross_check").PAIRS
 TORQUES = {"spur": 340.0, "helical": 5400.0, "internal": 10000.0}
 POSITIONS = (0.0, 0.2, 0.4, 0.6, 0.8)
 #: Mesh of the superelement: finer than the default one.
