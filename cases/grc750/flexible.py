@@ -15,6 +15,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from one_variant import LAW, show
 
 from exugear.assembly import assemble
 from exugear.elastic_scene import animate_elastic_bodies, draw_elastic_bodies, elastic_scene
@@ -24,14 +25,13 @@ from exugear.mesh_stiffness import mesh_stiffness
 from exugear.modes import MOTIONS, Modes, counterparts, eigenmodes
 from exugear.orders import order_lines, run_waterfall
 from exugear.plots import plot_waterfalls
-from exugear.results import bodies_folder, modes_path
-from exugear.runup import Progress, simulate
+from exugear.results import bodies_folder, keep_case, modes_path
+from exugear.runup import simulate
 from exugear.spectra import Pick, group_by_frequency, match_eigenfrequencies, pick_resonances
 from exugear.statics import locked_equilibrium
 from exugear.tables import order_tables
 
 VARIANTS = ("rigid", "bushing", "flexible")
-LAW = "line_of_action"
 MAIN_SHAFT_MODES = 500.0
 """Modes with the main shaft are listed up to here, Hz: above, both bend and twist for themselves."""
 MAIN_SHAFT = {"bodies.main_shaft.enabled": True, "static_load.torques_N_m": {"main_shaft": 240e3}}
@@ -53,6 +53,7 @@ def main(out: Path) -> None:
     gearbox = Gearbox.from_toml(Path(__file__).with_name("gearbox.toml"))
     for order in order_tables(gearbox, out):
         _ = order.stored or order.fill()
+    keep_case(gearbox, out)
     stiffness = mesh_stiffness(gearbox, LAW, out)
     bodies = bodies_folder(out)
     modes = {variant: eigenmodes(gearbox, variant, stiffness, LAW, folder=bodies) for variant in VARIANTS}
@@ -146,12 +147,6 @@ def draw_mode(modes: Modes, chosen: int, path: Path) -> None:
     scene = elastic_scene(modes.assembly, modes.shapes[:, chosen], title=title)
     draw_elastic_bodies(scene, path.with_suffix(".png"))
     animate_elastic_bodies(scene, path.with_suffix(".gif"))
-
-
-def show(progress: Progress) -> None:
-    """Print how far the run is."""
-    text = f"{progress.simulated:6.2f} of {progress.total:g} s, {progress.remaining:4.0f} s left"
-    print(f"\r{text}, {progress.speed:.2f} s per s", end="", flush=True)
 
 
 if __name__ == "__main__":

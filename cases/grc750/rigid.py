@@ -10,47 +10,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from exugear.gearbox import Gearbox
-from exugear.mesh_stiffness import mesh_stiffness
-from exugear.modes import eigenmodes
-from exugear.orders import order_lines, run_waterfall
-from exugear.plots import plot_campbell, plot_waterfalls
-from exugear.runup import Progress, simulate
-from exugear.spectra import group_by_frequency, match_eigenfrequencies, pick_resonances
-from exugear.tables import order_tables
-
-VARIANT = "rigid"
-LAW = "line_of_action"
-
-
-def main(out: Path) -> None:
-    """Compute what is missing, then print and draw."""
-    gearbox = Gearbox.from_toml(Path(__file__).with_name("gearbox.toml"))
-    for order in order_tables(gearbox, out):
-        _ = order.stored or order.fill()
-    stiffness = mesh_stiffness(gearbox, LAW, out)
-    run = simulate(gearbox, VARIANT, stiffness, out, mesh_law=LAW, progress=show)
-    modes = eigenmodes(gearbox, VARIANT, stiffness, LAW)
-    modes.save(run.path.with_name("modes.nc"))
-    spectra, lines = run_waterfall(run.path), order_lines(gearbox)
-    picks = pick_resonances(spectra, lines)
-    found = group_by_frequency(picks)
-    print(f"\nvariant {VARIANT}, law {LAW}, inertias {modes.assembly.inertias}; {spectra.description}")
-    for resonance, mode in zip(found, match_eigenfrequencies(found, modes.frequency), strict=True):
-        name = "no eigenfrequency within the resolution" if mode is None else modes.names[mode]
-        print(f"{resonance.frequency:7.0f} Hz  {resonance.picks[0].level:6.1f} dB  {name}")
-    marks = {VARIANT: picks}
-    plot_waterfalls({VARIANT: spectra}, lines, run.path.with_name("waterfall.png"), marks=marks)
-    fastest = float(spectra.speed.max())
-    plot_campbell(modes.frequency[1:], lines, fastest, run.path.with_name("campbell.png"), title=VARIANT)
-    print(f"pictures in {run.path.parent}")
-
-
-def show(progress: Progress) -> None:
-    """Print how far the run is."""
-    text = f"{progress.simulated:6.2f} of {progress.total:g} s, {progress.remaining:4.0f} s left"
-    print(f"\r{text}, {progress.speed:.2f} s per s", end="", flush=True)
-
+from one_variant import compute
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path("results/grc750"))
+    compute("rigid", Path(sys.argv[1]) if len(sys.argv) > 1 else Path("results/grc750"))
