@@ -456,8 +456,23 @@ def _check_choices(
         if load_case is not None and load_case not in gearbox.load_cases:
             known = ", ".join(gearbox.load_cases) or "none"
             raise gearbox.fault(f"no load case {load_case!r}; load cases are {known}")
+        if variant is Variant.flexible:
+            _check_solids(gearbox)
     if law is MeshLaw.rigid and variant is not Variant.rigid:
         raise BadInputError(f"--mesh-law rigid: its gears only roll, which needs the variant rigid, not {variant}")
+
+
+def _check_solids(gearbox: Gearbox) -> None:
+    """Refuse solids that are not known well enough, or whose files are not there."""
+    from exugear.elastic_bodies import elastic_names, solid_body
+
+    for name in elastic_names(gearbox):
+        family = gearbox.body(name).family
+        if gearbox.case.bodies[family].solid is None:
+            continue
+        file = solid_body(gearbox, name).model.mesh
+        if not file.path.is_file():
+            raise gearbox.fault(f"bodies.{family}.solid.file: {file.path}: no such file")
 
 
 @contextmanager

@@ -87,6 +87,23 @@ def test_a_floating_frame_asks_for_exudyn_before_anything_is_computed(tmp_path):
     assert summary["solver"].endswith("generalized-alpha")
 
 
+def test_a_solid_whose_file_is_missing_is_refused_before_anything_is_written(tmp_path):
+    case = tmp_path / "case.toml"
+    content = SPUR_CASE.replace(
+        "[bodies.shaft_2]",
+        """[bodies.shaft_2]
+flexibility = "elastic"
+solid = { file = "shaft.msh", seats = { bearing_2 = { diameter_mm = 40.0, width_mm = 10.0 } } }
+""",
+    )
+    case.write_text(content, encoding="utf-8")
+    outcome = iso("modes", case, "--variant", "flexible")
+    assert outcome.exit_code == 2
+    assert "bodies.shaft_2.solid.file: " in " ".join(outcome.stderr.split())
+    assert "shaft.msh: no such file" in " ".join(outcome.stderr.split())
+    assert list(tmp_path.iterdir()) == [case]
+
+
 def test_modes_are_those_of_the_closed_form(case):
     outcome = iso("modes", case, "--variant", "rigid", "--json")
     assert outcome.exit_code == 0, outcome.stderr
