@@ -4,8 +4,9 @@
 
 Modes that move and modes that are new, misalignment of each mesh under 240 kN m, run-ups with their waterfalls and
 resonances, pictures of flexible modes; and what the main shaft with hub and rotor changes. Results go to
-results/grc750 by default; what is there already is used again. The solids of carrier and housing are meshed by gmsh
-(extra `mesh`) and reduced once, in about a minute; the run-up with all of it elastic takes some minutes.
+results/grc750 by default; tables and reductions that are there already are used again. The solids of carrier and
+housing are meshed by gmsh (extra `mesh`) and reduced once, in about a minute; the run-up with all of it elastic takes
+some minutes.
 """
 
 from __future__ import annotations
