@@ -9,7 +9,6 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from exugear.assembly import Assembly
-from exugear.compilation import compiled
 from exugear.elastic import ElasticArrays, elastic_energies, scratch_for
 from exugear.gearbox import GROUND
 from exugear.kernels import (
@@ -25,6 +24,7 @@ from exugear.kernels import (
 )
 from exugear.modes import overall_row
 from exugear.turning import TurningArrays, turning_energies, turning_memory
+from fe_ste.compilation import compiled
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exugear.compilation import kernel, summing_kernel
+from fe_ste.compilation import kernel, summing_kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

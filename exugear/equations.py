@@ -14,11 +14,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exugear.compilation import kernel
 from exugear.elastic import ElasticArrays, ElasticMotion, elastic_energies, set_elastic_motion
 from exugear.table_law import FIRST_TWO, Scratch, TableArrays, surface_law
 from exugear.travelling import TravellingArrays, place_travelling, share_travelling_forces
 from exugear.turning import TurningArrays, set_turning_motion, turning_energies
+from fe_ste.compilation import kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

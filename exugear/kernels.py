@@ -30,8 +30,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exugear.compilation import compiled
 from exugear.table_law import ORDERS, TableArrays, scratch_memory, surface_law, surface_tangent
+from fe_ste.compilation import compiled
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

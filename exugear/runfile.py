@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exugear.channels import BALANCE_TERMS, Channels
-from exugear.compilation import compiled
+from fe_ste.compilation import compiled
 
 Floats = NDArray[np.float64]
 

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exugear.compilation import compiled, kernel
+from fe_ste.compilation import compiled, kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -34,9 +34,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exugear.compilation import kernel
 from exugear.elastic import LANES, row_product
 from exugear.reduction import ReducedBody
+from fe_ste.compilation import kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

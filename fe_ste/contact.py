@@ -14,10 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
-from numba import njit
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline, make_interp_spline
 
+from fe_ste.compilation import compiled, summing
 from fe_ste.elasticity import FlankCompliance
 from fe_ste.gears import GearPair
 from fe_ste.halfspace import rectangle_integral
@@ -101,7 +101,7 @@ class FlankPair(NamedTuple):
         )
 
 
-@njit(cache=True)
+@compiled
 def _polar_on_gear_2(pair: FlankPair, roll: float, axial: float, tooth: int, rotation: float) -> tuple[float, float]:
     """Radius and polar angle, about the axis of gear 2, of a flank point of gear 1."""
     radius = pair.base_radius_1 * math.sqrt(1.0 + roll * roll)
@@ -111,7 +111,7 @@ def _polar_on_gear_2(pair: FlankPair, roll: float, axial: float, tooth: int, rot
     return math.sqrt(x * x + y * y), math.atan2(y, x)
 
 
-@njit(cache=True)
+@compiled
 def rigid_gap(pair: FlankPair, roll: float, axial: float, tooth: int, rotation: float) -> tuple[float, float]:
     """Gap between a flank point of gear 1 and the unmodified flank of gear 2, along the contact normal.
 
@@ -147,7 +147,7 @@ def rigid_gap(pair: FlankPair, roll: float, axial: float, tooth: int, rotation: 
     return pair.kind * pair.base_radius_2 * (angle - flank) * pair.base_helix_cosine, gear_roll
 
 
-@njit(cache=True)
+@compiled
 def _tip_limit(pair: FlankPair, axial: float, tooth: int, rotation: float) -> float:
     """Least roll angle on gear 1 that the tip circle of gear 2 reaches, by bisection; within gear 1's flank."""
     low, high = pair.form_roll_1, pair.tip_roll_1
@@ -164,7 +164,7 @@ def _tip_limit(pair: FlankPair, axial: float, tooth: int, rotation: float) -> fl
     return 0.5 * (low + high)
 
 
-@njit(cache=True)
+@compiled
 def _lay_cells(
     pair: FlankPair, rotation: float, teeth: IntArray, axial: FloatArray, half_window: float, count: int
 ) -> tuple[IntArray, IntArray, FloatArray, FloatArray, FloatArray, FloatArray, BoolArray]:
@@ -217,7 +217,7 @@ def _lay_cells(
     )  # fmt: skip
 
 
-@njit(cache=True)
+@compiled
 def _mean_inverse_distance(across: float, along: float, half_across: float, half_along: float) -> float:
     square = across * across + along * along
     if square > (_FAR * max(half_across, half_along)) ** 2:
@@ -226,7 +226,7 @@ def _mean_inverse_distance(across: float, along: float, half_across: float, half
     return rectangle_integral(across, along, half_across, half_along) / (4.0 * half_across * half_along)
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+@summing
 def _add_far(
     row: FloatArray, strength: float, roll: float, across_scale: float, shift: float, along: float, half_across: float,
     half_along: float, rolls: FloatArray, halves: FloatArray,
@@ -241,7 +241,7 @@ def _add_far(
         row[j] += strength * math.sqrt(inverse) * (1.0 + moments * inverse * inverse / 6.0)
 
 
-@njit(cache=True)
+@compiled
 def _add_near(
     row: FloatArray, strength: float, roll: float, across_scale: float, shift: float, along: float, half_across: float,
     half_along: float, rolls: FloatArray, halves: FloatArray,
@@ -253,7 +253,7 @@ def _add_near(
         row[j] += strength * _mean_inverse_distance(across, along, half, half_along)
 
 
-@njit(cache=True)
+@compiled
 def _add_half_spaces(
     matrix: FloatArray,
     groups: IntArray,
@@ -301,7 +301,7 @@ def _add_half_spaces(
                         _add_near(row, *place, rolls, halves)
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+@summing
 def _add_regular(
     matrix: FloatArray,
     groups: IntArray,
@@ -340,7 +340,7 @@ def _add_regular(
                     )
 
 
-@njit(cache=True)
+@compiled
 def _mirror_lower(matrix: FloatArray) -> None:
     for i in range(len(matrix)):
         for j in range(i):

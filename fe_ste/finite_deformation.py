@@ -17,9 +17,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from fe_ste.compilation import compiled
 from fe_ste.elasticity import brick_gradients, brick_values
 from fe_ste.gears import Material
 
@@ -34,7 +34,7 @@ class InvertedElementError(RuntimeError):
     """A brick was turned inside out, or its incompatible modes lost their stiffness."""
 
 
-@njit(cache=True)
+@compiled
 def _mean_gradients(gradients: FloatArray, volumes: FloatArray) -> FloatArray:
     """Mean gradients (11, 3) over a brick of its shape functions; those of the incompatible modes vanish."""
     mean = np.zeros((_FUNCTIONS, 3))
@@ -45,7 +45,7 @@ def _mean_gradients(gradients: FloatArray, volumes: FloatArray) -> FloatArray:
     return mean / np.sum(volumes)
 
 
-@njit(cache=True)
+@compiled
 def _gradient(motion: FloatArray, gradients: FloatArray) -> FloatArray:
     """Displacement gradient (3, 3) from displacements (11, 3) and gradients (11, 3)."""
     result = np.zeros((3, 3))
@@ -56,7 +56,7 @@ def _gradient(motion: FloatArray, gradients: FloatArray) -> FloatArray:
     return result
 
 
-@njit(cache=True)
+@compiled
 def _stress(whole: FloatArray, deviation: FloatArray, lame: float, shear: float, finite: bool) -> FloatArray:
     """Second Piola-Kirchhoff stress from the displacement gradient and its deviation from the mean."""
     strain = 0.5 * (whole + whole.T)
@@ -70,7 +70,7 @@ def _stress(whole: FloatArray, deviation: FloatArray, lame: float, shear: float,
     return stress
 
 
-@njit(cache=True)
+@compiled
 def _determinant(f: FloatArray) -> float:
     return float(
         f[0, 0] * (f[1, 1] * f[2, 2] - f[1, 2] * f[2, 1])
@@ -79,7 +79,7 @@ def _determinant(f: FloatArray) -> float:
     )
 
 
-@njit(cache=True)
+@compiled
 def _brick(
     motion: FloatArray,
     gradients: FloatArray,
@@ -138,7 +138,7 @@ def _brick(
     return True
 
 
-@njit(cache=True)
+@compiled
 def _add_geometric_stiffness(here: FloatArray, mean: FloatArray, stress: FloatArray, matrix: FloatArray) -> None:
     """Add the stress times the second derivative of the strain, which has no square of the deviation."""
     deviation = here - mean
@@ -149,7 +149,7 @@ def _add_geometric_stiffness(here: FloatArray, mean: FloatArray, stress: FloatAr
                 matrix[3 * i + a, 3 * j + a] += whole[i, j]
 
 
-@njit(cache=True)
+@compiled
 def _cholesky(matrix: FloatArray, right: FloatArray) -> bool:
     """Factorise `matrix` in place and solve for the columns of `right` in place; false unless positive definite."""
     size, columns = right.shape
@@ -175,7 +175,7 @@ def _cholesky(matrix: FloatArray, right: FloatArray) -> bool:
     return True
 
 
-@njit(cache=True)
+@compiled
 def _all_bricks(
     displacement: FloatArray,
     modes: FloatArray,
@@ -225,7 +225,7 @@ def _all_bricks(
     return -1
 
 
-@njit(cache=True)
+@compiled
 def _cauchy_stress(
     displacement: FloatArray,
     modes: FloatArray,

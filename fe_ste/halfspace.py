@@ -14,13 +14,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from fe_ste.compilation import compiled
 
 FloatArray = NDArray[np.float64]
 
 
-@njit(cache=True, fastmath=False)
+@compiled
 def interior_normal_displacement(across: float, along: float, depth: float, poissons_ratio: float) -> float:
     """Evaluate the normal displacement inside a half-space under a unit normal point load.
 
@@ -48,7 +49,7 @@ def interior_normal_displacement(across: float, along: float, depth: float, pois
     return depth * depth / (square * distance) + 2.0 * (1.0 - poissons_ratio) / distance
 
 
-@njit(cache=True, fastmath=False)
+@compiled
 def _weighted_difference(x: float, high: float, low: float, to_high: float, to_low: float) -> float:
     """Evaluate x [asinh(high / |x|) - asinh(low / |x|)] with one logarithm; ``to_high`` is hypot(x, high)."""
     if x == 0.0:
@@ -59,7 +60,7 @@ def _weighted_difference(x: float, high: float, low: float, to_high: float, to_l
     return x * math.log(above * below / (x * x))
 
 
-@njit(cache=True, fastmath=False)
+@compiled
 def rectangle_integral(across: float, along: float, half_across: float, half_along: float) -> float:
     """Integral of 1 / distance over a rectangle, seen from a point of the surface (Love's uniform pressure).
 
@@ -93,7 +94,7 @@ def rectangle_integral(across: float, along: float, half_across: float, half_alo
     )
 
 
-@njit(cache=True)
+@compiled
 def tent_displacements(
     roll: FloatArray,
     axial: FloatArray,

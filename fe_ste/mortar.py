@@ -13,8 +13,9 @@ from functools import cached_property
 
 import numpy as np
 import scipy.sparse
-from numba import njit
 from numpy.typing import NDArray
+
+from fe_ste.compilation import compiled
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -118,7 +119,7 @@ class WeightedGap:
         return np.where(facing, self.gap / np.where(facing, self.weight, 1.0), np.inf)
 
 
-@njit(cache=True)
+@compiled
 def _cut(polygon: FloatArray, count: int, window: FloatArray, result: FloatArray, spare: FloatArray) -> int:
     """Cut a polygon by a convex one, both counter-clockwise (Sutherland and Hodgman); the number of corners left."""
     result[:count] = polygon[:count]
@@ -145,7 +146,7 @@ def _cut(polygon: FloatArray, count: int, window: FloatArray, result: FloatArray
     return count
 
 
-@njit(cache=True)
+@compiled
 def _shape(s: float, t: float, values: FloatArray) -> None:
     values[0] = 0.25 * (1.0 - s) * (1.0 - t)
     values[1] = 0.25 * (1.0 + s) * (1.0 - t)
@@ -153,7 +154,7 @@ def _shape(s: float, t: float, values: FloatArray) -> None:
     values[3] = 0.25 * (1.0 - s) * (1.0 + t)
 
 
-@njit(cache=True)
+@compiled
 def _shape_at(corners: FloatArray, x: float, y: float, values: FloatArray) -> None:
     """Bilinear shape functions of a plane quadrilateral at a point, by Newton."""
     s, t = 0.0, 0.0
@@ -176,7 +177,7 @@ def _shape_at(corners: FloatArray, x: float, y: float, values: FloatArray) -> No
     _shape(s, t, values)
 
 
-@njit(cache=True)
+@compiled
 def _flatten(corners: FloatArray, origin: FloatArray, axes: FloatArray, reverse: bool, result: FloatArray) -> None:
     for corner in range(4):
         at = 3 - corner if reverse else corner
@@ -187,7 +188,7 @@ def _flatten(corners: FloatArray, origin: FloatArray, axes: FloatArray, reverse:
             result[corner, axis] = total
 
 
-@njit(cache=True)
+@compiled
 def _plane(corners: FloatArray, origin: FloatArray, axes: FloatArray) -> float:
     """Middle, two axes and normal of a facet's plane; its area."""
     for k in range(3):
@@ -202,7 +203,7 @@ def _plane(corners: FloatArray, origin: FloatArray, axes: FloatArray) -> float:
     return float(0.5 * twice_area)
 
 
-@njit(cache=True)
+@compiled
 def _integrate_pairs(
     points: FloatArray,
     first: IntArray,
@@ -275,7 +276,7 @@ def _integrate_pairs(
                             gradients[number, a, 4 + b, axis] += weight * shape_two[b] * normal[axis]
 
 
-@njit(cache=True)
+@compiled
 def _facing_pairs(points: FloatArray, first: IntArray, second: IntArray, reach: float) -> IntArray:
     """Pairs of facets whose boxes come within `reach` and whose normals point against each other."""
     count_one, count_two = len(first), len(second)
