@@ -116,11 +116,13 @@ def write_file(path: Path, content: ReadableBuffer) -> None:
         _write_all(file, content)
 
 
-def write_sealed(path: Path, content: ReadableBuffer) -> None:
-    """Write a file whole or not at all, with the checksum of its content behind it."""
+def write_sealed(path: Path, content: ReadableBuffer) -> str:
+    """Write a file whole or not at all, with the checksum of its content behind it; return that."""
+    checksum = hashlib.sha256(content).hexdigest()
     with replacement(path) as file:
         _write_all(file, content)
-        _write_all(file, _seal(hashlib.sha256(content).hexdigest()))
+        _write_all(file, _seal(checksum))
+    return checksum
 
 
 def seal(file: IO[bytes]) -> None:
