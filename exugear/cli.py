@@ -244,14 +244,18 @@ def run(
     Ctrl-C keeps what was reached. Tables that are missing or do not fit the case are computed first.
     """
     with exit_codes():
+        from exugear.runup import refuse_if_busy, refuse_to_resume, run_directory
+
         gearbox = read_gearbox(case)
         loads = load_case or next(iter(gearbox.load_cases), "")
         _check_choices(gearbox, variant, mesh_law, inertias, loads)
         _check_solver(gearbox, variant, solver)
         inertias = inertias or gearbox.case.default_inertias
         folder = _results_folder(case, out, make=not resume)
-        if resume and not _partial_run(folder, variant.value, loads, mesh_law.value, inertias).is_file():
-            raise BadInputError(f"--resume: no run of these choices was stopped in {folder}; run without it")
+        directory = run_directory(folder, variant.value, loads, mesh_law.value, inertias)
+        refuse_if_busy(directory)
+        if resume and (reason := refuse_to_resume(directory)):
+            raise BadInputError(f"--resume: {reason}; run without it")
         _fill_missing_tables(gearbox, folder, mesh_law)
         with _time_noted(folder, f"run, {variant}, {loads}, {inertias}, {mesh_law}, solver {solver}"):
             finished = _simulate(
@@ -310,8 +314,6 @@ def report(
                 written = write_report(folder, near, lambda what: bar.update(task, description=what))
         except (CaseError, ReportError) as error:
             raise BadInputError(error) from error
-        except OSError as error:
-            raise FailedError(f"report of {folder}: {error}") from error
         _report_report(folder, written.path, written.statements, written.left_out, as_json)
 
 
@@ -384,8 +386,6 @@ def _fill_reference(order: ReferenceOrder, bar: Progress, task: TaskID) -> Nonli
         return order.fill(at_iteration)
     except GeometryError as error:
         raise BadInputError(f"pairs.{order.name}: {error}") from error
-    except OSError as error:
-        raise FailedError(f"{order.name}: {error}") from error
 
 
 def _fill_tables(orders: list[TableOrder]) -> dict[str, MeshTable]:
@@ -419,7 +419,7 @@ def _fill_table(order: TableOrder, bar: Progress, task: TaskID) -> MeshTable:
         return order.fill(at_state)
     except GeometryError as error:
         raise BadInputError(f"pairs.{order.name}: {error}") from error
-    except (FactorisationError, SweepError, OSError) as error:
+    except (FactorisationError, SweepError) as error:
         raise FailedError(f"{order.name}: {error}") from error
 
 
@@ -439,12 +439,6 @@ def _results_folder(case: Path, out: Path | None, make: bool = True) -> Path:
     if make:
         make_results_folder(folder)
     return folder
-
-
-def _partial_run(folder: Path, variant: str, load_case: str, law: str, inertias: str) -> Path:
-    from exugear.runup import run_directory
-
-    return run_directory(folder, variant, load_case, law, inertias) / "run.partial.nc"
 
 
 def _check_choices(
@@ -639,11 +633,11 @@ def _simulate(
 ) -> Run:
     """Run a load case behind a progress bar."""
     from exugear.mesh_stiffness import mesh_stiffness
-    from exugear.runup import RunError, simulate
+    from exugear.runup import RunError, refuse_to_resume, run_directory, simulate
 
-    partial = _partial_run(folder, variant, load_case, law, inertias)
-    if not resume and partial.is_file():
-        note(f"{partial}: a stopped run is begun anew; --resume would have gone on from it")
+    directory = run_directory(folder, variant, load_case, law, inertias)
+    if not resume and not refuse_to_resume(directory):
+        note(f"{directory}: a stopped run is begun anew; --resume would have gone on from it")
     _reduce_elastic_bodies(gearbox, folder, variant, inertias)
     with progress_bar() as bar:
         task = bar.add_task(f"{variant}: start in balance", total=None)
@@ -667,7 +661,7 @@ def _simulate(
                     resume=resume,
                     progress=show,
                 )
-        except (RunError, OSError) as error:
+        except RunError as error:
             raise FailedError(error) from error
 
 
@@ -675,25 +669,24 @@ def _report_run(case: Path, finished: Run, as_json: bool) -> None:
     """Print what a run reached; end with 130 if it was stopped."""
     if not finished.complete:
         raise StoppedError(f"at {finished.end:.3f} s; kept in {finished.path}, --resume goes on from there")
-    import xarray as xr
-
-    from exugear.channels import energy_residual
+    from exugear.channels import BALANCE_TERMS, energy_residual
     from exugear.gearbox import RPM
+    from exugear.runfile import MESH_TIMES, load_run
 
-    with xr.open_dataset(finished.path, engine="h5netcdf") as data:
-        outside = float(data["outside_time"].max())
-        summary = {
-            "case": str(case),
-            **{key: str(data.attrs[key]) for key in ("variant", "load_case", "mesh_law", "inertias", "solver")},
-            "file": str(finished.path),
-            "simulated_s": finished.end,
-            "wall_s": round(finished.wall, 2),
-            "input_speed_rpm": float(data["input_speed"][-1]) / RPM,
-            "energy_not_accounted_for": energy_residual(data),
-            "longest_pull_of_a_mesh_s": float(data["pulling_time"].max()),
-            "longest_time_apart_s": float(data["apart_time"].max()),
-            "longest_time_outside_table_s": outside,
-        }
+    data = load_run(finished.path, ("input_speed", *MESH_TIMES, *BALANCE_TERMS))
+    outside = float(data["outside_time"].max())
+    summary = {
+        "case": str(case),
+        **{key: str(data.attrs[key]) for key in ("variant", "load_case", "mesh_law", "inertias", "solver")},
+        "file": str(finished.path),
+        "simulated_s": finished.end,
+        "wall_s": round(finished.wall, 2),
+        "input_speed_rpm": float(data["input_speed"][-1]) / RPM,
+        "energy_not_accounted_for": energy_residual(data),
+        "longest_pull_of_a_mesh_s": float(data["pulling_time"].max()),
+        "longest_time_apart_s": float(data["apart_time"].max()),
+        "longest_time_outside_table_s": outside,
+    }
     if as_json:
         print_json({key: None if value != value else value for key, value in summary.items()})
         return

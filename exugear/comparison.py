@@ -14,6 +14,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from exugear.orders import run_waterfall
+from exugear.runfile import load_run
 from exugear.spectra import (
     AbsenceRule,
     OrderLine,
@@ -124,7 +125,7 @@ def read_run(
     Parameters
     ----------
     path : path
-        ``run.nc``, or the partial file of a run that was stopped.
+        ``run.nc``, or ``run.partial`` of a run that was stopped.
     lines : sequence of OrderLine
         Where to look for resonances.
     modes : xarray.Dataset, optional
@@ -136,9 +137,10 @@ def read_run(
     ------
     ValueError
         The run is too short for a spectrum, or its speed does not change.
+    FileError
+        The run is missing or damaged.
     """
-    with xr.open_dataset(path, engine="h5netcdf") as data:
-        attributes = dict(data.attrs)
+    attributes = load_run(path, ()).attrs
     spectra = run_waterfall(path, window_length)
     return VariantRun(Path(path), attributes, spectra, pick_resonances(spectra, lines), modes)
 

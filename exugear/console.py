@@ -80,7 +80,8 @@ interruption = Interruption()
 def exit_codes() -> Iterator[None]:
     """Turn errors the user can act on into one message and an exit code; others keep their traceback.
 
-    2 after `BadInputError`, 1 after `FailedError`, 130 after `StoppedError` and Ctrl-C.
+    2 after `BadInputError`, 1 after `FailedError` and whatever goes wrong in reading and writing, 130 after
+    `StoppedError` and Ctrl-C.
     """
     try:
         with interruption.listening():
@@ -93,6 +94,15 @@ def exit_codes() -> Iterator[None]:
         _end("Stopped", error, EXIT_INTERRUPTED)
     except KeyboardInterrupt:
         _end("Stopped", "finished results are kept; the same command goes on from there", EXIT_INTERRUPTED)
+    except OSError as error:
+        _end("Failed", _of_a_file(error), EXIT_FAILED)
+    except MemoryError as error:
+        _end("Failed", f"out of memory ({error})" if str(error) else "out of memory", EXIT_FAILED)
+
+
+def _of_a_file(error: OSError) -> str:
+    """File and reason; what the program says of a file by itself names it already."""
+    return f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error)
 
 
 def _end(what: str, reason: object, code: int) -> NoReturn:

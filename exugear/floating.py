@@ -15,9 +15,7 @@ Nothing here knows a solver; Exudyn's floating frame is in `exugear.flexible`.
 from __future__ import annotations
 
 import math
-import os
-import tempfile
-import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from pathlib import Path
@@ -27,7 +25,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from exugear.reduction import ReducedBody, ReductionError, RigidInertia, kept
+from exugear.reduction import ReducedBody, ReductionError, RigidInertia, keep_arrays, kept, kept_arrays
 from exugear.solids import ReducedSolid, SolidModel, in_each_direction, reduce_matrices, reduced_body
 
 Floats: TypeAlias = NDArray[np.float64]
@@ -176,34 +174,20 @@ def load_or_reduce_floating(model: SolidModel, folder: Path | None) -> tuple[Red
     if folder is None:
         return reduced_body(model, matrices()), floating_body(model, matrices())
     name = f"{model.name}-{model.key[:16]}"
-    reduced = kept(folder / f"{name}.npz", lambda: reduced_body(model, matrices()))
+    reduced = kept(folder / f"{name}.npz", model.key, lambda: reduced_body(model, matrices()))
     path = folder / f"{name}-floating.npz"
-    try:
-        return reduced, _loaded(path)
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
-        body = floating_body(model, matrices())
-        _keep(body, path)
-        return reduced, body
+    arrays = kept_arrays(path, model.key)
+    if arrays is not None:
+        return reduced, _from_arrays(arrays)
+    body = floating_body(model, matrices())
+    keep_arrays(path, model.key, {one.name: np.asarray(getattr(body, one.name)) for one in fields(body)})
+    return reduced, body
 
 
-def _keep(body: FloatingBody, path: Path) -> None:
-    """Write a body so that others see the whole file or none."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            arrays: dict[str, Any] = {one.name: np.asarray(getattr(body, one.name)) for one in fields(body)}
-            np.savez_compressed(file, **arrays)
-        Path(temporary).chmod(0o644)
-        os.replace(temporary, path)
-    finally:
-        Path(temporary).unlink(missing_ok=True)
-
-
-def _loaded(path: Path) -> FloatingBody:
-    with path.open("rb") as raw, np.load(raw) as file:
-        arrays = {one.name: file[one.name] for one in fields(FloatingBody)}
-    arrays |= {"name": str(arrays["name"]), "mass": float(arrays["mass"])}
-    return FloatingBody(**{**arrays, "seats": tuple(arrays["seats"].tolist())})
+def _from_arrays(arrays: Mapping[str, NDArray[Any]]) -> FloatingBody:
+    values: dict[str, Any] = {one.name: arrays[one.name] for one in fields(FloatingBody)}
+    values |= {"name": str(values["name"]), "mass": float(values["mass"]), "seats": tuple(values["seats"].tolist())}
+    return FloatingBody(**values)
 
 
 def _skew(vectors: Floats) -> Floats:

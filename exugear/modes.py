@@ -32,6 +32,8 @@ from exugear.reduction import ReducedBody
 from exugear.results import input_hash
 from exugear.statics import locked_equilibrium
 from exugear.turning import TurningBody
+from exugear.versions import MODES
+from fe_ste.files import Layout, load_dataset, write_dataset
 
 Floats = NDArray[np.float64]
 DIFFERENCE_STEP = 1e-6
@@ -181,6 +183,7 @@ class Modes:
             "mesh_law": assembly.law,
             "inertias": assembly.inertias,
             "input_hash": input_hash(assembly),
+            "method_version": MODES,
             "housing_factor": assembly.housing_factor,
             "growth_rate": self.growth_rate,
         }
@@ -189,10 +192,43 @@ class Modes:
     def save(self, path: str | Path) -> Path:
         """Write to netCDF (atomically) and return the path."""
         path = Path(path)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        partial = path.with_suffix(".partial.nc")
-        self.to_dataset().to_netcdf(partial, engine="h5netcdf")
-        return partial.replace(path)
+        write_dataset(path, self.to_dataset())
+        return path
+
+
+_LAYOUT = Layout(
+    "eigenmodes",
+    MODES,
+    {
+        "frequency": ("mode",),
+        "damping_ratio": ("mode",),
+        "shape": ("coordinate", "mode"),
+        "strain_energy_share": ("mode", "element"),
+        "kinetic_energy_share": ("mode", "body", "motion"),
+        "overall_dte": ("mode",),
+        "amplification": ("mode", "mesh"),
+        "name": ("mode",),
+    }
+    | {name: (name,) for name in ("mode", "coordinate", "element", "body", "motion", "mesh")},
+    ("gearbox", "variant", "mesh_law", "inertias", "input_hash", "housing_factor", "growth_rate"),
+)
+
+
+def load_modes(path: str | Path) -> xr.Dataset:
+    """Read what `Modes.save` wrote.
+
+    Raises
+    ------
+    FileError
+        The file is missing, damaged, or of another version.
+
+    Examples
+    --------
+    >>> load_modes("nowhere/modes.nc")
+    Traceback (most recent call last):
+    fe_ste.files.FileError: nowhere/modes.nc: no such file
+    """
+    return load_dataset(Path(path), _LAYOUT)
 
 
 def coordinate_labels(assembly: Assembly) -> list[str]:

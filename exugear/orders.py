@@ -6,9 +6,9 @@ import math
 from pathlib import Path
 
 import numpy as np
-import xarray as xr
 
 from exugear.gearbox import Gearbox
+from exugear.runfile import load_run
 from exugear.spectra import OrderLine, Waterfall, harmonics, sweep_matched_window, waterfall
 
 
@@ -44,7 +44,7 @@ def run_waterfall(path: str | Path, window_length: float | None = None) -> Water
     Parameters
     ----------
     path : path
-        ``run.nc`` of a run-up.
+        ``run.nc`` of a run-up, or ``run.partial``.
     window_length : float, optional
         s; what suits the fastest first-order sweep by default. Runs to be compared need the same.
 
@@ -52,12 +52,14 @@ def run_waterfall(path: str | Path, window_length: float | None = None) -> Water
     ------
     ValueError
         The speed does not change, so that nothing says how long a window should be, or the run is too short.
+    FileError
+        The run is missing or damaged.
     """
-    with xr.open_dataset(path, engine="h5netcdf") as data:
-        time = data["time"].to_numpy()
-        speed = data["input_speed"].to_numpy()
-        values = data["overall_dte"].to_numpy()
-        highest_order = float(data.attrs["highest_order"])
+    data = load_run(path, ("time", "input_speed", "overall_dte"))
+    time = data["time"].to_numpy()
+    speed = data["input_speed"].to_numpy()
+    values = data["overall_dte"].to_numpy()
+    highest_order = float(data.attrs["highest_order"])
     if time.size < 2:
         raise ValueError(f"{path}: holds {time.size} samples, too few for a spectrum; run for longer")
     if window_length is None:

@@ -13,9 +13,9 @@ the seats' turning about z is the spin, with Omega = r' M q' / (r' M r) for the 
 from __future__ import annotations
 
 import hashlib
+import io
 import json
-import os
-import tempfile
+import logging
 import time
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
@@ -30,8 +30,9 @@ import scipy.sparse
 import scipy.sparse.csgraph
 from numpy.typing import NDArray
 
-from exugear import meridian
 from exugear.meridian import STANDARD_SIZE, Harmonic, MeshSize, Motion, SeatBand, Shaft, ShaftSection
+from exugear.versions import REDUCTION
+from fe_ste.files import FileError, read_sealed, write_sealed
 from fe_ste.gears import Material
 from fe_ste.sparse import Backend, Factorisation, factorise
 
@@ -44,6 +45,7 @@ MOST_STEPS = 150
 """Lanczos steps after which the search for free vibrations is given up."""
 CONVERGED = 1e-9
 """Relative residual of a free vibration; its frequency is then exact to the square of it."""
+_log = logging.getLogger(__name__)
 NEGLIGIBLE = 1e-8
 """Share of a free vibration that the static shapes must leave over for it to count as a shape of its own."""
 
@@ -451,10 +453,9 @@ class ShaftModel:
 
     @property
     def key(self) -> str:
-        """SHA-256 of these inputs and of the code that reduces them."""
-        code = [Path(str(file)).read_bytes() for file in (__file__, meridian.__file__)]
-        text = json.dumps(asdict(self), sort_keys=True)
-        return hashlib.sha256(b"".join([text.encode(), *code])).hexdigest()
+        """SHA-256 of these inputs and of the version of the method that reduces them."""
+        text = json.dumps({"method_version": REDUCTION, **asdict(self)}, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
 
 
 def reduce_shaft(model: ShaftModel) -> ReducedBody:
@@ -506,25 +507,44 @@ def reduce_shaft(model: ShaftModel) -> ReducedBody:
 
 def load_or_reduce(model: ShaftModel, folder: Path) -> ReducedBody:
     """Reduced shaft from a folder if it is there for exactly these inputs, else reduced and kept there."""
-    return kept(folder / f"{model.name}-{model.key[:16]}.npz", lambda: reduce_shaft(model))
+    return kept(folder / f"{model.name}-{model.key[:16]}.npz", model.key, lambda: reduce_shaft(model))
 
 
-def kept(path: Path, reduce: Callable[[], ReducedBody]) -> ReducedBody:
-    """Body from a file, or reduced and kept there if the file is missing, cut short or of another making."""
+def kept(path: Path, key: str, reduce: Callable[[], ReducedBody]) -> ReducedBody:
+    """Body from a file, or reduced and kept there if the file is missing, damaged or of another key."""
+    arrays = kept_arrays(path, key)
+    if arrays is not None:
+        return _from_arrays(arrays)
+    body = reduce()
+    keep_arrays(path, key, _arrays_of(body))
+    return body
+
+
+def keep_arrays(path: Path, key: str, arrays: Mapping[str, Any]) -> None:
+    """Write arrays into a sealed file of a key."""
+    content = io.BytesIO()
+    np.savez_compressed(content, key=np.array(key), **arrays)
+    write_sealed(path, content.getbuffer())
+
+
+def kept_arrays(path: Path, key: str) -> dict[str, NDArray[Any]] | None:
+    """Read what `keep_arrays` wrote; nothing if the file is missing, damaged or of another key."""
+    if not path.exists():
+        return None
     try:
-        return _loaded(path)
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
-        body = reduce()
-        _keep(body, path)
-        return body
+        with np.load(io.BytesIO(read_sealed(path)), allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+    except (FileError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        _log.warning("%s; the body is reduced again", error)
+        return None
+    return arrays if str(arrays.pop("key", "")) == key else None
 
 
 _MATRICES = ("mass", "stiffness", "gyroscopic", "spin")
 _SURFACE = ("points", "quads", "displacement", "strain", "elasticity")
 
 
-def _keep(body: ReducedBody, path: Path) -> None:
-    """Write a reduced body so that others see the whole file or none."""
+def _arrays_of(body: ReducedBody) -> dict[str, NDArray[Any]]:
     words = {
         "name": body.name,
         "seats": [[seat.name, seat.place] for seat in body.seats],
@@ -534,32 +554,23 @@ def _keep(body: ReducedBody, path: Path) -> None:
     }
     arrays = {name: getattr(body, name) for name in _MATRICES}
     arrays |= {name: getattr(body.surface, name) for name in _SURFACE}
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            np.savez_compressed(file, words=np.array(json.dumps(words)), **arrays)
-        Path(temporary).chmod(0o644)
-        os.replace(temporary, path)
-    finally:
-        Path(temporary).unlink(missing_ok=True)
+    return {"words": np.array(json.dumps(words)), **arrays}
 
 
-def _loaded(path: Path) -> ReducedBody:
-    with path.open("rb") as raw, np.load(raw) as file:
-        words = json.loads(str(file["words"]))
-        figures = words["figures"]
-        for key in ("free_frequencies", "lowered"):
-            figures[key] = {motion: tuple(values) for motion, values in figures[key].items()}
-        return ReducedBody(
-            name=words["name"],
-            seats=tuple(Seat(name, (place[0], place[1], place[2])) for name, place in words["seats"]),
-            **{name: file[name] for name in _MATRICES},
-            frame=words["frame"],
-            groups=tuple(words["groups"]),
-            surface=Surface(**{name: file[name] for name in _SURFACE}),
-            figures=Figures(**figures),
-        )
+def _from_arrays(arrays: Mapping[str, NDArray[Any]]) -> ReducedBody:
+    words = json.loads(str(arrays["words"]))
+    figures = words["figures"]
+    for key in ("free_frequencies", "lowered"):
+        figures[key] = {motion: tuple(values) for motion, values in figures[key].items()}
+    return ReducedBody(
+        name=words["name"],
+        seats=tuple(Seat(name, (place[0], place[1], place[2])) for name, place in words["seats"]),
+        **{name: arrays[name] for name in _MATRICES},
+        frame=words["frame"],
+        groups=tuple(words["groups"]),
+        surface=Surface(**{name: arrays[name] for name in _SURFACE}),
+        figures=Figures(**figures),
+    )
 
 
 def _blank_masses(model: ShaftModel, motion: Motion) -> Floats:

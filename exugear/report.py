@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from exugear import page
 from exugear.assembly import Assembly, VariantError, assemble
-from exugear.channels import energy_residual
+from exugear.channels import BALANCE_TERMS, energy_residual
 from exugear.comparison import (
     NEAR,
     REFERENCE_FREQUENCY,
@@ -33,16 +33,17 @@ from exugear.comparison import (
 from exugear.elastic_scene import draw_elastic_bodies, elastic_scene
 from exugear.gearbox import CaseError, Gearbox
 from exugear.mesh_stiffness import iso6336_stiffness, mesh_stiffness
-from exugear.modes import Modes, modes_of
+from exugear.modes import Modes, load_modes, modes_of
 from exugear.orders import order_lines
 from exugear.plots import Sensitivity, plot_mode_energies, plot_order_levels, plot_sensitivities, plot_waterfalls
 from exugear.results import REPORT_FILE, bodies_folder, input_hash, kept_case, times_spent
-from exugear.runfile import MESH_TIMES
+from exugear.runfile import FINAL_NAME, MESH_TIMES, PARTIAL_NAME, load_run
 from exugear.scene import draw_mode
 from exugear.sensitivity import Remedy, Sweep, parameters_of, remedies, sweep_modes
 from exugear.shapes import bodies_of, mode_scene, motions_of
 from exugear.tables import PICTURE_FOLDER, fitting_table
 from exugear.tooth_contact import MeshError
+from fe_ste.files import FileError, write_file
 from fe_ste.interpolation import SteSurface
 from fe_ste.scene import RenderingError
 from fe_ste.table import MeshTable, TableError
@@ -203,7 +204,8 @@ def write_report(
         head.append(page.section("Left out", page.bullets(writer.left_out)))
     head.append(_assumptions_section(writer))
     path = folder / REPORT_FILE
-    path.write_text(page.whole(f"{writer.gearbox.name}: transmission error and dynamics", *head, *body), "utf-8")
+    whole = page.whole(f"{writer.gearbox.name}: transmission error and dynamics", *head, *body)
+    write_file(path, whole.encode("utf-8"))
     return Report(path, tuple(writer.statements), tuple(writer.left_out), tuple(writer.pictures))
 
 
@@ -227,9 +229,9 @@ def _tables(writer: _Writer) -> dict[str, MeshTable]:
 def _stored_modes(writer: _Writer) -> Iterator[tuple[Model, xr.Dataset]]:
     for path in sorted(writer.folder.glob("*/*/modes.nc")):
         try:
-            data = xr.load_dataset(path, engine="h5netcdf")
-        except (OSError, ValueError) as error:
-            writer.left_out.append(f"{path.relative_to(writer.folder)}: cannot be read ({error})")
+            data = load_modes(path)
+        except FileError as error:
+            writer.left_out.append(str(error))
             continue
         if writer.fits(path, data.attrs):
             yield Model.of(data.attrs), data
@@ -239,18 +241,20 @@ def _stored_runs(writer: _Writer, modes: Mapping[Model, xr.Dataset]) -> Iterator
     """Read the runs that fit; those to be compared share one window."""
     lines = order_lines(writer.gearbox)
     windows: dict[tuple[str, ...], float] = {}
-    for path in sorted(writer.folder.glob("*/*/run*.nc")):
-        if path.name == "run.partial.nc" and path.with_name("run.nc").is_file():
-            continue
+    whole = set(writer.folder.glob(f"*/*/{FINAL_NAME}"))
+    stopped = {path for path in writer.folder.glob(f"*/*/{PARTIAL_NAME}") if path.with_name(FINAL_NAME) not in whole}
+    for path in sorted(whole | stopped):
         try:
-            with xr.open_dataset(path, engine="h5netcdf") as data:
-                attributes = dict(data.attrs)
+            attributes = load_run(path, ()).attrs
             if not writer.fits(path, attributes):
                 continue
             writer.tell(f"spectra of {path.relative_to(writer.folder)}")
             key = _run_key(attributes)
             run = read_run(path, lines, modes.get(Model.of(attributes)), windows.get(key))
-        except (OSError, ValueError) as error:
+        except FileError as error:
+            writer.left_out.append(str(error))
+            continue
+        except ValueError as error:
             writer.left_out.append(f"{path.relative_to(writer.folder)}: {error}")
             continue
         windows[key] = run.spectra.window_length
@@ -366,10 +370,10 @@ def _levels_picture(writer: _Writer, runs: Sequence[VariantRun], label: str, fil
 
 
 def _run_row(run: VariantRun) -> dict[str, object]:
-    with xr.open_dataset(run.path, engine="h5netcdf") as data:
-        times = [float(data[name].max()) for name in MESH_TIMES]
-        figures = energy_residual(data)
-        end = float(data["time"][-1])
+    data = load_run(run.path, ("time", *MESH_TIMES, *BALANCE_TERMS))
+    times = [float(data[name].max()) for name in MESH_TIMES]
+    figures = energy_residual(data)
+    end = float(data["time"][-1])
     return {
         "variant": run.variant,
         "solver": run.attributes["solver"],

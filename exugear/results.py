@@ -5,9 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import os
 import sys
-import tempfile
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -17,6 +15,8 @@ import numpy as np
 
 from exugear.assembly import Assembly
 from exugear.gearbox import CaseError, Gearbox
+from exugear.versions import MODES, REDUCTION, RUN
+from fe_ste.files import FileError, append_line, read_text, write_file
 from fe_ste.interpolation import SteSurface
 
 CASE_FILE = "case.json"
@@ -26,6 +26,8 @@ REPORT_FILE = "report.html"
 
 def input_hash(assembly: Assembly, load_case: str | None = None) -> str:
     """SHA-256 of all that the equations of a variant depend on: gearbox file with its solids, choices, mesh stiffness.
+
+    The versions of the methods are part of it.
 
     Parameters
     ----------
@@ -45,6 +47,8 @@ def input_hash(assembly: Assembly, load_case: str | None = None) -> str:
     gearbox = assembly.gearbox
     series = gearbox.load_cases[load_case].torque_series if load_case else None
     content = {
+        "method_version": RUN if load_case else MODES,
+        "reduction_version": REDUCTION if assembly.elastic_bodies else None,
         "gearbox": gearbox.content,
         "variant": assembly.variant,
         "law": assembly.law,
@@ -79,8 +83,14 @@ def _digest(surface: SteSurface) -> str:
 
 def keep_case(gearbox: Gearbox, folder: Path) -> None:
     """Write the content of the gearbox file into the results folder, so that a report needs nothing else."""
-    content = {"source": str(Path(gearbox.source).resolve()), "content": gearbox.content}
-    _replace(folder / CASE_FILE, json.dumps(content, indent=1))
+    kept = {"source": str(Path(gearbox.source).resolve()), "content": gearbox.content}
+    write_file(folder / CASE_FILE, json.dumps({**kept, "checksum": _checksum(kept)}, indent=1).encode("utf-8"))
+
+
+def _checksum(kept: dict[str, Any]) -> str:
+    """Checksum of a case as it is kept, however it is set out."""
+    text = json.dumps([kept["source"], kept["content"]], sort_keys=True)
+    return hashlib.sha256(text.encode("utf-8")).hexdigest()
 
 
 def kept_case(folder: Path) -> Gearbox:
@@ -95,20 +105,15 @@ def kept_case(folder: Path) -> Gearbox:
     if not path.is_file():
         raise CaseError(f"{folder}: holds no results (no {CASE_FILE}); name the folder that `exugear run` wrote into")
     try:
-        kept = json.loads(path.read_text(encoding="utf-8"))
+        kept = json.loads(read_text(path))
+        if kept["checksum"] != _checksum(kept):
+            raise ValueError("it was changed since it was written")
         return Gearbox.from_dict(kept["content"], kept["source"])
-    except (ValueError, KeyError, TypeError) as error:
-        raise CaseError(f"{path}: cannot be used ({error}); run `exugear modes` into this folder again") from error
-
-
-def _replace(path: Path, text: str) -> None:
-    """Write a file so that others see the old one or the new one; two processes may do so at once."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    with os.fdopen(handle, "w", encoding="utf-8") as file:
-        file.write(text)
-    Path(temporary).chmod(0o644)
-    os.replace(temporary, path)
+    # Whoever makes up a file with its checksum may nest it and write numbers as he likes.
+    except (FileError, ValueError, KeyError, TypeError, RecursionError, OverflowError) as error:
+        raise CaseError(
+            f"{path}: cannot be used ({type(error).__name__}: {error}); run `exugear modes` into this folder again"
+        ) from error
 
 
 def modes_path(folder: str | Path, variant: str, law: str, inertias: str) -> Path:
@@ -149,9 +154,7 @@ def peak_memory() -> float:
 
 def note_time(folder: Path, step: str, seconds: float) -> None:
     """Add a line to the folder's account of time; processes may do so at once."""
-    line = json.dumps(asdict(Spent(step, round(seconds, 2), peak_memory()))) + "\n"
-    with (folder / TIMES_FILE).open("a", encoding="utf-8") as file:
-        file.write(line)
+    append_line(folder / TIMES_FILE, json.dumps(asdict(Spent(step, round(seconds, 2), peak_memory()))))
 
 
 def times_spent(folder: Path) -> tuple[Spent, ...]:
@@ -164,11 +167,15 @@ def times_spent(folder: Path) -> tuple[Spent, ...]:
 
 
 def _lines(path: Path) -> Iterator[Spent]:
-    if not path.is_file():
-        return
-    for line in path.read_text(encoding="utf-8").splitlines():
+    try:
+        lines = read_text(path).splitlines()
+    except FileError:
+        return  # an account that is missing or is none
+    for line in lines:
         try:
             values: dict[str, Any] = json.loads(line)
-            yield Spent(str(values["step"]), float(values["seconds"]), float(values["memory"]))
-        except (ValueError, KeyError, TypeError):
+            spent = Spent(str(values["step"]), float(values["seconds"]), float(values["memory"]))
+        except (ValueError, KeyError, TypeError, RecursionError, OverflowError):
             continue  # a line cut short by a kill says nothing
+        if math.isfinite(spent.seconds):
+            yield spent

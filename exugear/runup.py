@@ -39,8 +39,19 @@ from exugear.compiled import (
 from exugear.gearbox import CaseError, Gearbox, LoadCase
 from exugear.mesh_element import Angles, MeshData
 from exugear.results import bodies_folder, input_hash
-from exugear.runfile import MESH_TIMES, Checkpoint, Decimator, RunFile
+from exugear.runfile import (
+    EARLIER_PARTIAL_NAME,
+    FINAL_NAME,
+    MESH_TIMES,
+    PARTIAL_NAME,
+    Checkpoint,
+    Decimator,
+    RunFile,
+    has_pieces,
+)
 from exugear.statics import accelerating_start
+from exugear.versions import RUN
+from fe_ste.files import exclusive
 
 if TYPE_CHECKING:
     from exugear.system import Loading, MeshRoute
@@ -53,14 +64,15 @@ SOLVERS: tuple[str, ...] = get_args(Solver)
 BAND = 6.4e3
 """Highest frequency whose amplitude is kept, Hz."""
 SAMPLE_RATE = 20e3
+LOCK_NAME = "run.partial.lock"
 FLUSH_INTERVAL = 0.25
 """Simulated time between writes to disk, s."""
 FLUSH_FACTOR = {"compiled": 4, "exudyn": 1}
-"""How many times this interval each solver goes without: opening the file costs as much as 2000 compiled steps."""
+"""How many times this interval each solver goes without: a piece costs as much as 2000 compiled steps."""
 
 
 class RunError(RuntimeError):
-    """A run that went wrong; what was reached before stays in the partial file."""
+    """A run that went wrong; what was reached before is kept."""
 
 
 @dataclass(frozen=True)
@@ -135,20 +147,24 @@ def simulate(
     mesh_route : {"element", "loads"}
         See `exugear.system`; "loads" is Exudyn's alone.
     resume : bool
-        Go on from the partial file of a stopped run.
+        Go on with a run that was stopped.
     progress : callable, optional
         Called about every quarter of a simulated second.
 
     Returns
     -------
     Run
-        Not complete after Ctrl-C; the partial file then holds everything up to there.
+        Not complete after Ctrl-C; its folder then holds everything up to there, see `exugear.runfile.load_run`.
 
     Raises
     ------
     RunError
         The compiled solver does not take the variant or the step, a state that is not finite, a step that Exudyn
         cut, or nothing to resume.
+    FileError
+        Another process is at work on this run.
+    OSError
+        The results cannot be written; what was written before is kept.
     """
     if load_case not in gearbox.load_cases:
         raise gearbox.fault(f"no load case {load_case!r}; load cases are {', '.join(gearbox.load_cases)}")
@@ -159,8 +175,45 @@ def simulate(
     total = case.duration if duration is None else duration
     chosen = _solver(solver, assembly, mesh_route)
     step = choose_step(assembly, sample_rate, band) if step is None else step
-    recorder = Recorder(assembly, case, directory, total, step, band, sample_rate, chosen, resume, progress)
-    return recorder.run(mesh_route)
+    with held(directory):
+        recorder = Recorder(assembly, case, directory, total, step, band, sample_rate, chosen, resume, progress)
+        return recorder.run(mesh_route)
+
+
+@contextmanager
+def held(directory: Path) -> Iterator[None]:
+    """Keep a run to this process; the lock ends with the process, however that ends.
+
+    Raises
+    ------
+    FileError
+        Another process is at work on the run.
+    """
+    with exclusive(directory / LOCK_NAME, f"the run {directory}"):
+        yield
+
+
+def refuse_if_busy(directory: Path) -> None:
+    """Raise what `simulate` would raise if another process is at work on a run; change nothing.
+
+    Raises
+    ------
+    FileError
+    """
+    if (directory / LOCK_NAME).exists():
+        with held(directory):
+            pass
+
+
+def refuse_to_resume(directory: Path) -> str:
+    """Why a run cannot be gone on with; empty if it can."""
+    if has_pieces(directory / PARTIAL_NAME):
+        return ""
+    if (directory / EARLIER_PARTIAL_NAME).exists():
+        return f"{directory / EARLIER_PARTIAL_NAME}: was written by an earlier version, which cannot be gone on with"
+    if (directory / FINAL_NAME).exists():
+        return f"{directory / FINAL_NAME}: is complete, nothing was stopped"
+    return f"{directory}: no run of these choices was stopped here"
 
 
 def _solver(asked: str | None, assembly: Assembly, mesh_route: str) -> str:
@@ -205,8 +258,8 @@ class Recorder:
             )
         self.channels = Channels(assembly)
         self.decimator = Decimator(factor, self.channels.count)
-        self.final_path = directory / "run.nc"
-        self.partial_path = directory / "run.partial.nc"
+        self.final_path = directory / FINAL_NAME
+        self.partial_path = directory / PARTIAL_NAME
         self.progress = progress
         self.balance = np.zeros(len(BALANCE_TERMS))
         self._mesh_times = np.zeros((len(MESH_TIMES), len(self.channels.mesh_names)))
@@ -226,8 +279,9 @@ class Recorder:
         """Open the file and set the state to start from."""
         series = _torque_series(self.assembly.gearbox, case)
         if resume:
-            if not self.partial_path.is_file():
-                raise RunError(f"{self.partial_path}: nothing to resume; run without resuming first")
+            reason = refuse_to_resume(self.partial_path.parent)
+            if reason:
+                raise RunError(f"{reason}; run without resuming")
             self.file = RunFile(self.partial_path, self.channels)
             self._check_same_run(case)
             state = self.file.last_checkpoint()
@@ -238,6 +292,7 @@ class Recorder:
         else:
             self.first_step = 0
             self.q, self.v, offset = _start(self.assembly, case, series)
+            (self.partial_path.parent / EARLIER_PARTIAL_NAME).unlink(missing_ok=True)
             self.file = RunFile(self.partial_path, self.channels, self._attributes(case))
         self.loads = _load_table(case, series, offset, self.assembly.gearbox)
         self.observer = Observer(self.channels, self.loads)
@@ -253,6 +308,7 @@ class Recorder:
             "mesh_law": assembly.law,
             "inertias": assembly.inertias,
             "input_hash": input_hash(assembly, case.name),
+            "method_version": RUN,
             "housing_factor": assembly.housing_factor,
             "ratio": gearbox.ratio,
             "output_base_radius": self.channels.radius,
@@ -278,14 +334,16 @@ class Recorder:
     def _check_same_run(self, case: LoadCase) -> None:
         kept = self.file.attributes
         for key, value in self._attributes(case).items():
-            if key not in ("complete", "solver") and kept[key] != value:
-                raise RunError(f"{self.partial_path}: was run with {key} = {kept[key]}, not {value}; start anew")
+            if key not in ("complete", "solver") and kept.get(key) != value:
+                raise RunError(f"{self.partial_path}: was run with {key} = {kept.get(key)}, not {value}; start anew")
 
     def run(self, mesh_route: MeshRoute) -> Run:
         """Integrate to the end, or to the first fault or interruption."""
         self._wall_start = time.perf_counter()
         with _interruption(self):
-            if self.solver == "compiled":
+            if self.first_step >= self.steps:  # a kill fell between the last step and the joining of the pieces
+                self._last_time = self.first_step * self.step
+            elif self.solver == "compiled":
                 self._integrate()
             else:
                 self._integrate_in_exudyn(mesh_route)
@@ -297,7 +355,7 @@ class Recorder:
         if self._fault:
             raise RunError(f"{self._fault}; what was reached is in {self.partial_path}")
         if complete:
-            self.partial_path.replace(self.final_path)
+            self.file.finish(self.final_path)
         return Run(self.final_path if complete else self.partial_path, complete, self._last_time, wall)
 
     def _integrate_in_exudyn(self, mesh_route: MeshRoute) -> None:
@@ -306,10 +364,21 @@ class Recorder:
 
         system = ExudynSystem(self.assembly, self.q, self.v, _loading(self.loads), mesh_route)
         start = self.first_step * self.step
+        unwritten: list[OSError] = []
+
+        def observe(t: float, q: Floats, v: Floats) -> bool:
+            try:
+                return self._observe(t, q, v)
+            except OSError as error:  # Exudyn would make an error of its own of it
+                unwritten.append(error)
+                return False
+
         try:
-            system.run(start, self.steps - self.first_step, self.step, self._observe, not self._is_implicit)
+            system.run(start, self.steps - self.first_step, self.step, observe, not self._is_implicit)
         except SolverFailure as error:
             self._fault = self._fault or f"Exudyn gave up at t = {self._last_time:.6g} s: {error}"
+        if unwritten:
+            raise unwritten[0]
 
     def _integrate(self) -> None:
         """Let the compiled solver fill the buffers, one call per flush."""

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exugear.shapes import BodyShape, ModeScene, placed
+from fe_ste.files import write_file
 from fe_ste.plots import COLOURS, drawing_style, finish_figure, new_figure
 from fe_ste.scene import drawn_part, offscreen_plotter, place_picture, rendered_image, without_margins
 
@@ -157,7 +158,6 @@ def write_animation(way_out: Sequence[Figure], target: Path, duration: float) ->
 
     if target.suffix.lower() != ".gif":
         raise ValueError(f"animation {target}: the suffix must be .gif")
-    target.parent.mkdir(parents=True, exist_ok=True)
     # A standing wave: the way back shows the pictures of the way out.
     finished = [_set_picture(figure) for figure in way_out]
     pictures = finished + finished[-2:0:-1]
@@ -165,7 +165,10 @@ def write_animation(way_out: Sequence[Figure], target: Path, duration: float) ->
     palette = _with_white(pictures[0].quantize(colors=255, method=Image.Quantize.MEDIANCUT))
     indexed = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     pause = round(1e3 * duration / len(indexed))
-    indexed[0].save(target, save_all=True, append_images=indexed[1:], duration=pause, loop=0, optimize=True)
+    content = io.BytesIO()
+    rest = indexed[1:]
+    indexed[0].save(content, "GIF", save_all=True, append_images=rest, duration=pause, loop=0, optimize=True)
+    write_file(target, content.getbuffer())
     return target
 
 

@@ -32,7 +32,6 @@ import scipy.sparse
 import skfem
 from numpy.typing import NDArray
 
-from exugear import reduction, solid_mesh
 from exugear.reduction import (
     Blank,
     Figures,
@@ -47,6 +46,7 @@ from exugear.reduction import (
     reduce_part,
 )
 from exugear.solid_mesh import SolidError, SolidFile, entity_numbers
+from exugear.versions import REDUCTION
 from fe_ste.elasticity import gradient_products
 from fe_ste.gears import Material
 from fe_ste.sparse import Backend
@@ -314,19 +314,19 @@ class SolidModel:
 
     @property
     def key(self) -> str:
-        """SHA-256 of these inputs and of the code that reduces them."""
+        """SHA-256 of these inputs and of the version of the method that reduces them."""
         words = {
             "material": asdict(self.material),
             "seats": [asdict(seat) for seat in self.seats],
             "blanks": {name: asdict(blank) for name, blank in self.blanks.items()},
+            "method_version": REDUCTION,
             "rest": [self.name, self.frame, self.band, self.limit, self.axis],
         }
-        code = [Path(str(file)).read_bytes() for file in (__file__, reduction.__file__, solid_mesh.__file__)]
         if isinstance(self.mesh, SolidFile):
             shape = [self.mesh.digest]
         else:
             shape = [np.ascontiguousarray(a).tobytes() for a in (self.mesh.doflocs, self.mesh.t)]
-        return hashlib.sha256(b"".join([json.dumps(words, sort_keys=True).encode(), *shape, *code])).hexdigest()
+        return hashlib.sha256(b"".join([json.dumps(words, sort_keys=True).encode(), *shape])).hexdigest()
 
     @property
     def elements(self) -> Any:
@@ -427,7 +427,7 @@ def reduced_body(model: SolidModel, reduced: ReducedSolid) -> ReducedBody:
 
 def load_or_reduce_solid(model: SolidModel, folder: Path) -> ReducedBody:
     """Reduced solid from a folder if it is there for exactly these inputs, else reduced and kept there."""
-    return kept(folder / f"{model.name}-{model.key[:16]}.npz", lambda: reduce_solid(model))
+    return kept(folder / f"{model.name}-{model.key[:16]}.npz", model.key, lambda: reduce_solid(model))
 
 
 def gyroscopic_matrix(model: SolidModel, reduced: ReducedSolid) -> Floats:

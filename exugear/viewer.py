@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from exugear.scene import DISPLACEMENT_COLOURS, body_colours
 from exugear.shapes import ModeScene, displacement_of
+from fe_ste.files import write_file
 
 
 def write_mode_page(
@@ -72,9 +73,8 @@ def write_mode_page(
     # A "</script>" inside a name must not end the script element.
     text = json.dumps(data, separators=(",", ":")).replace("</", "<\\/")
     target = Path(path)
-    target.parent.mkdir(parents=True, exist_ok=True)
     page = _PAGE.replace("@HEADING@", html.escape(heading)).replace("@DATA@", text)
-    target.write_text(page, encoding="utf-8")
+    write_file(target, page.encode("utf-8"))
     return target
 
 

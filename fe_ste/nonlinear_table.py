@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
@@ -18,15 +19,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fe_ste.files import FileError, Layout, load_dataset, write_dataset
 from fe_ste.finite_deformation import von_mises
 from fe_ste.gears import GearPair
 from fe_ste.newton import EquilibriumError, Iteration, convergence_table
 from fe_ste.nonlinear import NonlinearPosition, NonlinearSettings, nonlinear_position
-from fe_ste.sweep import replace_file
 from fe_ste.table import TableError
+from fe_ste.versions import NONLINEAR_TABLE
 
-#: Raised when a change of the method changes the numbers.
-METHOD_VERSION = 1
 METHOD = "non-linear finite elements"
 
 _UNITS = {
@@ -45,6 +45,15 @@ _UNITS = {
     "wall_time": ("s", "of the position"),
     "converged": ("1", "whether the position was solved"),
 }
+_LAYOUT = Layout(
+    "table of the non-linear analysis",
+    NONLINEAR_TABLE,
+    {name: (name,) for name in ("pmc", "torque", "tooth")}
+    | {name: ("pmc", "torque") for name in _UNITS if name not in {"pmc", "torque", "tooth", "load_share"}}
+    | {"load_share": ("pmc", "torque", "tooth")},
+    ("method", "input_hash", "failures", "convergence"),
+)
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +90,7 @@ class NonlinearInput:
 
     def resolved(self) -> dict[str, Any]:
         """Return the input as plain data, with everything that has a default spelled out."""
-        return {"method": METHOD, "method_version": METHOD_VERSION, **asdict(self)}
+        return {"method": METHOD, "method_version": NONLINEAR_TABLE, **asdict(self)}
 
     @cached_property
     def hash(self) -> str:
@@ -145,7 +154,7 @@ class NonlinearTable:
             table = table._with_position(int(number), wanted, report)
             solved = table.dataset["converged"].values[:, 0]
             if path is not None:
-                replace_file(table.dataset, Path(path))
+                write_dataset(Path(path), table.dataset)
         if progress is not None:
             progress(wanted.positions, wanted.positions, None)
         return table
@@ -163,15 +172,14 @@ class NonlinearTable:
         Raises
         ------
         TableError
-            If the file is missing, cannot be read, is no table of the reference analysis, or belongs to another input.
+            If the file is missing, damaged, is no table of the reference analysis in this version, or belongs to
+            another input.
         """
         path = Path(path)
-        if not path.is_file():
-            raise TableError(f"{path}: no such table")
         try:
-            dataset = xr.load_dataset(path, engine="h5netcdf")
-        except (OSError, ValueError, KeyError) as error:
-            raise TableError(f"{path}: not a readable netCDF table ({error})") from error
+            dataset = load_dataset(path, _LAYOUT)
+        except FileError as error:
+            raise TableError(str(error)) from error
         if not str(dataset.attrs.get("method", "")).startswith(METHOD):
             raise TableError(f"{path}: is no table of the non-linear analysis")
         if wanted is not None and dataset.attrs["input_hash"] != wanted.hash:
@@ -262,6 +270,7 @@ def _without_results(wanted: NonlinearInput) -> xr.Dataset:
         "faces",
         "input": json.dumps(wanted.resolved(), sort_keys=True),
         "input_hash": wanted.hash,
+        "method_version": NONLINEAR_TABLE,
         "failures": "",
         "convergence": "",
         "versions": json.dumps({package: version(package) for package in packages}),
@@ -271,7 +280,10 @@ def _without_results(wanted: NonlinearInput) -> xr.Dataset:
 
 def _stored_or(table: NonlinearTable, wanted: NonlinearInput, path: Path) -> NonlinearTable:
     """Return the table in a file if it is of the same input, else the given one."""
+    if not path.exists():
+        return table
     try:
         return NonlinearTable.open(path, wanted)
-    except TableError:
+    except TableError as error:
+        _log.warning("%s; its positions are computed again", error)
         return table

@@ -5,6 +5,7 @@ matplotlib is imported when a diagram is drawn and needs no display: figures are
 
 from __future__ import annotations
 
+import io
 import itertools
 import math
 from collections.abc import Iterator, Mapping
@@ -15,6 +16,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+from fe_ste.files import write_file
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -64,8 +67,9 @@ def new_figure(width: float, height: float) -> Figure:
 def finish_figure(figure: Figure, path: str | Path | None) -> Figure:
     """Write a figure, if a path is given, in the format of its suffix, and return it."""
     if path is not None:
-        Path(path).parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, dpi=200)
+        path, content = Path(path), io.BytesIO()
+        figure.savefig(content, format=path.suffix.removeprefix(".") or None, dpi=200)
+        write_file(path, content.getbuffer())
     return figure
 
 

@@ -750,7 +750,10 @@ _UNITS = {
 }
 
 
-_RESULTS = ("ste", "tangent_stiffness", "load_centre", "tangent_load_centre", "max_pressure", "edge_pressure")
+#: Axes of a table beside the position in the mesh cycle, ``pmc``.
+STATE_AXES = ("torque", "centre_distance", "misalignment")
+#: Results of a state that are numbers by themselves.
+RESULTS = ("ste", "tangent_stiffness", "load_centre", "tangent_load_centre", "max_pressure", "edge_pressure")
 
 
 @dataclass
@@ -792,7 +795,7 @@ class StateResults:
             teeth,
             axial,
             compliance.pair.pinion.base_radius,
-            {name: np.full(shape, np.nan) for name in _RESULTS},
+            {name: np.full(shape, np.nan) for name in RESULTS},
             np.full((*shape, len(teeth), len(axial)), np.nan),
             np.full((*shape, len(teeth)), np.nan),
             np.full((*shape, len(teeth)), np.nan),
@@ -806,7 +809,7 @@ class StateResults:
             like.teeth,
             like.axial,
             like.base_radius,
-            {name: dataset[name].to_numpy() for name in _RESULTS},
+            {name: dataset[name].to_numpy() for name in RESULTS},
             dataset["line_load"].to_numpy(),
             dataset["load_share"].to_numpy(),
             dataset["tangent_load_share"].to_numpy(),

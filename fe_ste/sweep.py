@@ -6,11 +6,10 @@ be sent to any executor of `concurrent.futures` or with its protocol: a block ca
 
 from __future__ import annotations
 
+import logging
 import math
-import os
 import pickle
 import signal
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
@@ -24,7 +23,9 @@ from typing import Protocol
 import numpy as np
 import xarray as xr
 
-from fe_ste.ste import PairCompliance, StateAxes, StateResults, solve_positions
+from fe_ste.files import FileError, Layout, load_dataset, write_dataset
+from fe_ste.ste import RESULTS, STATE_AXES, PairCompliance, StateAxes, StateResults, solve_positions
+from fe_ste.versions import TABLE
 
 #: States of a block: some seconds of work, so that little is lost and the time left is known.
 _BLOCK_STATES = 300
@@ -32,6 +33,15 @@ _BLOCK_STATES = 300
 _STORE_EVERY = 10.0
 #: Attribute that ties a file of finished positions to its input.
 _PARTIAL_OF = "partial_of"
+_LAYOUT = Layout(
+    "finished positions of a table",
+    TABLE,
+    {"solved": ("pmc",), "line_load": ("pmc", *STATE_AXES, "tooth", "axial_position")}
+    | {name: ("pmc", *STATE_AXES) for name in (*RESULTS, "iterations")}
+    | {name: ("pmc", *STATE_AXES, "tooth") for name in ("load_share", "tangent_load_share")},
+    (_PARTIAL_OF, "failures"),
+)
+_log = logging.getLogger(__name__)
 
 
 class SweepError(RuntimeError):
@@ -63,11 +73,14 @@ class Checkpoint:
 
     def load(self, results: StateResults) -> set[int]:
         """Fill `results` with what the file holds and return the finished positions; none if it does not fit."""
-        try:
-            stored = xr.load_dataset(self.path, engine="h5netcdf")
-        except (OSError, ValueError, KeyError):
+        if not self.path.exists():
             return set()
-        if stored.attrs.get(_PARTIAL_OF) != self.input_hash:
+        try:
+            stored = load_dataset(self.path, _LAYOUT)
+        except FileError as error:
+            _log.warning("%s; its positions are computed again", error)
+            return set()
+        if stored.attrs[_PARTIAL_OF] != self.input_hash:
             return set()
         rows = np.flatnonzero(stored["solved"].to_numpy())
         results.insert(rows.tolist(), StateResults.from_dataset(results, stored.isel(pmc=rows)))
@@ -79,29 +92,8 @@ class Checkpoint:
         solved = np.isin(np.arange(axes.positions), sorted(finished))
         attributes = {"units": "1", "long_name": "whether all states of the position are finished"}
         dataset["solved"] = ("pmc", solved.astype(np.int8), attributes)
-        dataset.attrs[_PARTIAL_OF] = self.input_hash
-        replace_file(dataset, self.path)
-
-
-def replace_file(dataset: xr.Dataset, path: Path) -> None:
-    """Write a netCDF file; a file of that name is replaced only by a complete one.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-    path : Path
-        Its directory is made if need be.
-    """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
-    os.close(handle)
-    try:
-        dataset.to_netcdf(Path(temporary), engine="h5netcdf")
-        Path(temporary).chmod(0o644)
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+        dataset.attrs |= {_PARTIAL_OF: self.input_hash, "method_version": TABLE}
+        write_dataset(self.path, dataset)
 
 
 def process_pool(workers: int = 2) -> Executor:

@@ -22,20 +22,28 @@ import xarray as xr
 
 from fe_ste.contact import ContactSettings
 from fe_ste.elasticity import HANDOVER_DEPTH, FlankCompliance, flank_compliance
+from fe_ste.files import FileError, Layout, load_dataset, write_dataset
 from fe_ste.gears import Gear, GearPair
 from fe_ste.hexmesh import MeshSettings
 from fe_ste.modifications import FlankModification
-from fe_ste.ste import PairCompliance, StateAxes, unloaded_states
-from fe_ste.sweep import Checkpoint, Submits, process_pool, replace_file, sweep_states
+from fe_ste.ste import RESULTS, STATE_AXES, PairCompliance, StateAxes, unloaded_states
+from fe_ste.sweep import Checkpoint, Submits, process_pool, sweep_states
+from fe_ste.versions import TABLE
 
-#: Raised when a change of the method changes the numbers, so that tables of the old method are not used.
-METHOD_VERSION = 4
 #: Beyond this many states the start of processes is repaid.
 _STATES_IN_PROCESS = 1000
+_LAYOUT = Layout(
+    "static transmission error table",
+    TABLE,
+    {name: (name,) for name in ("pmc", *STATE_AXES, "tooth", "axial_position")}
+    | {name: ("pmc", *STATE_AXES) for name in (*RESULTS, "mesh_stiffness", "converged")}
+    | {name: ("pmc", *STATE_AXES, "tooth") for name in ("load_share", "tangent_load_share")},
+    ("input_hash", "failures", "pair", "static_centre_distance", "static_misalignment"),
+)
 
 
-class TableError(ValueError):
-    """A table file that is missing, unreadable, or belongs to another input."""
+class TableError(FileError):
+    """A table file that is missing, damaged, or belongs to another input."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,7 +88,7 @@ class TableInput:
 
     def resolved(self) -> dict[str, Any]:
         """Return the input as plain data, with everything that has a default spelled out."""
-        return {"method_version": METHOD_VERSION, "handover_depth": HANDOVER_DEPTH, **asdict(self)}
+        return {"method_version": TABLE, "handover_depth": HANDOVER_DEPTH, **asdict(self)}
 
     @cached_property
     def hash(self) -> str:
@@ -156,17 +164,13 @@ class MeshTable:
         Raises
         ------
         TableError
-            If the file is missing, cannot be read, is no table, or belongs to another input.
+            If the file is missing, damaged, is no table of this version, or belongs to another input.
         """
         path = Path(path)
-        if not path.is_file():
-            raise TableError(f"{path}: no such table")
         try:
-            dataset = xr.load_dataset(path, engine="h5netcdf")
-        except (OSError, ValueError, KeyError) as error:
-            raise TableError(f"{path}: not a readable netCDF table ({error})") from error
-        if "ste" not in dataset or "input_hash" not in dataset.attrs:
-            raise TableError(f"{path}: holds no static transmission error table")
+            dataset = load_dataset(path, _LAYOUT)
+        except FileError as error:
+            raise TableError(str(error)) from error
         if wanted is not None and dataset.attrs["input_hash"] != wanted.hash:
             raise TableError(f"{path}: was computed from another input; compute it again")
         return cls(dataset)
@@ -179,7 +183,7 @@ class MeshTable:
         path : path
             Its directory is made if need be.
         """
-        replace_file(self.dataset, Path(path))
+        write_dataset(Path(path), self.dataset)
 
     @property
     def input_hash(self) -> str:
@@ -243,6 +247,7 @@ def _attributes(wanted: TableInput, compliance: PairCompliance) -> dict[str, str
         "pair": wanted.pair.name,
         "input": json.dumps(wanted.resolved(), sort_keys=True),
         "input_hash": wanted.hash,
+        "method_version": TABLE,
         "boundary": "pinion hub held; gear hub (or ring's outer rim) rigid and turning about its axis only",
         "method": "closed ring of 8-node hexahedra with incompatible modes, half-space near field, linear elastic, "
         "frictionless contact on the exact rigid gap",

@@ -153,7 +153,7 @@ def test_dynamics_refuses_a_table_of_another_input_but_not_of_other_positions(ca
         ("modes", ["--variant", "rigid", "--inertias", "none"], "sets are disc"),
         ("run", ["--variant", "rigid", "--load-case", "nothing"], "load cases are run_up"),
         ("run", ["--variant", "rigid", "--duration", "-1"], "--duration"),
-        ("run", ["--variant", "rigid", "--resume"], "was stopped in"),
+        ("run", ["--variant", "rigid", "--resume"], "was stopped here"),
         ("run", ["--variant", "bushing", "--mesh-law", "rigid"], "needs the variant rigid"),
     ],
 )
@@ -191,8 +191,8 @@ def test_ctrl_c_keeps_the_run_and_resume_ends_it_as_if_nothing_had_been(case, mo
     assert stopped.exit_code == 130
     assert "--resume" in stopped.stderr
     folder = case.parent / "out" / "rigid" / "run_up-iso6336-disc"
-    assert (folder / "run.partial.nc").is_file()
-    assert not (folder / "run.nc").exists()
+    assert (folder / "run.partial" / "000001.nc").is_file()
+    assert sorted(path.name for path in folder.iterdir()) == ["run.partial"]
     resumed = iso("run", case, *duration, "--resume")
     assert resumed.exit_code == 0, resumed.stderr
     with xr.open_dataset(folder / "run.nc", engine="h5netcdf") as data:

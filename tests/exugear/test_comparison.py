@@ -16,7 +16,10 @@ from exugear.comparison import (
     read_run,
     report_mode,
 )
+from exugear.runfile import load_run
 from exugear.spectra import OrderLine
+from exugear.versions import RUN
+from fe_ste.files import write_dataset
 
 RATE = 8000.0
 LINE = OrderLine("mesh", 100.0)
@@ -26,6 +29,7 @@ LABELS = {
     "mesh_law": "line_of_action",
     "inertias": "gears",
     "highest_order": 100.0,
+    "method_version": RUN,
 }
 
 
@@ -40,9 +44,8 @@ def write_run(path: Path, variant: str, resonances: list[float], **labels: str) 
         answer = 1e-7 / (1 - (frequency / resonance) ** 2 + 0.02j * frequency / resonance)
         signal += (answer * np.exp(1j * phase)).real
     data = {"input_speed": ("time", speed), "overall_dte": ("time", signal)}
-    path.parent.mkdir(parents=True, exist_ok=True)
     attributes = {**LABELS, "variant": variant, **labels}
-    xr.Dataset(data, {"time": time}, attributes).to_netcdf(path, engine="h5netcdf")
+    write_dataset(path, xr.Dataset(data, {"time": time}, attributes))
     return path
 
 
@@ -114,10 +117,10 @@ def test_runs_with_different_windows_are_not_compared(runs):
 
 def test_a_run_of_constant_speed_or_hardly_any_length_says_so(tmp_path):
     path = write_run(tmp_path / "run.nc", "rigid", [500.0])
-    with xr.load_dataset(path, engine="h5netcdf") as data:
-        data.isel(time=slice(0, 1)).to_netcdf(tmp_path / "short.nc", engine="h5netcdf")
-        steady = data.assign(input_speed=("time", np.full(data.sizes["time"], 3.0)))
-        steady.to_netcdf(tmp_path / "steady.nc", engine="h5netcdf")
+    data = load_run(path)
+    write_dataset(tmp_path / "short.nc", data.isel(time=slice(0, 1)))
+    steady = data.assign(input_speed=("time", np.full(data.sizes["time"], 3.0)))
+    write_dataset(tmp_path / "steady.nc", steady)
     with pytest.raises(ValueError, match="too few"):
         read_run(tmp_path / "short.nc", [LINE])
     with pytest.raises(ValueError, match="sweep rate"):

@@ -152,7 +152,7 @@ def test_a_folder_with_nothing_of_its_case_is_refused(gearbox, tmp_path):
     with pytest.raises(CaseError, match="no results"):
         write_report(tmp_path)
     keep_case(gearbox, tmp_path)
-    with pytest.raises(ReportError, match="no such table"):
+    with pytest.raises(ReportError, match="no such file"):
         write_report(tmp_path)
 
 

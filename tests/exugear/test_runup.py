@@ -15,13 +15,13 @@ import xarray as xr
 
 from exugear.channels import BALANCE_TERMS
 from exugear.gearbox import CaseError, Gearbox
-from exugear.runfile import Decimator, low_pass
+from exugear.runfile import Decimator, load_run, low_pass
 from exugear.runup import Progress, RunError, simulate
 from exugear.system import ExudynSystem
 
 
 def opened(path: Path) -> xr.Dataset:
-    return xr.load_dataset(path, engine="h5netcdf")
+    return load_run(path)
 
 
 def balance_residual(data: xr.Dataset) -> float:
@@ -97,7 +97,7 @@ def test_stopped_run_resumes_where_it_was(
 
     stopped = simulate(grc, "rigid", stiffness, tmp_path, duration=0.05, progress=press_ctrl_c)
     assert not stopped.complete
-    assert stopped.path.name == "run.partial.nc"
+    assert stopped.path.name == "run.partial"
     assert 0.015 < float(opened(stopped.path).time[-1]) < 0.025
     resumed = simulate(grc, "rigid", stiffness, tmp_path, duration=0.05, resume=True)
     assert resumed.complete
@@ -129,16 +129,16 @@ runup.simulate(gearbox, "rigid", stiffness, sys.argv[2], duration=0.05, progress
 """
 
 
-def test_killed_run_leaves_a_readable_file(grc: Gearbox, tmp_path: Path) -> None:
+def test_a_killed_run_can_be_read(grc: Gearbox, tmp_path: Path) -> None:
     ended = subprocess.run([sys.executable, "-c", KILLED, grc.source, str(tmp_path)], check=False)
     assert ended.returncode == -signal.SIGKILL
-    data = opened(tmp_path / "rigid" / "reference-line_of_action-assemblies" / "run.partial.nc")
+    data = opened(tmp_path / "rigid" / "reference-line_of_action-assemblies" / "run.partial")
     assert 0.008 < float(data.time[-1]) < 0.02
     assert data.attrs["complete"] == 0
 
 
 def test_resuming_another_run_is_refused(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
-    with pytest.raises(RunError, match="nothing to resume"):
+    with pytest.raises(RunError, match="no run of these choices was stopped"):
         simulate(grc, "rigid", stiffness, tmp_path, duration=0.01, resume=True)
 
 
@@ -156,7 +156,7 @@ def test_not_finite_state_stops_the_run_at_once(
     monkeypatch.setattr(ExudynSystem, "run", poisoned)
     with pytest.raises(RunError, match=r"not finite at t = 0.004.*what was reached"):
         simulate(grc, "rigid", stiffness, tmp_path, duration=0.01, solver="exudyn")
-    partial = tmp_path / "rigid" / "reference-line_of_action-assemblies" / "run.partial.nc"
+    partial = tmp_path / "rigid" / "reference-line_of_action-assemblies" / "run.partial"
     assert float(opened(partial).time[-1]) > 0.002
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import errno
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +15,7 @@ import xarray as xr
 
 import fe_ste.table
 from fe_ste.contact import ContactSettings
+from fe_ste.files import write_dataset
 from fe_ste.gears import Gear, GearPair
 from fe_ste.hexmesh import MeshSettings
 from fe_ste.modifications import FlankModification
@@ -97,12 +100,11 @@ def test_failure_while_writing_leaves_the_old_file(
     table.save(path)
     before = path.read_bytes()
 
-    def torn(self: xr.Dataset, target: Path, **options: object) -> None:
-        Path(target).write_bytes(b"half a table")
-        raise OSError("disk full")
+    def full(handle: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(xr.Dataset, "to_netcdf", torn)
-    with pytest.raises(OSError, match="disk full"):
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match=r"No space left on device: '.*pair\.nc'"):
         table.save(path)
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
@@ -118,8 +120,8 @@ def test_unreadable_files_are_refused_by_name(content: bytes | None, tmp_path: P
 
 
 def test_netcdf_without_a_table_is_refused(tmp_path: Path) -> None:
-    xr.Dataset({"other": ("x", [1.0])}).to_netcdf(tmp_path / "other.nc", engine="h5netcdf")
-    with pytest.raises(TableError, match="no static transmission error table"):
+    write_dataset(tmp_path / "other.nc", xr.Dataset({"other": ("x", [1.0])}))
+    with pytest.raises(TableError, match="holds no static transmission error table"):
         MeshTable.open(tmp_path / "other.nc")
 
 

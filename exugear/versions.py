@@ -1,0 +1,15 @@
+"""Versions of the methods that give stored numbers; part of the hash of every input.
+
+Raise a number when a change of the method, or of what it rests on, changes what is stored: results of the old
+version are then computed again or refused. A change that leaves all numbers as they are leaves the version, too.
+Tables have theirs in `fe_ste.versions`.
+"""
+
+from __future__ import annotations
+
+#: Reduced elastic bodies (`meridian`, `reduction`, `solid_mesh`, `solids`, `floating`). Runs and modes rest on it.
+REDUCTION = 1
+#: Eigenmodes (`modes`, and the laws and matrices of `assembly`).
+MODES = 1
+#: Runs in time (`runup`, both solvers, the laws, signals and filters).
+RUN = 1
