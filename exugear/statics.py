@@ -20,6 +20,9 @@ Floats = NDArray[np.float64]
 STEP = 1e-7
 """Difference step of the Newton matrices, m and rad: far above round-off, far below any radius."""
 
+LARGEST_RESIDUAL = 1e-9
+"""Share of the load at which a residual that stops falling is round-off."""
+
 
 class BalanceError(RuntimeError):
     """No state in balance was found."""
@@ -35,19 +38,24 @@ class StartState:
     drive_torque: float
 
 
-def _newton(residual: Callable[[Floats], Floats], start: Floats, scale: Floats, what: str) -> Floats:
-    """Newton's method with central differences; `scale` is the size of each residual that counts as one."""
-    x = start.copy()
-    best = np.inf
+def _newton(residual: Callable[[Floats], Floats], start: Floats, steps: Floats, scale: Floats, what: str) -> Floats:
+    """Newton's method with central differences, until the residual stops falling.
+
+    `steps` are those of the differences, `scale` is the size of each residual that counts as one. Being small against
+    the loads ends nothing: a train near balance accelerates with a ten-thousandth of them.
+    """
+    x, solution, best = start, start, np.inf
     for _ in range(30):
         r = residual(x)
         error = float(np.max(np.abs(r) / scale))
         if not np.isfinite(error):
             break
-        if error < 1e-12 or (error < 1e-9 and error > 0.5 * best):
-            return x
-        best = min(best, error)
-        columns = [(residual(x + STEP * e) - residual(x - STEP * e)) / (2.0 * STEP) for e in np.eye(x.size)]
+        stalled = error > 0.5 * best
+        if error < best:
+            solution, best = x, error
+        if error == 0.0 or (stalled and best < LARGEST_RESIDUAL):
+            return solution
+        columns = [(residual(x + e) - residual(x - e)) / (2.0 * e.sum()) for e in np.diag(steps)]
         matrix = np.array(columns).T
         try:
             x = x - scipy.linalg.solve(matrix / scale[:, None], r / scale)
@@ -88,7 +96,8 @@ def locked_equilibrium(
         def residual(x: Floats) -> Floats:
             return free.T @ (assembly.forces(free @ x, rest, meshes) + applied)
 
-        return _newton(residual, start, np.full(free.shape[1], _load_scale(applied)), "static state")
+        steps, scale = np.full(start.size, STEP), np.full(start.size, _load_scale(applied))
+        return _newton(residual, start, steps, scale, "static state")
 
     start = _touching(assembly, np.zeros(free.shape[1]), lambda x: np.asarray(free @ x), solve)
     return np.asarray(free @ solve(start, meshes))
@@ -163,7 +172,9 @@ def accelerating_start(
             unbalanced = assembly.forces(q, v, meshes) + applied + torque * direction - needed
             return np.append(motions.T @ unbalanced, size * q[pinned])
 
-        return _newton(residual, start, np.full(start.size, size), "start of the run")
+        # The residual is linear in the last unknown, an acceleration or a torque: no step is too long for it.
+        steps = np.append(np.full(start.size - 1, STEP), 1.0)
+        return _newton(residual, start, steps, np.full(start.size, size), "start of the run")
 
     x = _touching(assembly, np.zeros(motions.shape[1] + 1), lambda x: split(x)[0], solve)
     q, rates, torque = split(solve(x, None))

@@ -133,6 +133,20 @@ def test_speed_driven_start_solves_for_the_drive_torque(grc: Gearbox, stiffness:
     assert start.drive_torque == pytest.approx(-2945.1, rel=5e-5)
 
 
+@pytest.mark.parametrize("law", ["rigid", "line_of_action"])
+def test_train_near_balance_starts_with_what_its_loads_leave(grc: Gearbox, stiffness: dict, law: str) -> None:
+    """Net torque over referred inertia, whatever share of the loads is left over."""
+    assembly = assemble(grc, "rigid", {} if law == "rigid" else stiffness, law)
+    ratios = grc.rolling_speeds("carrier", 1.0)
+    inertia = sum(assembly.mass_matrix[i, i] * ratios[name] ** 2 for name, i in assembly.spin.items())
+    for share in np.geomspace(1.0, 1e-6, 25):
+        loads = {"carrier": 240e3, "hss": -240e3 * (1.0 - share) / ratios["hss"]}
+        net = sum(torque * ratios[name] for name, torque in loads.items())
+        # Both sums of torques, here and there, are rounded: a few units of the last digit of the loads.
+        expected = pytest.approx(net / inertia, abs=100 * np.finfo(float).eps * 240e3 / inertia)
+        assert accelerating_start(assembly, loads).rates["carrier"] == expected
+
+
 def test_unheld_structure_is_reported(grc: Gearbox, stiffness: dict) -> None:
     assembly = assemble(grc, "rigid", stiffness)
     with pytest.raises(BalanceError):
