@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from exugear.channels import BALANCE_TERMS, Channels
 from exugear.compilation import compiled
+from exugear.extent import TAPS_PER_FACTOR
+from exugear.trust import FIGURES
 
 Floats = NDArray[np.float64]
 
 TEXT = np.dtype("O", metadata={"vlen": str})
 """Text of any length, as HDF5 stores it."""
-TAPS_PER_FACTOR = 31
-"""Length of the anti-aliasing filter per decimation factor: 80 dB above 0.58, flat below 0.42 of the rate."""
 
 
 @compiled
@@ -116,7 +116,7 @@ class Decimator:
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """State from which a run goes on: step number, coordinates, velocities, filter memory, accounts so far."""
+    """State from which a run goes on: step number, coordinates, velocities, filter memory, accounts and judgement."""
 
     step: int
     q: Floats
@@ -126,6 +126,7 @@ class Checkpoint:
     balance: Floats
     start_angle: float
     mesh_times: Floats
+    judgement: Floats
 
 
 class RunFile:
@@ -152,6 +153,7 @@ class RunFile:
         channels = self.channels
         sizes = {"mesh": len(channels.mesh_names), "support": len(channels.support_names), "axis": 3}
         states = {"coordinate": channels.assembly.size, "signal": channels.count, "term": len(BALANCE_TERMS)}
+        states |= dict(zip(("criterion", "figure"), FIGURES, strict=True))
         file.dimensions = {"time": None, "balance_time": None, "pending": None, **sizes, **states}
         for key, value in attributes.items():
             file.attrs[key] = value
@@ -176,6 +178,7 @@ class RunFile:
         _add(file, "state_v", ("coordinate",), "m/s or rad/s")
         _add(file, "state_balance", ("term",), "J")
         _add(file, "state_pending", ("pending", "signal"), "of the signals")
+        _add(file, "state_judgement", ("criterion", "figure"), "value, s, place")
         for dimension, names in (("mesh", channels.mesh_names), ("support", channels.support_names)):
             variable = file.create_variable(dimension, (dimension,), TEXT)
             if names:
@@ -197,6 +200,7 @@ class RunFile:
             file.variables["state_q"][:] = state.q
             file.variables["state_v"][:] = state.v
             file.variables["state_balance"][:] = state.balance
+            file.variables["state_judgement"][:] = state.judgement
             for name, times in zip(MESH_TIMES, state.mesh_times, strict=True):
                 file.variables[name][:] = times
             file.attrs["state_step"] = state.step
@@ -237,6 +241,7 @@ class RunFile:
                 balance=np.array(file.variables["state_balance"][:]),
                 start_angle=float(file.attrs["start_angle"]),
                 mesh_times=np.array([file.variables[name][:] for name in MESH_TIMES]),
+                judgement=np.array(file.variables["state_judgement"][:]),
             )
 
     @property
