@@ -128,15 +128,23 @@ def _program(
 
 @app.command()
 def check(case: CaseArgument, as_json: JsonOption = False) -> None:
-    """Read and check a gearbox file; compute nothing."""
+    """Read and check a gearbox file, and sum up its load cases; compute nothing."""
     with exit_codes():
         gearbox = read_gearbox(case)
         pairs = [_pair_summary(name, spec) for name, spec in gearbox.pairs.items()]
+        loads = _load_summaries(gearbox)
         if as_json:
-            print_json({"case": str(case), "name": gearbox.name, "ratio": gearbox.ratio, "pairs": pairs})
-            return
-        results.print(f"{gearbox.name}: no fault found, ratio {gearbox.ratio:.6f}", highlight=False)
-        print_table("Gear pairs", [_pair_row(pair) for pair in pairs])
+            summary = {"case": str(case), "name": gearbox.name, "ratio": gearbox.ratio, "pairs": pairs}
+            print_json({**summary, "load_cases": loads})
+        else:
+            results.print(f"{gearbox.name}: no fault found, ratio {gearbox.ratio:.6f}", highlight=False)
+            print_table("Gear pairs", [_pair_row(pair) for pair in pairs])
+            if loads:
+                title = f"Load cases, rolling at the overall input {gearbox.case.overall.input}"
+                print_table(title, [_load_row(one) for one in loads], ("loaded flanks",))
+        for one in loads:
+            for doubt in one["doubts"]:
+                note(f"load_cases.{one['load_case']}: {doubt}", style="yellow")
 
 
 @app.command()
@@ -249,6 +257,7 @@ def run(
         gearbox = read_gearbox(case)
         loads = load_case or next(iter(gearbox.load_cases), "")
         _check_choices(gearbox, variant, mesh_law, inertias, loads)
+        _check_extent(gearbox, loads, duration, out or Path("results"))
         _check_solver(gearbox, variant, solver)
         inertias = inertias or gearbox.case.default_inertias
         folder = _results_folder(case, out, make=not resume)
@@ -456,6 +465,15 @@ def _check_choices(
         raise BadInputError(f"--mesh-law rigid: its gears only roll, which needs the variant rigid, not {variant}")
 
 
+def _check_extent(gearbox: Gearbox, load_case: str, duration: float | None, folder: Path) -> None:
+    """Refuse a simulated time that is too short, or whose results do not fit on the disk."""
+    from exugear.extent import check_disk, check_duration
+
+    with _model_errors():
+        check_duration(gearbox, gearbox.load_cases[load_case], duration)
+        check_disk(gearbox, gearbox.load_cases[load_case], folder, duration)
+
+
 def _check_solids(gearbox: Gearbox) -> None:
     """Refuse solids that are not known well enough, or whose files are not there."""
     from exugear.elastic_bodies import elastic_names, solid_body
@@ -633,7 +651,7 @@ def _simulate(
 ) -> Run:
     """Run a load case behind a progress bar."""
     from exugear.mesh_stiffness import mesh_stiffness
-    from exugear.runup import RunError, refuse_to_resume, run_directory, simulate
+    from exugear.runup import LimitError, RunError, refuse_to_resume, run_directory, simulate
 
     directory = run_directory(folder, variant, load_case, law, inertias)
     if not resume and not refuse_to_resume(directory):
@@ -661,13 +679,15 @@ def _simulate(
                     resume=resume,
                     progress=show,
                 )
+        except LimitError as error:
+            return error.run
         except RunError as error:
             raise FailedError(error) from error
 
 
 def _report_run(case: Path, finished: Run, as_json: bool) -> None:
-    """Print what a run reached; end with 130 if it was stopped."""
-    if not finished.complete:
+    """Print what a run reached; end with 130 if the user stopped it, with 1 if it is not to be trusted."""
+    if not finished.complete and finished.trusted:
         raise StoppedError(f"at {finished.end:.3f} s; kept in {finished.path}, --resume goes on from there")
     from exugear.channels import BALANCE_TERMS, energy_residual
     from exugear.gearbox import RPM
@@ -686,13 +706,24 @@ def _report_run(case: Path, finished: Run, as_json: bool) -> None:
         "longest_pull_of_a_mesh_s": float(data["pulling_time"].max()),
         "longest_time_apart_s": float(data["apart_time"].max()),
         "longest_time_outside_table_s": outside,
+        "complete": finished.complete,
+        "trusted": finished.trusted,
+        "reasons": list(finished.reasons),
     }
     if as_json:
-        print_json({key: None if value != value else value for key, value in summary.items()})
-        return
+        unknown = {key for key, value in summary.items() if isinstance(value, float) and not math.isfinite(value)}
+        print_json({key: None if key in unknown else value for key, value in summary.items()})
+    else:
+        _print_run(summary, outside)
+    if not finished.trusted:
+        what = "the run is" if finished.complete else f"the run was stopped at {finished.end:.4g} s and is"
+        raise FailedError("\n".join([f"{what} not to be trusted:", *finished.reasons, f"It is in {finished.path}"]))
+
+
+def _print_run(summary: dict[str, Any], outside: float) -> None:
     results.print(
         f"{summary['variant']}, {summary['load_case']}, law {summary['mesh_law']}, inertias {summary['inertias']}: "
-        f"{finished.end:g} s simulated in {finished.wall:.1f} s ({summary['solver']}), "
+        f"{summary['simulated_s']:g} s simulated in {summary['wall_s']:.1f} s ({summary['solver']}), "
         f"{summary['input_speed_rpm']:.1f} rpm reached",
         highlight=False,
         soft_wrap=True,
@@ -704,7 +735,7 @@ def _report_run(case: Path, finished: Run, as_json: bool) -> None:
             highlight=False,
             soft_wrap=True,
         )
-    results.print(f"Results in {finished.path}", highlight=False, soft_wrap=True)
+    results.print(f"Results in {summary['file']}", highlight=False, soft_wrap=True)
 
 
 def _draw_modes(found: Modes, folder: Path, first: int, animation: bool) -> list[Path]:
@@ -857,6 +888,48 @@ def _pair_row(pair: dict[str, Any]) -> dict[str, str]:
         "press. angle\ndeg": f"{pair['pressure_angle_deg']:.3f}",
         "contact ratio\n+ overlap": f"{pair['transverse_contact_ratio']:.3f} + {pair['overlap_ratio']:.3f}",
         "torque 1\nN m": f"{pair['torque_gear_1_N_m']:.1f}",
+    }
+
+
+def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
+    """Sum up what each load case does to the rolling train; one that no run could take is bad input."""
+    from exugear.extent import check_duration
+    from exugear.gearbox import RPM
+    from exugear.load_summary import doubts_about, summarise_loads
+
+    found = []
+    with _model_errors():
+        for name, case in gearbox.load_cases.items():
+            check_duration(gearbox, case)
+            loads = summarise_loads(gearbox, case)
+            body, rim = loads.fastest_rim
+            found.append(
+                {
+                    "load_case": name,
+                    "net_torque_N_m": loads.net_torque,
+                    "driven": loads.driven,
+                    "duration_s": case.duration,
+                    "start_speed_rpm": loads.start_speed / RPM,
+                    "end_speed_rpm": loads.end_speed / RPM,
+                    "fastest_rim_m_per_s": rim,
+                    "fastest_rim_on": body,
+                    "loaded_flanks": dict(loads.flanks),
+                    "reversed_flanks": list(loads.reversed_flanks),
+                    "doubts": list(doubts_about(loads)),
+                }
+            )
+    return found
+
+
+def _load_row(summary: dict[str, Any]) -> dict[str, str]:
+    turned = summary["reversed_flanks"]
+    flanks = (f"{name} {sign}{'!' if name in turned else ''}" for name, sign in summary["loaded_flanks"].items())
+    return {
+        "load case": summary["load_case"],
+        "net torque\nN m": f"{summary['net_torque_N_m']:.6g}" + (" (driven)" if summary["driven"] else ""),
+        "end speed\nrpm": f"{summary['end_speed_rpm']:.4g}",
+        "fastest rim\nm/s": f"{summary['fastest_rim_m_per_s']:.3g}",
+        "loaded flanks": ", ".join(flanks),
     }
 
 

@@ -31,7 +31,7 @@ from exugear.equations import (
 )
 from exugear.gearbox import GROUND
 from exugear.kernels import ConnectorArrays
-from exugear.modes import linearise, overall_row
+from exugear.modes import Linearised, coordinate_labels, linearise, overall_row
 from exugear.table_law import scratch_memory
 from exugear.turning import turning_memory
 
@@ -103,17 +103,47 @@ def refusal(assembly: Assembly) -> str:
 def eigenvalues(assembly: Assembly) -> NDArray[np.complex128]:
     """Eigenvalues (1/s) of the system linearised at rest, mean mesh stiffness, damping included."""
     linear = linearise(assembly, np.zeros(assembly.size), assembly.linear_meshes())
-    free = assembly.motions
+    return scipy.linalg.eigvals(_free_motions(linear, assembly.motions)[1]).astype(np.complex128)
+
+
+def _free_motions(linear: Linearised, free: Floats) -> tuple[Floats, Floats]:
+    """Free motions of unit mass (size, n), and the matrix (2n, 2n) of the first-order equations of their amounts."""
     root = np.linalg.cholesky(linear.mass)
-    basis = np.linalg.solve(root.T, scipy.linalg.orth(root.T @ free))  # free motions of unit mass
+    basis = np.linalg.solve(root.T, scipy.linalg.orth(root.T @ free))
     size = free.shape[1]
     lower = np.hstack([-basis.T @ linear.total_stiffness @ basis, -basis.T @ linear.total_damping @ basis])
-    return scipy.linalg.eigvals(np.vstack([np.eye(size, 2 * size, size), lower])).astype(np.complex128)
+    return basis, np.vstack([np.eye(size, 2 * size, size), lower])
 
 
 def highest_rate(assembly: Assembly) -> float:
     """Largest |eigenvalue|, rad/s: it decides whether a step is stable."""
     return float(np.abs(eigenvalues(assembly)).max())
+
+
+def fastest_motion(assembly: Assembly) -> str:
+    """Say in words what the largest |eigenvalue| belongs to: the body that moves, and what holds or damps it.
+
+    Examples
+    --------
+    >>> from exugear.assembly import assemble
+    >>> from exugear.gearbox import Gearbox
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> stiffness = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
+    >>> fastest_motion(assemble(gearbox, "rigid", stiffness))
+    'the fastest motion, 9.25e+03 rad/s, is of hss.spin against high_speed'
+    """
+    linear = linearise(assembly, np.zeros(assembly.size), assembly.linear_meshes())
+    basis, matrix = _free_motions(linear, assembly.motions)
+    values, vectors = scipy.linalg.eig(matrix)
+    fastest = int(np.argmax(np.abs(values)))
+    rate, shape = float(np.abs(values[fastest])), basis @ vectors[: basis.shape[1], fastest]
+    moving = int(np.argmax(np.abs(shape) ** 2 * np.diag(linear.mass)))
+    strained = {
+        name: abs(shape.conj() @ (k + values[fastest] * linear.damping[name]) @ shape)
+        for name, k in linear.stiffness.items()
+    }
+    holding = max(strained, key=lambda name: strained[name]) if strained else "nothing"
+    return f"the fastest motion, {rate:.3g} rad/s, is of {coordinate_labels(assembly)[moving]} against {holding}"
 
 
 def choose_step(assembly: Assembly, sample_rate: float, band: float) -> float:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exugear.elastic import ElasticArrays, ElasticMotion, elastic_energies, set_elastic_motion
-from exugear.table_law import FIRST_TWO, Scratch, TableArrays, surface_law
+from exugear.table_law import FIRST_TWO, Scratch, TableArrays, piece_at, surface_law
 from exugear.travelling import TravellingArrays, place_travelling, share_travelling_forces
 from exugear.turning import TurningArrays, set_turning_motion, turning_energies
 from fe_ste.compilation import kernel
@@ -385,7 +385,7 @@ def mesh_stiffness(q: Floats, m: int, meshes: Meshes) -> tuple[float, float]:
     position = meshes.phase[m] + meshes.cycles[m] * (q[meshes.coordinates[m, 5]] - q[meshes.coordinates[m, 12]])
     pieces = meshes.pieces[m]
     scaled = (position - math.floor(position)) * pieces
-    piece = min(int(scaled), pieces - 1)
+    piece = piece_at(scaled, pieces)
     t = scaled - piece
     c = meshes.stiffness[m, piece]
     slope = (c[1] + t * (2.0 * c[2] + t * 3.0 * c[3])) * pieces
@@ -398,7 +398,7 @@ def error_at(m: int, end: int, angle: float, meshes: Meshes) -> tuple[float, flo
     pieces = meshes.error_pieces[m, end]
     turns = angle / (2.0 * math.pi)
     scaled = (turns - math.floor(turns)) * pieces
-    piece = min(int(scaled), pieces - 1)
+    piece = piece_at(scaled, pieces)
     t = scaled - piece
     c = meshes.error[m, end, piece]
     slope = (c[1] + t * (2.0 * c[2] + t * 3.0 * c[3])) * pieces / (2.0 * math.pi)

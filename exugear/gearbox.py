@@ -351,7 +351,7 @@ class Gearbox:
     @cached_property
     def kinematic_modes(self) -> NDArray[np.float64]:
         """Basis of rolling motions, (bodies, mobility): no mesh closes, no coupling twists."""
-        rows = np.vstack([self._spin_rows(), np.zeros((1, len(self.spinning)))])
+        rows = np.vstack([self.spin_rows, np.zeros((1, len(self.spinning)))])
         scale = np.abs(rows).max(axis=1, keepdims=True)
         _, singular, basis = np.linalg.svd(rows / np.where(scale > 0, scale, 1.0))
         rank = int(np.sum(singular > 1e-9 * singular[0]))
@@ -417,7 +417,7 @@ class Gearbox:
                     )
         applied = np.array([torques.get(name, 0.0) for name in self.spinning])
         locks = np.array([[float(name == lock) for name in self.spinning] for lock in load.locked])
-        balance = np.vstack([self._spin_rows(), locks.reshape(-1, len(self.spinning))]).T
+        balance = np.vstack([self.spin_rows, locks.reshape(-1, len(self.spinning))]).T
         forces = np.linalg.lstsq(balance, applied, rcond=1e-12)[0]
         if np.abs(balance @ forces - applied).max() > 1e-9 * np.abs(applied).max():
             raise self.fault(
@@ -426,7 +426,9 @@ class Gearbox:
             )
         return {mesh.name: float(force) for mesh, force in zip(self.meshes, forces, strict=False)}
 
-    def _spin_rows(self) -> NDArray[np.float64]:
+    @property
+    def spin_rows(self) -> NDArray[np.float64]:
+        """How meshes close and couplings twist per unit spins, (meshes and couplings, spins); m/rad, and 1."""
         rows = [self.mesh_row(mesh) for mesh in self.meshes]
         for coupling in self.couplings:
             rows.append(

@@ -30,7 +30,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exugear.table_law import ORDERS, TableArrays, scratch_memory, surface_law, surface_tangent
+from exugear.table_law import ORDERS, TableArrays, piece_at, scratch_memory, surface_law, surface_tangent
 from fe_ste.compilation import compiled
 
 Floats = NDArray[np.float64]
@@ -160,7 +160,7 @@ def periodic_cubic(samples: Floats) -> Floats:
 def stiffness_at(coefficients: Floats, pieces: int, pmc: float) -> tuple[float, float]:
     """Stiffness (N/m) and its slope per cycle at any position in the mesh cycle; pieces (n, 4)."""
     scaled = (pmc - math.floor(pmc)) * pieces
-    piece = min(int(scaled), pieces - 1)
+    piece = piece_at(scaled, pieces)
     t = scaled - piece
     c = coefficients[piece]
     value: float = c[0] + t * (c[1] + t * (c[2] + t * c[3]))
@@ -210,7 +210,7 @@ def error_at(m: int, end: int, angle: float, meshes: MeshArrays) -> tuple[float,
         return 0.0, 0.0, 0.0
     turns = angle / (2.0 * math.pi)
     scaled = (turns - math.floor(turns)) * pieces
-    piece = min(int(scaled), pieces - 1)
+    piece = piece_at(scaled, pieces)
     t = scaled - piece
     c = meshes.error[m, end, piece]
     per_rad = pieces / (2.0 * math.pi)

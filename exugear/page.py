@@ -17,6 +17,7 @@ th { border-bottom: 1px solid #999; font-weight: 600; vertical-align: bottom; }
 th.text, td.text { text-align: left; }
 figure { margin: 1rem 0; } figure img { max-width: 100%; } figcaption { font-size: .86rem; color: #555; }
 .scroll { overflow-x: auto; } .warning { background: #fff4e0; padding: .4rem .8rem; border-left: 3px solid #e69f00; }
+.alert { background: #fdecea; border: 2px solid #b3261e; color: #5c0f0a; padding: .4rem 1rem; margin: 1rem 0; }
 code { font-size: .82rem; overflow-wrap: anywhere; } summary { cursor: pointer; margin: .6rem 0; }
 """
 
@@ -63,6 +64,17 @@ def table(rows: Sequence[Mapping[str, object]], texts: Iterable[str] = ()) -> st
     head = "".join(cell("th", key, key) for key in keys)
     body = "".join(f"<tr>{''.join(cell('td', key, row[key]) for key in keys)}</tr>" for row in rows)
     return f'<div class="scroll"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+
+
+def alert(title: str, values: Iterable[str]) -> str:
+    """Make a red box that readers of the page cannot miss, also those who have it read aloud.
+
+    Examples
+    --------
+    >>> alert("Not to be trusted", ["run <1>"])
+    '<div class="alert" role="alert"><strong>Not to be trusted</strong><ul><li>run &lt;1&gt;</li></ul></div>'
+    """
+    return f'<div class="alert" role="alert"><strong>{text(title)}</strong>{bullets(values)}</div>'
 
 
 def picture(path: Path, caption: str) -> str:

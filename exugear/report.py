@@ -43,6 +43,7 @@ from exugear.sensitivity import Remedy, Sweep, parameters_of, remedies, sweep_mo
 from exugear.shapes import bodies_of, mode_scene, motions_of
 from exugear.tables import PICTURE_FOLDER, fitting_table
 from exugear.tooth_contact import MeshError
+from exugear.trust import verdict_of
 from fe_ste.files import FileError, write_file
 from fe_ste.interpolation import SteSurface
 from fe_ste.scene import RenderingError
@@ -121,6 +122,7 @@ class _Writer:
     statements: list[str] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
     pictures: list[Path] = field(default_factory=list)
+    distrusted: list[str] = field(default_factory=list)
     models: dict[Model, Assembly] = field(default_factory=dict)
     stiffnesses: dict[str, dict[str, FloatArray | SteSurface]] = field(default_factory=dict)
 
@@ -200,6 +202,9 @@ def write_report(
         _provenance_section(writer, tables, runs, modes),
     ]
     head = [page.paragraph(_subtitle(writer.gearbox)), page.section("In short", page.bullets(writer.statements))]
+    if writer.distrusted:
+        title = "Runs that are not to be trusted; what follows shows them all the same"
+        head.insert(0, page.alert(title, writer.distrusted))
     if writer.left_out:
         head.append(page.section("Left out", page.bullets(writer.left_out)))
     head.append(_assumptions_section(writer))
@@ -248,6 +253,7 @@ def _stored_runs(writer: _Writer, modes: Mapping[Model, xr.Dataset]) -> Iterator
             attributes = load_run(path, ()).attrs
             if not writer.fits(path, attributes):
                 continue
+            _note_distrust(writer, path, attributes)
             writer.tell(f"spectra of {path.relative_to(writer.folder)}")
             key = _run_key(attributes)
             run = read_run(path, lines, modes.get(Model.of(attributes)), windows.get(key))
@@ -259,6 +265,15 @@ def _stored_runs(writer: _Writer, modes: Mapping[Model, xr.Dataset]) -> Iterator
             continue
         windows[key] = run.spectra.window_length
         yield run
+
+
+def _note_distrust(writer: _Writer, path: Path, attributes: Mapping[str, Any]) -> None:
+    """Name a run that is not to be trusted, with the reason that its file gives."""
+    verdict = verdict_of(attributes)
+    if verdict:
+        name = path.relative_to(writer.folder)
+        writer.distrusted.append(f"{name}: {verdict}")
+        writer.statements.append(f"Not to be trusted: {name}: {verdict}")
 
 
 def _run_key(attributes: Mapping[str, Any]) -> tuple[str, str, str]:
@@ -292,7 +307,9 @@ def _group(writer: _Writer, key: tuple[str, str, str], runs: Sequence[VariantRun
     others = [run for run in runs if run.variant != STIFF]
     comparisons = [compare(other, stiff[0]) for other in others] if stiff else []
     file_part = f"{load_case}-{law}-{inertias}"
-    content = [_waterfall_picture(writer, stiff + others, comparisons, label, file_part)]
+    doubtful = [f"{run.variant}: {verdict_of(run.attributes)}" for run in runs if verdict_of(run.attributes)]
+    content = [page.alert("Not to be trusted", doubtful)] if doubtful else []
+    content.append(_waterfall_picture(writer, stiff + others, comparisons, label, file_part))
     content += [_only_table(writer, comparison, label) for comparison in comparisons]
     content.append(_levels_picture(writer, stiff + others, label, file_part))
     for run in stiff + others:
@@ -376,6 +393,7 @@ def _run_row(run: VariantRun) -> dict[str, object]:
     end = float(data["time"][-1])
     return {
         "variant": run.variant,
+        "to be trusted": "NO, see above" if verdict_of(run.attributes) else "yes",
         "solver": run.attributes["solver"],
         "step / µs": f"{1e6 * float(run.attributes['step']):g}",
         "simulated / s": f"{end:.2f}" + ("" if int(run.attributes["complete"]) else " (stopped)"),

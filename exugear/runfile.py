@@ -25,6 +25,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from exugear.channels import BALANCE_TERMS, Channels
+from exugear.extent import TAPS_PER_FACTOR
+from exugear.trust import FIGURES
 from exugear.versions import RUN
 from fe_ste.compilation import compiled
 from fe_ste.files import (
@@ -47,8 +49,6 @@ EARLIER_PARTIAL_NAME = "run.partial.nc"
 """What an earlier version wrote instead; it can be neither trusted nor gone on with."""
 TEXT = np.dtype("O", metadata={"vlen": str})
 """Text of any length, as HDF5 stores it."""
-TAPS_PER_FACTOR = 31
-"""Length of the anti-aliasing filter per decimation factor: 80 dB above 0.58, flat below 0.42 of the rate."""
 
 
 @compiled
@@ -141,7 +141,7 @@ class Decimator:
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """State from which a run goes on: step number, coordinates, velocities, filter memory, accounts so far."""
+    """State from which a run goes on: step number, coordinates, velocities, filter memory, accounts and judgement."""
 
     step: int
     q: Floats
@@ -151,6 +151,7 @@ class Checkpoint:
     balance: Floats
     start_angle: float
     mesh_times: Floats
+    judgement: Floats
 
 
 _GROWING = ("time", "balance_time")
@@ -215,6 +216,7 @@ class RunFile:
             file.variables["state_q"][:] = state.q
             file.variables["state_v"][:] = state.v
             file.variables["state_balance"][:] = state.balance
+            file.variables["state_judgement"][:] = state.judgement
             for name, values in zip(MESH_TIMES, state.mesh_times, strict=True):
                 file.variables[name][:] = values
             file.attrs["state_step"] = state.step
@@ -229,6 +231,7 @@ class RunFile:
         channels = self.channels
         sizes = {"mesh": len(channels.mesh_names), "support": len(channels.support_names), "axis": 3}
         states = {"coordinate": channels.assembly.size, "signal": channels.count, "term": len(BALANCE_TERMS)}
+        states |= dict(zip(("criterion", "figure"), FIGURES, strict=True))
         # What has no length yet must be able to grow: netCDF knows no empty dimension.
         file.dimensions = {name: length or None for name, length in lengths.items()} | sizes | states
         for key, value in attributes.items():
@@ -254,6 +257,7 @@ class RunFile:
         _add(file, "state_v", ("coordinate",), "m/s or rad/s")
         _add(file, "state_balance", ("term",), "J")
         _add(file, "state_pending", ("pending", "signal"), "of the signals")
+        _add(file, "state_judgement", ("criterion", "figure"), "value, s, place")
         for dimension, names in (("mesh", channels.mesh_names), ("support", channels.support_names)):
             variable = file.create_variable(dimension, (dimension,), TEXT)
             if names:
@@ -289,11 +293,18 @@ class RunFile:
                 balance=np.array(file.variables["state_balance"][:]),
                 start_angle=float(file.attrs["start_angle"]),
                 mesh_times=np.array([file.variables[name][:] for name in MESH_TIMES]),
+                judgement=np.array(file.variables["state_judgement"][:]),
             )
 
     def note(self, key: str, value: Any) -> None:
         """Add an attribute to the pieces that follow and to the whole run."""
         self.attributes[key] = value
+
+    def mark(self) -> None:
+        """Write a piece without samples: it keeps what was noted since the last one."""
+        nothing = np.zeros(0)
+        rows, lines = np.zeros((0, self.channels.count)), np.zeros((0, len(BALANCE_TERMS)))
+        self.append(nothing, rows, nothing, lines, self.last_checkpoint())
 
     def finish(self, path: Path) -> None:
         """Join the pieces into one file, a piece in memory at a time, and remove them.

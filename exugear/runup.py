@@ -8,7 +8,6 @@ finds the longest that is stable and keeps the excitation in the band: 6.4 kHz i
 
 from __future__ import annotations
 
-import csv
 import math
 import signal
 import threading
@@ -32,11 +31,14 @@ from exugear.compiled import (
     LoadTable,
     Observer,
     choose_step,
+    fastest_motion,
     highest_rate,
     refusal,
     unstable,
 )
-from exugear.gearbox import CaseError, Gearbox, LoadCase
+from exugear.extent import SAMPLE_RATE, buffer_rows, check_disk, check_duration, too_fine
+from exugear.gearbox import Gearbox, LoadCase
+from exugear.load_summary import drive_rate, driven_start_speed, summarise_loads, torque_series
 from exugear.mesh_element import Angles, MeshData
 from exugear.results import bodies_folder, input_hash
 from exugear.runfile import (
@@ -50,6 +52,7 @@ from exugear.runfile import (
     has_pieces,
 )
 from exugear.statics import accelerating_start
+from exugear.trust import Judge
 from exugear.versions import RUN
 from fe_ste.files import exclusive
 
@@ -63,7 +66,6 @@ SOLVERS: tuple[str, ...] = get_args(Solver)
 
 BAND = 6.4e3
 """Highest frequency whose amplitude is kept, Hz."""
-SAMPLE_RATE = 20e3
 LOCK_NAME = "run.partial.lock"
 FLUSH_INTERVAL = 0.25
 """Simulated time between writes to disk, s."""
@@ -73,6 +75,14 @@ FLUSH_FACTOR = {"compiled": 4, "exudyn": 1}
 
 class RunError(RuntimeError):
     """A run that went wrong; what was reached before is kept."""
+
+
+class LimitError(RunError):
+    """A run that was stopped beyond a limit of `exugear.trust`, with what was reached."""
+
+    def __init__(self, message: str, run: Run) -> None:
+        super().__init__(message)
+        self.run = run
 
 
 @dataclass(frozen=True)
@@ -92,12 +102,28 @@ class Progress:
 
 @dataclass(frozen=True)
 class Run:
-    """A finished or stopped run: its file, whether it is complete, simulated end (s), wall time (s)."""
+    """A finished or stopped run.
+
+    Attributes
+    ----------
+    path : Path
+    complete : bool
+    end, wall : float
+        Simulated and wall time, s.
+    reasons : tuple of str
+        Why it is not to be trusted (`exugear.trust`), none if it is.
+    """
 
     path: Path
     complete: bool
     end: float
     wall: float
+    reasons: tuple[str, ...] = ()
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the run stayed within the limits of what it may claim."""
+        return not self.reasons
 
 
 def run_directory(out: str | Path, variant: str, load_case: str, law: str, inertias: str) -> Path:
@@ -158,6 +184,9 @@ def simulate(
 
     Raises
     ------
+    CaseError
+        A load case or a duration that cannot be run: too short, too long for the disk, or with a motion so fast that
+        it asks for an absurd step.
     RunError
         The compiled solver does not take the variant or the step, a state that is not finite, a step that Exudyn
         cut, or nothing to resume.
@@ -165,16 +194,22 @@ def simulate(
         Another process is at work on this run.
     OSError
         The results cannot be written; what was written before is kept.
+    LimitError
+        A limit of `exugear.trust` that no run may go beyond; softer ones end in `Run.reasons`.
     """
     if load_case not in gearbox.load_cases:
         raise gearbox.fault(f"no load case {load_case!r}; load cases are {', '.join(gearbox.load_cases)}")
     case = gearbox.load_cases[load_case]
+    check_duration(gearbox, case, duration, sample_rate)
     folder = bodies_folder(Path(out))
     assembly = assemble(gearbox, variant, stiffness, mesh_law, inertias, angles=angles, folder=folder)
     directory = run_directory(out, variant, load_case, mesh_law, assembly.inertias)
     total = case.duration if duration is None else duration
     chosen = _solver(solver, assembly, mesh_route)
-    step = choose_step(assembly, sample_rate, band) if step is None else step
+    if step is None:
+        step = choose_step(assembly, sample_rate, band)
+        if too_fine(step, total, sample_rate):
+            raise gearbox.fault(f"{fastest_motion(assembly)}; {too_fine(step, total, sample_rate)}")
     with held(directory):
         recorder = Recorder(assembly, case, directory, total, step, band, sample_rate, chosen, resume, progress)
         return recorder.run(mesh_route)
@@ -249,6 +284,8 @@ class Recorder:
         self._rate = highest_rate(assembly)
         if solver == "compiled" and unstable(self._rate, step):
             raise RunError(unstable(self._rate, step))
+        if too_fine(step, total, sample_rate):
+            raise RunError(too_fine(step, total, sample_rate))
         self.steps = round(total / step)
         factor = max(1, round(1.0 / (step * sample_rate)))
         if abs(factor * step * sample_rate - 1.0) > 1e-9:
@@ -264,7 +301,7 @@ class Recorder:
         self.balance = np.zeros(len(BALANCE_TERMS))
         self._mesh_times = np.zeros((len(MESH_TIMES), len(self.channels.mesh_names)))
         self._powers: Floats | None = None
-        rows = max(1, round(FLUSH_FACTOR[solver] * FLUSH_INTERVAL / step))
+        rows = buffer_rows(FLUSH_FACTOR[solver] * FLUSH_INTERVAL / step, assembly.size, self.channels.count)
         self._q = np.empty((rows, assembly.size))
         self._v = np.empty((rows, assembly.size))
         self._t = np.empty(rows)
@@ -273,11 +310,16 @@ class Recorder:
         self._last_time = 0.0
         self._stop = False
         self._fault = ""
+        if not resume:
+            check_disk(assembly.gearbox, case, directory, total, sample_rate, 4 * (8 + self.channels.count))
         self._prepare(case, resume)
 
     def _prepare(self, case: LoadCase, resume: bool) -> None:
         """Open the file and set the state to start from."""
-        series = _torque_series(self.assembly.gearbox, case)
+        series = torque_series(self.assembly.gearbox, case)
+        total = self.steps * self.step
+        intended = summarise_loads(self.assembly.gearbox, case, self.assembly.inertias, total, series)
+        self._judge = Judge(self.assembly, intended)
         if resume:
             reason = refuse_to_resume(self.partial_path.parent)
             if reason:
@@ -289,6 +331,10 @@ class Recorder:
             self.decimator.pending, self.decimator.first = state.pending, state.pending_first
             self.balance, self._mesh_times = state.balance, state.mesh_times
             offset = state.start_angle
+            self._judge.figures = state.judgement
+            if self._judge.stop:
+                reasons = self._judge.reasons(state.mesh_times[0], state.step * self.step)
+                raise RunError(f"{self.partial_path}: stopped for good: {'; '.join(reasons)}; run it anew")
         else:
             self.first_step = 0
             self.q, self.v, offset = _start(self.assembly, case, series)
@@ -348,15 +394,32 @@ class Recorder:
             else:
                 self._integrate_in_exudyn(mesh_route)
             self._flush()
-        complete = not self._stop and not self._fault
+            if self._fault:
+                self._note_verdict()
+                self.file.mark()
+        complete = not self._stop and not self._fault and not self._judge.stop
+        reasons = self._reasons()
         if complete:
             self.file.note("complete", 1)
         wall = time.perf_counter() - self._wall_start
         if self._fault:
-            raise RunError(f"{self._fault}; what was reached is in {self.partial_path}")
+            raise RunError(f"{'; '.join((self._fault, *reasons))}; what was reached is in {self.partial_path}")
+        run = Run(self.final_path if complete else self.partial_path, complete, self._last_time, wall, reasons)
+        if self._judge.stop:
+            raise LimitError(f"{'; '.join(reasons)}; what was reached is in {self.partial_path}", run)
         if complete:
             self.file.finish(self.final_path)
-        return Run(self.final_path if complete else self.partial_path, complete, self._last_time, wall)
+        return run
+
+    def _reasons(self) -> tuple[str, ...]:
+        return self._judge.reasons(self._mesh_times[0], self._last_time)
+
+    def _note_verdict(self) -> None:
+        """Write what the run may claim so far into its next piece, and what speaks against it."""
+        against = ((self._fault,) if self._fault else ()) + self._reasons()
+        self.file.note("limits", self._judge.limits.to_json())
+        self.file.note("verdict", "; ".join(against) or "within all limits")
+        self.file.note("trusted", 0 if against else 1)
 
     def _integrate_in_exudyn(self, mesh_route: MeshRoute) -> None:
         from exugear.flexible import SolverFailure
@@ -386,7 +449,7 @@ class Recorder:
         done = self.first_step
         if not self._observe(done * self.step, self.q, self.v):
             return
-        while done < self.steps and not self._stop and not self._fault:
+        while done < self.steps and not self._stop and not self._fault and not self._judge.stop:
             end = min(self._filled + self.steps - done, len(self._t))
             q, v = self._q[self._filled : end], self._v[self._filled : end]
             good = system.advance(done, q, v)
@@ -425,7 +488,7 @@ class Recorder:
         self._filled += 1
         if self._filled == len(self._t):
             self._flush()
-        return not self._stop
+        return not self._stop and not self._judge.stop
 
     def _advance(self, t: float) -> int:
         """Count steps since the start of this integration; the first call is the start itself."""
@@ -441,6 +504,7 @@ class Recorder:
         t, q, v = self._t[:n], self._q[:n], self._v[:n]
         signals, energies, powers = self.observer.observe(t, q, v)
         balance_times, balances = self._account(t, energies, powers)
+        self._judge.see(t, self.channels.mesh_deflections(signals), v, balance_times, balances)
         self._mesh_times = self._mesh_times + self.step * self.channels.mesh_times(signals)
         centre, rows = self.decimator.push(signals)
         times = self.step * (centre + self.decimator.factor * np.arange(len(rows), dtype=np.float64))
@@ -453,7 +517,9 @@ class Recorder:
             balance=self.balance,
             start_angle=self._offset,
             mesh_times=self._mesh_times,
+            judgement=self._judge.figures,
         )
+        self._note_verdict()
         self.file.append(times, rows, balance_times, balances, state)
         self._filled = 0
         if self.progress is not None:
@@ -474,7 +540,8 @@ class Recorder:
         before = powers[:1] if self._powers is None else self._powers
         series = np.vstack([before, powers])
         lines = np.empty((len(t), len(BALANCE_TERMS)))
-        worked = self.balance[[0, 3, 4, 5, 6]] + 0.5 * self.step * np.cumsum(series[1:] + series[:-1], axis=0)
+        with np.errstate(over="ignore", invalid="ignore"):  # powers of a run that diverges; the judge sees the sums
+            worked = self.balance[[0, 3, 4, 5, 6]] + 0.5 * self.step * np.cumsum(series[1:] + series[:-1], axis=0)
         if self._powers is None:
             worked -= self.step * powers[0]  # no time passes before the first state
         lines[:, [0, 3, 4, 5, 6]] = worked
@@ -510,24 +577,12 @@ def _start(
     torques = {**case.torques, **{name: float(values[0]) for name, (_, values) in series.items()}}
     driven = None
     if case.driven_body is not None:
-        driven = case.driven_body, _drive_rate(assembly.gearbox, case)
+        driven = case.driven_body, drive_rate(assembly.gearbox, case)
     found = accelerating_start(assembly, torques, case.start_speed, driven)
     offset = 0.0
     if case.driven_body is not None and case.drive_stiffness is not None:
         offset = float(found.q[assembly.spin[case.driven_body]]) + found.drive_torque / case.drive_stiffness
     return found.q, found.v, offset
-
-
-def _drive_rate(gearbox: Gearbox, case: LoadCase) -> float:
-    """Spin rate (rad/s2) of the driven body: from its speed at the start to its end speed."""
-    end = case.end_speed if case.end_speed is not None else 0.0
-    return (end - _driven_start_speed(gearbox, case)) / case.duration
-
-
-def _driven_start_speed(gearbox: Gearbox, case: LoadCase) -> float:
-    """Speed of the driven body at the start, rad/s; the case states it at the overall input."""
-    unit = gearbox.rolling_speeds(gearbox.case.overall.input, 1.0)
-    return unit[str(case.driven_body)] * case.start_speed
 
 
 def _load_table(
@@ -540,7 +595,7 @@ def _load_table(
             body=case.driven_body,
             stiffness=case.drive_stiffness,
             damping=gearbox.case.damping.coupling_time_s * case.drive_stiffness,
-            angle=(offset, _driven_start_speed(gearbox, case), 0.5 * _drive_rate(gearbox, case)),
+            angle=(offset, driven_start_speed(gearbox, case), 0.5 * drive_rate(gearbox, case)),
         )
     return LoadTable(case.torques, series, drive)
 
@@ -565,38 +620,3 @@ def _loading(loads: LoadTable) -> Loading:
 
 def _interpolator(times: Floats, values: Floats) -> Callable[[float], float]:
     return lambda t: float(np.interp(t, times, values))
-
-
-def _torque_series(gearbox: Gearbox, case: LoadCase) -> dict[str, tuple[Floats, Floats]]:
-    """Read times (s) and torques (N m) by body from the case's CSV file.
-
-    The header is ``time_s`` and one ``<body>_N_m`` per loaded body; between lines torques are linear.
-
-    Raises
-    ------
-    CaseError
-        Unknown columns, text where numbers belong, times that do not grow.
-    """
-    if case.torque_series is None:
-        return {}
-    path = case.torque_series
-    with path.open(newline="", encoding="utf-8") as file:
-        lines = [line for line in csv.reader(file) if line]
-    if len(lines) < 3 or lines[0][0].strip() != "time_s":
-        raise CaseError(f"{path}: expected a header time_s,BODY_N_m,... and at least two lines of numbers")
-    try:
-        table = np.array([[float(cell) for cell in line] for line in lines[1:]])
-    except ValueError as error:
-        raise CaseError(f"{path}: {error}; every line needs {len(lines[0])} numbers") from None
-    if table.ndim != 2 or table.shape[1] != len(lines[0]) or not np.all(np.isfinite(table)):
-        raise CaseError(f"{path}: every line needs {len(lines[0])} finite numbers")
-    if not np.all(np.diff(table[:, 0]) > 0.0):
-        raise CaseError(f"{path}: time_s must grow from line to line")
-    series = {}
-    for column, name in enumerate(lines[0][1:], start=1):
-        body = name.strip().removesuffix("_N_m")
-        if body not in gearbox.spinning or not name.strip().endswith("_N_m"):
-            known = ", ".join(f"{known}_N_m" for known in gearbox.spinning)
-            raise CaseError(f"{path}: column {name.strip()!r} is no torque of a body; columns are {known}")
-        series[body] = (table[:, 0], table[:, column])
-    return series
