@@ -49,6 +49,7 @@ def drawing_style() -> Iterator[None]:
             "grid.linewidth": 0.6,
             "lines.linewidth": 1.5,
             "figure.dpi": 100,
+            "text.parse_math": False,  # names are shown as they are, even with a dollar in them
         }
     ):
         yield
