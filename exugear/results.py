@@ -16,7 +16,9 @@ from typing import Any
 import numpy as np
 
 from exugear.assembly import Assembly
+from exugear.elastic_bodies import solid_body
 from exugear.gearbox import CaseError, Gearbox
+from exugear.named_files import NOTHING_MORE, Permissions
 from fe_ste.interpolation import SteSurface
 
 CASE_FILE = "case.json"
@@ -52,9 +54,9 @@ def input_hash(assembly: Assembly, load_case: str | None = None) -> str:
         "load_case": load_case,
         "torque_series": hashlib.sha256(series.read_bytes()).hexdigest() if series else None,
         "solids": {
-            name: hashlib.sha256((Path(gearbox.source).parent / solid.file).read_bytes()).hexdigest()
+            name: hashlib.sha256(solid_body(gearbox, name).model.mesh.path.read_bytes()).hexdigest()
             for name in assembly.elastic_bodies
-            if (solid := gearbox.case.bodies[name].solid) is not None
+            if gearbox.case.bodies[name].solid is not None
         },
         # Rounded: another machine's last digits must not make another hash.
         "stiffness": {
@@ -83,8 +85,14 @@ def keep_case(gearbox: Gearbox, folder: Path) -> None:
     _replace(folder / CASE_FILE, json.dumps(content, indent=1))
 
 
-def kept_case(folder: Path) -> Gearbox:
+def kept_case(folder: Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:
     """Read the gearbox that the results of a folder belong to.
+
+    Parameters
+    ----------
+    folder : Path
+    permissions : Permissions
+        Where else files that the gearbox file names may lie.
 
     Raises
     ------
@@ -96,7 +104,7 @@ def kept_case(folder: Path) -> Gearbox:
         raise CaseError(f"{folder}: holds no results (no {CASE_FILE}); name the folder that `exugear run` wrote into")
     try:
         kept = json.loads(path.read_text(encoding="utf-8"))
-        return Gearbox.from_dict(kept["content"], kept["source"])
+        return Gearbox.from_dict(kept["content"], kept["source"], permissions)
     except (ValueError, KeyError, TypeError) as error:
         raise CaseError(f"{path}: cannot be used ({error}); run `exugear modes` into this folder again") from error
 
