@@ -13,10 +13,12 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from exugear.named_files import LARGEST_CASE, NamedFileError, check_regular
+
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=80)]  # up to three make a file's name
 GROUND = "ground"
 
 
@@ -191,8 +193,9 @@ class SolidSeatSection(_Section):
 class SolidSection(_Section):
     """A body of any shape from a file beside the gearbox file, in the gearbox's axes.
 
-    Geometry (.geo, .step, .stp, .brep) is meshed with tetrahedra by gmsh; a mesh (.msh, .inp, .vtu and what else
-    meshio reads) is taken as it is. `torque_seat` names the seat where torques act. `blanks` are by seat.
+    Geometry (.step, .stp, .brep, or the script .geo, which needs permission to run) is meshed with tetrahedra by gmsh;
+    a mesh (.msh, .inp, .vtu, .vtk, .bdf, .nas, .fem) is taken as it is. `torque_seat` names the seat where torques
+    act. `blanks` are by seat.
     """
 
     file: str
@@ -484,7 +487,7 @@ class SteSection(_Section):
 class CaseFile(_Section):
     """The whole gearbox file."""
 
-    name: str
+    name: Annotated[str, Field(max_length=200)]
     default_inertias: Name
     overall: OverallSection
     static_load: StaticLoadSection
@@ -512,11 +515,13 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     Raises
     ------
     CaseError
-        No such file, nothing in it, or not TOML (with line and column).
+        No regular file, nothing in it, or not TOML (with line and column).
     """
     path = Path(path)
-    if not path.is_file():
-        raise CaseError(f"{path}: no such file; expected a gearbox file such as cases/grc750/gearbox.toml")
+    try:
+        check_regular(path, LARGEST_CASE)
+    except NamedFileError as error:
+        raise CaseError(f"{path}: {error}; expected a gearbox file such as cases/grc750/gearbox.toml") from None
     try:
         text = path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:

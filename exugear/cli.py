@@ -26,7 +26,7 @@ from exugear.console import (
     print_json,
     print_table,
     progress_bar,
-    results,
+    say,
 )
 
 if TYPE_CHECKING:
@@ -88,6 +88,24 @@ class Solver(StrEnum):
 
 VariantOption = Annotated[Variant, typer.Option(help="How the shafts are held.", show_default=False)]
 LawOption = Annotated[MeshLaw, typer.Option("--mesh-law", help="How teeth in mesh push each other.")]
+FilesBelowOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--files-below",
+        metavar="DIR",
+        envvar="EXUGEAR_FILES_BELOW",
+        help="A further folder that files may lie in which the gearbox file names. (default: its own alone)",
+        show_default=False,
+    ),
+]
+ScriptsOption = Annotated[
+    bool,
+    typer.Option(
+        "--allow-scripts",
+        envvar="EXUGEAR_ALLOW_SCRIPTS",
+        help="Let gmsh scripts run that the gearbox file names; they can do all that you can.",
+    ),
+]
 InertiasOption = Annotated[
     str | None, typer.Option("--inertias", metavar="SET", help="Inertia set. (default: as the file says)")
 ]
@@ -113,7 +131,7 @@ def _print_version(wanted: bool) -> None:
     if wanted:
         from exugear import __version__
 
-        results.print(f"exugear {__version__}", highlight=False)
+        say(f"exugear {__version__}")
         raise typer.Exit
 
 
@@ -127,17 +145,18 @@ def _program(
 
 
 @app.command()
-def check(case: CaseArgument, as_json: JsonOption = False) -> None:
+def check(case: CaseArgument, files_below: FilesBelowOption = None, as_json: JsonOption = False) -> None:
     """Read and check a gearbox file, and sum up its load cases; compute nothing."""
     with exit_codes():
-        gearbox = read_gearbox(case)
+        gearbox = read_gearbox(case, files_below)
+        _tell_scripts(gearbox)
         pairs = [_pair_summary(name, spec) for name, spec in gearbox.pairs.items()]
         loads = _load_summaries(gearbox)
         if as_json:
             summary = {"case": str(case), "name": gearbox.name, "ratio": gearbox.ratio, "pairs": pairs}
             print_json({**summary, "load_cases": loads})
         else:
-            results.print(f"{gearbox.name}: no fault found, ratio {gearbox.ratio:.6f}", highlight=False)
+            say(f"{gearbox.name}: no fault found, ratio {gearbox.ratio:.6f}")
             print_table("Gear pairs", [_pair_row(pair) for pair in pairs])
             if loads:
                 title = f"Load cases, rolling at the overall input {gearbox.case.overall.input}"
@@ -168,6 +187,7 @@ def ste(
         typer.Option("--grid", help="Over load, centre distance and misalignment too, with the axes of the file."),
     ] = False,
     out: OutOption = None,
+    files_below: FilesBelowOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Compute the static transmission error of the gear pairs, with pictures.
@@ -178,7 +198,7 @@ def ste(
     with exit_codes():
         from exugear.tables import draw_curves, stored_tables
 
-        gearbox = read_gearbox(case)
+        gearbox = read_gearbox(case, files_below)
         if method is Method.nonlinear:
             if grid:
                 raise BadInputError("--grid: the method nonlinear computes the static state alone; leave --grid out")
@@ -204,6 +224,8 @@ def modes(
     mesh_law: LawOption = MeshLaw.line_of_action,
     inertias: InertiasOption = None,
     out: OutOption = None,
+    files_below: FilesBelowOption = None,
+    scripts: ScriptsOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Compute the eigenmodes of a variant at its static load, with a Campbell diagram.
@@ -211,8 +233,8 @@ def modes(
     Tables that are missing or do not fit the case are computed first.
     """
     with exit_codes():
-        gearbox = read_gearbox(case)
-        _check_choices(gearbox, variant, mesh_law, inertias)
+        gearbox = read_gearbox(case, files_below, scripts)
+        _check_choices(gearbox, variant, mesh_law, inertias, _results_folder(case, out, make=False))
         folder = _results_folder(case, out)
         _fill_missing_tables(gearbox, folder, mesh_law)
         with _time_noted(folder, f"modes, {variant}, {inertias or gearbox.case.default_inertias}, {mesh_law}"):
@@ -227,7 +249,7 @@ def modes(
             print_json({"case": str(case), **label, "modes": rows, "file": str(path), "picture": str(picture)})
             return
         print_table(f"Modes of {_label(found)}", [_mode_row(row) for row in rows], ("what moves",))
-        results.print(f"Modes in {path}, diagram in {picture}", highlight=False)
+        say(f"Modes in {path}, diagram in {picture}")
 
 
 @app.command()
@@ -245,6 +267,8 @@ def run(
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with a run that was stopped.")] = False,
     out: OutOption = None,
+    files_below: FilesBelowOption = None,
+    scripts: ScriptsOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Run a load case in time; results are written while it goes on.
@@ -254,9 +278,9 @@ def run(
     with exit_codes():
         from exugear.runup import refuse_if_busy, refuse_to_resume, run_directory
 
-        gearbox = read_gearbox(case)
+        gearbox = read_gearbox(case, files_below, scripts)
         loads = load_case or next(iter(gearbox.load_cases), "")
-        _check_choices(gearbox, variant, mesh_law, inertias, loads)
+        _check_choices(gearbox, variant, mesh_law, inertias, _results_folder(case, out, make=False), loads)
         _check_extent(gearbox, loads, duration, out or Path("results"))
         _check_solver(gearbox, variant, solver)
         inertias = inertias or gearbox.case.default_inertias
@@ -284,12 +308,14 @@ def view(
     ] = 3215.0,
     animation: Annotated[bool, typer.Option("--gif", help="Write that mode as an animated picture, too.")] = False,
     out: OutOption = None,
+    files_below: FilesBelowOption = None,
+    scripts: ScriptsOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Show the gearbox and its modes in three dimensions: a web page that stands alone, and pictures."""
     with exit_codes():
-        gearbox = read_gearbox(case)
-        _check_choices(gearbox, variant, mesh_law, inertias)
+        gearbox = read_gearbox(case, files_below, scripts)
+        _check_choices(gearbox, variant, mesh_law, inertias, _results_folder(case, out, make=False))
         folder = _results_folder(case, out)
         _fill_missing_tables(gearbox, folder, mesh_law)
         found, path = _compute_modes(gearbox, folder, variant.value, mesh_law.value, inertias)
@@ -298,29 +324,31 @@ def view(
             print_json({"case": str(case), "mode": found.nearest(near) + 1, "files": [str(file) for file in written]})
             return
         for file in written:
-            results.print(str(file), highlight=False, soft_wrap=True)
+            say(str(file))
 
 
 @app.command()
 def report(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Results folder.", show_default=False)],
     near: Annotated[float, typer.Option(min=1.0, metavar="HZ", help="Frequency to look for modes at.")] = 3215.0,
+    files_below: FilesBelowOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Write a report of a results folder: one web page with pictures, tables, assumptions, and where time went.
 
-    Compares the variants whose runs and modes are there.
+    Compares the variants whose runs and modes are there. gmsh scripts never run: what they would make must be there.
     """
     with exit_codes():
         from exugear.gearbox import CaseError
         from exugear.report import ReportError, write_report
 
+        _check_files_below(files_below)
         if not folder.is_dir():
             raise BadInputError(f"{folder}: no such folder; name the one that `exugear run` wrote into")
         try:
             with _time_noted(folder, "report"), progress_bar() as bar:
                 task = bar.add_task("report", total=None)
-                written = write_report(folder, near, lambda what: bar.update(task, description=what))
+                written = write_report(folder, near, lambda what: bar.update(task, description=what), files_below)
         except (CaseError, ReportError) as error:
             raise BadInputError(error) from error
         _report_report(folder, written.path, written.statements, written.left_out, as_json)
@@ -373,7 +401,7 @@ def _compute_references(
         print_json({"case": str(case), "tables": summaries})
     else:
         print_table("Static transmission error, non-linear finite elements", [_ste_row(row) for row in summaries])
-        results.print(f"Tables in {folder / 'tables'}", highlight=False)
+        say(f"Tables in {folder / 'tables'}")
     failures = [f"{name}: {line}" for name, table in tables.items() for line in table.failures]
     if failures:
         raise FailedError("\n".join(["positions that are not solved:", *failures]))
@@ -451,16 +479,24 @@ def _results_folder(case: Path, out: Path | None, make: bool = True) -> Path:
 
 
 def _check_choices(
-    gearbox: Gearbox, variant: Variant, law: MeshLaw, inertias: str | None, load_case: str | None = None
+    gearbox: Gearbox,
+    variant: Variant,
+    law: MeshLaw,
+    inertias: str | None,
+    folder: Path,
+    load_case: str | None = None,
 ) -> None:
-    """Refuse what the gearbox does not have before anything is written."""
+    """Refuse what the gearbox does not have, or may not do, before anything is written into the results folder."""
+    from exugear.elastic_bodies import check_solids
+    from exugear.results import bodies_folder
+
     with _model_errors():
         gearbox.bodies(inertias)
         if load_case is not None and load_case not in gearbox.load_cases:
             known = ", ".join(gearbox.load_cases) or "none"
             raise gearbox.fault(f"no load case {load_case!r}; load cases are {known}")
         if variant is Variant.flexible:
-            _check_solids(gearbox)
+            check_solids(gearbox, bodies_folder(folder))
     if law is MeshLaw.rigid and variant is not Variant.rigid:
         raise BadInputError(f"--mesh-law rigid: its gears only roll, which needs the variant rigid, not {variant}")
 
@@ -474,17 +510,18 @@ def _check_extent(gearbox: Gearbox, load_case: str, duration: float | None, fold
         check_disk(gearbox, gearbox.load_cases[load_case], folder, duration)
 
 
-def _check_solids(gearbox: Gearbox) -> None:
-    """Refuse solids that are not known well enough, or whose files are not there."""
-    from exugear.elastic_bodies import elastic_names, solid_body
+def _tell_scripts(gearbox: Gearbox) -> None:
+    """Check the solids, and say which of them only a script makes."""
+    from exugear.elastic_bodies import solids_of
 
-    for name in elastic_names(gearbox):
-        family = gearbox.body(name).family
-        if gearbox.case.bodies[family].solid is None:
-            continue
-        file = solid_body(gearbox, name).model.mesh
-        if not file.path.is_file():
-            raise gearbox.fault(f"bodies.{family}.solid.file: {file.path}: no such file")
+    with _model_errors():
+        for key, model in solids_of(gearbox):
+            if model.mesh.is_script:
+                note(
+                    f"{key}.file = {model.mesh.path.name!r}: a gmsh script can run any command, so modes, run and "
+                    "view want --allow-scripts or EXUGEAR_ALLOW_SCRIPTS=1 for the variant flexible",
+                    style="yellow",
+                )
 
 
 @contextmanager
@@ -721,21 +758,17 @@ def _report_run(case: Path, finished: Run, as_json: bool) -> None:
 
 
 def _print_run(summary: dict[str, Any], outside: float) -> None:
-    results.print(
+    say(
         f"{summary['variant']}, {summary['load_case']}, law {summary['mesh_law']}, inertias {summary['inertias']}: "
         f"{summary['simulated_s']:g} s simulated in {summary['wall_s']:.1f} s ({summary['solver']}), "
-        f"{summary['input_speed_rpm']:.1f} rpm reached",
-        highlight=False,
-        soft_wrap=True,
+        f"{summary['input_speed_rpm']:.1f} rpm reached"
     )
     if outside > 0.0:
-        results.print(
+        say(
             f"A mesh was outside its table for {outside:.3g} s, where the table goes on in a straight line: "
-            "outside_time in the results names the mesh; widen the axes of [ste]",
-            highlight=False,
-            soft_wrap=True,
+            "outside_time in the results names the mesh; widen the axes of [ste]"
         )
-    results.print(f"Results in {summary['file']}", highlight=False, soft_wrap=True)
+    say(f"Results in {summary['file']}")
 
 
 def _draw_modes(found: Modes, folder: Path, first: int, animation: bool) -> list[Path]:
@@ -794,13 +827,13 @@ def _report_report(
         print_json({"report": str(path), "statements": list(statements), "left_out": list(left_out), "seconds": times})
         return
     for line in statements:
-        results.print(f"- {line}", highlight=False)
+        say(f"- {line}")
     rows = [
         {"step": entry.step, "wall s": f"{entry.seconds:.1f}", "peak MB": f"{1e-6 * entry.memory:.0f}"}
         for entry in spent
     ]
     print_table("Where the time went, the last time of each step (steps side by side overlap)", rows, ("step",))
-    results.print(f"Report: {path}", highlight=False, soft_wrap=True)
+    say(f"Report: {path}")
 
 
 def _draw_contacts(orders: list[TableOrder], tables: dict[str, MeshTable], folder: Path) -> list[Path]:
@@ -841,7 +874,7 @@ def _report_tables(
         print_json({"case": str(case), "tables": summaries, "pictures": [str(path) for path in pictures]})
     else:
         print_table("Static transmission error", [_ste_row(summary) for summary in summaries])
-        results.print(f"Tables in {folder / 'tables'}, pictures in {folder / 'pictures'}", highlight=False)
+        say(f"Tables in {folder / 'tables'}, pictures in {folder / 'pictures'}")
     failures = [f"{name}: {line}" for name, table in tables.items() for line in table.failures]
     if failures:
         raise FailedError("\n".join(["positions that are not solved:", *failures]))
@@ -857,14 +890,21 @@ def make_results_folder(folder: Path) -> None:
         raise BadInputError(f"--out {folder}: not writable; name another folder")
 
 
-def read_gearbox(case: Path) -> Gearbox:
-    """Read a gearbox file for a verb."""
+def read_gearbox(case: Path, files_below: Path | None = None, scripts: bool = False) -> Gearbox:
+    """Read a gearbox file for a verb, with what the user permits it."""
     from exugear.gearbox import CaseError, Gearbox
+    from exugear.named_files import Permissions
 
+    _check_files_below(files_below)
     try:
-        return Gearbox.from_toml(case)
+        return Gearbox.from_toml(case, Permissions(scripts, files_below))
     except CaseError as error:
         raise BadInputError(error) from error
+
+
+def _check_files_below(folder: Path | None) -> None:
+    if folder is not None and not folder.is_dir():
+        raise BadInputError(f"--files-below {folder}: no such folder; name one that the gearbox file may read from")
 
 
 def _pair_summary(name: str, spec: PairSpec) -> dict[str, Any]:

@@ -1,4 +1,8 @@
-"""What the command line says and how it ends: results on standard output, all else on standard error."""
+"""What the command line says and how it ends: results on standard output, all else on standard error.
+
+Names, paths and what files hold may come from a stranger. Nothing of it is taken as markup, and what would steer the
+terminal is shown, not obeyed.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +10,7 @@ import json
 import signal
 import sys
 import threading
+import unicodedata
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from types import FrameType
@@ -16,6 +21,8 @@ from rich.console import Console
 from rich.progress import (
     BarColumn,
     Progress,
+    ProgressColumn,
+    Task,
     TaskProgressColumn,
     TextColumn,
     TimeElapsedColumn,
@@ -27,6 +34,11 @@ from rich.text import Text
 EXIT_FAILED = 1
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
+
+LONGEST_LINE = 400
+"""Letters of a line of a message; of a longer one the middle is left out, for file and remedy stand at its ends."""
+_TURNS = frozenset("\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
+"""Characters that turn the direction of writing and so can show a text that is not there."""
 
 results = Console()
 messages = Console(stderr=True)
@@ -110,15 +122,56 @@ def _end(what: str, reason: object, code: int) -> NoReturn:
     sys.exit(code)
 
 
+def plain(text: object) -> str:
+    r"""Show what would steer a terminal: control characters, turns of the writing direction, halves of characters.
+
+    Examples
+    --------
+    >>> print(plain("red \x1b[31m, 5 µm"))
+    red \x1b[31m, 5 µm
+    """
+    return "".join(
+        letter.encode("unicode_escape").decode("ascii")
+        if letter in _TURNS or unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp")
+        else letter
+        for letter in str(text)
+    )
+
+
+def shortened(line: str) -> str:
+    """Leave out the middle of a line above `LONGEST_LINE`.
+
+    Examples
+    --------
+    >>> shortened("file: " + 1000 * "x" + " must be shorter")[-20:]
+    'xxxx must be shorter'
+    """
+    half = (LONGEST_LINE - 3) // 2
+    return line if len(line) <= LONGEST_LINE else f"{line[:half]}...{line[-half:]}"
+
+
+def say(line: str) -> None:
+    """Print a line of results, unwrapped, so that paths in it can be copied."""
+    results.print(Text(plain(line)), soft_wrap=True)
+
+
 def note(message: str, style: str = "") -> None:
-    """Say something that is no result, unwrapped, so that paths in it can be copied."""
-    messages.print(Text(message, style=style), soft_wrap=True)
+    """Say something that is no result, unwrapped, so that paths in it can be copied; its lines stay lines."""
+    lines = [shortened(plain(line)) for line in message.split("\n")]
+    messages.print(Text("\n".join(lines), style=style), soft_wrap=True)
+
+
+class _Description(ProgressColumn):
+    """What a bar is about, as it is."""
+
+    def render(self, task: Task) -> Text:
+        return Text(shortened(plain(task.description)))
 
 
 def progress_bar() -> Progress:
     """Return a bar with the time left, to be used as a context manager."""
     return Progress(
-        TextColumn("{task.description}"),
+        _Description(),
         BarColumn(),
         TaskProgressColumn(),
         TimeElapsedColumn(),
@@ -136,11 +189,13 @@ def print_json(summary: Mapping[str, Any]) -> None:
 
 def print_table(title: str, rows: list[dict[str, str]], texts: tuple[str, ...] = ()) -> None:
     """Print rows under the keys of the first one; the first column is text, others numbers but for `texts`."""
-    table = Table(title=title, title_justify="left", title_style="bold", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    table = Table(
+        title=Text(plain(title)), title_justify="left", title_style="bold", box=SIMPLE_HEAD, padding=(0, 1, 0, 0)
+    )
     for place, heading in enumerate(rows[0]):
         words = heading in texts
         justify: Literal["left", "right"] = "right" if place and not words else "left"
         table.add_column(heading, justify=justify, no_wrap=not words, overflow="fold" if words else "ellipsis")
     for row in rows:
-        table.add_row(*row.values())
+        table.add_row(*(Text(plain(value)) for value in row.values()))
     results.print(table)

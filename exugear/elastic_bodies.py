@@ -17,6 +17,7 @@ from exugear.casefile import BlankSection, MaterialSection, ShapeSection, SolidS
 from exugear.floating import FloatingBody, load_or_reduce_floating, with_inertia
 from exugear.gearbox import Bearing, Body, Gearbox
 from exugear.meridian import MeshSize, SeatBand, Shaft, ShaftError, ShaftSection
+from exugear.named_files import LARGEST_SOLID
 from exugear.reduction import (
     Blank,
     Frame,
@@ -28,8 +29,8 @@ from exugear.reduction import (
     reduce_shaft,
     with_rigid_inertia,
 )
-from exugear.solid_mesh import SolidError, SolidFile, turned_hexahedra
-from exugear.solids import SolidModel, SolidSeat, load_or_reduce_solid, reduce_solid
+from exugear.solid_mesh import GEOMETRY, MESHES, UNPERMITTED, SolidError, SolidFile, turned_hexahedra
+from exugear.solids import SolidModel, SolidSeat, kept_file, load_or_reduce_solid, reduce_solid
 from fe_ste.gears import Material
 
 SOLID_SIZE = MeshSize(0.05, 0.05, 1)
@@ -153,12 +154,13 @@ class SolidBody:
 
 
 def solid_body(gearbox: Gearbox, name: str) -> SolidBody:
-    """Everything that the gearbox file says of a body's solid; its file is not read yet.
+    """Everything that the gearbox file says of a body's solid; its file is there and may be read, but is not yet.
 
     Raises
     ------
     CaseError
-        The body has no solid, or a seat of something on it is missing or not known well enough.
+        The body has no solid, its file is not there, in no format that is read, or lies where it may not, or a seat of
+        something on it is missing or not known well enough.
     """
     body = gearbox.body(name)
     section = gearbox.case.bodies[body.family]
@@ -172,11 +174,15 @@ def solid_body(gearbox: Gearbox, name: str) -> SolidBody:
             "its own turning frame; use 'elastic'"
         )
     file = SolidFile(
-        Path(gearbox.source).parent / solid.file,
+        gearbox.file(f"{key}.file", solid.file, LARGEST_SOLID),
         solid.length_unit_mm * 1e-3,
         (solid.element_size_mm or 0.0) * 1e-3,
         solid.elements_around,
+        gearbox.permissions.scripts,
     )
+    if not file.is_geometry and not file.is_mesh:
+        endings = ", ".join((*GEOMETRY, *MESHES))
+        raise gearbox.fault(f"{key}.file = {solid.file!r}: no format that is read; its name must end in {endings}")
     if file.is_geometry and solid.element_size_mm is None:
         raise gearbox.fault(f"{key}.element_size_mm: this key is missing; {solid.file} has to be meshed")
     band = solid.band_Hz or gearbox.case.elasticity.band_Hz
@@ -321,6 +327,40 @@ def _solid_blanks(gearbox: Gearbox, body: Body, solid: SolidSection, names: list
 def elastic_names(gearbox: Gearbox) -> tuple[str, ...]:
     """Names of the bodies that the variant `flexible` takes as elastic."""
     return tuple(body.name for body in gearbox.bodies() if gearbox.case.bodies[body.family].flexibility != "none")
+
+
+def solids_of(gearbox: Gearbox) -> Iterator[tuple[str, SolidModel]]:
+    """Key and model of each solid that the variant `flexible` takes; files are there, but none is read or run yet.
+
+    Raises
+    ------
+    CaseError
+        As `solid_body`.
+    """
+    for name in elastic_names(gearbox):
+        family = gearbox.body(name).family
+        if gearbox.case.bodies[family].solid is not None:
+            yield f"bodies.{family}.solid", solid_body(gearbox, name).model
+
+
+def check_solids(gearbox: Gearbox, folder: Path) -> None:
+    """Refuse solids that cannot be taken, and scripts that would have to run and may not, before any work.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    folder : Path
+        Where reductions are kept: a script whose reduction is there need not run.
+
+    Raises
+    ------
+    CaseError
+        A script that may not run, or as `solid_body`.
+    """
+    for key, model in solids_of(gearbox):
+        file: SolidFile = model.mesh
+        if file.is_script and not file.scripts and not kept_file(model, folder).is_file():
+            raise gearbox.fault(f"{key}.file = {file.path.name!r}: {UNPERMITTED}")
 
 
 def mounts_at_work(gearbox: Gearbox) -> tuple[Bearing, ...]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +30,7 @@ from exugear.casefile import (
     read_toml,
 )
 from exugear.gearbox_checks import check
+from exugear.named_files import LARGEST_TABLE, NOTHING_MORE, NamedFileError, Permissions, named_file
 from exugear.parts import (
     Bearing,
     Body,
@@ -80,22 +81,31 @@ class Gearbox:
     case: CaseFile
     source: str
     content: Mapping[str, Any] = field(repr=False)
+    permissions: Permissions = field(default=NOTHING_MORE, repr=False)
 
     @classmethod
-    def from_toml(cls, path: str | Path) -> Gearbox:
+    def from_toml(cls, path: str | Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:
         """Read and check a gearbox file.
+
+        Parameters
+        ----------
+        path : path-like
+        permissions : Permissions
+            Whether scripts that it names may run, and where else files that it names may lie.
 
         Raises
         ------
         CaseError
             Anything wrong with the file: one message with file, key, value and what would be right.
         """
-        return cls.from_dict(read_toml(path), source=str(path))
+        return cls.from_dict(read_toml(path), str(path), permissions)
 
     @classmethod
-    def from_dict(cls, content: Mapping[str, Any], source: str = "gearbox") -> Gearbox:
-        """Check content already in memory, such as a varied case."""
-        gearbox = cls(parse_case(dict(content), source), source, content)
+    def from_dict(
+        cls, content: Mapping[str, Any], source: str = "gearbox", permissions: Permissions = NOTHING_MORE
+    ) -> Gearbox:
+        """Check content already in memory, such as a varied case; files that it names lie beside `source`."""
+        gearbox = cls(parse_case(dict(content), source), source, content, permissions)
         check(gearbox)
         return gearbox
 
@@ -117,11 +127,24 @@ class Gearbox:
                 if not isinstance(section, dict):
                     raise self.fault(f"{dotted}: {part!r} is not a section")
             section[last] = value
-        return Gearbox.from_dict(content, self.source)
+        return Gearbox.from_dict(content, self.source, self.permissions)
 
     def fault(self, text: str) -> CaseError:
         """Error that names the file before `text` (key, value and what would be right)."""
         return CaseError(f"{self.source}: {text}")
+
+    def file(self, key: str, name: str, largest: int) -> Path:
+        """Path of a file of at most `largest` bytes that the gearbox file names under a key.
+
+        Raises
+        ------
+        CaseError
+            The file is not there or may not be read, as `exugear.named_files.named_file` says.
+        """
+        try:
+            return named_file(name, Path(self.source).parent, self.permissions, largest)
+        except NamedFileError as error:
+            raise self.fault(f"{key} = {name!r}: {error}") from None
 
     @property
     def name(self) -> str:
@@ -161,11 +184,12 @@ class Gearbox:
         CaseError
             A modification that does not fit its gear, or a topography that cannot be read.
         """
-        folder = Path(self.source).parent
-        return {
-            name: self._guard(f"gears.{name}.modification", modification_from, self.gears[name], section, folder)
-            for name, section in self.case.gears.items()
-        }
+        found = {}
+        for name, section in self.case.gears.items():
+            key = f"gears.{name}.modification"
+            find = partial(self.file, f"{key}.topography", largest=LARGEST_TABLE)
+            found[name] = self._guard(key, modification_from, self.gears[name], section, find)
+        return found
 
     @cached_property
     def gear_pairs(self) -> dict[str, GearPair]:
@@ -591,12 +615,7 @@ class Gearbox:
                 raise self.fault(f"{key}: no turning body {body!r}; bodies are {', '.join(self.spinning)}")
         series = None
         if section.torque_series is not None:
-            series = Path(self.source).parent / section.torque_series
-            if not series.is_file():
-                raise self.fault(
-                    f"{key}.torque_series = {section.torque_series!r}: no such file "
-                    "beside the gearbox file; expected CSV with time_s and BODY_N_m columns"
-                )
+            series = self.file(f"{key}.torque_series", section.torque_series, LARGEST_TABLE)
         return LoadCase(
             name,
             dict(section.torques_N_m),

@@ -23,8 +23,8 @@ code { font-size: .82rem; overflow-wrap: anywhere; } summary { cursor: pointer; 
 
 
 def text(value: object) -> str:
-    """Escape a text for the page."""
-    return html.escape(str(value))
+    """Escape a text for the page; halves of characters, which no file can hold, become question marks."""
+    return html.escape(str(value).encode("utf-8", "replace").decode("utf-8"))
 
 
 def paragraph(value: str, kind: str = "") -> str:

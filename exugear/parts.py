@@ -203,8 +203,8 @@ def gear_from(name: str, section: GearSection) -> Gear:
     )
 
 
-def modification_from(gear: Gear, section: GearSection, folder: Path) -> FlankModification:
-    """Modification of a gear from its section, tried on the gear."""
+def modification_from(gear: Gear, section: GearSection, find: Callable[[str], Path]) -> FlankModification:
+    """Modification of a gear from its section, tried on the gear; `find` gives the path of the topography it names."""
     given = section.modification
     if given is None:
         return FlankModification()
@@ -216,7 +216,7 @@ def modification_from(gear: Gear, section: GearSection, folder: Path) -> FlankMo
         profile_slope=1e-6 * given.profile_slope_um,
         helix_slope=1e-6 * given.helix_slope_um,
         twist=1e-6 * given.twist_um,
-        topography=None if given.topography is None else FlankTopography.from_csv(folder / given.topography),
+        topography=None if given.topography is None else FlankTopography.from_csv(find(given.topography)),
     )
     modification.gap(gear, np.array(gear.tip_radius), np.array(0.0))  # refuses a relief that starts off the involute
     return modification

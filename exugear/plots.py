@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from exugear.spectra import OrderLine, Pick, Waterfall, line_level
-from fe_ste.plots import COLOURS, WARNING_COLOUR, drawing_style, finish_figure, new_figure
+from fe_ste.plots import COLOURS, WARNING_COLOUR, drawable, drawing_style, finish_figure, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -427,7 +427,7 @@ def plot_mode_energies(
         panels = figure.subplots(1, 2)
         headings = ("Strain energy", "Kinetic energy")
         for panel, entries, heading, colour in zip(panels, shares, headings, COLOURS, strict=False):
-            names, values = list(entries), [100.0 * value for value in entries.values()]
+            names, values = [drawable(name) for name in entries], [100.0 * value for value in entries.values()]
             bars = panel.barh(range(len(names)), values, color=colour, height=0.7)
             panel.bar_label(bars, fmt="%.0f %%", padding=2, fontsize=7.5)
             panel.set_yticks(range(len(names)), names)

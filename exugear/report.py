@@ -34,6 +34,7 @@ from exugear.elastic_scene import draw_elastic_bodies, elastic_scene
 from exugear.gearbox import CaseError, Gearbox
 from exugear.mesh_stiffness import iso6336_stiffness, mesh_stiffness
 from exugear.modes import Modes, load_modes, modes_of
+from exugear.named_files import Permissions
 from exugear.orders import order_lines
 from exugear.plots import Sensitivity, plot_mode_energies, plot_order_levels, plot_sensitivities, plot_waterfalls
 from exugear.results import REPORT_FILE, bodies_folder, input_hash, kept_case, times_spent
@@ -163,7 +164,10 @@ class _Writer:
 
 
 def write_report(
-    folder: str | Path, target: float = REFERENCE_FREQUENCY, tell: Callable[[str], None] | None = None
+    folder: str | Path,
+    target: float = REFERENCE_FREQUENCY,
+    tell: Callable[[str], None] | None = None,
+    files_below: Path | None = None,
 ) -> Report:
     """Write ``report.html`` from what a results folder holds: tables, runs, modes, pictures.
 
@@ -175,6 +179,9 @@ def write_report(
         Frequency to look for modes at, Hz.
     tell : callable, optional
         Called with what is being done.
+    files_below : Path, optional
+        A further folder that files may lie in which the gearbox file names. Scripts among them never run: what they
+        would make must be kept in the folder.
 
     Returns
     -------
@@ -188,12 +195,15 @@ def write_report(
         Neither tables nor modes nor runs in it belong to its case.
     """
     folder = Path(folder)
-    writer = _Writer(folder, kept_case(folder), target, tell or (lambda what: None))
+    gearbox = kept_case(folder, Permissions(below=files_below))
+    writer = _Writer(folder, gearbox, target, tell or (lambda what: None))
     tables = _tables(writer)
     modes = dict(_stored_modes(writer))
     runs = list(_stored_runs(writer, modes))
     if not (tables or modes or runs):
-        raise ReportError(f"{folder}: nothing here belongs to its case: {'; '.join(writer.left_out) or 'no files'}")
+        raise ReportError(
+            "\n".join([f"{folder}: nothing here belongs to its case", *(writer.left_out or ["no files"])])
+        )
     body = [
         _runs_section(writer, runs),
         _modes_section(writer, modes),

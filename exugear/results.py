@@ -14,7 +14,9 @@ from typing import Any
 import numpy as np
 
 from exugear.assembly import Assembly
+from exugear.elastic_bodies import solid_body
 from exugear.gearbox import CaseError, Gearbox
+from exugear.named_files import NOTHING_MORE, Permissions
 from exugear.versions import MODES, REDUCTION, RUN
 from fe_ste.files import FileError, append_line, read_text, write_file
 from fe_ste.interpolation import SteSurface
@@ -56,9 +58,9 @@ def input_hash(assembly: Assembly, load_case: str | None = None) -> str:
         "load_case": load_case,
         "torque_series": hashlib.sha256(series.read_bytes()).hexdigest() if series else None,
         "solids": {
-            name: hashlib.sha256((Path(gearbox.source).parent / solid.file).read_bytes()).hexdigest()
+            name: hashlib.sha256(solid_body(gearbox, name).model.mesh.path.read_bytes()).hexdigest()
             for name in assembly.elastic_bodies
-            if (solid := gearbox.case.bodies[name].solid) is not None
+            if gearbox.case.bodies[name].solid is not None
         },
         # Rounded: another machine's last digits must not make another hash.
         "stiffness": {
@@ -93,8 +95,14 @@ def _checksum(kept: dict[str, Any]) -> str:
     return hashlib.sha256(text.encode("utf-8")).hexdigest()
 
 
-def kept_case(folder: Path) -> Gearbox:
+def kept_case(folder: Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:
     """Read the gearbox that the results of a folder belong to.
+
+    Parameters
+    ----------
+    folder : Path
+    permissions : Permissions
+        Where else files that the gearbox file names may lie.
 
     Raises
     ------
@@ -108,7 +116,7 @@ def kept_case(folder: Path) -> Gearbox:
         kept = json.loads(read_text(path))
         if kept["checksum"] != _checksum(kept):
             raise ValueError("it was changed since it was written")
-        return Gearbox.from_dict(kept["content"], kept["source"])
+        return Gearbox.from_dict(kept["content"], kept["source"], permissions)
     # Whoever makes up a file with its checksum may nest it and write numbers as he likes.
     except (FileError, ValueError, KeyError, TypeError, RecursionError, OverflowError) as error:
         raise CaseError(

@@ -1,5 +1,8 @@
 """Meshes of solid bodies: second-order hexahedra of turned shafts, tetrahedra by gmsh, files by meshio.
 
+Files may come from a stranger. Scripts of gmsh run only where they are permitted to; shapes are read without what
+lies beside them, meshes in formats that refer to no other file.
+
 Every mesh comes out as scikit-fem's `MeshHex2` (27 nodes) or `MeshTet2` (10 nodes). Elements of first order keep their
 straight edges and get nodes in the middle; the displacement is of second order in either case.
 
@@ -39,8 +42,29 @@ _HEX_FACES = np.array([[0, 4, 7, 3], [1, 2, 6, 5], [0, 1, 5, 4], [3, 7, 6, 2], [
 _HEX_FACE_EDGES = np.array([[3, 8, 7, 11], [1, 9, 5, 10], [0, 9, 4, 8], [2, 11, 6, 10], [0, 1, 2, 3], [4, 5, 6, 7]])
 """Corners of edges and faces, and edges of faces, in the order of VTK."""
 _CORNERS = {"tetra": 4, "tetra10": 4, "hexahedron": 8, "hexahedron20": 8, "hexahedron27": 8}
-GEOMETRY = (".geo", ".step", ".stp", ".brep")
-"""Endings of files that gmsh meshes; all others hold a mesh."""
+SCRIPT = ".geo"
+"""Ending of gmsh scripts. Such a script can run any command of the system."""
+CAD = {".step": "step", ".stp": "step", ".brep": "brep"}
+"""Formats of shapes that hold nothing to run, by the ending of the file."""
+GEOMETRY = (SCRIPT, *CAD)
+"""Endings of files that gmsh meshes."""
+MESHES = {
+    ".msh": "gmsh",
+    ".inp": "abaqus",
+    ".vtu": "vtu",
+    ".vtk": "vtk",
+    ".bdf": "nastran",
+    ".nas": "nastran",
+    ".fem": "nastran",
+}
+"""Formats of meshes that are read, by the ending of the file: one file each, which refers to no other."""
+
+
+UNPERMITTED = (
+    "a gmsh script can run any command; if you trust it, permit it with --allow-scripts (modes, run, view) or "
+    "EXUGEAR_ALLOW_SCRIPTS=1; a STEP file needs no permission"
+)
+"""Why a script is refused, and what would be right."""
 
 
 class SolidError(ValueError):
@@ -171,8 +195,8 @@ def tetrahedra(build: Callable[[Any], None], size: float, curvature: int = 12) -
     return _meshed(load, size, curvature)
 
 
-def mesh_geometry(path: Path, size: float, curvature: int = 12, unit: float = 1e-3) -> Any:
-    """Mesh a gmsh script (.geo, OpenCASCADE kernel) or a STEP or BREP file with tetrahedra of second order.
+def mesh_geometry(path: Path, size: float, curvature: int = 12, unit: float = 1e-3, scripts: bool = False) -> Any:
+    """Mesh a STEP or BREP file or a gmsh script (.geo, OpenCASCADE kernel) with tetrahedra of second order.
 
     Parameters
     ----------
@@ -182,6 +206,8 @@ def mesh_geometry(path: Path, size: float, curvature: int = 12, unit: float = 1e
         As in `tetrahedra`; m.
     unit : float
         Length of the file's unit, m. gmsh reads STEP in mm whatever its unit is.
+    scripts : bool
+        Whether a script may run. It can do all that the user can.
 
     Returns
     -------
@@ -190,13 +216,28 @@ def mesh_geometry(path: Path, size: float, curvature: int = 12, unit: float = 1e
     Raises
     ------
     SolidError
-        As `tetrahedra`; also a file that is missing or that gmsh cannot read. After a syntax error in a script gmsh
-        reads no other one in the same process.
+        As `tetrahedra`; also a file that is missing or that gmsh cannot read, and a script that may not run. After a
+        syntax error in a script gmsh reads no other one in the same process.
     """
     if not path.is_file():
         raise SolidError(f"{path}: no such file")
+    kind = path.suffix.lower()
+    if kind not in GEOMETRY:
+        raise SolidError(f"{path}: no geometry; its name must end in {', '.join(GEOMETRY)}")
+    if kind == SCRIPT and not scripts:
+        raise SolidError(f"{path.name}: {UNPERMITTED}")
+
+    def load(gmsh: Any) -> None:
+        if kind == SCRIPT:
+            gmsh.open(str(path))
+            return
+        # gmsh.open would run a script of options that lies beside the shape; labels may refer to other files.
+        gmsh.option.setNumber("Geometry.OCCImportLabels", 0)
+        gmsh.model.occ.importShapes(str(path), format=CAD[kind])
+        gmsh.model.occ.synchronize()
+
     try:
-        return _meshed(lambda gmsh: gmsh.open(str(path)), size / unit, curvature, unit)
+        return _meshed(load, size / unit, curvature, unit)
     except SolidError as error:
         raise SolidError(f"{path}: {error}") from None
 
@@ -238,7 +279,7 @@ def _keep_broken_pipes() -> None:
 
 
 def read_solid(path: Path, unit: float = 1.0) -> Any:
-    """Read a mesh of tetrahedra or hexahedra, first or second order: .msh, .inp, .vtu, and what else meshio knows.
+    """Read a mesh of tetrahedra or hexahedra, first or second order, in one of the formats `MESHES`.
 
     Parameters
     ----------
@@ -253,15 +294,20 @@ def read_solid(path: Path, unit: float = 1.0) -> Any:
     Raises
     ------
     SolidError
-        meshio is missing or cannot read the file, or it holds no solid elements of one kind.
+        Another format, meshio is missing or cannot read the file, or it holds no solid elements of one kind.
     """
+    kind = MESHES.get(path.suffix.lower())
+    if kind is None:
+        raise SolidError(f"{path}: no mesh that is read; its name must end in {', '.join(MESHES)}")
     meshio = _library("meshio")
     if not path.is_file():
         raise SolidError(f"{path}: no such file")
+    if kind == "abaqus" and _includes(path):
+        raise SolidError(f"{path}: refers to another file by *INCLUDE; put all of the mesh into one file")
     try:
-        content = meshio.read(path)
-    except (SystemExit, meshio.ReadError, ValueError, KeyError, IndexError) as error:
-        raise SolidError(f"{path}: meshio cannot read it ({error})") from None
+        content = getattr(meshio, kind).read(str(path))
+    except Exception as error:  # its readers let out whatever damaged content makes them stumble on
+        raise SolidError(f"{path}: meshio cannot read it as {kind} ({error or type(error).__name__})") from None
     solid: dict[str, list[Any]] = {}
     for block in content.cells:
         if block.type in _CORNERS:
@@ -273,6 +319,12 @@ def read_solid(path: Path, unit: float = 1.0) -> Any:
     return second_order(unit * np.asarray(content.points), np.concatenate(blocks).astype(np.int64), kind)
 
 
+def _includes(path: Path) -> bool:
+    """Tell whether a file of Abaqus takes in another one; keywords as meshio understands them."""
+    with path.open(encoding="utf-8", errors="replace") as lines:
+        return any(line.partition(",")[0].strip().replace("*", "").upper() == "INCLUDE" for line in lines)
+
+
 @dataclass(frozen=True)
 class SolidFile:
     """A solid in a file, meshed or read when its mesh is asked for.
@@ -282,17 +334,29 @@ class SolidFile:
     path : geometry (`GEOMETRY`) or mesh
     unit : length of the file's unit, m
     size, curvature : largest element (m) and elements around a circle, for a geometry
+    scripts : whether it may run if it is a script
     """
 
     path: Path
     unit: float
     size: float = 0.0
     curvature: int = 12
+    scripts: bool = False
 
     @property
     def is_geometry(self) -> bool:
         """Tell whether gmsh has to mesh it."""
         return self.path.suffix.lower() in GEOMETRY
+
+    @property
+    def is_mesh(self) -> bool:
+        """Tell whether it holds a mesh in a format that is read."""
+        return self.path.suffix.lower() in MESHES
+
+    @property
+    def is_script(self) -> bool:
+        """Tell whether it can run commands of the system."""
+        return self.path.suffix.lower() == SCRIPT
 
     @cached_property
     def mesh(self) -> Any:
@@ -304,7 +368,7 @@ class SolidFile:
             As `mesh_geometry` and `read_solid`.
         """
         if self.is_geometry:
-            return mesh_geometry(self.path, self.size, self.curvature, self.unit)
+            return mesh_geometry(self.path, self.size, self.curvature, self.unit, self.scripts)
         return read_solid(self.path, self.unit)
 
     @property

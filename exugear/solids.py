@@ -425,9 +425,14 @@ def reduced_body(model: SolidModel, reduced: ReducedSolid) -> ReducedBody:
     )
 
 
+def kept_file(model: SolidModel, folder: Path) -> Path:
+    """Place of a solid's reduction in the folder where they are kept."""
+    return folder / f"{model.name}-{model.key[:16]}.npz"
+
+
 def load_or_reduce_solid(model: SolidModel, folder: Path) -> ReducedBody:
     """Reduced solid from a folder if it is there for exactly these inputs, else reduced and kept there."""
-    return kept(folder / f"{model.name}-{model.key[:16]}.npz", model.key, lambda: reduce_solid(model))
+    return kept(kept_file(model, folder), model.key, lambda: reduce_solid(model))
 
 
 def gyroscopic_matrix(model: SolidModel, reduced: ReducedSolid) -> Floats:

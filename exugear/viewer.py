@@ -8,6 +8,7 @@ from __future__ import annotations
 import base64
 import html
 import json
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -70,11 +71,13 @@ def write_mode_page(
         ],
         "modes": [_mode(scene) for scene in scenes],
     }
-    # A "</script>" inside a name must not end the script element.
-    text = json.dumps(data, separators=(",", ":")).replace("</", "<\\/")
+    # Names are free: as escapes of JSON, none of them ends the script element or begins another.
+    text = json.dumps(data, separators=(",", ":")).translate({ord(sign): f"\\u{ord(sign):04x}" for sign in "<>&"})
     target = Path(path)
-    page = _PAGE.replace("@HEADING@", html.escape(heading)).replace("@DATA@", text)
-    write_file(target, page.encode("utf-8"))
+    pieces = {"@HEADING@": html.escape(heading), "@DATA@": text}
+    # In one pass, so that nothing in a name is taken for a place to put something.
+    page = re.sub("|".join(pieces), lambda found: pieces[found[0]], _PAGE)
+    write_file(target, page.encode("utf-8", errors="replace"))
     return target
 
 

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
+from unicodedata import category
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +53,7 @@ def drawing_style() -> Iterator[None]:
             "grid.linewidth": 0.6,
             "lines.linewidth": 1.5,
             "figure.dpi": 100,
+            "text.parse_math": False,  # names are shown as they are, even with a dollar in them
         }
     ):
         yield
@@ -64,8 +66,24 @@ def new_figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
+def drawable(text: str) -> str:
+    r"""Put a sign in place of what no font can draw: control characters but ends of lines, halves of characters.
+
+    Examples
+    --------
+    >>> ascii(drawable("mode\x1b 3\n3215 Hz"))
+    "'mode\\ufffd 3\\n3215 Hz'"
+    """
+    return "".join("\ufffd" if letter != "\n" and category(letter) in ("Cc", "Cs") else letter for letter in text)
+
+
 def finish_figure(figure: Figure, path: str | Path | None) -> Figure:
-    """Write a figure, if a path is given, in the format of its suffix, and return it."""
+    """Write a figure, if a path is given, in the format of its suffix, and return it; any text in it can be drawn."""
+    from matplotlib.text import Text
+
+    for text in figure.findobj(Text):
+        assert isinstance(text, Text)
+        text.set_text(drawable(text.get_text()))
     if path is not None:
         path, content = Path(path), io.BytesIO()
         figure.savefig(content, format=path.suffix.removeprefix(".") or None, dpi=200)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from fe_ste.gears import Gear, GearPair
 from fe_ste.hexmesh import MeshSettings, sector_mesh
-from fe_ste.plots import drawing_style, finish_figure, new_figure
+from fe_ste.plots import drawable, drawing_style, finish_figure, new_figure
 
 if TYPE_CHECKING:
     import pyvista
@@ -152,7 +152,7 @@ def place_picture(panel: Axes, image: ImageArray, pixel: float, title: str = "")
     """Show a rendered image in parallel projection with a scale bar below; `pixel` is a pixel's size in m."""
     panel.imshow(image, interpolation="antialiased")
     panel.set_axis_off()
-    panel.set_title(title, loc="left")
+    panel.set_title(drawable(title), loc="left")
     height, width = image.shape[:2]
     bar = nice_length(0.2 * width * pixel)
     below = 1.04 * height

@@ -1,4 +1,4 @@
-// Planet carrier of the GRC with its pins, mm, for gmsh; taken by gearbox.toml.
+// Planet carrier of the GRC with its pins, mm, for gmsh. gearbox.toml takes carrier.step, which write_step.py makes of it.
 //
 // Letters as in gearbox.toml: P1, P2 printed, D derived, A assumed. Followed from printed numbers: bores, widths and
 // places of the bearings, orbit of the planets. Invented (A), because no dimensioned drawings are published: plates and

@@ -1,4 +1,5 @@
-// Housing of the GRC: torque arm, ring and rear housing in one piece, mm, for gmsh; taken by gearbox.toml.
+// Housing of the GRC: torque arm, ring and rear housing in one piece, mm, for gmsh. gearbox.toml takes housing.step, which
+// write_step.py makes of it.
 //
 // Letters as in gearbox.toml: P1, P2 printed, D derived, A assumed. Followed from printed numbers: bores of the bearings
 // and their places, flange, root and face of the ring, places of the axes. Invented (A), because no dimensioned drawings

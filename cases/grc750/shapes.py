@@ -2,9 +2,10 @@
 
     python cases/grc750/shapes.py [results folder]
 
-Solids come from the gmsh scripts beside this file as gearbox.toml names them; gmsh (extra `mesh`) meshes them. The rim
+Solids come from the STEP files beside this file as gearbox.toml names them; gmsh (extra `mesh`) meshes them. The rim
 is part of the housing there, and is taken here by itself as well. Reductions are kept in the results folder, where
-`exugear run` finds them; pictures of the first free vibrations go beside them.
+`exugear run` finds them; pictures of the first free vibrations go beside them. `write_step.py` makes the STEP files
+from scripts.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from exugear.solid_scene import draw_free_vibration
 from exugear.solids import SolidModel, load_or_reduce_solid
 
 RIM = {
-    "file": "ring_rim.geo",
+    "file": "ring_rim.step",
     "element_size_mm": 60.0,
     "elements_around": 36,
     "band_Hz": 2000.0,

@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ import xarray as xr
 
 from exugear.channels import BALANCE_TERMS
 from exugear.gearbox import CaseError, Gearbox
+from exugear.named_files import Permissions
 from exugear.runfile import Decimator, load_run, low_pass
 from exugear.runup import Progress, RunError, simulate
 from exugear.system import ExudynSystem
@@ -196,7 +198,7 @@ def test_torque_series_from_a_file(grc: Gearbox, stiffness: dict, tmp_path: Path
     table = tmp_path / "torque.csv"
     table.write_text("time_s,carrier_N_m,hss_N_m\n0,240e3,-2945.12\n0.02,240e3,-2945.12\n0.04,241e3,-2945.12\n")
     case = {"torque_series": str(table), "duration_s": 0.04}
-    gearbox = grc.varied({"load_cases.measured": case})
+    gearbox = replace(grc, permissions=Permissions(below=tmp_path)).varied({"load_cases.measured": case})
     data = opened(simulate(gearbox, "rigid", stiffness, tmp_path, load_case="measured").path)
     assert abs(float(data.input_speed.sel(time=0.015, method="nearest"))) < 1e-5
     # The ramp of 1 kNm over 20 ms brings 10 Nm s on 5.97e3 kg m2.
@@ -215,7 +217,8 @@ def test_torque_series_from_a_file(grc: Gearbox, stiffness: dict, tmp_path: Path
 def test_wrong_torque_series_is_named(grc: Gearbox, stiffness: dict, tmp_path: Path, text: str, words: str) -> None:
     table = tmp_path / "torque.csv"
     table.write_text(text)
-    gearbox = grc.varied({"load_cases.measured": {"torque_series": str(table)}})
+    permitted = replace(grc, permissions=Permissions(below=tmp_path))
+    gearbox = permitted.varied({"load_cases.measured": {"torque_series": str(table)}})
     with pytest.raises(CaseError, match=words):
         simulate(gearbox, "rigid", stiffness, tmp_path, load_case="measured", duration=0.01)
 

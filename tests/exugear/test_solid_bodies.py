@@ -19,6 +19,7 @@ from exugear.elastic_bodies import reduced_bodies, solid_body
 from exugear.elastic_scene import elastic_scene
 from exugear.gearbox import Gearbox
 from exugear.modes import MOTIONS, counterparts, eigenmodes, linearise, modes_of
+from exugear.named_files import Permissions
 from exugear.results import input_hash
 from exugear.runup import simulate
 from exugear.solids import assemble as assemble_solid
@@ -217,8 +218,9 @@ BooleanDifference{ Volume{plate}; Delete; }{ Volume{bores()}; Delete; }
 
 
 @needs_gmsh
-def test_a_script_step_and_its_mesh_are_the_same_body(box: Gearbox, tmp_path: Path) -> None:
+def test_a_script_step_and_its_mesh_are_the_same_body(tmp_path: Path) -> None:
     # STEP is the same geometry, whose edges gmsh may take up in another order; the mesh is the script's own.
+    box = Gearbox.from_dict(box_content(tmp_path), str(tmp_path / "case.toml"), Permissions(scripts=True))
     gmsh: Any = importlib.import_module("gmsh")
     (tmp_path / "plate.geo").write_text(PLATE, encoding="utf-8")
     gmsh.initialize(["test", "-nopopup"], readConfigFiles=False, interruptible=False)
@@ -241,7 +243,7 @@ def test_a_script_step_and_its_mesh_are_the_same_body(box: Gearbox, tmp_path: Pa
     bore = {"diameter_mm": 30.0, "width_mm": 20.0}
     bodies = {}
     for file in ("plate.geo", "plate.step", "plate.brep", "plate.msh"):
-        solid = {"file": str(tmp_path / file), "element_size_mm": 20.0, "elements_around": 8, "seats": {}}
+        solid = {"file": file, "element_size_mm": 20.0, "elements_around": 8, "seats": {}}
         for name, x in (("bearing_1", 0.0), ("bearing_2", 75.0), ("foot", 75.0)):
             solid["seats"][name] = {**bore, "position_mm": [x, 0.0, -10.0]}
         solid["seats"]["foot"] = {"same_as": "bearing_2"}
@@ -310,14 +312,19 @@ def test_results_know_the_file_of_a_solid(box: Gearbox, housed: Assembly, tmp_pa
     assert input_hash(assemble(same, "flexible", STIFFNESS)) != before
 
 
-def test_faults_name_body_key_and_what_would_be_right(box: Gearbox, tmp_path: Path, monkeypatch: Any) -> None:
+def test_faults_name_body_key_and_what_would_be_right(tmp_path: Path, monkeypatch: Any) -> None:
+    box = Gearbox.from_dict(box_content(tmp_path), str(tmp_path / "case.toml"))
+    for name in ("plate.step", "plate.xdmf"):
+        (tmp_path / name).write_text("no STEP", encoding="utf-8")
+
     def refused(changes: dict[str, Any], match: str) -> None:
         with pytest.raises((CaseError, VariantError), match=match):
             assemble(box.varied(changes), "flexible", STIFFNESS)
 
     solid, seats = "bodies.box.solid", box.content["bodies"]["box"]["solid"]["seats"]
-    refused({f"{solid}.file": "none.vtu"}, r"bodies\.box\.solid: .*none\.vtu: no such file")
-    refused({f"{solid}.file": "plate.geo"}, r"bodies\.box\.solid\.element_size_mm: this key is missing")
+    refused({f"{solid}.file": "none.vtu"}, r"bodies\.box\.solid\.file = 'none\.vtu': no such file")
+    refused({f"{solid}.file": "plate.xdmf"}, r"solid\.file = 'plate\.xdmf': no format .* must end in \.geo, \.step, ")
+    refused({f"{solid}.file": "plate.step"}, r"bodies\.box\.solid\.element_size_mm: this key is missing")
     needs = r"seats\.bearing_1: bearing 'bearing_1' needs its seat; give diameter_mm and width_mm"
     refused({f"{solid}.seats": {}}, needs)
     refused({f"{solid}.seats": seats | {"lid": {"diameter_mm": 5.0}}}, r"seats\.lid: .* give width_mm and position_mm")
@@ -336,10 +343,8 @@ def test_faults_name_body_key_and_what_would_be_right(box: Gearbox, tmp_path: Pa
     refused({"bodies.box.flexibility": "none"}, "no body is elastic")
     shape = {"start_z_mm": 0.0, "sections": [{"length_mm": 10.0, "outer_diameter_mm": 10.0}]}
     refused({"bodies.box.shape": shape}, "give a shape or a solid, not both")
-    broken = tmp_path / "plate.step"
-    broken.write_text("no STEP", encoding="utf-8")
     if works("gmsh"):
-        refused({f"{solid}.file": str(broken), f"{solid}.element_size_mm": 20.0}, r"plate\.step: gmsh cannot")
+        refused({f"{solid}.file": "plate.step", f"{solid}.element_size_mm": 20.0}, r"plate\.step: gmsh cannot")
 
     def missing(name: str) -> Any:
         raise ModuleNotFoundError(name)

@@ -223,7 +223,9 @@ def test_tetrahedra_and_hexahedra_of_a_tube_agree():
 
 
 @needs_meshio
-@pytest.mark.parametrize(("suffix", "options"), [(".msh", {"file_format": "gmsh"}), (".inp", {}), (".vtu", {})])
+@pytest.mark.parametrize(
+    ("suffix", "options"), [(".msh", {"file_format": "gmsh"}), (".inp", {}), (".vtu", {}), (".vtk", {})]
+)
 @pytest.mark.parametrize("kind", ["tetra10", "tetra", "hexahedron20", "hexahedron"])
 def test_meshes_are_read_from_files(tmp_path, suffix, options, kind):
     # A box of 2 x 1 x 1, in mm in the file; its rigid motions and its volume come out whatever the element.
@@ -315,14 +317,66 @@ def test_a_reduction_is_kept_and_every_input_has_its_own_key(tmp_path: Path):
     assert len({one.key for one in (bar, *others)}) == len(others) + 1
 
 
+GRC = Path(__file__).parents[2] / "cases" / "grc750"
+
+
+def script(name: str) -> Any:
+    """Python script beside the GRC's gearbox file, as a module."""
+    spec = importlib.util.spec_from_file_location(f"grc750_{name}", GRC / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
 @pytest.fixture(scope="module")
 def shapes() -> dict[str, SolidModel]:
     """Carrier, ring rim and housing of the GRC, by the script beside its gearbox file."""
-    file = Path(__file__).parents[2] / "cases" / "grc750" / "shapes.py"
-    spec = importlib.util.spec_from_file_location("grc750_shapes", file)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module.solid_models()
+    return script("shapes").solid_models()
+
+
+def test_the_grc_needs_no_permission_to_run_scripts(shapes):
+    assert {name: model.mesh.path.name for name, model in shapes.items()} == {
+        name: f"{name}.step" for name in script("write_step").SOLIDS
+    }
+
+
+def faces_of(path: Path) -> tuple[float, np.ndarray, np.ndarray]:
+    """Volume, box (6,) and faces of a shape as OpenCASCADE has them: a row of area and centre each, sorted."""
+    gmsh = importlib.import_module("gmsh")
+    gmsh.initialize(["test", "-nopopup"], readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.open(str(path))
+        occ = gmsh.model.occ
+        occ.synchronize()
+        ((_, volume),) = occ.getEntities(3)
+        faces = [[occ.getMass(2, tag), *occ.getCenterOfMass(2, tag)] for _, tag in occ.getEntities(2)]
+        table = np.array(faces)
+        # Rounded for the order alone: equal faces of a regular pattern must not change places by the last digit.
+        order = np.lexsort(np.round(table, 2).T + 0.0)
+        return occ.getMass(3, volume), np.array(occ.getBoundingBox(3, volume)), table[order]
+    finally:
+        gmsh.finalize()
+
+
+@needs_gmsh
+@pytest.mark.parametrize("name", ["carrier", "ring_rim", "housing"])
+def test_step_files_of_the_grc_are_those_of_their_scripts(name, tmp_path):
+    # All faces, so all seats: each ends where the script cuts it, or its face would be larger. Lengths in mm.
+    volume, box, faces = faces_of(GRC / f"{name}.geo")
+    found = faces_of(GRC / f"{name}.step")
+    assert found[0] == pytest.approx(volume, rel=1e-9)
+    assert found[1] == pytest.approx(box, abs=1e-3)
+    assert found[2].shape == faces.shape
+    assert np.abs(found[2][:, 0] / faces[:, 0] - 1.0).max() < 1e-6
+    assert np.abs(found[2][:, 1:] - faces[:, 1:]).max() < 1e-3
+    # What is written today by the script is the same again, whatever the time and place.
+    script("write_step").write_step(GRC / f"{name}.geo", tmp_path / f"{name}.step")
+    again = faces_of(tmp_path / f"{name}.step")
+    assert again[0] == pytest.approx(volume, rel=1e-9)
+    assert again[2].shape == faces.shape
+    header = (tmp_path / f"{name}.step").read_text(encoding="ascii").split("DATA;")[0]
+    assert header.split("FILE_NAME", 1)[1].startswith(f"('{name}.step','1970-01-01T00:00:00'")
 
 
 @needs_gmsh

@@ -184,7 +184,7 @@ def test_table_of_the_other_flank_sees_the_modification_from_the_other_end(tmp_p
             "gears.pinion.modification: .* off the involute",
         ),
         (("tip_relief_length_mm = 2.0", "tip_relief_length_mm = 16.5"), "tip_relief.start_radius"),
-        (("pinion.csv", "other.csv"), r"gears.pinion.modification: .*other.csv: cannot be read"),
+        (("pinion.csv", "other.csv"), r"gears.pinion.modification.topography = 'other.csv': no such file"),
         (("lead_crowning_um = 3.0", "lead_crowning_um = -3.0"), "lead_crowning_um"),
         (("twist_um", "twist_mm"), "twist_um"),
     ],
