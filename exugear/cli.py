@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
+from rich.text import Text
 
 from exugear.console import (
     BadInputError,
@@ -130,13 +131,23 @@ def _program(
 def check(case: CaseArgument, as_json: JsonOption = False) -> None:
     """Read and check a gearbox file; compute nothing."""
     with exit_codes():
-        gearbox = read_gearbox(case)
+        from exugear.readiness import VARIANTS, lacking, remarks
+
+        gearbox = read_gearbox(case, tell=False)
         pairs = [_pair_summary(name, spec) for name, spec in gearbox.pairs.items()]
+        variants = {variant: lacking(gearbox, variant) for variant in VARIANTS}
         if as_json:
-            print_json({"case": str(case), "name": gearbox.name, "ratio": gearbox.ratio, "pairs": pairs})
+            summary = {"case": str(case), "name": gearbox.name, "ratio": gearbox.ratio, "pairs": pairs}
+            print_json({**summary, "variants": variants, "warnings": remarks(gearbox)})
             return
         results.print(f"{gearbox.name}: no fault found, ratio {gearbox.ratio:.6f}", highlight=False)
         print_table("Gear pairs", [_pair_row(pair) for pair in pairs])
+        for variant, reason in variants.items():
+            results.print(
+                Text(f"variant {variant}: {f'not possible, {reason}' if reason else 'possible'}"), soft_wrap=True
+            )
+        for line in remarks(gearbox):
+            note(f"Warning: {line}", style="yellow")
 
 
 @app.command()
@@ -153,8 +164,11 @@ def ste(
         ),
     ] = None,
     method: Annotated[
-        Method, typer.Option(help="How the teeth deflect; nonlinear takes a minute or two a position.")
-    ] = Method.superelement,
+        Method | None,
+        typer.Option(
+            help="How the teeth deflect; nonlinear takes a minute or two a position. (default: as the file says)"
+        ),
+    ] = None,
     grid: Annotated[
         bool,
         typer.Option("--grid", help="Over load, centre distance and misalignment too, with the axes of the file."),
@@ -171,7 +185,7 @@ def ste(
         from exugear.tables import draw_curves, stored_tables
 
         gearbox = read_gearbox(case)
-        if method is Method.nonlinear:
+        if (method or Method(gearbox.ste.method)) is Method.nonlinear:
             if grid:
                 raise BadInputError("--grid: the method nonlinear computes the static state alone; leave --grid out")
             _compute_references(gearbox, case, out, mesh or [], positions, as_json)
@@ -247,6 +261,7 @@ def run(
         gearbox = read_gearbox(case)
         loads = load_case or next(iter(gearbox.load_cases), "")
         _check_choices(gearbox, variant, mesh_law, inertias, loads)
+        _check_freedom(gearbox)
         _check_solver(gearbox, variant, solver)
         inertias = inertias or gearbox.case.default_inertias
         folder = _results_folder(case, out, make=not resume)
@@ -267,8 +282,11 @@ def view(
     mesh_law: LawOption = MeshLaw.line_of_action,
     inertias: InertiasOption = None,
     near: Annotated[
-        float, typer.Option(min=0.0, metavar="HZ", help="Frequency whose nearest mode is shown first.")
-    ] = 3215.0,
+        float | None,
+        typer.Option(
+            min=0.0, metavar="HZ", help="Frequency whose nearest mode is shown first. (default: as the file says)"
+        ),
+    ] = None,
     animation: Annotated[bool, typer.Option("--gif", help="Write that mode as an animated picture, too.")] = False,
     out: OutOption = None,
     as_json: JsonOption = False,
@@ -280,9 +298,11 @@ def view(
         folder = _results_folder(case, out)
         _fill_missing_tables(gearbox, folder, mesh_law)
         found, path = _compute_modes(gearbox, folder, variant.value, mesh_law.value, inertias)
-        written = _draw_modes(found, path.parent, found.nearest(near), animation)
+        wanted = gearbox.case.report.reference_frequency_Hz if near is None else near
+        first = int(found.overall.argmax()) if wanted is None else found.nearest(wanted)
+        written = _draw_modes(found, path.parent, first, animation)
         if as_json:
-            print_json({"case": str(case), "mode": found.nearest(near) + 1, "files": [str(file) for file in written]})
+            print_json({"case": str(case), "mode": first + 1, "files": [str(file) for file in written]})
             return
         for file in written:
             results.print(str(file), highlight=False, soft_wrap=True)
@@ -291,7 +311,10 @@ def view(
 @app.command()
 def report(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Results folder.", show_default=False)],
-    near: Annotated[float, typer.Option(min=1.0, metavar="HZ", help="Frequency to look for modes at.")] = 3215.0,
+    near: Annotated[
+        float | None,
+        typer.Option(min=1.0, metavar="HZ", help="Frequency to look for modes at. (default: as the case says)"),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Write a report of a results folder: one web page with pictures, tables, assumptions, and where time went.
@@ -456,23 +479,13 @@ def _check_choices(
         if load_case is not None and load_case not in gearbox.load_cases:
             known = ", ".join(gearbox.load_cases) or "none"
             raise gearbox.fault(f"no load case {load_case!r}; load cases are {known}")
-        if variant is Variant.flexible:
-            _check_solids(gearbox)
+        from exugear.readiness import lacking
+
+        reason = lacking(gearbox, variant.value)
+        if reason:
+            raise gearbox.fault(f"variant {variant}: {reason}")
     if law is MeshLaw.rigid and variant is not Variant.rigid:
         raise BadInputError(f"--mesh-law rigid: its gears only roll, which needs the variant rigid, not {variant}")
-
-
-def _check_solids(gearbox: Gearbox) -> None:
-    """Refuse solids that are not known well enough, or whose files are not there."""
-    from exugear.elastic_bodies import elastic_names, solid_body
-
-    for name in elastic_names(gearbox):
-        family = gearbox.body(name).family
-        if gearbox.case.bodies[family].solid is None:
-            continue
-        file = solid_body(gearbox, name).model.mesh
-        if not file.path.is_file():
-            raise gearbox.fault(f"bodies.{family}.solid.file: {file.path}: no such file")
 
 
 @contextmanager
@@ -507,11 +520,11 @@ def _fill_missing_tables(gearbox: Gearbox, folder: Path, law: MeshLaw) -> None:
     from exugear.results import keep_case
     from exugear.tables import missing_tables
 
+    orders = []
+    if law not in (MeshLaw.rigid, MeshLaw.iso6336):
+        with _model_errors():
+            orders = missing_tables(gearbox, folder, grid=law is MeshLaw.table)
     keep_case(gearbox, folder)
-    if law in (MeshLaw.rigid, MeshLaw.iso6336):
-        return
-    with _model_errors():
-        orders = missing_tables(gearbox, folder, grid=law is MeshLaw.table)
     for order in orders:
         note(order.replaces or f"{order.name}: no table in {folder}; it is computed first")
     with _time_noted(folder, "tables, computed before dynamics") if orders else nullcontext():
@@ -531,12 +544,23 @@ def _check_solver(gearbox: Gearbox, variant: Variant, solver: Solver) -> None:
         )
 
 
+def _check_freedom(gearbox: Gearbox) -> None:
+    """Refuse to run a train whose speeds do not follow from one of them."""
+    freedoms = gearbox.kinematic_modes.shape[1]
+    if freedoms > 1:
+        raise BadInputError(
+            f"{gearbox.source}: the gear train has {freedoms} degrees of freedom, and its runs do not work yet; "
+            "fix a body (fixed = true) or couple two, or take `exugear modes`"
+        )
+
+
 def _reduce_elastic_bodies(gearbox: Gearbox, folder: Path, variant: str, inertias: str | None) -> None:
     """Reduce the elastic bodies of a variant behind a progress bar; kept, they are there at once when asked for."""
     if variant != Variant.flexible:
         return
-    from exugear.elastic_bodies import elastic_names, reduced_bodies
+    from exugear.elastic_bodies import reduced_bodies
     from exugear.results import bodies_folder
+    from exugear.supports import elastic_names
 
     with progress_bar() as bar:
         task = bar.add_task("", total=len(elastic_names(gearbox)))
@@ -833,14 +857,19 @@ def make_results_folder(folder: Path) -> None:
         raise BadInputError(f"--out {folder}: not writable; name another folder")
 
 
-def read_gearbox(case: Path) -> Gearbox:
-    """Read a gearbox file for a verb."""
+def read_gearbox(case: Path, tell: bool = True) -> Gearbox:
+    """Read a gearbox file for a verb and try all its parts; tell what is unusual in it."""
     from exugear.gearbox import CaseError, Gearbox
+    from exugear.readiness import check_parts
 
     try:
-        return Gearbox.from_toml(case)
+        gearbox = Gearbox.from_toml(case)
+        check_parts(gearbox)
     except CaseError as error:
         raise BadInputError(error) from error
+    for line in gearbox.warnings if tell else ():
+        note(f"Warning: {line}", style="yellow")
+    return gearbox
 
 
 def _pair_summary(name: str, spec: PairSpec) -> dict[str, Any]:

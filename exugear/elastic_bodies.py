@@ -16,7 +16,7 @@ from pathlib import Path
 from exugear.casefile import BlankSection, MaterialSection, ShapeSection, SolidSeatSection, SolidSection
 from exugear.floating import FloatingBody, load_or_reduce_floating, with_inertia
 from exugear.gearbox import Bearing, Body, Gearbox
-from exugear.meridian import MeshSize, SeatBand, Shaft, ShaftError, ShaftSection
+from exugear.meridian import MeshSize, SeatBand, Shaft, ShaftError, ShaftSection, check_shaft
 from exugear.reduction import (
     Blank,
     Frame,
@@ -30,6 +30,7 @@ from exugear.reduction import (
 )
 from exugear.solid_mesh import SolidError, SolidFile, turned_hexahedra
 from exugear.solids import SolidModel, SolidSeat, load_or_reduce_solid, reduce_solid
+from exugear.supports import elastic_names, mounts_at_work
 from fe_ste.gears import Material
 
 SOLID_SIZE = MeshSize(0.05, 0.05, 1)
@@ -318,20 +319,29 @@ def _solid_blanks(gearbox: Gearbox, body: Body, solid: SolidSection, names: list
     return found
 
 
-def elastic_names(gearbox: Gearbox) -> tuple[str, ...]:
-    """Names of the bodies that the variant `flexible` takes as elastic."""
-    return tuple(body.name for body in gearbox.bodies() if gearbox.case.bodies[body.family].flexibility != "none")
+def check_elastic_body(gearbox: Gearbox, name: str) -> None:
+    """Refuse an elastic body before its finite elements are made.
 
-
-def mounts_at_work(gearbox: Gearbox) -> tuple[Bearing, ...]:
-    """Mounts that hold the gearbox in the variant `flexible`: none where no fixed body is elastic.
-
-    A fixed body that is rigid is the ground itself, and so needs no mount.
+    Raises
+    ------
+    CaseError
+        A shape or solid that cannot be, a solid whose file is not there, seats that do not fit.
     """
-    elastic, bodies = elastic_names(gearbox), {body.name: body for body in gearbox.bodies()}
-    if not any(bodies[name].fixed for name in elastic):
-        return ()
-    return tuple(mount for mount in gearbox.mounts if mount.body in elastic or not bodies[mount.body].fixed)
+    family = gearbox.body(name).family
+    if gearbox.case.bodies[family].solid is not None:
+        file = solid_body(gearbox, name).model.mesh
+        if isinstance(file, SolidFile) and not file.path.is_file():
+            raise gearbox.fault(f"bodies.{family}.solid.file: {file.path}: no such file")
+        return
+    model = shaft_model(gearbox, name)
+    if not model.seats:
+        raise gearbox.fault(
+            f"bodies.{family}.shape: nothing sits on the body; give it a gear, a bearing or torque_z_mm"
+        )
+    try:
+        check_shaft(model.sections, model.seats)
+    except ShaftError as error:
+        raise gearbox.fault(f"bodies.{family}.shape: {error}") from None
 
 
 def reduced_bodies(

@@ -7,7 +7,10 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING
 
-from exugear.casefile import GROUND, CaseError, shortened
+import numpy as np
+
+from exugear.casefile import GROUND, BearingSection, CaseError, StiffnessSection, shortened
+from exugear.parts import stiffness_matrix
 
 if TYPE_CHECKING:
     from exugear.gearbox import Gearbox
@@ -21,6 +24,8 @@ ASSEMBLY_TOLERANCE = 2e-3
 """Allowed departure from the assembly condition, in teeth: angles in a file are rounded."""
 
 
+MATRIX_TOLERANCE = 1e-4
+"""Rounding allowed in a stiffness matrix, against its diagonal: as printed with five digits."""
 LARGEST_MATRICES = 2e9
 """Largest memory of all matrices of the elements together, bytes: each is over the coordinates of all bodies."""
 
@@ -313,12 +318,56 @@ def _check_couplings(gearbox: Gearbox) -> None:
                 paths[end][start] = paths[start][end][::-1]
     for bearing in gearbox.bearings:
         given = bearing.stiffness
-        torsion = 0.0 if given is None else given.torsion_N_m_per_rad if given.matrix is None else given.matrix[5][5]
+        torsion = 0.0 if given is None else stiffness_matrix(given)[5, 5]
         if torsion and bearing.on in gearbox.spinning:
             raise gearbox.fault(
                 f"bearings.{bearing.family}.stiffness: torsion {torsion:g} N m/rad between {bearing.on} and "
                 f"{bearing.body}, which both turn; give it in a [couplings] table, which knows that they turn together"
             )
+
+
+def _check_supports(gearbox: Gearbox) -> None:
+    _raise_all(gearbox, _faults_of_supports(gearbox))
+
+
+def _faults_of_supports(gearbox: Gearbox) -> Iterator[str]:
+    """Stiffness and damping that no support has: unsymmetric, indefinite, none at all, or against turning freely."""
+    for table, sections in (("bearings", gearbox.case.bearings), ("mounts", gearbox.case.mounts)):
+        for name, section in sections.items():
+            key = f"{table}.{name}"
+            given, damping = section.stiffness, section.damping
+            catalogue = isinstance(section, BearingSection) and section.catalogue is not None
+            if given is not None:
+                yield from _faults_of_matrix(f"{key}.stiffness", given)
+                if not catalogue and not np.any(stiffness_matrix(given)):
+                    yield f"{key}.stiffness: is zero in all directions; give at least one above zero"
+            if damping is not None:
+                yield from _faults_of_matrix(f"{key}.damping", damping)
+    for bearing in gearbox.bearings:
+        turning = bearing.body in gearbox.spinning and bearing.on not in gearbox.spinning
+        if turning and bearing.stiffness is not None and stiffness_matrix(bearing.stiffness)[5, 5]:
+            yield (
+                f"bearings.{bearing.family}.stiffness: its torsion holds {bearing.body}, which turns on {bearing.on}; "
+                "leave torsion at zero"
+            )
+
+
+def _faults_of_matrix(key: str, section: StiffnessSection) -> Iterator[str]:
+    """Compare each entry with the diagonal entries of its row and column: units differ by row."""
+    if section.matrix is None:
+        return
+    matrix = stiffness_matrix(section)
+    scale = np.sqrt(np.abs(np.diag(matrix)))
+    scaled = matrix / np.outer(*[np.where(scale > 0.0, scale, 1.0)] * 2)
+    skew = np.abs(scaled - scaled.T)
+    row, column = (int(place) for place in np.unravel_index(np.argmax(skew), skew.shape))
+    if skew[row, column] > MATRIX_TOLERANCE:
+        yield (
+            f"{key}.matrix: is not symmetric: {matrix[row, column]:g} in row {row + 1}, column {column + 1}, but "
+            f"{matrix[column, row]:g} in row {column + 1}, column {row + 1}"
+        )
+    elif np.linalg.eigvalsh(0.5 * (scaled + scaled.T))[0] < -MATRIX_TOLERANCE:
+        yield f"{key}.matrix: is indefinite, some displacement would release energy; no eigenvalue may be below zero"
 
 
 def _check_names(gearbox: Gearbox) -> None:
@@ -367,7 +416,7 @@ _STAGES: tuple[tuple[Callable[[Gearbox], object], ...], ...] = (
         _check_centre_distances,
         _check_planets,
     ),
-    (_check_size, _check_connected, _check_couplings, _check_names, _check_joints, _check_told_once),
+    (_check_size, _check_connected, _check_couplings, _check_supports, _check_names, _check_joints, _check_told_once),
     (_check_output_gear, _check_static_load),
 )
 """What is checked together; each stage needs those before it."""

@@ -8,7 +8,6 @@ finds the longest that is stable and keeps the excitation in the band: 6.4 kHz i
 
 from __future__ import annotations
 
-import csv
 import math
 import signal
 import threading
@@ -36,11 +35,12 @@ from exugear.compiled import (
     refusal,
     unstable,
 )
-from exugear.gearbox import CaseError, Gearbox, LoadCase
+from exugear.gearbox import Gearbox, LoadCase
 from exugear.mesh_element import Angles, MeshData
 from exugear.results import bodies_folder, input_hash
 from exugear.runfile import MESH_TIMES, Checkpoint, Decimator, RunFile
 from exugear.statics import accelerating_start
+from exugear.torque_series import torque_series
 
 if TYPE_CHECKING:
     from exugear.system import Loading, MeshRoute
@@ -224,7 +224,7 @@ class Recorder:
 
     def _prepare(self, case: LoadCase, resume: bool) -> None:
         """Open the file and set the state to start from."""
-        series = _torque_series(self.assembly.gearbox, case)
+        series = torque_series(self.assembly.gearbox, case)
         if resume:
             if not self.partial_path.is_file():
                 raise RunError(f"{self.partial_path}: nothing to resume; run without resuming first")
@@ -496,38 +496,3 @@ def _loading(loads: LoadTable) -> Loading:
 
 def _interpolator(times: Floats, values: Floats) -> Callable[[float], float]:
     return lambda t: float(np.interp(t, times, values))
-
-
-def _torque_series(gearbox: Gearbox, case: LoadCase) -> dict[str, tuple[Floats, Floats]]:
-    """Read times (s) and torques (N m) by body from the case's CSV file.
-
-    The header is ``time_s`` and one ``<body>_N_m`` per loaded body; between lines torques are linear.
-
-    Raises
-    ------
-    CaseError
-        Unknown columns, text where numbers belong, times that do not grow.
-    """
-    if case.torque_series is None:
-        return {}
-    path = case.torque_series
-    with path.open(newline="", encoding="utf-8") as file:
-        lines = [line for line in csv.reader(file) if line]
-    if len(lines) < 3 or lines[0][0].strip() != "time_s":
-        raise CaseError(f"{path}: expected a header time_s,BODY_N_m,... and at least two lines of numbers")
-    try:
-        table = np.array([[float(cell) for cell in line] for line in lines[1:]])
-    except ValueError as error:
-        raise CaseError(f"{path}: {error}; every line needs {len(lines[0])} numbers") from None
-    if table.ndim != 2 or table.shape[1] != len(lines[0]) or not np.all(np.isfinite(table)):
-        raise CaseError(f"{path}: every line needs {len(lines[0])} finite numbers")
-    if not np.all(np.diff(table[:, 0]) > 0.0):
-        raise CaseError(f"{path}: time_s must grow from line to line")
-    series = {}
-    for column, name in enumerate(lines[0][1:], start=1):
-        body = name.strip().removesuffix("_N_m")
-        if body not in gearbox.spinning or not name.strip().endswith("_N_m"):
-            known = ", ".join(f"{known}_N_m" for known in gearbox.spinning)
-            raise CaseError(f"{path}: column {name.strip()!r} is no torque of a body; columns are {known}")
-        series[body] = (table[:, 0], table[:, column])
-    return series

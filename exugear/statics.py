@@ -6,6 +6,7 @@ that a few steps with a difference quotient of the residual reach round-off.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -36,21 +37,31 @@ class StartState:
 
 
 def _newton(residual: Callable[[Floats], Floats], start: Floats, scale: Floats, what: str) -> Floats:
-    """Newton's method with central differences; `scale` is the size of each residual that counts as one."""
+    """Newton's method with central differences; `scale` is the size of each residual that counts as one.
+
+    Residuals are sums of spring forces, and rounding of places near 1 m is what these cannot resolve: under a small
+    load that is more of it than under a large one, and no step can make it less.
+    """
     x = start.copy()
-    best = np.inf
+    if not x.size:
+        return x
+    best, rounding = np.inf, np.zeros_like(x)
     for _ in range(30):
         r = residual(x)
         error = float(np.max(np.abs(r) / scale))
         if not np.isfinite(error):
             break
-        if error < 1e-12 or (error < 1e-9 and error > 0.5 * best):
+        small = error < 1e-9 or bool(np.all(np.abs(r) <= rounding))
+        if error < 1e-12 or (small and error > 0.5 * best):
             return x
         best = min(best, error)
         columns = [(residual(x + STEP * e) - residual(x - STEP * e)) / (2.0 * STEP) for e in np.eye(x.size)]
         matrix = np.array(columns).T
+        rounding = np.abs(matrix) @ np.full(x.size, np.finfo(float).eps)
         try:
-            x = x - scipy.linalg.solve(matrix / scale[:, None], r / scale)
+            with warnings.catch_warnings():
+                warnings.simplefilter("error", scipy.linalg.LinAlgWarning)
+                x = x - scipy.linalg.solve(matrix / scale[:, None], r / scale)
         except (scipy.linalg.LinAlgError, scipy.linalg.LinAlgWarning):
             raise BalanceError(
                 f"{what}: the stiffness matrix is singular; a body may move without resistance"
@@ -70,7 +81,8 @@ def locked_equilibrium(
     ----------
     assembly : Assembly
     torques : mapping of body name to torque about +z, N m
-    locked : names of the bodies whose spins are held
+    locked : names of the bodies whose spins are held; where they leave the train free to roll and the torques are in
+        balance, it stays where it is
     meshes : MeshArrays, optional
         Mesh arrays to use instead of the assembly's, such as its `mean_meshes`.
 
@@ -79,7 +91,7 @@ def locked_equilibrium(
     BalanceError
         The structure is free to move, or Newton's method does not converge.
     """
-    held = [assembly.spin[name] for name in locked]
+    held = [assembly.spin[name] for name in _held(assembly, torques, locked)]
     free = assembly.motions @ scipy.linalg.null_space(assembly.motions[held])
     applied = assembly.torque_vector(torques)
     rest = np.zeros(assembly.size)
@@ -92,6 +104,28 @@ def locked_equilibrium(
 
     start = _touching(assembly, np.zeros(free.shape[1]), lambda x: np.asarray(free @ x), solve)
     return np.asarray(free @ solve(start, meshes))
+
+
+def _held(assembly: Assembly, torques: Mapping[str, float], locked: Sequence[str]) -> list[str]:
+    """Bodies to hold so that the train cannot roll: the locked ones, then such as carry no torque by being held.
+
+    Raises
+    ------
+    BalanceError
+        The locked bodies leave the train free to roll, and the torques would make it.
+    """
+    gearbox, held = assembly.gearbox, list(locked)
+    rolling, row = gearbox.kinematic_modes, gearbox.spinning.index
+    free = rolling @ scipy.linalg.null_space(rolling[[row(name) for name in held]]) if held else rolling
+    applied = np.array([torques.get(name, 0.0) for name in gearbox.spinning])
+    if free.size and np.abs(free.T @ applied).max() > 1e-9 * np.abs(applied).max():
+        raise BalanceError(f"static state: the torques are not held by locking {', '.join(locked) or 'nothing'}")
+    overall = gearbox.case.overall
+    for name in (overall.input, overall.output, *gearbox.spinning):
+        rank = np.linalg.matrix_rank(rolling[[row(other) for other in held]]) if held else 0
+        if np.linalg.matrix_rank(rolling[[row(other) for other in (*held, name)]]) > rank:
+            held.append(name)
+    return held
 
 
 def _touching(
