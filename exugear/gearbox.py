@@ -49,6 +49,7 @@ from exugear.parts import (
     WheelDeviation,
     gear_from,
     modification_from,
+    stiffness_matrix,
 )
 from exugear.quantities import unusual_values
 from fe_ste.gears import Gear, GearPair, GeometryError
@@ -139,7 +140,14 @@ class Gearbox:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What is possible and unusual about the file, a line each."""
-        return tuple(f"{key} = {value:g}: {what}" for key, value, what in unusual_values(self.case))
+        found = [f"{key} = {value:g}: {what}" for key, value, what in unusual_values(self.case)]
+        for bearing in self.bearings:
+            if bearing.body in self.spinning and bearing.on not in self.spinning:
+                torsion = stiffness_matrix(bearing.stiffness)[5, 5]
+                if torsion:
+                    key = f"bearings.{bearing.family}.stiffness"
+                    found.append(f"{key}: torsion {torsion:g} N m/rad holds {bearing.body} back, which turns")
+        return tuple(dict.fromkeys(found))
 
     @property
     def name(self) -> str:

@@ -331,7 +331,7 @@ def _check_supports(gearbox: Gearbox) -> None:
 
 
 def _faults_of_supports(gearbox: Gearbox) -> Iterator[str]:
-    """Stiffness and damping that no support has: unsymmetric, indefinite, none at all, or against turning freely."""
+    """Stiffness and damping that no support has: unsymmetric, indefinite, or none at all."""
     for table, sections in (("bearings", gearbox.case.bearings), ("mounts", gearbox.case.mounts)):
         for name, section in sections.items():
             key = f"{table}.{name}"
@@ -343,13 +343,6 @@ def _faults_of_supports(gearbox: Gearbox) -> Iterator[str]:
                     yield f"{key}.stiffness: is zero in all directions; give at least one above zero"
             if damping is not None:
                 yield from _faults_of_matrix(f"{key}.damping", damping)
-    for bearing in gearbox.bearings:
-        turning = bearing.body in gearbox.spinning and bearing.on not in gearbox.spinning
-        if turning and bearing.stiffness is not None and stiffness_matrix(bearing.stiffness)[5, 5]:
-            yield (
-                f"bearings.{bearing.family}.stiffness: its torsion holds {bearing.body}, which turns on {bearing.on}; "
-                "leave torsion at zero"
-            )
 
 
 def _faults_of_matrix(key: str, section: StiffnessSection) -> Iterator[str]:
