@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -23,8 +23,6 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from exugear import bearings as rolling
-from exugear.casefile import CatalogueSection, StiffnessSection
 from exugear.elastic import (
     ElasticArrays,
     add_elastic_forces,
@@ -32,7 +30,7 @@ from exugear.elastic import (
     scratch_for,
     set_elastic_accelerations,
 )
-from exugear.elastic_bodies import ElasticBody, elastic_names, mounts_at_work, reduced_bodies
+from exugear.elastic_bodies import ElasticBody, reduced_bodies
 from exugear.floating import FloatingBody
 from exugear.gearbox import Bearing, Body, Gearbox
 from exugear.kernels import (
@@ -51,6 +49,7 @@ from exugear.kernels import (
     mesh_state,
 )
 from exugear.mesh_element import Angles, MeshData, MeshElement, mesh_elements, node_position, pack, seat_key
+from exugear.supports import ON_BEARINGS, bearing_matrices, elastic_names, mounts_at_work, unsupported
 from exugear.travelling import (
     TravellingArrays,
     follow,
@@ -63,8 +62,6 @@ from exugear.turning import TurningArrays, TurningBody, turning_arrays
 Floats = NDArray[np.float64]
 Variant = Literal["rigid", "bushing", "flexible", "jointed"]
 VARIANTS: tuple[str, ...] = get_args(Variant)
-ON_BEARINGS = ("bushing", "flexible")
-"""Variants whose bodies sit on bearings."""
 
 
 class VariantError(ValueError):
@@ -395,7 +392,9 @@ def assemble(
     inertias = inertias or gearbox.case.default_inertias
     elastic = elastic_names(gearbox) if variant == "flexible" else ()
     moving = [body for body in gearbox.bodies(inertias) if not body.fixed or body.name in elastic]
-    _check_supports(gearbox, variant, moving)
+    lacking = unsupported(gearbox, variant)
+    if lacking:
+        raise VariantError(f"variant {variant}: {lacking}")
     if law == "rigid" and variant != "rigid":
         raise VariantError(f"mesh law rigid: its gears only roll, which needs the variant rigid, not {variant}")
     flexible = reduced_bodies(gearbox, inertias, folder) if variant == "flexible" else {}
@@ -543,21 +542,6 @@ def elastic_arrays(flexible: Mapping[str, ElasticBody], size: int, damping_time:
     )
 
 
-def _check_supports(gearbox: Gearbox, variant: str, moving: list[Body]) -> None:
-    """Every body of the variant `rigid` needs its joint: without one it would not turn on a fixed axis."""
-    held = {joint.body for joint in gearbox.joints}
-    missing = [body.name for body in moving if not body.spin_only and body.name not in held]
-    if variant not in ON_BEARINGS and missing:
-        raise VariantError(f"variant {variant}: no joint holds {', '.join(missing)}; add one under [joints]")
-    if variant in ON_BEARINGS and not gearbox.bearings:
-        raise VariantError(f"variant {variant}: the gearbox file has no [bearings]")
-    if variant == "flexible" and not elastic_names(gearbox):
-        raise VariantError('variant flexible: no body is elastic; give one a shape and flexibility = "elastic"')
-    for body in moving:
-        if body.fixed and not any(mount.body == body.name for mount in mounts_at_work(gearbox)):
-            raise VariantError(f"body {body.name}: it is elastic, but nothing holds it; add [mounts] on the ground")
-
-
 def _coordinates(six: list[Body], alone: list[Body]) -> dict[str, tuple[int, ...]]:
     """Six state indices of each moving body; -1 for all but the spin where a body has nothing else."""
     found = {body.name: tuple(range(6 * n, 6 * n + 6)) for n, body in enumerate(six)}
@@ -655,59 +639,3 @@ def no_connectors() -> ConnectorArrays:
     empty = np.zeros((0, 2, 3))
     matrices = np.zeros((0, 6, 6))
     return ConnectorArrays(np.zeros((0, 2), dtype=np.int64), empty, empty, matrices, matrices)
-
-
-def bearing_matrices(bearing: Bearing, damping_time: float) -> tuple[Floats, Floats]:
-    """Stiffness and damping (6, 6) of a bearing, housing factor included, in the axes of what it sits on.
-
-    Catalogue bearings: tangent of ISO/TS 16281 at the stated load, averaged over cage positions and
-    directions, raised to the stated floor. Given ones: as given. Damping as given, else time times stiffness.
-
-    Raises
-    ------
-    exugear.bearings.BearingError
-        The catalogue dimensions or the load are impossible.
-    """
-    given = _matrix(bearing.stiffness)
-    if bearing.catalogue is not None:
-        given = rolling.regularised(_catalogue_stiffness(bearing.catalogue), np.diag(given))
-    stiffness = bearing.factor * given
-    if bearing.damping is not None:
-        return stiffness, _matrix(bearing.damping)
-    return stiffness, rolling.proportional_damping(stiffness, damping_time)
-
-
-def _matrix(section: StiffnessSection | None) -> Floats:
-    if section is None:
-        return np.zeros((6, 6))
-    if section.matrix is not None:
-        return np.array(section.matrix, dtype=np.float64)
-    radial, tilt = section.radial_N_per_m, section.tilt_N_m_per_rad
-    return np.diag([radial, radial, section.axial_N_per_m, tilt, tilt, section.torsion_N_m_per_rad])
-
-
-@lru_cache(maxsize=64)
-def _catalogue_stiffness(section: CatalogueSection) -> Floats:
-    one: rolling.CylindricalRollerBearing | rolling.TaperedRollerBearing
-    if section.type == "cylindrical_roller":
-        one = rolling.CylindricalRollerBearing(
-            bore=section.bore_mm * 1e-3,
-            outside_diameter=section.outer_diameter_mm * 1e-3,
-            width=section.width_mm * 1e-3,
-            full_complement=section.full_complement,
-            radial_clearance=section.radial_clearance_mm * 1e-3,
-        )
-    else:
-        one = rolling.TaperedRollerBearing(
-            bore=section.bore_mm * 1e-3,
-            outside_diameter=section.outer_diameter_mm * 1e-3,
-            width=section.width_mm * 1e-3,
-            contact_angle=math.radians(section.contact_angle_deg),
-            radial_clearance=section.radial_clearance_mm * 1e-3,
-        )
-    whole: rolling.RollerBearing = one
-    if section.arrangement != "single":
-        distance = None if section.row_distance_mm is None else section.row_distance_mm * 1e-3
-        whole = rolling.BearingPair(bearing=one, arrangement=section.arrangement, row_distance=distance)
-    force = (section.radial_load_kN * 1e3, 0.0, section.axial_load_kN * 1e3)
-    return rolling.axially_symmetric(rolling.pitch_averaged_tangent(whole, force))

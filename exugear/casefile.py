@@ -1,68 +1,106 @@
 """The gearbox file as it is written: pydantic models of the TOML sections, unit in the key.
 
-Nothing here knows mechanics. The models refuse unknown keys and values that no gearbox can have;
-:mod:`exugear.gearbox` turns them into SI data and checks them against each other.
+Nothing here knows mechanics. The models refuse unknown keys, values of the wrong type and values that no gearbox can
+have (:mod:`exugear.quantities`); :mod:`exugear.gearbox` turns them into SI data and checks them against each other.
 """
 
 from __future__ import annotations
 
 import difflib
+import re
 import tomllib
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError, model_validator
 
+from exugear import quantities as q
 from exugear.named_files import LARGEST_CASE, NamedFileError, check_regular
 
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=80)]  # up to three make a file's name
 GROUND = "ground"
+MOST_ENTRIES = 500
+"""Most entries of a table such as [bearings]."""
+MOST_PLANETS = 40
+SHOWN_FAULTS = 20
+LONGEST_FAULT = 280
+"""Characters of a fault after the name of the file."""
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=80)]
+"""Name of a part; results folders and files are named by them, by up to three in one name."""
+Text = Annotated[str, Field(pattern=r"^[^\x00-\x08\x0b-\x1f\x7f]*$", max_length=2000)]
+"""Words for people: no control characters but tabs and line ends."""
+FileName = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]+$", max_length=1000)]
+Entry = TypeVar("Entry")
+Entries = Annotated[dict[Name, Entry], Field(max_length=MOST_ENTRIES)]
+"""Table of named entries."""
+Point = Annotated[tuple[q.PlaceMm, q.PlaceMm, q.PlaceMm], Field(strict=False)]
+"""Arrays of a file are lists; nothing in them is converted."""
 
 
 class CaseError(ValueError):
-    """A gearbox file that cannot be used; the message says file, key, value and what would be right."""
+    """A gearbox file that cannot be used: a line for each fault says file, key, value and what would be right.
+
+    Attributes
+    ----------
+    faults : all of them; the message shows the first `SHOWN_FAULTS`
+    """
+
+    def __init__(self, *faults: str) -> None:
+        self.faults = tuple(dict.fromkeys(faults))
+        more = len(self.faults) - SHOWN_FAULTS
+        rest = [f"and {more} more fault{'s' if more > 1 else ''}"] if more > 0 else []
+        super().__init__("\n".join([*self.faults[:SHOWN_FAULTS], *rest]))
+
+
+def fault_line(source: str, text: str) -> str:
+    """One line that names the file before a fault, cut where it is longer than anybody reads."""
+    text = " ".join(text.split())
+    return f"{source}: {text if len(text) <= LONGEST_FAULT else text[: LONGEST_FAULT - 1] + '…'}"
 
 
 class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+def _wall(inner: float, outer: float, keys: str) -> None:
+    if inner >= outer:
+        raise ValueError(f"{keys} = {inner:g} must be below outer_diameter_mm = {outer:g}")
 
 
 class RackSection(_Section):
     """Basic rack of one gear, as factors of the normal module (ISO 53)."""
 
-    addendum: Positive = 1.0
-    dedendum: Positive = 1.25
-    tip_radius: NonNegative = 0.38
+    addendum: q.RackHeight = 1.0
+    dedendum: q.RackHeight = 1.25
+    tip_radius: q.RackRadius = 0.38
 
 
 class MaterialSection(_Section):
     """Elastic material of a gear."""
 
-    youngs_modulus_GPa: Positive = 206.0
-    poissons_ratio: Annotated[float, Field(ge=0.0, lt=0.5)] = 0.3
-    density_kg_per_m3: Positive = 7850.0
+    youngs_modulus_GPa: q.YoungsModulusGPa = 206.0
+    poissons_ratio: q.PoissonsRatio = 0.3
+    density_kg_per_m3: q.Density = 7850.0
 
 
 class ModificationSection(_Section):
     """Material removed from both flanks of every tooth; lengths in roll length, +z as in the gearbox."""
 
-    tip_relief_um: NonNegative = 0.0
-    tip_relief_length_mm: Positive | None = None
-    tip_relief_start_roll_deg: Positive | None = None
+    tip_relief_um: q.RemovedUm = 0.0
+    tip_relief_length_mm: q.RollLengthMm | None = None
+    tip_relief_start_roll_deg: q.RollAngleDeg | None = None
     tip_relief_shape: Literal["linear", "parabolic"] = "linear"
-    root_relief_um: NonNegative = 0.0
-    root_relief_length_mm: Positive | None = None
-    root_relief_start_roll_deg: Positive | None = None
+    root_relief_um: q.RemovedUm = 0.0
+    root_relief_length_mm: q.RollLengthMm | None = None
+    root_relief_start_roll_deg: q.RollAngleDeg | None = None
     root_relief_shape: Literal["linear", "parabolic"] = "linear"
-    profile_crowning_um: NonNegative = 0.0
-    lead_crowning_um: NonNegative = 0.0
-    profile_slope_um: Finite = 0.0
-    helix_slope_um: Finite = 0.0
-    twist_um: Finite = 0.0
-    topography: str | None = None
+    profile_crowning_um: q.RemovedUm = 0.0
+    lead_crowning_um: q.RemovedUm = 0.0
+    profile_slope_um: q.SlopeUm = 0.0
+    helix_slope_um: q.SlopeUm = 0.0
+    twist_um: q.SlopeUm = 0.0
+    topography: FileName | None = None
 
     @model_validator(mode="after")
     def _starts(self) -> ModificationSection:
@@ -80,17 +118,17 @@ class ModificationSection(_Section):
 class GearSection(_Section):
     """One toothed wheel; helix angle signed, right hand positive."""
 
-    teeth: Annotated[int, Field(ge=5)]
-    normal_module_mm: Positive
-    normal_pressure_angle_deg: Annotated[float, Field(gt=5.0, lt=45.0)] = 20.0
-    helix_angle_deg: Annotated[float, Field(gt=-60.0, lt=60.0)] = 0.0
-    profile_shift: Finite = 0.0
-    face_width_mm: Positive
-    held_diameter_mm: Positive
+    teeth: q.Teeth
+    normal_module_mm: q.ModuleMm
+    normal_pressure_angle_deg: q.PressureAngleDeg = 20.0
+    helix_angle_deg: q.HelixAngleDeg = 0.0
+    profile_shift: q.ProfileShift = 0.0
+    face_width_mm: q.FaceWidthMm
+    held_diameter_mm: q.LengthMm
     internal: bool = False
-    tooth_thinning_mm: NonNegative = 0.0
-    tip_diameter_mm: Positive | None = None
-    root_diameter_mm: Positive | None = None
+    tooth_thinning_mm: q.ThinningMm = 0.0
+    tip_diameter_mm: q.LengthMm | None = None
+    root_diameter_mm: q.LengthMm | None = None
     rack: RackSection = RackSection()
     material: MaterialSection = MaterialSection()
     modification: ModificationSection | None = None
@@ -101,17 +139,17 @@ class PairSection(_Section):
 
     pinion: Name
     gear: Name
-    centre_distance_mm: Positive
+    centre_distance_mm: q.LengthMm
     table: bool = True
 
 
 class InertiaSection(_Section):
     """Mass properties of a body in one inertia set; moments about its centre of mass."""
 
-    mass_kg: Positive | None = None
-    axial_kg_m2: Positive
-    transverse_kg_m2: Positive | None = None
-    centre_of_mass_z_mm: Finite | None = None
+    mass_kg: q.MassKg | None = None
+    axial_kg_m2: q.InertiaKgM2
+    transverse_kg_m2: q.InertiaKgM2 | None = None
+    centre_of_mass_z_mm: q.PlaceMm | None = None
 
     @model_validator(mode="after")
     def _triangle(self) -> InertiaSection:
@@ -126,17 +164,22 @@ class InertiaSection(_Section):
 class ShaftSectionSection(_Section):
     """A cylindrical piece of a shaft."""
 
-    length_mm: Positive
-    outer_diameter_mm: Positive
-    inner_diameter_mm: NonNegative = 0.0
+    length_mm: q.LengthMm
+    outer_diameter_mm: q.LengthMm
+    inner_diameter_mm: q.BoreMm = 0.0
+
+    @model_validator(mode="after")
+    def _has_wall(self) -> ShaftSectionSection:
+        _wall(self.inner_diameter_mm, self.outer_diameter_mm, "inner_diameter_mm")
+        return self
 
 
 class BlankSection(_Section):
     """What a gear or bearing puts on its seat beyond the shaft itself: a rigid ring about the seat's centre."""
 
-    mass_kg: Positive
-    axial_kg_m2: Positive
-    transverse_kg_m2: Positive
+    mass_kg: q.MassKg
+    axial_kg_m2: q.InertiaKgM2
+    transverse_kg_m2: q.InertiaKgM2
 
     @model_validator(mode="after")
     def _triangle(self) -> BlankSection:
@@ -154,9 +197,9 @@ class ShapeSection(_Section):
     `blanks` are by the name of the gear or bearing.
     """
 
-    start_z_mm: Finite
-    sections: Annotated[tuple[ShaftSectionSection, ...], Field(min_length=1)]
-    torque_z_mm: Finite | None = None
+    start_z_mm: q.PlaceMm
+    sections: Annotated[tuple[ShaftSectionSection, ...], Field(strict=False, min_length=1, max_length=200)]
+    torque_z_mm: q.PlaceMm | None = None
     material: MaterialSection = MaterialSection()
     blanks: dict[Name, BlankSection] = {}
 
@@ -169,11 +212,11 @@ class SolidSeatSection(_Section):
     that a second bearing in the same bore sits on.
     """
 
-    diameter_mm: Positive | None = None
-    width_mm: Positive | None = None
-    inner_diameter_mm: NonNegative | None = None
-    position_mm: tuple[Finite, Finite, Finite] | None = None
-    sectors: Annotated[int, Field(ge=3)] | None = None
+    diameter_mm: q.LengthMm | None = None
+    width_mm: q.LengthMm | None = None
+    inner_diameter_mm: q.BoreMm | None = None
+    position_mm: Point | None = None
+    sectors: q.Sectors | None = None
     same_as: Name | None = None
 
     @model_validator(mode="after")
@@ -198,11 +241,11 @@ class SolidSection(_Section):
     act. `blanks` are by seat.
     """
 
-    file: str
-    length_unit_mm: Positive = 1.0
-    element_size_mm: Positive | None = None
-    elements_around: Annotated[int, Field(ge=6)] = 12
-    band_Hz: Positive | None = None
+    file: FileName
+    length_unit_mm: q.LengthUnitMm = 1.0
+    element_size_mm: q.ElementSizeMm | None = None
+    elements_around: q.ElementsAround = 12
+    band_Hz: q.FrequencyHz | None = None
     torque_seat: Name | None = None
     material: MaterialSection = MaterialSection()
     seats: dict[Name, SolidSeatSection] = {}
@@ -218,11 +261,11 @@ class BodySection(_Section):
     with the body (Exudyn only).
     """
 
-    axis_position_mm: tuple[Finite, Finite] | None = None
+    axis_position_mm: Annotated[tuple[q.PlaceMm, q.PlaceMm], Field(strict=False)] | None = None
     carrier: Name | None = None
-    orbit_radius_mm: Positive | None = None
-    planet_angles_deg: tuple[Finite, ...] = ()
-    wheels_z_mm: dict[Name, Finite] = {}
+    orbit_radius_mm: q.LengthMm | None = None
+    planet_angles_deg: Annotated[tuple[q.AngleDeg, ...], Field(strict=False, max_length=MOST_PLANETS)] = ()
+    wheels_z_mm: dict[Name, q.PlaceMm] = {}
     fixed: bool = False
     spin_only: bool = False
     enabled: bool = True
@@ -262,22 +305,28 @@ class JointSection(_Section):
 
     body: Name
     on: Name = GROUND
-    z_mm: Finite
+    z_mm: q.PlaceMm
+
+
+_MatrixRow = Annotated[tuple[q.StiffnessEntry, ...], Field(strict=False, max_length=6)]
 
 
 class StiffnessSection(_Section):
     """6x6 stiffness (or damping) of a bearing, about its place: isotropic entries or the full matrix."""
 
-    radial_N_per_m: NonNegative = 0.0
-    axial_N_per_m: NonNegative = 0.0
-    tilt_N_m_per_rad: NonNegative = 0.0
-    torsion_N_m_per_rad: NonNegative = 0.0
-    matrix: tuple[tuple[Finite, ...], ...] | None = None
+    radial_N_per_m: q.Stiffness = 0.0
+    axial_N_per_m: q.Stiffness = 0.0
+    tilt_N_m_per_rad: q.Stiffness = 0.0
+    torsion_N_m_per_rad: q.Stiffness = 0.0
+    matrix: Annotated[tuple[_MatrixRow, ...], Field(strict=False, max_length=6)] | None = None
 
     @model_validator(mode="after")
     def _shape(self) -> StiffnessSection:
         if self.matrix is not None and [len(row) for row in self.matrix] != [6] * 6:
             raise ValueError("matrix needs 6 rows of 6 numbers (N/m, N, N m/rad; order x y z rx ry rz)")
+        others = self.model_fields_set - {"matrix"}
+        if self.matrix is not None and others:
+            raise ValueError(f"matrix stands alone: leave {', '.join(sorted(others))} out, or give no matrix")
         return self
 
 
@@ -285,17 +334,22 @@ class CatalogueSection(_Section):
     """Boundary dimensions and operating load from which ISO/TS 16281 gives a bearing's stiffness."""
 
     type: Literal["cylindrical_roller", "tapered_roller"]
-    designation: str = ""
-    bore_mm: Positive
-    outer_diameter_mm: Positive
-    width_mm: Positive
-    contact_angle_deg: Annotated[float, Field(ge=0.0, lt=60.0)] = 0.0
+    designation: Text = ""
+    bore_mm: q.LengthMm
+    outer_diameter_mm: q.LengthMm
+    width_mm: q.LengthMm
+    contact_angle_deg: q.ContactAngleDeg = 0.0
     arrangement: Literal["single", "X", "O", "tandem"] = "single"
-    row_distance_mm: NonNegative | None = None
+    row_distance_mm: q.BoreMm | None = None
     full_complement: bool = False
-    radial_clearance_mm: Finite = 0.0
-    radial_load_kN: NonNegative
-    axial_load_kN: Finite = 0.0
+    radial_clearance_mm: q.ClearanceMm = 0.0
+    radial_load_kN: q.RadialLoadKN
+    axial_load_kN: q.AxialLoadKN = 0.0
+
+    @model_validator(mode="after")
+    def _has_wall(self) -> CatalogueSection:
+        _wall(self.bore_mm, self.outer_diameter_mm, "bore_mm")
+        return self
 
 
 class BearingSection(_Section):
@@ -306,7 +360,7 @@ class BearingSection(_Section):
 
     body: Name
     on: Name = GROUND
-    z_mm: Finite
+    z_mm: q.PlaceMm
     housing_factor_applies: bool = True
     stiffness: StiffnessSection | None = None
     catalogue: CatalogueSection | None = None
@@ -327,7 +381,7 @@ class MountSection(_Section):
 
     body: Name
     instead_of: Name | None = None
-    position_mm: tuple[Finite, Finite, Finite]
+    position_mm: Point
     stiffness: StiffnessSection
     damping: StiffnessSection | None = None
 
@@ -339,11 +393,19 @@ class CouplingSection(_Section):
     that stands for a body (`instead_of`) steps aside when that body is enabled.
     """
 
-    bodies: tuple[Name, Name]
+    bodies: Annotated[tuple[Name, Name], Field(strict=False)]
     seat: Name | None = None
     instead_of: Name | None = None
-    stiffness_N_m_per_rad: Positive
-    damping_N_m_s_per_rad: NonNegative | None = None
+    stiffness_N_m_per_rad: q.CouplingStiffness
+    damping_N_m_s_per_rad: q.CouplingDamping | None = None
+
+
+Phases = Annotated[
+    Annotated[q.Phase, Tag("one")]
+    | Annotated[tuple[q.Phase, ...], Field(strict=False, max_length=MOST_PLANETS), Tag("each")],
+    Discriminator(lambda value: "each" if isinstance(value, list | tuple) else "one"),
+]
+"""One phase for all meshes of a set, or one for each."""
 
 
 class MeshSection(_Section):
@@ -353,8 +415,8 @@ class MeshSection(_Section):
     pinion_body: Name
     gear_body: Name
     frame: Name | None = None
-    position_angle_deg: Finite | None = None
-    phase: Finite | tuple[Finite, ...] | None = None
+    position_angle_deg: q.AngleDeg | None = None
+    phase: Phases | None = None
 
 
 class DeviationSection(_Section):
@@ -362,9 +424,9 @@ class DeviationSection(_Section):
 
     body: Name
     gear: Name | None = None
-    cumulative_pitch_um: tuple[Finite, ...] = ()
-    runout_um: NonNegative = 0.0
-    runout_angle_deg: Finite = 0.0
+    cumulative_pitch_um: Annotated[tuple[q.PitchUm, ...], Field(strict=False, max_length=2000)] = ()
+    runout_um: q.RunoutUm = 0.0
+    runout_angle_deg: q.AngleDeg = 0.0
 
     @model_validator(mode="after")
     def _something(self) -> DeviationSection:
@@ -377,21 +439,21 @@ class PinSection(_Section):
     """Position error of a planet's pin in its carrier."""
 
     body: Name
-    radial_um: Finite = 0.0
-    tangential_um: Finite = 0.0
+    radial_um: q.PlaceErrorUm = 0.0
+    tangential_um: q.PlaceErrorUm = 0.0
 
 
 class LoadCaseSection(_Section):
     """Torques on the gearbox and, when speed-driven, the prescribed speed of one body."""
 
-    torques_N_m: dict[Name, Finite] = {}
-    torque_series: str | None = None
-    duration_s: Positive = 30.0
-    start_speed_rpm: Finite = 0.0
+    torques_N_m: dict[Name, q.TorqueNm] = {}
+    torque_series: FileName | None = None
+    duration_s: q.DurationS = 30.0
+    start_speed_rpm: q.SpeedRpm = 0.0
     driven_body: Name | None = None
-    end_speed_rpm: Finite | None = None
-    drive_stiffness_N_m_per_rad: Positive | None = None
-    description: str = ""
+    end_speed_rpm: q.SpeedRpm | None = None
+    drive_stiffness_N_m_per_rad: q.CouplingStiffness | None = None
+    description: Text = ""
 
     @model_validator(mode="after")
     def _drive(self) -> LoadCaseSection:
@@ -418,17 +480,17 @@ class OverallSection(_Section):
 class StaticLoadSection(_Section):
     """The static state that fixes loaded flanks and the load of the STE tables."""
 
-    torques_N_m: dict[Name, Finite]
-    locked: tuple[Name, ...]
+    torques_N_m: dict[Name, q.TorqueNm]
+    locked: Annotated[tuple[Name, ...], Field(strict=False, max_length=MOST_ENTRIES)]
 
 
 class DampingSection(_Section):
     """Stiffness-proportional damping times: c = time * k."""
 
-    bearing_time_s: NonNegative = 4e-6
-    mesh_time_s: NonNegative = 4e-6
-    coupling_time_s: NonNegative = 4e-6
-    body_time_s: NonNegative = 1e-6
+    bearing_time_s: q.DampingTimeS = 4e-6
+    mesh_time_s: q.DampingTimeS = 4e-6
+    coupling_time_s: q.DampingTimeS = 4e-6
+    body_time_s: q.DampingTimeS = 1e-6
 
 
 class ElasticitySection(_Section):
@@ -438,8 +500,8 @@ class ElasticitySection(_Section):
     that a solver's step is not ruled by it.
     """
 
-    band_Hz: Positive = 4500.0
-    limit_Hz: Positive = 9000.0
+    band_Hz: q.FrequencyHz = 4500.0
+    limit_Hz: q.FrequencyHz = 9000.0
 
     @model_validator(mode="after")
     def _order(self) -> ElasticitySection:
@@ -451,24 +513,37 @@ class ElasticitySection(_Section):
 class HousingSection(_Section):
     """Factor on bearing stiffness that stands for the housing seat in series; not where the housing is elastic."""
 
-    factor: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
+    factor: q.SeatFactor = 1.0
+
+
+_Vector = Annotated[tuple[q.Acceleration, q.Acceleration, q.Acceleration], Field(strict=False)]
 
 
 class GravitySection(_Section):
     """Weight as an acceleration vector in the model's axes; off by default."""
 
-    acceleration_m_per_s2: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)
+    acceleration_m_per_s2: _Vector = (0.0, 0.0, 0.0)
+
+
+class ReportSection(_Section):
+    """What a report looks for: modes near a frequency that was measured or published."""
+
+    reference_frequency_Hz: q.FrequencyHz | None = None
+
+
+_Factors = Annotated[tuple[q.LoadFactor, ...], Field(strict=False, max_length=50)]
+_Offsets = Annotated[tuple[q.OffsetUm, ...], Field(strict=False, max_length=50)]
 
 
 class SteSection(_Section):
     """Settings of the finite-element tables; the axes are those of a table with ``grid``."""
 
-    positions: Annotated[int, Field(ge=8, le=2000)] = 50
+    positions: q.Positions = 50
     method: Literal["superelement", "nonlinear"] = "superelement"
     grid: bool = False
-    torque_factors: tuple[Positive, ...] = (0.05, 0.2, 0.5, 1.0, 2.0, 3.0)
-    centre_distance_offsets_um: tuple[Finite, ...] = (-100.0, -50.0, 0.0, 50.0, 100.0)
-    misalignment_um: tuple[Finite, ...] = (-60.0, -30.0, 0.0, 30.0, 60.0)
+    torque_factors: _Factors = (0.05, 0.2, 0.5, 1.0, 2.0, 3.0)
+    centre_distance_offsets_um: _Offsets = (-100.0, -50.0, 0.0, 50.0, 100.0)
+    misalignment_um: _Offsets = (-60.0, -30.0, 0.0, 30.0, 60.0)
 
     @model_validator(mode="after")
     def _axes(self) -> SteSection:
@@ -487,25 +562,26 @@ class SteSection(_Section):
 class CaseFile(_Section):
     """The whole gearbox file."""
 
-    name: Annotated[str, Field(max_length=200)]
+    name: Annotated[Text, Field(max_length=200)]
     default_inertias: Name
     overall: OverallSection
     static_load: StaticLoadSection
-    gears: dict[Name, GearSection]
-    pairs: dict[Name, PairSection]
-    bodies: dict[Name, BodySection]
-    meshes: dict[Name, MeshSection]
-    load_cases: dict[Name, LoadCaseSection]
-    joints: dict[Name, JointSection] = {}
-    bearings: dict[Name, BearingSection] = {}
-    mounts: dict[Name, MountSection] = {}
-    couplings: dict[Name, CouplingSection] = {}
-    deviations: dict[Name, DeviationSection] = {}
-    pins: dict[Name, PinSection] = {}
+    gears: Entries[GearSection]
+    pairs: Entries[PairSection]
+    bodies: Entries[BodySection]
+    meshes: Entries[MeshSection]
+    load_cases: Entries[LoadCaseSection]
+    joints: Entries[JointSection] = {}
+    bearings: Entries[BearingSection] = {}
+    mounts: Entries[MountSection] = {}
+    couplings: Entries[CouplingSection] = {}
+    deviations: Entries[DeviationSection] = {}
+    pins: Entries[PinSection] = {}
     damping: DampingSection = DampingSection()
     elasticity: ElasticitySection = ElasticitySection()
     housing: HousingSection = HousingSection()
     gravity: GravitySection = GravitySection()
+    report: ReportSection = ReportSection()
     ste: SteSection = SteSection()
 
 
@@ -515,7 +591,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     Raises
     ------
     CaseError
-        No regular file, nothing in it, or not TOML (with line and column).
+        No regular file, nothing in it, far too much in it, or not TOML (with line and column).
     """
     path = Path(path)
     try:
@@ -523,66 +599,158 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     except NamedFileError as error:
         raise CaseError(f"{path}: {error}; expected a gearbox file such as cases/grc750/gearbox.toml") from None
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         raise CaseError(f"{path}: not UTF-8 text at byte {error.start}; expected TOML") from None
+    except OSError as error:
+        raise CaseError(f"{path}: cannot be read ({error.strerror}); expected a gearbox file") from None
     if not text.strip():
         raise CaseError(f"{path}: the file is empty; expected sections such as [gears.sun]")
+    return read_text(lambda: tomllib.loads(text), str(path), "TOML")
+
+
+def read_text(parse: Callable[[], dict[str, Any]], source: str, form: str) -> dict[str, Any]:
+    """Run a parser of TOML or JSON; whatever it refuses is one fault.
+
+    Python's parsers raise ValueError for numbers of thousands of digits, and run out of stack in deep nesting.
+
+    Raises
+    ------
+    CaseError
+        The text is not of this form.
+    """
     try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise CaseError(f"{path}: not valid TOML: {error}") from None
+        return parse()
+    except RecursionError:
+        raise CaseError(fault_line(source, f"not valid {form}: nested too deep; a gearbox needs 6 levels")) from None
+    except ValueError as error:
+        raise CaseError(fault_line(source, f"not valid {form}: {error}")) from None
 
 
 def parse_case(content: dict[str, Any], source: str) -> CaseFile:
-    """Validate raw content; the first fault becomes one message, further faults are counted.
+    """Validate raw content; each fault becomes a line of the message.
 
     Examples
     --------
     >>> parse_case({"name": 3}, "x.toml")
     Traceback (most recent call last):
     ...
-    exugear.casefile.CaseError: x.toml: name = 3: input should be a valid string (and 8 more faults)
+    exugear.casefile.CaseError: x.toml: name = 3: must be text in quotes
+    x.toml: default_inertias: this key is missing
+    ...
     """
     try:
         return CaseFile.model_validate(content)
     except ValidationError as error:
-        raise CaseError(_describe(error, source)) from None
+        faults = error.errors(include_url=False)
+    raise CaseError(*(fault_line(source, text) for text in _described(faults, content)))
 
 
-def _describe(error: ValidationError, source: str) -> str:
-    faults = error.errors()
-    # A misspelt key shows twice, as unknown and as missing: the unknown one says more.
-    fault = next((f for f in faults if f["type"] == "extra_forbidden"), faults[0])
-    key = ".".join(str(part) for part in fault["loc"])
+def _described(faults: list[Any], content: dict[str, Any]) -> Iterator[str]:
+    """Key, value and what would be right of each fault; a misspelt key is not told as missing besides."""
+    meant = set()
+    places = {fault["loc"] for fault in faults}
+    for fault in faults:
+        if fault["type"] == "extra_forbidden":
+            meant.add((*fault["loc"][:-1], _nearest(fault["loc"])))
+    for fault in faults:
+        place = _place(fault["loc"], content)
+        key = ".".join(_key(part) for part in place)
+        if fault["type"] == "too_short" and any(loc[:-1][: len(fault["loc"])] == fault["loc"] for loc in places):
+            continue  # only because entries of it are wrong
+        if fault["type"] == "missing":
+            if place not in meant:
+                yield f"{key}: this key is missing"
+            continue
+        shown = "" if isinstance(fault["input"], Mapping) else f" = {shortened(fault['input'])}"
+        if fault["loc"][-1:] == ("[key]",):
+            yield f"{key}: {_A_NAME}"
+        else:
+            yield f"{key}{shown}: {_remedy(fault)}"
+
+
+_NO_CONTROL = "must hold words and no control characters"
+_A_NAME = "a name has letters, digits and underscores, begins with a letter, and is 100 long at most"
+_TYPES = {
+    "float_type": "must be a number",
+    "int_type": "must be a whole number, without quotes and decimal point",
+    "int_from_float": "must be a whole number, without decimal point",
+    "bool_type": "must be true or false",
+    "string_type": "must be text in quotes",
+    "dict_type": "must be a table",
+    "model_type": "must be a table",
+    "tuple_type": "must be an array in brackets",
+}
+"""What would be right where a value has the wrong type; numbers and words of a file are not converted."""
+
+
+def _remedy(fault: Any) -> str:
+    """Say what would be right."""
     if fault["type"] == "extra_forbidden":
-        text = f"unknown key{_suggestion(fault['loc'])}"
-    elif fault["type"] == "missing":
-        return f"{source}: {key}: this key is missing{_others(faults)}"
+        near = _nearest(fault["loc"])
+        known = ", ".join(_known_keys(fault["loc"]))
+        return f"unknown key; did you mean {near!r}?" if near else f"unknown key; known keys are {known}"
+    if fault["type"] in _TYPES:
+        return _TYPES[fault["type"]]
+    if fault["type"] in ("too_long", "too_short"):
+        limit = fault["ctx"].get("max_length", fault["ctx"].get("min_length"))
+        return f"must have {'at most' if fault['type'] == 'too_long' else 'at least'} {limit} entries"
+    if fault["type"] == "string_pattern_mismatch":
+        return _NO_CONTROL if "x7f" in fault["ctx"]["pattern"] else _A_NAME
+    text = str(fault["msg"]).removeprefix("Value error, ")
+    return text[:1].lower() + text[1:]
+
+
+def _place(location: tuple[int | str, ...], content: Any) -> tuple[int | str, ...]:
+    """Path of a fault in the content: without the words that pydantic adds for the branches of a type."""
+    place: list[int | str] = []
+    for number, part in enumerate(location):
+        inside = (isinstance(content, Mapping) and part in content) or (
+            isinstance(content, list | tuple) and isinstance(part, int) and part < len(content)
+        )
+        if inside:
+            content = content[part]
+        if inside or (number == len(location) - 1 and isinstance(content, Mapping) and part != "[key]"):
+            place.append(part)
+    return tuple(place)
+
+
+def _key(part: int | str) -> str:
+    """Part of a dotted key, in quotes where TOML wants them."""
+    return str(part) if re.fullmatch(r"[A-Za-z0-9_-]{1,60}", str(part)) else shortened(part)
+
+
+def shortened(value: Any, longest: int = 60) -> str:
+    """Show a value as a message does: on one line and not longer than anybody reads.
+
+    Examples
+    --------
+    >>> shortened([1.5, "a"]), shortened(10**30), shortened("x" * 200, 20)
+    ("[1.5, 'a']", 'an integer of 100 bits', "'xxxxxxxxxxxxxxxxxx…")
+    """
+    if isinstance(value, int) and value.bit_length() > 64:  # Python refuses to print thousands of digits
+        return f"an integer of {value.bit_length()} bits"
+    if isinstance(value, list | tuple):
+        text = "[" + ", ".join(shortened(entry, 20) for entry in value[:longest]) + "]"
+    elif isinstance(value, Mapping):
+        text = "a table"
     else:
-        text = fault["msg"].removeprefix("Value error, ")
-        text = text[0].lower() + text[1:]
-    value = "" if isinstance(fault["input"], dict) else f" = {fault['input']!r}"
-    return f"{source}: {key}{value}: {text}{_others(faults)}"
+        text = repr(value[: longest + 1] if isinstance(value, str) else value)
+    return text if len(text) <= longest else text[: longest - 1] + "…"
 
 
-def _others(faults: list[Any]) -> str:
-    more = len(faults) - 1
-    return f" (and {more} more fault{'s' if more > 1 else ''})" if more else ""
+def _nearest(location: tuple[int | str, ...]) -> str:
+    """Known key that an unknown one resembles; empty for none."""
+    near = difflib.get_close_matches(str(location[-1])[:100], _known_keys(location), n=1)
+    return near[0] if near else ""
 
 
-def _suggestion(location: tuple[int | str, ...]) -> str:
-    """Name the nearest known key of the section that holds the unknown one."""
+def _known_keys(location: tuple[int | str, ...]) -> list[str]:
+    """Keys of the section that holds an unknown one."""
     section: Any = CaseFile
     for part in location[:-1]:
         section = _inner(section, part)
-        if section is None:
-            return ""
-    if not (isinstance(section, type) and issubclass(section, BaseModel)):
-        return ""
-    known = list(section.model_fields)
-    near = difflib.get_close_matches(str(location[-1]), known, n=1)
-    return f"; did you mean {near[0]!r}?" if near else f"; known keys are {', '.join(known)}"
+    return list(section.model_fields) if isinstance(section, type) and issubclass(section, BaseModel) else []
 
 
 def _inner(section: Any, part: int | str) -> Any:
@@ -592,6 +760,6 @@ def _inner(section: Any, part: int | str) -> Any:
         section = field.annotation if field else None
         candidates = [section, *getattr(section, "__args__", ())]
         models = [c for c in candidates if isinstance(c, type) and issubclass(c, BaseModel)]
-        return models[0] if models and getattr(section, "__origin__", None) is not dict else section
+        return models[0] if models and getattr(section, "__origin__", None) not in (dict, tuple) else section
     arguments = getattr(section, "__args__", ())
-    return arguments[-1] if arguments else None
+    return next((one for one in reversed(arguments) if one is not Ellipsis), None)

@@ -148,19 +148,26 @@ def _program(
 def check(case: CaseArgument, files_below: FilesBelowOption = None, as_json: JsonOption = False) -> None:
     """Read and check a gearbox file, and sum up its load cases; compute nothing."""
     with exit_codes():
-        gearbox = read_gearbox(case, files_below)
+        from exugear.readiness import VARIANTS, lacking, remarks
+
+        gearbox = read_gearbox(case, files_below, tell=False)
         _tell_scripts(gearbox)
         pairs = [_pair_summary(name, spec) for name, spec in gearbox.pairs.items()]
         loads = _load_summaries(gearbox)
+        variants = {variant: lacking(gearbox, variant) for variant in VARIANTS}
         if as_json:
             summary = {"case": str(case), "name": gearbox.name, "ratio": gearbox.ratio, "pairs": pairs}
-            print_json({**summary, "load_cases": loads})
+            print_json({**summary, "load_cases": loads, "variants": variants, "warnings": remarks(gearbox)})
         else:
             say(f"{gearbox.name}: no fault found, ratio {gearbox.ratio:.6f}")
             print_table("Gear pairs", [_pair_row(pair) for pair in pairs])
             if loads:
                 title = f"Load cases, rolling at the overall input {gearbox.case.overall.input}"
                 print_table(title, [_load_row(one) for one in loads], ("loaded flanks",))
+            for variant, reason in variants.items():
+                say(f"variant {variant}: {f'not possible, {reason}' if reason else 'possible'}")
+            for line in remarks(gearbox):
+                note(f"Warning: {line}", style="yellow")
         for one in loads:
             for doubt in one["doubts"]:
                 note(f"load_cases.{one['load_case']}: {doubt}", style="yellow")
@@ -180,8 +187,11 @@ def ste(
         ),
     ] = None,
     method: Annotated[
-        Method, typer.Option(help="How the teeth deflect; nonlinear takes a minute or two a position.")
-    ] = Method.superelement,
+        Method | None,
+        typer.Option(
+            help="How the teeth deflect; nonlinear takes a minute or two a position. (default: as the file says)"
+        ),
+    ] = None,
     grid: Annotated[
         bool,
         typer.Option("--grid", help="Over load, centre distance and misalignment too, with the axes of the file."),
@@ -199,7 +209,7 @@ def ste(
         from exugear.tables import draw_curves, stored_tables
 
         gearbox = read_gearbox(case, files_below)
-        if method is Method.nonlinear:
+        if (method or Method(gearbox.ste.method)) is Method.nonlinear:
             if grid:
                 raise BadInputError("--grid: the method nonlinear computes the static state alone; leave --grid out")
             _compute_references(gearbox, case, out, mesh or [], positions, as_json)
@@ -281,6 +291,7 @@ def run(
         gearbox = read_gearbox(case, files_below, scripts)
         loads = load_case or next(iter(gearbox.load_cases), "")
         _check_choices(gearbox, variant, mesh_law, inertias, _results_folder(case, out, make=False), loads)
+        _check_freedom(gearbox)
         _check_extent(gearbox, loads, duration, out or Path("results"))
         _check_solver(gearbox, variant, solver)
         inertias = inertias or gearbox.case.default_inertias
@@ -304,8 +315,11 @@ def view(
     mesh_law: LawOption = MeshLaw.line_of_action,
     inertias: InertiasOption = None,
     near: Annotated[
-        float, typer.Option(min=0.0, metavar="HZ", help="Frequency whose nearest mode is shown first.")
-    ] = 3215.0,
+        float | None,
+        typer.Option(
+            min=0.0, metavar="HZ", help="Frequency whose nearest mode is shown first. (default: as the file says)"
+        ),
+    ] = None,
     animation: Annotated[bool, typer.Option("--gif", help="Write that mode as an animated picture, too.")] = False,
     out: OutOption = None,
     files_below: FilesBelowOption = None,
@@ -319,9 +333,11 @@ def view(
         folder = _results_folder(case, out)
         _fill_missing_tables(gearbox, folder, mesh_law)
         found, path = _compute_modes(gearbox, folder, variant.value, mesh_law.value, inertias)
-        written = _draw_modes(found, path.parent, found.nearest(near), animation)
+        wanted = gearbox.case.report.reference_frequency_Hz if near is None else near
+        first = int(found.overall.argmax()) if wanted is None else found.nearest(wanted)
+        written = _draw_modes(found, path.parent, first, animation)
         if as_json:
-            print_json({"case": str(case), "mode": found.nearest(near) + 1, "files": [str(file) for file in written]})
+            print_json({"case": str(case), "mode": first + 1, "files": [str(file) for file in written]})
             return
         for file in written:
             say(str(file))
@@ -330,7 +346,10 @@ def view(
 @app.command()
 def report(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Results folder.", show_default=False)],
-    near: Annotated[float, typer.Option(min=1.0, metavar="HZ", help="Frequency to look for modes at.")] = 3215.0,
+    near: Annotated[
+        float | None,
+        typer.Option(min=1.0, metavar="HZ", help="Frequency to look for modes at. (default: as the case says)"),
+    ] = None,
     files_below: FilesBelowOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -488,6 +507,7 @@ def _check_choices(
 ) -> None:
     """Refuse what the gearbox does not have, or may not do, before anything is written into the results folder."""
     from exugear.elastic_bodies import check_solids
+    from exugear.readiness import lacking
     from exugear.results import bodies_folder
 
     with _model_errors():
@@ -495,6 +515,9 @@ def _check_choices(
         if load_case is not None and load_case not in gearbox.load_cases:
             known = ", ".join(gearbox.load_cases) or "none"
             raise gearbox.fault(f"no load case {load_case!r}; load cases are {known}")
+        reason = lacking(gearbox, variant.value)
+        if reason:
+            raise gearbox.fault(f"variant {variant}: {reason}")
         if variant is Variant.flexible:
             check_solids(gearbox, bodies_folder(folder))
     if law is MeshLaw.rigid and variant is not Variant.rigid:
@@ -556,11 +579,11 @@ def _fill_missing_tables(gearbox: Gearbox, folder: Path, law: MeshLaw) -> None:
     from exugear.results import keep_case
     from exugear.tables import missing_tables
 
+    orders = []
+    if law not in (MeshLaw.rigid, MeshLaw.iso6336):
+        with _model_errors():
+            orders = missing_tables(gearbox, folder, grid=law is MeshLaw.table)
     keep_case(gearbox, folder)
-    if law in (MeshLaw.rigid, MeshLaw.iso6336):
-        return
-    with _model_errors():
-        orders = missing_tables(gearbox, folder, grid=law is MeshLaw.table)
     for order in orders:
         note(order.replaces or f"{order.name}: no table in {folder}; it is computed first")
     with _time_noted(folder, "tables, computed before dynamics") if orders else nullcontext():
@@ -580,12 +603,23 @@ def _check_solver(gearbox: Gearbox, variant: Variant, solver: Solver) -> None:
         )
 
 
+def _check_freedom(gearbox: Gearbox) -> None:
+    """Refuse to run a train whose speeds do not follow from one of them."""
+    freedoms = gearbox.kinematic_modes.shape[1]
+    if freedoms > 1:
+        raise BadInputError(
+            f"{gearbox.source}: the gear train has {freedoms} degrees of freedom, and its runs do not work yet; "
+            "fix a body (fixed = true) or couple two, or take `exugear modes`"
+        )
+
+
 def _reduce_elastic_bodies(gearbox: Gearbox, folder: Path, variant: str, inertias: str | None) -> None:
     """Reduce the elastic bodies of a variant behind a progress bar; kept, they are there at once when asked for."""
     if variant != Variant.flexible:
         return
-    from exugear.elastic_bodies import elastic_names, reduced_bodies
+    from exugear.elastic_bodies import reduced_bodies
     from exugear.results import bodies_folder
+    from exugear.supports import elastic_names
 
     with progress_bar() as bar:
         task = bar.add_task("", total=len(elastic_names(gearbox)))
@@ -890,16 +924,23 @@ def make_results_folder(folder: Path) -> None:
         raise BadInputError(f"--out {folder}: not writable; name another folder")
 
 
-def read_gearbox(case: Path, files_below: Path | None = None, scripts: bool = False) -> Gearbox:
-    """Read a gearbox file for a verb, with what the user permits it."""
+def read_gearbox(
+    case: Path, files_below: Path | None = None, scripts: bool = False, *, tell: bool = True
+) -> Gearbox:
+    """Read a gearbox file for a verb, with what the user permits it, and try all its parts; tell what is unusual."""
     from exugear.gearbox import CaseError, Gearbox
     from exugear.named_files import Permissions
+    from exugear.readiness import check_parts
 
     _check_files_below(files_below)
     try:
-        return Gearbox.from_toml(case, Permissions(scripts, files_below))
+        gearbox = Gearbox.from_toml(case, Permissions(scripts, files_below))
+        check_parts(gearbox)
     except CaseError as error:
         raise BadInputError(error) from error
+    for line in gearbox.warnings if tell else ():
+        note(f"Warning: {line}", style="yellow")
+    return gearbox
 
 
 def _check_files_below(folder: Path | None) -> None:

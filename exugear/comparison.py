@@ -29,8 +29,6 @@ from exugear.spectra import (
 
 FloatArray = NDArray[np.float64]
 
-REFERENCE_FREQUENCY = 3215.0
-"""Frequency of the global mode that the reference study found with compliant bearings, Hz."""
 NEAR = 0.05
 """A mode within this part of a frequency counts as near it."""
 LEAST_SHARE = 1e-5

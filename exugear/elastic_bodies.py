@@ -16,7 +16,7 @@ from pathlib import Path
 from exugear.casefile import BlankSection, MaterialSection, ShapeSection, SolidSeatSection, SolidSection
 from exugear.floating import FloatingBody, load_or_reduce_floating, with_inertia
 from exugear.gearbox import Bearing, Body, Gearbox
-from exugear.meridian import MeshSize, SeatBand, Shaft, ShaftError, ShaftSection
+from exugear.meridian import MeshSize, SeatBand, Shaft, ShaftError, ShaftSection, check_shaft
 from exugear.named_files import LARGEST_SOLID
 from exugear.reduction import (
     Blank,
@@ -31,6 +31,7 @@ from exugear.reduction import (
 )
 from exugear.solid_mesh import GEOMETRY, MESHES, UNPERMITTED, SolidError, SolidFile, turned_hexahedra
 from exugear.solids import SolidModel, SolidSeat, kept_file, load_or_reduce_solid, reduce_solid
+from exugear.supports import elastic_names, mounts_at_work
 from fe_ste.gears import Material
 
 SOLID_SIZE = MeshSize(0.05, 0.05, 1)
@@ -324,9 +325,27 @@ def _solid_blanks(gearbox: Gearbox, body: Body, solid: SolidSection, names: list
     return found
 
 
-def elastic_names(gearbox: Gearbox) -> tuple[str, ...]:
-    """Names of the bodies that the variant `flexible` takes as elastic."""
-    return tuple(body.name for body in gearbox.bodies() if gearbox.case.bodies[body.family].flexibility != "none")
+def check_elastic_body(gearbox: Gearbox, name: str) -> None:
+    """Refuse an elastic body before its finite elements are made.
+
+    Raises
+    ------
+    CaseError
+        A shape or solid that cannot be, a solid whose file is not there, seats that do not fit.
+    """
+    family = gearbox.body(name).family
+    if gearbox.case.bodies[family].solid is not None:
+        solid_body(gearbox, name)
+        return
+    model = shaft_model(gearbox, name)
+    if not model.seats:
+        raise gearbox.fault(
+            f"bodies.{family}.shape: nothing sits on the body; give it a gear, a bearing or torque_z_mm"
+        )
+    try:
+        check_shaft(model.sections, model.seats)
+    except ShaftError as error:
+        raise gearbox.fault(f"bodies.{family}.shape: {error}") from None
 
 
 def solids_of(gearbox: Gearbox) -> Iterator[tuple[str, SolidModel]]:
@@ -361,17 +380,6 @@ def check_solids(gearbox: Gearbox, folder: Path) -> None:
         file: SolidFile = model.mesh
         if file.is_script and not file.scripts and not kept_file(model, folder).is_file():
             raise gearbox.fault(f"{key}.file = {file.path.name!r}: {UNPERMITTED}")
-
-
-def mounts_at_work(gearbox: Gearbox) -> tuple[Bearing, ...]:
-    """Mounts that hold the gearbox in the variant `flexible`: none where no fixed body is elastic.
-
-    A fixed body that is rigid is the ground itself, and so needs no mount.
-    """
-    elastic, bodies = elastic_names(gearbox), {body.name: body for body in gearbox.bodies()}
-    if not any(bodies[name].fixed for name in elastic):
-        return ()
-    return tuple(mount for mount in gearbox.mounts if mount.body in elastic or not bodies[mount.body].fixed)
 
 
 def reduced_bodies(

@@ -8,11 +8,11 @@ numbered from 1 (`planet_1`, `sun_planet_1`).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +23,17 @@ from exugear.casefile import (
     BodySection,
     CaseError,
     CaseFile,
+    CouplingSection,
+    DeviationSection,
+    GearSection,
+    JointSection,
     LoadCaseSection,
     MeshSection,
+    MountSection,
+    PairSection,
+    PinSection,
     SteSection,
+    fault_line,
     parse_case,
     read_toml,
 )
@@ -42,7 +50,9 @@ from exugear.parts import (
     WheelDeviation,
     gear_from,
     modification_from,
+    stiffness_matrix,
 )
+from exugear.quantities import unusual_values
 from fe_ste.gears import Gear, GearPair, GeometryError
 from fe_ste.modifications import (
     FlankModification,
@@ -63,6 +73,10 @@ __all__ = [
 ]
 
 RPM = math.pi / 30.0
+DEEPEST_REMOVAL = 0.5
+"""Most that a modification or an error may take off a flank, in normal modules: a tooth is 1.6 thick."""
+Section = TypeVar("Section")
+Part = TypeVar("Part")
 
 
 @dataclass(frozen=True)
@@ -131,7 +145,19 @@ class Gearbox:
 
     def fault(self, text: str) -> CaseError:
         """Error that names the file before `text` (key, value and what would be right)."""
-        return CaseError(f"{self.source}: {text}")
+        return CaseError(fault_line(self.source, text))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is possible and unusual about the file, a line each."""
+        found = [f"{key} = {value:g}: {what}" for key, value, what in unusual_values(self.case)]
+        for bearing in self.bearings:
+            if bearing.body in self.spinning and bearing.on not in self.spinning:
+                torsion = stiffness_matrix(bearing.stiffness)[5, 5]
+                if torsion:
+                    key = f"bearings.{bearing.family}.stiffness"
+                    found.append(f"{key}: torsion {torsion:g} N m/rad holds {bearing.body} back, which turns")
+        return tuple(dict.fromkeys(found))
 
     def file(self, key: str, name: str, largest: int) -> Path:
         """Path of a file of at most `largest` bytes that the gearbox file names under a key.
@@ -150,6 +176,20 @@ class Gearbox:
     def name(self) -> str:
         """Title of the gearbox."""
         return self.case.name
+
+    def table_distances(self, pair: str) -> tuple[float, ...]:
+        """Centre distances (m) of a pair's table with axes.
+
+        Raises
+        ------
+        CaseError
+            The gears cannot run at one of them.
+        """
+        static = self.gear_pairs[pair]
+        distances = tuple(static.centre_distance + 1e-6 * um for um in self.ste.centre_distance_offsets_um)
+        for offset, distance in zip(self.ste.centre_distance_offsets_um, distances, strict=True):
+            self._guard(f"ste.centre_distance_offsets_um: {offset:g}", static.with_centre_distance, distance)
+        return distances
 
     @property
     def ste(self) -> SteSection:
@@ -171,9 +211,10 @@ class Gearbox:
         CaseError
             A gear that cannot be made, with its key.
         """
-        return {
-            name: self._guard(f"gears.{name}", gear_from, name, section) for name, section in self.case.gears.items()
-        }
+        return self._all(self._gear, self.case.gears)
+
+    def _gear(self, name: str, section: GearSection) -> Gear:
+        return self._guard(f"gears.{name}", gear_from, name, section)
 
     @cached_property
     def modifications(self) -> dict[str, FlankModification]:
@@ -184,33 +225,41 @@ class Gearbox:
         CaseError
             A modification that does not fit its gear, or a topography that cannot be read.
         """
-        found = {}
-        for name, section in self.case.gears.items():
-            key = f"gears.{name}.modification"
-            find = partial(self.file, f"{key}.topography", largest=LARGEST_TABLE)
-            found[name] = self._guard(key, modification_from, self.gears[name], section, find)
-        return found
+        return self._all(self._modification, self.case.gears)
+
+    def _modification(self, name: str, section: GearSection) -> FlankModification:
+        key = f"gears.{name}.modification"
+        given = {} if section.modification is None else dict(section.modification)
+        self._check_depth(key, given, section.normal_module_mm)
+        find = partial(self.file, f"{key}.topography", largest=LARGEST_TABLE)
+        return self._guard(key, modification_from, self.gears[name], section, find)
+
+    def _check_depth(self, key: str, amounts: Mapping[str, Any], module_mm: float) -> None:
+        """Refuse removal that leaves nothing of the teeth."""
+        deepest = 1e3 * DEEPEST_REMOVAL * module_mm
+        for name, amount in amounts.items():
+            if name.endswith("_um") and abs(amount) > deepest:
+                raise self.fault(f"{key}.{name} = {amount:g}: must be at most {deepest:g}, half a normal module")
 
     @cached_property
     def gear_pairs(self) -> dict[str, GearPair]:
         """All gear pairs by name."""
-        found = {}
-        for name, section in self.case.pairs.items():
-            for key in ("pinion", "gear"):
-                if getattr(section, key) not in self.gears:
-                    raise self.fault(
-                        f"pairs.{name}.{key} = {getattr(section, key)!r}: no such gear; "
-                        f"gears are {', '.join(self.gears)}"
-                    )
-            found[name] = self._guard(
-                f"pairs.{name}",
-                GearPair,
-                name=name,
-                pinion=self.gears[section.pinion],
-                gear=self.gears[section.gear],
-                centre_distance=section.centre_distance_mm * 1e-3,
-            )
-        return found
+        return self._all(self._gear_pair, self.case.pairs)
+
+    def _gear_pair(self, name: str, section: PairSection) -> GearPair:
+        for key in ("pinion", "gear"):
+            if getattr(section, key) not in self.gears:
+                raise self.fault(
+                    f"pairs.{name}.{key} = {getattr(section, key)!r}: no such gear; gears are {', '.join(self.gears)}"
+                )
+        return self._guard(
+            f"pairs.{name}",
+            GearPair,
+            name=name,
+            pinion=self.gears[section.pinion],
+            gear=self.gears[section.gear],
+            centre_distance=section.centre_distance_mm * 1e-3,
+        )
 
     @cached_property
     def pairs(self) -> dict[str, PairSpec]:
@@ -245,112 +294,114 @@ class Gearbox:
     @cached_property
     def joints(self) -> tuple[Joint, ...]:
         """Ideal joints of the variant `rigid`."""
-        found = []
-        for name, section in self.case.joints.items():
-            if not self._known(f"joints.{name}", section.body, section.on):
-                continue
-            for suffix, body, on in self._instances(section.body, section.on):
-                found.append(Joint(name + suffix, body, on, self._place(body, section.z_mm)))
-        return tuple(found)
+        return self._flat(self._joint_instances, self.case.joints)
+
+    def _joint_instances(self, name: str, section: JointSection) -> tuple[Joint, ...]:
+        key = f"joints.{name}"
+        if section.body == GROUND:
+            raise self.fault(f"{key}.body = {GROUND!r}: name the body that turns; the ground is what it turns on")
+        if not self._known(key, section.body, section.on):
+            return ()
+        return tuple(
+            Joint(name + suffix, body, on, self._place(body, section.z_mm))
+            for suffix, body, on in self._instances(key, section.body, section.on)
+        )
 
     @cached_property
     def bearings(self) -> tuple[Bearing, ...]:
         """Compliant supports of the variants `bushing` and `flexible`."""
-        found: list[Bearing] = []
-        for name, section in self.case.bearings.items():
-            if self._known(f"bearings.{name}", section.body, section.on):
-                found.extend(self._bearing_instances(name, section))
-        return tuple(found)
+        return self._flat(self._bearing_instances, self.case.bearings)
 
     @cached_property
     def mounts(self) -> tuple[Bearing, ...]:
         """Supports of the gearbox on the ground, at work where a fixed body is elastic."""
-        found = []
-        for name, section in self.case.mounts.items():
-            key = f"mounts.{name}"
-            if section.instead_of is not None and self._known(f"{key}.instead_of", section.instead_of):
-                continue
-            if section.body == GROUND or not self._known(key, section.body):
-                raise self.fault(f"{key}.body = {section.body!r}: name an enabled body that the mount holds")
-            body = self.case.bodies[section.body]
-            if body.carrier is not None or body.spin_only:
-                raise self.fault(f"{key}.body = {section.body!r}: a planet or a spin-only body cannot be mounted")
-            x, y, z = (1e-3 * value for value in section.position_mm)
-            found.append(
-                Bearing(name, name, section.body, GROUND, (x, y, z), section.stiffness, None, section.damping, 1.0)
-            )
-        return tuple(found)
+        return self._flat(self._mount, self.case.mounts)
+
+    def _mount(self, name: str, section: MountSection) -> tuple[Bearing, ...]:
+        key = f"mounts.{name}"
+        if section.instead_of is not None and self._known(f"{key}.instead_of", section.instead_of):
+            return ()
+        if section.body == GROUND or not self._known(key, section.body):
+            raise self.fault(f"{key}.body = {section.body!r}: name an enabled body that the mount holds")
+        body = self.case.bodies[section.body]
+        if body.carrier is not None or body.spin_only:
+            raise self.fault(f"{key}.body = {section.body!r}: a planet or a spin-only body cannot be mounted")
+        x, y, z = (1e-3 * value for value in section.position_mm)
+        return (Bearing(name, name, section.body, GROUND, (x, y, z), section.stiffness, None, section.damping, 1.0),)
 
     @cached_property
     def couplings(self) -> tuple[Coupling, ...]:
         """Torsional springs between spins."""
-        found = []
-        for name, section in self.case.couplings.items():
-            key = f"couplings.{name}"
-            if section.instead_of is not None and self._known(f"{key}.instead_of", section.instead_of):
-                continue
-            if not self._known(key, *section.bodies):
-                continue
-            if section.seat is not None and section.seat not in {bearing.name for bearing in self.bearings}:
-                known = ", ".join(bearing.name for bearing in self.bearings)
-                raise self.fault(f"{key}.seat = {section.seat!r}: no such bearing; bearings are {known}")
-            damping = section.damping_N_m_s_per_rad
-            if damping is None:
-                damping = self.case.damping.coupling_time_s * section.stiffness_N_m_per_rad
-            found.append(Coupling(name, *section.bodies, section.seat, section.stiffness_N_m_per_rad, damping))
-        return tuple(found)
+        return self._flat(self._coupling, self.case.couplings)
+
+    def _coupling(self, name: str, section: CouplingSection) -> tuple[Coupling, ...]:
+        key = f"couplings.{name}"
+        if section.instead_of is not None and self._known(f"{key}.instead_of", section.instead_of):
+            return ()
+        if not self._known(key, *section.bodies):
+            return ()
+        for body in section.bodies:
+            if body not in self.spinning:
+                known = ", ".join(self.spinning)
+                raise self.fault(f"{key}.bodies: {body!r} does not turn by itself; a coupling joins two of {known}")
+        if section.seat is not None and section.seat not in {bearing.name for bearing in self.bearings}:
+            known = ", ".join(bearing.name for bearing in self.bearings)
+            raise self.fault(f"{key}.seat = {section.seat!r}: no such bearing; bearings are {known}")
+        damping = section.damping_N_m_s_per_rad
+        if damping is None:
+            damping = self.case.damping.coupling_time_s * section.stiffness_N_m_per_rad
+        return (Coupling(name, *section.bodies, section.seat, section.stiffness_N_m_per_rad, damping),)
 
     @cached_property
     def meshes(self) -> tuple[Mesh, ...]:
         """All meshes at work, one per planet."""
-        found: list[Mesh] = []
-        for name, section in self.case.meshes.items():
-            if self._known(f"meshes.{name}", section.pinion_body, section.gear_body):
-                found.extend(self._mesh_instances(name, section))
-        return tuple(found)
+        return self._flat(self._mesh_instances, self.case.meshes)
 
     @cached_property
     def deviations(self) -> dict[tuple[str, str], WheelDeviation]:
         """Errors of wheels by body and gear; a pitch deviation is cumulative, positive into the tooth (ISO 1328-1)."""
-        found = {}
-        for name, section in self.case.deviations.items():
-            key = f"deviations.{name}"
-            if section.body not in self._named_bodies:
-                known = ", ".join(self._named_bodies)
-                raise self.fault(f"{key}.body = {section.body!r}: no such body; bodies are {known}")
-            wheels = self._named_bodies[section.body].wheels
-            gear = section.gear or next(iter(wheels), "")
-            if gear not in wheels or (section.gear is None and len(wheels) > 1):
-                raise self.fault(f"{key}.gear = {section.gear!r}: name one of {', '.join(wheels) or 'no gears'}")
-            toothed, pitch = self.gears[gear], np.array(section.cumulative_pitch_um) * 1e-6
-            if len(pitch) not in (0, toothed.teeth):
-                raise self.fault(f"{key}.cumulative_pitch_um: {len(pitch)} values; {gear} has {toothed.teeth} teeth")
-            found[section.body, gear] = WheelDeviation(
-                teeth=toothed.teeth,
-                pitch=pitch * toothed.base_radius / toothed.reference_radius,
-                eccentricity=0.5e-6 * section.runout_um,
-                eccentricity_angle=math.radians(section.runout_angle_deg),
-            )
-        return found
+        return dict(self._all(self._deviation, self.case.deviations).values())
+
+    def _deviation(self, name: str, section: DeviationSection) -> tuple[tuple[str, str], WheelDeviation]:
+        key = f"deviations.{name}"
+        if section.body not in self._named_bodies:
+            known = ", ".join(self._named_bodies)
+            raise self.fault(f"{key}.body = {section.body!r}: no such body; bodies are {known}")
+        wheels = self._named_bodies[section.body].wheels
+        gear = section.gear or next(iter(wheels), "")
+        if gear not in wheels or (section.gear is None and len(wheels) > 1):
+            raise self.fault(f"{key}.gear = {section.gear!r}: name one of {', '.join(wheels) or 'no gears'}")
+        toothed, pitch = self.gears[gear], np.array(section.cumulative_pitch_um) * 1e-6
+        if len(pitch) not in (0, toothed.teeth):
+            raise self.fault(f"{key}.cumulative_pitch_um: {len(pitch)} values; {gear} has {toothed.teeth} teeth")
+        amounts = {"cumulative_pitch_um": max(map(abs, section.cumulative_pitch_um), default=0.0)}
+        amounts["runout_um"] = section.runout_um
+        self._check_depth(key, amounts, 1e3 * toothed.normal_module)
+        return (section.body, gear), WheelDeviation(
+            teeth=toothed.teeth,
+            pitch=pitch * toothed.base_radius / toothed.reference_radius,
+            eccentricity=0.5e-6 * section.runout_um,
+            eccentricity_angle=math.radians(section.runout_angle_deg),
+        )
 
     @cached_property
     def pin_offsets(self) -> dict[str, tuple[float, float]]:
         """Position error of planets in their carrier at zero angles, x and y, m."""
-        found = {}
-        for name, section in self.case.pins.items():
-            body = self._named_bodies.get(section.body)
-            if body is None or body.carrier is None:
-                planets = ", ".join(b.name for b in self._named_bodies.values() if b.carrier) or "none"
-                raise self.fault(f"pins.{name}.body = {section.body!r}: no planet; planets are {planets}")
-            error = 1e-6 * complex(section.radial_um, section.tangential_um)
-            error *= complex(math.cos(body.orbit_angle), math.sin(body.orbit_angle))
-            found[section.body] = error.real, error.imag
-        return found
+        return dict(self._all(self._pin_offset, self.case.pins).values())
+
+    def _pin_offset(self, name: str, section: PinSection) -> tuple[str, tuple[float, float]]:
+        body = self._named_bodies.get(section.body)
+        if body is None or body.carrier is None:
+            planets = ", ".join(b.name for b in self._named_bodies.values() if b.carrier) or "none"
+            raise self.fault(f"pins.{name}.body = {section.body!r}: no planet; planets are {planets}")
+        error = 1e-6 * complex(section.radial_um, section.tangential_um)
+        error *= complex(math.cos(body.orbit_angle), math.sin(body.orbit_angle))
+        return section.body, (error.real, error.imag)
 
     @cached_property
     def load_cases(self) -> dict[str, LoadCase]:
         """Load cases by name."""
-        return {name: self._load_case(name, section) for name, section in self.case.load_cases.items()}
+        return self._all(self._load_case, self.case.load_cases)
 
     # -- kinematics and statics of the spins -------------------------------------------------------------
 
@@ -394,21 +445,33 @@ class Gearbox:
         if body not in self.spinning:
             raise self.fault(f"body {body!r} does not turn; bodies are {', '.join(self.spinning)}")
         modes = self.kinematic_modes
-        prescribed = {body: speed, **dict.fromkeys(self._held_aside(body), 0.0)}
-        rows = modes[[self.spinning.index(name) for name in prescribed]]
-        wanted = np.array(list(prescribed.values()))
+        if not modes.shape[1]:
+            raise self.fault("meshes: the gear train cannot turn, its meshes and couplings lock each other")
+        held = self._held_aside(body)
+        rows = modes[[self.spinning.index(name) for name in (body, *held)]]
+        wanted = np.array([speed, *(0.0 for _ in held)])
         weights, _, rank, _ = np.linalg.lstsq(rows, wanted, rcond=1e-9)
         if rank < modes.shape[1] or np.abs(rows @ weights - wanted).max() > 1e-9 * abs(speed):
             raise self.fault(
-                f"the gear train has {modes.shape[1]} degrees of freedom; turning {', '.join(prescribed)} "
+                f"the gear train has {modes.shape[1]} degrees of freedom; turning {', '.join((body, *held))} "
                 "does not fix it: name the bodies that are held in static_load.locked"
             )
         return dict(zip(self.spinning, (modes @ weights).tolist(), strict=True))
 
     def _held_aside(self, body: str) -> tuple[str, ...]:
-        """Bodies that a train of several degrees of freedom holds: the locked ones but input, output, `body`."""
-        overall = self.case.overall
-        return tuple(name for name in self.case.static_load.locked if name not in (body, overall.input, overall.output))
+        """Bodies that stand while `body` turns in a train of several degrees of freedom: the locked ones.
+
+        Not those that turn with it, with the input or with the output, such as a brake behind the output.
+        """
+        modes, overall = self.kinematic_modes, self.case.overall
+        if modes.shape[1] == 1:
+            return ()
+        turning = [modes[self.spinning.index(name)] for name in (body, overall.input, overall.output)]
+        return tuple(
+            name
+            for name in self.case.static_load.locked
+            if not any(_parallel(modes[self.spinning.index(name)], row) for row in turning)
+        )
 
     @cached_property
     def ratio(self) -> float:
@@ -462,6 +525,25 @@ class Gearbox:
 
     # -- from sections to data ---------------------------------------------------------------------------
 
+    def _all(self, build: Callable[[str, Section], Part], sections: Mapping[str, Section]) -> dict[str, Part]:
+        """Build a part of each section; faults of several are told together."""
+        found: dict[str, Part] = {}
+        faults: list[str] = []
+        for name, section in sections.items():
+            try:
+                found[name] = build(name, section)
+            except CaseError as error:
+                faults += error.faults
+        if faults:
+            raise CaseError(*faults)
+        return found
+
+    def _flat(
+        self, build: Callable[[str, Section], tuple[Part, ...]], sections: Mapping[str, Section]
+    ) -> tuple[Part, ...]:
+        """Build the parts of each section, such as one bearing for each planet, likewise."""
+        return tuple(part for parts in self._all(build, sections).values() for part in parts)
+
     @cached_property
     def _body_sections(self) -> dict[str, BodySection]:
         return {name: section for name, section in self.case.bodies.items() if section.enabled}
@@ -473,7 +555,7 @@ class Gearbox:
                 raise self.fault(f"{key}: no body {name!r}; bodies are {', '.join(self.case.bodies)} and ground")
         return all(name == GROUND or name in self._body_sections for name in names)
 
-    def _guard(self, key: str, build: Any, *arguments: Any, **named: Any) -> Any:
+    def _guard(self, key: str, build: Callable[..., Part], *arguments: Any, **named: Any) -> Part:
         try:
             return build(*arguments, **named)
         except GeometryError as error:
@@ -483,15 +565,14 @@ class Gearbox:
         count = len(self._body_sections[name].planet_angles_deg) if name in self._body_sections else 0
         return [f"_{number}" for number in range(1, count + 1)] or [""]
 
-    def _instances(self, first: str, second: str) -> list[tuple[str, str, str]]:
+    def _instances(self, key: str, first: str, second: str) -> list[tuple[str, str, str]]:
         """(suffix, first, second) for each planet; sets meet single bodies or equal sets."""
         one, two = self._suffixes(first), self._suffixes(second)
-        if len(one) > 1 and len(two) > 1 and len(one) != len(two):
-            raise self.fault(f"bodies {first!r} and {second!r} are planet sets of different size")
-        many = one if len(one) >= len(two) else two
+        if one != [""] and two != [""] and len(one) != len(two):
+            raise self.fault(f"{key}: {first!r} and {second!r} are planet sets of different size")
         return [
             (suffix, first + (suffix if one != [""] else ""), second + (suffix if two != [""] else ""))
-            for suffix in many
+            for suffix in (two if one == [""] else one)
         ]
 
     def _bodies(self, inertias: str) -> Iterator[Body]:
@@ -541,10 +622,15 @@ class Gearbox:
     def _place(self, body: str, z_mm: float) -> tuple[float, float, float]:
         return (*self._named_bodies[body].axis, z_mm * 1e-3)
 
-    def _bearing_instances(self, name: str, section: BearingSection) -> Iterator[Bearing]:
+    def _bearing_instances(self, name: str, section: BearingSection) -> tuple[Bearing, ...]:
+        key = f"bearings.{name}"
+        if section.body == GROUND:
+            raise self.fault(f"{key}.body = {GROUND!r}: name the body that is held; the ground is what it sits on")
+        if not self._known(key, section.body, section.on):
+            return ()
         factor = self.case.housing.factor if section.housing_factor_applies else 1.0
-        for suffix, body, on in self._instances(section.body, section.on):
-            yield Bearing(
+        return tuple(
+            Bearing(
                 name + suffix,
                 name,
                 body,
@@ -555,13 +641,21 @@ class Gearbox:
                 section.damping,
                 factor,
             )
+            for suffix, body, on in self._instances(key, section.body, section.on)
+        )
 
-    def _mesh_instances(self, name: str, section: MeshSection) -> Iterator[Mesh]:
+    def _mesh_instances(self, name: str, section: MeshSection) -> tuple[Mesh, ...]:
         key = f"meshes.{name}"
+        for end in ("pinion_body", "gear_body"):
+            if getattr(section, end) == GROUND:
+                raise self.fault(f"{key}.{end} = {GROUND!r}: name a body; one with fixed = true does not turn")
+        if not self._known(key, section.pinion_body, section.gear_body):
+            return ()
         if section.pair not in self.gear_pairs:
             raise self.fault(f"{key}.pair = {section.pair!r}: no such pair; pairs are {', '.join(self.gear_pairs)}")
         pair = self.gear_pairs[section.pair]
-        instances = self._instances(section.pinion_body, section.gear_body)
+        instances = self._instances(key, section.pinion_body, section.gear_body)
+        found = []
         phases = section.phase if isinstance(section.phase, tuple) else (section.phase,) * len(instances)
         if len(phases) != len(instances):
             raise self.fault(f"{key}.phase = {list(phases)}: {len(instances)} meshes need {len(instances)} phases")
@@ -579,19 +673,22 @@ class Gearbox:
                     f"{math.degrees(angle):.4f} deg; leave the key out or correct the positions"
                 )
             z = self._common_middle(key, pair, first, second)
-            yield Mesh(
-                name=name + suffix,
-                family=name,
-                pair=pair,
-                pinion=pinion,
-                gear=gear,
-                frame=frame,
-                z=z,
-                offsets=(z - first.wheels[pair.pinion.name], z - second.wheels[pair.gear.name]),
-                position_angle=angle,
-                centre_distance=math.hypot(dx, dy),
-                phase=phase,
+            found.append(
+                Mesh(
+                    name=name + suffix,
+                    family=name,
+                    pair=pair,
+                    pinion=pinion,
+                    gear=gear,
+                    frame=frame,
+                    z=z,
+                    offsets=(z - first.wheels[pair.pinion.name], z - second.wheels[pair.gear.name]),
+                    position_angle=angle,
+                    centre_distance=math.hypot(dx, dy),
+                    phase=phase,
+                )
             )
+        return tuple(found)
 
     def _common_middle(self, key: str, pair: GearPair, first: Body, second: Body) -> float:
         """Middle of the overlap of the two faces, m."""
@@ -633,3 +730,8 @@ def _copied(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {key: _copied(entry) for key, entry in value.items()}
     return list(value) if isinstance(value, list) else value
+
+
+def _parallel(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+    """Tell whether two bodies' rows of the rolling motions are one up to a factor: they turn together."""
+    return bool(abs(one @ other) > (1.0 - 1e-9) * np.linalg.norm(one) * np.linalg.norm(other))

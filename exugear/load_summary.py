@@ -7,7 +7,6 @@ costs nothing beside a run, and shows the wrong sign of a torque before one is b
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from exugear.gearbox import CaseError, Gearbox, LoadCase
+from exugear.gearbox import Gearbox, LoadCase
+from exugear.torque_series import torque_series
 
 Floats = NDArray[np.float64]
 Series = Mapping[str, tuple[Floats, Floats]]
@@ -92,7 +92,7 @@ def summarise_loads(
     duration : float, optional
         Simulated time, s; the load case's by default.
     series : mapping, optional
-        As `torque_series` reads it, where it has been read.
+        As `exugear.torque_series.torque_series` reads it, where it has been read.
 
     Raises
     ------
@@ -241,38 +241,3 @@ def _flanks(gearbox: Gearbox, forces: Floats) -> tuple[dict[str, str], tuple[str
         if np.any(own * math.copysign(1.0, static[mesh.name]) < -least):
             turned.append(mesh.family)
     return {family: found or "0" for family, found in flanks.items()}, tuple(dict.fromkeys(turned))
-
-
-def torque_series(gearbox: Gearbox, case: LoadCase) -> dict[str, tuple[Floats, Floats]]:
-    """Read times (s) and torques (N m) by body from the case's CSV file.
-
-    The header is ``time_s`` and one ``<body>_N_m`` per loaded body; between lines torques are linear.
-
-    Raises
-    ------
-    CaseError
-        Unknown columns, text where numbers belong, times that do not grow.
-    """
-    if case.torque_series is None:
-        return {}
-    path = case.torque_series
-    with path.open(newline="", encoding="utf-8") as file:
-        lines = [line for line in csv.reader(file) if line]
-    if len(lines) < 3 or lines[0][0].strip() != "time_s":
-        raise CaseError(f"{path}: expected a header time_s,BODY_N_m,... and at least two lines of numbers")
-    try:
-        table = np.array([[float(cell) for cell in line] for line in lines[1:]])
-    except ValueError as error:
-        raise CaseError(f"{path}: {error}; every line needs {len(lines[0])} numbers") from None
-    if table.ndim != 2 or table.shape[1] != len(lines[0]) or not np.all(np.isfinite(table)):
-        raise CaseError(f"{path}: every line needs {len(lines[0])} finite numbers")
-    if not np.all(np.diff(table[:, 0]) > 0.0):
-        raise CaseError(f"{path}: time_s must grow from line to line")
-    series = {}
-    for column, name in enumerate(lines[0][1:], start=1):
-        body = name.strip().removesuffix("_N_m")
-        if body not in gearbox.spinning or not name.strip().endswith("_N_m"):
-            known = ", ".join(f"{known}_N_m" for known in gearbox.spinning)
-            raise CaseError(f"{path}: column {name.strip()!r} is no torque of a body; columns are {known}")
-        series[body] = (table[:, 0], table[:, column])
-    return series

@@ -37,6 +37,8 @@ GRADING = 0.35
 """Ratio of neighbouring element sizes towards a re-entrant corner."""
 INTEGRATION_ORDER = 5
 """Exact for the mass matrix but for the factor r; the strains' 1/r is no polynomial anyway."""
+MOST_ELEMENTS = 50_000
+"""Most elements over a half-section: 10 m of shaft with 3 m diameter; 4 GB."""
 SAME = 1e-9
 """Two places (m) this close are one."""
 
@@ -196,20 +198,7 @@ class Shaft:
         return (2.0 * r < outer) & (2.0 * r > inner)
 
     def _locate(self, seat: SeatBand) -> tuple[ShaftSection, float, float]:
-        """Section under a seat, lower and upper edge; neighbours of one diameter count as one."""
-        low, high = seat.z - seat.width / 2.0, seat.z + seat.width / 2.0
-        if low < -SAME or high > self.length + SAME:
-            raise ShaftError(
-                f"seat {seat.name}: it reaches from {low:g} to {high:g} m, the shaft from 0 to {self.length:g} m"
-            )
-        under = [
-            section
-            for section, start, end in zip(self.sections, self._ends[:-1], self._ends[1:], strict=True)
-            if (start < high - SAME and end > low + SAME) or (seat.width == 0.0 and start - SAME <= low <= end + SAME)
-        ]
-        if seat.width > 0.0 and len({section.outer_diameter for section in under}) > 1:
-            raise ShaftError(f"seat {seat.name}: a shoulder lies between {low:g} and {high:g} m; move or narrow it")
-        return max(under, key=lambda section: section.outer_diameter), low, high
+        return locate(self.sections, seat)
 
     def _lines(self) -> tuple[Floats, Floats]:
         """Lines of the mesh over the radius and along the axis, closing in on re-entrant corners."""
@@ -409,6 +398,48 @@ class Shaft:
         values = np.zeros((fields * self.nodes.shape[1], shapes.shape[1]))
         values[self.free_unknowns(motion)] = shapes
         return values.reshape(self.nodes.shape[1], fields, -1)
+
+
+def locate(sections: Sequence[ShaftSection], seat: SeatBand) -> tuple[ShaftSection, float, float]:
+    """Section under a seat, lower and upper edge (m); neighbours of one diameter count as one.
+
+    Raises
+    ------
+    ShaftError
+        The seat lies outside the shaft or across a step.
+    """
+    ends = np.concatenate([[0.0], np.cumsum([section.length for section in sections])])
+    low, high = seat.z - seat.width / 2.0, seat.z + seat.width / 2.0
+    if low < -SAME or high > ends[-1] + SAME:
+        raise ShaftError(f"seat {seat.name}: it reaches from {low:g} to {high:g} m, the shaft from 0 to {ends[-1]:g} m")
+    under = [
+        section
+        for section, start, end in zip(sections, ends[:-1], ends[1:], strict=True)
+        if (start < high - SAME and end > low + SAME) or (seat.width == 0.0 and start - SAME <= low <= end + SAME)
+    ]
+    if seat.width > 0.0 and len({section.outer_diameter for section in under}) > 1:
+        raise ShaftError(f"seat {seat.name}: a shoulder lies between {low:g} and {high:g} m; move or narrow it")
+    return max(under, key=lambda section: section.outer_diameter), low, high
+
+
+def check_shaft(sections: Sequence[ShaftSection], seats: Sequence[SeatBand], size: MeshSize = STANDARD_SIZE) -> None:
+    """Refuse a shaft before it is meshed.
+
+    Raises
+    ------
+    ShaftError
+        Sections that do not touch each other, seats that do not lie on them, or more elements than memory holds.
+    """
+    _check_sections(tuple(sections))
+    for seat in seats:
+        locate(sections, seat)
+    length, radius = sum(s.length for s in sections), max(s.outer_diameter for s in sections) / 2.0
+    elements = length / size.axial * radius / size.radial
+    if elements > MOST_ELEMENTS:
+        raise ShaftError(
+            f"a shaft of {length:g} m and {2.0 * radius:g} m diameter needs {elements:.0f} elements over its section; "
+            f"{MOST_ELEMENTS} are the most"
+        )
 
 
 def _check_sections(sections: tuple[ShaftSection, ...]) -> None:

@@ -48,7 +48,16 @@ from exugear.deviations import wheel_errors
 from exugear.gearbox import GROUND, Body, Gearbox, Mesh
 from exugear.kernels import MeshArrays, periodic_cubic
 from exugear.table_law import TableArrays
-from exugear.tooth_contact import MeshError, MeshGeometry, ToothContact, tooth_places
+from exugear.tooth_contact import (
+    MeshError,
+    MeshGeometry,
+    ToothContact,
+    line_of_action_row,
+    loaded_flanks,
+    pitch_point_of,
+    tooth_places,
+    wrench_row,
+)
 from fe_ste.gears import Gear
 from fe_ste.interpolation import SteSurface, axis_weights, slope_axis_weights
 
@@ -119,45 +128,27 @@ class MeshElement:
     table: TableFlanks | None = None
 
 
-def loaded_flanks(gearbox: Gearbox, torques: Mapping[str, float] | None = None) -> dict[str, int]:
-    """Tell the loaded flank s of each mesh under the static load, or other torques at the same locks."""
-    forces = gearbox.static_mesh_forces(torques)
-    return {name: -1 if force < 0.0 else 1 for name, force in forces.items()}
-
-
-def wrench_row(direction: Floats, pitch_point: Floats, nodes: tuple[Floats, Floats]) -> Floats:
-    """Row (12,) of a force along `direction` (3,) at the pitch point: plus on gear 1, minus on gear 2."""
-    ends = [np.concatenate([direction, np.cross(pitch_point - node, direction)]) for node in nodes]
-    return np.concatenate([ends[0], -ends[1]])
-
-
 def rows_of_law(
     mesh: Mesh, flank: int, nodes: tuple[Floats, Floats], law: str, angles: Angles = "reference"
 ) -> tuple[Floats, Floats]:
     """Deflection row and force row (12,) of a mesh law about the two bodies' nodes."""
+    if law != "seed":
+        row = line_of_action_row(mesh, flank, nodes)
+        return row, row
     geometry = MeshGeometry.of(mesh)
     along, across, axial = geometry.tangential, geometry.radial, np.array([0.0, 0.0, 1.0])
-    pitch_point = _pitch_point(mesh, geometry, nodes)
-    if law != "seed":
-        direction = geometry.plane_of_action(flank) - flank * math.tan(mesh.pair.pinion.base_helix_angle) * axial
-        row = wrench_row(direction, pitch_point, nodes)
-        return row, row
+    pitch_point = pitch_point_of(mesh, geometry, nodes)
     pressure, helix = seed_angles(mesh, angles)
     tangent = flank * along
     pushing = tangent + math.tan(pressure) * across - flank * math.tan(helix) * axial
     return wrench_row(tangent, pitch_point, nodes), wrench_row(pushing, pitch_point, nodes)
 
 
-def _pitch_point(mesh: Mesh, geometry: MeshGeometry, nodes: tuple[Floats, Floats]) -> Floats:
-    first_axis = np.array([nodes[0][0], nodes[0][1], mesh.z])
-    return np.asarray(first_axis + geometry.pinion_radius * geometry.radial)
-
-
 def rows_of_place(mesh: Mesh, flank: int, nodes: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
     """Rows (12,) of the centre distance and of the misalignment of a flank about the two bodies' nodes."""
     geometry = MeshGeometry.of(mesh)
     towards = np.array([math.cos(mesh.position_angle), math.sin(mesh.position_angle), 0.0])
-    centre = -wrench_row(towards, _pitch_point(mesh, geometry, nodes), nodes)
+    centre = -wrench_row(towards, pitch_point_of(mesh, geometry, nodes), nodes)
     x, y, _ = geometry.plane_of_action(flank)
     tilt = np.zeros(12)
     tilt[[3, 4, 9, 10]] = y, -x, -y, x

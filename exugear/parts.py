@@ -179,6 +179,16 @@ class PairSpec:
     modifications: tuple[FlankModification, FlankModification]
 
 
+def stiffness_matrix(section: StiffnessSection | None) -> NDArray[np.float64]:
+    """Stiffness or damping (6, 6) as a section gives it; zeros for none."""
+    if section is None:
+        return np.zeros((6, 6))
+    if section.matrix is not None:
+        return np.array(section.matrix, dtype=np.float64)
+    radial, tilt = section.radial_N_per_m, section.tilt_N_m_per_rad
+    return np.diag([radial, radial, section.axial_N_per_m, tilt, tilt, section.torsion_N_m_per_rad])
+
+
 def gear_from(name: str, section: GearSection) -> Gear:
     """Gear from its section: millimetres to metres, degrees to radians."""
     return Gear(
@@ -191,7 +201,7 @@ def gear_from(name: str, section: GearSection) -> Gear:
         face_width=section.face_width_mm * 1e-3,
         held_diameter=section.held_diameter_mm * 1e-3,
         internal=section.internal,
-        rack=BasicRack(**section.rack.model_dump()),
+        rack=BasicRack(section.rack.addendum, section.rack.dedendum, section.rack.tip_radius),
         tip_diameter=None if section.tip_diameter_mm is None else section.tip_diameter_mm * 1e-3,
         root_diameter=None if section.root_diameter_mm is None else section.root_diameter_mm * 1e-3,
         tooth_thinning=section.tooth_thinning_mm * 1e-3,

@@ -19,7 +19,6 @@ from exugear.assembly import Assembly, VariantError, assemble
 from exugear.channels import BALANCE_TERMS, energy_residual
 from exugear.comparison import (
     NEAR,
-    REFERENCE_FREQUENCY,
     RPM,
     Comparison,
     Finding,
@@ -118,7 +117,7 @@ class _Writer:
 
     folder: Path
     gearbox: Gearbox
-    target: float
+    reference: float | None
     tell: Callable[[str], None]
     statements: list[str] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
@@ -126,6 +125,12 @@ class _Writer:
     distrusted: list[str] = field(default_factory=list)
     models: dict[Model, Assembly] = field(default_factory=dict)
     stiffnesses: dict[str, dict[str, FloatArray | SteSurface]] = field(default_factory=dict)
+
+    @property
+    def target(self) -> float:
+        """Frequency (Hz) that modes are looked for at; only where there is one."""
+        assert self.reference is not None
+        return self.reference
 
     def stiffness(self, law: str) -> dict[str, FloatArray | SteSurface]:
         """Mesh stiffness of a law from the tables of the folder, read once."""
@@ -165,7 +170,7 @@ class _Writer:
 
 def write_report(
     folder: str | Path,
-    target: float = REFERENCE_FREQUENCY,
+    target: float | None = None,
     tell: Callable[[str], None] | None = None,
     files_below: Path | None = None,
 ) -> Report:
@@ -175,8 +180,8 @@ def write_report(
     ----------
     folder : path
         What ``exugear ste``, ``run`` and ``modes`` wrote into.
-    target : float
-        Frequency to look for modes at, Hz.
+    target : float, optional
+        Frequency to look for modes at, Hz; the case's reference frequency by default. Without either, modes are listed.
     tell : callable, optional
         Called with what is being done.
     files_below : Path, optional
@@ -196,7 +201,8 @@ def write_report(
     """
     folder = Path(folder)
     gearbox = kept_case(folder, Permissions(below=files_below))
-    writer = _Writer(folder, gearbox, target, tell or (lambda what: None))
+    reference = gearbox.case.report.reference_frequency_Hz if target is None else target
+    writer = _Writer(folder, gearbox, reference, tell or (lambda what: None))
     tables = _tables(writer)
     modes = dict(_stored_modes(writer))
     runs = list(_stored_runs(writer, modes))
@@ -419,7 +425,18 @@ def _run_row(run: VariantRun) -> dict[str, object]:
 def _modes_section(writer: _Writer, modes: Mapping[Model, xr.Dataset]) -> str:
     if not modes:
         return ""
-    target = f"{writer.target:.0f} Hz"
+    for model, data in modes.items():
+        growth = float(data.attrs["growth_rate"])
+        if growth > 0.0:
+            writer.statements.append(f"{model.words}: unstable, disturbances grow by up to {growth:.3g} 1/s.")
+    listed = [_all_modes(model, data) for model, data in modes.items()]
+    if writer.reference is None:
+        return page.section("Modes", *listed)
+    return page.section(f"Modes near {writer.target:.0f} Hz", *_modes_near(writer, modes), *listed)
+
+
+def _modes_near(writer: _Writer, modes: Mapping[Model, xr.Dataset]) -> Iterator[str]:
+    """Tell of the modes near the reference frequency, what they depend on, and what would bring one there."""
     rows, pictures = [], []
     for model, data in modes.items():
         nearest = nearest_mode(data, writer.target)
@@ -431,23 +448,16 @@ def _modes_section(writer: _Writer, modes: Mapping[Model, xr.Dataset]) -> str:
             rows.append(_nearest_row(model, seen, writer.target))
         writer.statements.append(_nearest_statement(model, data, nearest, seen, writer.target))
         pictures.append(_energies_picture(writer, model, seen))
-        growth = float(data.attrs["growth_rate"])
-        if growth > 0.0:
-            writer.statements.append(f"{model.words}: unstable, disturbances grow by up to {growth:.3g} 1/s.")
     sensitivity, found = _sensitivity(writer, modes)
-    return page.section(
-        f"Modes near {target}",
-        page.table(rows, ("inertias", "what moves")),
-        page.paragraph(
-            "Share: of the mode in the mobility of the overall transmission error; amplification: overall transmission "
-            "error at resonance per transmission error of the mesh named. Where the nearest mode has a share under "
-            f"{100 * SEEN:g} %, the nearest that has more stands below it. Near means within {100 * NEAR:g} %."
-        ),
-        _mode_picture(writer, modes, found),
-        page.folded("Where the energy of these modes sits", "".join(pictures)),
-        sensitivity,
-        *(_all_modes(model, data) for model, data in modes.items()),
+    yield page.table(rows, ("inertias", "what moves"))
+    yield page.paragraph(
+        "Share: of the mode in the mobility of the overall transmission error; amplification: overall transmission "
+        "error at resonance per transmission error of the mesh named. Where the nearest mode has a share under "
+        f"{100 * SEEN:g} %, the nearest that has more stands below it. Near means within {100 * NEAR:g} %."
     )
+    yield _mode_picture(writer, modes, found)
+    yield page.folded("Where the energy of these modes sits", "".join(pictures))
+    yield sensitivity
 
 
 def _nearest_row(model: Model, mode: ModeReport, target: float) -> dict[str, object]:

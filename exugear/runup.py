@@ -38,7 +38,7 @@ from exugear.compiled import (
 )
 from exugear.extent import SAMPLE_RATE, buffer_rows, check_disk, check_duration, too_fine
 from exugear.gearbox import Gearbox, LoadCase
-from exugear.load_summary import drive_rate, driven_start_speed, summarise_loads, torque_series
+from exugear.load_summary import drive_rate, driven_start_speed, summarise_loads
 from exugear.mesh_element import Angles, MeshData
 from exugear.results import bodies_folder, input_hash
 from exugear.runfile import (
@@ -52,6 +52,7 @@ from exugear.runfile import (
     has_pieces,
 )
 from exugear.statics import accelerating_start
+from exugear.torque_series import torque_series
 from exugear.trust import Judge
 from exugear.versions import RUN
 from fe_ste.files import exclusive

@@ -6,6 +6,7 @@ that a few steps with a difference quotient of the residual reach round-off.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -42,9 +43,14 @@ def _newton(residual: Callable[[Floats], Floats], start: Floats, steps: Floats, 
     """Newton's method with central differences, until the residual stops falling.
 
     `steps` are those of the differences, `scale` is the size of each residual that counts as one. Being small against
-    the loads ends nothing: a train near balance accelerates with a ten-thousandth of them.
+    the loads ends nothing: a train near balance accelerates with a ten-thousandth of them. Residuals are sums of spring
+    forces, and rounding of places near 1 m is what these cannot resolve: under a small load that is more of it than
+    under a large one, and no step can make it less.
     """
     x, solution, best = start, start, np.inf
+    if not x.size:
+        return x
+    rounding = np.zeros_like(x)
     for _ in range(30):
         r = residual(x)
         error = float(np.max(np.abs(r) / scale))
@@ -53,12 +59,16 @@ def _newton(residual: Callable[[Floats], Floats], start: Floats, steps: Floats, 
         stalled = error > 0.5 * best
         if error < best:
             solution, best = x, error
-        if error == 0.0 or (stalled and best < LARGEST_RESIDUAL):
+        small = best < LARGEST_RESIDUAL or bool(np.all(np.abs(r) <= rounding))
+        if error == 0.0 or (stalled and small):
             return solution
         columns = [(residual(x + e) - residual(x - e)) / (2.0 * e.sum()) for e in np.diag(steps)]
         matrix = np.array(columns).T
+        rounding = np.abs(matrix) @ np.full(x.size, np.finfo(float).eps)
         try:
-            x = x - scipy.linalg.solve(matrix / scale[:, None], r / scale)
+            with warnings.catch_warnings():
+                warnings.simplefilter("error", scipy.linalg.LinAlgWarning)
+                x = x - scipy.linalg.solve(matrix / scale[:, None], r / scale)
         except (scipy.linalg.LinAlgError, scipy.linalg.LinAlgWarning):
             raise BalanceError(
                 f"{what}: the stiffness matrix is singular; a body may move without resistance"
@@ -78,7 +88,8 @@ def locked_equilibrium(
     ----------
     assembly : Assembly
     torques : mapping of body name to torque about +z, N m
-    locked : names of the bodies whose spins are held
+    locked : names of the bodies whose spins are held; where they leave the train free to roll and the torques are in
+        balance, it stays where it is
     meshes : MeshArrays, optional
         Mesh arrays to use instead of the assembly's, such as its `mean_meshes`.
 
@@ -87,7 +98,7 @@ def locked_equilibrium(
     BalanceError
         The structure is free to move, or Newton's method does not converge.
     """
-    held = [assembly.spin[name] for name in locked]
+    held = [assembly.spin[name] for name in _held(assembly, torques, locked)]
     free = assembly.motions @ scipy.linalg.null_space(assembly.motions[held])
     applied = assembly.torque_vector(torques)
     rest = np.zeros(assembly.size)
@@ -101,6 +112,28 @@ def locked_equilibrium(
 
     start = _touching(assembly, np.zeros(free.shape[1]), lambda x: np.asarray(free @ x), solve)
     return np.asarray(free @ solve(start, meshes))
+
+
+def _held(assembly: Assembly, torques: Mapping[str, float], locked: Sequence[str]) -> list[str]:
+    """Bodies to hold so that the train cannot roll: the locked ones, then such as carry no torque by being held.
+
+    Raises
+    ------
+    BalanceError
+        The locked bodies leave the train free to roll, and the torques would make it.
+    """
+    gearbox, held = assembly.gearbox, list(locked)
+    rolling, row = gearbox.kinematic_modes, gearbox.spinning.index
+    free = rolling @ scipy.linalg.null_space(rolling[[row(name) for name in held]]) if held else rolling
+    applied = np.array([torques.get(name, 0.0) for name in gearbox.spinning])
+    if free.size and np.abs(free.T @ applied).max() > 1e-9 * np.abs(applied).max():
+        raise BalanceError(f"static state: the torques are not held by locking {', '.join(locked) or 'nothing'}")
+    overall = gearbox.case.overall
+    for name in (overall.input, overall.output, *gearbox.spinning):
+        rank = np.linalg.matrix_rank(rolling[[row(other) for other in held]]) if held else 0
+        if np.linalg.matrix_rank(rolling[[row(other) for other in (*held, name)]]) > rank:
+            held.append(name)
+    return held
 
 
 def _touching(

@@ -10,7 +10,6 @@ from typing import Any
 import xarray as xr
 
 from exugear.gearbox import CaseError, Gearbox
-from fe_ste.gears import GearPair, GeometryError
 from fe_ste.plots import plot_load_share, plot_ste_curves
 from fe_ste.scene import contact_quads, draw_tooth_contact, meshed_teeth
 from fe_ste.ste import contact_state
@@ -147,18 +146,9 @@ def wanted_table(gearbox: Gearbox, name: str, positions: int, grid: bool = False
     return replace(
         static,
         torque=tuple(torque if factor == 1.0 else _rounded(torque * factor) for factor in axes.torque_factors),
-        centre_distance=tuple(_distance(gearbox, spec.pair, um) for um in axes.centre_distance_offsets_um),
+        centre_distance=gearbox.table_distances(name),
         misalignment=tuple(1e-6 * opening / width for opening in axes.misalignment_um),
     )
-
-
-def _distance(gearbox: Gearbox, pair: GearPair, offset_um: float) -> float:
-    distance = pair.centre_distance + 1e-6 * offset_um
-    try:
-        pair.with_centre_distance(distance)
-    except GeometryError as error:
-        raise CaseError(f"{gearbox.source}: ste.centre_distance_offsets_um: {offset_um:g}: {error}") from None
-    return distance
 
 
 def _rounded(value: float) -> float:

@@ -111,6 +111,31 @@ class ToothContact:
         return angle + math.pi if self.number == 2 and not self._wheel_is_internal else angle
 
 
+def loaded_flanks(gearbox: Gearbox, torques: Mapping[str, float] | None = None) -> dict[str, int]:
+    """Tell the loaded flank s of each mesh under the static load, or other torques at the same locks."""
+    forces = gearbox.static_mesh_forces(torques)
+    return {name: -1 if force < 0.0 else 1 for name, force in forces.items()}
+
+
+def wrench_row(direction: Floats, pitch_point: Floats, nodes: tuple[Floats, Floats]) -> Floats:
+    """Row (12,) of a force along `direction` (3,) at the pitch point: plus on gear 1, minus on gear 2."""
+    ends = [np.concatenate([direction, np.cross(pitch_point - node, direction)]) for node in nodes]
+    return np.concatenate([ends[0], -ends[1]])
+
+
+def pitch_point_of(mesh: Mesh, geometry: MeshGeometry, nodes: tuple[Floats, Floats]) -> Floats:
+    """Place of the pitch point at the middle of the common face, m."""
+    first_axis = np.array([nodes[0][0], nodes[0][1], mesh.z])
+    return np.asarray(first_axis + geometry.pinion_radius * geometry.radial)
+
+
+def line_of_action_row(mesh: Mesh, flank: int, nodes: tuple[Floats, Floats]) -> Floats:
+    """Row (12,) of the deflection along the line of action about the two bodies' nodes."""
+    geometry = MeshGeometry.of(mesh)
+    axial = flank * math.tan(mesh.pair.pinion.base_helix_angle) * np.array([0.0, 0.0, 1.0])
+    return wrench_row(geometry.plane_of_action(flank) - axial, pitch_point_of(mesh, geometry, nodes), nodes)
+
+
 def mesh_phases(gearbox: Gearbox, flanks: Mapping[str, int]) -> dict[str, float]:
     """Compute the PMC of each mesh at zero angles: see `tooth_places`."""
     return tooth_places(gearbox, flanks)[0]

@@ -113,7 +113,7 @@ def test_check_as_json_is_one_object_on_standard_output():
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("teeth = 21 ", "teeth = -21 ", ["gears.sun.teeth", "-21", "greater than"]),
+        ("teeth = 21 ", "teeth = -21 ", ["gears.sun.teeth", "-21", "between 5 and 2000"]),
         ("teeth = 21 ", "theeth = 21 ", ["gears.sun.theeth", "did you mean 'teeth'"]),
         ("teeth = 21 ", "teeth 21 ", ["not valid TOML"]),
     ],

@@ -18,6 +18,8 @@ from exugear.modes import eigenmodes, linearise, modes_of
 from exugear.statics import accelerating_start, locked_equilibrium
 from exugear.system import ExudynSystem, Loading
 
+from .limit_case import unchecked
+
 pytestmark = pytest.mark.skipif(importlib.util.find_spec("meshio") is None, reason="meshio (extra mesh) is missing")
 
 LOAD = {"carrier": 240e3, "hss": -3000.0}
@@ -85,7 +87,7 @@ def test_a_stiff_carrier_is_the_rigid_one(grc_shafts: Gearbox, carrying: Gearbox
     gaps = []
     for factor in (10.0, 100.0):
         modulus = {"bodies.carrier.solid.material.youngs_modulus_GPa": 206.0 * factor}
-        found = eigenmodes(carrying.varied(modulus | limit), "flexible", stiffness).frequency[1:60]
+        found = eigenmodes(unchecked(carrying, modulus | limit), "flexible", stiffness).frequency[1:60]
         assert np.all(found < rigid * (1 + 1e-6))  # compliance can only lower
         gaps.append(np.abs(found / rigid - 1).mean())
     assert gaps[1] < 1e-4
