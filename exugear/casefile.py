@@ -237,7 +237,7 @@ class SolidSection(_Section):
     """A body of any shape from a file beside the gearbox file, in the gearbox's axes.
 
     Geometry (.step, .stp, .brep, or the script .geo, which needs permission to run) is meshed with tetrahedra by gmsh;
-    a mesh (.msh, .inp, .vtu, .vtk, .bdf, .nas, .fem) is taken as it is. `torque_seat` names the seat where torques
+    a mesh (.msh, .inp, .vtu, .vtk) is taken as it is. `torque_seat` names the seat where torques
     act. `blanks` are by seat.
     """
 

@@ -48,16 +48,9 @@ CAD = {".step": "step", ".stp": "step", ".brep": "brep"}
 """Formats of shapes that hold nothing to run, by the ending of the file."""
 GEOMETRY = (SCRIPT, *CAD)
 """Endings of files that gmsh meshes."""
-MESHES = {
-    ".msh": "gmsh",
-    ".inp": "abaqus",
-    ".vtu": "vtu",
-    ".vtk": "vtk",
-    ".bdf": "nastran",
-    ".nas": "nastran",
-    ".fem": "nastran",
-}
-"""Formats of meshes that are read, by the ending of the file: one file each, which refers to no other."""
+MESHES = {".msh": "gmsh", ".inp": "abaqus", ".vtu": "vtu", ".vtk": "vtk"}
+"""Formats of meshes that are read, by the ending of the file: one file each, which refers to no other, and whose
+reader comes to an end on a file that is cut short (that of Nastran's does not)."""
 
 
 UNPERMITTED = (

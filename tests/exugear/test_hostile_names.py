@@ -6,6 +6,7 @@ import io
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import unicodedata
@@ -23,6 +24,8 @@ from exugear import console, page
 from exugear.cli import app
 from exugear.plots import plot_mode_energies
 from exugear.scene import mode_figure
+from exugear.shapes import BodyShape, mode_scene, tube_surface
+from exugear.viewer import write_mode_page
 from fe_ste.scene import RenderingError
 
 from .spur_case import SPUR_CASE
@@ -143,6 +146,40 @@ def test_no_name_breaks_out_of_a_page(results: tuple[Path, list[Any]], name: str
         assert data["heading"].startswith(NAME)
         assert not re.search("[<>&]", found.texts["data"])
         assert not re.search(r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|eval\(", text)
+
+
+BROWSER = r"""
+const texts = {options: [], bodies: []};
+const gl = new Proxy(function () {}, { get: () => gl, apply: () => gl });
+class Element {
+  constructor() { this.style = {}; }
+  append(...parts) { texts.bodies.push(...parts.filter(part => typeof part === "string")); }
+  add(option) { texts.options.push(option.text); }
+  getContext() { return gl; }
+}
+class Option { constructor(text) { this.text = text; } }
+const page = require("fs").readFileSync(process.argv[1], "utf8");
+const [data, script] = [...page.matchAll(/<script[^>]*>([^]*?)<\/script>/g)].map(found => found[1]);
+const known = { data: { textContent: data } };
+const document = {
+  getElementById: id => known[id] ??= new Element(),
+  createElement: () => new Element(),
+};
+new Function("document", "Option", "requestAnimationFrame", script)(document, Option, () => {});
+console.log(JSON.stringify(texts));
+"""
+"""What of a browser the mode page needs to begin, its drawing aside: prints the texts that it puts in."""
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="no node to run the page's script")
+def test_the_mode_page_itself_puts_names_in_as_text(tmp_path: Path) -> None:
+    body = BodyShape(HTML, "shaft", tube_surface(0.1, 0.0, 0.5), np.zeros(3))
+    title = f"3215 Hz\n{HTML} {STEERING}"
+    scene = mode_scene((body,), {HTML: [0, 1e-3, 0, 0, 0, 1.0]}, title=title)
+    written = write_mode_page([scene], tmp_path / "modes.html", heading=NAME)
+    found = subprocess.run(["node", "-e", BROWSER, written], capture_output=True, text=True, timeout=60)
+    assert found.returncode == 0, found.stderr
+    assert json.loads(found.stdout) == {"options": [title.replace("\n", ", ")], "bodies": [HTML]}
 
 
 def test_pieces_of_a_page_escape_whatever_a_file_holds() -> None:

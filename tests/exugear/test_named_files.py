@@ -94,7 +94,8 @@ def modes(case: Path, *more: object, **environment: str) -> Any:
 def test_a_script_is_refused_before_anything_is_written(scripted: tuple[Path, Path], verb: str) -> None:
     case, mark = scripted
     out = case.parents[1] / "out"
-    outcome = exugear(verb, case, "--variant", "flexible", "--mesh-law", "iso6336", "--out", out)
+    choices = ("--variant", "flexible", "--mesh-law", "iso6336", "--out", out)
+    outcome = exugear(verb, case, *choices, EXUGEAR_ALLOW_SCRIPTS="0")
     assert outcome.exit_code == 2
     assert "bodies.box.solid.file = 'plate.geo': a gmsh script can run any command" in said(outcome)
     for way in ("--allow-scripts", "EXUGEAR_ALLOW_SCRIPTS=1", "a STEP file"):
@@ -191,7 +192,7 @@ def test_meshes_are_read_in_formats_that_refer_to_no_other_file(tmp_path: Path) 
         whole.write_text(f"** all of it\n{keyword}\n", encoding="utf-8")
         with pytest.raises(SolidError, match=r"whole\.inp: refers to another file by \*INCLUDE"):
             read_solid(whole)
-    for name in ("plate.xdmf", "plate.med", "plate", "plate.msh.h5"):
+    for name in ("plate.xdmf", "plate.med", "plate.bdf", "plate", "plate.msh.h5"):
         (tmp_path / name).write_text("", encoding="utf-8")
         with pytest.raises(SolidError, match=r"its name must end in \.msh, \.inp, \.vtu"):
             read_solid(tmp_path / name)
@@ -210,7 +211,7 @@ def test_a_mesh_that_swells_while_it_is_read_is_refused(tmp_path: Path) -> None:
         read_solid(bomb)
 
 
-@pytest.mark.parametrize("suffix", [".msh", ".inp", ".vtu", ".vtk", ".bdf", ".nas", ".fem"])
+@pytest.mark.parametrize("suffix", [".msh", ".inp", ".vtu", ".vtk"])
 @needs_meshio
 def test_a_mesh_of_anything_is_refused_in_one_sentence(tmp_path: Path, suffix: str, capfd: Any) -> None:
     random = np.random.default_rng(3)
@@ -218,7 +219,6 @@ def test_a_mesh_of_anything_is_refused_in_one_sentence(tmp_path: Path, suffix: s
         ".msh": b"$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 900000000000 1 1\n",
         ".vtk": b"# vtk DataFile Version 4.2\n\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS 9000000000000 double\n",
         ".inp": b"*NODE\n1, 0, zero\n*ELEMENT, TYPE=C3D4\n1, 2, 3\n",
-        ".bdf": b"BEGIN BULK\nGRID\nENDDATA\n",
     }.get(suffix, b"")
     for content in (b"", head, head + random.bytes(300), random.bytes(300)):
         file = tmp_path / f"any{suffix}"
@@ -301,12 +301,14 @@ def test_what_is_no_regular_file_is_refused_at_once(tmp_path: Path, kind: str, k
     with (tmp_path / "large.csv").open("wb") as file:
         file.truncate(LARGEST_TABLE + 1)
     # In a process of its own: reading a pipe that nobody writes into never ends.
-    for name, reason in (("pipe.csv", "a pipe or device"), ("folder.csv", "a folder"), ("large.csv", "at most 100 MB")):
-        case = with_files(tmp_path, **{kind: name})
-        code = "import sys; from exugear.gearbox import Gearbox; Gearbox.from_toml(sys.argv[1])"
-        found = subprocess.run([sys.executable, "-c", code, case], capture_output=True, text=True, timeout=60)
-        assert f"CaseError: {case}: {key} = '{name}': " in found.stderr
-        assert reason in found.stderr.splitlines()[-1]
+    case = with_files(tmp_path, **{kind: "pipe.csv"})
+    code = "import sys; from exugear.gearbox import Gearbox; Gearbox.from_toml(sys.argv[1])"
+    found = subprocess.run([sys.executable, "-c", code, case], capture_output=True, text=True, timeout=60)
+    assert f"CaseError: {case}: {key} = 'pipe.csv': a pipe or device" in found.stderr
+    for name, reason in (("folder.csv", "a folder"), ("large.csv", "100 MB; at most 100 MB")):
+        outcome = exugear("check", with_files(tmp_path, **{kind: name}))
+        assert outcome.exit_code == 2
+        assert f"{key} = '{name}': {reason}" in said(outcome)
     with pytest.raises(CaseError, match="a pipe or device"):
         Gearbox.from_toml(with_files(tmp_path, **{kind: "/dev/zero"}), Permissions(below=Path("/dev")))
 
