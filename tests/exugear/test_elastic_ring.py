@@ -19,6 +19,7 @@ from exugear.statics import accelerating_start, locked_equilibrium
 from exugear.system import ExudynSystem, Loading
 
 from .ring_case import ring_content
+from .rounding import allowed_difference
 
 LOAD = {"carrier": 240e3, "lss": -38e3}
 STEP = 5e-6
@@ -114,10 +115,12 @@ def test_compiled_right_hand_side_is_that_of_the_plain_kernels(ringed: Assembly)
     loads = LoadTable(LOAD)
     found = CompiledSystem(ringed, q, v, loads, STEP).accelerations()
     expected = ringed.accelerations(q, v, ringed.torque_vector(LOAD))
-    assert np.abs(found - expected).max() < 1e-11 * np.abs(expected).max()
+    # Rounding of places of 1 m, 1e-16 m each, of displacements of 1e-6 m.
+    assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
     signals, energies, _ = Observer(Channels(ringed), loads).observe(np.zeros(1), q[None], v[None])
-    assert signals[0] == pytest.approx(Channels(ringed).sample(q[None], v[None])[0], rel=1e-9, abs=1e-12)
-    assert energies[0] == pytest.approx(Channels(ringed).energies(q[None], v[None])[0, :2], rel=1e-12)
+    plain = Channels(ringed).sample(q[None], v[None])
+    assert np.all(np.abs(signals - plain) < allowed_difference(plain, len(ringed.mesh_names)))
+    assert energies[0] == pytest.approx(Channels(ringed).energies(q[None], v[None])[0, :2], rel=1e-9)
 
 
 def test_compiled_solver_and_exudyn_run_alike(ringed: Assembly) -> None:

@@ -59,8 +59,8 @@ def test_rolling_at_rated_speed_has_no_deflection_rate(grc: Gearbox, stiffness: 
         q = rolled(assembly, angle)
         found = states(assembly, q, assembly.rolling_velocity(q, speeds))
         assert np.abs(found[:, 1]).max() < 1e-12  # m/s, the bound of the specification
-        # Angles of 8e3 rad times base radii of 0.5 m, in double precision.
-        assert np.abs(found[:, 0]).max() < 1e-12
+        # The spins are a null space, each known to some 1e-16 of the fastest: 8e3 rad, on base radii of up to 0.5 m.
+        assert np.abs(found[:, 0]).max() < 1e-11
 
 
 def test_mesh_cycle_runs_once_per_tooth(grc: Gearbox, stiffness: dict) -> None:

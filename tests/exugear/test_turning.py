@@ -99,8 +99,8 @@ def test_compiled_accelerations_are_those_of_the_plain_law(body: TurningBody) ->
         for one, state in zip((body, other), states, strict=True)
     ]
     assert np.isnan(found[:4]).all() and np.isnan(found[-6:]).all()
-    # Round-off of sums over 39 terms, in parts of another order.
-    assert np.abs(found[4:-6] - np.concatenate(expected)).max() < 1e-12 * np.abs(found[4:-6]).max()
+    # Displacements of 1e-5 m are differences of places of 0.3 m, which are rounded to some 1e-16 m.
+    assert np.abs(found[4:-6] - np.concatenate(expected)).max() < 1e-10 * np.abs(found[4:-6]).max()
 
 
 def test_inertia_forces_invert_accelerations(body: TurningBody) -> None:
@@ -234,8 +234,8 @@ def test_another_rigid_inertia_keeps_the_law_of_a_rigid_body(plate: ReducedBody)
 
 def test_displacements_vibrate_as_mass_coriolis_and_stiffness_say(plate: ReducedBody) -> None:
     # Second method: M q'' + 2 Omega C q' + K q = 0 by the matrix exponential, the common spin taken out of both; the
-    # law vibrates about its centrifugal expansion. In 0.5 ms at 20 rad/s Coriolis forces do 4e-4 of the displacement,
-    # terms in the square of the speed a hundredth of it.
+    # law vibrates about its centrifugal expansion. In 0.5 ms at 20 rad/s Coriolis forces do some 1e-3 of the
+    # displacement; terms in the square of the speed, (20 / omega)^2 = 1e-5 at the lowest 975 Hz, few times that.
     body, speed, time = TurningBody(plate, 0.0), 20.0, 5e-4
     motion, size, spin = Motion(body), plate.size, plate.spin
     expanded = np.linalg.lstsq(plate.stiffness, speed**2 * body.pull)[0]
@@ -245,14 +245,17 @@ def test_displacements_vibrate_as_mass_coriolis_and_stiffness_say(plate: Reduced
     for coriolis in (plate.gyroscopic, np.zeros((size, size))):
         lower = np.hstack([-inverse @ plate.stiffness, -speed * inverse @ coriolis])
         exponential = scipy.linalg.expm(time * np.vstack([np.eye(size, 2 * size, size), lower]))
-        rates = 1e-3 * lowest @ np.random.default_rng(2).normal(size=lowest.shape[1])
+        # From velocities of seats: signs of modes, and directions among equal frequencies, are each machine's own.
+        rates = np.zeros(size)
+        rates[: 6 * body.seats] = 1e-3 * np.random.default_rng(2).normal(size=6 * body.seats)
+        rates = lowest @ (lowest.T @ plate.mass @ rates)
         rates -= spin * (body.weights @ rates)
         start = rates + speed * (spin + body.across(expanded))
         q, _ = integrated(expanded, start, time / 250, 250, lambda q, v: motion.accelerations(q, v, np.zeros(size)))
         expected = (exponential @ np.concatenate([np.zeros(size), rates]))[:size]
         expected -= spin * (body.weights @ expected)
         errors.append(np.abs(body.seen(q) - expanded - expected).max() / np.abs(expected).max())
-    assert errors[0] < 3e-5 < 3e-4 < errors[1]
+    assert errors[0] < 1e-4 < 3e-4 < errors[1]
 
 
 def test_a_shaft_moves_alike_in_its_own_frame_and_in_one_that_does_not_turn(shaft: SolidModel) -> None:
