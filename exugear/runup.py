@@ -429,8 +429,9 @@ class Recorder:
         if n == 0:
             return
         t, q, v = self._t[:n], self._q[:n], self._v[:n]
-        signals, energies, powers = self.observer.observe(t, q, v)
-        balance_times, balances = self._account(t, energies, powers)
+        with np.errstate(over="ignore", invalid="ignore"):  # a run that diverges ends in numbers too large to add up
+            signals, energies, powers = self.observer.observe(t, q, v)
+            balance_times, balances = self._account(t, energies, powers)
         self._judge.see(t, self.channels.mesh_deflections(signals), v, balance_times, balances)
         self._mesh_times = self._mesh_times + self.step * self.channels.mesh_times(signals)
         centre, rows = self.decimator.push(signals)
@@ -466,8 +467,7 @@ class Recorder:
         before = powers[:1] if self._powers is None else self._powers
         series = np.vstack([before, powers])
         lines = np.empty((len(t), len(BALANCE_TERMS)))
-        with np.errstate(over="ignore", invalid="ignore"):  # powers of a run that diverges; the judge sees the sums
-            worked = self.balance[[0, 3, 4, 5, 6]] + 0.5 * self.step * np.cumsum(series[1:] + series[:-1], axis=0)
+        worked = self.balance[[0, 3, 4, 5, 6]] + 0.5 * self.step * np.cumsum(series[1:] + series[:-1], axis=0)
         if self._powers is None:
             worked -= self.step * powers[0]  # no time passes before the first state
         lines[:, [0, 3, 4, 5, 6]] = worked
