@@ -100,6 +100,8 @@ class Run:
         Simulated and wall time, s.
     reasons : tuple of str
         Why it is not to be trusted (`exugear.trust`), none if it is.
+    halted : bool
+        Whether it was stopped beyond a limit, and cannot go on.
     """
 
     path: Path
@@ -107,6 +109,7 @@ class Run:
     end: float
     wall: float
     reasons: tuple[str, ...] = ()
+    halted: bool = False
 
     @property
     def trusted(self) -> bool:
@@ -343,8 +346,9 @@ class Recorder:
         wall = time.perf_counter() - self._wall_start
         if self._fault:
             raise RunError(f"{'; '.join((self._fault, *reasons))}; what was reached is in {self.partial_path}")
-        run = Run(self.final_path if complete else self.partial_path, complete, self._last_time, wall, reasons)
-        if self._judge.stop:
+        path = self.final_path if complete else self.partial_path
+        run = Run(path, complete, self._last_time, wall, reasons, self._judge.stop)
+        if run.halted:
             raise LimitError(f"{'; '.join(reasons)}; what was reached is in {self.partial_path}", run)
         if complete:
             self.partial_path.replace(self.final_path)

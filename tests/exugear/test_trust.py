@@ -21,11 +21,12 @@ from exugear import cli
 from exugear.assembly import assemble
 from exugear.compiled import STABILITY_LIMIT, highest_rate
 from exugear.gearbox import Gearbox
+from exugear.load_summary import summarise_loads
 from exugear.mesh_stiffness import mesh_stiffness
 from exugear.report import write_report
 from exugear.runup import LimitError, Progress, RunError, simulate
 from exugear.table_law import piece_at
-from exugear.trust import LIMITS, verdict_of
+from exugear.trust import LIMITS, Judge, verdict_of
 
 from .spur_case import SPUR_CASE
 
@@ -142,6 +143,42 @@ def test_energy_that_a_coarse_step_loses_marks_the_run(tmp_path):
     with pytest.raises(LimitError, match=r"energy: from t = .* not accounted for, up to [1-9]\d"):
         simulate(gearbox, "rigid", stiffness, tmp_path / "coarse", **options, **coarse)
     assert simulate(gearbox, "rigid", stiffness, tmp_path / "fine", **options).trusted
+
+
+def judged() -> Judge:
+    """Judge of the spur case, which nothing has happened to yet."""
+    gearbox = spur()
+    assembly = assemble(gearbox, "rigid", stiffness_of(gearbox))
+    return Judge(assembly, summarise_loads(gearbox, gearbox.load_cases["run_up"]))
+
+
+def seen(judge: Judge, deflection: float = 0.0, spin: float = 0.0, left: float = 0.0) -> tuple[str, ...]:
+    """Judge one more state, of 100 J and some energy that is left over."""
+    account = np.array([[0.0, 50.0, 50.0 + left, 0.0, 0.0, 0.0, 0.0]])
+    judge.see(np.array([0.1]), np.array([[deflection]]), np.array([[spin, 0.0]]), np.array([0.1]), account)
+    return judge.reasons(np.zeros(1), 0.1)
+
+
+def test_each_limit_has_its_words_and_stops_where_it_says():
+    height = 2.25 * 3e-3
+    intended = 9.429  # m/s on the pinion's rim: 6.67 N m for 1 s
+    for figures, words, stops in (
+        ({"deflection": 0.049 * height}, "", False),
+        ({"deflection": 0.051 * height}, "deflection: at t = 0.1 s the teeth of mesh spur", False),
+        ({"deflection": -0.26 * height}, "deflection", True),
+        ({"deflection": math.nan}, "deflection", True),
+        ({"spin": 0.99 * (2.0 * intended + 10.0) / 33e-3}, "", False),
+        ({"spin": -1.01 * (2.0 * intended + 10.0) / 33e-3}, "where the loads bring it to 9.429 m/s at most", True),
+        ({"left": 0.4}, "", False),
+        ({"left": 2.0}, "energy: from t = 0.1 s on more than 1 %", False),
+        ({"left": 20.0}, "energy", True),
+    ):
+        judge = judged()
+        assert seen(judge) == ()
+        reasons = seen(judge, **figures)
+        assert words in "".join(reasons) and len(reasons) == bool(words), figures
+        assert judge.stop is stops, figures
+        assert seen(judge) == reasons  # what was reached is not forgotten
 
 
 def test_a_resumed_run_keeps_its_verdict(tmp_path, monkeypatch):
