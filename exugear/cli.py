@@ -758,8 +758,9 @@ def _simulate(
 
 def _report_run(case: Path, finished: Run, as_json: bool) -> None:
     """Print what a run reached; end with 130 if the user stopped it, with 1 if it is not to be trusted."""
-    if not finished.complete and finished.trusted:
-        raise StoppedError(f"at {finished.end:.3f} s; kept in {finished.path}, --resume goes on from there")
+    if not finished.complete and not finished.halted:
+        so_far = "".join(f"\nNot to be trusted so far: {reason}" for reason in finished.reasons)
+        raise StoppedError(f"at {finished.end:.3f} s; kept in {finished.path}, --resume goes on from there{so_far}")
     from exugear.channels import BALANCE_TERMS, energy_residual
     from exugear.gearbox import RPM
     from exugear.runfile import MESH_TIMES, load_run

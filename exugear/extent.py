@@ -20,7 +20,7 @@ MOST_STEPS_PER_SAMPLE = 1000
 The anti-aliasing filter reaches over 31 times as many steps, and a simulated second takes minutes to hours.
 """
 BUFFER_BYTES = 1 << 30
-"""Memory of the states and signals between two writes at most."""
+"""Memory of what is kept between two writes at most."""
 LEAST_SAMPLE_BYTES = 32
 """Time, speed and overall transmission error of one sample on disk; meshes and supports add to it."""
 
@@ -103,9 +103,9 @@ def buffer_rows(wanted: float, size: int, signals: int) -> int:
     Examples
     --------
     >>> buffer_rows(40000, size=60, signals=60), buffer_rows(1e12, size=60, signals=60)
-    (40000, 447392)
+    (40000, 298261)
     """
-    numbers = 2 * size + 3 * signals  # the signals before, in and after the filter
+    numbers = 2 * size + 5 * signals + 30  # states, signals in the filter and under the judge, energies
     return max(1, min(round(wanted), BUFFER_BYTES // (8 * numbers)))
 
 

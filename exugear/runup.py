@@ -113,6 +113,8 @@ class Run:
         Simulated and wall time, s.
     reasons : tuple of str
         Why it is not to be trusted (`exugear.trust`), none if it is.
+    halted : bool
+        Whether it was stopped beyond a limit, and cannot go on.
     """
 
     path: Path
@@ -120,6 +122,7 @@ class Run:
     end: float
     wall: float
     reasons: tuple[str, ...] = ()
+    halted: bool = False
 
     @property
     def trusted(self) -> bool:
@@ -405,8 +408,9 @@ class Recorder:
         wall = time.perf_counter() - self._wall_start
         if self._fault:
             raise RunError(f"{'; '.join((self._fault, *reasons))}; what was reached is in {self.partial_path}")
-        run = Run(self.final_path if complete else self.partial_path, complete, self._last_time, wall, reasons)
-        if self._judge.stop:
+        path = self.final_path if complete else self.partial_path
+        run = Run(path, complete, self._last_time, wall, reasons, self._judge.stop)
+        if run.halted:
             raise LimitError(f"{'; '.join(reasons)}; what was reached is in {self.partial_path}", run)
         if complete:
             self.file.finish(self.final_path)
@@ -503,8 +507,9 @@ class Recorder:
         if n == 0:
             return
         t, q, v = self._t[:n], self._q[:n], self._v[:n]
-        signals, energies, powers = self.observer.observe(t, q, v)
-        balance_times, balances = self._account(t, energies, powers)
+        with np.errstate(over="ignore", invalid="ignore"):  # a run that diverges ends in numbers too large to add up
+            signals, energies, powers = self.observer.observe(t, q, v)
+            balance_times, balances = self._account(t, energies, powers)
         self._judge.see(t, self.channels.mesh_deflections(signals), v, balance_times, balances)
         self._mesh_times = self._mesh_times + self.step * self.channels.mesh_times(signals)
         centre, rows = self.decimator.push(signals)
@@ -541,8 +546,7 @@ class Recorder:
         before = powers[:1] if self._powers is None else self._powers
         series = np.vstack([before, powers])
         lines = np.empty((len(t), len(BALANCE_TERMS)))
-        with np.errstate(over="ignore", invalid="ignore"):  # powers of a run that diverges; the judge sees the sums
-            worked = self.balance[[0, 3, 4, 5, 6]] + 0.5 * self.step * np.cumsum(series[1:] + series[:-1], axis=0)
+        worked = self.balance[[0, 3, 4, 5, 6]] + 0.5 * self.step * np.cumsum(series[1:] + series[:-1], axis=0)
         if self._powers is None:
             worked -= self.step * powers[0]  # no time passes before the first state
         lines[:, [0, 3, 4, 5, 6]] = worked

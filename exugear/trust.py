@@ -29,6 +29,8 @@ FIGURES = (5, 3)
 
 ENERGIES = [BALANCE_TERMS.index(term) for term in ("work_of_loads", "kinetic_energy", "elastic_energy")]
 """Terms of the account that say how much energy there is; what varying stiffness pumps in shows up in them."""
+WHOLLY = 0.9
+"""Part of a run in which a mesh pulls that is not swaying about no load, but load on the other flank."""
 LEAST_ENERGY = 1e-9
 """Energy that counts as none, J: a train at rest has nothing but round-off to account for."""
 
@@ -244,10 +246,12 @@ class Judge:
         limit = self.limits.pulling_marked
         names = [name for name, part in zip(self._meshes, share, strict=True) if part >= limit]
         if names:
+            all_along = share.max() > WHOLLY
+            cause = "look for a torque of the wrong sign" if all_along else "they are hardly loaded, or unstable"
             yield (
                 f"pulling: {', '.join(names)} pull for up to {_percent(share.max())} of the run (limit "
-                f"{_percent(limit)}), which no teeth do; the law {self._law} knows one flank alone; look for a torque "
-                "of the wrong sign, or take the law table, which has both flanks"
+                f"{_percent(limit)}), which no teeth do, but the law {self._law} does; {cause}, or take the law table, "
+                "which has both flanks"
             )
 
 

@@ -83,6 +83,7 @@ def test_the_page_stands_alone_and_names_its_assumptions(results):
         "exudyn",
     ):
         assert words in page, words
+    assert 'role="alert"' not in page
     assert report.left_out == ("picture of a mode: 3-D pictures need pyvista: pip install 'exugear[pictures]'",)
     assert all(path.is_file() for path in report.pictures)
 
