@@ -148,7 +148,7 @@ def append_line(path: Path, line: str) -> None:
     """Add a line to a text file; several processes may do so at once. A line cut short before it stays alone."""
     flags = os.O_RDWR | os.O_APPEND | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
     with _named_after(path), io.FileIO(os.open(path, flags, 0o666), "r+") as file:
-        _demand_regular(file, path)
+        _demand_regular(file.fileno(), path)
         length = file.seek(0, os.SEEK_END)
         if length:
             file.seek(length - 1)
@@ -238,13 +238,17 @@ def _opened(path: Path) -> Iterator[IO[bytes]]:
         raise FileError(f"{path}: no such file") from None
     except OSError as error:
         raise FileError(f"{path}: cannot be read ({error.strerror})") from error
+    try:
+        _demand_regular(handle, path)
+    except FileError:
+        os.close(handle)
+        raise
     with os.fdopen(handle, "rb") as file:
-        _demand_regular(file, path)
         yield file
 
 
-def _demand_regular(file: IO[bytes], path: Path) -> None:
-    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+def _demand_regular(handle: int, path: Path) -> None:
+    if not stat.S_ISREG(os.fstat(handle).st_mode):
         raise FileError(f"{path}: is no regular file")
 
 

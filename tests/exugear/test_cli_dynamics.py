@@ -190,7 +190,7 @@ def test_ctrl_c_keeps_the_run_and_resume_ends_it_as_if_nothing_had_been(case, mo
     assert stopped.exit_code == 130
     assert "--resume" in stopped.stderr
     folder = case.parent / "out" / "rigid" / "run_up-iso6336-disc"
-    assert (folder / "run.partial" / "000001.nc").is_file()
+    assert (folder / "run.partial" / "000001.npz").is_file()
     assert sorted(path.name for path in folder.iterdir()) == ["run.partial"]
     resumed = iso("run", case, *duration, "--resume")
     assert resumed.exit_code == 0, resumed.stderr

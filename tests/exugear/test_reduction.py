@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 from dataclasses import replace
 
@@ -17,12 +18,16 @@ from exugear.reduction import (
     ReductionError,
     RigidInertia,
     ShaftModel,
+    kept_arrays,
     load_or_reduce,
     reduce_shaft,
     stiffened,
     with_rigid_inertia,
 )
+from fe_ste.files import write_sealed
 from fe_ste.gears import Material
+
+from ..fe_ste.damage import damages
 
 STEEL = Material(210e9, 0.3, 7850.0)
 STEPPED = ShaftModel(
@@ -269,11 +274,37 @@ def test_a_reduction_is_kept_and_found_again(stepped, tmp_path):
         assert np.array_equal(one.surface.strain, two.surface.strain)
 
 
-def test_a_damaged_file_is_computed_again(tmp_path):
+def test_a_damaged_file_is_computed_again_with_a_word(tmp_path, caplog):
     first = load_or_reduce(STEPPED, tmp_path)
     file = next(tmp_path.iterdir())
-    file.write_bytes(file.read_bytes()[:1000])
+    content = file.read_bytes()
+    for damaged in damages(content, 100):
+        file.write_bytes(damaged)
+        assert kept_arrays(file, STEPPED.key) is None
+        assert "the body is reduced again" in caplog.messages[-1]
     assert np.array_equal(load_or_reduce(STEPPED, tmp_path).mass, first.mass)
+    assert kept_arrays(file, STEPPED.key) is not None
+
+
+def test_a_reduction_of_another_body_under_this_name_is_not_used(tmp_path):
+    load_or_reduce(replace(STEPPED, band=2000.0), tmp_path)
+    next(tmp_path.iterdir()).rename(tmp_path / f"stepped-{STEPPED.key[:16]}.npz")
+    again = load_or_reduce(STEPPED, tmp_path)
+    assert np.array_equal(again.mass, reduce_shaft(STEPPED).mass)
+
+
+def test_a_stored_object_is_never_unpickled(tmp_path):
+    """A pickle runs whatever its maker likes."""
+    content = io.BytesIO()
+    np.savez(content, key=np.array("key"), words=np.array([print], dtype=object))
+    write_sealed(tmp_path / "body.npz", content.getvalue())
+    assert kept_arrays(tmp_path / "body.npz", "key") is None
+
+
+def test_the_version_of_the_method_and_no_comment_decides_on_the_key(monkeypatch):
+    before = STEPPED.key
+    monkeypatch.setattr("exugear.reduction.REDUCTION", 1000)
+    assert STEPPED.key != before
 
 
 def test_every_input_has_its_own_key():

@@ -14,6 +14,8 @@ from fe_ste.nonlinear_table import NonlinearInput, NonlinearTable
 from fe_ste.sectors import ContactMesh
 from fe_ste.table import MeshTable, TableError, TableInput
 
+from .damage import damages
+
 GEAR = Gear(name="gear", teeth=30, normal_module=3e-3, face_width=20e-3, held_diameter=60e-3)
 PAIR = GearPair(name="pair", pinion=GEAR, gear=GEAR, centre_distance=90e-3)
 SETTINGS = NonlinearSettings(
@@ -55,6 +57,14 @@ def test_a_table_is_refused_for_another_input_and_as_one_of_the_superelement(pat
     (tmp_path / "text.nc").write_text("no netCDF")
     with pytest.raises(TableError, match="no checksum at its end"):
         NonlinearTable.open(tmp_path / "text.nc")
+
+
+def test_no_damaged_table_is_used(path, tmp_path):
+    copy = tmp_path / "pair-nonlinear.nc"
+    for damaged in damages(path.read_bytes(), 100):
+        copy.write_bytes(damaged)
+        with pytest.raises(TableError, match=r"nonlinear\.nc: (has no checksum at its end|is damaged)"):
+            NonlinearTable.open(copy, WANTED)
 
 
 def test_what_converged_before_a_stop_is_kept_and_taken_up_again(tmp_path):

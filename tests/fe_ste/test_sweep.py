@@ -24,6 +24,8 @@ from fe_ste.ste import PairCompliance, StateAxes, StateResults, contact_state, s
 from fe_ste.sweep import Checkpoint, SweepError, process_pool, sweep_states
 from fe_ste.table import MeshTable, TableError
 
+from .damage import damages
+
 PAIR = GearPair(
     name="helical",
     pinion=Gear(
@@ -169,14 +171,21 @@ def test_a_stopped_sweep_keeps_what_is_finished_and_goes_on_from_there(
     same(rest, grid)
 
 
-def test_finished_positions_of_another_input_are_not_taken_up(compliance: PairCompliance, tmp_path: Path) -> None:
+def test_finished_positions_of_another_input_or_in_a_damaged_file_are_not_taken_up(
+    compliance: PairCompliance, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     path = tmp_path / "helical.partial.nc"
     results = solve_positions(compliance, AXES, range(3))
     Checkpoint(path, "another input").store(results, AXES, {0, 1, 2})
     empty = StateResults.empty(compliance, AXES.shape)
     assert Checkpoint(path, "this input").load(empty) == set()
-    path.write_bytes(b"torn")
-    assert Checkpoint(path, "another input").load(empty) == set()
+    content = path.read_bytes()
+    for damaged in damages(content, 60):
+        path.write_bytes(damaged)
+        assert Checkpoint(path, "another input").load(empty) == set()
+        assert "its positions are computed again" in caplog.messages[-1]
+    path.write_bytes(content)
+    assert Checkpoint(path, "another input").load(empty) == {0, 1, 2}
 
 
 @pytest.mark.usefixtures("small_blocks")

@@ -9,6 +9,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 import xarray as xr
@@ -20,6 +21,8 @@ from fe_ste.gears import Gear, GearPair
 from fe_ste.hexmesh import MeshSettings
 from fe_ste.modifications import FlankModification
 from fe_ste.table import MeshTable, TableError, TableInput
+
+from .damage import damages
 
 GEAR = Gear(name="gear", teeth=30, normal_module=3e-3, face_width=20e-3, held_diameter=50e-3)
 PAIR = GearPair(name="pair", pinion=GEAR, gear=GEAR, centre_distance=90e-3)
@@ -117,6 +120,21 @@ def test_unreadable_files_are_refused_by_name(content: bytes | None, tmp_path: P
         path.write_bytes(content)
     with pytest.raises(TableError, match="broken.nc"):
         MeshTable.open(path)
+
+
+def test_no_damaged_or_edited_table_is_used(table: MeshTable, tmp_path: Path) -> None:
+    path = tmp_path / "pair.nc"
+    table.save(path)
+    content = path.read_bytes()
+    for damaged in damages(content, 400):
+        path.write_bytes(damaged)
+        with pytest.raises(TableError, match=r"pair\.nc: (has no checksum at its end|is damaged)"):
+            MeshTable.open(path, WANTED)
+    path.write_bytes(content)
+    with h5py.File(path, "r+") as file:  # under its old hash
+        file["ste"][...] = 2.0 * file["ste"][...]
+    with pytest.raises(TableError, match=r"pair\.nc: (has no checksum at its end|is damaged)"):
+        MeshTable.open(path, WANTED)
 
 
 def test_netcdf_without_a_table_is_refused(tmp_path: Path) -> None:
