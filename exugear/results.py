@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from exugear.assembly import Assembly
+from exugear.casefile import read_text
 from exugear.gearbox import CaseError, Gearbox
 from fe_ste.interpolation import SteSurface
 
@@ -95,7 +96,8 @@ def kept_case(folder: Path) -> Gearbox:
     if not path.is_file():
         raise CaseError(f"{folder}: holds no results (no {CASE_FILE}); name the folder that `exugear run` wrote into")
     try:
-        kept = json.loads(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        kept = read_text(lambda: json.loads(text), str(path), "JSON")
         return Gearbox.from_dict(kept["content"], kept["source"])
     except (ValueError, KeyError, TypeError) as error:
         raise CaseError(f"{path}: cannot be used ({error}); run `exugear modes` into this folder again") from error
