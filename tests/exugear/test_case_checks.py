@@ -385,6 +385,11 @@ def test_faults_of_several_parts_are_told_together(case: Any) -> None:
     assert ["one" in lines[0], "two" in lines[1], "three" in lines[2]] == [True] * 3
 
 
+def test_one_phase_for_each_mesh_of_a_set_is_taken(case: Any) -> None:
+    gearbox = case("planetary", meshes__sun_planet__phase=[0.0, 20.0, 0.5])
+    assert gearbox.warnings == ("meshes.sun_planet.phase.1 = 20: unusual, most lie between -10 and 10; check the unit",)
+
+
 def test_whole_numbers_serve_where_a_length_is_asked(case: Any) -> None:
     assert case("spur", pairs__spur__centre_distance_mm=75).ratio == case("spur").ratio
 
