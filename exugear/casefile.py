@@ -606,10 +606,10 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         raise CaseError(f"{path}: cannot be read ({error.strerror}); expected a gearbox file") from None
     if not text.strip():
         raise CaseError(f"{path}: the file is empty; expected sections such as [gears.sun]")
-    return read_text(lambda: tomllib.loads(text), str(path), "TOML")
+    return parsed(lambda: tomllib.loads(text), str(path), "TOML")
 
 
-def read_text(parse: Callable[[], dict[str, Any]], source: str, form: str) -> dict[str, Any]:
+def parsed(parse: Callable[[], dict[str, Any]], source: str, form: str) -> dict[str, Any]:
     """Run a parser of TOML or JSON; whatever it refuses is one fault.
 
     Python's parsers raise ValueError for numbers of thousands of digits, and run out of stack in deep nesting.

@@ -132,7 +132,7 @@ def _check_overall(gearbox: Gearbox) -> None:
 
 
 def _check_output_gear(gearbox: Gearbox) -> None:
-    """Let the overall transmission error be a length on a gear that turns with the output."""
+    """Let the overall transmission error be a length on a gear of the output; a carrier has none, and so any serves."""
     overall = gearbox.case.overall
     if overall.output_gear not in gearbox.gears:
         raise gearbox.fault(
@@ -140,10 +140,10 @@ def _check_output_gear(gearbox: Gearbox) -> None:
         )
     turning = _coupled(gearbox, overall.output)
     known = [gear for body in gearbox.bodies() if body.name in turning for gear in body.wheels]
-    if overall.output_gear not in known:
+    if known and overall.output_gear not in known:
         raise gearbox.fault(
             f"overall.output_gear = {overall.output_gear!r}: does not turn with {overall.output}; "
-            f"gears that do are {', '.join(known) or 'none'}"
+            f"gears that do are {', '.join(known)}"
         )
 
 

@@ -143,8 +143,9 @@ def _quantities(value: Any, kind: Any, metadata: tuple[Any, ...], key: str) -> I
             where = f"{key}.{name}" if key else name
             yield from _quantities(value.__dict__[name], field.annotation, tuple(field.metadata), where)
     elif get_origin(kind) in (Union, UnionType):
-        matching = [one for one in get_args(kind) if isinstance(value, tuple) == (_plain(one) is tuple)]
-        yield from _quantities(value, matching[0], metadata, key)
+        branches = [one for one in get_args(kind) if one is not type(None)]
+        fitting = [one for one in branches if isinstance(value, tuple) == (_plain(one) is tuple)]
+        yield from _quantities(value, branches[0] if len(branches) == 1 else fitting[0], metadata, key)
     elif isinstance(value, Mapping):
         for name, entry in value.items():
             yield from _quantities(entry, get_args(kind)[1], (), f"{key}.{name}")

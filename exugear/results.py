@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from exugear.assembly import Assembly
+from exugear.casefile import parsed
 from exugear.elastic_bodies import solid_body
 from exugear.gearbox import CaseError, Gearbox
 from exugear.named_files import NOTHING_MORE, Permissions
@@ -113,15 +114,16 @@ def kept_case(folder: Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:
     if not path.is_file():
         raise CaseError(f"{folder}: holds no results (no {CASE_FILE}); name the folder that `exugear run` wrote into")
     try:
-        kept = json.loads(read_text(path))
+        kept = parsed(lambda: json.loads(read_text(path)), str(path), "JSON")
+        if "checksum" not in kept:
+            raise ValueError("it was written by an earlier version")
         if kept["checksum"] != _checksum(kept):
             raise ValueError("it was changed since it was written")
-        return Gearbox.from_dict(kept["content"], kept["source"], permissions)
-    # Whoever makes up a file with its checksum may nest it and write numbers as he likes.
-    except (FileError, ValueError, KeyError, TypeError, RecursionError, OverflowError) as error:
-        raise CaseError(
-            f"{path}: cannot be used ({type(error).__name__}: {error}); run `exugear modes` into this folder again"
-        ) from error
+        content, source = kept["content"], kept["source"]
+    # Whoever makes up a file with its checksum may write into it what he likes.
+    except (FileError, ValueError, KeyError, TypeError, RecursionError) as error:
+        raise CaseError(f"{path}: cannot be used ({error}); run `exugear modes` into this folder again") from error
+    return Gearbox.from_dict(content, source, permissions)
 
 
 def modes_path(folder: str | Path, variant: str, law: str, inertias: str) -> Path:

@@ -13,7 +13,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from fe_ste.gears import Gear, GeometryError
 from fe_ste.profile import ToothProfile, tooth_profile
@@ -397,6 +396,8 @@ def _geometric(count: int, first: float) -> FloatArray:
     """Fractions 0..1 in geometric progression whose first interval is `first`, or uniform ones if that is smaller."""
     if first * count >= 1.0 or count == 1:
         return np.linspace(0.0, 1.0, count + 1)
+
+    from scipy.optimize import brentq  # a quarter of a second that a check of the gearbox file need not wait
 
     def excess(ratio: float) -> float:
         return first * float(np.sum(ratio ** np.arange(count))) - 1.0

@@ -113,9 +113,21 @@ class FlankTopography:
         )
 
     def gap(self, gear: Gear, radius: FloatArray, z: FloatArray) -> FloatArray:
-        """Material removed at points of the flank, m; `radius` and `z` (m) broadcast against each other."""
+        """Material removed at points of the flank, m; `radius` and `z` (m) broadcast against each other.
+
+        Raises
+        ------
+        GeometryError
+            If no radius of the grid lies on the gear's involute.
+        """
         along, across = np.broadcast_arrays(_roll_length(gear, radius), z)
-        i, s = _place(_roll_length(gear, np.array(self.radius)), along)
+        nodes = _roll_length(gear, np.array(self.radius))
+        if not nodes[-1] > 0.0:
+            raise GeometryError(
+                f"gear '{gear.name}': topography: its radii end at {1e3 * self.radius[-1]:.4f} mm, inside the "
+                f"base circle of {1e3 * gear.base_radius:.4f} mm, where no involute is"
+            )
+        i, s = _place(nodes, along)
         j, t = _place(np.array(self.axial), across)
         values = np.array(self.removed)
         low = (1.0 - t) * values[i, j] + t * values[i, j + 1]

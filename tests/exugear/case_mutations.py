@@ -142,8 +142,10 @@ def _with_shapes() -> dict[str, Any]:
             "shape": {
                 "start_z_mm": -60.0,
                 "torque_z_mm": 60.0,
-                "sections": [{"length_mm": 60.0, "outer_diameter_mm": 20.0}, {"length_mm": 60.0, "outer_diameter_mm": 25.0,
-                                                                              "inner_diameter_mm": 5.0}],
+                "sections": [
+                    {"length_mm": 60.0, "outer_diameter_mm": 20.0},
+                    {"length_mm": 60.0, "outer_diameter_mm": 25.0, "inner_diameter_mm": 5.0},
+                ],
                 "material": {"youngs_modulus_GPa": 206.0},
                 "blanks": {"torque": {"mass_kg": 0.2, "axial_kg_m2": 1e-4, "transverse_kg_m2": 1e-4}},
             },
@@ -162,7 +164,8 @@ def _with_box() -> dict[str, Any]:
         "axis_position_mm": [0.0, 0.0],
         "flexibility": "elastic",
         "solid": {
-            "file": "plate.vtu", "band_Hz": 4000.0, "length_unit_mm": 1.0, "element_size_mm": 5.0, "elements_around": 12,
+            "file": "plate.vtu", "band_Hz": 4000.0, "length_unit_mm": 1.0, "element_size_mm": 5.0,
+            "elements_around": 12,
             "seats": {"bearing_1": face, "bearing_2": face, "foot": {**face, "position_mm": [50.0, 0.0, -12.0]}},
         },
     }  # fmt: skip

@@ -84,3 +84,10 @@ def test_grid_that_is_none_is_refused() -> None:
         FlankTopography((0.2, 0.2), (0.0, 0.1), ((0.0, 0.0), (0.0, 0.0)))
     with pytest.raises(GeometryError, match="2 rows of 2"):
         FlankTopography((0.1, 0.2), (0.0, 0.1), ((0.0, 0.0), (0.0,)))
+
+
+def test_a_grid_inside_the_base_circle_is_refused(sun_planet: GearPair) -> None:
+    base = sun_planet.pinion.base_radius
+    grid = FlankTopography((0.9 * base, base), (-0.01, 0.01), ((0.0, 1e-6), (0.0, 1e-6)))
+    with pytest.raises(GeometryError, match="inside the base circle"):
+        grid.gap(sun_planet.pinion, np.array(1.1 * base), np.array(0.0))
