@@ -27,6 +27,8 @@ from exugear.console import (
     print_table,
     progress_bar,
     results,
+    say_what_is_logged,
+    standard_streams,
 )
 
 if TYPE_CHECKING:
@@ -106,7 +108,9 @@ def main() -> None:
     BLAS keeps to one thread: its idle threads wait actively and slow the compiled kernels beside them severalfold.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    app()
+    say_what_is_logged()
+    with standard_streams():
+        app()
 
 
 def _print_version(wanted: bool) -> None:
@@ -649,6 +653,7 @@ def _simulate(
         task = bar.add_task(f"{variant}: start in balance", total=None)
 
         def show(at: RunProgress) -> None:
+            interruption.check()
             text = f"{variant}: {at.simulated:.2f} of {at.total:g} s, {at.speed:.2f} simulated s per s"
             bar.update(task, completed=at.simulated, total=at.total, description=text)
 
@@ -669,6 +674,10 @@ def _simulate(
                 )
         except (RunError, OSError) as error:
             raise FailedError(error) from error
+        except KeyboardInterrupt:
+            if not partial.is_file():
+                raise
+            raise StoppedError(f"kept in {partial}, --resume goes on from there") from None
 
 
 def _report_run(case: Path, finished: Run, as_json: bool) -> None:

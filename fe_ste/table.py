@@ -26,7 +26,8 @@ from fe_ste.gears import Gear, GearPair
 from fe_ste.hexmesh import MeshSettings
 from fe_ste.modifications import FlankModification
 from fe_ste.ste import PairCompliance, StateAxes, unloaded_states
-from fe_ste.sweep import Checkpoint, Submits, process_pool, replace_file, sweep_states
+from fe_ste.sweep import Checkpoint, Submits, replace_file, sweep_states
+from fe_ste.workers import Workers
 
 #: Raised when a change of the method changes the numbers, so that tables of the old method are not used.
 METHOD_VERSION = 4
@@ -137,7 +138,7 @@ class MeshTable:
         checkpoint = None if partial is None else Checkpoint(partial, wanted.hash)
         with ExitStack() as owned:
             if executor is None and math.prod(axes.shape) > _STATES_IN_PROCESS:
-                executor = owned.enter_context(process_pool())
+                executor = owned.enter_context(Workers())
             dataset = sweep_states(compliance, axes, executor=executor, checkpoint=checkpoint, progress=progress)
         dataset = dataset.assign(unloaded_states(compliance, axes))
         dataset.attrs |= _attributes(wanted, compliance)
