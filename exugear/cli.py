@@ -27,6 +27,8 @@ from exugear.console import (
     print_table,
     progress_bar,
     say,
+    say_what_is_logged,
+    standard_streams,
 )
 
 if TYPE_CHECKING:
@@ -124,7 +126,9 @@ def main() -> None:
     BLAS keeps to one thread: its idle threads wait actively and slow the compiled kernels beside them severalfold.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    app()
+    say_what_is_logged()
+    with standard_streams():
+        app()
 
 
 def _print_version(wanted: bool) -> None:
@@ -732,6 +736,7 @@ def _simulate(
         task = bar.add_task(f"{variant}: start in balance", total=None)
 
         def show(at: RunProgress) -> None:
+            interruption.check()
             text = f"{variant}: {at.simulated:.2f} of {at.total:g} s, {at.speed:.2f} simulated s per s"
             bar.update(task, completed=at.simulated, total=at.total, description=text)
 
@@ -754,6 +759,10 @@ def _simulate(
             return error.run
         except RunError as error:
             raise FailedError(error) from error
+        except KeyboardInterrupt:
+            if refuse_to_resume(directory):
+                raise
+            raise StoppedError(f"kept in {directory}, --resume goes on from there") from None
 
 
 def _report_run(case: Path, finished: Run, as_json: bool) -> None:

@@ -6,7 +6,10 @@ terminal is shown, not obeyed.
 
 from __future__ import annotations
 
+import io
 import json
+import logging
+import os
 import signal
 import sys
 import threading
@@ -14,7 +17,7 @@ import unicodedata
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from types import FrameType
-from typing import Any, Literal, NoReturn
+from typing import Any, Literal, NoReturn, TextIO
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -34,6 +37,11 @@ from rich.text import Text
 EXIT_FAILED = 1
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
+EXIT_UNREAD = 141
+"""As of any program whose reader, such as ``head``, has read enough."""
+
+STOPPING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+"""Signals that ask the work to stop: Ctrl-C, kill, a closed terminal."""
 
 LONGEST_LINE = 400
 """Letters of a line of a message; of a longer one the middle is left out, for file and remedy stand at its ends."""
@@ -57,26 +65,46 @@ class StoppedError(Exception):
 
 
 class Interruption:
-    """Ctrl-C, remembered: Python drops the exception where it falls into a finaliser or a library's callback."""
+    """Ctrl-C, remembered: Python drops the exception where it falls into a finaliser or a library's callback.
+
+    SIGTERM and SIGHUP act as Ctrl-C does. The second Ctrl-C ends the process at once.
+    """
 
     def __init__(self) -> None:
         self._wanted = False
 
     @contextmanager
     def listening(self) -> Iterator[None]:
-        """Remember Ctrl-C inside the context, besides raising it; only the main thread receives it."""
+        """Remember Ctrl-C inside the context, besides raising it; only the main thread receives it.
+
+        Whatever error a library makes of it leaves the context as KeyboardInterrupt.
+        """
         if threading.current_thread() is not threading.main_thread():
             yield
             return
         self._wanted = False
-        before = signal.signal(signal.SIGINT, self._remember)
+        before = {number: signal.getsignal(number) for number in STOPPING}
+        for number, handler in before.items():
+            if number == signal.SIGINT or handler is not signal.SIG_IGN:  # nohup has SIGHUP ignored
+                signal.signal(number, self._remember)
         try:
             yield
+            self.check()
+        except StoppedError:
+            raise
+        except Exception as error:
+            if self._wanted:
+                raise KeyboardInterrupt from error
+            raise
         finally:
-            signal.signal(signal.SIGINT, before)
+            for number, handler in before.items():
+                signal.signal(number, handler)
 
     def _remember(self, number: int, frame: FrameType | None) -> None:
+        if self._wanted:  # what is finished is being put away
+            return
         self._wanted = True
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
         raise KeyboardInterrupt
 
     def check(self) -> None:
@@ -153,6 +181,84 @@ def shortened(line: str) -> str:
 def say(line: str) -> None:
     """Print a line of results, unwrapped, so that paths in it can be copied."""
     results.print(Text(plain(line)), soft_wrap=True)
+class _Stream(io.TextIOWrapper):
+    """Standard stream that costs no work when it cannot be written: what follows is dropped, the failure kept."""
+
+    failure: OSError | None = None
+
+    def write(self, text: str, /) -> int:
+        try:
+            return super().write(text)
+        except OSError as error:
+            self._give_up(error)
+            return len(text)
+
+    def flush(self) -> None:
+        try:
+            super().flush()
+        except OSError as error:
+            self._give_up(error)
+
+    def _give_up(self, error: OSError) -> None:
+        self.failure = self.failure or error
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, self.fileno())
+        os.close(nowhere)
+
+
+@contextmanager
+def standard_streams() -> Iterator[None]:
+    """Finish the work though its output cannot be written, and tell by the exit code of the program inside.
+
+    141 if the reader of standard output is gone, without a word; 1 and a sentence if it is full or closed. What was
+    to be said on standard error and cannot is dropped.
+    """
+    _take_closed_numbers()
+    sys.stdout, sys.stderr = output, _ = _lasting(sys.stdout, 1), _lasting(sys.stderr, 2)
+    try:
+        yield
+    except SystemExit as end:
+        output.flush()
+        failure = getattr(output, "failure", None)
+        if failure is not None and not end.code:
+            if isinstance(failure, BrokenPipeError):
+                sys.exit(EXIT_UNREAD)
+            _end("Failed", f"standard output: {failure.strerror}", EXIT_FAILED)
+        raise
+
+
+def _take_closed_numbers() -> None:
+    """Put something in the place of closed streams, so that no file gets their numbers and what goes to them."""
+    for number, mode in enumerate((os.O_RDONLY, os.O_RDONLY, os.O_WRONLY)):  # writing to standard output fails
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, mode)  # takes the lowest number, which is this one
+
+
+def _lasting(stream: TextIO | None, number: int) -> TextIO:
+    """Stream in place of Python's own, which is None if it was closed."""
+    if stream is None:
+        return _Stream(open(number, "wb", closefd=False), encoding="utf-8", line_buffering=True)
+    if not isinstance(stream, io.TextIOWrapper):
+        return stream
+    return _Stream(stream.buffer, stream.encoding, stream.errors, None, stream.line_buffering, stream.write_through)
+
+
+class _Notes(logging.Handler):
+    """Says what the library logs."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        note(record.getMessage(), style="yellow" if record.levelno >= logging.WARNING else "")
+
+
+def say_what_is_logged() -> None:
+    """Let the packages' own log appear on standard error."""
+    handler = _Notes()
+    for package in ("exugear", "fe_ste"):
+        logger = logging.getLogger(package)
+        logger.addHandler(handler)
+        logger.setLevel(logging.INFO)
 
 
 def note(message: str, style: str = "") -> None:

@@ -73,6 +73,9 @@ FLUSH_INTERVAL = 0.25
 FLUSH_FACTOR = {"compiled": 4, "exudyn": 1}
 """How many times this interval each solver goes without: a piece costs as much as 2000 compiled steps."""
 
+STEPS_AT_ONCE = 2000
+"""Steps of one call of the compiled solver: Ctrl-C is heard between calls, and a step takes up to half a ms."""
+
 
 class RunError(RuntimeError):
     """A run that went wrong; what was reached before is kept."""
@@ -455,7 +458,7 @@ class Recorder:
         if not self._observe(done * self.step, self.q, self.v):
             return
         while done < self.steps and not self._stop and not self._fault and not self._judge.stop:
-            end = min(self._filled + self.steps - done, len(self._t))
+            end = min(self._filled + min(self.steps - done, STEPS_AT_ONCE), len(self._t))
             q, v = self._q[self._filled : end], self._v[self._filled : end]
             good = system.advance(done, q, v)
             if good < len(q):
@@ -470,6 +473,11 @@ class Recorder:
     def interrupt(self) -> None:
         """Stop after the present step."""
         self._stop = True
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether the run was asked to stop."""
+        return self._stop
 
     def _observe(self, t: float, q: Floats, v: Floats) -> bool:
         """Take one state; False stops the run."""
@@ -560,19 +568,28 @@ class Recorder:
 
 @contextmanager
 def _interruption(recorder: Recorder) -> Iterator[None]:
-    """Let Ctrl-C end a run after its step instead of tearing it down; only the main thread receives it."""
+    """Let Ctrl-C end a run after its step instead of tearing it down; only the main thread receives it.
+
+    So do other signals by which the program that runs this has itself stopped. A second Ctrl-C tears down.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
+    numbers = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    before = {number: found for number in numbers if callable(found := signal.getsignal(number))}
 
     def handler(number: int, frame: FrameType | None) -> None:
+        if recorder.interrupted and number == signal.SIGINT:
+            before[number](number, frame)
         recorder.interrupt()
 
-    before = signal.signal(signal.SIGINT, handler)
+    for number in before:
+        signal.signal(number, handler)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, found in before.items():
+            signal.signal(number, found)
 
 
 def _start(

@@ -9,14 +9,12 @@ from __future__ import annotations
 import logging
 import math
 import pickle
-import signal
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Protocol
 
@@ -26,6 +24,7 @@ import xarray as xr
 from fe_ste.files import FileError, Layout, load_dataset, write_dataset
 from fe_ste.ste import RESULTS, STATE_AXES, PairCompliance, StateAxes, StateResults, solve_positions
 from fe_ste.versions import TABLE
+from fe_ste.workers import Workers, stop_if_asked
 
 #: States of a block: some seconds of work, so that little is lost and the time left is known.
 _BLOCK_STATES = 300
@@ -94,24 +93,6 @@ class Checkpoint:
         dataset["solved"] = ("pmc", solved.astype(np.int8), attributes)
         dataset.attrs |= {_PARTIAL_OF: self.input_hash, "method_version": TABLE}
         write_dataset(self.path, dataset)
-
-
-def process_pool(workers: int = 2) -> Executor:
-    """Return worker processes for a sweep; the process that starts them is the one that Ctrl-C stops.
-
-    Parameters
-    ----------
-    workers : int
-
-    Notes
-    -----
-    Workers are started afresh, not forked: a script that sweeps needs the usual ``if __name__ == "__main__":``.
-    """
-    return ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_leave_interrupts)
-
-
-def _leave_interrupts() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def sweep_states(
@@ -194,7 +175,7 @@ def _sent(
     """Yield blocks in the order in which workers finish them."""
     one = compliance
     packed = pickle.dumps((one.pair, one.flanks, one.contact, one.modifications, one.tooth_gap))
-    with _cancelled_on_error() as waiting:
+    with _cancelled_on_error(executor) as waiting:
         for positions in blocks:
             waiting[executor.submit(solve_block, packed, axes, positions)] = positions
         while waiting:
@@ -208,17 +189,20 @@ def _sent(
 
 
 @contextmanager
-def _cancelled_on_error() -> Iterator[dict[Future[StateResults], list[int]]]:
+def _cancelled_on_error(executor: Submits) -> Iterator[dict[Future[StateResults], list[int]]]:
     waiting: dict[Future[StateResults], list[int]] = {}
     try:
         yield waiting
     finally:
-        for future in waiting:
-            future.cancel()
+        # Workers drop what waits themselves: before Python 3.12 a pool hangs if a process of it ends while calls that
+        # were cancelled from outside wait, as when a signal goes to a whole group of processes.
+        if not isinstance(executor, Workers):
+            for future in waiting:
+                future.cancel()
 
 
 def solve_block(packed: bytes, axes: StateAxes, positions: list[int]) -> StateResults:
-    """Solve some positions in a worker, which unpacks the compliance of a pair once.
+    """Solve some positions in a worker, which unpacks the compliance of a pair once and stops if it is asked to.
 
     Parameters
     ----------
@@ -227,7 +211,8 @@ def solve_block(packed: bytes, axes: StateAxes, positions: list[int]) -> StateRe
     axes : StateAxes
     positions : list of int
     """
-    return solve_positions(_unpacked(packed), axes, positions)
+    stop_if_asked()
+    return solve_positions(_unpacked(packed), axes, positions, lambda solved: stop_if_asked())
 
 
 @lru_cache(maxsize=1)

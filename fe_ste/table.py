@@ -27,8 +27,9 @@ from fe_ste.gears import Gear, GearPair
 from fe_ste.hexmesh import MeshSettings
 from fe_ste.modifications import FlankModification
 from fe_ste.ste import RESULTS, STATE_AXES, PairCompliance, StateAxes, unloaded_states
-from fe_ste.sweep import Checkpoint, Submits, process_pool, sweep_states
+from fe_ste.sweep import Checkpoint, Submits, sweep_states
 from fe_ste.versions import TABLE
+from fe_ste.workers import Workers
 
 #: Beyond this many states the start of processes is repaid.
 _STATES_IN_PROCESS = 1000
@@ -145,7 +146,7 @@ class MeshTable:
         checkpoint = None if partial is None else Checkpoint(partial, wanted.hash)
         with ExitStack() as owned:
             if executor is None and math.prod(axes.shape) > _STATES_IN_PROCESS:
-                executor = owned.enter_context(process_pool())
+                executor = owned.enter_context(Workers())
             dataset = sweep_states(compliance, axes, executor=executor, checkpoint=checkpoint, progress=progress)
         dataset = dataset.assign(unloaded_states(compliance, axes))
         dataset.attrs |= _attributes(wanted, compliance)

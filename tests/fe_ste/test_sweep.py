@@ -7,7 +7,7 @@ import itertools
 import math
 import multiprocessing
 from collections.abc import Callable
-from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -21,8 +21,9 @@ from fe_ste.gears import Gear, GearPair
 from fe_ste.hexmesh import MeshSettings
 from fe_ste.modifications import FlankModification
 from fe_ste.ste import PairCompliance, StateAxes, StateResults, contact_state, solve_positions, unloaded_states
-from fe_ste.sweep import Checkpoint, SweepError, process_pool, sweep_states
+from fe_ste.sweep import Checkpoint, SweepError, sweep_states
 from fe_ste.table import MeshTable, TableError
+from fe_ste.workers import Workers
 
 from .damage import damages
 
@@ -134,8 +135,7 @@ def test_any_executor_gives_the_same_grid(compliance: PairCompliance, grid: xr.D
 @pytest.mark.usefixtures("small_blocks")
 def test_processes_give_the_same_grid(compliance: PairCompliance, grid: xr.Dataset) -> None:
     seen = []
-    with process_pool(1) as pool:
-        assert isinstance(pool, ProcessPoolExecutor)
+    with Workers(1) as pool:
         data = sweep_states(compliance, AXES, executor=pool, progress=lambda done, of: seen.append((done, of)))
     same(data, grid)
     assert seen[-1] == (54, 54)
@@ -197,7 +197,7 @@ def test_lost_workers_are_reported_and_finished_positions_kept(compliance: PairC
         for worker in multiprocessing.active_children():
             worker.kill()
 
-    with process_pool(1) as pool, pytest.raises(SweepError, match="finished positions are kept"):
+    with Workers(1) as pool, pytest.raises(SweepError, match="finished positions are kept"):
         sweep_states(compliance, AXES, executor=pool, checkpoint=checkpoint, progress=kill)
     assert 1 <= len(checkpoint.load(StateResults.empty(compliance, AXES.shape))) < 3
 
