@@ -87,6 +87,13 @@ class Interruption:
         for number, handler in before.items():
             if number == signal.SIGINT or handler is not signal.SIG_IGN:  # nohup has SIGHUP ignored
                 signal.signal(number, self._remember)
+        complain = sys.unraisablehook
+
+        def leave_out_ctrl_c(dropped: sys.UnraisableHookArgs) -> None:
+            if dropped.exc_type is not KeyboardInterrupt:
+                complain(dropped)
+
+        sys.unraisablehook = leave_out_ctrl_c
         try:
             yield
             self.check()
@@ -97,6 +104,7 @@ class Interruption:
                 raise KeyboardInterrupt from error
             raise
         finally:
+            sys.unraisablehook = complain
             for number, handler in before.items():
                 signal.signal(number, handler)
 

@@ -73,6 +73,21 @@ def test_ctrl_c_that_nothing_noticed_ends_the_work_with_130(capsys):
     assert "Stopped" in capsys.readouterr().err
 
 
+def test_ctrl_c_in_a_callback_of_a_library_stops_without_a_traceback():
+    """Where Python drops it, as while kernels are compiled."""
+    program = """
+import ctypes, signal
+from exugear.console import exit_codes
+called_back = ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGINT))
+with exit_codes():
+    called_back()
+"""
+    process = begun(program=program)
+    _, said = process.communicate(timeout=30.0)
+    assert process.returncode == 130
+    assert said == "Stopped: finished results are kept; the same command goes on from there\n"
+
+
 def test_ctrl_c_that_a_library_made_an_error_of_ends_the_work_with_130(capsys):
     with pytest.raises(SystemExit) as end, exit_codes():
         try:
