@@ -181,14 +181,16 @@ runup.simulate(gearbox, "rigid", stiffness, out, load_case="run_up", mesh_law="i
 def test_a_second_process_on_a_run_is_turned_away_and_changes_nothing(case: Path, tmp_path: Path) -> None:
     out, go = tmp_path / "out", tmp_path / "go"
     with python(SLOW, case, out, go) as first:
-        assert first.stdout.readline() == "begun\n", first.stderr.read()
-        before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
-        for more in ((), ("--resume",)):
-            second = run(case, out, *more)
-            assert second.exit_code == 1
-            assert "another process is at work on it" in second.stderr
-        assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
-        go.touch()
+        try:
+            assert first.stdout.readline() == "begun\n", first.stderr.read()
+            before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+            for more in ((), ("--resume",)):
+                second = run(case, out, *more)
+                assert second.exit_code == 1
+                assert "another process is at work on it" in second.stderr
+            assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
+        finally:
+            go.touch()
         assert first.wait(timeout=120) == 0, first.stderr.read()
     assert [path.name for path in (out / DIRECTORY).iterdir()] == ["run.nc"]
     assert load_run(out / DIRECTORY / "run.nc").attrs["complete"] == 1
