@@ -54,9 +54,10 @@ class CaseError(ValueError):
 
 
 def fault_line(source: str, text: str) -> str:
-    """One line that names the file before a fault, cut where it is longer than anybody reads."""
+    """One line that names the file before a fault; of a long one the middle is left out, not key and remedy."""
     text = " ".join(text.split())
-    return f"{source}: {text if len(text) <= LONGEST_FAULT else text[: LONGEST_FAULT - 1] + '…'}"
+    half = (LONGEST_FAULT - 1) // 2
+    return f"{source}: {text if len(text) <= LONGEST_FAULT else f'{text[:half]}…{text[-half:]}'}"
 
 
 class _Section(BaseModel):
@@ -670,7 +671,7 @@ def _described(faults: list[Any], content: dict[str, Any]) -> Iterator[str]:
 
 
 _NO_CONTROL = "must hold words and no control characters"
-_A_NAME = "a name has letters, digits and underscores, begins with a letter, and is 100 long at most"
+_A_NAME = "a name has letters, digits and underscores, begins with a letter, and is 80 long at most"
 _TYPES = {
     "float_type": "must be a number",
     "int_type": "must be a whole number, without quotes and decimal point",

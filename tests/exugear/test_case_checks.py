@@ -328,7 +328,7 @@ BLANK = {"mass_kg": 1.0, "axial_kg_m2": 1.0, "transverse_kg_m2": 1.0}
         ("shafts", {"bodies__shaft_1__shape__blanks__lid": BLANK}, "bodies.shaft_1.shape.blanks.lid: no such seat"),
         ("shafts", {"bodies__shaft_1__shape__sections": [{"length_mm": 1e5, "outer_diameter_mm": 2000.0}]},
          "elements over its section; 50000 are the most"),
-        ("box", {"bodies__box__solid__file": "missing.vtu"}, "bodies.box.solid.file: "),
+        ("box", {"bodies__box__solid__file": "missing.vtu"}, "bodies.box.solid.file = 'missing.vtu': no such file"),
         ("box", {"bodies__box__solid__seats__foot__same_as": "bearing_1"}, "same_as stands alone"),
         ("modified", {"load_cases__series__torque_series": "flank.csv"}, "flank.csv: expected a header time_s"),
         ("modified", {"gears__pinion__modification__topography": "series.csv"}, "gears.pinion.modification: "),
@@ -417,10 +417,10 @@ def test_a_mark_of_byte_order_does_no_harm_and_other_files_are_told(cases: Any, 
     file = tmp_path / "case.toml"
     file.write_text("\ufeff" + toml_text(cases[1]["spur"]), encoding="utf-8")
     assert exugear("check", file).exit_code == 0
-    assert "is a folder" in exugear("check", tmp_path).stderr
+    assert "a folder; a regular file is needed" in exugear("check", tmp_path).stderr
     with file.open("wb") as handle:
         handle.truncate(20_000_000)
-    assert "has 20000000 bytes" in exugear("check", file).stderr
+    assert "20 MB; at most 10 MB are read" in exugear("check", file).stderr
 
 
 @pytest.mark.parametrize("text", ["[" * 5000, '{"content": ' + "9" * 5000 + "}", '{"content": 3, "source": 3}', "[]"])

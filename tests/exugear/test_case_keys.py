@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from exugear import casefile
+from exugear import casefile, supports
 from exugear.assembly import assemble
 from exugear.cli import app
 from exugear.elastic_bodies import check_elastic_body
@@ -47,6 +47,7 @@ def read_keys(monkeypatch: pytest.MonkeyPatch) -> set[tuple[str, str]]:
 
 
 def test_every_key_is_read(read_keys: set[tuple[str, str]], tmp_path: Path) -> None:
+    supports._catalogue_stiffness.cache_clear()  # what other tests had computed would not be read again
     contents = bases(tmp_path)
     contents["spur"]["ste"] = {"method": "nonlinear", "positions": 8}
     for name, content in contents.items():

@@ -139,9 +139,11 @@ def test_a_full_disk_ends_each_verb_with_a_sentence(case: Path, small_disk: Path
                     ballast.write(bytes(size))
                 except OSError:
                     break
+    refused = exugear("run", case, "--variant", "rigid", "--mesh-law", "iso6336", "--duration", 0.1, "--out", out)
+    assert refused.exit_code == 2
+    assert f"{out} has 0 GB free" in refused.stderr
     verbs = [
         ("modes", case, "--variant", "bushing", "--mesh-law", "iso6336", "--out", out),
-        ("run", case, "--variant", "rigid", "--mesh-law", "iso6336", "--duration", 0.1, "--out", out),
         ("view", case, "--variant", "rigid", "--mesh-law", "iso6336", "--out", out),
         ("report", out),
     ]

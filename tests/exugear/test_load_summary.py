@@ -25,12 +25,13 @@ INERTIA = 1e-2 + 3e-2 / 2.25
 BASE = 30e-3 * math.cos(math.radians(20.0))
 
 
-def spur(**load_case: object) -> Gearbox:
-    return Gearbox.from_dict(tomllib.loads(SPUR_CASE), "spur.toml").varied({"load_cases.run_up": load_case})
+def spur(folder: Path = Path(), **load_case: object) -> Gearbox:
+    plain = Gearbox.from_dict(tomllib.loads(SPUR_CASE), str(folder / "spur.toml"))
+    return plain.varied({"load_cases.run_up": load_case})
 
 
-def summed(**load_case: object) -> LoadSummary:
-    gearbox = spur(**load_case)
+def summed(folder: Path = Path(), **load_case: object) -> LoadSummary:
+    gearbox = spur(folder, **load_case)
     return summarise_loads(gearbox, gearbox.load_cases["run_up"])
 
 
@@ -82,7 +83,7 @@ def test_a_drive_holds_what_the_torques_do_not(grc: Gearbox, stiffness: dict) ->
 def test_a_torque_series_is_integrated_and_its_flanks_are_told(tmp_path):
     table = tmp_path / "torque.csv"
     table.write_text("time_s,shaft_1_N_m\n0.1,0\n0.3,200\n0.5,-200\n0.7,0\n")
-    loads = summed(torque_series=str(table), duration_s=1.0)
+    loads = summed(tmp_path, torque_series=table.name, duration_s=1.0)
     assert loads.net_torque == 0.0
     assert loads.end_speed == pytest.approx(0.0, abs=1e-9)  # two triangles that cancel
     assert loads.fastest_speed == pytest.approx(0.5 * 0.3 * 200.0 / INERTIA, rel=1e-6)  # after the first
@@ -132,7 +133,7 @@ def test_check_asks_about_the_sign_of_a_torque_that_lets_the_train_run_away(tmp_
 def test_check_reads_the_torque_series_too(tmp_path):
     (tmp_path / "torque.csv").write_text("time_s,nobody_N_m\n0,1\n1,1\n")
     with pytest.raises(CaseError, match="is no torque of a body"):
-        summed(torque_series=str(tmp_path / "torque.csv"))
+        summed(tmp_path, torque_series="torque.csv")
     case = tmp_path / "spur.toml"
     case.write_text(
         SPUR_CASE.replace("torques_N_m = { shaft_1 = 100.0, shaft_2 = 140.0 }", 'torque_series = "torque.csv"')
