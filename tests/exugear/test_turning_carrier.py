@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from exugear.channels import Channels
 from exugear.compiled import CompiledSystem, LoadTable, Observer
 from exugear.gearbox import Gearbox
 from exugear.modes import eigenmodes, linearise, modes_of
+from exugear.named_files import Permissions
 from exugear.statics import accelerating_start, locked_equilibrium
 from exugear.system import ExudynSystem, Loading
 
@@ -43,7 +45,8 @@ def carrying(grc_shafts: Gearbox, tmp_path_factory: pytest.TempPathFactory) -> G
         "band_Hz": 1000.0,
         "seats": {name: {"diameter_mm": wide, "inner_diameter_mm": 0.0} for name, wide in diameters.items()},
     }
-    return grc_shafts.varied({"bodies.carrier.flexibility": "elastic", "bodies.carrier.solid": solid})
+    permitted = replace(grc_shafts, permissions=Permissions(below=file.parent))
+    return permitted.varied({"bodies.carrier.flexibility": "elastic", "bodies.carrier.solid": solid})
 
 
 @pytest.fixture(scope="module")
