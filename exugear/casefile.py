@@ -57,7 +57,7 @@ def fault_line(source: str, text: str) -> str:
     """One line that names the file before a fault; of a long one the middle is left out, not key and remedy."""
     text = " ".join(text.split())
     half = (LONGEST_FAULT - 1) // 2
-    return f"{source}: {text if len(text) <= LONGEST_FAULT else f'{text[:half]}…{text[-half:]}'}"
+    return f"{' '.join(source.splitlines())}: {text if len(text) <= LONGEST_FAULT else f'{text[:half]}…{text[-half:]}'}"
 
 
 class _Section(BaseModel):
@@ -625,7 +625,8 @@ def parsed(parse: Callable[[], dict[str, Any]], source: str, form: str) -> dict[
     except RecursionError:
         raise CaseError(fault_line(source, f"not valid {form}: nested too deep; a gearbox needs 6 levels")) from None
     except ValueError as error:
-        raise CaseError(fault_line(source, f"not valid {form}: {error}")) from None
+        why = "a whole number of thousands of digits" if "set_int_max_str_digits" in str(error) else error
+        raise CaseError(fault_line(source, f"not valid {form}: {why}")) from None
 
 
 def parse_case(content: dict[str, Any], source: str) -> CaseFile:

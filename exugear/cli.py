@@ -277,7 +277,7 @@ def run(
     ] = None,
     solver: Annotated[Solver, typer.Option(help="What integrates.")] = Solver.compiled,
     duration: Annotated[
-        float | None, typer.Option(min=1e-2, metavar="S", help="Simulated time, s. (default: the load case's)")
+        float | None, typer.Option(metavar="S", help="Simulated time, s. (default: the load case's)")
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with a run that was stopped.")] = False,
     out: OutOption = None,
@@ -296,7 +296,7 @@ def run(
         loads = load_case or next(iter(gearbox.load_cases), "")
         _check_choices(gearbox, variant, mesh_law, inertias, _results_folder(case, out, make=False), loads)
         _check_freedom(gearbox)
-        _check_extent(gearbox, loads, duration, out or Path("results"))
+        _check_extent(gearbox, variant, mesh_law, loads, duration, out or Path("results"))
         _check_solver(gearbox, variant, solver)
         inertias = inertias or gearbox.case.default_inertias
         folder = _results_folder(case, out, make=not resume)
@@ -304,6 +304,7 @@ def run(
         refuse_if_busy(directory)
         if resume and (reason := refuse_to_resume(directory)):
             raise BadInputError(f"--resume: {reason}; run without it")
+        _tell_doubts(gearbox, loads)
         _fill_missing_tables(gearbox, folder, mesh_law)
         with _time_noted(folder, f"run, {variant}, {loads}, {inertias}, {mesh_law}, solver {solver}"):
             finished = _simulate(
@@ -528,13 +529,27 @@ def _check_choices(
         raise BadInputError(f"--mesh-law rigid: its gears only roll, which needs the variant rigid, not {variant}")
 
 
-def _check_extent(gearbox: Gearbox, load_case: str, duration: float | None, folder: Path) -> None:
+def _check_extent(
+    gearbox: Gearbox, variant: Variant, law: MeshLaw, load_case: str, duration: float | None, folder: Path
+) -> None:
     """Refuse a simulated time that is too short, or whose results do not fit on the disk."""
-    from exugear.extent import check_disk, check_duration
+    from exugear.extent import check_disk, check_duration, sample_bytes
 
+    supports = gearbox.joints if variant is Variant.rigid else gearbox.bearings
+    size = sample_bytes(len(gearbox.meshes), len(supports), law is MeshLaw.table)
     with _model_errors():
         check_duration(gearbox, gearbox.load_cases[load_case], duration)
-        check_disk(gearbox, gearbox.load_cases[load_case], folder, duration)
+        check_disk(gearbox, gearbox.load_cases[load_case], folder, duration, sample_bytes=size)
+
+
+def _tell_doubts(gearbox: Gearbox, load_case: str) -> None:
+    """Say what looks like the wrong sign of a torque."""
+    from exugear.load_summary import doubts_about, summarise_loads
+
+    with _model_errors():
+        doubts = doubts_about(summarise_loads(gearbox, gearbox.load_cases[load_case]))
+    for doubt in doubts:
+        note(f"load_cases.{load_case}: {doubt}", style="yellow")
 
 
 def _tell_scripts(gearbox: Gearbox) -> None:
@@ -558,7 +573,10 @@ def _time_noted(folder: Path, step: str) -> Iterator[None]:
 
     start = time.perf_counter()
     yield
-    note_time(folder, step, time.perf_counter() - start)
+    try:
+        note_time(folder, step, time.perf_counter() - start)
+    except OSError as error:  # the work itself is done
+        note(f"The time that it took is not noted: {error}", style="yellow")
 
 
 @contextmanager
@@ -632,8 +650,11 @@ def _reduce_elastic_bodies(gearbox: Gearbox, folder: Path, variant: str, inertia
             done = bar.tasks[task].completed + (bar.tasks[task].description != "")
             bar.update(task, completed=done, description=f"{name}: finite elements, reduced to its seats")
 
-        with _model_errors():
-            reduced_bodies(gearbox, inertias or gearbox.case.default_inertias, bodies_folder(folder), begin)
+        try:
+            with _model_errors():
+                reduced_bodies(gearbox, inertias or gearbox.case.default_inertias, bodies_folder(folder), begin)
+        except BadInputError as error:  # a mesh that only reading shows to be none: the work has begun
+            raise FailedError(error) from error
         bar.update(task, completed=bar.tasks[task].total)
 
 

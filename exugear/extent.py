@@ -21,8 +21,6 @@ The anti-aliasing filter reaches over 31 times as many steps, and a simulated se
 """
 BUFFER_BYTES = 1 << 30
 """Memory of what is kept between two writes at most."""
-LEAST_SAMPLE_BYTES = 32
-"""Time, speed and overall transmission error of one sample on disk; meshes and supports add to it."""
 
 
 def check_duration(
@@ -53,7 +51,8 @@ def check_disk(
     folder: Path,
     duration: float | None = None,
     sample_rate: float = SAMPLE_RATE,
-    sample_bytes: int = LEAST_SAMPLE_BYTES,
+    *,
+    sample_bytes: int,
 ) -> None:
     """Refuse a simulated time (s) whose results do not fit on the disk of a folder, which need not be there yet.
 
@@ -69,6 +68,24 @@ def check_disk(
             f"{key} = {total:g}: {total * sample_rate:.3g} samples take {1e-9 * needed:.3g} GB, and {there} has "
             f"{1e-9 * free:.3g} GB free; give at most {free / (sample_rate * sample_bytes):.3g} s"
         )
+
+
+def sample_bytes(meshes: int, supports: int, has_places: bool) -> int:
+    """Size of one sample on disk: time, speed and overall transmission error in 8 bytes each, all else in 4.
+
+    Parameters
+    ----------
+    meshes, supports : int
+        Of each mesh deflection and force, of each support three forces.
+    has_places : bool
+        Whether two more numbers say where the gears of each mesh stand (law `table`).
+
+    Examples
+    --------
+    >>> sample_bytes(meshes=8, supports=12, has_places=False)
+    240
+    """
+    return 4 * 8 + 4 * ((4 if has_places else 2) * meshes + 3 * supports)
 
 
 def too_fine(step: float, total: float, sample_rate: float) -> str:

@@ -73,6 +73,8 @@ __all__ = [
 ]
 
 RPM = math.pi / 30.0
+UNLOADED = 1e-9
+"""Part of the largest load below which a mesh counts as unloaded: round-off of the balance."""
 DEEPEST_REMOVAL = 0.5
 """Most that a modification or an error may take off a flank, in normal modules: a tooth is 1.6 thick."""
 Section = TypeVar("Section")
@@ -232,7 +234,11 @@ class Gearbox:
         given = {} if section.modification is None else dict(section.modification)
         self._check_depth(key, given, section.normal_module_mm)
         find = partial(self.file, f"{key}.topography", largest=LARGEST_TABLE)
-        return self._guard(key, modification_from, self.gears[name], section, find)
+        found: FlankModification = self._guard(key, modification_from, self.gears[name], section, find)
+        if found.topography is not None:
+            removed = 1e6 * max(abs(value) for row in found.topography.removed for value in row)
+            self._check_depth(key, {"topography, removed_um": removed}, section.normal_module_mm)
+        return found
 
     def _check_depth(self, key: str, amounts: Mapping[str, Any], module_mm: float) -> None:
         """Refuse removal that leaves nothing of the teeth."""
@@ -502,6 +508,12 @@ class Gearbox:
                     raise self.fault(
                         f"static_load.{key} = {name!r}: no such turning body; bodies are {', '.join(self.spinning)}"
                     )
+        held = self.kinematic_modes[[self.spinning.index(name) for name in load.locked]]
+        if np.linalg.matrix_rank(held) < len(load.locked):
+            raise self.fault(
+                f"static_load.locked = {list(load.locked)}: more bodies than the train has freedoms, "
+                f"{self.kinematic_modes.shape[1]}; leave one out, for nothing says how they share the load"
+            )
         applied = np.array([torques.get(name, 0.0) for name in self.spinning])
         locks = np.array([[float(name == lock) for name in self.spinning] for lock in load.locked])
         balance = np.vstack([self.spin_rows, locks.reshape(-1, len(self.spinning))]).T
@@ -511,6 +523,10 @@ class Gearbox:
                 f"static_load: the torques {dict(torques)} are not held by locking "
                 f"{', '.join(load.locked) or 'nothing'}"
             )
+        least = UNLOADED * np.abs(applied).max() / min(
+            (mesh.pair.pinion.base_radius for mesh in self.meshes), default=1.0
+        )
+        forces = np.where(np.abs(forces) > least, forces, 0.0)
         return {mesh.name: float(force) for mesh, force in zip(self.meshes, forces, strict=False)}
 
     @property

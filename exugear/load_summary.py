@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from exugear.gearbox import Gearbox, LoadCase
+from exugear.gearbox import UNLOADED, Gearbox, LoadCase
 from exugear.torque_series import torque_series
 
 Floats = NDArray[np.float64]
@@ -26,8 +26,6 @@ of gear steels. The fastest turbo gears run at two thirds of it.
 """
 INSTANTS = 2001
 """Instants at which a torque that changes is looked at, beside those of its own lines."""
-UNLOADED = 1e-9
-"""Part of the largest mesh force below which a mesh counts as unloaded: round-off of the balance."""
 
 
 @dataclass(frozen=True)
@@ -238,6 +236,6 @@ def _flanks(gearbox: Gearbox, forces: Floats) -> tuple[dict[str, str], tuple[str
         own = forces[:, m]
         loaded = ("+" if np.any(own > least) else "") + ("-" if np.any(own < -least) else "")
         flanks[mesh.family] = "".join(sign for sign in "+-" if sign in flanks.get(mesh.family, "") + loaded)
-        if np.any(own * math.copysign(1.0, static[mesh.name]) < -least):
+        if np.any(own * np.sign(static[mesh.name]) < -least):
             turned.append(mesh.family)
     return {family: found or "0" for family, found in flanks.items()}, tuple(dict.fromkeys(turned))

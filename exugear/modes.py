@@ -300,7 +300,8 @@ def modes_of(assembly: Assembly, preload: bool = True) -> Modes:
     omega = 2.0 * np.pi * frequency
     modal_damping = np.einsum("im,ij,jm->m", shapes, linear.total_damping, shapes)
     elastic = frequency > RIGID_BODY_LIMIT
-    ratio = np.divide(modal_damping, 2.0 * omega, out=np.zeros_like(omega), where=elastic)
+    with np.errstate(over="ignore"):  # a static load beyond anything: its modes are damped infinitely
+        ratio = np.divide(modal_damping, 2.0 * omega, out=np.zeros_like(omega), where=elastic)
     strain = np.array([np.einsum("im,ij,jm->m", shapes, k, shapes) for k in linear.stiffness.values()]).T
     strain = np.where(elastic[:, None], strain / np.maximum(strain.sum(axis=1, keepdims=True), 1e-300), 0.0)
     kinetic = _kinetic_shares(assembly, shapes, q)

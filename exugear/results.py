@@ -115,6 +115,8 @@ def kept_case(folder: Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:
         raise CaseError(f"{folder}: holds no results (no {CASE_FILE}); name the folder that `exugear run` wrote into")
     try:
         kept = parsed(lambda: json.loads(read_text(path)), str(path), "JSON")
+        if not isinstance(kept, dict):
+            raise ValueError("it holds no case")
         if "checksum" not in kept:
             raise ValueError("it was written by an earlier version")
         if kept["checksum"] != _checksum(kept):

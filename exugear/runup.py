@@ -36,7 +36,7 @@ from exugear.compiled import (
     refusal,
     unstable,
 )
-from exugear.extent import SAMPLE_RATE, buffer_rows, check_disk, check_duration, too_fine
+from exugear.extent import SAMPLE_RATE, buffer_rows, check_disk, check_duration, sample_bytes, too_fine
 from exugear.gearbox import Gearbox, LoadCase
 from exugear.load_summary import drive_rate, driven_start_speed, summarise_loads
 from exugear.mesh_element import Angles, MeshData
@@ -50,12 +50,13 @@ from exugear.runfile import (
     Decimator,
     RunFile,
     has_pieces,
+    load_run,
 )
 from exugear.statics import accelerating_start
 from exugear.torque_series import torque_series
 from exugear.trust import Judge
 from exugear.versions import RUN
-from fe_ste.files import exclusive
+from fe_ste.files import FileError, exclusive
 
 if TYPE_CHECKING:
     from exugear.system import Loading, MeshRoute
@@ -254,6 +255,10 @@ def refuse_to_resume(directory: Path) -> str:
     if (directory / EARLIER_PARTIAL_NAME).exists():
         return f"{directory / EARLIER_PARTIAL_NAME}: was written by an earlier version, which cannot be gone on with"
     if (directory / FINAL_NAME).exists():
+        try:
+            load_run(directory / FINAL_NAME, ())
+        except FileError as error:
+            return str(error)
         return f"{directory / FINAL_NAME}: is complete, nothing was stopped"
     return f"{directory}: no run of these choices was stopped here"
 
@@ -318,7 +323,9 @@ class Recorder:
         self._stop = False
         self._fault = ""
         if not resume:
-            check_disk(assembly.gearbox, case, directory, total, sample_rate, 4 * (8 + self.channels.count))
+            channels = self.channels
+            size = sample_bytes(len(channels.mesh_names), len(channels.support_names), channels.has_places)
+            check_disk(assembly.gearbox, case, directory, total, sample_rate, sample_bytes=size)
         self._prepare(case, resume)
 
     def _prepare(self, case: LoadCase, resume: bool) -> None:

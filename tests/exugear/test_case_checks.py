@@ -15,6 +15,7 @@ from exugear.assembly import assemble
 from exugear.casefile import CaseError
 from exugear.cli import app
 from exugear.gearbox import Gearbox
+from exugear.load_summary import summarise_loads
 from exugear.modes import eigenmodes
 from exugear.readiness import check_parts, lacking, remarks
 from exugear.statics import locked_equilibrium
@@ -252,6 +253,28 @@ def test_values_that_nothing_has_are_refused_in_one_line_with_the_key(
 def test_a_relief_deeper_than_half_a_module_is_refused(case: Any) -> None:
     with pytest.raises(CaseError, match=r"tip_relief_um = 1600: must be at most 1500, half a normal module"):
         case("modified", gears__pinion__modification__tip_relief_um=1600.0)
+
+
+def test_a_topography_deeper_than_half_a_module_is_refused(case: Any, cases: Any) -> None:
+    deep = "radius_mm,-7.0,7.0\n29.0,1601.0,0.0\n31.0,0.0,2.0\n"
+    (cases[0].parent / "deep.csv").write_text(deep, encoding="utf-8")
+    with pytest.raises(CaseError, match=r"pinion.modification.topography, removed_um = 1601: must be at most 1500"):
+        case("modified", gears__pinion__modification__topography="deep.csv")
+
+
+def test_what_carries_nothing_in_the_static_load_is_told(case: Any) -> None:
+    gearbox = case("spur", static_load={"torques_N_m": {"shaft_1": 100.0}, "locked": ["shaft_1"]})
+    assert gearbox.static_mesh_forces() == {"spur": 0.0}  # not the rounding of zero
+    assert "pairs.spur: carries no torque in [static_load], and so gets no table" in remarks(gearbox)
+    still = case("grc", static_load__torques_N_m={"carrier": 0.0})
+    assert set(still.static_mesh_forces().values()) == {0.0}
+    (loads,) = {summarise_loads(still, still.load_cases["reference"]).reversed_flanks}
+    assert loads == ()
+
+
+def test_more_locks_than_freedoms_are_refused(case: Any) -> None:
+    with pytest.raises(CaseError, match=r"static_load.locked = .*: more bodies than the train has freedoms, 1"):
+        case("spur", static_load={"torques_N_m": {"shaft_1": 100.0}, "locked": ["shaft_1", "shaft_2"]})
 
 
 def test_unusual_values_are_warnings(case: Any) -> None:

@@ -151,7 +151,7 @@ def test_dynamics_refuses_a_table_of_another_input_but_not_of_other_positions(ca
         ("run", ["--variant", "rigid", "--inertias", "none"], "sets are disc"),
         ("modes", ["--variant", "rigid", "--inertias", "none"], "sets are disc"),
         ("run", ["--variant", "rigid", "--load-case", "nothing"], "load cases are run_up"),
-        ("run", ["--variant", "rigid", "--duration", "-1"], "--duration"),
+        ("run", ["--variant", "rigid", "--duration", "-1"], "duration = -1"),
         ("run", ["--variant", "rigid", "--resume"], "was stopped here"),
         ("run", ["--variant", "bushing", "--mesh-law", "rigid"], "needs the variant rigid"),
     ],

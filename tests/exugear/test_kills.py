@@ -210,6 +210,10 @@ def test_what_an_earlier_version_left_is_refused_and_what_is_complete_is_said(ca
     outcome = run(case, tmp_path, "--resume")
     assert outcome.exit_code == 2
     assert "run.nc: is complete, nothing was stopped" in outcome.stderr
+    (directory / "run.nc").write_bytes(b"")
+    outcome = run(case, tmp_path, "--resume")
+    assert outcome.exit_code == 2
+    assert "run.nc: has no checksum at its end" in outcome.stderr
 
 
 def test_a_folder_of_pieces_that_is_a_link_is_left_alone(case: Path, tmp_path: Path) -> None:

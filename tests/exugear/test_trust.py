@@ -300,7 +300,12 @@ def test_a_run_that_diverges_names_the_time_and_is_marked(tmp_path):
 
 @pytest.mark.parametrize(
     ("duration", "said"),
-    [("inf", "give a finite number"), ("nan", "0.01"), ("1e9", "GB free; give at most")],
+    [
+        ("inf", "give a finite number"),
+        ("nan", "give a finite number"),
+        ("1e9", "GB free; give at most"),
+        ("-1", "too short"),
+    ],
 )
 def test_a_duration_that_no_run_can_have_is_bad_input_before_anything_is_written(tmp_path, duration, said):
     case = written(tmp_path, BALANCED)
