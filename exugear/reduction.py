@@ -524,7 +524,7 @@ def keep_arrays(path: Path, key: str, arrays: Mapping[str, Any]) -> None:
     """Write arrays into a sealed file of a key."""
     content = io.BytesIO()
     np.savez_compressed(content, key=np.array(key), **arrays)
-    write_sealed(path, content.getbuffer())
+    write_sealed(path, content.getvalue())
 
 
 def kept_arrays(path: Path, key: str) -> dict[str, NDArray[Any]] | None:

@@ -220,7 +220,7 @@ class _Piece:
         content = io.BytesIO()
         arrays: Mapping[str, Any] = self.arrays
         np.savez(content, words=np.array(json.dumps(words)), **arrays)
-        return write_sealed(path, content.getbuffer())
+        return write_sealed(path, content.getvalue())
 
     @classmethod
     def read(cls, path: Path) -> tuple[_Piece, str]:

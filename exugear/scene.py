@@ -168,7 +168,7 @@ def write_animation(way_out: Sequence[Figure], target: Path, duration: float) ->
     content = io.BytesIO()
     rest = indexed[1:]
     indexed[0].save(content, "GIF", save_all=True, append_images=rest, duration=pause, loop=0, optimize=True)
-    write_file(target, content.getbuffer())
+    write_file(target, content.getvalue())
     return target
 
 

@@ -141,7 +141,7 @@ def write_dataset(path: Path, dataset: xr.Dataset) -> None:
     """Write a sealed netCDF file whole or not at all."""
     content = io.BytesIO()
     dataset.to_netcdf(content, engine="h5netcdf")
-    write_sealed(path, content.getbuffer())
+    write_sealed(path, content.getvalue())
 
 
 def append_line(path: Path, line: str) -> None:

@@ -87,7 +87,7 @@ def finish_figure(figure: Figure, path: str | Path | None) -> Figure:
     if path is not None:
         path, content = Path(path), io.BytesIO()
         figure.savefig(content, format=path.suffix.removeprefix(".") or None, dpi=200)
-        write_file(path, content.getbuffer())
+        write_file(path, content.getvalue())
     return figure
 
 
