@@ -18,12 +18,16 @@ from typing import Any, Literal
 import numpy as np
 from timing import CASE, Cost, median, median_row, peak_memory, result, say, start, timed
 
-from exugear.assembly import Assembly, assemble
-from exugear.channels import Channels
-from exugear.compiled import CompiledSystem, LoadTable, Observer, choose_step
-from exugear.gearbox import Gearbox
-from exugear.runup import BAND, SAMPLE_RATE, simulate
-from exugear.statics import accelerating_start
+from exugear.dynamics.assemble import assemble
+from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.signals import Channels
+from exugear.dynamics.statics import accelerating_start
+from exugear.model.gearbox import Gearbox
+from exugear.runs.extent import SAMPLE_RATE
+from exugear.runs.runup import BAND, simulate
+from exugear.solvers.compiled.solver import CompiledSystem, Observer
+from exugear.solvers.compiled.step import choose_step
+from exugear.solvers.loads import LoadTable
 
 LOAD = {"carrier": 240e3, "hss": -3000.0}
 RATED = {"carrier": 240e3, "hss": -2945.12}

@@ -16,12 +16,16 @@ import numpy as np
 from dynamics import LOAD, stiffness_of
 from timing import CASE, median, say, timed
 
-from exugear.assembly import Assembly, assemble
-from exugear.channels import Channels
-from exugear.compiled import CompiledSystem, LoadTable, Observer, choose_step
-from exugear.gearbox import Gearbox
-from exugear.runup import BAND, SAMPLE_RATE
-from exugear.statics import accelerating_start
+from exugear.dynamics.assemble import assemble
+from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.signals import Channels
+from exugear.dynamics.statics import accelerating_start
+from exugear.model.gearbox import Gearbox
+from exugear.runs.extent import SAMPLE_RATE
+from exugear.runs.runup import BAND
+from exugear.solvers.compiled.solver import CompiledSystem, Observer
+from exugear.solvers.compiled.step import choose_step
+from exugear.solvers.loads import LoadTable
 
 SHAFTS = ("lss", "ims", "hss")
 CARRIER = (*SHAFTS, "carrier")

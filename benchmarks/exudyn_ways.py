@@ -8,14 +8,15 @@ from typing import Any
 import numpy as np
 from timing import Cost, timed
 
-from exugear.assembly import Assembly
-from exugear.kernels import stiffness_at
-from exugear.mesh_element import MeshElement
-from exugear.system import ExudynSystem, Loading, MeshRoute, exudyn, items
+from exugear.dynamics.assembly import Assembly
+from exugear.kernels.meshes import stiffness_at
+from exugear.solvers.exudyn_model.system import ExudynSystem, MeshRoute, exudyn, items
+from exugear.solvers.loads import Loading
+from exugear.tooth_mesh.element import MeshElement
 
 
 class PythonMesh:
-    """One mesh as the textbook would write it: the law of `exugear.kernels` in plain Python on its own bodies."""
+    """One mesh as the textbook would write it: the law of `exugear.kernels.meshes` in plain Python."""
 
     def __init__(self, system: ExudynSystem, element: MeshElement) -> None:
         mesh = element.mesh

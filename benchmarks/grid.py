@@ -22,7 +22,7 @@ from timing import say
 if TYPE_CHECKING:
     import xarray as xr
 
-    from fe_ste.table import TableInput
+    from fe_ste.transmission_error.table import TableInput
 
 HERE = Path(__file__).parent
 CASE = HERE.parent / "cases" / "grc750" / "gearbox.toml"
@@ -33,9 +33,9 @@ ALONE_EVERY = 251
 
 def measure(name: str) -> dict[str, float | int | str]:
     """Compute one pair's grid in this process and two workers, and some of its states alone."""
-    from exugear.gearbox import Gearbox
-    from exugear.tables import wanted_table
-    from fe_ste.table import MeshTable, prepared_compliance
+    from exugear.model.gearbox import Gearbox
+    from exugear.tooth_mesh.tables import wanted_table
+    from fe_ste.transmission_error.table import MeshTable, prepared_compliance
 
     gearbox = Gearbox.from_toml(CASE)
     wanted = wanted_table(gearbox, name, gearbox.ste.positions, grid=True)
@@ -69,9 +69,9 @@ def solved_alone(wanted: TableInput, data: xr.Dataset) -> tuple[float, float]:
 
     import numpy as np
 
-    from fe_ste.ste import contact_state
-    from fe_ste.table import prepared_compliance
-    from fe_ste.threads import one_dense_thread
+    from fe_ste.tools.threads import one_dense_thread
+    from fe_ste.transmission_error.search import contact_state
+    from fe_ste.transmission_error.table import prepared_compliance
 
     compliance = prepared_compliance(wanted)
     cosine = math.cos(wanted.pair.pinion.base_helix_angle)

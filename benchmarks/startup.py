@@ -19,7 +19,7 @@ def cost_of(arguments: list[str], cache: str) -> Cost:
     """Cost of one command; the processor time counts this process's children."""
     import resource
 
-    command = [sys.executable, "-c", "from exugear.cli import main; main()", *arguments]
+    command = [sys.executable, "-c", "from exugear.cli.app import main; main()", *arguments]
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     cost = timed(
         lambda: subprocess.run(

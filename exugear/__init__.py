@@ -9,17 +9,18 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from exugear.gearbox import CaseError, Gearbox
-    from exugear.modes import eigenmodes
-    from exugear.runup import simulate
+    from exugear.dynamics.modes import eigenmodes
+    from exugear.model.gearbox import Gearbox
+    from exugear.model.reading import CaseError
+    from exugear.runs.runup import simulate
 
 __all__ = ["CaseError", "Gearbox", "__version__", "eigenmodes", "simulate"]
 
 _HOMES = {
-    "CaseError": "exugear.gearbox",
-    "Gearbox": "exugear.gearbox",
-    "eigenmodes": "exugear.modes",
-    "simulate": "exugear.runup",
+    "CaseError": "exugear.model.gearbox",
+    "Gearbox": "exugear.model.gearbox",
+    "eigenmodes": "exugear.dynamics.modes",
+    "simulate": "exugear.runs.runup",
 }
 
 

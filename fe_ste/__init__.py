@@ -5,32 +5,34 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from fe_ste.gears import BasicRack, Gear, GearPair, GeometryError, Material
-from fe_ste.modifications import FlankModification, Relief, ReliefShape
-from fe_ste.profile import ToothProfile, tooth_profile
-from fe_ste.topography import FlankTopography
+from fe_ste.flanks.modifications import FlankModification, Relief, ReliefShape
+from fe_ste.flanks.topography import FlankTopography
+from fe_ste.geometry.checks import GeometryError
+from fe_ste.geometry.gears import BasicRack, Gear, GearPair, Material
+from fe_ste.geometry.profile import ToothProfile, tooth_profile
 
 if TYPE_CHECKING:
-    from fe_ste.contact import ContactSettings
-    from fe_ste.hexmesh import MeshSettings
-    from fe_ste.nonlinear import NonlinearSettings, nonlinear_position
-    from fe_ste.sectors import ContactMesh
-    from fe_ste.ste import PairCompliance, pair_compliance, static_transmission_error
-    from fe_ste.table import MeshTable, TableError, TableInput
+    from fe_ste.contact.cells import ContactSettings
+    from fe_ste.elasticity.hexmesh import MeshSettings
+    from fe_ste.elasticity.sectors import ContactMesh
+    from fe_ste.reference.position import NonlinearSettings, nonlinear_position
+    from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance
+    from fe_ste.transmission_error.table import MeshTable, TableError, TableInput
+    from fe_ste.transmission_error.transmission_error import static_transmission_error
 
 #: Names whose modules load the finite-element libraries: imported when first asked for.
 _LATER = {
-    "ContactMesh": "sectors",
-    "ContactSettings": "contact",
-    "MeshSettings": "hexmesh",
-    "MeshTable": "table",
-    "NonlinearSettings": "nonlinear",
-    "PairCompliance": "ste",
-    "TableError": "table",
-    "TableInput": "table",
-    "nonlinear_position": "nonlinear",
-    "pair_compliance": "ste",
-    "static_transmission_error": "ste",
+    "ContactMesh": "elasticity.sectors",
+    "ContactSettings": "contact.cells",
+    "MeshSettings": "elasticity.hexmesh",
+    "MeshTable": "transmission_error.table",
+    "NonlinearSettings": "reference.position",
+    "PairCompliance": "transmission_error.compliance",
+    "TableError": "transmission_error.table",
+    "TableInput": "transmission_error.table",
+    "nonlinear_position": "reference.position",
+    "pair_compliance": "transmission_error.compliance",
+    "static_transmission_error": "transmission_error.transmission_error",
 }
 
 __all__ = [

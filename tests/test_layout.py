@@ -12,7 +12,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("fe_ste", "exugear")
-ALONE_WITH_EXUDYN = {"exugear.system", "exugear.flexible"}
+ALONE_WITH_EXUDYN = {"exugear.solvers.exudyn_model.system", "exugear.solvers.exudyn_model.floating"}
 ROW = re.compile(r"^\| `(\w+)` \| .* \|([^|]*)\|$", re.MULTILINE)
 
 
@@ -91,7 +91,7 @@ def test_only_two_modules_know_exudyn(module):
 def left_unloaded(arguments: list[str], heavy: tuple[str, ...]) -> str:
     """Output of the command line run in a process of its own, in which none of the named libraries was loaded."""
     program = (
-        "import sys\nfrom exugear.cli import app\n"
+        "import sys\nfrom exugear.cli.app import app\n"
         f"try:\n    app({arguments!r})\nexcept SystemExit as end:\n    assert not end.code, end.code\n"
         f"sys.exit(', '.join(name for name in {heavy!r} if name in sys.modules) or 0)"
     )

@@ -1,7 +1,7 @@
 """CalculiX model of a gear pair: open sectors of the meshes of `fe_ste`, contact, and the turning of gear 2.
 
-The pose is that of `fe_ste.sectors`, whose numbers of a brick's faces are those of CalculiX. Gear 1's hub is held;
-gear 2's hub is a rigid body that turns about its axis under the torque.
+The pose is that of `fe_ste.elasticity.sectors`, whose numbers of a brick's faces are those of CalculiX. Gear 1's hub
+is held; gear 2's hub is a rigid body that turns about its axis under the torque.
 Units in the input file: mm, N, MPa.
 """
 
@@ -16,8 +16,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from fe_ste.gears import GearPair
-from fe_ste.sectors import OpenSector
+from fe_ste.elasticity.sectors import OpenSector
+from fe_ste.geometry.gears import GearPair
 
 _M_TO_MM = 1e3
 _PA_TO_MPA = 1e-6

@@ -20,13 +20,14 @@ from typing import Any
 
 from ccx_model import CalculixSettings, run_calculix, write_input
 
-from fe_ste.contact import ContactSettings
-from fe_ste.gears import BasicRack, Gear, GearPair
-from fe_ste.hexmesh import MeshSettings
-from fe_ste.newton import solve_contact
-from fe_ste.nonlinear import gear_model
-from fe_ste.sectors import placed_sectors
-from fe_ste.ste import contact_state, pair_compliance
+from fe_ste.contact.cells import ContactSettings
+from fe_ste.elasticity.hexmesh import MeshSettings
+from fe_ste.elasticity.sectors import placed_sectors
+from fe_ste.geometry.gears import BasicRack, Gear, GearPair
+from fe_ste.reference.newton import solve_contact
+from fe_ste.reference.position import gear_model
+from fe_ste.transmission_error.compliance import pair_compliance
+from fe_ste.transmission_error.search import contact_state
 
 RESULTS = Path(__file__).with_name("results.json")
 TEETH = 3

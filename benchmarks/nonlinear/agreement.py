@@ -19,10 +19,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from fe_ste.hexmesh import MeshSettings
-from fe_ste.nonlinear import NonlinearSettings, nonlinear_position
-from fe_ste.sectors import ContactMesh
-from fe_ste.ste import PairCompliance, contact_state, pair_compliance
+from fe_ste.elasticity.hexmesh import MeshSettings
+from fe_ste.elasticity.sectors import ContactMesh
+from fe_ste.reference.position import NonlinearSettings, nonlinear_position
+from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance
+from fe_ste.transmission_error.search import contact_state
 
 RESULTS = Path(__file__).with_name("results.json")
 sys.path.insert(0, str(Path(__file__).parents[1] / "calculix"))

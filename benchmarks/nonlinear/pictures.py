@@ -8,13 +8,13 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from exugear.gearbox import Gearbox
-from exugear.tables import order_tables
-from fe_ste.nonlinear import nonlinear_position
-from fe_ste.ste import contact_state
-from fe_ste.stress import StressField, stress_of_position, stress_of_state
-from fe_ste.stress_scene import draw_contact_stress
-from fe_ste.table import prepared_compliance
+from exugear.model.gearbox import Gearbox
+from exugear.tooth_mesh.tables import order_tables
+from fe_ste.pictures.stress import draw_contact_stress
+from fe_ste.reference.position import nonlinear_position
+from fe_ste.reference.stress import StressField, stress_of_position, stress_of_state
+from fe_ste.transmission_error.search import contact_state
+from fe_ste.transmission_error.table import prepared_compliance
 
 ROOT = Path(__file__).parents[2]
 CASE = ROOT / "cases" / "grc750" / "gearbox.toml"

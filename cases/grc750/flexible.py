@@ -18,19 +18,19 @@ from pathlib import Path
 import numpy as np
 from one_variant import LAW, show
 
-from exugear.assembly import assemble
-from exugear.elastic_scene import animate_elastic_bodies, draw_elastic_bodies, elastic_scene
-from exugear.gearbox import Gearbox
-from exugear.mesh_element import MeshData
-from exugear.mesh_stiffness import mesh_stiffness
-from exugear.modes import MOTIONS, Modes, counterparts, eigenmodes
-from exugear.orders import order_lines, run_waterfall
-from exugear.plots import plot_waterfalls
-from exugear.results import bodies_folder, keep_case, modes_path
-from exugear.runup import simulate
-from exugear.spectra import Pick, group_by_frequency, match_eigenfrequencies, pick_resonances
-from exugear.statics import locked_equilibrium
-from exugear.tables import order_tables
+from exugear.dynamics.assemble import assemble
+from exugear.dynamics.modes import MOTIONS, Modes, counterparts, eigenmodes
+from exugear.dynamics.statics import locked_equilibrium
+from exugear.model.gearbox import Gearbox
+from exugear.pictures.diagrams import plot_waterfalls
+from exugear.pictures.elastic_scene import animate_elastic_bodies, draw_elastic_bodies, elastic_scene
+from exugear.results.folder import bodies_folder, keep_case, modes_path
+from exugear.runs.runup import simulate
+from exugear.spectra.orders import order_lines, run_waterfall
+from exugear.spectra.resonances import Pick, group_by_frequency, match_eigenfrequencies, pick_resonances
+from exugear.tooth_mesh.element import MeshData
+from exugear.tooth_mesh.stiffness import mesh_stiffness
+from exugear.tooth_mesh.tables import order_tables
 
 VARIANTS = ("rigid", "bushing", "flexible")
 MAIN_SHAFT_MODES = 500.0

@@ -14,15 +14,17 @@ from collections.abc import Callable, Iterator
 from functools import lru_cache
 from pathlib import Path
 
-from exugear.assembly import Assembly, assemble
-from exugear.gearbox import Gearbox
-from exugear.mesh_stiffness import mesh_stiffness
-from exugear.results import bodies_folder
-from exugear.statics import locked_equilibrium
-from exugear.tables import order_tables, wanted_table
-from fe_ste.face_load import face_load_factor
-from fe_ste.ste import PairCompliance, static_transmission_error
-from fe_ste.table import prepared_compliance
+from exugear.dynamics.assemble import assemble
+from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.statics import locked_equilibrium
+from exugear.model.gearbox import Gearbox
+from exugear.results.folder import bodies_folder
+from exugear.tooth_mesh.stiffness import mesh_stiffness
+from exugear.tooth_mesh.tables import order_tables, wanted_table
+from fe_ste.transmission_error.compliance import PairCompliance
+from fe_ste.transmission_error.face_load import face_load_factor
+from fe_ste.transmission_error.table import prepared_compliance
+from fe_ste.transmission_error.transmission_error import static_transmission_error
 
 POSITIONS = 10
 """Positions of the mesh cycle; 50 change the factor by less than 0.01."""

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from exugear.gearbox import Gearbox
-from exugear.mesh_stiffness import mesh_stiffness
-from exugear.modes import eigenmodes
-from exugear.orders import order_lines, run_waterfall
-from exugear.plots import plot_campbell, plot_waterfalls
-from exugear.results import keep_case
-from exugear.runup import Progress, simulate
-from exugear.spectra import group_by_frequency, match_eigenfrequencies, pick_resonances
-from exugear.tables import order_tables
+from exugear.dynamics.modes import eigenmodes
+from exugear.model.gearbox import Gearbox
+from exugear.pictures.diagrams import plot_campbell, plot_waterfalls
+from exugear.results.folder import keep_case
+from exugear.runs.outcome import Progress
+from exugear.runs.runup import simulate
+from exugear.spectra.orders import order_lines, run_waterfall
+from exugear.spectra.resonances import group_by_frequency, match_eigenfrequencies, pick_resonances
+from exugear.tooth_mesh.stiffness import mesh_stiffness
+from exugear.tooth_mesh.tables import order_tables
 
 LAW = "line_of_action"
 

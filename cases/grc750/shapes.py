@@ -13,11 +13,11 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from exugear.elastic_bodies import solid_body
-from exugear.gearbox import Gearbox
-from exugear.reduction import ReducedBody
-from exugear.solid_scene import draw_free_vibration
-from exugear.solids import SolidModel, load_or_reduce_solid
+from exugear.bodies.of_gearbox import solid_body
+from exugear.bodies.reduced_body import ReducedBody
+from exugear.bodies.solids import SolidModel, load_or_reduce_solid
+from exugear.model.gearbox import Gearbox
+from exugear.pictures.solid_scene import draw_free_vibration
 
 RIM = {
     "file": "ring_rim.step",

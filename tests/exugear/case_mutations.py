@@ -16,8 +16,8 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
 
-from exugear.casefile import CaseFile
-from exugear.quantities import Range
+from exugear.model.quantities import Range
+from exugear.model.sections import CaseFile
 
 from .spur_case import SPUR_CASE
 

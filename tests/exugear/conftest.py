@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from exugear.gearbox import Gearbox
+from exugear.model.gearbox import Gearbox
 
 CASE = Path(__file__).parents[2] / "cases" / "grc750" / "gearbox.toml"
 

@@ -18,11 +18,11 @@ from pathlib import Path
 
 import xarray as xr
 
-import fe_ste.files
-from exugear import runup
-from exugear.gearbox import Gearbox
-from exugear.mesh_stiffness import mesh_stiffness
-from exugear.runfile import load_run
+import fe_ste.tools.files
+from exugear.model.gearbox import Gearbox
+from exugear.results.run_file import load_run
+from exugear.runs import runup
+from exugear.tooth_mesh.stiffness import mesh_stiffness
 
 CALLS = ("open", "fsync", "replace", "unlink", "rmdir", "mkdir")
 DURATION = 0.024
@@ -47,7 +47,7 @@ def kill_at(number: int) -> None:
 
     for name in CALLS:
         setattr(os, name, counted(getattr(os, name)))
-    plain = fe_ste.files._write_all
+    plain = fe_ste.tools.files._write_all
 
     def write_all(file, content) -> None:
         if reached():
@@ -55,7 +55,7 @@ def kill_at(number: int) -> None:
             os.kill(os.getpid(), signal.SIGKILL)
         plain(file, content)
 
-    fe_ste.files._write_all = write_all
+    fe_ste.tools.files._write_all = write_all
 
 
 def in_fork(work: Callable[[], None]) -> int:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import functools
 
-from fe_ste.contact import ContactSettings
-from fe_ste.hexmesh import MeshSettings
-from fe_ste.table import TableInput
+from fe_ste.contact.cells import ContactSettings
+from fe_ste.elasticity.hexmesh import MeshSettings
+from fe_ste.transmission_error.table import TableInput
 
 COARSE_INPUT = functools.partial(
     TableInput, mesh=MeshSettings(layers=4, flank=8, thickness=6), contact=ContactSettings(slices=8)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from exugear.gearbox import Gearbox
-from fe_ste.interpolation import SteSurface
+from exugear.model.gearbox import Gearbox
+from fe_ste.transmission_error.surface import SteSurface
 
 LOADS = np.array([0.05, 0.2, 0.5, 1.0, 1.5, 2.0])
 STIFFNESS = {"sun_planet": 3.77e9, "ring_planet": 4.85e9, "intermediate": 3.07e9, "high_speed": 1.93e9}

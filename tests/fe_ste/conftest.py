@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fe_ste.gears import BasicRack, Gear, GearPair
+from fe_ste.geometry.gears import BasicRack, Gear, GearPair
 
 DEEP_RACK = BasicRack(addendum=1.0, dedendum=1.46, tip_radius=0.36)
 DEEPEST_RACK = BasicRack(addendum=1.0, dedendum=1.50, tip_radius=0.34)

@@ -1,0 +1,1 @@
+"""Bearings and other supports: stiffness from catalogue dimensions, matrices."""

@@ -1,0 +1,484 @@
+"""Elasticity of shafts turned on a lathe: finite elements over the half-section, Fourier harmonics around it.
+
+The solid is axially symmetric, its displacement is not. Written in harmonics around the axis the three-dimensional
+problem falls into small ones over the half-section (r, z): bending (n = 1), torsion and stretching (n = 0). They
+are exact in the angle, so that a shaft needs about a tenth of the unknowns of a solid mesh on the same lines and has
+no facets and no preferred direction.
+
+Bending uses u_r = U cos(phi), u_phi = V sin(phi), u_z = W cos(phi) for a motion along x (turned by a right angle for
+y) with the unknowns A = (U - V)/2, S = (U + V)/2 and W: a translation is A = 1, on the axis S = W = 0.
+
+Gyroscopic terms follow from the velocity Omega z x x + u_t + Omega (x d_y - y d_x) u of a particle that passes a fixed
+point of space. What is quadratic in Omega, this convection and the stiffness by centrifugal tension, cancels for
+rigid tilts and is left out together, as is usual in rotor dynamics (Friswell et al., Dynamics of Rotating Machines,
+2010).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+import scipy.sparse
+import skfem
+from fe_ste.tools.arrays import Floats, SparseMatrix
+from numpy.typing import NDArray
+
+from fe_ste.geometry.gears import Material
+
+Motion = Literal["bending", "torsion", "stretching"]
+GRADING = 0.35
+"""Ratio of neighbouring element sizes towards a re-entrant corner."""
+INTEGRATION_ORDER = 5
+"""Exact for the mass matrix but for the factor r; the strains' 1/r is no polynomial anyway."""
+MOST_ELEMENTS = 50_000
+"""Most elements over a half-section: 10 m of shaft with 3 m diameter; 4 GB."""
+SAME = 1e-9
+"""Two places (m) this close are one."""
+
+
+class ShaftError(ValueError):
+    """A shaft that cannot be, or a seat that does not lie on it."""
+
+
+@dataclass(frozen=True)
+class ShaftSection:
+    """A cylindrical piece of a shaft: length, outer and inner diameter, m.
+
+    Raises
+    ------
+    ShaftError
+        Length or outer diameter not positive, or no wall between the diameters.
+    """
+
+    length: float
+    outer_diameter: float
+    inner_diameter: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be turned."""
+        if self.length <= 0.0 or self.outer_diameter <= 0.0 or not 0.0 <= self.inner_diameter < self.outer_diameter:
+            raise ShaftError(
+                f"section of length {self.length:g} m and diameters {self.outer_diameter:g} over "
+                f"{self.inner_diameter:g} m: it needs a positive length and a wall"
+            )
+
+
+@dataclass(frozen=True)
+class MeshSize:
+    """Element sizes over the half-section.
+
+    Attributes
+    ----------
+    axial, radial : largest element, m
+    grading : number of lines that close in on each shoulder
+    """
+
+    axial: float = 0.025
+    radial: float = 0.0125
+    grading: int = 3
+
+
+STANDARD_SIZE = MeshSize()
+
+
+@dataclass(frozen=True)
+class SeatBand:
+    """Where something sits on a shaft: a band of the outer surface, or a plane cross-section if it has no width.
+
+    Attributes
+    ----------
+    z : middle, m from the beginning of the first section
+    width : m; 0 for the cross-section
+    """
+
+    name: str
+    z: float
+    width: float = 0.0
+
+
+@dataclass(frozen=True)
+class Harmonic:
+    """One harmonic of a shaft as matrices over its n free unknowns.
+
+    Attributes
+    ----------
+    motion : what it describes
+    mass, stiffness : (n, n) sparse, kg and N/m
+    gyroscopic : (n, n) sparse symmetric g of M q'' - 2 i Omega g q' + K q, q = q_x + i q_y; None but for bending
+    seats : (s, n) averages over the seats: per seat displacement and tilt (bending), twist, or axial displacement
+    rigid : (n, k) rigid motions: along x and tilt about the origin (bending), turn, or along z
+    """
+
+    motion: Motion
+    mass: SparseMatrix
+    stiffness: SparseMatrix
+    gyroscopic: SparseMatrix | None
+    seats: Floats
+    rigid: Floats
+
+
+@dataclass(frozen=True)
+class Outline:
+    """Boundary of a half-section: places (m), nodes, edges as pairs of places, and the element along each edge."""
+
+    r: Floats
+    z: Floats
+    nodes: NDArray[np.int64]
+    edges: NDArray[np.int64]
+    elements: NDArray[np.int64]
+
+
+class Shaft:
+    """The half-section of a shaft, meshed.
+
+    Parameters
+    ----------
+    sections : sequence of ShaftSection
+        From the beginning at z = 0 on.
+    material : Material
+    seats : sequence of SeatBand
+        Element boundaries fall on the edges of each band.
+    size : MeshSize
+
+    Raises
+    ------
+    ShaftError
+        Sections that do not touch each other, or a seat outside the shaft or across a step.
+
+    Examples
+    --------
+    >>> from fe_ste.geometry.gears import Material
+    >>> shaft = Shaft([ShaftSection(1.2, 0.08)], Material(), [SeatBand("left", 0.0), SeatBand("right", 1.2)])
+    >>> torsion = shaft.harmonic("torsion")
+    >>> turn = torsion.rigid[:, 0]
+    >>> round(float(turn @ torsion.mass @ turn), 6)  # polar inertia, kg m2
+    0.03788
+    """
+
+    def __init__(
+        self,
+        sections: Sequence[ShaftSection],
+        material: Material,
+        seats: Sequence[SeatBand],
+        size: MeshSize = STANDARD_SIZE,
+    ) -> None:
+        self.sections = tuple(sections)
+        self.material = material
+        self.seats = tuple(seats)
+        self.size = size
+        self._ends = np.concatenate([[0.0], np.cumsum([section.length for section in sections])])
+        _check_sections(self.sections)
+        self._bands = [self._locate(seat) for seat in self.seats]
+        radii, heights = self._lines()
+        self.mesh = _half_section(radii, heights, self._solid)
+        self.basis = skfem.Basis(self.mesh, skfem.ElementQuad2(), intorder=INTEGRATION_ORDER)
+        self.nodes: Floats = np.asarray(self.basis.doflocs)
+
+    @property
+    def length(self) -> float:
+        """Overall length, m."""
+        return float(self._ends[-1])
+
+    def section_under(self, seat: SeatBand) -> ShaftSection:
+        """Return the section that a seat lies on: the thicker one where it is a plane between two."""
+        return self._locate(seat)[0]
+
+    def _solid(self, r: Floats, z: Floats) -> NDArray[np.bool_]:
+        """Tell which points of the half-section are steel."""
+        number = np.clip(np.searchsorted(self._ends, z) - 1, 0, len(self.sections) - 1)
+        outer = np.array([section.outer_diameter for section in self.sections])[number]
+        inner = np.array([section.inner_diameter for section in self.sections])[number]
+        return (2.0 * r < outer) & (2.0 * r > inner)
+
+    def _locate(self, seat: SeatBand) -> tuple[ShaftSection, float, float]:
+        return locate(self.sections, seat)
+
+    def _lines(self) -> tuple[Floats, Floats]:
+        """Lines of the mesh over the radius and along the axis, closing in on re-entrant corners."""
+        shoulder_z, corner_r = set(), set()
+        for number, (left, right) in enumerate(zip(self.sections[:-1], self.sections[1:], strict=True), start=1):
+            if abs(left.outer_diameter - right.outer_diameter) > SAME:
+                corner_r.add(min(left.outer_diameter, right.outer_diameter) / 2.0)
+                shoulder_z.add(float(self._ends[number]))
+            if abs(left.inner_diameter - right.inner_diameter) > SAME:
+                corner_r.add(max(left.inner_diameter, right.inner_diameter) / 2.0)
+                shoulder_z.add(float(self._ends[number]))
+        edges = [edge for _, low, high in self._bands for edge in (low, high)]
+        radii = [d / 2.0 for s in self.sections for d in (s.outer_diameter, s.inner_diameter)]
+        return (
+            _graded_line(radii, corner_r, self.size.radial, self.size.grading),
+            _graded_line([*self._ends, *edges], shoulder_z, self.size.axial, self.size.grading),
+        )
+
+    @cached_property
+    def _fields(self) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+        """Values, slopes along r and along z (elements, points, 9), radius and weight r dr dz (elements, points)."""
+        basis = self.basis
+        values = np.stack([np.broadcast_to(b[0], basis.dx.shape) for b in basis.basis], axis=-1)
+        slopes = np.stack([b[0].grad for b in basis.basis], axis=-1)
+        radius = np.asarray(basis.global_coordinates())[0]
+        return values, slopes[0], slopes[1], radius, radius * basis.dx
+
+    def strains(self, motion: Motion, points: tuple[Floats, Floats, Floats, Floats] | None = None) -> Floats:
+        """Strain amplitudes per unknown, (elements, points, 6, 9 fields): rr, phi phi, zz, rz, r phi, phi z.
+
+        Parameters
+        ----------
+        points : values, slopes along r and z (elements, points, 9), radius (elements, points)
+            Of the shape functions; the integration points by default.
+        """
+        n, n_r, n_z, r = self._fields[:4] if points is None else points
+        over_r = n / r[..., None]
+        fields = {"bending": 3, "torsion": 1, "stretching": 2}[motion]
+        e = np.zeros((*n.shape[:2], 6, n.shape[2], fields))
+        if motion == "bending":  # unknowns A, S, W: U = S + A, V = S - A
+            e[:, :, 0, :, 0], e[:, :, 0, :, 1] = n_r, n_r
+            e[:, :, 1, :, 1] = 2.0 * over_r
+            e[:, :, 2, :, 2] = n_z
+            e[:, :, 3, :, 0], e[:, :, 3, :, 1], e[:, :, 3, :, 2] = n_z, n_z, n_r
+            e[:, :, 4, :, 0], e[:, :, 4, :, 1] = -n_r, n_r - 2.0 * over_r
+            e[:, :, 5, :, 0], e[:, :, 5, :, 1], e[:, :, 5, :, 2] = -n_z, n_z, -over_r
+        elif motion == "torsion":  # unknown V
+            e[:, :, 4, :, 0], e[:, :, 5, :, 0] = n_r - over_r, n_z
+        else:  # unknowns U, W
+            e[:, :, 0, :, 0], e[:, :, 1, :, 0], e[:, :, 2, :, 1] = n_r, over_r, n_z
+            e[:, :, 3, :, 0], e[:, :, 3, :, 1] = n_z, n_r
+        return e.reshape(*n.shape[:2], 6, -1)
+
+    @property
+    def elasticity(self) -> Floats:
+        """Stress by strain (6, 6), Pa, engineering shear strains."""
+        e, nu = self.material.youngs_modulus, self.material.poissons_ratio
+        shear = e / (2.0 * (1.0 + nu))
+        lame = e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
+        d = np.diag([2.0 * shear] * 3 + [shear] * 3)
+        d[:3, :3] += lame
+        return d
+
+    def harmonic(self, motion: Motion) -> Harmonic:
+        """Matrices, seat averages and rigid motions of one harmonic."""
+        n, _, _, _, weight = self._fields
+        around = math.pi if motion == "bending" else 2.0 * math.pi
+        strain = self.strains(motion)
+        stress = np.einsum("st,epti->epsi", self.elasticity, strain)
+        size = strain.shape[-1]
+        flat = strain.reshape(len(strain), -1, size)
+        weighted = (stress * (around * weight)[..., None, None]).reshape(len(strain), -1, size)
+        stiffness = flat.transpose(0, 2, 1) @ weighted
+        scalar = (n.transpose(0, 2, 1) * (self.material.density * around * weight)[:, None, :]) @ n
+        inertia = {"bending": [2.0, 2.0, 1.0], "torsion": [1.0], "stretching": [1.0, 1.0]}[motion]
+        free = self.free_unknowns(motion)
+        gyroscopic = None
+        if motion == "bending":
+            gyroscopic = self._gather(_by_field(scalar, [0.0, 4.0, 1.0]), 3, free)
+        return Harmonic(
+            motion=motion,
+            mass=self._gather(_by_field(scalar, inertia), len(inertia), free),
+            stiffness=self._gather(stiffness, len(inertia), free),
+            gyroscopic=gyroscopic,
+            seats=self._seat_rows(motion)[:, free],
+            rigid=self._rigid(motion)[free],
+        )
+
+    def free_unknowns(self, motion: Motion) -> NDArray[np.int64]:
+        """Unknowns that the axis leaves free, numbered field by field within each node."""
+        on_axis = self.nodes[0] < SAME
+        held = {"bending": [False, True, True], "torsion": [True], "stretching": [True, False]}[motion]
+        return np.flatnonzero(~(on_axis[:, None] & np.array(held)).ravel())
+
+    def _gather(self, blocks: Floats, fields: int, free: NDArray[np.int64]) -> SparseMatrix:
+        """Sparse matrix over the free unknowns from one block per element (elements, 9 fields, 9 fields)."""
+        dofs = (np.asarray(self.basis.element_dofs).T[:, :, None] * fields + np.arange(fields)).reshape(len(blocks), -1)
+        rows = np.broadcast_to(dofs[:, :, None], blocks.shape).ravel()
+        columns = np.broadcast_to(dofs[:, None, :], blocks.shape).ravel()
+        size = fields * self.nodes.shape[1]
+        whole = scipy.sparse.csr_array((blocks.ravel(), (rows, columns)), shape=(size, size))
+        gathered = whole[free][:, free]
+        return scipy.sparse.csr_array(0.5 * (gathered + gathered.T))
+
+    def _rigid(self, motion: Motion) -> Floats:
+        """Rigid motions over all unknowns, about the origin."""
+        r, z = self.nodes
+        zero, one = np.zeros_like(r), np.ones_like(r)
+        fields: dict[Motion, list[list[Floats]]] = {
+            "bending": [[one, zero, zero], [z, zero, -r]],
+            "torsion": [[r]],
+            "stretching": [[zero, one]],
+        }
+        motions: list[Floats] = [np.stack(amplitudes, axis=1).ravel() for amplitudes in fields[motion]]
+        return np.stack(motions, axis=1)
+
+    def _seat_rows(self, motion: Motion) -> Floats:
+        """Seat averages over all unknowns: the rigid motion nearest to the surface's, area by area (RBE3)."""
+        fields = {"bending": 3, "torsion": 1, "stretching": 2}[motion]
+        rows = []
+        for seat, (section, low, high) in zip(self.seats, self._bands, strict=True):
+            nodes, weight = self._surface(seat, section, low, high)
+            r, arm = self.nodes[0, nodes], self.nodes[1, nodes] - seat.z
+            weight = weight / weight.sum()
+            if motion == "bending":
+                inertia = weight @ (arm**2 + r**2 / 2.0)
+                row, tilt = np.zeros((fields, self.nodes.shape[1])), np.zeros((fields, self.nodes.shape[1]))
+                row[0, nodes] = weight
+                tilt[0, nodes], tilt[2, nodes] = weight * arm / inertia, -0.5 * weight * r / inertia
+                rows += [row.T.ravel(), tilt.T.ravel()]
+            else:
+                row = np.zeros((fields, self.nodes.shape[1]))
+                row[-1, nodes] = weight * r / (weight @ r**2) if motion == "torsion" else weight
+                rows.append(row.T.ravel())
+        return np.array(rows).reshape(len(rows), fields * self.nodes.shape[1])
+
+    def _surface(
+        self, seat: SeatBand, section: ShaftSection, low: float, high: float
+    ) -> tuple[NDArray[np.int64], Floats]:
+        """Nodes of a seat's surface and their share of its area, by Simpson's rule over each element's edge."""
+        r, z = self.nodes
+        if seat.width > 0.0:
+            on = (np.abs(r - section.outer_diameter / 2.0) < SAME) & (z > low - SAME) & (z < high + SAME)
+        else:
+            on = np.abs(z - seat.z) < SAME
+            on &= (r < section.outer_diameter / 2.0 + SAME) & (r > section.inner_diameter / 2.0 - SAME)
+        along = z if seat.width > 0.0 else r
+        nodes = np.flatnonzero(on)
+        nodes = nodes[np.argsort(along[nodes])]
+        edges = np.diff(along[nodes[::2]])
+        weight = np.zeros(nodes.size)
+        for offset, share in ((0, 1.0), (1, 4.0), (2, 1.0)):
+            weight[offset : offset + 2 * edges.size - 1 : 2] += share / 6.0 * edges
+        return nodes, weight * r[nodes]
+
+    def outline(self) -> Outline:
+        """Boundary of the half-section, the axis left out."""
+        facets = self.mesh.boundary_facets()
+        ends = self.mesh.facets[:, facets]
+        off_axis = self.mesh.p[0, ends].max(axis=0) > SAME
+        facets, ends = facets[off_axis], ends[:, off_axis]
+        vertices, edges = np.unique(ends, return_inverse=True)
+        return Outline(
+            r=np.asarray(self.mesh.p[0, vertices]),
+            z=np.asarray(self.mesh.p[1, vertices]),
+            nodes=np.asarray(self.basis.nodal_dofs[0, vertices]),
+            edges=edges.reshape(ends.shape).T,
+            elements=np.asarray(self.mesh.f2t[0, facets]),
+        )
+
+    def displacement(self, motion: Motion, nodes: NDArray[np.int64], shapes: Floats) -> Floats:
+        """Amplitudes of u_r, u_phi, u_z (nodes, 3, k) at nodes for shapes (free unknowns, k)."""
+        values = self._whole(motion, shapes)[nodes]
+        zero = np.zeros_like(values[:, 0])
+        if motion == "bending":
+            a, s, w = values[:, 0], values[:, 1], values[:, 2]
+            return np.stack([s + a, s - a, w], axis=1)
+        if motion == "torsion":
+            return np.stack([zero, values[:, 0], zero], axis=1)
+        return np.stack([values[:, 0], zero, values[:, 1]], axis=1)
+
+    def strain_at_edges(self, motion: Motion, elements: NDArray[np.int64], shapes: Floats) -> Floats:
+        """Strain amplitudes (elements, 6, k) in the middle of elements for shapes (free unknowns, k)."""
+        middle = skfem.Basis(
+            self.mesh, skfem.ElementQuad2(), quadrature=(np.array([[0.5], [0.5]]), np.ones(1)), elements=elements
+        )
+        values = np.stack([np.broadcast_to(b[0], middle.dx.shape) for b in middle.basis], axis=-1)
+        slopes = np.stack([b[0].grad for b in middle.basis], axis=-1)
+        radius = np.asarray(middle.global_coordinates())[0]
+        strain = self.strains(motion, (values, slopes[0], slopes[1], radius))[:, 0]
+        local = self._whole(motion, shapes)[np.asarray(self.basis.element_dofs)[:, elements].T]
+        return np.asarray(strain @ local.reshape(len(elements), -1, shapes.shape[1]))
+
+    def _whole(self, motion: Motion, shapes: Floats) -> Floats:
+        """Shapes over all unknowns (nodes, fields, k), zero where the axis holds them."""
+        fields = {"bending": 3, "torsion": 1, "stretching": 2}[motion]
+        values = np.zeros((fields * self.nodes.shape[1], shapes.shape[1]))
+        values[self.free_unknowns(motion)] = shapes
+        return values.reshape(self.nodes.shape[1], fields, -1)
+
+
+def locate(sections: Sequence[ShaftSection], seat: SeatBand) -> tuple[ShaftSection, float, float]:
+    """Section under a seat, lower and upper edge (m); neighbours of one diameter count as one.
+
+    Raises
+    ------
+    ShaftError
+        The seat lies outside the shaft or across a step.
+    """
+    ends = np.concatenate([[0.0], np.cumsum([section.length for section in sections])])
+    low, high = seat.z - seat.width / 2.0, seat.z + seat.width / 2.0
+    if low < -SAME or high > ends[-1] + SAME:
+        raise ShaftError(f"seat {seat.name}: it reaches from {low:g} to {high:g} m, the shaft from 0 to {ends[-1]:g} m")
+    under = [
+        section
+        for section, start, end in zip(sections, ends[:-1], ends[1:], strict=True)
+        if (start < high - SAME and end > low + SAME) or (seat.width == 0.0 and start - SAME <= low <= end + SAME)
+    ]
+    if seat.width > 0.0 and len({section.outer_diameter for section in under}) > 1:
+        raise ShaftError(f"seat {seat.name}: a shoulder lies between {low:g} and {high:g} m; move or narrow it")
+    return max(under, key=lambda section: section.outer_diameter), low, high
+
+
+def check_shaft(sections: Sequence[ShaftSection], seats: Sequence[SeatBand], size: MeshSize = STANDARD_SIZE) -> None:
+    """Refuse a shaft before it is meshed.
+
+    Raises
+    ------
+    ShaftError
+        Sections that do not touch each other, seats that do not lie on them, or more elements than memory holds.
+    """
+    _check_sections(tuple(sections))
+    for seat in seats:
+        locate(sections, seat)
+    length, radius = sum(s.length for s in sections), max(s.outer_diameter for s in sections) / 2.0
+    elements = length / size.axial * radius / size.radial
+    if elements > MOST_ELEMENTS:
+        raise ShaftError(
+            f"a shaft of {length:g} m and {2.0 * radius:g} m diameter needs {elements:.0f} elements over its section; "
+            f"{MOST_ELEMENTS} are the most"
+        )
+
+
+def _check_sections(sections: tuple[ShaftSection, ...]) -> None:
+    if not sections:
+        raise ShaftError("a shaft needs at least one section")
+    for number, (left, right) in enumerate(zip(sections[:-1], sections[1:], strict=True), start=1):
+        if min(left.outer_diameter, right.outer_diameter) <= max(left.inner_diameter, right.inner_diameter):
+            raise ShaftError(f"sections {number} and {number + 1} do not touch: the bore of one clears the other")
+
+
+def _by_field(scalar: Floats, factors: Sequence[float]) -> Floats:
+    """Element matrices (elements, 9 f, 9 f) of f fields that do not couple, from the scalar one (elements, 9, 9)."""
+    return np.asarray(np.kron(scalar, np.diag(factors)))
+
+
+def _graded_line(breaks: Sequence[float], corners: set[float], size: float, grading: int) -> Floats:
+    """Lines over an axis: on all breaks, no farther apart than `size`, closing in on the corners."""
+    unique: list[float] = []
+    for place in sorted(breaks):
+        if not unique or place - unique[-1] > SAME:
+            unique.append(place)
+    lines = [unique[0]]
+    for low, high in zip(unique[:-1], unique[1:], strict=True):
+        ends = [any(abs(end - corner) < SAME for corner in corners) for end in (low, high)]
+        room = min(size, (high - low) / (2.0 if all(ends) else 1.0))
+        closing = room * GRADING ** np.arange(grading, 0, -1)
+        left = low + closing if ends[0] else np.array([low])
+        right = high - closing if ends[1] else np.array([high])
+        start, stop = left.max(initial=low), right.min(initial=high)
+        between = np.linspace(start, stop, 1 + max(1, math.ceil((stop - start) / size - SAME)))
+        inside = np.unique(np.concatenate([left, between, right, [high]]))
+        lines += inside[inside > low].tolist()
+    return np.array(lines)
+
+
+def _half_section(radii: Floats, heights: Floats, solid: Any) -> Any:
+    """Quadrilaterals over the steel of the half-section."""
+    r_middle, z_middle = np.meshgrid((radii[1:] + radii[:-1]) / 2.0, (heights[1:] + heights[:-1]) / 2.0, indexing="ij")
+    i, j = np.nonzero(solid(r_middle, z_middle))
+    count = len(heights)
+    corners = np.stack([i * count + j, (i + 1) * count + j, (i + 1) * count + j + 1, i * count + j + 1])
+    used, numbers = np.unique(corners, return_inverse=True)
+    points = np.stack([radii[used // count], heights[used % count]])
+    return skfem.MeshQuad(points, numbers.reshape(corners.shape))

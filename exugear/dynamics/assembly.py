@@ -1,0 +1,345 @@
+"""A gearbox variant as equations of motion on one vector of coordinates, independent of any solver.
+
+Everything is packed once into arrays for the kernels: Exudyn (system.py) and the compiled solver are built
+from the same assembly, so they solve the same equations in the same coordinates.
+
+Bodies with six coordinates come first, in the order of the file, then those with their spin alone. In the
+variant `rigid` every body has its spin alone: ideal joints leave nothing else, and a planet rides on its
+carrier's spin. In the variant `flexible` elastic bodies follow, with six coordinates at each seat and their inner
+amplitudes: a gear or a bearing sits on a seat as it would on a rigid body. A fixed body, such as the housing, is the
+ground itself unless it is elastic; then it moves on its mounts, and what sits in it sits on its seats.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from fe_ste.tools.arrays import Floats
+from numpy.typing import NDArray
+
+from exugear.bodies.floating import FloatingBody
+from exugear.bodies.of_gearbox import ElasticBody
+from exugear.bodies.turning_frame import TurningBody, turning_arrays
+from exugear.kernels.connectors import ConnectorArrays, add_connector_forces, connector_load
+from exugear.kernels.elastic import ElasticArrays, add_elastic_forces, scratch_for, set_elastic_accelerations
+from exugear.kernels.inertia import InertiaArrays, accelerations
+from exugear.kernels.meshes import (
+    STATE_SIZE,
+    MeshArrays,
+    add_mesh_forces,
+    add_mesh_jacobian,
+    gear_positions,
+    mesh_state,
+)
+from exugear.kernels.springs import SpringArrays, add_spring_forces
+from exugear.kernels.travelling import TravellingArrays, follow, share_travelling_forces, travelling_tangent
+from exugear.kernels.turning import TurningArrays
+from exugear.model.gearbox import Gearbox
+from exugear.model.parts import Bearing, Body
+from exugear.tooth_mesh.element import MeshElement, pack
+
+
+class VariantError(ValueError):
+    """A variant that cannot be built from this gearbox."""
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """Equations of motion of a gearbox variant.
+
+    Attributes
+    ----------
+    gearbox, variant, law, inertias : what was assembled
+    bodies : moving bodies in the order of their coordinates, elastic fixed ones among them
+    coordinates : the six state indices of each body by name, -1 where there is none; of an elastic body those of
+        its main seat, and those of each seat under `exugear.model.seats.seat_key`
+    size : number of coordinates
+    elements, meshes : mesh elements and their arrays
+    travelling : seats of meshes on an elastic ring; their coordinates follow those of the system
+    supports, connectors : bearings and mounts (none in the variant `rigid`)
+    spring_names, springs : torsional couplings
+    inertia : mass properties of rigid bodies; in the variant `rigid` the planets' orbit is in the carrier's
+    elastic_bodies : elastic bodies by name, in the order of their coordinates
+    elastic : matrices of those whose frame does not turn
+    motions : (size, n) motions that are free; the identity, but for the law `rigid` the rolling ones
+    """
+
+    gearbox: Gearbox
+    variant: str
+    law: str
+    inertias: str
+    bodies: tuple[Body, ...]
+    coordinates: Mapping[str, tuple[int, ...]]
+    size: int
+    elements: tuple[MeshElement, ...]
+    meshes: MeshArrays
+    travelling: TravellingArrays
+    supports: tuple[Bearing, ...]
+    connectors: ConnectorArrays
+    spring_names: tuple[str, ...]
+    springs: SpringArrays
+    inertia: InertiaArrays
+    elastic_bodies: Mapping[str, ElasticBody]
+    elastic: ElasticArrays
+    motions: Floats
+
+    def has_six(self, body: Body) -> bool:
+        """Tell whether a body is rigid with all six coordinates."""
+        return self.coordinates[body.name][0] >= 0 and body.name not in self.elastic_bodies
+
+    @cached_property
+    def elastic_slices(self) -> dict[str, slice]:
+        """Coordinates of each elastic body."""
+        begin, found = self.size - sum(shaft.reduced.size for shaft in self.elastic_bodies.values()), {}
+        for name, shaft in self.elastic_bodies.items():
+            found[name] = slice(begin, begin + shaft.reduced.size)
+            begin += shaft.reduced.size
+        return found
+
+    @property
+    def floating(self) -> dict[str, FloatingBody]:
+        """Bodies that move in floating frames in Exudyn."""
+        return {name: body.floating for name, body in self.elastic_bodies.items() if body.floating is not None}
+
+    @cached_property
+    def turning(self) -> dict[str, TurningBody]:
+        """Elastic bodies in their own turning frame."""
+        time, gravity = self.gearbox.case.damping.body_time_s, self.gearbox.case.gravity.acceleration_m_per_s2
+        return {
+            name: TurningBody(body.reduced, time, gravity)
+            for name, body in self.elastic_bodies.items()
+            if body.reduced.frame == "carrier"
+        }
+
+    @cached_property
+    def turning_arrays(self) -> TurningArrays:
+        """Arrays of the same bodies."""
+        return turning_arrays((self.elastic_slices[name].start, body) for name, body in self.turning.items())
+
+    def rigid_part(self, vector: Floats) -> Floats:
+        """Copy of a vector of coordinates in which a shaft's main seat has the mean motion of the whole shaft.
+
+        It is that of the body's centre of mass, as `coordinates` of a rigid body are.
+        """
+        out = vector.copy()
+        for name, place in self.elastic_slices.items():
+            body = self.elastic_bodies[name].reduced
+            motions = body.rigid_motions(body.rigid_inertia.centre)
+            carried = motions.T @ body.mass
+            out[list(self.coordinates[name])] = np.linalg.solve(carried @ motions, carried @ vector[place])
+        return out
+
+    @cached_property
+    def housing_factor(self) -> float:
+        """Factor on bearings' stiffness that stands for their seats: 1 where an elastic housing has these itself."""
+        replaced = self.variant == "flexible" and all(support.factor == 1.0 for support in self.supports)
+        return 1.0 if replaced else self.gearbox.case.housing.factor
+
+    @cached_property
+    def spin(self) -> dict[str, int]:
+        """Coordinate of the spin of each body that turns."""
+        return {body.name: self.coordinates[body.name][5] for body in self.bodies if not body.fixed}
+
+    @cached_property
+    def connector_names(self) -> tuple[str, ...]:
+        """Names of bearings and mounts in the order of the arrays."""
+        return tuple(support.name for support in self.supports)
+
+    @cached_property
+    def mesh_names(self) -> tuple[str, ...]:
+        """Names of the meshes in the order of the arrays."""
+        return tuple(element.mesh.name for element in self.elements)
+
+    @cached_property
+    def mean_meshes(self) -> MeshArrays:
+        """Mesh arrays with stiffness and tables replaced by their mean over the cycle."""
+        return pack(self.elements, self.coordinates, averaged=True)
+
+    def linear_meshes(self, reversed_flanks: NDArray[np.bool_] | None = None) -> MeshArrays:
+        """Mesh arrays that are linear and bilateral, tables replaced by the mean stiffness at their static load.
+
+        Parameters
+        ----------
+        reversed_flanks : (meshes,) array of bool, optional
+            Meshes that press the other flank: their deflection counts from there.
+        """
+        meshes = pack(self.elements, self.coordinates, averaged=True, tables=False)
+        for m, element in enumerate(self.elements):
+            if reversed_flanks is not None and reversed_flanks[m] and element.table is not None:
+                meshes.table.nominal[m, 0] += element.table.backlash
+        return meshes
+
+    def forces(self, q: Floats, v: Floats, meshes: MeshArrays | None = None) -> Floats:
+        """Generalized forces of meshes, bearings, couplings, elastic bodies and weight, shape (size,), N and N m."""
+        f = self.mesh_forces(q, v, self.meshes if meshes is None else meshes)
+        add_connector_forces(q, v, self.connectors, f)
+        add_spring_forces(q, v, self.springs, f)
+        add_elastic_forces(q, v, self.elastic, scratch_for(self.elastic), f)
+        for name, body in self.turning.items():
+            place = self.elastic_slices[name]
+            f[place] += body.forces(q[place], v[place])
+        return f + self.weight
+
+    @cached_property
+    def weight(self) -> Floats:
+        """Generalized forces of gravity, shape (size,); those on bodies in turning frames turn with them."""
+        f = np.zeros(self.size)
+        acceleration = np.array(self.gearbox.case.gravity.acceleration_m_per_s2)
+        for body in self.bodies:
+            if self.has_six(body):
+                f[list(self.coordinates[body.name][:3])] = body.mass * acceleration
+        for name, place in self.elastic_slices.items():
+            if name in self.turning:
+                continue
+            reduced = self.elastic_bodies[name].reduced
+            f[place] = reduced.mass @ reduced.rigid_motions(reduced.seats[0].place)[:, :3] @ acceleration
+        return f
+
+    def torque_vector(self, torques: Mapping[str, float]) -> Floats:
+        """Generalized forces of torques about the bodies' spin axes (N m), shape (size,)."""
+        f = np.zeros(self.size)
+        for name, torque in torques.items():
+            if name not in self.spin:
+                raise VariantError(f"no turning body {name!r} to load; bodies are {', '.join(self.spin)}")
+            f[self.spin[name]] += torque
+        return f
+
+    def accelerations(self, q: Floats, v: Floats, applied: Floats) -> Floats:
+        """Accelerations under all forces and the applied generalized forces, shape (size,)."""
+        out = np.zeros(self.size)
+        forces = self.forces(q, v) + applied
+        accelerations(q, v, self.inertia, forces, out)
+        set_elastic_accelerations(forces, self.elastic, scratch_for(self.elastic), out)
+        for name, body in self.turning.items():
+            place = self.elastic_slices[name]
+            out[place] = body.accelerations(q[place], v[place], forces[place])
+        return out
+
+    def with_travelling(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """States (..., size) as the laws of meshes read them: with the travelling seats' coordinates, if any."""
+        if not self.travelling.first.size:
+            return q, v
+        x, u = follow(np.atleast_2d(q), np.atleast_2d(v), self.travelling)
+        return (x, u) if q.ndim > 1 else (x[0], u[0])
+
+    def mesh_forces(self, q: Floats, v: Floats, meshes: MeshArrays) -> Floats:
+        """Generalized forces of meshes, shape (size,), N and N m."""
+        x, u = self.with_travelling(q, v)
+        f = np.zeros(x.size)
+        add_mesh_forces(x, u, meshes, f)
+        share_travelling_forces(x, self.travelling, f)
+        return f[: self.size]
+
+    def mesh_jacobians(self, q: Floats, v: Floats, meshes: MeshArrays | None = None) -> tuple[Floats, Floats]:
+        """Differentiate the forces of the meshes, or others, to q and to v, each (size, size)."""
+        meshes = self.meshes if meshes is None else meshes
+        x, u = self.with_travelling(q, v)
+        jq, jv = np.zeros((x.size, x.size)), np.zeros((x.size, x.size))
+        add_mesh_jacobian(x, u, meshes, jq, jv)
+        if not self.travelling.first.size:
+            return jq, jv
+        f = np.zeros(x.size)
+        add_mesh_forces(x, u, meshes, f)
+        place, rate, turning = travelling_tangent(x, u, f, self.travelling)
+        return place.T @ (jq @ place + jv @ rate) + turning, place.T @ jv @ place
+
+    @cached_property
+    def mass_matrix(self) -> Floats:
+        """Mass matrix at zero angles, diagonal but for elastic bodies, (size, size)."""
+        m = np.zeros((self.size, self.size))
+        for n, o in enumerate(self.inertia.body):
+            values = [self.inertia.mass[n]] * 3 + [self.inertia.transverse[n]] * 2 + [self.inertia.axial[n]]
+            m[range(o, o + 6), range(o, o + 6)] = values
+        m[self.inertia.spin, self.inertia.spin] = self.inertia.spin_inertia
+        for name, place in self.elastic_slices.items():
+            m[place, place] = self.elastic_bodies[name].reduced.mass
+        return m
+
+    def mass_at(self, q: Floats) -> Floats:
+        """Mass matrix at coordinates q and zero tilts, (size, size)."""
+        m = self.mass_matrix.copy()
+        for name, body in self.turning.items():
+            place = self.elastic_slices[name]
+            m[place, place] = body.mass_matrix(q[place])
+        return m
+
+    def rolling_velocity(self, q: Floats, speeds: Mapping[str, float]) -> Floats:
+        """Velocities when the train rolls at the given spins and the planets orbit with their carriers."""
+        v = np.zeros(self.size)
+        for name, place in self.elastic_slices.items():
+            v[place] = speeds.get(name, 0.0) * self.elastic_bodies[name].reduced.spin
+            if name in self.turning:
+                v[place] = self.turning[name].rolling_velocity(q[place], speeds[name])
+        for body in self.bodies:
+            if body.fixed:
+                continue
+            v[self.spin[body.name]] = speeds[body.name]
+            if self.has_six(body) and body.carrier is not None:
+                x, y = self._from_carrier_axis(body, q)
+                o = self.coordinates[body.name][0]
+                v[o : o + 2] = speeds[body.carrier] * np.array([-y, x])
+        return v
+
+    def rolling_acceleration(self, q: Floats, speeds: Mapping[str, float], rates: Mapping[str, float]) -> Floats:
+        """Accelerations of a train that rolls at given spins and spin rates, planets' orbit included."""
+        a = np.zeros(self.size)
+        for name, place in self.elastic_slices.items():
+            a[place] = rates.get(name, 0.0) * self.elastic_bodies[name].reduced.spin
+            if name in self.turning:
+                a[place] = self.turning[name].rolling_acceleration(q[place], speeds[name], rates[name])
+        for body in self.bodies:
+            if body.fixed:
+                continue
+            a[self.spin[body.name]] = rates[body.name]
+            if self.has_six(body) and body.carrier is not None:
+                x, y = self._from_carrier_axis(body, q)
+                o, w = self.coordinates[body.name][0], speeds[body.carrier]
+                a[o : o + 2] = rates[body.carrier] * np.array([-y, x]) - w**2 * np.array([x, y])
+        return a
+
+    def _from_carrier_axis(self, body: Body, q: Floats) -> tuple[float, float]:
+        carrier = next(other for other in self.bodies if other.name == body.carrier)
+        o = self.coordinates[body.name][0]
+        return body.axis[0] - carrier.axis[0] + float(q[o]), body.axis[1] - carrier.axis[1] + float(q[o + 1])
+
+    def bearing_loads(self, q: Floats, v: Floats) -> Floats:
+        """Force and moment that each bearing takes from its body, (bearings, 6), global axes, N and N m."""
+        loads, arms = np.zeros((len(self.connector_names), 6)), np.zeros((2, 3))
+        for n, load in enumerate(loads):
+            connector_load(q, v, n, self.connectors, arms, load)
+        return loads
+
+    def mesh_states(self, q: Floats, v: Floats, meshes: MeshArrays | None = None) -> Floats:
+        """State of each mesh, (meshes, 10): see `exugear.kernels.meshes.mesh_state`."""
+        out = np.zeros((len(self.elements), STATE_SIZE))
+        mesh_state(*self.with_travelling(q, v), self.meshes if meshes is None else meshes, out)
+        return out
+
+    def gear_positions(self, q: Floats) -> Floats:
+        """Centre distance (m) and misalignment (rad) of each mesh, (meshes, 2)."""
+        out = np.zeros((len(self.elements), 2))
+        gear_positions(self.with_travelling(q, q)[0], self.meshes, out)
+        return out
+
+    def inertia_forces(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        """Generalized forces that the accelerations a need, shape (size,): the inverse of `accelerations`."""
+        f = np.zeros(self.size)
+        for n, o in enumerate(self.inertia.body):
+            mass, jt, ja = self.inertia.mass[n], self.inertia.transverse[n], self.inertia.axial[n]
+            sb, cb = math.sin(q[o + 4]), math.cos(q[o + 4])
+            da, db = v[o + 3], v[o + 4]
+            p = ja * (v[o + 5] + da * sb)
+            f[o : o + 3] = mass * a[o : o + 3]
+            f[o + 5] = ja * (a[o + 5] + a[o + 3] * sb + da * db * cb)
+            f[o + 3] = jt * cb**2 * a[o + 3] + f[o + 5] * sb + p * db * cb - 2.0 * jt * da * db * sb * cb
+            f[o + 4] = jt * a[o + 4] + jt * da**2 * sb * cb - p * da * cb
+        f[self.inertia.spin] = self.inertia.spin_inertia * a[self.inertia.spin]
+        for name, place in self.elastic_slices.items():
+            f[place] = self.elastic_bodies[name].reduced.mass @ a[place]
+            if name in self.turning:
+                f[place] = self.turning[name].inertia_forces(q[place], v[place], a[place])
+        return f

@@ -1,0 +1,70 @@
+"""Hash of all that the equations of a variant depend on."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+
+import numpy as np
+
+from exugear.bodies.of_gearbox import solid_body
+from exugear.dynamics.assembly import Assembly
+from exugear.versions import MODES, REDUCTION, RUN
+from fe_ste.transmission_error.surface import SteSurface
+
+
+def input_hash(assembly: Assembly, load_case: str | None = None) -> str:
+    """SHA-256 of all that the equations of a variant depend on: gearbox file with its solids, choices, mesh stiffness.
+
+    The versions of the methods are part of it.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    load_case : str, optional
+        For a run: its load case, with the content of its torque series.
+
+    Examples
+    --------
+    >>> from exugear.dynamics.assemble import assemble
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> softer = gearbox.varied({"housing.factor": 0.2})
+    >>> stiffness = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
+    >>> input_hash(assemble(gearbox, "bushing", stiffness)) == input_hash(assemble(softer, "bushing", stiffness))
+    False
+    """
+    gearbox = assembly.gearbox
+    series = gearbox.load_cases[load_case].torque_series if load_case else None
+    content = {
+        "method_version": RUN if load_case else MODES,
+        "reduction_version": REDUCTION if assembly.elastic_bodies else None,
+        "gearbox": gearbox.content,
+        "variant": assembly.variant,
+        "law": assembly.law,
+        "inertias": assembly.inertias,
+        "load_case": load_case,
+        "torque_series": hashlib.sha256(series.read_bytes()).hexdigest() if series else None,
+        "solids": {
+            name: hashlib.sha256(solid_body(gearbox, name).model.mesh.path.read_bytes()).hexdigest()
+            for name in assembly.elastic_bodies
+            if gearbox.case.bodies[name].solid is not None
+        },
+        # Rounded: another machine's last digits must not make another hash.
+        "stiffness": {
+            element.mesh.name: [f"{value:.9g}" for value in np.atleast_1d(element.stiffness)]
+            for element in assembly.elements
+        },
+        "tables": {
+            element.mesh.name: _digest(element.table.surface)
+            for element in assembly.elements
+            if element.table is not None
+        },
+    }
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _digest(surface: SteSurface) -> str:
+    """Hash of a table's surface, rounded likewise."""
+    arrays = (surface.centre_distance, surface.misalignment, surface.root_force, surface.coefficients)
+    text = ",".join(f"{value:.9g}" for values in arrays for value in values.ravel())
+    return hashlib.sha256(text.encode()).hexdigest()

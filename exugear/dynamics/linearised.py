@@ -1,0 +1,123 @@
+"""Equations of motion linearised about a state, and their undamped modes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.optimize
+from fe_ste.tools.arrays import Floats
+
+from exugear.bodies.turning_frame import TurningBody
+from exugear.dynamics.assembly import Assembly
+from exugear.kernels.connectors import ConnectorArrays, add_connector_forces
+from exugear.kernels.meshes import MeshArrays
+from exugear.kernels.springs import SpringArrays, add_spring_forces
+
+DIFFERENCE_STEP = 1e-6
+RIGID_BODY_LIMIT = 0.1
+"""Modes below this frequency (Hz) are motions of the whole train without deflection."""
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """Mass, and stiffness and damping by element, about a state; each matrix (size, size).
+
+    Attributes
+    ----------
+    mass : (size, size)
+    stiffness, damping : element name -> matrix; elements are meshes, bearings, couplings, elastic bodies
+    """
+
+    mass: Floats
+    stiffness: Mapping[str, Floats]
+    damping: Mapping[str, Floats]
+
+    @property
+    def total_stiffness(self) -> Floats:
+        """Sum over all elements."""
+        return sum(self.stiffness.values(), start=np.zeros_like(self.mass))
+
+    @property
+    def total_damping(self) -> Floats:
+        """Sum over all elements."""
+        return sum(self.damping.values(), start=np.zeros_like(self.mass))
+
+
+def linearise(assembly: Assembly, q: Floats, meshes: MeshArrays | None = None) -> Linearised:
+    """Matrices about the coordinates q at rest, mesh stiffness averaged over the cycle or that of other `meshes`."""
+    stiffness: dict[str, Floats] = {}
+    damping: dict[str, Floats] = {}
+    rest = np.zeros(assembly.size)
+    averaged = assembly.mean_meshes if meshes is None else meshes
+    for n, name in enumerate(assembly.mesh_names):
+        jq, jv = assembly.mesh_jacobians(q, rest, averaged.one(n))
+        stiffness[name], damping[name] = -jq, -jv
+    for n, name in enumerate(assembly.connector_names):
+        connector = ConnectorArrays._make(values[n : n + 1] for values in assembly.connectors)
+        stiffness[name], damping[name] = _tangents(assembly.size, q, connector, add_connector_forces)
+    for n, name in enumerate(assembly.spring_names):
+        spring = SpringArrays._make(values[n : n + 1] for values in assembly.springs)
+        stiffness[name], damping[name] = _tangents(assembly.size, q, spring, add_spring_forces)
+    for name, place in assembly.elastic_slices.items():
+        if name in assembly.turning:
+            turning = (place, assembly.turning[name])
+            stiffness[f"{name}_body"], damping[f"{name}_body"] = _tangents(
+                assembly.size, q, turning, _add_turning_forces
+            )
+            continue
+        own = np.zeros((assembly.size,) * 2)
+        own[place, place] = assembly.elastic_bodies[name].reduced.stiffness
+        stiffness[f"{name}_body"] = own
+        damping[f"{name}_body"] = assembly.gearbox.case.damping.body_time_s * own
+    return Linearised(assembly.mass_at(q), stiffness, damping)
+
+
+def _add_turning_forces(q: Floats, v: Floats, element: tuple[slice, TurningBody], f: Floats) -> None:
+    place, body = element
+    f[place] += body.forces(q[place], v[place])
+
+
+def _tangents(
+    size: int, q: Floats, element: Any, add: Callable[[Floats, Floats, Any, Floats], None]
+) -> tuple[Floats, Floats]:
+    """Stiffness and damping matrices of one element by central differences of its force."""
+
+    def force(dq: Floats, v: Floats) -> Floats:
+        f = np.zeros(size)
+        add(q + dq, v, element, f)
+        return f
+
+    none = np.zeros(size)
+    steps = DIFFERENCE_STEP * np.eye(size)
+    k = np.array([force(-e, none) - force(e, none) for e in steps]).T / (2.0 * DIFFERENCE_STEP)
+    d = np.array([force(none, -e) - force(none, e) for e in steps]).T / (2.0 * DIFFERENCE_STEP)
+    return k, d
+
+
+def undamped_modes(mass: Floats, stiffness: Floats, motions: Floats | None = None) -> tuple[Floats, Floats]:
+    """Solve M x'' + K x = 0 for frequencies (Hz, ascending) and real shapes; M symmetric, K any.
+
+    A preloaded connector or the law `seed` makes K unsymmetric. Equal frequencies may then come out as a complex pair
+    that differs from real by round-off; its real and imaginary parts span the same plane. `motions` (size, n) are
+    those that are free, all by default.
+    """
+    root = np.linalg.cholesky(mass)
+    basis = scipy.linalg.orth(root.T @ (np.eye(len(mass)) if motions is None else motions))
+    free = np.linalg.solve(root.T, basis)
+    values, vectors = scipy.linalg.eig(free.T @ stiffness @ free)
+    shapes = free @ np.where(values.imag < 0.0, vectors.imag, vectors.real)
+    order = np.argsort(values.real)
+    frequency = np.sqrt(np.maximum(values.real[order], 0.0)) / (2.0 * np.pi)
+    return frequency, shapes[:, order]
+
+
+def growth_rate(linear: Linearised) -> float:
+    """Largest real part of the eigenvalues of M x'' + D x' + K x = 0, 1/s, the free rotation left out."""
+    size = len(linear.mass)
+    lower = np.linalg.solve(linear.mass, np.hstack([-linear.total_stiffness, -linear.total_damping]))
+    values = scipy.linalg.eigvals(np.vstack([np.eye(size, 2 * size, size), lower]))
+    elastic = np.abs(values.imag) > 2.0 * np.pi * RIGID_BODY_LIMIT
+    return float(values.real[elastic].max(initial=-np.inf))

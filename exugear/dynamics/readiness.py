@@ -1,0 +1,107 @@
+"""All parts of a gearbox built once, as far as that is quick: what a later step refuses is told before it begins."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from exugear.bearings.rollers import BearingError
+from exugear.bearings.supports import ON_BEARINGS, bearing_matrices, elastic_names, unsupported
+from exugear.dynamics.restraint import free_motion
+from exugear.loads.torque_series import torque_series
+from exugear.model.gearbox import Gearbox
+from exugear.model.parts import Bearing
+from exugear.model.reading import CaseError
+from exugear.tooth_mesh.placement import MeshError, loaded_flanks, tooth_places
+
+VARIANTS = ("rigid", "bushing", "flexible")
+MOST_STATES = 200_000
+"""Most states of one table: at 50 ms each, three hours."""
+
+
+def check_parts(gearbox: Gearbox) -> None:
+    """Build what tables, modes and runs are made of, but no mesh of finite elements.
+
+    Raises
+    ------
+    CaseError
+        All that is wrong: bearings, teeth that do not fit, shapes and solids with their seats, axes of tables, series.
+    """
+    families = {bearing.family: bearing for bearing in gearbox.bearings}
+    attempts: list[Callable[[], object]] = [partial(_build_bearing, gearbox, bearing) for bearing in families.values()]
+    attempts += [partial(_place_teeth, gearbox), partial(_count_states, gearbox)]
+    attempts += [partial(gearbox.table_distances, name) for name in _pairs_with_axes(gearbox)]
+    attempts += [partial(torque_series, gearbox, case) for case in gearbox.load_cases.values()]
+    attempts += [partial(_build_elastic_body, gearbox, name) for name in elastic_names(gearbox)]
+    faults: list[str] = []
+    for attempt in attempts:
+        try:
+            attempt()
+        except CaseError as error:
+            faults += error.faults
+    if faults:
+        raise CaseError(*faults)
+
+
+def lacking(gearbox: Gearbox, variant: str) -> str:
+    """Say why a variant cannot be built or moves without resistance; empty if it can.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> [lacking(gearbox, variant) for variant in VARIANTS]
+    ['', '', '']
+    """
+    return unsupported(gearbox, variant) or (free_motion(gearbox, variant) if variant in ON_BEARINGS else "")
+
+
+def remarks(gearbox: Gearbox) -> tuple[str, ...]:
+    """Tell what is possible and unusual, and what some verbs will refuse; a line each."""
+    found = list(gearbox.warnings)
+    for name, spec in gearbox.pairs.items():
+        if not spec.static_torque > 0.0 and any(mesh.pair.name == name for mesh in gearbox.meshes):
+            found.append(f"pairs.{name}: carries no torque in [static_load], and so gets no table")
+    freedoms = gearbox.kinematic_modes.shape[1]
+    if freedoms > 1:
+        found.append(f"meshes: the train has {freedoms} degrees of freedom; modes are possible, runs are not yet")
+    return tuple(found)
+
+
+def _build_bearing(gearbox: Gearbox, bearing: Bearing) -> None:
+    try:
+        stiffness, _ = bearing_matrices(bearing, 0.0)
+    except BearingError as error:
+        raise gearbox.fault(f"bearings.{bearing.family}.catalogue: {error}") from None
+    if not np.all(np.isfinite(stiffness)):
+        raise gearbox.fault(f"bearings.{bearing.family}.catalogue: gives no finite stiffness; check its dimensions")
+
+
+def _place_teeth(gearbox: Gearbox) -> None:
+    try:
+        tooth_places(gearbox, loaded_flanks(gearbox))
+    except MeshError as error:
+        raise gearbox.fault(str(error)) from None
+
+
+def _count_states(gearbox: Gearbox) -> None:
+    axes = gearbox.ste
+    states = axes.positions * len(axes.torque_factors) * len(axes.centre_distance_offsets_um)
+    states *= len(axes.misalignment_um)
+    if states > MOST_STATES:
+        raise gearbox.fault(f"ste: its axes make {states} states of a table; {MOST_STATES} are the most")
+
+
+def _pairs_with_axes(gearbox: Gearbox) -> list[str]:
+    """Pairs whose tables go over centre distances; none where nobody asked for these."""
+    if not gearbox.ste.grid and "centre_distance_offsets_um" not in gearbox.ste.model_fields_set:
+        return []
+    at_work = {mesh.pair.name for mesh in gearbox.meshes}
+    return [name for name, section in gearbox.case.pairs.items() if section.table or name in at_work]
+
+
+def _build_elastic_body(gearbox: Gearbox, name: str) -> None:
+    from exugear.bodies.of_gearbox import check_elastic_body
+
+    check_elastic_body(gearbox, name)

@@ -1,0 +1,212 @@
+"""States in balance: the output locked under load, and the start of a run in uniform acceleration.
+
+Both are Newton solutions of the assembly's own forces; elastic deflections are small against the geometry, so
+that a few steps with a difference quotient of the residual reach round-off.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+from fe_ste.tools.arrays import Floats
+
+from exugear.dynamics.assembly import Assembly
+from exugear.kernels.meshes import MeshArrays
+
+STEP = 1e-7
+"""Difference step of the Newton matrices, m and rad: far above round-off, far below any radius."""
+LARGEST_RESIDUAL = 1e-9
+"""Share of the load at which a residual that stops falling is round-off."""
+
+
+class BalanceError(RuntimeError):
+    """No state in balance was found."""
+
+
+@dataclass(frozen=True)
+class StartState:
+    """Coordinates and velocities at the start of a run, with the spin rates (rad/s2) it starts with."""
+
+    q: Floats
+    v: Floats
+    rates: Mapping[str, float]
+    drive_torque: float
+
+
+def _newton(residual: Callable[[Floats], Floats], start: Floats, steps: Floats, scale: Floats, what: str) -> Floats:
+    """Newton's method with central differences, until the residual stops falling.
+
+    `steps` are those of the differences, `scale` is the size of each residual that counts as one. Being small against
+    the loads ends nothing: a train near balance accelerates with a ten-thousandth of them. Residuals are sums of spring
+    forces, and rounding of places near 1 m is what these cannot resolve: under a small load that is more of it than
+    under a large one, and no step can make it less.
+    """
+    x, solution, best = start, start, np.inf
+    if not x.size:
+        return x
+    rounding = np.zeros_like(x)
+    for _ in range(30):
+        r = residual(x)
+        error = float(np.max(np.abs(r) / scale))
+        if not np.isfinite(error):
+            break
+        stalled = error > 0.5 * best
+        if error < best:
+            solution, best = x, error
+        small = best < LARGEST_RESIDUAL or bool(np.all(np.abs(r) <= rounding))
+        if error == 0.0 or (stalled and small):
+            return solution
+        columns = [(residual(x + e) - residual(x - e)) / (2.0 * e.sum()) for e in np.diag(steps)]
+        matrix = np.array(columns).T
+        rounding = np.abs(matrix) @ np.full(x.size, np.finfo(float).eps)
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error", scipy.linalg.LinAlgWarning)
+                x = x - scipy.linalg.solve(matrix / scale[:, None], r / scale)
+        except (scipy.linalg.LinAlgError, scipy.linalg.LinAlgWarning):
+            raise BalanceError(
+                f"{what}: the stiffness matrix is singular; a body may move without resistance"
+            ) from None
+    raise BalanceError(f"{what}: no balance found, the residual stays at {best:.2e} of the load")
+
+
+def locked_equilibrium(
+    assembly: Assembly,
+    torques: Mapping[str, float],
+    locked: Sequence[str],
+    meshes: MeshArrays | None = None,
+) -> Floats:
+    """Coordinates at rest under torques (N m) with some spins held at zero.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    torques : mapping of body name to torque about +z, N m
+    locked : names of the bodies whose spins are held; where they leave the train free to roll and the torques are in
+        balance, it stays where it is
+    meshes : MeshArrays, optional
+        Mesh arrays to use instead of the assembly's, such as its `mean_meshes`.
+
+    Raises
+    ------
+    BalanceError
+        The structure is free to move, or Newton's method does not converge.
+    """
+    held = [assembly.spin[name] for name in _held(assembly, torques, locked)]
+    free = assembly.motions @ scipy.linalg.null_space(assembly.motions[held])
+    applied = assembly.torque_vector(torques)
+    rest = np.zeros(assembly.size)
+
+    def solve(start: Floats, meshes: MeshArrays | None) -> Floats:
+        def residual(x: Floats) -> Floats:
+            return free.T @ (assembly.forces(free @ x, rest, meshes) + applied)
+
+        steps, scale = np.full(start.size, STEP), np.full(start.size, _load_scale(applied))
+        return _newton(residual, start, steps, scale, "static state")
+
+    start = _touching(assembly, np.zeros(free.shape[1]), lambda x: np.asarray(free @ x), solve)
+    return np.asarray(free @ solve(start, meshes))
+
+
+def _held(assembly: Assembly, torques: Mapping[str, float], locked: Sequence[str]) -> list[str]:
+    """Bodies to hold so that the train cannot roll: the locked ones, then such as carry no torque by being held.
+
+    Raises
+    ------
+    BalanceError
+        The locked bodies leave the train free to roll, and the torques would make it.
+    """
+    gearbox, held = assembly.gearbox, list(locked)
+    rolling, row = gearbox.kinematic_modes, gearbox.spinning.index
+    free = rolling @ scipy.linalg.null_space(rolling[[row(name) for name in held]]) if held else rolling
+    applied = np.array([torques.get(name, 0.0) for name in gearbox.spinning])
+    if free.size and np.abs(free.T @ applied).max() > 1e-9 * np.abs(applied).max():
+        raise BalanceError(f"static state: the torques are not held by locking {', '.join(locked) or 'nothing'}")
+    overall = gearbox.case.overall
+    for name in (overall.input, overall.output, *gearbox.spinning):
+        rank = np.linalg.matrix_rank(rolling[[row(other) for other in held]]) if held else 0
+        if np.linalg.matrix_rank(rolling[[row(other) for other in (*held, name)]]) > rank:
+            held.append(name)
+    return held
+
+
+def _touching(
+    assembly: Assembly,
+    start: Floats,
+    place: Callable[[Floats], Floats],
+    solve: Callable[[Floats, MeshArrays | None], Floats],
+) -> Floats:
+    """Begin with tables where linear teeth would be, on the flanks that these press: flanks apart hold nothing."""
+    if assembly.law != "table":
+        return start
+    x = solve(start, assembly.linear_meshes())
+    q = place(x)
+    reversed_flanks = assembly.mesh_states(q, np.zeros_like(q), assembly.linear_meshes())[:, 4] < 0.0
+    return solve(x, assembly.linear_meshes(reversed_flanks)) if reversed_flanks.any() else x
+
+
+def _load_scale(applied: Floats) -> float:
+    """Size of the loads (N or N m, at least 1) that residuals are measured by."""
+    return max(1.0, float(np.abs(applied).max(initial=0.0)))
+
+
+def accelerating_start(
+    assembly: Assembly,
+    torques: Mapping[str, float],
+    input_speed: float = 0.0,
+    driven: tuple[str, float] | None = None,
+) -> StartState:
+    """State that rolls with a uniform acceleration, deflections in balance with loads and inertia forces.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    torques : mapping of body name to torque about +z, N m
+    input_speed : float
+        Speed of the overall input, rad/s; all other speeds follow by rolling.
+    driven : (body, spin rate), optional
+        A body whose spin rate (rad/s2) is prescribed; the torque that this takes is solved for.
+
+    Raises
+    ------
+    BalanceError
+        As `locked_equilibrium`; also when the train has several degrees of freedom.
+    """
+    gearbox = assembly.gearbox
+    reference = gearbox.case.overall.input
+    unit = gearbox.rolling_speeds(reference, 1.0)
+    speeds = {name: value * input_speed for name, value in unit.items()}
+    applied = assembly.torque_vector(torques)
+    pinned = assembly.spin[reference]
+    direction = np.zeros(assembly.size)
+    known_rate = 0.0
+    if driven is not None:
+        direction[assembly.spin[driven[0]]] = 1.0
+        known_rate = driven[1] / unit[driven[0]]
+    size = _load_scale(applied)
+    motions = assembly.motions
+
+    def split(x: Floats) -> tuple[Floats, dict[str, float], float]:
+        rate = known_rate if driven is not None else float(x[-1])
+        torque = size * float(x[-1]) if driven is not None else 0.0
+        return motions @ x[:-1], {name: value * rate for name, value in unit.items()}, torque
+
+    def solve(start: Floats, meshes: MeshArrays | None) -> Floats:
+        def residual(x: Floats) -> Floats:
+            q, rates, torque = split(x)
+            v = assembly.rolling_velocity(q, speeds)
+            needed = assembly.inertia_forces(q, v, assembly.rolling_acceleration(q, speeds, rates))
+            unbalanced = assembly.forces(q, v, meshes) + applied + torque * direction - needed
+            return np.append(motions.T @ unbalanced, size * q[pinned])
+
+        # The residual is linear in the last unknown, an acceleration or a torque: no step is too long for it.
+        steps = np.append(np.full(start.size - 1, STEP), 1.0)
+        return _newton(residual, start, steps, np.full(start.size, size), "start of the run")
+
+    x = _touching(assembly, np.zeros(motions.shape[1] + 1), lambda x: split(x)[0], solve)
+    q, rates, torque = split(solve(x, None))
+    return StartState(q, assembly.rolling_velocity(q, speeds), rates, torque)

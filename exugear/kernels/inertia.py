@@ -1,0 +1,66 @@
+"""Compiled inertia of rigid bodies, symmetric about their axes, on arrays of coordinates."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from fe_ste.tools.arrays import Floats, Integers
+
+from fe_ste.tools.compilation import compiled
+
+
+class InertiaArrays(NamedTuple):
+    """Inertias, axially symmetric with the centre of mass at the node.
+
+    Attributes
+    ----------
+    body : (b,) first coordinate of each body with six coordinates
+    mass, transverse, axial : (b,) kg, kg m2, kg m2
+    spin : (s,) coordinate of each body with its spin alone
+    spin_inertia : (s,) kg m2
+    """
+
+    body: Integers
+    mass: Floats
+    transverse: Floats
+    axial: Floats
+    spin: Integers
+    spin_inertia: Floats
+
+
+@compiled
+def accelerations(q: Floats, v: Floats, inertia: InertiaArrays, f: Floats, out: Floats) -> None:
+    """Solve the equations of motion of the bodies for the accelerations under generalized forces f.
+
+    For an axially symmetric body in Rxyz coordinates with p = J_a (spin' + a' sin b):
+
+        J_t cos^2 b a'' = Q_a - Q_spin sin b - p b' cos b + 2 J_t a' b' sin b cos b
+        J_t b'' = Q_b - J_t a'^2 sin b cos b + p a' cos b,   spin'' = Q_spin / J_a - a'' sin b - a' b' cos b
+    """
+    for n in range(inertia.body.size):
+        o, jt, ja = inertia.body[n], inertia.transverse[n], inertia.axial[n]
+        for i in range(3):
+            out[o + i] = f[o + i] / inertia.mass[n]
+        sb, cb = math.sin(q[o + 4]), math.cos(q[o + 4])
+        da, db = v[o + 3], v[o + 4]
+        p = ja * (v[o + 5] + da * sb)
+        out[o + 3] = (f[o + 3] - f[o + 5] * sb - p * db * cb + 2.0 * jt * da * db * sb * cb) / (jt * cb * cb)
+        out[o + 4] = (f[o + 4] - jt * da * da * sb * cb + p * da * cb) / jt
+        out[o + 5] = f[o + 5] / ja - out[o + 3] * sb - da * db * cb
+    for n in range(inertia.spin.size):
+        out[inertia.spin[n]] = f[inertia.spin[n]] / inertia.spin_inertia[n]
+
+
+@compiled
+def kinetic_energies(q: Floats, v: Floats, inertia: InertiaArrays, out: Floats) -> None:
+    """Fill the kinetic energy (J) of each body, six-coordinate bodies first."""
+    for n in range(inertia.body.size):
+        o = inertia.body[n]
+        square = v[o] ** 2 + v[o + 1] ** 2 + v[o + 2] ** 2
+        sb, cb = math.sin(q[o + 4]), math.cos(q[o + 4])
+        tilting = (v[o + 3] * cb) ** 2 + v[o + 4] ** 2
+        spin = v[o + 5] + v[o + 3] * sb
+        out[n] = 0.5 * (inertia.mass[n] * square + inertia.transverse[n] * tilting + inertia.axial[n] * spin**2)
+    for n in range(inertia.spin.size):
+        out[inertia.body.size + n] = 0.5 * inertia.spin_inertia[n] * v[inertia.spin[n]] ** 2

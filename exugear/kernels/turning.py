@@ -1,0 +1,191 @@
+"""Elastic bodies described in their own turning frame, such as a planet carrier: laws on arrays of coordinates.
+
+Coordinates in the state are those of rigid bodies: at each seat the displacement of its centre from the place p that
+it has at zero angles, tilts about axes that do not turn, and the unwrapped spin; then the inner amplitudes. So a seat
+at p from the axis that turns by psi is displaced by x = R(psi) (p + u) - p. Stiffness and mass are constant in a frame
+that turns with the mean psi of the spins of the seats off the axis (of all seats if none is), Omega = d psi / dt:
+
+- displacements in it, q: u = R' (p + x) - p, tilts R' (a, b), spins less psi, amplitudes as they are;
+- velocities along its axes, w: R' x', R' (a', b'), spins', amplitudes'. With S, which turns the vectors of the seats
+  by a right angle about z (no spin, no amplitude), and the rigid spin r, q' = w - Omega (r + S q).
+
+Kinetic energy w' M w / 2, elastic energy q' K q / 2 and damping, time times K, on the rates q' give
+
+    M dw/dt = R' f - K (q + time q') + Omega h + s m,    h = -(2 C - M S) (w - Omega r) - Omega C r,
+
+with C_ij = int rho phi_i . (e_z x phi_j), accelerations R (dw/dt + Omega S w), and the weights s of the spins in psi,
+which carry the reaction on the frame's angle, m = (S q) . K (q + time q') - w . h. The sum has the Coriolis forces
+2 Omega C q' and the centrifugal force -Omega^2 C r of the undeformed body; a disc on the axis tilts as a gyroscope.
+All forces but damping balance: their power w . (-K q + Omega h) + Omega m is -q' . K q, whatever h is.
+
+Of what else is quadratic in Omega, centrifugal stiffening and softening of the deformation are left out together, and
+tilts count as on the axis; the part of Omega' C q that M S does not hold is left out, too. At the speed of a planet
+carrier (3 rad/s) this is a millionth of the elastic forces.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from fe_ste.tools.arrays import Floats, Integers
+
+from exugear.kernels.elastic import LANES, row_product
+from fe_ste.tools.compilation import kernel
+
+
+class TurningArrays(NamedTuple):
+    """Bodies in turning frames as b bodies, arranged for speed; rows are filled up with zeros to `LANES`.
+
+    Attributes
+    ----------
+    begin, size, seats : (b,) first coordinate in the state, number of coordinates and seats
+    columns : (b,) length of the rows of the matrices
+    first : (b,) first entry of each body in the vectors
+    spin, weight, pull : r, s and -C r of all bodies
+    square : (b,) first entry of each body in the matrices
+    stiffness, coriolis, mass, inverse : K, 2 C - M S, M and its inverse, row by row
+    damping_time : (b,) s
+    gravity : (b, 3) m/s2
+    """
+
+    begin: Integers
+    size: Integers
+    seats: Integers
+    columns: Integers
+    first: Integers
+    spin: Floats
+    weight: Floats
+    pull: Floats
+    square: Integers
+    stiffness: Floats
+    coriolis: Floats
+    mass: Floats
+    inverse: Floats
+    damping_time: Floats
+    gravity: Floats
+
+
+def turning_memory(turning: TurningArrays) -> Floats:
+    """Memory that the functions below work in."""
+    return np.zeros((5, int(turning.columns.max(initial=LANES))))
+
+
+@kernel
+def see_body(
+    b: int, q: Floats, v: Floats, turning: TurningArrays, moved: Floats, rates: Floats
+) -> tuple[float, float, float]:
+    """Fill displacements q and rates w - Omega r of body b in its frame; return cos psi, sin psi and Omega."""
+    begin, first, size = turning.begin[b], turning.first[b], turning.size[b]
+    angle, speed = 0.0, 0.0
+    for n in range(turning.seats[b]):
+        weight = turning.weight[first + 6 * n + 5]
+        angle += weight * q[begin + 6 * n + 5]
+        speed += weight * v[begin + 6 * n + 5]
+    c, s = math.cos(angle), math.sin(angle)
+    for n in range(turning.seats[b]):
+        i, j = 6 * n, begin + 6 * n
+        rx, ry = turning.spin[first + i], turning.spin[first + i + 1]
+        x, y = ry + q[j], q[j + 1] - rx
+        moved[i], moved[i + 1] = c * x + s * y - ry, c * y - s * x + rx
+        rates[i] = c * v[j] + s * v[j + 1] - speed * rx
+        rates[i + 1] = c * v[j + 1] - s * v[j] - speed * ry
+        moved[i + 3], moved[i + 4] = c * q[j + 3] + s * q[j + 4], c * q[j + 4] - s * q[j + 3]
+        rates[i + 3], rates[i + 4] = c * v[j + 3] + s * v[j + 4], c * v[j + 4] - s * v[j + 3]
+        moved[i + 2], rates[i + 2] = q[j + 2], v[j + 2]
+        moved[i + 5], rates[i + 5] = q[j + 5] - angle, v[j + 5] - speed
+    for i in range(6 * turning.seats[b], size):
+        moved[i], rates[i] = q[begin + i], v[begin + i]
+    for i in range(size, turning.columns[b]):
+        moved[i], rates[i] = 0.0, 0.0
+    return c, s, speed
+
+
+@kernel
+def turn_on(b: int, moved: Floats, rates: Floats, speed: float, turning: TurningArrays, out: Floats) -> None:
+    """Fill the rates q' = w - Omega r - Omega S q of the displacements of body b."""
+    for i in range(turning.columns[b]):
+        out[i] = rates[i]
+    for n in range(turning.seats[b]):
+        for i in (6 * n, 6 * n + 3):
+            out[i] += speed * moved[i + 1]
+            out[i + 1] -= speed * moved[i]
+
+
+@kernel
+def set_turning_motion(q: Floats, v: Floats, f: Floats, turning: TurningArrays, memory: Floats, out: Floats) -> None:
+    """Fill the accelerations of all bodies under generalized forces f, their own forces left out, into out."""
+    moved, rates, given, elastic, total = memory[0], memory[1], memory[2], memory[3], memory[4]
+    for b in range(turning.begin.size):
+        begin, first, size, columns = turning.begin[b], turning.first[b], turning.size[b], turning.columns[b]
+        c, s, speed = see_body(b, q, v, turning, moved, rates)
+        turn_on(b, moved, rates, speed, turning, given)
+        for i in range(size):
+            given[i] = moved[i] + turning.damping_time[b] * given[i]
+        reaction = 0.0
+        row = turning.square[b]
+        for i in range(size):
+            elastic[i] = -row_product(turning.stiffness, row, given, columns)
+            apparent = speed * turning.pull[first + i] - row_product(turning.coriolis, row, rates, columns)
+            total[i] = f[begin + i] + elastic[i] + speed * apparent
+            reaction -= (rates[i] + speed * turning.spin[first + i]) * apparent
+            row += columns
+        for n in range(turning.seats[b]):
+            for i in (6 * n, 6 * n + 3):
+                x, y = f[begin + i], f[begin + i + 1]
+                reaction += moved[i + 1] * elastic[i] - moved[i] * elastic[i + 1]
+                total[i] += c * x + s * y - x
+                total[i + 1] += c * y - s * x - y
+        for n in range(turning.seats[b]):
+            total[6 * n + 5] += reaction * turning.weight[first + 6 * n + 5]
+        for i in range(size, columns):
+            total[i] = 0.0
+        row = turning.square[b]
+        for i in range(size):
+            out[begin + i] = row_product(turning.inverse, row, total, columns)
+            row += columns
+        for n in range(turning.seats[b]):
+            for i in (6 * n, 6 * n + 3):
+                spin_x, spin_y = turning.spin[first + i], turning.spin[first + i + 1]
+                x = out[begin + i] - speed * (rates[i + 1] + speed * spin_y)
+                y = out[begin + i + 1] + speed * (rates[i] + speed * spin_x)
+                out[begin + i], out[begin + i + 1] = c * x - s * y, s * x + c * y
+            for axis in range(3):
+                out[begin + 6 * n + axis] += turning.gravity[b, axis]
+
+
+@kernel
+def square_form(matrix: Floats, row: int, size: int, columns: int, x: Floats) -> float:
+    """Scalar x' A x of a body's matrix that begins at an entry."""
+    total = 0.0
+    for i in range(size):
+        total += x[i] * row_product(matrix, row, x, columns)
+        row += columns
+    return total
+
+
+@kernel
+def turning_energies(q: Floats, v: Floats, turning: TurningArrays, memory: Floats) -> tuple[float, float, float, float]:
+    """Kinetic and elastic energy (J) of all bodies, the power that they damp, and that of their weight (W)."""
+    moved, rates, given, falling = memory[0], memory[1], memory[2], memory[3]
+    kinetic, stored, damped, weight = 0.0, 0.0, 0.0, 0.0
+    for b in range(turning.begin.size):
+        first, size, columns = turning.first[b], turning.size[b], turning.columns[b]
+        row = turning.square[b]
+        c, s, speed = see_body(b, q, v, turning, moved, rates)
+        stored += 0.5 * square_form(turning.stiffness, row, size, columns, moved)
+        turn_on(b, moved, rates, speed, turning, given)
+        damped += turning.damping_time[b] * square_form(turning.stiffness, row, size, columns, given)
+        falling[:] = 0.0
+        for n in range(turning.seats[b]):
+            x, y = turning.gravity[b, 0], turning.gravity[b, 1]
+            falling[6 * n], falling[6 * n + 1] = c * x + s * y, c * y - s * x
+            falling[6 * n + 2] = turning.gravity[b, 2]
+        for i in range(size):
+            rates[i] += speed * turning.spin[first + i]
+        kinetic += 0.5 * square_form(turning.mass, row, size, columns, rates)
+        for i in range(size):
+            weight += rates[i] * row_product(turning.mass, row, falling, columns)
+            row += columns
+    return kinetic, stored, damped, weight

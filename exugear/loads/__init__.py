@@ -1,0 +1,1 @@
+"""Load cases: torque series, and what they do to the rolling train."""

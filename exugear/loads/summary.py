@@ -1,0 +1,240 @@
+"""What a load case does to the train as it rolls: net torque, speeds, and the flanks that its meshes load.
+
+Gears and couplings count as rigid and all axes as fixed, so that one speed tells all others: that of the overall
+input. To it torques are referred by their power and inertias by their kinetic energy, planets' orbits included. This
+costs nothing beside a run, and shows the wrong sign of a torque before one is begun.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from fe_ste.tools.arrays import Floats
+
+from exugear.loads.torque_series import torque_series
+from exugear.model.gearbox import UNLOADED, Gearbox
+from exugear.model.parts import LoadCase
+
+Series = Mapping[str, tuple[Floats, Floats]]
+BURSTING_RIM_SPEED = 300.0
+"""Rim speed that no wheel of steel survives, m/s: density times its square is 0.7 GPa, the yield strength
+of gear steels. The fastest turbo gears run at two thirds of it.
+"""
+INSTANTS = 2001
+"""Instants at which a torque that changes is looked at, beside those of its own lines."""
+
+
+@dataclass(frozen=True)
+class LoadSummary:
+    """A load case in figures, of the rolling train.
+
+    Attributes
+    ----------
+    name : str
+        Of the load case.
+    inertia : float
+        Of the whole train at the overall input, kg m2.
+    net_torque : float
+        Of all torques at the overall input, at the start and without a drive's, N m.
+    driven : bool
+        Whether a machine prescribes the speed, and holds what the torques do not.
+    start_speed, end_speed, fastest_speed : float
+        Of the overall input, rad/s; the last without sign.
+    rim_speeds : mapping of body name to float
+        Speed of the fastest gear's rim on each body with gears at `fastest_speed`, m/s.
+    mesh_forces : mapping of mesh name to float
+        F_bt at the start, N; its sign says which flank of gear 1 carries, as in `Gearbox.static_mesh_forces`.
+    flanks : mapping of mesh family to str
+        Loaded flanks in the course of the load case: ``+``, ``-``, ``+-`` for both, ``0`` for none.
+    reversed_flanks : tuple of str
+        Mesh families with a loaded flank that is not the one of the static load, which their tables are of.
+    """
+
+    name: str
+    inertia: float
+    net_torque: float
+    driven: bool
+    start_speed: float
+    end_speed: float
+    fastest_speed: float
+    rim_speeds: Mapping[str, float]
+    mesh_forces: Mapping[str, float]
+    flanks: Mapping[str, str]
+    reversed_flanks: tuple[str, ...]
+
+    @property
+    def fastest_rim(self) -> tuple[str, float]:
+        """Body with the fastest rim and its speed, m/s."""
+        return max(self.rim_speeds.items(), key=lambda item: item[1])
+
+
+def summarise_loads(
+    gearbox: Gearbox,
+    case: LoadCase,
+    inertias: str | None = None,
+    duration: float | None = None,
+    series: Series | None = None,
+) -> LoadSummary:
+    """Sum up what a load case does to the rolling train.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    case : LoadCase
+    inertias : str, optional
+        Inertia set; the file's default otherwise.
+    duration : float, optional
+        Simulated time, s; the load case's by default.
+    series : mapping, optional
+        As `exugear.loads.torque_series.torque_series` reads it, where it has been read.
+
+    Raises
+    ------
+    CaseError
+        The torque series cannot be used, or the train is not fixed by the speed of its input.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> loads = summarise_loads(gearbox, gearbox.load_cases["reference"])
+    >>> round(loads.net_torque), round(loads.end_speed, 1)
+    (-4472, -22.5)
+    >>> loads.flanks["high_speed"], loads.reversed_flanks
+    ('-', ())
+    """
+    series = torque_series(gearbox, case) if series is None else series
+    total = case.duration if duration is None else duration
+    names = gearbox.spinning
+    rolling = gearbox.rolling_speeds(gearbox.case.overall.input, 1.0)
+    unit = np.array([rolling[name] for name in names])
+    axial = _axial_inertias(gearbox, inertias)
+    inertia = float(axial @ unit**2)
+    times = _instants(series, total)
+    torques = _torques(names, case, series, times)
+    rates, speeds = _motion(gearbox, case, times, torques @ unit / inertia)
+    needed = torques - rates[:, None] * axial * unit
+    if case.driven_body is not None:
+        place = names.index(case.driven_body)
+        needed[:, place] -= needed @ unit / unit[place]  # what the machine adds
+    forces = _mesh_forces(gearbox, needed)
+    fastest = float(np.abs(speeds).max())
+    flanks, reversed_flanks = _flanks(gearbox, forces)
+    return LoadSummary(
+        name=case.name,
+        inertia=inertia,
+        net_torque=float(torques[0] @ unit),
+        driven=case.driven_body is not None,
+        start_speed=case.start_speed,
+        end_speed=float(speeds[-1]),
+        fastest_speed=fastest,
+        rim_speeds={name: fastest * abs(rolling[name]) * radius for name, radius in rim_radii(gearbox).items()},
+        mesh_forces={mesh.name: float(force) for mesh, force in zip(gearbox.meshes, forces[0], strict=True)},
+        flanks=flanks,
+        reversed_flanks=reversed_flanks,
+    )
+
+
+def doubts_about(loads: LoadSummary) -> tuple[str, ...]:
+    """Say in words what looks like the wrong sign of a torque, nothing if all is well."""
+    found = []
+    if loads.reversed_flanks:
+        found.append(
+            f"torque sign? {', '.join(loads.reversed_flanks)} loaded on another flank than by the static load, which "
+            "tables, stiffness and phases are of"
+        )
+    body, rim = loads.fastest_rim
+    if rim > BURSTING_RIM_SPEED:
+        found.append(
+            f"torque sign, or too long? the torques bring a rim on {body} to {rim:.4g} m/s, and wheels of steel burst "
+            f"at some {BURSTING_RIM_SPEED:g} m/s; a run stops there"
+        )
+    return tuple(found)
+
+
+def rim_radii(gearbox: Gearbox) -> dict[str, float]:
+    """Radius (m) of the largest gear on each turning body that has gears; of an internal gear that of its teeth."""
+    return {
+        body.name: max(gearbox.gears[gear].tip_radius for gear in body.wheels)
+        for body in gearbox.bodies()
+        if body.wheels and not body.fixed
+    }
+
+
+def _axial_inertias(gearbox: Gearbox, inertias: str | None) -> Floats:
+    """Inertia of each spin, kg m2, with planets' orbits in their carrier's."""
+    bodies = {body.name: body for body in gearbox.bodies(inertias)}
+    axial = {name: bodies[name].axial for name in gearbox.spinning}
+    for body in bodies.values():
+        if body.carrier is not None and body.carrier in axial:
+            axial[body.carrier] += body.mass * math.dist(body.axis, bodies[body.carrier].axis) ** 2
+    return np.array([axial[name] for name in gearbox.spinning])
+
+
+def _instants(series: Series, total: float) -> Floats:
+    """Instants (s) from 0 to the end that tell all of a load case: with torques that change, their lines too."""
+    if not series:
+        return np.array([0.0, total])
+    lines = np.concatenate([times for times, _ in series.values()])
+    inside = lines[(lines > 0.0) & (lines < total)]
+    return np.unique(np.concatenate([np.linspace(0.0, total, INSTANTS), inside]))
+
+
+def _torques(names: tuple[str, ...], case: LoadCase, series: Series, times: Floats) -> Floats:
+    """Torques (times, bodies) on the spins, N m."""
+    torques = np.zeros((len(times), len(names)))
+    for name, torque in case.torques.items():
+        torques[:, names.index(name)] += torque
+    for name, (lines, values) in series.items():
+        torques[:, names.index(name)] += np.interp(times, lines, values)
+    return torques
+
+
+def _motion(gearbox: Gearbox, case: LoadCase, times: Floats, free: Floats) -> tuple[Floats, Floats]:
+    """Rates (rad/s2) and speeds (rad/s) of the overall input; `free` are the rates that the torques alone give."""
+    if case.driven_body is not None:
+        rates = np.full(len(times), drive_rate(gearbox, case) / _drive_ratio(gearbox, case))
+    else:
+        rates = free
+    # Between the instants torques are linear: the trapezoidal rule is exact at them.
+    gained = np.append(0.0, np.cumsum(0.5 * (rates[1:] + rates[:-1]) * np.diff(times)))
+    return rates, case.start_speed + gained
+
+
+def drive_rate(gearbox: Gearbox, case: LoadCase) -> float:
+    """Spin rate (rad/s2) of the driven body: from its speed at the start to its end speed."""
+    end = case.end_speed if case.end_speed is not None else 0.0
+    return (end - driven_start_speed(gearbox, case)) / case.duration
+
+
+def driven_start_speed(gearbox: Gearbox, case: LoadCase) -> float:
+    """Speed of the driven body at the start, rad/s; the case states it at the overall input."""
+    return _drive_ratio(gearbox, case) * case.start_speed
+
+
+def _drive_ratio(gearbox: Gearbox, case: LoadCase) -> float:
+    """Spin of the driven body per spin of the overall input."""
+    return gearbox.rolling_speeds(gearbox.case.overall.input, 1.0)[str(case.driven_body)]
+
+
+def _mesh_forces(gearbox: Gearbox, applied: Floats) -> Floats:
+    """F_bt (times, meshes) that torques in balance (times, bodies) load meshes with; least-norm where they share."""
+    forces = np.linalg.lstsq(gearbox.spin_rows.T, applied.T, rcond=1e-12)[0]
+    return np.asarray(forces[: len(gearbox.meshes)].T)
+
+
+def _flanks(gearbox: Gearbox, forces: Floats) -> tuple[dict[str, str], tuple[str, ...]]:
+    """Find loaded flanks by mesh family, and the families that load another than the static load does."""
+    static = gearbox.static_mesh_forces()
+    least = UNLOADED * float(np.abs(forces).max(initial=0.0))
+    flanks: dict[str, str] = {}
+    turned = []
+    for m, mesh in enumerate(gearbox.meshes):
+        own = forces[:, m]
+        loaded = ("+" if np.any(own > least) else "") + ("-" if np.any(own < -least) else "")
+        flanks[mesh.family] = "".join(sign for sign in "+-" if sign in flanks.get(mesh.family, "") + loaded)
+        if np.any(own * np.sign(static[mesh.name]) < -least):
+            turned.append(mesh.family)
+    return {family: found or "0" for family, found in flanks.items()}, tuple(dict.fromkeys(turned))

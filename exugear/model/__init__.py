@@ -1,0 +1,1 @@
+"""The gearbox as data: file, sections, parts, checks. Nothing here computes dynamics."""

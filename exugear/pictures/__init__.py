@@ -1,0 +1,1 @@
+"""Diagrams of runs and modes, pictures and animations of gearboxes."""

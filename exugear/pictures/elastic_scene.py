@@ -1,0 +1,258 @@
+"""Pictures and animations of elastic bodies in a mode, deformed and coloured by strain energy."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from textwrap import fill
+from typing import TYPE_CHECKING
+
+import numpy as np
+from fe_ste.tools.arrays import Floats, Pixels
+from numpy.typing import NDArray
+
+from exugear.bodies.reduced_body import Surface
+from exugear.dynamics.assembly import Assembly
+from exugear.model.seats import seat_key
+from exugear.pictures.scene import displacement_map, look, quad_mesh, write_animation
+from exugear.pictures.shapes import BodyShape, gear_surface, placed
+from fe_ste.tools.drawing import drawing_style, finish_figure, new_figure
+from fe_ste.tools.rendering import drawn_part, offscreen_plotter, place_picture, rendered_image, without_margins
+
+if TYPE_CHECKING:
+    import pyvista
+    from matplotlib.figure import Figure
+
+
+SIDE = (1.0, 0.35, -0.4)
+"""From the bodies to the eye: mostly from the side, where bending shows."""
+LINE = 90
+"""Letters in a line of the title."""
+BRIGHTEST = 99.0
+"""Share of the surface (%) below the density of the last colour: at sharp shoulders it grows without bound."""
+
+
+@dataclass(frozen=True)
+class DeformedBody:
+    """A body in a mode: points (p, 3) at rest, quads (f, 4), displacement (p, 3) as drawn, energy (f,) from 0 to 1.
+
+    Of a housing only the half behind its axis, so that it hides nothing.
+    """
+
+    points: Floats
+    quads: NDArray[np.int64]
+    displacement: Floats
+    energy: Floats
+
+
+@dataclass(frozen=True)
+class ElasticScene:
+    """Elastic bodies in a mode, and their gears, which ride on their seats.
+
+    Attributes
+    ----------
+    bodies : tuple of DeformedBody
+    gears : tuple of BodyShape
+    motions : tuple of (6,) arrays
+        Motion of each gear as drawn.
+    title : str
+    """
+
+    bodies: tuple[DeformedBody, ...]
+    gears: tuple[BodyShape, ...]
+    motions: tuple[Floats, ...]
+    title: str
+
+
+def elastic_scene(assembly: Assembly, shape: Floats, *, title: str = "", amplitude: float = 0.06) -> ElasticScene:
+    """Arrange the elastic bodies of an assembly in a mode.
+
+    Parameters
+    ----------
+    assembly : Assembly
+        Of the variant `flexible`.
+    shape : (size,) array
+        Mode shape.
+    title : str
+    amplitude : float
+        Largest displacement drawn, as a share of the longest body.
+
+    Raises
+    ------
+    ValueError
+        The assembly has no elastic bodies, or the mode does not move them.
+    """
+    if not assembly.elastic_bodies:
+        raise ValueError(f"variant {assembly.variant} has no elastic bodies to draw; use the variant flexible")
+    found = []
+    fixed = {body.name: body.axis for body in assembly.bodies if body.fixed}
+    for name, place in assembly.elastic_slices.items():
+        surface = assembly.elastic_bodies[name].reduced.surface
+        if name in fixed:
+            surface = _half_behind(surface, fixed[name])
+        found.append((surface, surface.displacement @ shape[place], surface.energy_density(shape[place])))
+    largest = max(float(np.linalg.norm(moved, axis=1).max()) for _, moved, _ in found)
+    if not largest > 0.0:
+        raise ValueError("the mode does not move the elastic bodies")
+    factor = amplitude * max(float(np.ptp(surface.points[:, 2])) for surface, _, _ in found) / largest
+    brightest = _density_below(
+        np.concatenate([density for _, _, density in found]),
+        np.concatenate([_areas(surface.points, surface.quads) for surface, _, _ in found]),
+    )
+    gears, motions = _gears(assembly, factor * shape)
+    return ElasticScene(
+        bodies=tuple(
+            DeformedBody(surface.points, surface.quads, factor * moved, np.minimum(density / brightest, 1.0))
+            for surface, moved, density in found
+        ),
+        gears=gears,
+        motions=motions,
+        title=title,
+    )
+
+
+def _half_behind(surface: Surface, axis: tuple[float, float]) -> Surface:
+    """Faces of a surface that lie behind an axis along z, seen from `SIDE`."""
+    behind = (surface.points[surface.quads].mean(axis=1)[:, :2] - axis) @ SIDE[:2] < 0.0
+    return replace(surface, quads=surface.quads[behind], strain=surface.strain[behind])
+
+
+def _areas(points: Floats, quads: NDArray[np.int64]) -> Floats:
+    """Area of each quad, m2."""
+    one, two = points[quads[:, 2]] - points[quads[:, 0]], points[quads[:, 3]] - points[quads[:, 1]]
+    areas: Floats = 0.5 * np.linalg.norm(np.cross(one, two), axis=1)
+    return areas
+
+
+def _density_below(density: Floats, area: Floats) -> float:
+    """Density that all but the brightest part of the surface stays below."""
+    order = np.argsort(density)
+    share = np.cumsum(area[order]) / area.sum()
+    return float(density[order][np.searchsorted(share, BRIGHTEST / 100.0)]) or 1.0
+
+
+def _gears(assembly: Assembly, shape: Floats) -> tuple[tuple[BodyShape, ...], tuple[Floats, ...]]:
+    gears, motions = [], []
+    for body in assembly.bodies:
+        if body.name not in assembly.elastic_bodies or body.fixed:  # a housing has its ring in its own surface
+            continue
+        for gear, z in body.wheels.items():
+            place = np.array([*body.axis, z])
+            gears.append(BodyShape(gear, gear, gear_surface(assembly.gearbox.gears[gear]).moved(place), place))
+            motions.append(shape[list(assembly.coordinates[seat_key(body.name, gear)])])
+    return tuple(gears), tuple(motions)
+
+
+def draw_elastic_bodies(
+    scene: ElasticScene, path: str | Path | None = None, *, size: tuple[int, int] = (1600, 1200)
+) -> Figure:
+    """Draw elastic bodies at their largest deflection, coloured by strain energy density; gears translucent.
+
+    Parameters
+    ----------
+    scene : ElasticScene
+    path : path-like, optional
+        Where to write the picture.
+    size : (int, int)
+        Width and height of the rendered image, pixels.
+
+    Raises
+    ------
+    fe_ste.tools.rendering.RenderingError
+        If this machine cannot render off-screen.
+    """
+    with offscreen_plotter(*size) as plotter:
+        _add(plotter, scene)
+        look(plotter, SIDE)
+        image, pixel = rendered_image(plotter)
+    return finish_figure(_figure(without_margins(image), pixel, scene.title), path)
+
+
+def animate_elastic_bodies(
+    scene: ElasticScene,
+    path: str | Path,
+    *,
+    frames: int = 24,
+    duration: float = 1.6,
+    size: tuple[int, int] = (900, 700),
+) -> Path:
+    """Write one period of a mode as an animated picture that repeats for ever.
+
+    Parameters
+    ----------
+    scene : ElasticScene
+    path : path-like
+        Where to write; the suffix must be ``.gif``.
+    frames : int
+        Pictures per period, an even number.
+    duration : float
+        Length of a period, s.
+    size : (int, int)
+        Width and height of the rendered image, pixels.
+
+    Raises
+    ------
+    ValueError
+        If the suffix is another.
+    fe_ste.tools.rendering.RenderingError
+        If this machine cannot render off-screen.
+    """
+    images = []
+    with offscreen_plotter(*size) as plotter:
+        bodies, gears = _add(plotter, scene)
+        look(plotter, SIDE)
+        count = frames // 2 + 1
+        for number in range(count):
+            part = math.cos(math.pi * number / (count - 1))
+            for mesh, body in zip(bodies, scene.bodies, strict=True):
+                mesh.points = body.points + part * body.displacement
+                mesh.cell_data["energy"] = part**2 * body.energy
+            for mesh, gear, motion in zip(gears, scene.gears, scene.motions, strict=True):
+                mesh.points = placed(gear, part * motion)
+            images.append(rendered_image(plotter))
+    together = np.min([image for image, _ in images], axis=0)
+    rows, columns = drawn_part(together)
+    return write_animation(
+        [_figure(image[rows, columns], pixel, scene.title) for image, pixel in images], Path(path), duration
+    )
+
+
+def _add(plotter: pyvista.Plotter, scene: ElasticScene) -> tuple[list[pyvista.PolyData], list[pyvista.PolyData]]:
+    import pyvista
+
+    bodies, gears = [], []
+    for body in scene.bodies:
+        mesh = quad_mesh(body.points + body.displacement, body.quads)
+        mesh.cell_data["energy"] = body.energy
+        plotter.add_mesh(
+            mesh,
+            scalars="energy",
+            clim=(0.0, 1.0),
+            cmap=displacement_map(),
+            show_scalar_bar=False,
+            ambient=0.15,
+            diffuse=0.75,  # less than full: walls at rest are light, and must stand out from the page
+        )
+        bodies.append(mesh)
+    for gear, motion in zip(scene.gears, scene.motions, strict=True):
+        triangles = gear.surface.triangles
+        faces = np.column_stack([np.full(len(triangles), 3), triangles])
+        mesh = pyvista.PolyData(placed(gear, motion), faces=faces.ravel())
+        plotter.add_mesh(mesh, color="#8A97A8", opacity=0.25)
+        gears.append(mesh)
+    return bodies, gears
+
+
+def _figure(image: Pixels, pixel: float, title: str) -> Figure:
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    with drawing_style():
+        figure = new_figure(7.6, 6.6 * image.shape[0] / image.shape[1] + 0.7)
+        panel = figure.add_subplot()
+        place_picture(panel, image, pixel, fill(title, LINE))
+        scale = ScalarMappable(Normalize(0.0, 1.0), displacement_map())
+        label = f"Strain energy density / that of {BRIGHTEST:g} % of the surface"
+        figure.colorbar(scale, ax=panel, label=label, shrink=0.7, aspect=26)
+        return figure

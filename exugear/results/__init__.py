@@ -1,0 +1,1 @@
+"""Files of results: the folder, runs in pieces and whole."""

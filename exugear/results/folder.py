@@ -1,0 +1,130 @@
+"""The results folder: the case it belongs to, whether a file fits that case, and where the time went."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import sys
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from exugear.model.gearbox import Gearbox
+from exugear.model.named_files import NOTHING_MORE, Permissions
+from exugear.model.reading import CaseError, parsed
+from fe_ste.tools.files import FileError, append_line, read_text, write_file
+
+CASE_FILE = "case.json"
+TIMES_FILE = "times.jsonl"
+REPORT_FILE = "report.html"
+
+
+def keep_case(gearbox: Gearbox, folder: Path) -> None:
+    """Write the content of the gearbox file into the results folder, so that a report needs nothing else."""
+    kept = {"source": str(Path(gearbox.source).resolve()), "content": gearbox.content}
+    write_file(folder / CASE_FILE, json.dumps({**kept, "checksum": _checksum(kept)}, indent=1).encode("utf-8"))
+
+
+def _checksum(kept: dict[str, Any]) -> str:
+    """Checksum of a case as it is kept, however it is set out."""
+    text = json.dumps([kept["source"], kept["content"]], sort_keys=True)
+    return hashlib.sha256(text.encode("utf-8")).hexdigest()
+
+
+def kept_case(folder: Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:
+    """Read the gearbox that the results of a folder belong to.
+
+    Parameters
+    ----------
+    folder : Path
+    permissions : Permissions
+        Where else files that the gearbox file names may lie.
+
+    Raises
+    ------
+    CaseError
+        The folder holds no results, or what it says of its case cannot be used.
+    """
+    path = folder / CASE_FILE
+    if not path.is_file():
+        raise CaseError(f"{folder}: holds no results (no {CASE_FILE}); name the folder that `exugear run` wrote into")
+    try:
+        kept = parsed(lambda: json.loads(read_text(path)), str(path), "JSON")
+        if not isinstance(kept, dict):
+            raise ValueError("it holds no case")
+        if "checksum" not in kept:
+            raise ValueError("it was written by an earlier version")
+        if kept["checksum"] != _checksum(kept):
+            raise ValueError("it was changed since it was written")
+        content, source = kept["content"], kept["source"]
+    # Whoever makes up a file with its checksum may write into it what he likes.
+    except (FileError, ValueError, KeyError, TypeError, RecursionError) as error:
+        raise CaseError(f"{path}: cannot be used ({error}); run `exugear modes` into this folder again") from error
+    return Gearbox.from_dict(content, source, permissions)
+
+
+def modes_path(folder: str | Path, variant: str, law: str, inertias: str) -> Path:
+    """Place of the modes of a variant: ``<variant>/<law>-<inertias>/modes.nc``."""
+    return Path(folder) / variant / f"{law}-{inertias}" / "modes.nc"
+
+
+def bodies_folder(folder: Path) -> Path:
+    """Place of the reductions of elastic bodies: ``bodies``."""
+    return folder / "bodies"
+
+
+@dataclass(frozen=True)
+class Spent:
+    """What a step of the work took.
+
+    Attributes
+    ----------
+    step : what was done
+    seconds : wall time
+    memory : peak of the process's memory, bytes
+    """
+
+    step: str
+    seconds: float
+    memory: float
+
+
+def peak_memory() -> float:
+    """Highest memory of this process so far, bytes; NaN on Windows."""
+    if sys.platform == "win32":
+        return math.nan  # no such account without a further library
+    import resource
+
+    peak = float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+    return peak if sys.platform == "darwin" else 1024.0 * peak  # Linux counts in KiB
+
+
+def note_time(folder: Path, step: str, seconds: float) -> None:
+    """Add a line to the folder's account of time; processes may do so at once."""
+    append_line(folder / TIMES_FILE, json.dumps(asdict(Spent(step, round(seconds, 2), peak_memory()))))
+
+
+def times_spent(folder: Path) -> tuple[Spent, ...]:
+    """Last account of each step, in the order in which the steps were last done."""
+    last: dict[str, Spent] = {}
+    for entry in _lines(folder / TIMES_FILE):
+        last.pop(entry.step, None)
+        last[entry.step] = entry
+    return tuple(last.values())
+
+
+def _lines(path: Path) -> Iterator[Spent]:
+    try:
+        lines = read_text(path).splitlines()
+    except FileError:
+        return  # an account that is missing or is none
+    for line in lines:
+        try:
+            values: dict[str, Any] = json.loads(line)
+            spent = Spent(str(values["step"]), float(values["seconds"]), float(values["memory"]))
+        except (ValueError, KeyError, TypeError, RecursionError, OverflowError):
+            continue  # a line cut short by a kill says nothing
+        if math.isfinite(spent.seconds):
+            yield spent

@@ -1,0 +1,1 @@
+"""Two solvers for one assembly: the compiled one, and Exudyn."""

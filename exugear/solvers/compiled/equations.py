@@ -1,0 +1,211 @@
+"""Equations of motion, signals and a Runge-Kutta loop as one compiled piece that allocates nothing per step.
+
+The laws are those of `exugear.kernels.meshes`, which the tests hold them against; here they are arranged for speed:
+every
+sine is taken once per evaluation, constant entries that are zero are left out, bearing forces are collected per body
+before they are turned into generalized ones. Bodies without a coordinate point to one that stays zero, so that
+the loops need no exceptions.
+"""
+
+from __future__ import annotations
+
+import math
+
+from exugear.kernels.elastic import elastic_energies, set_elastic_motion
+from exugear.kernels.travelling import place_travelling, share_travelling_forces
+from exugear.kernels.turning import set_turning_motion, turning_energies
+from exugear.solvers.compiled.arrays import Bodies, Equations, Joints, Loads, Meshes, Springs, Work
+from exugear.solvers.compiled.connectors import add_connectors, observe_connectors, place_bodies
+from exugear.solvers.compiled.meshes import add_meshes, observe_meshes
+from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.compilation import kernel
+
+
+@kernel
+def add_springs(q: Floats, v: Floats, springs: Springs, f: Floats) -> None:
+    """Add the torques of the torsional springs to f."""
+    for n in range(springs.ends.shape[0]):
+        i, j = springs.ends[n, 0], springs.ends[n, 1]
+        torque = springs.stiffness[n] * (q[j] - q[i]) + springs.damping[n] * (v[j] - v[i])
+        f[i] += torque
+        f[j] -= torque
+
+
+@kernel
+def set_loads(t: float, q: Floats, v: Floats, loads: Loads, series: Integers, f: Floats) -> None:
+    """Set f to what acts from outside at time t (s)."""
+    for i in range(loads.steady.size):
+        f[i] = loads.steady[i]
+    for n in range(loads.coordinate.size):
+        first, last = loads.first[n], loads.first[n + 1] - 1
+        line = series[n]
+        while line < last - 1 and loads.time[line + 1] <= t:
+            line += 1
+        while line > first and loads.time[line] > t:
+            line -= 1
+        series[n] = line
+        share = (t - loads.time[line]) / (loads.time[line + 1] - loads.time[line])
+        share = min(1.0, max(0.0, share))
+        f[loads.coordinate[n]] += loads.torque[line] + share * (loads.torque[line + 1] - loads.torque[line])
+    for n in range(loads.drive.size):
+        i, law = loads.drive[n], loads.law[n]
+        angle, speed = law[2] + t * (law[3] + t * law[4]), law[3] + 2.0 * t * law[4]
+        f[i] += law[0] * (angle - q[i]) + law[1] * (speed - v[i])
+
+
+@kernel
+def set_accelerations(v: Floats, bodies: Bodies, work: Work) -> None:
+    """Solve the bodies' equations for `work.rate`; formula in `exugear.kernels.inertia.accelerations`."""
+    f, out = work.force, work.rate
+    for n in range(bodies.mass.size):
+        o, jt, ja = bodies.start[n], bodies.transverse[n], bodies.axial[n]
+        sb, cb = work.frames[n, 14], work.frames[n, 15]
+        for i in range(3):
+            out[o + i] = f[o + i] / bodies.mass[n]
+        da, db = v[o + 3], v[o + 4]
+        p = ja * (v[o + 5] + da * sb)
+        out[o + 3] = (f[o + 3] - f[o + 5] * sb - p * db * cb + 2.0 * jt * da * db * sb * cb) / (jt * cb * cb)
+        out[o + 4] = (f[o + 4] - jt * da * da * sb * cb + p * da * cb) / jt
+        out[o + 5] = f[o + 5] / ja - out[o + 3] * sb - da * db * cb
+    for n in range(bodies.spin.size):
+        out[bodies.spin[n]] = f[bodies.spin[n]] / bodies.spin_inertia[n]
+    for n in range(bodies.inverse.shape[0]):
+        out[bodies.spin[n]] = 0.0
+        for m in range(bodies.inverse.shape[1]):
+            out[bodies.spin[n]] += bodies.inverse[n, m] * f[bodies.spin[m]]
+
+
+@kernel
+def evaluate(t: float, q: Floats, v: Floats, equations: Equations, work: Work) -> None:
+    """Fill `work.rate` with the accelerations at time t (s) and state q, v (e,)."""
+    place_bodies(q, v, equations.bodies, work)
+    set_loads(t, q, v, equations.loads, work.series, work.force)
+    add_connectors(q, v, equations.bodies, equations.connectors, work)
+    place_travelling(q, v, equations.travelling)
+    add_meshes(q, v, equations.meshes, work)
+    share_travelling_forces(q, equations.travelling, work.force)
+    add_springs(q, v, equations.springs, work.force)
+    set_accelerations(v, equations.bodies, work)
+    set_elastic_motion(q, v, work.force, equations.motion, work.scratch[0], work.rate)
+    set_turning_motion(q, v, work.force, equations.turning, work.memory, work.rate)
+
+
+@kernel
+def advance(first: int, step: float, equations: Equations, work: Work, out_q: Floats, out_v: Floats) -> int:
+    """Fill out_q and out_v (steps, size) with the states after each step of the classical Runge-Kutta method.
+
+    Starts from `work.q`, `work.v` at time ``first * step``; returns the number of steps that stayed finite.
+    """
+    size = out_q.shape[1]
+    q, v, x, u, a, total = work.q, work.v, work.stage_q, work.stage_v, work.rate, work.total
+    half = 0.5 * step
+    for n in range(out_q.shape[0]):
+        begin = (first + n) * step
+        for i in range(size):
+            x[i], u[i] = q[i], v[i]
+            total[i], out_q[n, i] = 0.0, 0.0
+        for stage in range(4):  # a loop, so that the equations are compiled once
+            evaluate(begin + (0.0 if stage == 0 else half if stage < 3 else step), x, u, equations, work)
+            weight = 2.0 if stage == 1 or stage == 2 else 1.0
+            ahead = half if stage < 2 else step
+            for i in range(size):
+                total[i] += weight * a[i]
+                if stage < 3:
+                    out_q[n, i] += a[i]
+                    x[i] = q[i] + ahead * u[i]
+                    u[i] = v[i] + ahead * a[i]
+        check = 0.0
+        for i in range(size):
+            q[i] += step * (v[i] + step / 6.0 * out_q[n, i])
+            v[i] += step / 6.0 * total[i]
+            out_q[n, i], out_v[n, i] = q[i], v[i]
+            check += abs(q[i]) + abs(v[i])
+        if not math.isfinite(check):
+            return n
+    steps: int = out_q.shape[0]
+    return steps
+
+
+@kernel
+def observe_joints(v: Floats, meshes: Meshes, joints: Joints, work: Work, signals: Floats) -> None:
+    """Fill the force of each ideal joint on its body (3 j,), global axes; after `observe_meshes`."""
+    signals[:] = 0.0
+    for m in range(meshes.coordinates.shape[0]):
+        c, s = work.turns[meshes.slot[m], 0], work.turns[meshes.slot[m], 1]
+        for end in range(2):
+            j = joints.ends[m, end]
+            if j >= 0:
+                force = work.states[m, 3]
+                row = meshes.force[m]
+                if force < 0.0 and meshes.table.shape[m, 0] > 0:  # the other flank pushes
+                    force, row = -force, meshes.table.back[m]
+                x, y, z = row[6 * end], row[6 * end + 1], row[6 * end + 2]
+                signals[3 * j] += force * (c * x - s * y)
+                signals[3 * j + 1] += force * (s * x + c * y)
+                signals[3 * j + 2] += force * z
+    for j in range(joints.host.size):
+        if joints.planet[j, 0] > 0.0:
+            c, s = work.turns[joints.slot[j], 0], work.turns[joints.slot[j], 1]
+            pull = joints.planet[j, 0] * v[joints.carrier[j]] ** 2
+            signals[3 * j] -= pull * (c * joints.planet[j, 1] - s * joints.planet[j, 2])
+            signals[3 * j + 1] -= pull * (s * joints.planet[j, 1] + c * joints.planet[j, 2])
+        if joints.host[j] >= 0:
+            for i in range(3):
+                signals[3 * joints.host[j] + i] += signals[3 * j + i]
+
+
+@kernel
+def observe_bodies(q: Floats, v: Floats, bodies: Bodies, work: Work, energy: Floats) -> None:
+    """Add the kinetic energy of all bodies (see `observe`)."""
+    for n in range(bodies.mass.size):
+        o, sb, cb = bodies.start[n], work.frames[n, 14], work.frames[n, 15]
+        square = v[o] * v[o] + v[o + 1] * v[o + 1] + v[o + 2] * v[o + 2]
+        tilting = (v[o + 3] * cb) ** 2 + v[o + 4] * v[o + 4]
+        spin = v[o + 5] + v[o + 3] * sb
+        energy[0] += 0.5 * (bodies.mass[n] * square + bodies.transverse[n] * tilting + bodies.axial[n] * spin * spin)
+    for n in range(bodies.spin.size):
+        energy[0] += 0.5 * bodies.spin_inertia[n] * v[bodies.spin[n]] ** 2
+
+
+@kernel
+def observe(
+    time: Floats, q: Floats, v: Floats, equations: Equations, work: Work, signals: Floats, energies: Floats
+) -> None:
+    """Fill signals (samples, 2 m + 3 supports) and energies (samples, 7) of states q, v (samples, size).
+
+    Signals: deflection and F_bt of each mesh, force of each bearing or ideal joint, with tables where the gears stand
+    (`exugear.dynamics.signals`). Energies: kinetic and elastic (J); powers (W) of the loads, damped, of k(PMC),
+    non-conservative of meshes and of bearings.
+    """
+    size = q.shape[1]
+    meshes, springs = equations.meshes, equations.springs
+    two = 2 * meshes.coordinates.shape[0]
+    x, u, f = work.stage_q, work.stage_v, work.force
+    for n in range(q.shape[0]):
+        energy = energies[n]
+        energy[:] = 0.0
+        for i in range(size):
+            x[i], u[i] = q[n, i], v[n, i]
+        place_bodies(x, u, equations.bodies, work)
+        observe_bodies(x, u, equations.bodies, work, energy)
+        place_travelling(x, u, equations.travelling)
+        observe_meshes(x, u, meshes, work, signals[n], energy)
+        observe_connectors(x, u, equations.bodies, equations.connectors, work, signals[n, two:], energy)
+        if equations.joints.host.size > 0:
+            observe_joints(u, meshes, equations.joints, work, signals[n, two : two + 3 * equations.joints.host.size])
+        for s in range(springs.ends.shape[0]):
+            i, j = springs.ends[s, 0], springs.ends[s, 1]
+            energy[1] += 0.5 * springs.stiffness[s] * (x[j] - x[i]) ** 2
+            energy[3] += springs.damping[s] * (u[j] - u[i]) ** 2
+        kinetic, stored, damped = elastic_energies(x, u, equations.elastic, work.scratch)
+        energy[0] += kinetic
+        energy[1] += stored
+        energy[3] += damped
+        kinetic, stored, damped, weight = turning_energies(x, u, equations.turning, work.memory)
+        energy[0] += kinetic
+        energy[1] += stored
+        energy[2] += weight
+        energy[3] += damped
+        set_loads(time[n], x, u, equations.loads, work.series, f)
+        for i in range(size):
+            energy[2] += f[i] * u[i]

@@ -1,0 +1,228 @@
+"""An assembly and its loads as the arrays of the compiled solver."""
+
+from __future__ import annotations
+
+import numpy as np
+from fe_ste.tools.arrays import Floats
+from numpy.typing import NDArray
+
+from exugear.dynamics.assembly import Assembly
+from exugear.kernels.connectors import ConnectorArrays
+from exugear.kernels.elastic import elastic_motion, scratch_for
+from exugear.kernels.table_law import scratch_memory
+from exugear.kernels.turning import turning_memory
+from exugear.model.sections import GROUND
+from exugear.solvers.compiled.arrays import Bodies, Connectors, Equations, Joints, Loads, Meshes, Springs, Work
+from exugear.solvers.loads import LoadTable
+
+ROUND_OFF = 1e-14
+"""Entries of a bearing's matrix this small beside its diagonal are left-overs of rotating it, and left out."""
+
+
+def extended_size(assembly: Assembly) -> int:
+    """Count the coordinates with those of travelling seats."""
+    return assembly.size + 6 * assembly.travelling.first.size
+
+
+class _Numbers:
+    """Numbering of bodies and of the coordinates whose sine is needed."""
+
+    def __init__(self, assembly: Assembly) -> None:
+        self.assembly = assembly
+        self.size = extended_size(assembly)
+        self.starts = [int(start) for start in assembly.inertia.body]
+        # Of elastic bodies only seats in bearings turn anything out of their own coordinates.
+        seats = np.setdiff1d(assembly.connectors.bodies, [-1, *self.starts])
+        self.starts += [int(start) for start in seats]
+        self.turning = [self.size]
+
+    def body(self, start: int) -> int:
+        """Find the number of the body that starts at a coordinate; the ground (-1) comes last."""
+        return len(self.starts) if start < 0 else self.starts.index(start)
+
+    def slot(self, coordinate: int) -> int:
+        """Place of a coordinate's sine, taken up if it is new; 0 for none."""
+        if coordinate < 0:
+            return 0
+        if coordinate not in self.turning:
+            self.turning.append(coordinate)
+        return self.turning.index(coordinate)
+
+
+def _connectors(numbers: _Numbers) -> tuple[Connectors, NDArray[np.int64]]:
+    """Connectors, and the slot of the sine of each body's spin where a connector needs it."""
+    given = numbers.assembly.connectors
+    ends = np.array([[numbers.body(int(s)) for s in pair] for pair in given.bodies], dtype=np.int64).reshape(-1, 2)
+    order = np.lexsort((ends[:, 1], ends[:, 0])).astype(np.int64)
+    given = ConnectorArrays._make(values[order] for values in given)
+    ends = ends[order]
+    slots = np.zeros(len(numbers.starts) + 1, dtype=np.int64)
+    twisting = np.zeros(len(ends), dtype=np.int64)
+    first, entries = [0], []
+    for n, (i, j) in enumerate(ends):
+        stiffness, damping = _without_round_off(given.stiffness[n]), _without_round_off(given.damping[n])
+        twisting[(ends == ends[n]).all(axis=1)] |= stiffness[:, 5].any()
+        for end, needed in ((i, True), (j, stiffness[:, 5].any() or given.local[n, 1, :2].any())):
+            if needed and end < len(numbers.starts):
+                slots[end] = numbers.slot(numbers.starts[end] + 5)
+        places = np.argwhere((stiffness != 0.0) | (damping != 0.0))
+        entries += [(r, c, stiffness[r, c], damping[r, c]) for r, c in places]
+        first.append(len(entries))
+    columns = list(zip(*entries, strict=True)) if entries else [(), (), (), ()]
+    connectors = Connectors(
+        number=order,
+        ends=ends,
+        local=given.local,
+        gap=(given.place[:, 1] + given.local[:, 1]) - (given.place[:, 0] + given.local[:, 0]),
+        repeated=np.append(0, (ends[1:] == ends[:-1]).all(axis=1)).astype(np.int64)[: len(ends)],
+        twisting=twisting,
+        first=np.array(first, dtype=np.int64),
+        row=np.array(columns[0], dtype=np.int64),
+        column=np.array(columns[1], dtype=np.int64),
+        stiffness=np.array(columns[2], dtype=np.float64),
+        damping=np.array(columns[3], dtype=np.float64),
+    )
+    return connectors, slots
+
+
+def _without_round_off(matrix: Floats) -> Floats:
+    """Set entries to zero that are nothing beside the translations' and the tilts' stiffness."""
+    entries = np.abs(matrix)
+    size = np.sqrt(np.repeat([entries[:3, :3].max(), entries[3:, 3:].max()], 3))
+    return np.where(entries <= ROUND_OFF * np.outer(size, size), 0.0, matrix)
+
+
+def _meshes(numbers: _Numbers) -> Meshes:
+    given = numbers.assembly.meshes
+    place = given.place.copy()
+    place[given.coordinates[:, :12].reshape(-1, 2, 6)[:, :, 0] < 0] = 0.0
+    others = np.delete(given.coordinates[:, :12], [5, 11], axis=1)
+    return Meshes(
+        coordinates=np.where(given.coordinates < 0, numbers.size, given.coordinates),
+        slot=np.array([numbers.slot(int(c)) for c in given.coordinates[:, 12]], dtype=np.int64),
+        place=place,
+        deflection=given.deflection,
+        force=given.force,
+        conjugate=np.all(given.deflection == given.force, axis=1).astype(np.int64),
+        spinning=np.all(others < 0, axis=1).astype(np.int64),
+        cycles=given.cycles,
+        phase=given.phase,
+        pieces=given.pieces,
+        stiffness=given.stiffness,
+        damping=given.damping,
+        line_of_action=given.line_of_action,
+        error_pieces=given.error_pieces,
+        error=given.error,
+        table=given.table,
+    )
+
+
+def _joints(numbers: _Numbers) -> Joints:
+    assembly = numbers.assembly
+    joints = assembly.gearbox.joints if assembly.variant == "rigid" else ()
+    bodies = {body.name: body for body in assembly.gearbox.bodies(assembly.inertias)}
+    number = {joint.body: n for n, joint in enumerate(joints)}
+    ends = [[number.get(e.mesh.pinion, -1), number.get(e.mesh.gear, -1)] for e in assembly.elements]
+    planet, carrier = np.zeros((len(joints), 3)), np.full(len(joints), numbers.size)
+    for n, joint in enumerate(joints):
+        body = bodies[joint.body]
+        if body.carrier is not None:
+            axis = np.array(body.axis) - np.array(bodies[body.carrier].axis)
+            planet[n] = body.mass, axis[0], axis[1]
+            carrier[n] = assembly.spin[body.carrier]
+    return Joints(
+        ends=np.array(ends, dtype=np.int64).reshape(-1, 2),
+        host=np.array([-1 if j.on == GROUND else number.get(j.on, -1) for j in joints], dtype=np.int64),
+        planet=planet,
+        carrier=carrier.astype(np.int64),
+        slot=np.array([numbers.slot(int(c)) if c < numbers.size else 0 for c in carrier], dtype=np.int64),
+    )
+
+
+def _loads(assembly: Assembly, loads: LoadTable) -> Loads:
+    series = list(loads.series.values())
+    drive = () if loads.drive is None else (loads.drive,)
+    following = np.zeros(extended_size(assembly) - assembly.size)
+    return Loads(
+        steady=np.append(assembly.torque_vector(loads.constant) + assembly.weight, following),
+        coordinate=np.array([assembly.spin[name] for name in loads.series], dtype=np.int64),
+        first=np.cumsum([0] + [len(times) for times, _ in series]).astype(np.int64),
+        time=np.concatenate([np.zeros(0)] + [times for times, _ in series]),
+        torque=np.concatenate([np.zeros(0)] + [torques for _, torques in series]),
+        drive=np.array([assembly.spin[d.body] for d in drive], dtype=np.int64),
+        law=np.array([(d.stiffness, d.damping, *d.angle) for d in drive]).reshape(-1, 5),
+    )
+
+
+def equations_of(assembly: Assembly, loads: LoadTable) -> Equations:
+    """Arrays of an assembly under loads, as the compiled loops read them."""
+    numbers = _Numbers(assembly)
+    connectors, slots = _connectors(numbers)
+    meshes, joints = _meshes(numbers), _joints(numbers)
+    inertia, springs = assembly.inertia, assembly.springs
+    bodies = Bodies(
+        start=np.append(np.array(numbers.starts, dtype=np.int64), numbers.size),
+        slot=slots,
+        mass=inertia.mass,
+        transverse=inertia.transverse,
+        axial=inertia.axial,
+        spin=inertia.spin,
+        spin_inertia=inertia.spin_inertia,
+        inverse=_rolling_inverse(assembly) if assembly.law == "rigid" else np.zeros((0, 0)),
+        turning=np.array(numbers.turning, dtype=np.int64),
+    )
+    return Equations(
+        bodies=bodies,
+        connectors=connectors,
+        meshes=meshes,
+        travelling=assembly.travelling,
+        springs=Springs(springs.coordinates, springs.stiffness, springs.damping),
+        loads=_loads(assembly, loads),
+        joints=joints,
+        elastic=assembly.elastic,
+        motion=elastic_motion(assembly.elastic, _acted(assembly)),
+        turning=assembly.turning_arrays,
+    )
+
+
+def _acted(assembly: Assembly) -> NDArray[np.bool_]:
+    """Coordinates that forces act on: of what goes on between an elastic body's seats only its weight."""
+    acted = assembly.weight != 0.0
+    for name, place in assembly.elastic_slices.items():
+        acted[place.start : place.start + 6 * len(assembly.elastic_bodies[name].reduced.seats)] = True
+    return np.asarray(acted)
+
+
+def _rolling_inverse(assembly: Assembly) -> Floats:
+    """Inverse mass matrix of spins that only roll: B (B^T M B)^-1 B^T with the free motions B."""
+    free, mass = assembly.motions, assembly.mass_matrix
+    inverse = free @ np.linalg.solve(free.T @ mass @ free, free.T)
+    return np.ascontiguousarray(inverse[np.ix_(assembly.inertia.spin, assembly.inertia.spin)])
+
+
+def work_for(equations: Equations, q: Floats, v: Floats) -> Work:
+    """Memory for the compiled loops, at the state q, v (size,)."""
+    size = equations.loads.steady.size + 6
+    frames = np.zeros((equations.bodies.start.size, 16))
+    frames[-1, [0, 4, 8, 13, 15]] = 1.0  # the ground neither turns nor tilts
+    return Work(
+        q=np.append(q, np.zeros(size - q.size)),
+        v=np.append(v, np.zeros(size - q.size)),
+        stage_q=np.zeros(size),
+        stage_v=np.zeros(size),
+        force=np.zeros(size),
+        rate=np.zeros(size),
+        total=np.zeros(size),
+        turns=np.zeros((equations.bodies.turning.size, 2)),
+        frames=frames,
+        wrench=np.zeros((equations.bodies.start.size, 6)),
+        motion=np.zeros((4, 6)),
+        gradient=np.zeros((3, 13)),
+        series=equations.loads.first[:-1].copy(),
+        states=np.zeros((equations.meshes.slot.size, 4)),
+        scratch=scratch_for(equations.elastic),
+        memory=turning_memory(equations.turning),
+        pieces=np.zeros((equations.meshes.slot.size, 2), dtype=np.int64),
+        law=scratch_memory(),
+        row=np.zeros(12),
+    )

@@ -1,0 +1,90 @@
+"""The compiled solver: an assembly's equations integrated by the classical Runge-Kutta method without Exudyn.
+
+Same coordinates and same laws as the Exudyn system built from the same assembly (see
+`exugear.solvers.compiled.equations`), so that the trajectories differ by round-off only, a hundred times faster.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.modes import overall_row
+from exugear.dynamics.signals import Channels
+from exugear.solvers.compiled.equations import advance, evaluate, observe
+from exugear.solvers.compiled.packing import equations_of, work_for
+from exugear.solvers.loads import LoadTable
+from fe_ste.tools.arrays import Floats
+
+
+def refusal(assembly: Assembly) -> str:
+    """Reason why the compiled solver cannot take a variant, empty if it can.
+
+    Every body of an assembly is axially symmetric with its centre of mass on its axis and at its node, as the
+    equations need it; what is left to refuse are constraints.
+    """
+    if assembly.variant == "jointed":
+        return "the variant jointed keeps ideal joints as constraints, which an explicit method cannot solve"
+    if assembly.floating:
+        family = assembly.gearbox.body(next(iter(assembly.floating))).family
+        return f"bodies.{family}.flexibility = 'ffrf' runs in Exudyn only, 'nonrotating' in both"
+    return ""
+
+
+class CompiledSystem:
+    """An assembly in motion.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    q, v : (size,) arrays
+        Initial coordinates and velocities.
+    loads : LoadTable
+    step : float
+        Time step, s; `unstable` tells whether it is stable.
+    """
+
+    def __init__(self, assembly: Assembly, q: Floats, v: Floats, loads: LoadTable, step: float) -> None:
+        self.step = step
+        self.equations = equations_of(assembly, loads)
+        self._size = assembly.size
+        self._work = work_for(self.equations, q, v)
+
+    def accelerations(self, time: float = 0.0) -> Floats:
+        """Accelerations (size,) at the present state and a time (s)."""
+        evaluate(time, self._work.q, self._work.v, self.equations, self._work)
+        return self._work.rate[: self._size].copy()
+
+    def advance(self, first: int, q: Floats, v: Floats) -> int:
+        """Fill q and v (steps, size) with the states after each step from step number `first` on.
+
+        Returns
+        -------
+        int
+            Number of steps that stayed finite.
+        """
+        return advance(first, self.step, self.equations, self._work, q, v)
+
+
+class Observer:
+    """Signals and energies of states by one compiled loop; columns as those of `exugear.dynamics.signals.Channels`."""
+
+    def __init__(self, channels: Channels, loads: LoadTable) -> None:
+        assembly = channels.assembly
+        overall = assembly.gearbox.case.overall
+        self._count = channels.count
+        self._input = assembly.spin[overall.input]
+        self._overall = overall_row(assembly) / channels.radius
+        self._equations = equations_of(assembly, loads)
+        self._work = work_for(self._equations, np.zeros(assembly.size), np.zeros(assembly.size))
+
+    def observe(self, time: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:
+        """Signals (samples, count), energies (samples, 2) in J and powers (samples, 5) in W of states q, v.
+
+        The powers are those of the loads, damping, k(PMC), and non-conservative forces of meshes and bearings.
+        """
+        signals, energies = np.empty((len(time), self._count)), np.empty((len(time), 7))
+        signals[:, 0] = v[:, self._input]
+        signals[:, 1] = q @ self._overall
+        observe(time, q, v, self._equations, self._work, signals[:, 2:], energies)
+        return signals, energies[:, :2], energies[:, 2:]

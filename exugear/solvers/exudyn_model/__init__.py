@@ -1,0 +1,1 @@
+"""The assembly as an Exudyn system; only here is Exudyn imported."""

@@ -1,0 +1,92 @@
+"""What acts on a gearbox from outside, as both solvers take it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from fe_ste.tools.arrays import Floats
+
+from exugear.dynamics.assembly import Assembly
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A machine that turns one body at a prescribed angle, behind a torsional spring and damper.
+
+    Attributes
+    ----------
+    body : name of the driven body
+    stiffness, damping : N m/rad, N m s/rad
+    angle, speed : functions of time, rad and rad/s
+    """
+
+    body: str
+    stiffness: float
+    damping: float
+    angle: Callable[[float], float]
+    speed: Callable[[float], float]
+
+
+@dataclass(frozen=True)
+class Loading:
+    """What acts from outside.
+
+    Attributes
+    ----------
+    constant : torque by body, N m
+    varying : torque by body as a function of time, N m
+    drive : machine that prescribes the angle of one body
+    """
+
+    constant: Mapping[str, float] = field(default_factory=dict)
+    varying: Mapping[str, Callable[[float], float]] = field(default_factory=dict)
+    drive: Drive | None = None
+
+    @property
+    def is_constant(self) -> bool:
+        """Tell whether the generalized forces never change."""
+        return self.drive is None and not self.varying
+
+    def generalized(self, assembly: Assembly, t: float, q: Floats, v: Floats) -> Floats:
+        """Generalized forces at a state, shape (size,)."""
+        f = assembly.torque_vector(self.constant)
+        for name, torque in self.varying.items():
+            f[assembly.spin[name]] += torque(t)
+        if self.drive is not None:
+            i, drive = assembly.spin[self.drive.body], self.drive
+            f[i] += drive.stiffness * (drive.angle(t) - q[i]) + drive.damping * (drive.speed(t) - v[i])
+        return f
+
+
+@dataclass(frozen=True)
+class DriveLaw:
+    """A machine that turns one body at an angle quadratic in time, behind a spring and damper.
+
+    Attributes
+    ----------
+    body : name of the driven body
+    stiffness, damping : N m/rad, N m s/rad
+    angle : coefficients of 1, t, t^2; rad, rad/s, rad/s2
+    """
+
+    body: str
+    stiffness: float
+    damping: float
+    angle: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class LoadTable:
+    """What acts from outside, as numbers: constant torques, torques linear between lines, a drive.
+
+    Attributes
+    ----------
+    constant : torque by body about +z, N m
+    series : by body times (s) and torques (N m)
+    drive : optional
+    """
+
+    constant: Mapping[str, float] = field(default_factory=dict)
+    series: Mapping[str, tuple[Floats, Floats]] = field(default_factory=dict)
+    drive: DriveLaw | None = None

@@ -1,0 +1,1 @@
+"""Waterfalls, order cuts, resonances, and variants compared by them."""

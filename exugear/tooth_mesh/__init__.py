@@ -1,0 +1,1 @@
+"""Gear meshes: tables, stiffness, where teeth stand, the mesh element."""

@@ -1,0 +1,111 @@
+"""Tables of a gearbox's pairs by the reference analysis, beside those that its dynamics use."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from exugear.model.gearbox import Gearbox
+from exugear.tooth_mesh.tables import TABLE_FOLDER, order_tables
+from fe_ste.reference.newton import Iteration
+from fe_ste.reference.table import NonlinearInput, NonlinearTable
+
+#: Positions of the mesh cycle unless asked for otherwise: one takes a minute or two.
+DEFAULT_POSITIONS = 10
+
+
+@dataclass(frozen=True)
+class ReferenceOrder:
+    """The reference analysis of one pair.
+
+    Attributes
+    ----------
+    name : str
+        Name of the pair in the gearbox file.
+    wanted : NonlinearInput
+        All that the numbers depend on.
+    path : Path
+        The table's file.
+    """
+
+    name: str
+    wanted: NonlinearInput
+    path: Path
+
+    def fill(self, progress: Callable[[int, int, Iteration | None], None] | None = None) -> NonlinearTable:
+        """Compute what the file does not hold yet, writing after each position."""
+        return NonlinearTable.compute(self.wanted, self.path, progress)
+
+
+def order_references(
+    gearbox: Gearbox, out: Path, names: Iterable[str] = (), positions: int | None = None
+) -> list[ReferenceOrder]:
+    """List the reference analyses of a gearbox under its static load; computes and writes nothing.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    out : Path
+        Results folder; a table lies in ``tables/<pair>-nonlinear.nc``.
+    names : iterable of str
+        Pairs; without any, those that the file wants a table of.
+    positions : int, optional
+        Positions of the mesh cycle.
+
+    Raises
+    ------
+    CaseError
+        A pair that is not in the file, or that carries no load in its static state.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> [str(order.path) for order in order_references(gearbox, Path("nowhere"), ["high_speed"])]
+    ['nowhere/tables/high_speed-nonlinear.nc']
+    """
+    orders = order_tables(gearbox, out, names)
+    return [
+        ReferenceOrder(
+            order.name,
+            NonlinearInput(
+                pair=order.wanted.pair,
+                torque=order.wanted.static_torque or order.wanted.torque[0],
+                positions=positions or DEFAULT_POSITIONS,
+            ),
+            out / TABLE_FOLDER / f"{order.name}-nonlinear.nc",
+        )
+        for order in orders
+    ]
+
+
+def summarise_reference(order: ReferenceOrder, table: NonlinearTable) -> dict[str, Any]:
+    """Return the figures of a table that a person asks for first; the unit is part of the key.
+
+    What no converged position gives is None.
+    """
+    data = table.dataset
+
+    def figure(values: xr.DataArray) -> float | None:
+        value = float(values)
+        return value if value == value else None
+
+    return {
+        "pair": order.name,
+        "table": str(order.path),
+        "method": "nonlinear",
+        "torque_gear_1_N_m": order.wanted.torque,
+        "positions": order.wanted.positions,
+        "states": order.wanted.positions,
+        "not_converged": int((~data["converged"]).sum()),
+        "ste_mean_um": figure(1e6 * data["ste"].mean()),
+        "ste_peak_to_peak_um": figure(1e6 * (data["ste"].max() - data["ste"].min())),
+        "mesh_stiffness_mean_N_per_m": figure(data["mesh_stiffness"].mean()),
+        "max_pressure_MPa": figure(1e-6 * data["max_pressure"].max()),
+        "max_von_mises_MPa": figure(1e-6 * data["max_von_mises"].max()),
+        "wall_time_per_position_s": figure(data["wall_time"].mean()),
+        "input_hash": table.input_hash,
+    }

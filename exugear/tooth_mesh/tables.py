@@ -1,0 +1,256 @@
+"""The transmission error tables of a gearbox: which are wanted, which are there, and their pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from exugear.model.gearbox import Gearbox
+from exugear.model.reading import CaseError
+from fe_ste.transmission_error.table import MeshTable, TableError, TableInput
+
+TABLE_FOLDER = "tables"
+
+
+@dataclass(frozen=True)
+class TableOrder:
+    """The table of one pair: its input, its file and, where the file fits the input, its content.
+
+    Attributes
+    ----------
+    name : str
+        Name of the pair in the gearbox file.
+    wanted : fe_ste.transmission_error.table.TableInput
+        All that the numbers depend on.
+    path : Path
+        The table's file.
+    stored : MeshTable or None
+        The table in the file, if it was computed from exactly this input.
+    replaces : str
+        Why a file that is there does not serve; empty if there is none or it serves.
+    """
+
+    name: str
+    wanted: TableInput
+    path: Path
+    stored: MeshTable | None
+    replaces: str = ""
+
+    def fill(self, progress: Callable[[int, int], None] | None = None) -> MeshTable:
+        """Compute the table and write its file; what a stopped computation had finished is taken up.
+
+        Parameters
+        ----------
+        progress : callable, optional
+            Called with the number of finished positions and of all positions.
+        """
+        partial = self.path.with_suffix(".partial.nc")
+        table = MeshTable.compute(self.wanted, progress, partial=partial)
+        table.save(self.path)
+        partial.unlink(missing_ok=True)
+        return table
+
+
+def order_tables(
+    gearbox: Gearbox,
+    out: Path,
+    names: Iterable[str] = (),
+    positions: int | None = None,
+    grid: bool = False,
+) -> list[TableOrder]:
+    """List the tables of a gearbox and find those that are there; computes and writes nothing.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+        The case.
+    out : Path
+        Results folder; the tables lie in its folder ``tables``.
+    names : iterable of str
+        Pairs to list; without any, those that the file wants a table of.
+    positions : int, optional
+        Positions of the mesh cycle; without it what the file says.
+    grid : bool
+        Ask for the axes of the file even if its section ``ste`` does not.
+
+    Raises
+    ------
+    CaseError
+        A pair that is not in the file, or that carries no load in its static state.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> [order.name for order in order_tables(gearbox, Path("nowhere"))]
+    ['sun_planet', 'ring_planet', 'intermediate', 'high_speed']
+    """
+    chosen = list(names) or [name for name, spec in gearbox.pairs.items() if spec.table]
+    for name in chosen:
+        if name not in gearbox.pairs:
+            known = ", ".join(gearbox.pairs)
+            raise CaseError(f"{gearbox.source}: no gear pair {name!r}; the pairs are {known}")
+        if not gearbox.pairs[name].static_torque > 0.0:
+            raise CaseError(
+                f"{gearbox.source}: pairs.{name}: carries no torque in [static_load]; "
+                "a table needs one, for it belongs to one loaded flank"
+            )
+    grid = grid or gearbox.ste.grid
+    wanted = {name: wanted_table(gearbox, name, positions or gearbox.ste.positions, grid) for name in chosen}
+    return [_order(gearbox, name, out, order, grid) for name, order in wanted.items()]
+
+
+def table_path(out: Path, name: str) -> Path:
+    """Place of a pair's table: ``tables/<pair>.nc`` in the results folder."""
+    return out / TABLE_FOLDER / f"{name}.nc"
+
+
+def wanted_table(gearbox: Gearbox, name: str, positions: int, grid: bool = False) -> TableInput:
+    """All that the numbers of a pair's table depend on.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    name : str
+        Pair.
+    positions : int
+    grid : bool
+        Over the axes of the file's section ``ste``, else the static state alone.
+
+    Raises
+    ------
+    CaseError
+        If the gears cannot run at a centre distance of the axes.
+    """
+    spec = gearbox.pairs[name]
+    # Statics leave rounding in the torque; another machine's must not make another hash of it.
+    torque = _rounded(spec.static_torque)
+    pinion, gear = (one if spec.flank > 0 else one.mirrored() for one in spec.modifications)
+    static = TableInput(
+        pair=spec.pair,
+        torque=(torque,),
+        positions=positions,
+        pinion_modification=pinion,
+        gear_modification=gear,
+        static_torque=torque,
+    )
+    if not grid:
+        return static
+    axes, width = gearbox.ste, spec.pair.face_width
+    return replace(
+        static,
+        torque=tuple(torque if factor == 1.0 else _rounded(torque * factor) for factor in axes.torque_factors),
+        centre_distance=gearbox.table_distances(name),
+        misalignment=tuple(1e-6 * opening / width for opening in axes.misalignment_um),
+    )
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.12g}")
+
+
+def fitting_table(gearbox: Gearbox, name: str, out: Path, grid: bool = False) -> MeshTable:
+    """Read the table of a pair, however many positions it has, if all else is the case's.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    name : str
+        Pair.
+    out : Path
+        Results folder.
+    grid : bool
+        Whether it must have exactly the axes of the file's section ``ste``; else any axes with the static state serve.
+
+    Raises
+    ------
+    fe_ste.transmission_error.table.TableError
+        The file is missing, unreadable, or was computed from another input.
+    """
+    path = table_path(out, name)
+    table = MeshTable.open(path)
+    wanted = wanted_table(gearbox, name, table.dataset.sizes["pmc"], grid)
+    if not (table.input_hash == wanted.hash or (not grid and _holds(table, wanted))):
+        raise TableError(f"{path}: was computed from another input; compute it again")
+    return table
+
+
+def _holds(table: MeshTable, static: TableInput) -> bool:
+    """Whether a table over more states was computed from the input `static`, axes aside, and holds its state."""
+    try:
+        torque = float(table.static_state["torque"])
+    except TableError:
+        return False
+    torques, distances, misalignments = (
+        tuple(table.dataset[name].to_numpy().tolist()) for name in ("torque", "centre_distance", "misalignment")
+    )
+    wider = replace(static, torque=torques, centre_distance=distances, misalignment=misalignments)
+    return torque == static.torque[0] and table.input_hash == wider.hash
+
+
+def missing_tables(gearbox: Gearbox, out: Path, grid: bool = False) -> list[TableOrder]:
+    """List the tables that dynamics need and that are not there, or belong to another input.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    out : Path
+        Results folder.
+    grid : bool
+        Whether the mesh law interpolates over load, centre distance and misalignment.
+    """
+    orders = []
+    for name in dict.fromkeys(mesh.pair.name for mesh in gearbox.meshes):
+        try:
+            fitting_table(gearbox, name, out, grid)
+        except TableError:
+            orders += order_tables(gearbox, out, [name], grid=grid)
+    return orders
+
+
+def _order(gearbox: Gearbox, name: str, out: Path, wanted: TableInput, grid: bool) -> TableOrder:
+    path = table_path(out, name)
+    if not path.exists():
+        return TableOrder(name, wanted, path, None)
+    try:
+        stored = fitting_table(gearbox, name, out, grid)
+    except TableError as error:
+        return TableOrder(name, wanted, path, None, str(error))
+    if stored.dataset.sizes["pmc"] != wanted.positions:
+        return TableOrder(name, wanted, path, None, f"{path}: was computed from another input, with other positions")
+    return TableOrder(name, wanted, path, stored)
+
+
+def summarise(order: TableOrder, table: MeshTable) -> dict[str, Any]:
+    """Return the figures of a table that a person asks for first; the unit is part of the key.
+
+    Of the static state, but for the numbers of states. What no converged position gives is None.
+    """
+    data = table.static_state
+
+    def figure(values: xr.DataArray) -> float | None:
+        value = float(values)
+        return value if value == value else None
+
+    return {
+        "pair": order.name,
+        "table": str(order.path),
+        "torque_gear_1_N_m": float(data["torque"]),
+        "positions": order.wanted.positions,
+        "states": table.dataset["ste"].size,
+        "not_converged": int((~table.dataset["converged"]).sum()),
+        "ste_mean_um": figure(1e6 * data["ste"].mean()),
+        "ste_peak_to_peak_um": figure(1e6 * (data["ste"].max() - data["ste"].min())),
+        "mesh_stiffness_mean_N_per_m": figure(data["mesh_stiffness"].mean()),
+        "max_pressure_MPa": figure(1e-6 * data["max_pressure"].max()),
+        "input_hash": table.input_hash,
+    }
+
+
+def stored_tables(gearbox: Gearbox, out: Path, positions: int | None = None) -> dict[str, MeshTable]:
+    """Return the tables of a results folder that fit the gearbox, by the name of the pair."""
+    orders = order_tables(gearbox, out, positions=positions)
+    return {order.name: order.stored for order in orders if order.stored}

@@ -1,0 +1,1 @@
+"""Contact of flanks: gap, cells, compliance, the complementarity problem."""

@@ -1,0 +1,132 @@
+"""Cells over the plane of action, in which pressures are looked for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_ste.contact.kinematics import FlankPair, rigid_gap, tip_limit
+from fe_ste.tools.arrays import Booleans, Floats, Integers
+from fe_ste.tools.compilation import compiled
+
+#: A cell cut by a tip edge to less than this part of its width is joined to its neighbour.
+_LEAST_CELL = 0.2
+
+
+@dataclass(frozen=True)
+class ContactSettings:
+    """Discretisation of the contact.
+
+    Parameters
+    ----------
+    slices : int
+        Slices along the common face width.
+    cells : int
+        Cells of a slice across the window that travels with the contact line.
+    window : float
+        Half width of that window in Hertzian half widths at the largest mean line load.
+    """
+
+    slices: int = 48
+    cells: int = 9
+    window: float = 1.8
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot resolve a contact."""
+        for key, least in (("slices", 3), ("cells", 3), ("window", 1.0)):
+            if not getattr(self, key) >= least:
+                raise ValueError(f"contact setting {key} = {getattr(self, key)}: must be at least {least}")
+
+
+@compiled
+def _lay_cells(
+    pair: FlankPair, rotation: float, teeth: Integers, axial: Floats, half_window: float, count: int
+) -> tuple[Integers, Integers, Floats, Floats, Floats, Floats, Booleans]:
+    """Cells around the contact lines: tooth, slice, mid arc length, half width, gap, roll on gear 2, cut by an edge.
+
+    Arc lengths u = r_b roll^2 / 2 run along the transverse involute of gear 1.
+    """
+    most = len(teeth) * len(axial) * count
+    tooth_of, slice_of = np.empty(most, np.int64), np.empty(most, np.int64)
+    middle, half, gap, gear_roll = np.empty(most), np.empty(most), np.empty(most), np.empty(most)
+    cut = np.zeros(most, np.bool_)
+    edges = np.empty(count + 1)
+    step = 2.0 * half_window / count
+    top = 0.5 * pair.base_radius_1 * pair.tip_roll_1**2
+    used = 0
+    for tooth in teeth:
+        for layer in range(len(axial)):
+            line = pair.working_roll + rotation + tooth * pair.pitch_1 + pair.twist_1 * axial[layer]
+            lowest_roll = tip_limit(pair, axial[layer], tooth, rotation)
+            bottom = 0.5 * pair.base_radius_1 * lowest_roll**2
+            if top - bottom < step:
+                continue
+            line = min(max(line, lowest_roll), pair.tip_roll_1)
+            centre = 0.5 * pair.base_radius_1 * line**2
+            number = 0
+            for edge in range(count + 1):
+                at = centre - half_window + edge * step
+                at = min(max(at, bottom), top)
+                if number == 0 or at > edges[number - 1]:
+                    edges[number] = at
+                    number += 1
+            if number > 2 and edges[1] - edges[0] < _LEAST_CELL * step:
+                for edge in range(1, number - 1):
+                    edges[edge] = edges[edge + 1]
+                number -= 1
+            if number > 2 and edges[number - 1] - edges[number - 2] < _LEAST_CELL * step:
+                edges[number - 2] = edges[number - 1]
+                number -= 1
+            for cell in range(number - 1):
+                mean = 0.5 * (edges[cell] + edges[cell + 1])
+                roll = math.sqrt(2.0 * mean / pair.base_radius_1)
+                distance, other = rigid_gap(pair, roll, axial[layer], tooth, rotation)
+                tooth_of[used], slice_of[used] = tooth, layer
+                middle[used], half[used] = mean, 0.5 * (edges[cell + 1] - edges[cell])
+                gap[used], gear_roll[used] = distance, other
+                cut[used] = edges[cell] == bottom or edges[cell + 1] == top
+                used += 1
+    return (
+        tooth_of[:used], slice_of[:used], middle[:used], half[:used], gap[:used], gear_roll[:used], cut[:used]
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Contact cells of one position.
+
+    Attributes
+    ----------
+    tooth, layer : ndarray (n,)
+        Tooth pair and slice.
+    roll, gear_roll : ndarray (n,)
+        Roll angles of the middle on both gears, rad.
+    half_across : ndarray (n,)
+        Half width along the profile, m.
+    gap : ndarray (n,)
+        Rigid gap of the unmodified flanks, m.
+    cut : ndarray (n,)
+        Whether a tip edge bounds the cell.
+    """
+
+    tooth: Integers
+    layer: Integers
+    roll: Floats
+    gear_roll: Floats
+    half_across: Floats
+    gap: Floats
+    cut: Booleans
+
+    def select(self, keep: Booleans) -> Cells:
+        """Return the cells for which `keep` holds."""
+        return Cells(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
+
+
+def lay_cells(
+    pair: FlankPair, rotation: float, teeth: Integers, axial: Floats, half_window: float, count: int
+) -> Cells:
+    """Lay the cells of all `teeth` around their contact lines at one rotation of gear 1."""
+    tooth, layer, middle, half, gap, gear_roll, cut = _lay_cells(pair, rotation, teeth, axial, half_window, count)
+    return Cells(tooth, layer, np.sqrt(2.0 * middle / pair.base_radius_1), gear_roll, half, gap, cut)

@@ -1,0 +1,116 @@
+"""Where flanks meet: the gap between rigid flanks over the plane of action."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from fe_ste.geometry.gears import GearPair
+from fe_ste.tools.compilation import compiled
+
+
+class ContactError(RuntimeError):
+    """A contact position that could not be solved; the message says why."""
+
+
+class FlankPair(NamedTuple):
+    """Numbers of the rigid kinematics of two conjugate flanks; lengths in m, angles in rad."""
+
+    base_radius_1: float
+    base_radius_2: float
+    centre_distance: float
+    working_involute: float
+    working_roll: float
+    pitch_1: float
+    pitch_2: float
+    twist_1: float
+    twist_2: float
+    base_helix_cosine: float
+    kind: float  # +1 external, -1 internal
+    form_roll_1: float
+    tip_roll_1: float
+    tip_radius_2: float
+
+    @classmethod
+    def from_pair(cls, pair: GearPair, form_roll: float, tip_roll: float) -> FlankPair:
+        """Collect the numbers of `pair`; `form_roll` and `tip_roll` bound the flank of gear 1."""
+        one, two, angle = pair.pinion, pair.gear, pair.working_pressure_angle
+        return cls(
+            base_radius_1=one.base_radius,
+            base_radius_2=two.base_radius,
+            centre_distance=pair.centre_distance,
+            working_involute=math.tan(angle) - angle,
+            working_roll=math.tan(angle),
+            pitch_1=one.angular_pitch,
+            pitch_2=two.angular_pitch,
+            twist_1=math.tan(one.base_helix_angle) / one.base_radius,
+            twist_2=math.tan(two.base_helix_angle) / two.base_radius,
+            base_helix_cosine=math.cos(one.base_helix_angle),
+            kind=-1.0 if two.internal else 1.0,
+            form_roll_1=form_roll,
+            tip_roll_1=tip_roll,
+            tip_radius_2=two.tip_radius,
+        )
+
+
+@compiled
+def _polar_on_gear_2(pair: FlankPair, roll: float, axial: float, tooth: int, rotation: float) -> tuple[float, float]:
+    """Radius and polar angle, about the axis of gear 2, of a flank point of gear 1."""
+    radius = pair.base_radius_1 * math.sqrt(1.0 + roll * roll)
+    angle = pair.working_involute - (roll - math.atan(roll)) + rotation + tooth * pair.pitch_1 + pair.twist_1 * axial
+    x = pair.centre_distance - pair.kind * radius * math.cos(angle)
+    y = -pair.kind * radius * math.sin(angle)
+    return math.sqrt(x * x + y * y), math.atan2(y, x)
+
+
+@compiled
+def rigid_gap(pair: FlankPair, roll: float, axial: float, tooth: int, rotation: float) -> tuple[float, float]:
+    """Gap between a flank point of gear 1 and the unmodified flank of gear 2, along the contact normal.
+
+    The gap is the arc by which gear 2 would have to turn to touch the point, as a length on the normal: exact, with
+    the sides of the teeth, tip corners and centre distance as they are.
+
+    Parameters
+    ----------
+    pair : FlankPair
+    roll : float
+        Roll angle of the point on gear 1, rad.
+    axial : float
+        Its axial position, m.
+    tooth : int
+        Tooth pair.
+    rotation : float
+        Rotation of gear 1, rad; gear 2 is where it rolls with it.
+
+    Returns
+    -------
+    gap : float
+        m; infinite inside the base circle of gear 2.
+    gear_roll : float
+        Roll angle on gear 2 at the point's radius, rad.
+    """
+    radius, angle = _polar_on_gear_2(pair, roll, axial, tooth, rotation)
+    square = (radius / pair.base_radius_2) ** 2 - 1.0
+    if square <= 0.0:
+        return math.inf, 0.0
+    gear_roll = math.sqrt(square)
+    rolled = -pair.kind * (rotation * pair.pitch_2 / pair.pitch_1 + tooth * pair.pitch_2)
+    flank = pair.working_involute - (gear_roll - math.atan(gear_roll)) + rolled + pair.twist_2 * axial
+    return pair.kind * pair.base_radius_2 * (angle - flank) * pair.base_helix_cosine, gear_roll
+
+
+@compiled
+def tip_limit(pair: FlankPair, axial: float, tooth: int, rotation: float) -> float:
+    """Least roll angle on gear 1 that the tip circle of gear 2 reaches, by bisection; within gear 1's flank."""
+    low, high = pair.form_roll_1, pair.tip_roll_1
+    if pair.kind * (_polar_on_gear_2(pair, low, axial, tooth, rotation)[0] - pair.tip_radius_2) <= 0.0:
+        return low
+    if pair.kind * (_polar_on_gear_2(pair, high, axial, tooth, rotation)[0] - pair.tip_radius_2) >= 0.0:
+        return high
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if pair.kind * (_polar_on_gear_2(pair, middle, axial, tooth, rotation)[0] - pair.tip_radius_2) > 0.0:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)

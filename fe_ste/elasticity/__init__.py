@@ -1,0 +1,1 @@
+"""Finite elements of teeth: meshes, bricks, the condensed compliance of a flank."""

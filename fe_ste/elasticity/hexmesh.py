@@ -1,0 +1,428 @@
+"""Structured 8-node hexahedra of one tooth sector, twisted along the helix, with named surfaces.
+
+The transverse section of one tooth is made of four transfinite blocks: the tooth core between both flanks, the
+rim below it, and the rim below each half root land. Extruding the section along the face width while turning it
+with the helix gives the sector. Its two cut faces are helical surfaces one angular pitch apart, so sectors join
+to a ring without any interpolation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from fe_ste.geometry.checks import GeometryError
+from fe_ste.geometry.gears import Gear
+from fe_ste.geometry.profile import ToothProfile, tooth_profile
+from fe_ste.tools.arrays import Floats, Integers
+
+#: Tangent angle to the tooth centre line at which the fillet is split between tooth core and rim.
+_FILLET_SPLIT_ANGLE = np.radians(50.0)
+
+
+@dataclass(frozen=True)
+class MeshSettings:
+    """Numbers of elements of one tooth sector.
+
+    Parameters
+    ----------
+    layers : int
+        Elements along the face width.
+    flank : int
+        Elements along the involute of one flank, equal in arc length.
+    thickness : int
+        Elements through the tooth, graded towards both flanks.
+    fillet : int
+        Elements along the upper part of the root fillet, which bounds the tooth core.
+    root : int
+        Elements along the lower fillet and half the root land.
+    rim : int
+        Elements from the held hub or rim to the root, graded towards the root.
+    grading : float
+        Ratio of the largest to the smallest element through the tooth.
+
+    Examples
+    --------
+    >>> MeshSettings().refined(2).layers
+    24
+    """
+
+    layers: int = 12
+    flank: int = 20
+    thickness: int = 12
+    fillet: int = 5
+    root: int = 3
+    rim: int = 14
+    grading: float = 4.0
+
+    def __post_init__(self) -> None:
+        """Refuse counts no mesh can have."""
+        for key, least in (
+            ("layers", 3),
+            ("flank", 4),
+            ("thickness", 2),
+            ("fillet", 1),
+            ("root", 1),
+            ("rim", 1),
+        ):
+            if getattr(self, key) < least:
+                raise ValueError(f"mesh setting {key} = {getattr(self, key)}: at least {least} elements are needed")
+        if not self.grading >= 1.0:
+            raise ValueError(f"mesh setting grading = {self.grading}: must be 1 (uniform) or more")
+
+    def refined(self, factor: int) -> MeshSettings:
+        """Return the settings with every element size divided by `factor`."""
+        return replace(
+            self,
+            layers=self.layers * factor,
+            flank=self.flank * factor,
+            thickness=self.thickness * factor,
+            fillet=self.fillet * factor,
+            root=self.root * factor,
+            rim=self.rim * factor,
+        )
+
+
+@dataclass(frozen=True)
+class SectionMesh:
+    """Quadrilaterals of the transverse section of one tooth, centred on the +x axis.
+
+    Attributes
+    ----------
+    points : ndarray (n, 2)
+        Node coordinates, m.
+    quads : ndarray (m, 4)
+        Counter-clockwise connectivity.
+    flank_roll : ndarray (f + 1,)
+        Roll angle tan(alpha) of the flank nodes, rad, ascending.
+    plus_flank, minus_flank : ndarray (f + 1,)
+        Nodes of the counter-clockwise and the clockwise flank, by ascending roll angle.
+    plus_cut, minus_cut : ndarray (c,)
+        Nodes of the cut faces at +pi/z and -pi/z, from the held surface to the root.
+    held : ndarray
+        Nodes of the held hub or rim surface.
+    """
+
+    points: Floats
+    quads: Integers
+    flank_roll: Floats
+    plus_flank: Integers
+    minus_flank: Integers
+    plus_cut: Integers
+    minus_cut: Integers
+    held: Integers
+
+
+@dataclass(frozen=True)
+class SectorMesh:
+    """Hexahedra of one tooth sector; node ``layer * section nodes + section node``.
+
+    Attributes
+    ----------
+    gear : Gear
+    settings : MeshSettings
+    section : SectionMesh
+    axial_positions : ndarray (layers + 1,)
+        z of the node layers from the middle of the face width, m.
+    layer_points : ndarray (layers + 1, n, 2), optional
+        Nodes of the section of each layer, before it is turned, where they are not those of `section`, m.
+    """
+
+    gear: Gear
+    settings: MeshSettings
+    section: SectionMesh
+    axial_positions: Floats
+    layer_points: Floats | None = None
+
+    @cached_property
+    def twist_rate(self) -> float:
+        """Rotation of the section per length along +z, rad/m: tan(beta_b) / r_b, positive for a right hand."""
+        return float(np.tan(self.gear.base_helix_angle) / self.gear.base_radius)
+
+    @cached_property
+    def points(self) -> Floats:
+        """Node coordinates (n, 3), m."""
+        layers = self.section.points if self.layer_points is None else self.layer_points
+        x, y = layers[..., 0], layers[..., 1]
+        angle = self.twist_rate * self.axial_positions[:, None]
+        turned_x = np.cos(angle) * x - np.sin(angle) * y
+        turned_y = np.sin(angle) * x + np.cos(angle) * y
+        z = np.broadcast_to(self.axial_positions[:, None], turned_x.shape)
+        return np.stack([turned_x, turned_y, z], axis=-1).reshape(-1, 3)
+
+    @cached_property
+    def hexahedra(self) -> Integers:
+        """Connectivity (m, 8) in VTK order: bottom quadrilateral counter-clockwise, then the top one."""
+        bottom = self._all_layers(self.section.quads)[:-1]
+        top = self._all_layers(self.section.quads)[1:]
+        return np.concatenate([bottom, top], axis=-1).reshape(-1, 8)
+
+    def flank_nodes(self, side: int) -> Integers:
+        """Nodes (flank + 1, layers + 1) of the flank on the `side` +1 (counter-clockwise) or -1 of the tooth."""
+        nodes = self.section.plus_flank if side > 0 else self.section.minus_flank
+        return self._all_layers(nodes).T
+
+    def cut_nodes(self, side: int) -> Integers:
+        """Nodes of the cut face at +pi/z (`side` +1) or -pi/z (-1), held nodes left out, matching one another."""
+        nodes = self.section.plus_cut if side > 0 else self.section.minus_cut
+        return self._all_layers(nodes[~np.isin(nodes, self.section.held)]).ravel()
+
+    @cached_property
+    def held_nodes(self) -> Integers:
+        """Nodes of the held hub or rim surface."""
+        return self._all_layers(self.section.held).ravel()
+
+    def _all_layers(self, section_nodes: Integers) -> Integers:
+        offsets = np.arange(len(self.axial_positions)) * len(self.section.points)
+        return offsets.reshape((-1,) + (1,) * section_nodes.ndim) + section_nodes
+
+    @cached_property
+    def scaled_jacobian(self) -> Floats:
+        """Least scaled Jacobian over the corners of each hexahedron (m,): 1 for a brick, 0 when degenerate."""
+        corners = self.points[self.hexahedra]
+        neighbours = np.array([[1, 3, 4], [2, 0, 5], [3, 1, 6], [0, 2, 7], [7, 5, 0], [4, 6, 1], [5, 7, 2], [6, 4, 3]])
+        edges = corners[:, neighbours] - corners[:, :, None]
+        edges = edges / np.linalg.norm(edges, axis=-1, keepdims=True)
+        return np.asarray(np.linalg.det(edges).min(axis=1))
+
+
+def sector_mesh(gear: Gear, settings: MeshSettings | None = None) -> SectorMesh:
+    """Mesh one tooth sector of `gear`.
+
+    Parameters
+    ----------
+    gear : Gear
+    settings : MeshSettings, optional
+
+    Returns
+    -------
+    SectorMesh
+
+    Raises
+    ------
+    GeometryError
+        If the section folds, that is, a hexahedron has a corner with no positive volume.
+
+    Examples
+    --------
+    >>> from fe_ste.geometry.gears import Gear
+    >>> gear = Gear(name="pinion", teeth=25, normal_module=3e-3, face_width=20e-3, held_diameter=40e-3)
+    >>> mesh = sector_mesh(gear, MeshSettings(layers=4))
+    >>> bool(mesh.scaled_jacobian.min() > 0.5)
+    True
+    """
+    settings = settings or MeshSettings()
+    section = _section_mesh(
+        gear,
+        settings,
+        tooth_profile(gear),
+        np.linspace(0.0, 1.0, settings.flank + 1),
+        _symmetric_grading(settings.thickness, settings.grading),
+    )
+    half_width = gear.face_width / 2
+    return _checked(SectorMesh(gear, settings, section, np.linspace(-half_width, half_width, settings.layers + 1)))
+
+
+def _checked(mesh: SectorMesh) -> SectorMesh:
+    if mesh.scaled_jacobian.min() <= 0:
+        raise GeometryError(
+            f"gear {mesh.gear.name}: the tooth section cannot be meshed (scaled Jacobian "
+            f"{mesh.scaled_jacobian.min():.3f}); held_diameter = {mesh.gear.held_diameter:.6g} m may be too near "
+            "the root"
+        )
+    return mesh
+
+
+def refined_sector_mesh(gear: Gear, settings: MeshSettings, flank_places: Floats, across_places: Floats) -> SectorMesh:
+    """Mesh one tooth sector with flank nodes at places of one's own in each layer.
+
+    Parameters
+    ----------
+    gear : Gear
+    settings : MeshSettings
+        Its numbers `flank` and `thickness` must be those of the places.
+    flank_places : ndarray (layers + 1, flank + 1)
+        Arc length of the flank nodes as part of the involute's from form to tip circle, ascending from 0 to 1.
+    across_places : ndarray (thickness + 1,)
+        Places through the tooth, ascending from 0 on its clockwise to 1 on its counter-clockwise flank.
+
+    Returns
+    -------
+    SectorMesh
+        The cut faces and the held surface are those of `sector_mesh`, whatever the places.
+
+    Raises
+    ------
+    GeometryError
+        If a section folds.
+    """
+    profile = tooth_profile(gear)
+    sections = [_section_mesh(gear, settings, profile, places, across_places) for places in flank_places]
+    half_width = gear.face_width / 2
+    return _checked(
+        SectorMesh(
+            gear,
+            settings,
+            sections[0],
+            np.linspace(-half_width, half_width, settings.layers + 1),
+            np.stack([section.points for section in sections]),
+        )
+    )
+
+
+def _section_mesh(
+    gear: Gear,
+    settings: MeshSettings,
+    profile: ToothProfile,
+    flank_places: Floats,
+    across_places: Floats,
+) -> SectionMesh:
+    flank_roll, upper, lower = _half_boundary(gear, profile, settings, flank_places)
+    core = _core_block(gear, upper, across_places)
+    rim_centre, rim_plus = _rim_blocks(gear, core, upper[0], lower, settings)
+    rim_minus = rim_plus[::-1] * np.array([1.0, -1.0])
+
+    points, (core_id, centre_id, plus_id, minus_id) = _joined(core, rim_centre, rim_plus, rim_minus)
+    quads = np.concatenate([_quads(ids) for ids in (core_id, centre_id, plus_id, minus_id)])
+    if gear.internal:  # the blocks run towards the axis there, which mirrors them
+        quads = quads[:, ::-1]
+    first = settings.fillet
+    by_roll = slice(None, None, -1) if gear.internal else slice(None)
+    return SectionMesh(
+        points=points,
+        quads=quads,
+        flank_roll=flank_roll[by_roll],
+        plus_flank=core_id[-1, first:][by_roll],
+        minus_flank=core_id[0, first:][by_roll],
+        plus_cut=plus_id[-1],
+        minus_cut=minus_id[0],
+        held=np.unique(np.concatenate([centre_id[:, 0], plus_id[:, 0], minus_id[:, 0]])),
+    )
+
+
+def _half_boundary(
+    gear: Gear, profile: ToothProfile, settings: MeshSettings, flank_places: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Roll angles from form to tip, boundary of the tooth core from split to tip, of the root from split to pi/z."""
+    roll_form, roll_tip = (
+        np.sqrt((radius / gear.base_radius) ** 2 - 1.0) for radius in (profile.form_radius, profile.tip_radius)
+    )
+    roll = np.sqrt(roll_form**2 + flank_places * (roll_tip**2 - roll_form**2))
+    radius = gear.base_radius * np.sqrt(1.0 + roll**2)
+    angle = gear.half_angle(radius)
+    involute = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+
+    land_angle = np.linspace(np.arctan2(profile.fillet[-1, 1], profile.fillet[-1, 0]), np.pi / gear.teeth, 50)
+    land = profile.root_radius * np.stack([np.cos(land_angle), np.sin(land_angle)], axis=-1)
+    root_curve = np.concatenate([profile.fillet, land[1:]]) if np.ptp(land_angle) > 1e-9 else profile.fillet
+    root_curve[-1] = land[-1]
+
+    step = np.diff(root_curve, axis=0)
+    length = np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))])
+    tangent_angle = np.arctan2(np.abs(step[:, 1]), np.abs(step[:, 0]))
+    split = max(length[int(np.argmax(tangent_angle > _FILLET_SPLIT_ANGLE))], 0.1 * length[-1])
+    upper_fillet = _along(root_curve, length, np.linspace(split, 0.0, settings.fillet + 1))
+    lower = _along(root_curve, length, np.linspace(split, length[-1], settings.root + 1))
+    upper_fillet[-1] = involute[0]
+    return roll, np.concatenate([upper_fillet[:-1], involute]), lower
+
+
+def _along(curve: Floats, length: Floats, at: Floats) -> Floats:
+    return np.stack([np.interp(at, length, curve[:, 0]), np.interp(at, length, curve[:, 1])], axis=-1)
+
+
+def _core_block(gear: Gear, plus_edge: Floats, across: Floats) -> Floats:
+    """Nodes (thickness + 1, fillet + flank + 1, 2) of the tooth core, from the minus to the plus flank, root to tip."""
+    minus_edge = plus_edge * np.array([1.0, -1.0])
+    step = np.hypot(*np.diff(plus_edge, axis=0).T)
+    along = np.concatenate([[0.0], np.cumsum(step)]) / step.sum()
+    bottom = minus_edge[0] + across[:, None] * (plus_edge[0] - minus_edge[0])
+    tip_radius, tip_angle = np.hypot(*plus_edge[-1]), np.arctan2(plus_edge[-1, 1], plus_edge[-1, 0])
+    angle = (2.0 * across - 1.0) * tip_angle
+    top = tip_radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    return _coons(minus_edge, plus_edge, bottom, top, across, along)
+
+
+def _rim_blocks(gear: Gear, core: Floats, split: Floats, root: Floats, settings: MeshSettings) -> tuple[Floats, Floats]:
+    """Nodes of the rim below the tooth core and of the rim below the root at its plus side, held surface to root."""
+    held_radius = gear.held_diameter / 2
+    split_angle = np.arctan2(split[1], split[0])
+    held_angle = split_angle * np.linspace(-1.0, 1.0, core.shape[0])
+    depth = abs(np.hypot(*split) - held_radius)
+    upwards = 1.0 - _geometric(settings.rim, np.hypot(*(root[1] - root[0])) / depth)[::-1]
+
+    def between(held_angles: Floats, top: Floats) -> Floats:
+        bottom = held_radius * np.stack([np.cos(held_angles), np.sin(held_angles)], axis=-1)
+        return bottom[:, None] + upwards[:, None] * (top - bottom)[:, None]
+
+    across = (core[:, 0, 1] / core[-1, 0, 1] + 1.0) / 2.0
+    centre = between((2.0 * across - 1.0) * held_angle[-1], core[:, 0])
+    fraction = np.linspace(0.0, 1.0, len(root))
+    plus = between(split_angle + fraction * (np.pi / gear.teeth - split_angle), root)
+    return centre, plus
+
+
+def _coons(
+    left: Floats,
+    right: Floats,
+    bottom: Floats,
+    top: Floats,
+    across: Floats,
+    along: Floats,
+) -> Floats:
+    """Transfinite interpolation between four edges; result (across, along, 2)."""
+    s, t = across[:, None, None], along[None, :, None]
+    edges = (1 - s) * left + s * right + (1 - t) * bottom[:, None] + t * top[:, None]
+    corners = (1 - s) * ((1 - t) * left[0] + t * left[-1]) + s * ((1 - t) * right[0] + t * right[-1])
+    return np.asarray(edges - corners)
+
+
+def _symmetric_grading(count: int, ratio: float) -> Floats:
+    """Fractions 0..1 whose intervals grow geometrically from both ends by `ratio` to the middle."""
+    position = np.minimum(np.arange(count), np.arange(count)[::-1])
+    size = ratio ** (position / max(position.max(), 1))
+    return _fractions(np.asarray(size, dtype=np.float64))
+
+
+def _geometric(count: int, first: float) -> Floats:
+    """Fractions 0..1 in geometric progression whose first interval is `first`, or uniform ones if that is smaller."""
+    if first * count >= 1.0 or count == 1:
+        return np.linspace(0.0, 1.0, count + 1)
+
+    from scipy.optimize import brentq  # a quarter of a second that a check of the gearbox file need not wait
+
+    def excess(ratio: float) -> float:
+        return first * float(np.sum(ratio ** np.arange(count))) - 1.0
+
+    size = first * brentq(excess, 1.0, 50.0) ** np.arange(count)
+    return _fractions(np.asarray(size, dtype=np.float64))
+
+
+def _fractions(sizes: Floats) -> Floats:
+    return np.asarray(np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum())
+
+
+def _quads(ids: Integers) -> Integers:
+    return np.stack([ids[:-1, :-1], ids[:-1, 1:], ids[1:, 1:], ids[1:, :-1]], axis=-1).reshape(-1, 4)
+
+
+def _joined(
+    core: Floats, centre: Floats, plus: Floats, minus: Floats
+) -> tuple[Floats, tuple[Integers, Integers, Integers, Integers]]:
+    """Join the blocks along their common edges; return the nodes and each block's node numbers.
+
+    The edges are known, so nothing is compared by distance: a node missed by rounding would be a crack.
+    """
+    core_id = np.arange(core.shape[0] * core.shape[1]).reshape(core.shape[:2])
+    centre_id = np.concatenate([_numbers(core_id, centre[:, :-1]), core_id[:, :1]], axis=1)
+    plus_id = np.concatenate([centre_id[-1:], _numbers(centre_id, plus[1:])])
+    minus_id = np.concatenate([_numbers(plus_id, minus[:-1]), centre_id[:1]])
+    new = (core, centre[:, :-1], plus[1:], minus[:-1])
+    return np.concatenate([part.reshape(-1, 2) for part in new]), (core_id, centre_id, plus_id, minus_id)
+
+
+def _numbers(before: Integers, nodes: Floats) -> Integers:
+    """Numbers for the new `nodes` of a block, after the largest number `before`."""
+    return np.asarray(before.max() + 1 + np.arange(nodes.shape[0] * nodes.shape[1]).reshape(nodes.shape[:2]))

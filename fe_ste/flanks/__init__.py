@@ -1,0 +1,1 @@
+"""What departs from the ideal flank: modifications, measured topography, errors of wheels."""

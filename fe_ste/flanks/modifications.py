@@ -1,0 +1,245 @@
+"""Flank modifications: material removed from the involute flank, as a gap over the flank.
+
+Every modification is a gap along the flank normal, zero or above (but for a topography as measured), so that the gaps
+of both gears and of several modifications add up. Heights are measured in roll length (ISO 21771), because a relief
+that is linear in roll length is linear along the path of contact.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from fe_ste.flanks.topography import FlankTopography
+from fe_ste.geometry.checks import GeometryError
+from fe_ste.geometry.gears import Gear
+from fe_ste.tools.arrays import Floats
+
+
+class ReliefShape(StrEnum):
+    """How a relief grows from its start."""
+
+    LINEAR = "linear"
+    PARABOLIC = "parabolic"
+
+
+@dataclass(frozen=True)
+class Relief:
+    """Tip or root relief.
+
+    Parameters
+    ----------
+    amount : float
+        Material removed at the tip, or at the form circle for a root relief, m.
+    start_radius : float
+        Radius at which the relief begins, m.
+    shape : ReliefShape
+        Growth from the start, in roll length; parabolic begins without a kink.
+
+    Raises
+    ------
+    GeometryError
+        If the amount is negative or not finite, or the shape unknown.
+    """
+
+    amount: float
+    start_radius: float
+    shape: ReliefShape = ReliefShape.LINEAR
+
+    def __post_init__(self) -> None:
+        """Refuse amounts and shapes that make no sense."""
+        _check_removal("relief amount", self.amount)
+        if self.shape not in tuple(ReliefShape):
+            known = ", ".join(f"'{shape}'" for shape in ReliefShape)
+            raise GeometryError(f"relief shape = {self.shape!r} must be one of {known}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlankModification:
+    """Modification of both flanks of every tooth of a gear.
+
+    Parameters
+    ----------
+    tip_relief, root_relief : Relief, optional
+        Reliefs towards the tip and towards the form circle.
+    profile_crowning : float
+        Parabola over the roll length from form to tip circle, zero in its middle, m at either end.
+    lead_crowning : float
+        Parabola over the face width, zero at mid-face, m at either end.
+    profile_slope : float
+        Linear over the roll length; m removed at the tip, or at the form circle if negative.
+    helix_slope : float
+        Linear over the face width; m removed at the +z end, or at the -z end if negative.
+    twist : float
+        Helix slope that turns over along the profile: m removed at the tip of the +z end and at the form circle of the
+        -z end, nothing at the other two corners, half at mid-flank; the other way round if negative.
+    topography : FlankTopography, optional
+        A measured or designed grid, which may also hold material that stands proud.
+
+    Raises
+    ------
+    GeometryError
+        If an amount is not finite, or is negative where only removal makes sense.
+
+    Examples
+    --------
+    >>> gear = Gear(name="pinion", teeth=50, normal_module=3e-3, face_width=20e-3, held_diameter=100e-3)
+    >>> modification = FlankModification(lead_crowning=8e-6, helix_slope=4e-6)
+    >>> ends = np.array([-10e-3, 0.0, 10e-3])
+    >>> print(np.round(1e6 * modification.gap(gear, np.array(75e-3), ends), 6))
+    [ 8.  2. 12.]
+    """
+
+    tip_relief: Relief | None = None
+    root_relief: Relief | None = None
+    profile_crowning: float = 0.0
+    lead_crowning: float = 0.0
+    profile_slope: float = 0.0
+    helix_slope: float = 0.0
+    twist: float = 0.0
+    topography: FlankTopography | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse amounts that make no sense."""
+        _check_removal("profile_crowning", self.profile_crowning)
+        _check_removal("lead_crowning", self.lead_crowning)
+        _check_removal("profile_slope", abs(self.profile_slope))
+        _check_removal("helix_slope", abs(self.helix_slope))
+        _check_removal("twist", abs(self.twist))
+
+    def mirrored(self) -> FlankModification:
+        """Return the modification with the ends of the face exchanged, as the other flank's table needs it."""
+        topography = self.topography.mirrored() if self.topography else None
+        return replace(self, helix_slope=-self.helix_slope, twist=-self.twist, topography=topography)
+
+    def gap(self, gear: Gear, radius: Floats, z: Floats) -> Floats:
+        """Material removed at points of the flank.
+
+        Parameters
+        ----------
+        gear : Gear
+            The modified gear.
+        radius, z : array
+            Radius and axial position of the points, m, the middle of the face width at zero; broadcast
+            against each other.
+
+        Returns
+        -------
+        array
+            Gap along the flank normal, m; divide by cos(beta_b) for the transverse line of action.
+
+        Raises
+        ------
+        GeometryError
+            If a relief starts outside the involute between form and tip circle.
+        """
+        roll_length = np.sqrt(np.maximum(radius**2 - gear.base_radius**2, 0.0))
+        form, tip = gear.form_roll_length, gear.tip_roll_length
+        from_form = (roll_length - form) / (tip - form)
+        along_face = z / gear.face_width
+        gap = (
+            self.profile_crowning * (2.0 * from_form - 1.0) ** 2
+            + _slope(self.profile_slope, from_form)
+            + self.lead_crowning * (2.0 * along_face) ** 2
+            + _slope(self.helix_slope, along_face + 0.5)
+            + 0.5 * (abs(self.twist) + self.twist * (2.0 * from_form - 1.0) * 2.0 * along_face)
+        )
+        if self.tip_relief is not None:
+            gap = gap + _relief_gap(gear, "tip_relief", self.tip_relief, roll_length, tip)
+        if self.root_relief is not None:
+            gap = gap + _relief_gap(gear, "root_relief", self.root_relief, roll_length, form)
+        if self.topography is not None:
+            gap = gap + self.topography.gap(gear, radius, z)
+        return gap
+
+
+def _check_removal(key: str, amount: float) -> None:
+    if not math.isfinite(amount) or amount < 0.0:
+        raise GeometryError(f"{key} = {amount!r} m must be finite and not negative: it removes material")
+
+
+def _relief_gap(gear: Gear, key: str, relief: Relief, roll_length: Floats, end: float) -> Floats:
+    """Gap of a relief that reaches its amount at the roll length `end`."""
+    low, high = sorted((gear.form_radius, gear.tip_radius))
+    if not low < relief.start_radius < high:
+        raise GeometryError(
+            f"gear '{gear.name}': {key}.start_radius = {1e3 * relief.start_radius:.4f} mm must lie on the "
+            f"involute, between {1e3 * low:.4f} mm and {1e3 * high:.4f} mm"
+        )
+    start = math.sqrt(relief.start_radius**2 - gear.base_radius**2)
+    reached = np.maximum((roll_length - start) / (end - start), 0.0)
+    exponent = 1 if relief.shape == ReliefShape.LINEAR else 2
+    return np.asarray(relief.amount * reached**exponent, dtype=np.float64)
+
+
+def _slope(amount: float, position: Floats) -> Floats:
+    """Linear gap over positions 0 to 1 that is zero at one end: at 0, or at 1 for a negative amount."""
+    within = np.clip(position, 0.0, 1.0)
+    return amount * within if amount >= 0.0 else -amount * (1.0 - within)
+
+
+def radius_at_roll_length_from_tip(gear: Gear, roll_length: float) -> float:
+    """Radius on the flank at a distance from the tip in roll length, to start a relief of given length.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear.
+    roll_length : float
+        Roll length from the tip circle into the flank, m.
+
+    Returns
+    -------
+    float
+        Radius, m.
+
+    Raises
+    ------
+    GeometryError
+        If there is no involute so far from the end.
+
+    Examples
+    --------
+    >>> gear = Gear(name="pinion", teeth=50, normal_module=3e-3, face_width=20e-3, held_diameter=100e-3)
+    >>> round(1e3 * radius_at_roll_length_from_tip(gear, 4e-3), 4)
+    76.3716
+    """
+    return _radius_at(gear, gear.tip_roll_length - gear.outward * roll_length)
+
+
+def radius_at_roll_length_from_root(gear: Gear, roll_length: float) -> float:
+    """Radius on the flank at a distance from the form circle in roll length, to start a root relief.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear.
+    roll_length : float
+        Roll length from the form circle into the flank, m.
+
+    Returns
+    -------
+    float
+        Radius, m.
+
+    Raises
+    ------
+    GeometryError
+        If there is no involute so far from the end.
+
+    Examples
+    --------
+    >>> gear = Gear(name="pinion", teeth=50, normal_module=3e-3, face_width=20e-3, held_diameter=100e-3)
+    >>> radius_at_roll_length_from_root(gear, 0.0) == gear.form_radius
+    True
+    """
+    return _radius_at(gear, gear.form_roll_length + gear.outward * roll_length)
+
+
+def _radius_at(gear: Gear, roll_length: float) -> float:
+    if roll_length < 0.0:
+        raise GeometryError(f"gear '{gear.name}': a roll length of {1e3 * roll_length:.4g} mm lies off the involute")
+    return math.hypot(gear.base_radius, roll_length)

@@ -1,0 +1,1 @@
+"""Gears and gear pairs: macro geometry, tooth profile, what makes them impossible."""

@@ -1,0 +1,414 @@
+"""What makes a gear or a gear pair impossible, told before any mesh is built.
+
+Every refusal is a `GeometryError` that names the gear, the key, the value and what would be right.
+"""
+
+from __future__ import annotations
+
+import math
+import numbers
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fe_ste.geometry.fillet import root_fillet
+from fe_ste.geometry.involute import involute
+
+if TYPE_CHECKING:
+    from fe_ste.geometry.gears import Gear, GearPair
+
+
+LEAST_TEETH = 5
+"""Fewest teeth; below lie worms and pump rotors."""
+LEAST_TIP_THICKNESS = 0.2
+"""Least tooth thickness at the tip circle, normal section, in normal modules."""
+PRESSURE_ANGLE_RANGE = (math.radians(10.0), math.radians(35.0))
+"""Normal pressure angles accepted, rad."""
+LARGEST_HELIX_ANGLE = math.radians(50.0)
+"""Largest magnitude of the helix angle at the reference circle, rad."""
+LENGTH_TOLERANCE = 1e-9
+"""Rounding allowed for when lengths are compared, in normal modules."""
+FILLET_TOLERANCE = 1e-5
+"""Error of the fillet as a polygon when a tip corner is led past it, in normal modules."""
+
+
+class GeometryError(ValueError):
+    """A gear or gear pair that cannot be made or cannot run."""
+
+
+def check_gear(gear: Gear) -> None:
+    """Refuse a gear that cannot be made.
+
+    Parameters
+    ----------
+    gear : Gear
+        The gear, possibly of nonsensical values.
+
+    Raises
+    ------
+    GeometryError
+        With one message that says what would be right.
+    """
+    _check_values(gear)
+    _check_circles(gear)
+    if gear.internal:
+        _check_internal_space(gear)
+    else:
+        _check_generating_rack(gear)
+        _check_undercut(gear)
+    _check_tip_thickness(gear)
+    _check_held_diameter(gear)
+
+
+def check_gear_pair(pair: GearPair) -> None:
+    """Refuse a pair that does not fit, does not touch or interferes.
+
+    Parameters
+    ----------
+    pair : GearPair
+        Two gears that passed `check_gear`.
+
+    Raises
+    ------
+    GeometryError
+        With one message that says what would be right.
+    """
+    _check_teeth_of_mates(pair)
+    _check_equal_rack(pair)
+    _check_hands(pair)
+    _check_centre_distance(pair)
+    _check_backlash(pair)
+    _check_tip_clearances(pair)
+    _check_tip_interference(pair)
+    _check_contact(pair)
+    _check_fillet_clearance(pair)
+    if pair.gear.internal:
+        _check_tips_pass(pair)
+
+
+def _refuse_gear(gear: Gear, key: str, value: str, remedy: str) -> GeometryError:
+    return GeometryError(f"gear '{gear.name}': {key} = {value} {remedy}")
+
+
+def _refuse_pair(pair: GearPair, key: str, value: str, remedy: str) -> GeometryError:
+    return GeometryError(f"gear pair '{pair.name}': {key} = {value} {remedy}")
+
+
+def _mm(length: float) -> str:
+    return f"{1e3 * length:.4f} mm"
+
+
+def _deg(angle: float) -> str:
+    return f"{math.degrees(angle):.4f} deg"
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, numbers.Real) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _check_values(gear: Gear) -> None:
+    """Check each number by itself: finite, of the right sign, within the range of the relations."""
+    teeth: object = gear.teeth
+    if not isinstance(teeth, numbers.Integral) or isinstance(teeth, bool) or teeth < LEAST_TEETH:
+        remedy = f"must be a whole number of at least {LEAST_TEETH}"
+        raise _refuse_gear(gear, "teeth", f"{teeth!r}", remedy)
+    positive = {
+        "normal_module": gear.normal_module,
+        "face_width": gear.face_width,
+        "held_diameter": gear.held_diameter,
+        "rack.addendum": gear.rack.addendum,
+        "rack.dedendum": gear.rack.dedendum,
+        "material.youngs_modulus": gear.material.youngs_modulus,
+        "material.density": gear.material.density,
+    }
+    given = {"tip_diameter": gear.tip_diameter, "root_diameter": gear.root_diameter}
+    positive |= {key: value for key, value in given.items() if value is not None}
+    for key, value in positive.items():
+        if not _is_number(value) or value <= 0.0:
+            raise _refuse_gear(gear, key, f"{value!r}", "must be a finite number above zero (SI units)")
+    not_negative = {"rack.tip_radius": gear.rack.tip_radius, "tooth_thinning": gear.tooth_thinning}
+    for key, value in not_negative.items():
+        if not _is_number(value) or value < 0.0:
+            raise _refuse_gear(gear, key, f"{value!r}", "must be a finite number, zero or above (SI units)")
+    if not _is_number(gear.profile_shift):
+        raise _refuse_gear(gear, "profile_shift", f"{gear.profile_shift!r}", "must be a finite number")
+    _check_ranges(gear)
+
+
+def _check_ranges(gear: Gear) -> None:
+    least, most = PRESSURE_ANGLE_RANGE
+    angle = gear.normal_pressure_angle
+    if not _is_number(angle) or not least <= angle <= most:
+        remedy = f"must lie between {_deg(least)} and {_deg(most)} (given in rad: {least:.4f} to {most:.4f})"
+        raise _refuse_gear(gear, "normal_pressure_angle", f"{angle!r} rad", remedy)
+    angle, most = gear.helix_angle, LARGEST_HELIX_ANGLE
+    if not _is_number(angle) or abs(angle) > most:
+        remedy = f"must lie within +-{_deg(most)} (given in rad: +-{most:.4f})"
+        raise _refuse_gear(gear, "helix_angle", f"{angle!r} rad", remedy)
+    ratio = gear.material.poissons_ratio
+    if not _is_number(ratio) or not 0.0 <= ratio < 0.5:
+        raise _refuse_gear(gear, "material.poissons_ratio", f"{ratio!r}", "must be at least 0 and below 0.5")
+
+
+def _check_circles(gear: Gear) -> None:
+    """Refuse teeth or spaces of no width at the reference circle, and tips that are not beyond the root."""
+    if not 0.0 < gear.reference_half_angle < 0.5 * gear.angular_pitch:
+        what = "tooth" if gear.reference_half_angle <= 0.0 else "tooth space"
+        value = f"{gear.profile_shift:g} with tooth_thinning = {_mm(gear.tooth_thinning)}"
+        remedy = f"leaves no {what} at the reference circle: values nearer to zero are needed"
+        raise _refuse_gear(gear, "profile_shift", value, remedy)
+    tip, root = gear.tip_radius, gear.root_radius
+    if min(tip, root) <= 0.0 or (tip - root) * gear.outward <= 0.0:
+        word = "below" if gear.internal else "above"
+        remedy = f"must lie {word} the root diameter of {_mm(2.0 * root)}, and both above zero"
+        raise _refuse_gear(gear, "tip_diameter", _mm(2.0 * tip), remedy)
+
+
+def _check_generating_rack(gear: Gear) -> None:
+    """Refuse a rounding that does not fit on the rack's tooth."""
+    if gear.rack_tip_half_land >= -LENGTH_TOLERANCE * gear.normal_module:
+        return
+    angle, radius = gear.normal_pressure_angle, gear.rack.tip_radius
+    growth = 1.0 / math.cos(angle) - math.tan(angle)
+    largest = radius + gear.rack_tip_half_land / gear.normal_module / growth
+    if largest < 0.0:
+        remedy = "makes the generating rack pointed: a smaller one is needed"
+        raise _refuse_gear(gear, "rack.dedendum", f"{gear.dedendum_factor:.4f}", remedy)
+    remedy = f"does not fit on the rack at a dedendum of {gear.dedendum_factor:.4f}: at most {largest:.4f}"
+    raise _refuse_gear(gear, "rack.tip_radius", f"{radius:g}", remedy)
+
+
+def _check_undercut(gear: Gear) -> None:
+    """Refuse a rack whose straight flank reaches so deep that it cuts back into the involute."""
+    lacking = -gear.form_roll_length * math.sin(gear.transverse_pressure_angle)
+    if lacking > LENGTH_TOLERANCE * gear.normal_module:
+        if gear.root_diameter is not None:
+            least = gear.root_diameter + 2.0 * lacking
+            remedy = f"undercuts the involute: at least {_mm(least)} is needed"
+            raise _refuse_gear(gear, "root_diameter", _mm(gear.root_diameter), remedy)
+        least = gear.profile_shift + lacking / gear.normal_module
+        remedy = f"undercuts the involute: at least {least:.4f} (or more teeth) is needed"
+        raise _refuse_gear(gear, "profile_shift", f"{gear.profile_shift:g}", remedy)
+    if gear.tip_radius <= gear.form_radius:
+        remedy = f"leaves no involute: it must lie above the form diameter of {_mm(2.0 * gear.form_radius)}"
+        raise _refuse_gear(gear, "tip_diameter", _mm(2.0 * gear.tip_radius), remedy)
+
+
+def _check_internal_space(gear: Gear) -> None:
+    """Refuse a tip without involute, a space closed at the root, a fillet higher than the tooth."""
+    if gear.tip_radius <= gear.base_radius:
+        base = _mm(2.0 * gear.base_radius)
+        remedy = f"lies inside the base circle, where no involute is: it must be above {base}"
+        raise _refuse_gear(gear, "tip_diameter", _mm(2.0 * gear.tip_radius), remedy)
+    if gear.half_angle(gear.root_radius) >= 0.5 * gear.angular_pitch:
+        remedy = "lies beyond the point where the flanks of a tooth space meet: a smaller one is needed"
+        raise _refuse_gear(gear, "root_diameter", _mm(2.0 * gear.root_radius), remedy)
+    depth = gear.root_radius - gear.tip_radius
+    if gear.rack.tip_radius * gear.normal_module >= depth or gear.form_radius <= gear.tip_radius:
+        remedy = f"leaves no involute on teeth {_mm(depth)} high: a smaller one is needed"
+        raise _refuse_gear(gear, "rack.tip_radius", f"{gear.rack.tip_radius:g}", remedy)
+
+
+def _check_tip_thickness(gear: Gear) -> None:
+    thickness = gear.tip_thickness / gear.normal_module
+    if thickness < LEAST_TIP_THICKNESS:
+        word = "larger" if gear.internal else "smaller"
+        remedy = (
+            f"at profile_shift = {gear.profile_shift:g} leaves a tip {thickness:.4f} normal modules thick: "
+            f"at least {LEAST_TIP_THICKNESS} is needed, for instance by a {word} tip_diameter"
+        )
+        raise _refuse_gear(gear, "tip_diameter", _mm(2.0 * gear.tip_radius), remedy)
+
+
+def _check_held_diameter(gear: Gear) -> None:
+    root = 2.0 * gear.root_radius
+    if (root - gear.held_diameter) * gear.outward <= 0.0:
+        word = "above" if gear.internal else "below"
+        remedy = f"must lie {word} the root diameter of {_mm(root)}"
+        raise _refuse_gear(gear, "held_diameter", _mm(gear.held_diameter), remedy)
+
+
+def _check_teeth_of_mates(pair: GearPair) -> None:
+    pinion, gear = pair.pinion, pair.gear
+    if pinion.internal:
+        remedy = "is an internal gear: the external gear of the pair must be the pinion"
+        raise _refuse_pair(pair, "pinion", f"'{pinion.name}'", remedy)
+    least = pinion.teeth + 1 if gear.internal else pinion.teeth
+    if gear.teeth < least:
+        remedy = f"must be at least {least}: the pinion, '{pinion.name}' with {pinion.teeth}, is the smaller"
+        raise _refuse_pair(pair, f"teeth of '{gear.name}'", f"{gear.teeth}", remedy)
+
+
+def _check_equal_rack(pair: GearPair) -> None:
+    pinion, gear = pair.pinion, pair.gear
+    if not math.isclose(pinion.normal_module, gear.normal_module, rel_tol=LENGTH_TOLERANCE):
+        remedy = f"must equal that of '{pinion.name}', {_mm(pinion.normal_module)}"
+        raise _refuse_pair(pair, f"normal_module of '{gear.name}'", _mm(gear.normal_module), remedy)
+    if not math.isclose(pinion.normal_pressure_angle, gear.normal_pressure_angle, rel_tol=LENGTH_TOLERANCE):
+        remedy = f"must equal that of '{pinion.name}', {_deg(pinion.normal_pressure_angle)}"
+        value = _deg(gear.normal_pressure_angle)
+        raise _refuse_pair(pair, f"normal_pressure_angle of '{gear.name}'", value, remedy)
+
+
+def _check_hands(pair: GearPair) -> None:
+    """Refuse hands that do not mate: external mates have opposite hands, internal mates the same."""
+    needed = -pair.gear.outward * pair.pinion.helix_angle
+    if not math.isclose(pair.gear.helix_angle, needed, rel_tol=LENGTH_TOLERANCE, abs_tol=LENGTH_TOLERANCE):
+        kind = "same hand" if pair.gear.internal else "opposite hand"
+        remedy = (
+            f"does not mate with {_deg(pair.pinion.helix_angle)} of '{pair.pinion.name}': an "
+            f"{'internal' if pair.gear.internal else 'external'} pair needs the {kind}, {_deg(needed)}"
+        )
+        raise _refuse_pair(pair, f"helix_angle of '{pair.gear.name}'", _deg(pair.gear.helix_angle), remedy)
+
+
+def _check_centre_distance(pair: GearPair) -> None:
+    if not _is_number(pair.centre_distance) or pair.centre_distance <= 0.0:
+        remedy = "must be a finite number above zero, also for an internal pair"
+        raise _refuse_pair(pair, "centre_distance", f"{pair.centre_distance!r}", remedy)
+    least = abs(pair.pinion.base_radius + pair.gear.outward * pair.gear.base_radius)
+    if pair.centre_distance <= least:
+        remedy = f"is too small: no line of action touches both base circles below {_mm(least)}"
+        raise _refuse_pair(pair, "centre_distance", _mm(pair.centre_distance), remedy)
+
+
+def _check_backlash(pair: GearPair) -> None:
+    backlash, limit = pair.circumferential_backlash, pair.backlash_free_centre_distance
+    if backlash >= -LENGTH_TOLERANCE * pair.pinion.normal_module:
+        return
+    if limit <= abs(pair.gear.base_radius - pair.pinion.base_radius):
+        remedy = f"leaves no room for the teeth of '{pair.pinion.name}' at any centre distance: more is needed"
+        value = f"{pair.gear.profile_shift:g}"
+        raise _refuse_pair(pair, f"profile_shift of '{pair.gear.name}'", value, remedy)
+    word, bound = ("large", "at most") if pair.gear.internal else ("small", "at least")
+    remedy = f"is too {word}: the flanks would overlap by {_mm(-backlash)}; {bound} {_mm(limit)} is needed"
+    raise _refuse_pair(pair, "centre_distance", _mm(pair.centre_distance), remedy)
+
+
+def _check_tip_clearances(pair: GearPair) -> None:
+    for tip, root, clearance in (
+        (pair.pinion, pair.gear, pair.pinion_tip_clearance),
+        (pair.gear, pair.pinion, pair.gear_tip_clearance),
+    ):
+        if clearance <= 0.0:
+            bound = tip.tip_radius + tip.outward * clearance
+            word = "above" if tip.internal else "below"
+            remedy = f"runs {_mm(-clearance)} into the root of '{root.name}': {word} {_mm(2.0 * bound)} needed"
+            raise _refuse_pair(pair, f"tip_diameter of '{tip.name}'", _mm(2.0 * tip.tip_radius), remedy)
+
+
+def _check_tip_interference(pair: GearPair) -> None:
+    """Refuse a tip that touches its mate below the form circle, where the mate has a fillet."""
+    tolerance = LENGTH_TOLERANCE * pair.pinion.normal_module
+    reach_of_gear = pair.pinion_roll_length(pair.gear.tip_roll_length)
+    reach_of_pinion = pair.pinion_roll_length(pair.gear.form_roll_length)
+    for tip, mate, excess in (
+        (pair.gear, pair.pinion, pair.pinion.form_roll_length - reach_of_gear),
+        (pair.pinion, pair.gear, pair.pinion.tip_roll_length - reach_of_pinion),
+    ):
+        if excess > tolerance:
+            bound = 2.0 * math.hypot(tip.base_radius, tip.tip_roll_length - tip.outward * excess)
+            word = "at least" if tip.internal else "at most"
+            remedy = (
+                f"interferes with the root fillet of '{mate.name}', which begins at the form diameter "
+                f"{_mm(2.0 * mate.form_radius)}: {word} {_mm(bound)} is needed"
+            )
+            raise _refuse_pair(pair, f"tip_diameter of '{tip.name}'", _mm(2.0 * tip.tip_radius), remedy)
+
+
+def _check_contact(pair: GearPair) -> None:
+    ratio = pair.transverse_contact_ratio
+    if ratio < 1.0:
+        remedy = f"must be at least 1: no contact at centre_distance = {_mm(pair.centre_distance)}"
+        raise _refuse_pair(pair, "transverse contact ratio", f"{ratio:.4f}", remedy)
+
+
+def _check_fillet_clearance(pair: GearPair) -> None:
+    """Refuse a tip whose corner, outside the path of contact, cuts into the root fillet of its mate."""
+    for tip, mate in ((pair.pinion, pair.gear), (pair.gear, pair.pinion)):
+        gap = corner_to_fillet_gap(pair, tip, mate)
+        if gap < -FILLET_TOLERANCE * tip.normal_module:
+            word = "larger" if tip.internal else "smaller"
+            remedy = (
+                f"interferes with the root fillet of '{mate.name}', its corner cuts {_mm(-gap)} into it: "
+                f"a {word} one, or a smaller rack.tip_radius of '{mate.name}', is needed"
+            )
+            raise _refuse_pair(pair, f"tip_diameter of '{tip.name}'", _mm(2.0 * tip.tip_radius), remedy)
+
+
+def corner_to_fillet_gap(pair: GearPair, tip: Gear, mate: Gear) -> float:
+    """Least gap between the way of a tip corner and the mate's root fillet.
+
+    The corner leaves the line of action at the end of the path of contact and goes deeper than there. The
+    flanks are taken in contact, as on the path of contact.
+
+    Parameters
+    ----------
+    pair : GearPair
+        The pair.
+    tip, mate : Gear
+        The gear whose tip corner moves and the gear whose fillet it passes.
+
+    Returns
+    -------
+    float
+        Arc about the mate's axis, m; negative if the corner cuts into the fillet, infinite if it does not get
+        below the form circle.
+    """
+    distance, radius = pair.centre_distance, tip.tip_radius
+    # Origin on the tip's axis, x along the line of centres to the pitch point; x as the mate sees it is
+    # to_mate * distance + turn * x.
+    to_mate, turn = (-1.0 if tip.internal else 1.0), -float(pair.gear.outward)
+    cosine = to_mate * turn * (mate.form_radius**2 - distance**2 - radius**2) / (2.0 * distance * radius)
+    if cosine >= 1.0:
+        return math.inf
+    corner = np.linspace(-1.0, 1.0, 1001) * math.acos(max(cosine, -1.0))
+    x, y = to_mate * distance + turn * radius * np.cos(corner), radius * np.sin(corner)
+    seen_radius, seen_angle = np.hypot(x, y), np.arctan2(y, x)
+    # The flanks touch at the pitch point at rotation zero.
+    rotation = corner - tip.half_angle(radius) + tip.half_angle(pair.working_radius(tip))
+    mate_tooth = mate.half_angle(pair.working_radius(mate)) + rotation * tip.teeth / mate.teeth
+    fillet = root_fillet(mate, np.linspace(0.0, 1.0, 2001))[:: -mate.outward]
+    half_angle = np.interp(seen_radius, np.hypot(*fillet.T), np.arctan2(fillet[:, 1], fillet[:, 0]))
+    return float(np.min(seen_radius * (mate_tooth - half_angle - seen_angle)))
+
+
+def _check_tips_pass(pair: GearPair) -> None:
+    """Refuse an internal pair whose tips collide outside the path of contact, where the tip circles cross."""
+    swallowed = pair.pinion.tip_radius >= pair.centre_distance + pair.gear.tip_radius
+    if swallowed or internal_tip_gap(pair) < 0.0:
+        difference = pair.gear.teeth - pair.pinion.teeth
+        remedy = (
+            f"is too small: outside the path of contact the tips of '{pair.pinion.name}' and "
+            f"'{pair.gear.name}' collide; more difference in teeth or shorter teeth are needed"
+        )
+        raise _refuse_pair(pair, "difference in teeth", f"{difference}", remedy)
+
+
+def internal_tip_gap(pair: GearPair) -> float:
+    """Gap between mating tip corners of an internal pair where the tip circles cross.
+
+    The flanks are taken in contact, as on the path of contact; the back flanks have the backlash in addition.
+
+    Parameters
+    ----------
+    pair : GearPair
+        An internal pair whose tip circles cross.
+
+    Returns
+    -------
+    float
+        Arc along the gear's tip circle, m; negative if the corners collide.
+    """
+    pinion, gear, distance = pair.pinion, pair.gear, pair.centre_distance
+    at_pinion = math.acos(
+        (gear.tip_radius**2 - distance**2 - pinion.tip_radius**2) / (2.0 * distance * pinion.tip_radius)
+    )
+    at_gear = math.acos((gear.tip_radius**2 + distance**2 - pinion.tip_radius**2) / (2.0 * distance * gear.tip_radius))
+    working = involute(pair.working_pressure_angle)
+    pinion_corner = working - involute(math.acos(pinion.base_radius / pinion.tip_radius))
+    gear_corner = working - involute(math.acos(gear.base_radius / gear.tip_radius))
+    # Angles from the line of centres; with the flanks touching at the pitch point the corners stand at
+    # pinion_corner and gear_corner. The pinion's is turned to the crossing at which it runs out of the
+    # mesh; at the other it runs in far behind its mate.
+    return gear.tip_radius * ((at_pinion - pinion_corner) / pair.ratio + gear_corner - at_gear)

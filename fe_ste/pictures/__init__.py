@@ -1,0 +1,1 @@
+"""Diagrams of tables, pictures of teeth in contact and of their stress."""

@@ -1,0 +1,273 @@
+"""Diagrams of transmission error tables.
+
+matplotlib is imported when a diagram is drawn and needs no display: figures are made without pyplot.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fe_ste.tools.arrays import Booleans, Floats
+from fe_ste.tools.drawing import COLOURS, WARNING_COLOUR, drawing_style, finish_figure, new_figure
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+def single_load_case(dataset: xr.Dataset) -> xr.Dataset:
+    """Reduce a table to the mesh cycle.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        With the dimension ``pmc``; torque, centre distance and misalignment may be there with length one.
+
+    Returns
+    -------
+    xarray.Dataset
+        Without the dimensions of length one, `tooth` apart, ordered by ``pmc``.
+
+    Raises
+    ------
+    ValueError
+        If a dimension is swept: a curve belongs to one state.
+    """
+    if "pmc" not in dataset.dims:
+        raise ValueError(f"dataset: no dimension 'pmc' among {sorted(map(str, dataset.dims))}")
+    swept = {"torque", "centre_distance", "misalignment"}.intersection(map(str, dataset.dims))
+    several = [name for name in sorted(swept) if dataset.sizes[name] > 1]
+    if several:
+        name = several[0]
+        raise ValueError(
+            f"dataset: {name} has {dataset.sizes[name]} values; choose one, such as dataset.isel({name}=0)"
+        )
+    return dataset.isel({name: 0 for name in swept}).sortby("pmc")
+
+
+def plot_ste_curves(datasets: Mapping[str, xr.Dataset], path: str | Path | None = None) -> Figure:
+    """Draw the static transmission error of several pairs over the mesh cycle.
+
+    Parameters
+    ----------
+    datasets : mapping of str to xarray.Dataset
+        Title of the panel and table: ``ste`` (m) over ``pmc``, optionally ``converged``.
+    path : path-like, optional
+        Where to write the picture.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One panel a pair, in micrometres. All panels span the same range, so that peak-to-peak values
+        compare; the means stand in the titles. Positions that have not converged are crossed out in red.
+
+    Raises
+    ------
+    ValueError
+        If there is nothing to draw or a table is swept over more than the mesh cycle.
+    """
+    if not datasets:
+        raise ValueError("plot_ste_curves: no dataset given")
+    curves = {name: _cycle(single_load_case(dataset), "ste", 1e6) for name, dataset in datasets.items()}
+    # A constant curve still needs an axis.
+    span = 1.15 * max([1e-3, *(curve.peak_to_peak for curve in curves.values())])
+    columns = 1 if len(curves) == 1 else 2
+    rows = math.ceil(len(curves) / columns)
+    with drawing_style():
+        figure = new_figure(3.4 * columns + 0.4, 2.4 * rows + 0.3)
+        panels = figure.subplots(rows, columns, squeeze=False)
+        for panel, (name, curve), colour in zip(panels.flat, curves.items(), itertools.cycle(COLOURS), strict=False):
+            _draw_cycle(panel, curve, colour, span)
+            panel.set_title(f"{name}\n{curve.summary}", loc="left")
+        for panel in panels.flat[len(curves) :]:
+            panel.set_visible(False)
+        for panel in panels[:, 0]:
+            panel.set_ylabel("STE / µm")
+        for panel in panels.flat[max(0, len(curves) - columns) : len(curves)]:
+            panel.set_xlabel("Position in mesh cycle")
+        return finish_figure(figure, path)
+
+
+def plot_ripple(
+    datasets: Mapping[str, xr.Dataset], path: str | Path | None = None, design: Mapping[str, float] | None = None
+) -> Figure:
+    """Draw the peak-to-peak transmission error of one or several tables over the load.
+
+    Parameters
+    ----------
+    datasets : mapping of str to xarray.Dataset
+        Title of the curve and table: ``ste`` (m) over ``pmc`` and ``torque``.
+    path : path-like, optional
+        Where to write the picture.
+    design : mapping of str to float, optional
+        Torque (N m) for which a curve's flanks were designed: marked on it.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    ValueError
+        If there is nothing to draw, or a table is swept over more than position and load.
+    """
+    if not datasets:
+        raise ValueError("plot_ripple: no dataset given")
+    with drawing_style():
+        figure = new_figure(5.0, 3.2)
+        panel = figure.subplots()
+        for (name, dataset), colour in zip(datasets.items(), itertools.cycle(COLOURS), strict=False):
+            torque = dataset["torque"].to_numpy().astype(np.float64)
+            ripple = np.array([_cycle(_at_load(dataset, t), "ste", 1e6).peak_to_peak for t in range(len(torque))])
+            panel.plot(torque, ripple, color=colour, label=name)
+            if design and name in design:
+                panel.plot(design[name], np.interp(design[name], torque, ripple), "o", color=colour)
+        panel.set_xlabel("torque on gear 1 / N m")
+        panel.set_ylabel("peak-to-peak STE / µm")
+        panel.set_ylim(bottom=0.0)
+        panel.set_xlim(left=0.0)
+        panel.legend()
+        return finish_figure(figure, path)
+
+
+def _at_load(dataset: xr.Dataset, number: int) -> xr.Dataset:
+    return single_load_case(dataset.isel(torque=[number]))
+
+
+@dataclass(frozen=True)
+class _Cycle:
+    """A quantity over the mesh cycle, in the unit of the picture."""
+
+    position: Floats
+    values: Floats
+    converged: Booleans
+
+    @property
+    def valid(self) -> Booleans:
+        """Where there is a number that can be relied on."""
+        return self.converged & np.isfinite(self.values)
+
+    @property
+    def middle(self) -> float:
+        """Middle between the extremes of what converged."""
+        shown = self.values[self.valid]
+        return 0.5 * float(shown.max() + shown.min()) if shown.size else 0.0
+
+    @property
+    def peak_to_peak(self) -> float:
+        """Difference of the extremes of what converged."""
+        shown = self.values[self.valid]
+        return float(np.ptp(shown)) if shown.size else 0.0
+
+    @property
+    def summary(self) -> str:
+        """Mean and peak-to-peak in words."""
+        if not self.valid.any():
+            return "no converged position"
+        mean = float(self.values[self.valid].mean())
+        return f"mean {mean:.1f} µm, peak-to-peak {self.peak_to_peak:.2f} µm"
+
+
+def _cycle(dataset: xr.Dataset, name: str, factor: float) -> _Cycle:
+    values = factor * dataset[name].to_numpy().astype(np.float64)
+    converged = dataset["converged"].to_numpy() if "converged" in dataset else np.ones(values.shape)
+    return _Cycle(dataset["pmc"].to_numpy().astype(np.float64), values, converged.astype(bool))
+
+
+def _draw_cycle(panel: Axes, curve: _Cycle, colour: str, span: float) -> None:
+    # The first position again at the end: it is the same state one pitch on.
+    position = np.append(curve.position, curve.position[0] + 1.0)
+    shown = np.where(curve.valid, curve.values, np.nan)
+    panel.plot(position, np.append(shown, shown[0]), color=colour, marker="o", markersize=2.2)
+    lowest, highest = curve.middle - 0.5 * span, curve.middle + 0.5 * span
+    # What has not converged may be anything: keep its mark inside the panel.
+    inside = np.clip(np.where(np.isfinite(curve.values), curve.values, curve.middle), lowest, highest)
+    mark_not_converged(panel, curve.position[~curve.valid], inside[~curve.valid])
+    panel.set(xlim=(0.0, 1.0), ylim=(lowest, highest))
+
+
+def mark_not_converged(panel: Axes, position: Floats, height: Floats) -> None:
+    """Cross out positions in red and count them in the legend; without positions do nothing."""
+    if not position.size:
+        return
+    label = f"{position.size} not converged"
+    (crosses,) = panel.plot(position, height, "x", color=WARNING_COLOUR, zorder=5, label=label)
+    crosses.set(markersize=6.0, markeredgewidth=1.6, clip_on=False)
+    for place in position:
+        panel.axvline(place, color=WARNING_COLOUR, linewidth=0.6, alpha=0.4)
+    panel.legend(loc="best")
+
+
+def plot_load_share(dataset: xr.Dataset, path: str | Path | None = None, title: str = "") -> Figure:
+    """Draw the share of the load that each tooth pair carries over the mesh cycle.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Table with ``load_share`` over ``pmc`` and ``tooth``, optionally ``converged``.
+    path : path-like, optional
+        Where to write the picture.
+    title : str
+        Name of the pair and its load.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Left the shares over one mesh cycle, right the way of one tooth pair from entry to exit, which is the
+        left panel unrolled.
+
+    Raises
+    ------
+    ValueError
+        If the table has no load shares or is swept over more than the mesh cycle.
+    """
+    if "load_share" not in dataset:
+        raise ValueError(f"dataset: no variable 'load_share' among {sorted(map(str, dataset.data_vars))}")
+    cycle = single_load_case(dataset)
+    share = 100.0 * cycle["load_share"].transpose("tooth", "pmc").to_numpy().astype(np.float64)
+    teeth = cycle["tooth"].to_numpy() if "tooth" in cycle.coords else np.arange(share.shape[0])
+    total = _cycle(cycle.assign(total=cycle["load_share"].sum("tooth")), "total", 100.0)
+    share[:, ~total.valid] = np.nan
+    carrying = np.nanmax(share, axis=1, initial=0.0) > 0.0
+    share, teeth = share[carrying], teeth[carrying]
+    with drawing_style():
+        figure = new_figure(7.2, 2.9)
+        over_cycle, over_way = figure.subplots(1, 2, sharey=True, width_ratios=(1.0, 1.4))
+        order = _order_along_way(share)
+        for step, row in enumerate(order):
+            colour, shown = COLOURS[row % len(COLOURS)], _carried(share[row])
+            label = f"tooth pair {teeth[row]:+d}" if teeth[row] else "tooth pair 0"
+            over_cycle.plot(total.position, shown, color=colour, marker="o", markersize=2.2, label=label)
+            over_way.plot(total.position + step, shown, color=colour, marker="o", markersize=2.2)
+        highest = 1.12 * float(np.nanmax(share, initial=1.0))
+        over_cycle.set(xlim=(0.0, 1.0), ylim=(0.0, highest), xlabel="Position in mesh cycle")
+        over_cycle.set_ylabel("Load share / %")
+        over_cycle.legend(loc="best")
+        missing = total.position[~total.valid]
+        mark_not_converged(over_cycle, missing, np.zeros(missing.size))
+        over_way.set(xlim=(0.0, max(1, len(order))), xlabel="Way of one tooth pair in mesh cycles")
+        figure.suptitle(title, fontsize=9.5)
+        return finish_figure(figure, path)
+
+
+def _carried(share: Floats) -> Floats:
+    """Blank the positions at which a tooth pair and both its neighbours in time carry nothing."""
+    loaded = share > 0.0
+    return np.where(loaded | np.roll(loaded, 1) | np.roll(loaded, -1), share, np.nan)
+
+
+def _order_along_way(share: Floats) -> list[int]:
+    """Order of the teeth in which the end of each one's cycle fits the beginning of the next one's."""
+    last, first = np.nan_to_num(share[:, -1]), np.nan_to_num(share[:, 0])
+    ascending = float(np.abs(last[:-1] - first[1:]).sum())
+    descending = float(np.abs(last[1:] - first[:-1]).sum())
+    rows = list(range(share.shape[0]))
+    return rows if ascending <= descending else rows[::-1]

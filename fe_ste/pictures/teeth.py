@@ -1,0 +1,319 @@
+"""Pictures of meshing teeth under load, rendered off-screen.
+
+pyvista is imported when a picture is drawn. VTK renders into memory without a display through EGL or OSMesa;
+where neither is there it crashes the process, so the first picture tries it in a process of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from fe_ste.elasticity.hexmesh import MeshSettings, sector_mesh
+from fe_ste.geometry.gears import Gear, GearPair
+from fe_ste.tools.arrays import Floats, Integers, Pixels
+from fe_ste.tools.drawing import drawing_style, finish_figure, new_figure
+from fe_ste.tools.rendering import offscreen_plotter, place_picture, rendered_image, without_margins
+
+if TYPE_CHECKING:
+    import pyvista
+    from matplotlib.axes import Axes
+    from matplotlib.collections import PolyCollection
+    from matplotlib.figure import Figure
+
+    from fe_ste.contact.cells import Cells
+
+
+#: Colours of the two gears of a pair.
+PINION_COLOUR = "#B9C4D0"
+GEAR_COLOUR = "#D9C9A8"
+_PRESSURE_MAP: Final = "inferno_r"
+
+
+@dataclass(frozen=True)
+class HexahedraMesh:
+    """Hexahedra of one body.
+
+    Attributes
+    ----------
+    points : (n, 3) array
+        m.
+    hexahedra : (m, 8) array of int
+        Connectivity in VTK order.
+    """
+
+    points: Floats
+    hexahedra: Integers
+
+    def surface(self) -> pyvista.PolyData:
+        """Outer surface as quadrilaterals."""
+        import pyvista
+
+        grid = pyvista.UnstructuredGrid({pyvista.CellType.HEXAHEDRON: self.hexahedra}, self.points)
+        return grid.extract_surface(algorithm="geometry")
+
+
+def draw_tooth_contact(
+    pinion: HexahedraMesh,
+    gear: HexahedraMesh,
+    quads: Floats,
+    pressure: Floats,
+    path: str | Path | None = None,
+    *,
+    title: str = "",
+    highest_pressure: float | None = None,
+    size: tuple[int, int] = (1800, 1400),
+) -> Figure:
+    """Draw meshing teeth with the contact pressure on the pinion's flanks.
+
+    Parameters
+    ----------
+    pinion, gear : HexahedraMesh
+        Some teeth of both gears in meshing position; the mating gear is drawn translucent.
+    quads : (k, 4, 3) array
+        Corners of the contact cells on the flanks of the pinion, m.
+    pressure : (k,) array
+        Contact pressure on the cells, Pa; cells without pressure are left out.
+    path : path-like, optional
+        Where to write the picture.
+    title : str
+        Name of the pair and its load.
+    highest_pressure : float, optional
+        Upper end of the colours, Pa, for peaks at tip edges that would darken all else.
+    size : (int, int)
+        Width and height of the rendered image, pixels.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Above the teeth, below the contact cells unrolled over face width and radius.
+
+    Raises
+    ------
+    RenderingError
+        If this machine cannot render off-screen; the message names what to install.
+    ValueError
+        If quads and pressure do not fit or nothing is loaded.
+    """
+    from matplotlib.patches import Patch
+
+    if quads.ndim != 3 or quads.shape[1:] != (4, 3) or pressure.shape != quads.shape[:1]:
+        raise ValueError(f"quads {quads.shape} and pressure {pressure.shape} must be (k, 4, 3) and (k,)")
+    loaded = pressure > 0.0
+    if not np.any(loaded):
+        raise ValueError("draw_tooth_contact: no cell carries pressure")
+    top = 1e-6 * (highest_pressure or float(pressure.max()))
+    image, pixel = _render_contact(pinion, gear, quads[loaded], 1e-6 * pressure[loaded], top, size)
+    with drawing_style():
+        tall = 6.5 * image.shape[0] / image.shape[1]
+        figure = new_figure(7.6, tall + 2.5)
+        picture, chart = figure.subplots(2, 1, height_ratios=(tall, 1.9))
+        place_picture(picture, image, pixel, title)
+        patches = [
+            Patch(facecolor=colour, edgecolor="#555555", label=label)
+            for label, colour in (("pinion", PINION_COLOUR), ("gear, translucent", GEAR_COLOUR))
+        ]
+        picture.legend(handles=patches, loc="lower right", ncols=2, borderaxespad=0.0)
+        cells = _chart_pressure(chart, quads[loaded], 1e-6 * pressure[loaded], top)
+        extend = "max" if 1e-6 * pressure.max() > 1.001 * top else "neither"
+        figure.colorbar(cells, ax=[picture, chart], label="Contact pressure / MPa", aspect=35, extend=extend)
+        return finish_figure(figure, path)
+
+
+def _render_contact(
+    pinion: HexahedraMesh,
+    gear: HexahedraMesh,
+    quads: Floats,
+    pressure: Floats,
+    top: float,
+    size: tuple[int, int],
+) -> tuple[Pixels, float]:
+    """Picture and size of its pixels; pressure in MPa."""
+    direction, upward = _view_on_contact(quads, pressure, pinion.points)
+    with offscreen_plotter(*size) as plotter:
+        for body, colour, opacity in ((pinion, PINION_COLOUR, 1.0), (gear, GEAR_COLOUR, 0.12)):
+            surface = body.surface()
+            plotter.add_mesh(surface, color=colour, opacity=opacity, ambient=0.35, diffuse=0.65)
+            edges = surface.extract_feature_edges(30.0, manifold_edges=False, non_manifold_edges=False)
+            plotter.add_mesh(edges, color="#444444", line_width=1.5, opacity=0.5 + 0.5 * opacity)
+        # Towards the eye by next to nothing, so that the cells are not lost in the flank below them.
+        lift = 2e-3 * float(np.ptp(pinion.points, axis=0).max()) * direction
+        patch = _quad_surface(quads + lift)
+        patch.cell_data["pressure"] = pressure
+        plotter.add_mesh(
+            patch,
+            scalars="pressure",
+            clim=(0.0, top),
+            cmap=_PRESSURE_MAP,
+            lighting=False,
+            show_scalar_bar=False,
+        )
+        focus = quads.mean(axis=(0, 1))
+        plotter.camera_position = [focus + direction, focus, upward]
+        plotter.renderer.ResetCamera()
+        image, pixel = rendered_image(plotter)
+    return without_margins(image), pixel
+
+
+def _chart_pressure(panel: Axes, quads: Floats, pressure: Floats, top: float) -> PolyCollection:
+    """Contact cells unrolled: radius over face width, the radius stretched."""
+    from matplotlib.collections import PolyCollection
+
+    radius = 1e3 * np.hypot(quads[..., 0], quads[..., 1])
+    height = 1e3 * quads[..., 2]
+    outlines = list(np.stack([height, radius], axis=-1))
+    cells = PolyCollection(outlines, array=pressure, cmap=_PRESSURE_MAP, edgecolor="face")
+    cells.set_clim(0.0, top)
+    panel.add_collection(cells)
+    panel.autoscale_view()
+    panel.set(xlabel="Face width z / mm", ylabel="Pinion radius / mm")
+    return cells
+
+
+def _quad_surface(quads: Floats) -> pyvista.PolyData:
+    import pyvista
+
+    faces = np.column_stack([np.full(len(quads), 4), np.arange(4 * len(quads)).reshape(-1, 4)])
+    return pyvista.PolyData(quads.reshape(-1, 3), faces=faces.ravel())
+
+
+def _view_on_contact(quads: Floats, pressure: Floats, body: Floats) -> tuple[Floats, Floats]:
+    """Direction to the eye, before the loaded flank and a little beyond the face, and which way is up."""
+    normals = np.cross(quads[:, 2] - quads[:, 0], quads[:, 3] - quads[:, 1])
+    outward = np.sign(np.einsum("ij,ij->i", normals, quads.mean(axis=1) - body.mean(axis=0)))
+    normal = np.sum((outward * pressure)[:, None] * normals, axis=0)
+    normal[2] = 0.0
+    normal /= np.linalg.norm(normal)
+    radial = quads.mean(axis=(0, 1)) * np.array([1.0, 1.0, 0.0])
+    radial -= (radial @ normal) * normal
+    radial /= np.linalg.norm(radial)
+    direction = normal + 0.45 * radial + 0.45 * np.array([0.0, 0.0, 1.0])
+    return direction / np.linalg.norm(direction), radial
+
+
+def meshed_teeth(
+    pair: GearPair, rotation: float, teeth: Sequence[int], settings: MeshSettings | None = None
+) -> tuple[HexahedraMesh, HexahedraMesh]:
+    """Mesh some teeth of both gears and put them into meshing position.
+
+    Parameters
+    ----------
+    pair : GearPair
+        The pair.
+    rotation : float
+        Rotation of gear 1, rad, from where tooth pair 0 touches at the pitch point; gear 2 rolls with it.
+    teeth : sequence of int
+        Tooth pairs to show.
+    settings : MeshSettings, optional
+        Elements per tooth.
+
+    Returns
+    -------
+    pinion, gear : HexahedraMesh
+        In the frame of gear 1: its axis is z, the line of centres lies along x, z = 0 is the middle of both
+        face widths.
+
+    Examples
+    --------
+    >>> gear = Gear(name="gear", teeth=30, normal_module=3e-3, face_width=20e-3, held_diameter=50e-3)
+    >>> pair = GearPair(name="pair", pinion=gear, gear=gear, centre_distance=90e-3)
+    >>> pinion, mate = meshed_teeth(pair, 0.0, [0], MeshSettings(layers=3, flank=4, thickness=2))
+    >>> from_axis = np.hypot(mate.points[:, 0] - 90e-3, mate.points[:, 1])
+    >>> bool(abs(from_axis.max() - gear.tip_radius) < 1e-9)
+    True
+    """
+    sides = _sides(pair)
+    return _teeth_of(pair.pinion, sides[0], rotation, teeth, settings), _teeth_of(
+        pair.gear, sides[1], rotation, teeth, settings
+    )
+
+
+@dataclass(frozen=True)
+class _Side:
+    """Where a gear of a pair stands: polar angle of the middle of its tooth 0, pitch and gear's own frame."""
+
+    start: float
+    pitch: float
+    ratio: float
+    centre: float
+    facing: float
+
+
+def _sides(pair: GearPair) -> tuple[_Side, _Side]:
+    kind = -1.0 if pair.gear.internal else 1.0
+    pinion = _Side(
+        start=-float(pair.pinion.half_angle(pair.pinion_working_radius)),
+        pitch=pair.pinion.angular_pitch,
+        ratio=1.0,
+        centre=0.0,
+        facing=1.0,
+    )
+    # The flank that gear 1 pushes lies on the other side of an internal tooth.
+    gear = _Side(
+        start=-kind * float(pair.gear.half_angle(pair.gear_working_radius)),
+        pitch=-kind * pair.gear.angular_pitch,
+        ratio=-kind * pair.pinion.teeth / pair.gear.teeth,
+        centre=kind * pair.centre_distance,
+        facing=-kind,
+    )
+    return pinion, gear
+
+
+def _teeth_of(
+    gear: Gear, side: _Side, rotation: float, teeth: Sequence[int], settings: MeshSettings | None
+) -> HexahedraMesh:
+    sector = sector_mesh(gear, settings)
+    angles = [side.start + side.ratio * rotation + tooth * side.pitch for tooth in teeth]
+    points = np.concatenate([_turned(sector.points, angle) for angle in angles])
+    points[:, :2] = side.facing * points[:, :2] + np.array([side.centre, 0.0])
+    offsets = np.arange(len(angles))[:, None, None] * len(sector.points)
+    return HexahedraMesh(points, (sector.hexahedra + offsets).reshape(-1, 8))
+
+
+def _turned(points: Floats, angle: float) -> Floats:
+    cosine, sine = math.cos(angle), math.sin(angle)
+    turned: Floats = points @ np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    return turned
+
+
+def contact_quads(pair: GearPair, cells: Cells, rotation: float, axial: Floats, slice_width: float) -> Floats:
+    """Corners of contact cells on the flanks of gear 1.
+
+    Parameters
+    ----------
+    pair : GearPair
+        The pair.
+    cells : fe_ste.contact.cells.Cells
+        Cells of a contact analysis.
+    rotation : float
+        Rotation of gear 1, rad.
+    axial : (slices,) array
+        Middle of the slices, m.
+    slice_width : float
+        m.
+
+    Returns
+    -------
+    (k, 4, 3) array
+        m, in the frame of `meshed_teeth`.
+    """
+    pinion = pair.pinion
+    # Along the profile the arc of an involute grows by r_b tan(alpha) per roll angle.
+    half_roll = cells.half_across / (pinion.base_radius * cells.roll)
+    roll = cells.roll[:, None] + half_roll[:, None] * np.array([-1.0, 1.0, 1.0, -1.0])
+    height = axial[cells.layer][:, None] + 0.5 * slice_width * np.array([-1.0, -1.0, 1.0, 1.0])
+    working = math.tan(pair.working_pressure_angle)
+    twist = math.tan(pinion.base_helix_angle) / pinion.base_radius
+    polar = (
+        (working - math.atan(working))
+        - (roll - np.arctan(roll))
+        + (rotation + cells.tooth[:, None] * pinion.angular_pitch)
+        + twist * height
+    )
+    radius = pinion.base_radius * np.sqrt(1.0 + roll**2)
+    return np.stack([radius * np.cos(polar), radius * np.sin(polar), height], axis=-1)

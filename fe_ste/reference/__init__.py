@@ -1,0 +1,1 @@
+"""The reference analysis: full non-linear contact of finite-element models."""

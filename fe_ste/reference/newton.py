@@ -1,0 +1,558 @@
+"""Equilibrium of elastic bricks in frictionless contact: Newton's method with a primal-dual active set.
+
+Each iteration linearises bricks and contact together. The nodes of the first surface whose pressure, lessened by a
+multiple of their mean gap, is positive must close their weighted gaps; the others carry no pressure (M. Hintermueller,
+K. Ito, K. Kunisch, SIAM J. Optim. 13 (2003) 865-888). The pressures are exact multipliers: the stiffness added on the
+active gaps only makes the matrix positive definite, and the multipliers are iterated until none of it is left.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import scipy.sparse
+
+from fe_ste.reference.finite_deformation import Bricks, BrickTangent, InvertedElementError
+from fe_ste.reference.mortar import Surface, WeightedGap, facing_pairs, summed, weighted_gap
+from fe_ste.tools.arrays import Booleans, Floats, Integers, SparseMatrix
+from fe_ste.tools.sparse import FactorisationError, factorise
+from fe_ste.tools.threads import one_dense_thread
+
+#: Stiffness added on active gaps, in Young's moduli times the node's width: what is left falls by it per solve.
+_AUGMENTATION = 100.0
+_MOST_AUGMENTATIONS = 25
+
+#: Nodes that face the other surface with less than this part of their area carry no pressure.
+_LEAST_FACING = 1e-3
+
+#: Nodes that face it with more than this part do so with their whole area: the rest is the surface's curvature.
+_WHOLLY_FACING = 0.95
+_LEAST_STEP_LENGTH = 1.0 / 16.0
+_LEAST_LOAD_STEP = 1.0 / 64.0
+
+
+class EquilibriumError(RuntimeError):
+    """No equilibrium was found; the message says at which load step and iteration."""
+
+
+@dataclass(frozen=True)
+class TurningHub:
+    """Nodes of a rigid hub that turns about an axis along z under a torque.
+
+    Attributes
+    ----------
+    nodes : ndarray
+    axis : ndarray (2,)
+        m.
+    lever : float
+        The unknown is the rotation (positive about +z) times this length, m; negative reverses its sense.
+    force : float
+        Torque over `lever`, N.
+    """
+
+    nodes: Integers
+    axis: Floats
+    lever: float
+    force: float
+
+
+@dataclass(frozen=True)
+class ContactModel:
+    """Elastic bodies, what holds and loads them, and where they may touch.
+
+    Attributes
+    ----------
+    bricks : Bricks
+    first, second : Surface
+        The nodes of the first one carry the contact pressures.
+    held : ndarray of bool (n, 3)
+        Displacements that are zero.
+    forces : ndarray (n, 3)
+        Nodal forces, N; they do not turn with the bodies.
+    hub : TurningHub, optional
+    modulus : float
+        A Young's modulus of the bodies, Pa, for scales.
+    search : float
+        Distance up to which facets count as neighbours, m.
+    reach : float
+        Gap at the edge of the contact expected, m: the first guess are the nodes whose gap is smaller. A guess too wide
+        would crush the smallest bricks.
+    allowed_overlap : float
+        Overlap of the undeformed surfaces that a mesh of chords may have, m.
+    """
+
+    bricks: Bricks
+    first: Surface
+    second: Surface
+    held: Booleans
+    forces: Floats
+    modulus: float
+    search: float
+    reach: float
+    allowed_overlap: float = 0.0
+    hub: TurningHub | None = None
+
+
+@dataclass(frozen=True)
+class NewtonSettings:
+    """How equilibrium is searched.
+
+    Parameters
+    ----------
+    load_steps : int
+        Equal steps in which the load is applied; a step that fails is halved.
+    most_iterations : int
+        Newton iterations of a step.
+    force_tolerance : float
+        Largest force out of balance, as part of the largest load.
+    gap_tolerance : float
+        Largest mean gap or overlap left where pressure is, as part of the largest displacement.
+    """
+
+    load_steps: int = 1
+    most_iterations: int = 30
+    force_tolerance: float = 1e-8
+    gap_tolerance: float = 1e-8
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot converge."""
+        if self.load_steps < 1 or self.most_iterations < 2:
+            raise ValueError("load_steps must be at least 1 and most_iterations at least 2")
+        if not (self.force_tolerance > 0 and self.gap_tolerance > 0):
+            raise ValueError("the tolerances must be positive")
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """One Newton iteration, a row of the convergence table.
+
+    Attributes
+    ----------
+    load : float
+        Part of the load.
+    number : int
+        Within the load step, from 1.
+    active : int
+        Nodes in contact.
+    changed : int
+        Nodes whose state changed after it.
+    step_length : float
+        Of the line search.
+    force_error : float
+        Largest force out of balance after it, as part of the largest load.
+    gap_error : float
+        Largest mean gap or overlap left where pressure is, as part of the largest displacement.
+    hub : float
+        Displacement of the hub, m.
+    """
+
+    load: float
+    number: int
+    active: int
+    changed: int
+    step_length: float
+    force_error: float
+    gap_error: float
+    hub: float
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """Bodies in equilibrium.
+
+    Attributes
+    ----------
+    displacement : ndarray (n, 3)
+        m.
+    modes : ndarray (m, 3, 3)
+        Incompatible modes.
+    pressure : ndarray (s,)
+        Contact pressure at the nodes of the first surface, Pa.
+    contact_force : ndarray (n, 3)
+        Contact forces on the nodes of both surfaces, N.
+    mean_pressure : ndarray (s,)
+        Contact force on each of these nodes over its contact area, Pa: without the peaks that `pressure` has where an
+        edge of the other surface leaves a node little of its area.
+    weight : ndarray (s,)
+        Contact area of each node, m^2.
+    facing : ndarray of bool (s,)
+        Nodes whose whole area faces the other surface.
+    hub : float
+        Displacement of the hub, m.
+    iterations : tuple of Iteration
+    """
+
+    displacement: Floats
+    modes: Floats
+    pressure: Floats
+    contact_force: Floats
+    mean_pressure: Floats
+    weight: Floats
+    facing: Booleans
+    hub: float
+    iterations: tuple[Iteration, ...]
+
+
+@dataclass(frozen=True)
+class _State:
+    displacement: Floats
+    modes: Floats
+    pressure: Floats
+    hub: float
+
+
+@dataclass(frozen=True)
+class _Evaluation:
+    """A state with its forces, tangents and gaps."""
+
+    state: _State
+    tangent: BrickTangent
+    contact: WeightedGap
+    mean_gap: Floats
+    imbalance: Floats
+
+
+@dataclass
+class _Numbering:
+    """Places of the bricks' node pairs in the matrix, and which unknowns are free; the hub is the last unknown."""
+
+    model: ContactModel
+    free: Integers = field(init=False)
+    count: int = field(init=False)
+    _place: Integers = field(init=False)
+    _columns: Integers = field(init=False)
+    _starts: Integers = field(init=False)
+    _hub_elements: Integers = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Sort out which displacements are unknown, and where the entries of the bricks go."""
+        nodes, hub, size = self.model.bricks.nodes, self.model.hub, len(self.model.bricks.points)
+        bound, on_hub = self.model.held.copy(), np.zeros(size, dtype=np.bool_)
+        if hub is not None:
+            bound[hub.nodes] = True
+            on_hub[hub.nodes] = True
+        self.free = np.flatnonzero(~bound.ravel())
+        self.count = len(self.free)
+        self._hub_elements = np.flatnonzero(on_hub[nodes].any(axis=1))
+        pairs, self._place = np.unique(nodes[:, :, None] * size + nodes[:, None, :], return_inverse=True)
+        self._columns = pairs % size
+        self._starts = np.searchsorted(pairs // size, np.arange(size + 1))
+
+    def matrix(self, tangent: BrickTangent, motion: Floats, curvature: float) -> SparseMatrix:
+        """Tangent matrix of the free unknowns, and of the hub where there is one.
+
+        ``motion`` (n, 3) are the displacements per unit of the hub's, ``curvature`` its geometric stiffness.
+        """
+        blocks = np.empty((len(self._columns), 3, 3))
+        by_node = tangent.stiffness.reshape(-1, 8, 3, 8, 3)
+        for a in range(3):
+            for b in range(3):
+                blocks[:, a, b] = summed(self._place, by_node[:, :, a, :, b], len(blocks))
+        size = motion.size
+        whole: SparseMatrix = scipy.sparse.bsr_matrix((blocks, self._columns, self._starts), shape=(size, size)).tocsr()
+        stiffness: SparseMatrix = whole[self.free][:, self.free]
+        if self.model.hub is None:
+            return stiffness
+        unknowns = self.model.bricks.unknowns[self._hub_elements]
+        forces = np.einsum("eij,ej->ei", tangent.stiffness[self._hub_elements], motion.ravel()[unknowns])
+        coupling = summed(unknowns, forces, size)
+        column: SparseMatrix = scipy.sparse.csr_matrix(coupling[self.free][:, None])
+        corner: SparseMatrix = scipy.sparse.csr_matrix([[float(motion.ravel() @ coupling) + curvature]])
+        return scipy.sparse.bmat([[stiffness, column], [column.T, corner]], format="csr")
+
+    def reduced(self, forces: Floats, motion: Floats) -> Floats:
+        """Gather the forces on the unknowns from nodal forces (n, 3)."""
+        free = forces.ravel()[self.free]
+        return free if self.model.hub is None else np.append(free, float(np.sum(motion * forces)))
+
+
+@dataclass
+class _Search:
+    """The search of one equilibrium."""
+
+    model: ContactModel
+    settings: NewtonSettings
+    report: Callable[[Iteration], None] | None
+
+    def __post_init__(self) -> None:
+        """Find what stays the same: numbering, areas, and in small displacements the contact geometry."""
+        points = self.model.bricks.points
+        self.numbering = _Numbering(self.model)
+        self.area = self.model.first.areas(points)
+        self.pairs = facing_pairs(points, self.model.first, self.model.second, self.model.search)
+        self.at_rest = weighted_gap(points, self.model.first, self.model.second, self.pairs)
+        self.history: list[Iteration] = []
+        hub = self.model.hub
+        self.largest_load = max(float(np.abs(self.model.forces).max()), abs(hub.force) if hub else 0.0)
+        self._check_start()
+
+    def _check_start(self) -> None:
+        if not self.largest_load > 0.0:
+            raise EquilibriumError("load step 1: there is no load")
+        gap = self._facing_gap(self.at_rest)
+        deepest = int(np.argmin(gap))
+        if gap[deepest] < -self.model.allowed_overlap:
+            where = self.model.bricks.points[self.model.first.nodes[deepest]]
+            place = ", ".join(f"{1e3 * value:.3f}" for value in where)
+            raise EquilibriumError(
+                f"the surfaces overlap by {-1e6 * gap[deepest]:.3g} um at the start, near ({place}) mm; "
+                f"at most {1e6 * self.model.allowed_overlap:.3g} um is allowed"
+            )
+        if not np.isfinite(gap).any():
+            raise EquilibriumError("no facets of the two surfaces face each other: nothing can touch")
+
+    def _facing_gap(self, contact: WeightedGap) -> Floats:
+        return np.where(contact.weight > _LEAST_FACING * self.area, contact.mean, np.inf)
+
+    def hub_motion(self, hub_displacement: float) -> tuple[Floats, Floats, Floats]:
+        """Displacement of the hub's nodes, and its first and second derivative by the hub's displacement, (n, 3)."""
+        hub, points = self.model.hub, self.model.bricks.points
+        value, first, second = np.zeros_like(points), np.zeros_like(points), np.zeros_like(points)
+        if hub is None:
+            return value, first, second
+        x, y = (points[hub.nodes, :2] - hub.axis).T
+        angle = hub_displacement / hub.lever
+        if not self.model.bricks.finite:
+            first[hub.nodes, :2] = np.stack([-y, x], axis=1) / hub.lever
+            return first * hub_displacement, first, second
+        cosine, sine = math.cos(angle), math.sin(angle)
+        turned = np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1)
+        value[hub.nodes, :2] = turned - np.stack([x, y], axis=1)
+        first[hub.nodes, :2] = np.stack([-turned[:, 1], turned[:, 0]], axis=1) / hub.lever
+        second[hub.nodes, :2] = -turned / hub.lever**2
+        return value, first, second
+
+    def _moved(self, state: _State, step: Floats, tangent: BrickTangent, length: float, pressure: Floats) -> _State:
+        """State after `length` times a step of the unknowns."""
+        hub = state.hub
+        displacement = state.displacement.copy()
+        displacement.ravel()[self.numbering.free] += length * step[: self.numbering.count]
+        full_step = np.zeros_like(displacement)
+        full_step.ravel()[self.numbering.free] = step[: self.numbering.count]
+        if self.model.hub is not None:
+            full_step += step[-1] * self.hub_motion(hub)[1]
+            hub += length * float(step[-1])
+            nodes = self.model.hub.nodes
+            displacement[nodes] = self.hub_motion(hub)[0][nodes]
+        return _State(
+            displacement=displacement,
+            modes=self.model.bricks.stepped_modes(state.modes, tangent, full_step, length),
+            pressure=state.pressure + length * (pressure - state.pressure),
+            hub=hub,
+        )
+
+    def evaluate(self, state: _State, load: float) -> _Evaluation:
+        """Compute forces, tangents and gaps of a state under a part of the load."""
+        model = self.model
+        tangent = model.bricks.evaluate(state.displacement, state.modes)
+        if model.bricks.finite:
+            contact = weighted_gap(model.bricks.points + state.displacement, model.first, model.second, self.pairs)
+        else:
+            opened = self.at_rest.gap + self.at_rest.gradient @ state.displacement.ravel()
+            contact = replace(self.at_rest, gap=opened)
+        imbalance = load * model.forces - tangent.force + self.contact_force(contact, state.pressure)
+        _, motion, _ = self.hub_motion(state.hub)
+        reduced = self.numbering.reduced(imbalance, motion)
+        if model.hub is not None:
+            reduced[-1] += load * model.hub.force
+        return _Evaluation(state, tangent, contact, self._facing_gap(contact), reduced)
+
+    def contact_force(self, contact: WeightedGap, pressure: Floats) -> Floats:
+        """Nodal forces (n, 3) of contact pressures."""
+        return np.asarray((contact.gradient.T @ pressure).reshape(-1, 3))
+
+    def solve(self) -> Equilibrium:
+        """Apply the load in steps."""
+        bricks = self.model.bricks
+        state = _State(np.zeros_like(bricks.points), bricks.modes_at_rest(), np.zeros(len(self.area)), 0.0)
+        active = self._first_guess(1.0)
+        reached, step, number = 0.0, 1.0 / self.settings.load_steps, 1
+        while reached < 1.0 - 1e-12:
+            load = min(reached + step, 1.0)
+            try:
+                state, active = self._solve_step(state, active, load, number)
+            except EquilibriumError as error:
+                step /= 2.0
+                if step < _LEAST_LOAD_STEP:
+                    raise EquilibriumError(f"{error}; {100 * reached:.3g} % of the load was reached") from error
+                if reached == 0.0:
+                    active = self._first_guess(step)
+                continue
+            reached, number = load, number + 1
+        contact = self.evaluate(state, 1.0).contact
+        force = self.contact_force(contact, state.pressure)
+        on_node = np.linalg.norm(force[self.model.first.nodes], axis=1)
+        return Equilibrium(
+            displacement=state.displacement,
+            modes=state.modes,
+            pressure=state.pressure,
+            contact_force=force,
+            mean_pressure=on_node / np.maximum(contact.weight, _LEAST_FACING * self.area),
+            weight=contact.weight,
+            facing=contact.weight > _WHOLLY_FACING * self.area,
+            hub=state.hub,
+            iterations=tuple(self.history),
+        )
+
+    def _first_guess(self, load: float) -> Booleans:
+        """Nodes that may be in contact under a first part of the load."""
+        gap = self._facing_gap(self.at_rest)
+        return np.asarray(gap <= max(float(gap.min()), 0.0) + load * self.model.reach)
+
+    def _solve_step(self, state: _State, active: Booleans, load: float, number: int) -> tuple[_State, Booleans]:
+        """Newton iterations of one load step."""
+        place = f"load step {number} ({100 * load:.4g} % of the load)"
+        try:
+            now = self.evaluate(state, load)
+        except InvertedElementError as error:
+            raise EquilibriumError(f"{place}, iteration 0: {error}") from error
+        for iteration in range(1, self.settings.most_iterations + 1):
+            at = f"{place}, iteration {iteration}"
+            try:
+                step, pressure = self._newton_step(now, active)
+            except FactorisationError as error:
+                raise EquilibriumError(
+                    f"{at}: a rigid-body motion is left free, or contact is lost: {error}"
+                ) from error
+            now, length = self._line_search(now, active, step, pressure, load, at)
+            tested = self._tested_active(now, active)
+            changed = int(np.sum(tested != active))
+            row = self._row(now, active, load, iteration, changed, length)
+            self.history.append(row)
+            if self.report is not None:
+                self.report(row)
+            settled = row.force_error < self.settings.force_tolerance and row.gap_error < self.settings.gap_tolerance
+            if changed == 0 and settled:
+                return now.state, active
+            active = tested
+        raise EquilibriumError(
+            f"{at}: not converged, force error {row.force_error:.1e}, gap error {row.gap_error:.1e}, "
+            f"{row.changed} nodes still change"
+        )
+
+    def _tested_active(self, now: _Evaluation, active: Booleans) -> Booleans:
+        """Nodes that pressure and gap ask to be in contact."""
+        width = np.sqrt(self.area)
+        test = now.state.pressure - self.model.modulus * now.mean_gap / width
+        tolerance = 1e-9 * float(np.abs(now.state.pressure).max())
+        # A node that is neither pressed nor open to rounding keeps its state, or it would change for ever.
+        tested = np.where(np.abs(test) <= tolerance, active, test > 0.0)
+        if not tested.any():
+            tested = now.mean_gap <= now.mean_gap.min() + self.model.reach
+        return np.asarray(tested & np.isfinite(now.mean_gap))
+
+    def _row(
+        self, now: _Evaluation, active: Booleans, load: float, iteration: int, changed: int, length: float
+    ) -> Iteration:
+        largest = float(np.abs(now.state.displacement).max())
+        gap = float(np.abs(now.mean_gap[active]).max(initial=0.0))
+        force = float(np.abs(now.imbalance).max()) / (load * self.largest_load)
+        return Iteration(load, iteration, int(active.sum()), changed, length, force, gap / largest, now.state.hub)
+
+    def _newton_step(self, now: _Evaluation, active: Booleans) -> tuple[Floats, Floats]:
+        """Step of the unknowns and the pressures after it, from the linearised equilibrium with the gaps closed."""
+        _, motion, second = self.hub_motion(now.state.hub)
+        held_force = self.contact_force(now.contact, now.state.pressure) - now.tangent.force
+        stiffness = self.numbering.matrix(now.tangent, motion, -float(np.sum(second * held_force)))
+        numbers = np.flatnonzero(active)
+        gradient = now.contact.gradient[numbers]
+        weight = now.contact.weight[numbers]
+        rows = gradient[:, self.numbering.free]
+        if self.model.hub is not None:
+            rows = scipy.sparse.hstack([rows, scipy.sparse.csr_matrix((gradient @ motion.ravel())[:, None])], "csr")
+        added = _AUGMENTATION * self.model.modulus * np.sqrt(self.area[numbers]) / weight**2
+        augmented = stiffness + rows.T @ scipy.sparse.diags_array(added) @ rows
+        balance = now.imbalance - self.numbering.reduced(self.contact_force(now.contact, now.state.pressure), motion)
+        pressure = np.where(active, now.state.pressure, 0.0)[numbers]
+        gap = now.contact.gap[numbers]
+        with factorise(augmented.tocsr()) as factor:
+            for _ in range(_MOST_AUGMENTATIONS):
+                step = factor.solve(balance + rows.T @ (pressure - added * gap))
+                change = -added * (gap + rows @ step)
+                pressure = pressure + change
+                if np.abs(change).max() <= 1e-12 * np.abs(pressure).max():
+                    break
+        result = np.zeros(len(self.area))
+        result[numbers] = pressure
+        return step, result
+
+    def _line_search(
+        self, now: _Evaluation, active: Booleans, step: Floats, pressure: Floats, load: float, at: str
+    ) -> tuple[_Evaluation, float]:
+        """Shorten the step until it lessens what is out of balance, on the gaps taken as closed."""
+        before, length, reason = self._merit(now, active), 1.0, ""
+        rounding = 0.1 * self.settings.force_tolerance * load * self.largest_load
+        while length >= _LEAST_STEP_LENGTH:
+            try:
+                trial = self.evaluate(self._moved(now.state, step, now.tangent, length, pressure), load)
+            except InvertedElementError as error:
+                reason = str(error)
+            else:
+                merit = self._merit(trial, active)
+                if merit < max(before, rounding):
+                    return trial, length
+                reason = "no step length lessens the forces out of balance"
+            length /= 2.0
+        raise EquilibriumError(f"{at}: {reason}; the load may be too large")
+
+    def _merit(self, now: _Evaluation, active: Booleans) -> float:
+        """Norm of what the linearised equations on the nodes taken as `active` are to remove, N."""
+        gaps = self.model.modulus * np.sqrt(self.area[active]) * now.mean_gap[active]
+        pulls = (now.contact.weight * now.state.pressure)[~active]
+        return float(np.sqrt(np.sum(now.imbalance**2) + np.sum(gaps**2) + np.sum(pulls**2)))
+
+
+def solve_contact(
+    model: ContactModel, settings: NewtonSettings | None = None, report: Callable[[Iteration], None] | None = None
+) -> Equilibrium:
+    """Find the equilibrium of elastic bodies in contact.
+
+    Parameters
+    ----------
+    model : ContactModel
+    settings : NewtonSettings, optional
+    report : callable, optional
+        Called after each iteration.
+
+    Returns
+    -------
+    Equilibrium
+
+    Raises
+    ------
+    EquilibriumError
+        If the surfaces overlap at the start or cannot touch, a rigid-body motion is left free, or Newton's method fails
+        in spite of halved load steps; the message names load step and iteration.
+    """
+    with one_dense_thread():
+        return _Search(model, settings or NewtonSettings(), report).solve()
+
+
+def fixed_body_displacement(model: ContactModel) -> tuple[Floats, Floats]:
+    """Displacement (n, 3) and modes of held bodies under their nodal forces alone, to first order, without contact.
+
+    Raises
+    ------
+    FactorisationError
+        If a rigid-body motion is left free.
+    """
+    bricks, numbering = model.bricks, _Numbering(model)
+    displacement, modes = np.zeros_like(bricks.points), bricks.modes_at_rest()
+    tangent = bricks.evaluate(displacement, modes)
+    with factorise(numbering.matrix(tangent, displacement, 0.0)) as factor:
+        displacement.ravel()[numbering.free] = factor.solve(numbering.reduced(model.forces, displacement))
+    return displacement, bricks.stepped_modes(modes, tangent, displacement, 1.0)
+
+
+def convergence_table(iterations: Sequence[Iteration]) -> str:
+    """Lay out the iterations of an analysis as text, one a line."""
+    head = "load %  iteration  in contact  changed  step  force error  gap error     hub um"
+    rows = [
+        f"{100 * row.load:6.4g}  {row.number:9d}  {row.active:10d}  {row.changed:7d}  {row.step_length:4.2f}"
+        f"  {row.force_error:11.1e}  {row.gap_error:9.1e}  {1e6 * row.hub:9.4f}"
+        for row in iterations
+    ]
+    return "\n".join([head, *rows])

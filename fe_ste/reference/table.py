@@ -1,0 +1,288 @@
+"""Tables of the reference analysis: kept position by position, apart from those of the superelement.
+
+A table is one netCDF file. It is written after each position, so that what converged is kept when the work is stopped
+or a position fails; the same input goes on from there.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fe_ste.geometry.gears import GearPair
+from fe_ste.reference.finite_deformation import von_mises
+from fe_ste.reference.newton import EquilibriumError, Iteration, convergence_table
+from fe_ste.reference.position import NonlinearPosition, NonlinearSettings, nonlinear_position
+from fe_ste.tools.files import FileError, Layout, load_dataset, write_dataset
+from fe_ste.tools.versions import NONLINEAR_TABLE
+from fe_ste.transmission_error.table import TableError
+
+METHOD = "non-linear finite elements"
+_UNITS = {
+    "pmc": ("1", "position in the mesh cycle"),
+    "torque": ("N m", "static torque on gear 1"),
+    "tooth": ("1", "tooth pair, counted ahead of pair 0, which touches at the pitch point at pmc 0"),
+    "ste": ("m", "static transmission error on the transverse line of action"),
+    "mesh_stiffness": ("N/m", "secant stiffness on the transverse line of action"),
+    "line_of_action_force": ("N", "torque on gear 1 over its base radius"),
+    "load_share": ("1", "part of the normal load that a tooth pair carries"),
+    "max_pressure": ("Pa", "largest contact pressure where a node's whole area faces the other flank"),
+    "edge_pressure": ("Pa", "largest mean contact pressure of nodes at an edge; depends on the mesh"),
+    "max_von_mises": ("Pa", "largest equivalent stress at the nodes"),
+    "unknowns": ("1", "displacements of the mesh"),
+    "iterations": ("1", "Newton iterations"),
+    "wall_time": ("s", "of the position"),
+    "converged": ("1", "whether the position was solved"),
+}
+_LAYOUT = Layout(
+    "table of the non-linear analysis",
+    NONLINEAR_TABLE,
+    {name: (name,) for name in ("pmc", "torque", "tooth")}
+    | {name: ("pmc", "torque") for name in _UNITS if name not in {"pmc", "torque", "tooth", "load_share"}}
+    | {"load_share": ("pmc", "torque", "tooth")},
+    ("method", "input_hash", "failures", "convergence"),
+)
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, kw_only=True)
+class NonlinearInput:
+    """All that the numbers of a table depend on.
+
+    Parameters
+    ----------
+    pair : GearPair
+    torque : float
+        Static torque on gear 1, N m.
+    positions : int
+        Equally spaced positions of the mesh cycle.
+    settings : NonlinearSettings
+
+    Examples
+    --------
+    >>> from fe_ste.geometry.gears import Gear
+    >>> gear = Gear(name="gear", teeth=30, normal_module=3e-3, face_width=20e-3, held_diameter=50e-3)
+    >>> pair = GearPair(name="pair", pinion=gear, gear=gear, centre_distance=90e-3)
+    >>> len(NonlinearInput(pair=pair, torque=100.0).hash)
+    64
+    """
+
+    pair: GearPair
+    torque: float
+    positions: int = 10
+    settings: NonlinearSettings = field(default_factory=NonlinearSettings)
+
+    def __post_init__(self) -> None:
+        """Refuse a table without positions."""
+        if self.positions < 1:
+            raise ValueError(f"positions = {self.positions}: at least 1 is needed")
+
+    def resolved(self) -> dict[str, Any]:
+        """Return the input as plain data, with everything that has a default spelled out."""
+        return {"method": METHOD, "method_version": NONLINEAR_TABLE, **asdict(self)}
+
+    @cached_property
+    def hash(self) -> str:
+        """SHA-256 of the resolved input."""
+        return hashlib.sha256(json.dumps(self.resolved(), sort_keys=True).encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class NonlinearTable:
+    """Static transmission error of a pair over the mesh cycle by the reference analysis.
+
+    Attributes
+    ----------
+    dataset : xarray.Dataset
+        Over (pmc, torque): ste (m), mesh_stiffness (N/m), line_of_action_force (N), load_share by ``tooth``,
+        max_pressure, edge_pressure and max_von_mises (Pa), unknowns, iterations, wall_time (s), converged. Positions
+        that failed or were not reached are not a number. Attributes: input and hash, ``failures``, and the table of
+        all Newton iterations, ``convergence``.
+    """
+
+    dataset: xr.Dataset
+
+    @classmethod
+    def compute(
+        cls,
+        wanted: NonlinearInput,
+        path: str | Path | None = None,
+        progress: Callable[[int, int, Iteration | None], None] | None = None,
+    ) -> NonlinearTable:
+        """Compute a table.
+
+        Parameters
+        ----------
+        wanted : NonlinearInput
+        path : path, optional
+            File to which each position is written once it is solved. If it holds positions of the same input, they
+            are kept.
+        progress : callable, optional
+            Called with the number of finished positions, of all positions, and after a Newton iteration with that.
+
+        Raises
+        ------
+        GeometryError
+            If a gear cannot be meshed.
+        OSError
+            If the file cannot be written.
+        """
+        table = cls(_without_results(wanted))
+        if path is not None:
+            table = _stored_or(table, wanted, Path(path))
+        solved = table.dataset["converged"].values[:, 0]
+        for number in np.flatnonzero(~solved):
+            done = int(solved.sum())
+            if progress is not None:
+                progress(done, wanted.positions, None)
+
+            def report(iteration: Iteration, done: int = done) -> None:
+                if progress is not None:
+                    progress(done, wanted.positions, iteration)
+
+            table = table._with_position(int(number), wanted, report)
+            solved = table.dataset["converged"].values[:, 0]
+            if path is not None:
+                write_dataset(Path(path), table.dataset)
+        if progress is not None:
+            progress(wanted.positions, wanted.positions, None)
+        return table
+
+    @classmethod
+    def open(cls, path: str | Path, wanted: NonlinearInput | None = None) -> NonlinearTable:
+        """Read a table into memory.
+
+        Parameters
+        ----------
+        path : path
+        wanted : NonlinearInput, optional
+            If given, the table must have been computed from exactly this input.
+
+        Raises
+        ------
+        TableError
+            If the file is missing, damaged, is no table of the reference analysis in this version, or belongs to
+            another input.
+        """
+        path = Path(path)
+        try:
+            dataset = load_dataset(path, _LAYOUT)
+        except FileError as error:
+            raise TableError(str(error)) from error
+        if not str(dataset.attrs.get("method", "")).startswith(METHOD):
+            raise TableError(f"{path}: is no table of the non-linear analysis")
+        if wanted is not None and dataset.attrs["input_hash"] != wanted.hash:
+            raise TableError(f"{path}: was computed from another input; compute it again")
+        return cls(dataset)
+
+    @property
+    def input_hash(self) -> str:
+        """Hash of the input the table was computed from."""
+        return str(self.dataset.attrs["input_hash"])
+
+    @property
+    def complete(self) -> bool:
+        """Whether every position is solved."""
+        return bool(self.dataset["converged"].all())
+
+    @property
+    def failures(self) -> list[str]:
+        """Positions that were not solved, with the reason."""
+        return [line for line in str(self.dataset.attrs["failures"]).splitlines() if line]
+
+    def _with_position(
+        self, number: int, wanted: NonlinearInput, report: Callable[[Iteration], None]
+    ) -> NonlinearTable:
+        """Return the table with one position solved, or with the reason why it is not."""
+        dataset = self.dataset.copy(deep=True)
+        pmc = number / wanted.positions
+        others = [line for line in self.failures if not line.startswith(f"position {pmc:.4g} ")]
+        try:
+            found = nonlinear_position(wanted.pair, wanted.torque, pmc, wanted.settings, report)
+        except EquilibriumError as error:
+            dataset.attrs["failures"] = "\n".join([*others, str(error)])
+            return NonlinearTable(dataset)
+        dataset.attrs["failures"] = "\n".join(others)
+        dataset.attrs["convergence"] += f"position {pmc:.4g}\n{convergence_table(found.equilibrium.iterations)}\n"
+        for name, value in _figures(found).items():
+            dataset[name].values[number, 0] = value
+        for tooth, share in found.load_share.items():
+            dataset["load_share"].loc[{"pmc": dataset["pmc"][number], "tooth": tooth}] = share
+        return NonlinearTable(dataset)
+
+
+def _figures(found: NonlinearPosition) -> dict[str, float]:
+    equilibrium, model = found.equilibrium, found.model
+    force = found.torque / found.pair.pinion.base_radius
+    inside, edge = equilibrium.pressure[equilibrium.facing], equilibrium.mean_pressure[~equilibrium.facing]
+    stress = model.bricks.nodal_stress(equilibrium.displacement, equilibrium.modes)
+    return {
+        "ste": found.ste,
+        "mesh_stiffness": force / found.ste,
+        "line_of_action_force": force,
+        "max_pressure": inside.max(initial=0.0),
+        "edge_pressure": edge.max(initial=0.0),
+        "max_von_mises": von_mises(stress).max(),
+        "unknowns": found.unknowns,
+        "iterations": len(equilibrium.iterations),
+        "wall_time": found.wall_time,
+        "converged": True,
+    }
+
+
+def _without_results(wanted: NonlinearInput) -> xr.Dataset:
+    """Table of the right shape with no position solved."""
+    names, shape = ("pmc", "torque"), (wanted.positions, 1)
+    whole = ("unknowns", "iterations")
+    teeth = np.arange(wanted.settings.teeth) - wanted.settings.teeth // 2
+    floats = [name for name in _UNITS if name not in {*names, *whole, "tooth", "converged", "load_share"}]
+    variables: dict[str, Any] = {name: (names, np.full(shape, np.nan)) for name in floats}
+    variables |= {name: (names, np.zeros(shape, dtype=np.int64)) for name in whole}
+    variables["converged"] = (names, np.zeros(shape, dtype=np.bool_))
+    variables["load_share"] = ((*names, "tooth"), np.full((*shape, len(teeth)), np.nan))
+    axes = {
+        "pmc": np.arange(wanted.positions) / wanted.positions,
+        "torque": np.array([wanted.torque]),
+        "tooth": teeth,
+    }
+    dataset = xr.Dataset(variables, axes)
+    for name, (unit, meaning) in _UNITS.items():
+        dataset[name].attrs = {"units": unit, "long_name": meaning}
+    packages = ("exugear", "numpy", "scipy", "scikit-fem", "numba")
+    dataset.attrs = {
+        "title": f"static transmission error of gear pair {wanted.pair.name}, reference analysis",
+        "pair": wanted.pair.name,
+        "method": f"{METHOD} on open sectors of {wanted.settings.teeth} teeth: 8-node hexahedra with incompatible "
+        "modes, mortar contact without friction, exact multipliers, "
+        + ("finite deformation" if wanted.settings.finite_deformation else "small strains"),
+        "boundary": "pinion hub held; gear hub (or ring's outer rim) rigid and turning about its axis only; free cut "
+        "faces",
+        "input": json.dumps(wanted.resolved(), sort_keys=True),
+        "input_hash": wanted.hash,
+        "method_version": NONLINEAR_TABLE,
+        "failures": "",
+        "convergence": "",
+        "versions": json.dumps({package: version(package) for package in packages}),
+    }
+    return dataset
+
+
+def _stored_or(table: NonlinearTable, wanted: NonlinearInput, path: Path) -> NonlinearTable:
+    """Return the table in a file if it is of the same input, else the given one."""
+    if not path.exists():
+        return table
+    try:
+        return NonlinearTable.open(path, wanted)
+    except TableError as error:
+        _log.warning("%s; its positions are computed again", error)
+        return table

@@ -1,0 +1,1 @@
+"""Gear standards, to compare with."""

@@ -1,0 +1,1 @@
+"""General things: arrays, files, compilation, sparse factors, threads, workers, drawing, rendering."""

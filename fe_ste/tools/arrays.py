@@ -1,0 +1,17 @@
+"""Types of arrays, one name each: what numbers an array holds. Shapes and units stand in docstrings."""
+
+from __future__ import annotations
+
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Booleans", "Complexes", "Floats", "Integers", "Pixels", "SparseMatrix"]
+
+Booleans: TypeAlias = NDArray[np.bool_]
+Complexes: TypeAlias = NDArray[np.complex128]
+Floats: TypeAlias = NDArray[np.float64]
+Integers: TypeAlias = NDArray[np.int64]
+Pixels: TypeAlias = NDArray[np.uint8]
+SparseMatrix: TypeAlias = Any  # any scipy.sparse matrix or array: their common base class has no arithmetic

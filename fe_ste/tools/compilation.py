@@ -1,0 +1,251 @@
+"""How numerical loops are compiled, and where their machine code is kept between processes.
+
+numba knows a kept function by its own source file only, while the machine code contains the functions that it calls,
+whichever file they are in. Here all kernels of a package are kept in one folder that is named by a digest of all
+sources with kernels: after any change they are compiled anew.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import os
+import shutil
+import stat
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import llvmlite
+import numba
+from numba.core import config
+from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.dispatcher import Dispatcher
+
+Function = TypeVar("Function", bound=Callable[..., object])
+
+#: Sums may be taken in parts: the same in every run, but not in the order that is written.
+_IN_PARTS = {"reassoc", "contract", "nsz"}
+_WITHOUT_MEMORY: dict[str, Any] = {"nogil": True, "error_model": "numpy", "forceinline": True, "_nrt": False}
+_FOLDER = "kernels-"
+
+#: Folders of kernels that stay beside the one in use: of branches and versions that one goes back to.
+_FOLDERS_KEPT = 4
+
+#: numba's settings, which have no types.
+_settings: Any = config
+_log = logging.getLogger(__name__)
+
+
+def compiled(function: Function) -> Function:
+    """Compile a function that may allocate arrays."""
+    return _kept(function, nogil=True)
+
+
+def summing(function: Function) -> Function:
+    """Compile as `compiled`; division without checks, sums in parts, not in the order that is written."""
+    return _kept(function, nogil=True, error_model="numpy", fastmath=_IN_PARTS)
+
+
+def kernel(function: Function) -> Function:
+    """Compile a function that allocates nothing, for loops over time; division without checks.
+
+    Reference counts of arrays are left out (they cost ten times the arithmetic), and everything becomes one function
+    (which saves handing over tuples of arrays).
+    """
+    return _kept(function, **_WITHOUT_MEMORY)
+
+
+def summing_kernel(function: Function) -> Function:
+    """Compile as `kernel`, with sums in parts, not in the order that is written."""
+    return _kept(function, **_WITHOUT_MEMORY, fastmath=_IN_PARTS)
+
+
+def kernel_folder(source: Path) -> Path | None:
+    """Folder that keeps the machine code of a source file's package; made if need be.
+
+    Beside the sources, or in ``NUMBA_CACHE_DIR`` if that is set. Where that cannot be written: in the user's cache
+    folder, else in a folder for temporary files that no other user can fill, because what lies there is executed.
+
+    Parameters
+    ----------
+    source : Path
+
+    Returns
+    -------
+    Path or None
+        None if there is no source to tell the version by, or no place to write: nothing is kept then.
+    """
+    return _folder_of(_package_of(source)) if source.is_file() else None
+
+
+def _kept(function: Function, **options: Any) -> Function:
+    """Compile with numba's options and keep the machine code."""
+    made = numba.njit(**options)(function)
+    # Under NUMBA_DISABLE_JIT the function comes back as it is.
+    if isinstance(made, Dispatcher) and kernel_folder(_source_of(function)):
+        cast(Any, made)._cache = _KernelCache(function)  # type: ignore[no-untyped-call]
+    return cast(Function, made)
+
+
+def _source_of(function: Callable[..., object]) -> Path:
+    return Path(function.__code__.co_filename)
+
+
+class _Place:
+    """Where numba looks for a function's machine code, and by what it tells that it fits the sources."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def get_cache_path(self) -> str:
+        return str(self._folder)
+
+    def get_source_stamp(self) -> str:
+        return self._folder.name
+
+    def ensure_cache_path(self) -> None:
+        self._folder.mkdir(parents=True, exist_ok=True)
+
+
+class _KernelFiles(CompileResultCacheImpl):
+    """Files of a function in a folder that this module chooses."""
+
+    def __init__(self, function: Callable[..., object]) -> None:
+        # In place of the base class's own, which chooses among numba's folders.
+        self._lineno = function.__code__.co_firstlineno
+        self._locator = _Place(cast(Path, kernel_folder(_source_of(function))))
+        name = f"{function.__module__}.{function.__qualname__}-{self._lineno}"
+        self._filename_base = f"{name}.py{sys.version_info[0]}{sys.version_info[1]}{getattr(sys, 'abiflags', '')}"
+
+
+class _KernelCache(FunctionCache):
+    """numba's cache of a function, whose faults cost a compilation and never the work."""
+
+    _impl_class = _KernelFiles
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        try:
+            found = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        except Exception:  # what reading a damaged pickle raises is not bounded
+            with suppress(OSError):
+                self.flush()  # type: ignore[no-untyped-call]
+            found = None
+        if found is None:
+            _tell_of_compiling()
+        return found
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        try:
+            super().save_overload(sig, data)  # type: ignore[no-untyped-call]
+        except OSError as error:
+            _tell_unkept(self.cache_path, error.strerror)
+
+
+@cache
+def _tell_of_compiling() -> None:
+    _log.info("Compiling kernels, once per installation or update: about a minute in all")
+
+
+@cache
+def _tell_unkept(folder: str, reason: str) -> None:
+    _log.warning("%s: compiled kernels cannot be kept (%s); they are compiled again at each start", folder, reason)
+
+
+def _package_of(source: Path) -> Path:
+    """Top folder of the package that a file belongs to."""
+    folder = source.resolve().parent
+    while (folder.parent / "__init__.py").is_file():
+        folder = folder.parent
+    return folder
+
+
+@cache
+def _folder_of(package: Path) -> Path | None:
+    name = _FOLDER + _digest(package)
+    for place in _places(package):
+        with suppress(OSError):
+            return _opened(place, name)
+    return None
+
+
+def _digest(package: Path) -> str:
+    """Digest of all sources with kernels, of a package and this one, and of what else shapes the machine code.
+
+    numba keeps the processor and its features apart within the folder.
+    """
+    compilers = numba.__version__, llvmlite.__version__
+    shaping = _settings.OPT, _settings.BOUNDSCHECK, _settings.LOOP_VECTORIZE, _settings.SLP_VECTORIZE
+    digest = hashlib.sha256(repr((compilers, shaping)).encode())
+    for folder in sorted({package, _package_of(Path(__file__))}):
+        for file in sorted(folder.rglob("*.py")):
+            source = file.read_bytes()
+            if __name__.encode() in source or file.name == Path(__file__).name:
+                digest.update(f"\n{file.relative_to(folder)} {len(source)}\n".encode() + source)
+    return digest.hexdigest()[:20]
+
+
+def _places(package: Path) -> Iterator[Path]:
+    """Folders to keep kernels in, the best first."""
+    if _settings.CACHE_DIR:
+        yield Path(_settings.CACHE_DIR) / package.name
+    else:
+        yield package / "__pycache__"
+    import platformdirs  # seldom needed: not worth its time at each start
+
+    user = platformdirs.user_cache_path("exugear", appauthor=False) / package.name
+    if user.is_absolute() and _is_own(user):
+        yield user
+    if sys.platform != "win32":
+        with suppress(OSError):  # no folder for temporary files
+            temporary = Path(tempfile.gettempdir()) / f"exugear-{os.getuid()}"
+            temporary.mkdir(mode=0o700, exist_ok=True)
+            if not temporary.is_symlink() and _is_own(temporary):
+                yield temporary / package.name
+
+
+def _is_own(folder: Path) -> bool:
+    """Tell whether no other user but root can put files into a folder, or another folder into its place."""
+    if sys.platform == "win32":
+        return True  # profiles are closed to other users
+    for place in (folder, *folder.resolve().parents):
+        try:
+            found = place.stat()
+        except FileNotFoundError:  # will be made by this process
+            continue
+        except OSError:
+            return False
+        open_to_all = bool(found.st_mode & stat.S_IWOTH) and not found.st_mode & stat.S_ISVTX
+        if open_to_all or found.st_uid not in (0, os.getuid()):
+            return False
+    return True
+
+
+def _opened(place: Path, name: str) -> Path:
+    """Return a folder of kernels that can be written; a new one takes the place of those not used for long."""
+    folder = place / name
+    is_new = not folder.is_dir()
+    folder.mkdir(parents=True, exist_ok=True)
+    tempfile.TemporaryFile(dir=folder).close()
+    os.utime(folder)
+    if is_new:
+        _prune(place)
+    return folder
+
+
+def _prune(place: Path) -> None:
+    """Remove the folders of kernels used least lately; a process that still uses one makes it anew."""
+
+    def last_used(folder: Path) -> float:
+        try:
+            return folder.stat().st_mtime
+        except FileNotFoundError:  # another process was faster
+            return 0.0
+
+    by_use = sorted(place.glob(_FOLDER + "*"), key=last_used, reverse=True)
+    for folder in by_use[1 + _FOLDERS_KEPT :]:
+        shutil.rmtree(folder, ignore_errors=True)

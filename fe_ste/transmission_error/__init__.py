@@ -1,0 +1,1 @@
+"""Static transmission error: states over the mesh cycle, grids of states, tables."""

@@ -1,0 +1,154 @@
+"""A gear pair with the compliance of both loaded flanks: all that does not depend on position or load."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fe_ste.contact.cells import ContactSettings
+from fe_ste.contact.compliance import SlicedCompliance
+from fe_ste.elasticity.flank import FlankCompliance, flank_compliance
+from fe_ste.elasticity.hexmesh import MeshSettings
+from fe_ste.flanks.modifications import FlankModification
+from fe_ste.geometry.gears import GearPair
+from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.sparse import Backend
+
+
+@dataclass(frozen=True)
+class PairCompliance:
+    """A gear pair with the compliance of both loaded flanks: all that does not depend on position or load.
+
+    Attributes
+    ----------
+    pair : GearPair
+    flanks : tuple of FlankCompliance
+        Gear 1, gear 2.
+    contact : ContactSettings
+    axial : ndarray (slices,)
+        Middle of the contact slices, m.
+    teeth : ndarray
+        Tooth pairs that may touch.
+    reach : int
+        Largest difference of tooth pairs in contact at once.
+    sliced : tuple of SlicedCompliance
+    modifications : tuple of FlankModification
+        Gear 1, gear 2.
+    tooth_gap : ndarray, optional
+        Gap of each of `teeth` on the transverse line of action, m.
+    """
+
+    pair: GearPair
+    flanks: tuple[FlankCompliance, FlankCompliance]
+    contact: ContactSettings
+    axial: Floats
+    teeth: Integers
+    reach: int
+    sliced: tuple[SlicedCompliance, SlicedCompliance]
+    modifications: tuple[FlankModification, FlankModification] = (FlankModification(), FlankModification())
+    tooth_gap: Floats | None = None
+
+    @classmethod
+    def from_flanks(
+        cls,
+        pair: GearPair,
+        flanks: tuple[FlankCompliance, FlankCompliance],
+        contact: ContactSettings | None = None,
+    ) -> PairCompliance:
+        """Prepare `pair` for contact with flanks computed before."""
+        contact = contact or ContactSettings()
+        edges = np.linspace(-pair.face_width / 2, pair.face_width / 2, contact.slices + 1)
+        axial = (edges[1:] + edges[:-1]) / 2
+        reach, outermost = _teeth_in_contact(pair, flanks)
+        teeth = np.arange(-outermost, outermost + 1)
+        senses = (1, 1 if pair.gear.internal else -1)
+        one, two = (
+            SlicedCompliance.from_flank(flank, axial, sense, teeth, reach)
+            for flank, sense in zip(flanks, senses, strict=True)
+        )
+        return cls(pair, flanks, contact, axial, teeth, reach, (one, two))
+
+    def at_centre_distance(self, centre_distance: float) -> PairCompliance:
+        """Return the same gears at another operating centre distance."""
+        return replace(self, pair=self.pair.with_centre_distance(centre_distance))
+
+    def with_modifications(self, pinion: FlankModification, gear: FlankModification) -> PairCompliance:
+        """Return the same gears with modified flanks."""
+        return replace(self, modifications=(pinion, gear))
+
+    def with_tooth_gaps(self, gaps: Mapping[int, float]) -> PairCompliance:
+        """Return the same gears with some tooth pairs out of place.
+
+        Parameters
+        ----------
+        gaps : mapping of int to float
+            Number of the tooth pair, counted ahead of the one that touches at the pitch point at pmc 0 -> gap of its
+            flanks, m on the transverse line of action, negative where they touch before the others; see
+            `fe_ste.flanks.deviations`.
+
+        Raises
+        ------
+        ValueError
+            If a pair cannot touch in the mesh cycle.
+        """
+        unknown = sorted(set(gaps) - set(self.teeth.tolist()))
+        if unknown:
+            raise ValueError(
+                f"tooth pair {unknown[0]}: only pairs {self.teeth[0]} to {self.teeth[-1]} may touch in the mesh cycle"
+            )
+        return replace(self, tooth_gap=np.array([gaps.get(tooth, 0.0) for tooth in self.teeth.tolist()]))
+
+    @property
+    def slice_width(self) -> float:
+        """Axial width of a contact slice, m."""
+        return self.pair.face_width / len(self.axial)
+
+
+def _teeth_in_contact(pair: GearPair, flanks: tuple[FlankCompliance, FlankCompliance]) -> tuple[int, int]:
+    """Largest difference of tooth pairs in contact at once, and outermost tooth pair that may touch.
+
+    In a closed ring every tooth is there, and contact needs one tooth pair more on either side than the contact ratio;
+    an open sector has its own teeth and no others.
+    """
+    reach = min([math.ceil(pair.total_contact_ratio)] + [flank.tooth_reach for flank in flanks if flank.closed])
+    open_reach = [flank.tooth_reach for flank in flanks if not flank.closed]
+    if open_reach:
+        return min([reach, 2 * min(open_reach)]), min(open_reach)
+    return reach, reach + 1
+
+
+def pair_compliance(
+    pair: GearPair,
+    mesh: MeshSettings | None = None,
+    contact: ContactSettings | None = None,
+    *,
+    open_teeth: int | None = None,
+    incompatible_modes: bool = True,
+    backend: Backend | None = None,
+) -> PairCompliance:
+    """Compute the compliance of both gears of `pair` by finite elements.
+
+    Parameters
+    ----------
+    pair : GearPair
+    mesh : MeshSettings, optional
+    contact : ContactSettings, optional
+    open_teeth : int, optional
+        Odd number of teeth of open sectors; without it closed rings.
+    incompatible_modes : bool
+    backend : {"pardiso", "superlu"}, optional
+
+    Returns
+    -------
+    PairCompliance
+    """
+    one, two = (
+        flank_compliance(
+            gear, side, mesh, open_teeth=open_teeth, incompatible_modes=incompatible_modes, backend=backend
+        )
+        for gear, side in ((pair.pinion, 1), (pair.gear, -1 if pair.gear.internal else 1))
+    )
+    return PairCompliance.from_flanks(pair, (one, two), contact)

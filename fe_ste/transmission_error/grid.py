@@ -1,0 +1,225 @@
+"""Grids of contact states on an executor: split by position, stored while they grow, taken up again.
+
+The unit of work is all states of one or a few positions of the mesh cycle, because these share what is costly. It can
+be sent to any executor of `concurrent.futures` or with its protocol: a block carries all it needs and returns arrays.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import pickle
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+import xarray as xr
+
+from fe_ste.tools.files import FileError, Layout, load_dataset, write_dataset
+from fe_ste.tools.versions import TABLE
+from fe_ste.tools.workers import Workers, stop_if_asked
+from fe_ste.transmission_error.compliance import PairCompliance
+from fe_ste.transmission_error.states import RESULTS, STATE_AXES, StateAxes, StateResults
+from fe_ste.transmission_error.transmission_error import solve_positions
+
+#: States of a block: some seconds of work, so that little is lost and the time left is known.
+_BLOCK_STATES = 300
+
+#: Seconds between two writings of what is finished.
+_STORE_EVERY = 10.0
+
+#: Attribute that ties a file of finished positions to its input.
+_PARTIAL_OF = "partial_of"
+_LAYOUT = Layout(
+    "finished positions of a table",
+    TABLE,
+    {"solved": ("pmc",), "line_load": ("pmc", *STATE_AXES, "tooth", "axial_position")}
+    | {name: ("pmc", *STATE_AXES) for name in (*RESULTS, "iterations")}
+    | {name: ("pmc", *STATE_AXES, "tooth") for name in ("load_share", "tangent_load_share")},
+    (_PARTIAL_OF, "failures"),
+)
+_log = logging.getLogger(__name__)
+
+
+class SweepError(RuntimeError):
+    """A sweep whose workers were lost; the message says what is kept."""
+
+
+class Submits(Protocol):
+    """What a sweep asks of an executor."""
+
+    def submit(self, fn: Callable[..., StateResults], /, *args: object) -> Future[StateResults]:
+        """Schedule a call and return its future."""
+        ...
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """File in which a sweep keeps the positions that are finished.
+
+    Parameters
+    ----------
+    path : Path
+        Replaced as a whole at each writing, so that it can be read at any time, by xarray too.
+    input_hash : str
+        Hash of the sweep's input; a file of another input is not taken up.
+    """
+
+    path: Path
+    input_hash: str
+
+    def load(self, results: StateResults) -> set[int]:
+        """Fill `results` with what the file holds and return the finished positions; none if it does not fit."""
+        if not self.path.exists():
+            return set()
+        try:
+            stored = load_dataset(self.path, _LAYOUT)
+        except FileError as error:
+            _log.warning("%s; its positions are computed again", error)
+            return set()
+        if stored.attrs[_PARTIAL_OF] != self.input_hash:
+            return set()
+        rows = np.flatnonzero(stored["solved"].to_numpy())
+        results.insert(rows.tolist(), StateResults.from_dataset(results, stored.isel(pmc=rows)))
+        return set(rows.tolist())
+
+    def store(self, results: StateResults, axes: StateAxes, finished: set[int]) -> None:
+        """Write the finished positions; the others are not a number."""
+        dataset = results.dataset(axes, all_teeth=True)
+        solved = np.isin(np.arange(axes.positions), sorted(finished))
+        attributes = {"units": "1", "long_name": "whether all states of the position are finished"}
+        dataset["solved"] = ("pmc", solved.astype(np.int8), attributes)
+        dataset.attrs |= {_PARTIAL_OF: self.input_hash, "method_version": TABLE}
+        write_dataset(self.path, dataset)
+
+
+def sweep_states(
+    compliance: PairCompliance,
+    axes: StateAxes,
+    *,
+    executor: Submits | None = None,
+    checkpoint: Checkpoint | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> xr.Dataset:
+    """Solve a grid of states.
+
+    Parameters
+    ----------
+    compliance : PairCompliance
+    axes : StateAxes
+    executor : optional
+        Anything with ``submit`` of `concurrent.futures`; without it this process does the work.
+    checkpoint : Checkpoint, optional
+        Where finished positions are kept, and looked for first.
+    progress : callable, optional
+        Called with the number of finished states and of all states. What it raises, such as Ctrl-C, ends the sweep
+        after the finished positions are stored.
+
+    Returns
+    -------
+    xarray.Dataset
+        As of `fe_ste.static_transmission_error`.
+
+    Raises
+    ------
+    SweepError
+        If workers are lost.
+    """
+    results = StateResults.empty(compliance, axes.shape)
+    finished = checkpoint.load(results) if checkpoint else set()
+    states_each = math.prod(axes.shape[1:])
+    total = math.prod(axes.shape)
+
+    def tell(within_block: int = 0) -> None:
+        if progress is not None:
+            progress(len(finished) * states_each + within_block, total)
+
+    stored = time.monotonic()
+    try:
+        blocks = _blocks(axes, finished)
+        done = _here(compliance, axes, blocks, tell) if executor is None else _sent(compliance, axes, blocks, executor)
+        for positions, part in done:
+            results.insert(positions, part)
+            finished.update(positions)
+            if executor is not None:
+                tell()
+            if checkpoint and time.monotonic() - stored > _STORE_EVERY:
+                checkpoint.store(results, axes, finished)
+                stored = time.monotonic()
+    except BaseException:
+        if checkpoint and finished:
+            checkpoint.store(results, axes, finished)
+        raise
+    return results.dataset(axes)
+
+
+def _blocks(axes: StateAxes, finished: set[int]) -> list[list[int]]:
+    """Positions still to solve, in runs of neighbours."""
+    length = max(1, _BLOCK_STATES // math.prod(axes.shape[1:]))
+    left = [position for position in range(axes.positions) if position not in finished]
+    return [left[start : start + length] for start in range(0, len(left), length)]
+
+
+def _here(
+    compliance: PairCompliance, axes: StateAxes, blocks: list[list[int]], tell: Callable[[int], None]
+) -> Iterator[tuple[list[int], StateResults]]:
+    for positions in blocks:
+        yield positions, solve_positions(compliance, axes, positions, tell)
+
+
+def _sent(
+    compliance: PairCompliance, axes: StateAxes, blocks: list[list[int]], executor: Submits
+) -> Iterator[tuple[list[int], StateResults]]:
+    """Yield blocks in the order in which workers finish them."""
+    one = compliance
+    packed = pickle.dumps((one.pair, one.flanks, one.contact, one.modifications, one.tooth_gap))
+    with _cancelled_on_error(executor) as waiting:
+        for positions in blocks:
+            waiting[executor.submit(solve_block, packed, axes, positions)] = positions
+        while waiting:
+            for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+                try:
+                    yield waiting.pop(future), future.result()
+                except BrokenExecutor as error:
+                    raise SweepError(
+                        f"a worker of the sweep ended before its work was done ({error}); finished positions are kept"
+                    ) from error
+
+
+@contextmanager
+def _cancelled_on_error(executor: Submits) -> Iterator[dict[Future[StateResults], list[int]]]:
+    waiting: dict[Future[StateResults], list[int]] = {}
+    try:
+        yield waiting
+    finally:
+        # Workers drop what waits themselves: before Python 3.12 a pool hangs if a process of it ends while calls that
+        # were cancelled from outside wait, as when a signal goes to a whole group of processes.
+        if not isinstance(executor, Workers):
+            for future in waiting:
+                future.cancel()
+
+
+def solve_block(packed: bytes, axes: StateAxes, positions: list[int]) -> StateResults:
+    """Solve some positions in a worker, which unpacks the compliance of a pair once and stops if it is asked to.
+
+    Parameters
+    ----------
+    packed : bytes
+        Pickled pair, flanks, contact settings, modifications and gaps of the teeth.
+    axes : StateAxes
+    positions : list of int
+    """
+    stop_if_asked()
+    return solve_positions(_unpacked(packed), axes, positions, lambda solved: stop_if_asked())
+
+
+@lru_cache(maxsize=1)
+def _unpacked(packed: bytes) -> PairCompliance:
+    pair, flanks, contact, modifications, tooth_gap = pickle.loads(packed)
+    return replace(PairCompliance.from_flanks(pair, flanks, contact), modifications=modifications, tooth_gap=tooth_gap)

@@ -1,0 +1,351 @@
+"""One position of the mesh cycle under one load: the window that contact fills, and the state in it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+import xarray as xr
+
+from fe_ste.contact.cells import Cells, lay_cells
+from fe_ste.contact.complementarity import ContactSolution, solve_complementarity
+from fe_ste.contact.compliance import compliance_matrix
+from fe_ste.contact.kinematics import ContactError, FlankPair
+from fe_ste.geometry.gears import Gear, GearPair
+from fe_ste.tools.arrays import Booleans, Floats, Integers
+from fe_ste.transmission_error.compliance import PairCompliance
+from fe_ste.transmission_error.states import ContactState, SearchStart, StateAxes
+
+#: Cells further apart than this many approaches in the unloaded position cannot touch.
+_GAP_REACH = 1.3
+
+#: Part of its cells by which a window that contact fills grows at either side.
+_WINDOW_GROWTH = 0.2
+
+#: Cells across a contact line among which the first touch is looked for, odd: the middle one is on the line; and their
+#: width in normal modules, which misses the first touch of modified flanks by some nanometres.
+_UNLOADED_CELLS = 101
+_UNLOADED_WIDTH = 3e-3
+
+#: Gaps this close to the least one touch at the same time, m.
+_TOUCHING = 1e-12
+_WINDOW_ATTEMPTS = 20
+
+#: Places across the window that an address tells apart.
+_PLACES = 64
+
+
+def hertz_half_width(pair: GearPair, line_load: float) -> float:
+    """Half width of the contact of the two flanks at the pitch point under a line load (N/m), m.
+
+    Notes
+    -----
+    b = sqrt(4 w R / (pi E*)), 1/R the sum of the normal curvatures, 1/E* the sum of (1 - nu^2)/E (Johnson, Contact
+    Mechanics, eq. 4.43).
+    """
+    roll = math.tan(pair.working_pressure_angle)
+    cosine = math.cos(pair.pinion.base_helix_angle)
+    sign = -1.0 if pair.gear.internal else 1.0
+    curvature = cosine / roll * (1.0 / pair.pinion.base_radius + sign / pair.gear.base_radius)
+    compliance = sum((1 - g.material.poissons_ratio**2) / g.material.youngs_modulus for g in (pair.pinion, pair.gear))
+    return math.sqrt(4.0 * line_load * compliance / (math.pi * curvature))
+
+
+@lru_cache(maxsize=64)
+def least_contact_length(pair: GearPair, samples: int = 100) -> float:
+    """Least total length of the contact lines over the mesh cycle, m."""
+    axial = np.linspace(-0.5, 0.5, 401) * pair.face_width
+    pitch = pair.transverse_base_pitch
+    lines = pair.path_pitch_point + math.tan(pair.pinion.base_helix_angle) * axial
+    reach = math.ceil(pair.total_contact_ratio) + 1
+    lines = lines + pitch * np.arange(-reach, reach + 1)[:, None]
+    shift = np.arange(samples)[:, None, None] / samples * pitch
+    inside = (lines + shift > pair.path_start) & (lines + shift < pair.path_end)
+    length = inside.mean(axis=2).sum(axis=1) * pair.face_width / math.cos(pair.pinion.base_helix_angle)
+    return float(length.min())
+
+
+def contact_state(compliance: PairCompliance, torque: float, pmc: float, misalignment: float = 0.0) -> ContactState:
+    """Solve the contact of one position.
+
+    Parameters
+    ----------
+    compliance : PairCompliance
+    torque : float
+        Static torque on gear 1, N m, positive.
+    pmc : float
+        Position in the mesh cycle.
+    misalignment : float
+        Relative rotation of the axes in the plane of action, rad, positive where it opens the gap at the +z end.
+
+    Returns
+    -------
+    ContactState
+
+    Raises
+    ------
+    ContactError
+        If the contact does not settle, or leaves the flank.
+    """
+    (state,) = contact_states(compliance, torque, pmc, np.array([misalignment]), [new_start(compliance, torque)])
+    if isinstance(state, ContactError):
+        raise state
+    return state
+
+
+def contact_states(
+    compliance: PairCompliance, torque: float, pmc: float, misalignments: Floats, starts: list[SearchStart]
+) -> list[ContactState | ContactError]:
+    """Solve the contact of one position under several misalignments, which share the compliance of the cells.
+
+    Parameters
+    ----------
+    compliance : PairCompliance
+    torque : float
+        Static torque on gear 1, N m, positive.
+    pmc : float
+        Position in the mesh cycle.
+    misalignments : ndarray (m,)
+        rad.
+    starts : list of SearchStart
+        One for each misalignment; replaced in place by what was found.
+
+    Returns
+    -------
+    list of ContactState or ContactError
+        For each misalignment the state, or why there is none.
+    """
+    search = _Search(compliance, torque, pmc, misalignments, starts)
+    for _ in range(_WINDOW_ATTEMPTS):
+        pending = search.pending()
+        if not pending:
+            break
+        window = search.window(pending)
+        for group in window.groups(compliance.reach):
+            search.solve(window, group)
+    for index in search.pending():
+        message = f"the contact is wider than the flanks, or found no approach, at torque {torque:g} N m"
+        search.found[index] = ContactError(message)
+    return [search.found[index] for index in range(len(starts))]
+
+
+@dataclass(frozen=True)
+class _Window:
+    """Cells laid at one position, with the gaps of several misalignments over them.
+
+    Attributes
+    ----------
+    cells : Cells
+    end : ndarray (n,)
+        Whether a cell ends the window where no tip edge does.
+    address : ndarray (n,)
+        Tooth pair, slice and place relative to the contact line in one number.
+    gap, near : dict
+        Misalignment's index -> gap (n,), m, and which cells are near enough to touch.
+    """
+
+    cells: Cells
+    end: Booleans
+    address: Integers
+    gap: dict[int, Floats]
+    near: dict[int, Booleans]
+
+    def groups(self, reach: int) -> list[list[int]]:
+        """Misalignments whose cells are few enough tooth pairs to share a compliance matrix."""
+        if not self.near:
+            return []
+        together = np.any(list(self.near.values()), axis=0)
+        if np.ptp(self.cells.tooth[together]) <= reach:
+            return [list(self.near)]
+        return [[index] for index in self.near]
+
+
+class _Search:
+    """The search for the contact of one position under several misalignments."""
+
+    def __init__(
+        self,
+        compliance: PairCompliance,
+        torque: float,
+        pmc: float,
+        misalignments: Floats,
+        starts: list[SearchStart],
+    ) -> None:
+        self.compliance, self.pmc, self.misalignments, self.starts = compliance, pmc, misalignments, starts
+        pair, roll = compliance.pair, compliance.flanks[0].roll
+        self.load = _normal_load(pair, torque)
+        self.kinematics = FlankPair.from_pair(pair, roll[0], roll[-1])
+        self.rotation = pmc * pair.pinion.angular_pitch
+        self.cell_width = _cell_width(compliance, self.load)
+        self.too_deep = [math.inf] * len(starts)
+        self.found: dict[int, ContactState | ContactError] = {}
+
+    def pending(self) -> list[int]:
+        """Misalignments whose state is not found yet."""
+        return [index for index in range(len(self.starts)) if index not in self.found]
+
+    def window(self, pending: list[int]) -> _Window:
+        """Lay the cells that the states of `pending` need."""
+        count = max(self.starts[index].cells for index in pending)
+        one, axial = self.compliance, self.compliance.axial
+        cells = lay_cells(self.kinematics, self.rotation, one.teeth, axial, count * self.cell_width / 2, count)
+        if not cells.tooth.size:  # wider than the flanks
+            return _Window(cells, cells.cut, cells.tooth, {}, {})
+        removed = cells.gap + _modification_gap(one, cells)
+        wedge = axial[cells.layer] * math.cos(one.pair.pinion.base_helix_angle)
+        gap = {index: removed + self.misalignments[index] * wedge for index in pending}
+        near = {index: g - g.min() < _GAP_REACH * self.starts[index].depth for index, g in gap.items()}
+        return _Window(cells, _window_ends(cells), self._addresses(cells), gap, near)
+
+    def _addresses(self, cells: Cells) -> Integers:
+        pair, radius = self.kinematics, self.kinematics.base_radius_1
+        axial = self.compliance.axial[cells.layer]
+        line = pair.working_roll + self.rotation + cells.tooth * pair.pitch_1 + pair.twist_1 * axial
+        from_line = 0.5 * radius * (cells.roll**2 - line * np.abs(line)) / self.cell_width
+        place = np.clip(np.rint(from_line) + _PLACES // 2, 0, _PLACES - 1).astype(np.int64)
+        row = (cells.tooth - self.compliance.teeth[0]) * len(self.compliance.axial) + cells.layer
+        return np.asarray(row * _PLACES + place, dtype=np.int64)
+
+    def solve(self, window: _Window, group: list[int]) -> None:
+        """Solve the states of `group`; one that needs other cells stays pending, with a start that asks for them."""
+        near = np.any([window.near[index] for index in group], axis=0)
+        if np.ptp(window.cells.tooth[near]) > self.compliance.reach:
+            self._come_nearer(group[0])
+            return
+        cells, address, end = window.cells.select(near), window.address[near], window.end[near]
+        one = self.compliance
+        matrix = compliance_matrix(cells, self.kinematics, one.axial, one.flanks, one.sliced)
+        for index in group:
+            gap = window.gap[index][near]
+            try:
+                solution = solve_complementarity(matrix, gap, self.load, self._guess(index, gap, address))
+                if self._settled(index, solution, gap, end):
+                    self.found[index] = self._state(cells, solution)
+                    carrying = address[solution.force > 0]
+                    self.starts[index] = replace(self.starts[index], touching=carrying)
+            except ContactError as error:
+                self.found[index] = error
+
+    def _guess(self, index: int, gap: Floats, address: Integers) -> Booleans:
+        start = self.starts[index]
+        if start.touching is None:
+            return np.asarray(gap - gap.min() < 0.7 * start.depth)
+        return np.isin(address, start.touching)
+
+    def _come_nearer(self, index: int) -> None:
+        """Leave out cells further apart: more tooth pairs than can touch at once were reckoned to be near."""
+        start = self.starts[index]
+        self.too_deep[index] = start.depth
+        self.starts[index] = replace(start, depth=0.7 * start.depth)
+
+    def _settled(self, index: int, solution: ContactSolution, gap: Floats, end: Booleans) -> bool:
+        """Whether all cells that may touch were there; else change the start."""
+        start = self.starts[index]
+        depth = solution.approach - gap.min()
+        if depth > 0.95 * _GAP_REACH * start.depth:
+            if depth >= self.too_deep[index]:
+                most = self.compliance.reach + 1
+                raise ContactError(f"contact spreads over more than {most} tooth pairs: the torque is too large")
+            self.starts[index] = replace(start, depth=min(1.2 * depth, 0.5 * (depth + self.too_deep[index])))
+            return False
+        if (solution.force[end] > 0).any():
+            self.starts[index] = replace(start, cells=start.cells + 2 * math.ceil(_WINDOW_GROWTH * start.cells))
+            return False
+        self.starts[index] = replace(start, depth=depth)
+        return True
+
+    def _state(self, cells: Cells, solution: ContactSolution) -> ContactState:
+        _check_on_flanks(self.compliance, cells, solution.force)
+        half_along = 0.5 * self.compliance.slice_width / self.kinematics.base_helix_cosine
+        return ContactState(
+            self.pmc, self.load, cells, solution, solution.force / (4.0 * cells.half_across * half_along)
+        )
+
+
+def _modification_gap(compliance: PairCompliance, cells: Cells) -> Floats:
+    """Gap over the cells, along the normal, that modifications and deviations add to the conjugate flanks."""
+    axial = compliance.axial[cells.layer]
+    gap = np.zeros(len(axial))
+    if compliance.tooth_gap is not None:
+        cosine = math.cos(compliance.pair.pinion.base_helix_angle)
+        gap = gap + cosine * compliance.tooth_gap[cells.tooth - compliance.teeth[0]]
+    gears = (compliance.pair.pinion, compliance.pair.gear)
+    for gear, roll, modification in zip(gears, (cells.roll, cells.gear_roll), compliance.modifications, strict=True):
+        radius = gear.base_radius * np.sqrt(1.0 + roll**2)
+        gap = gap + modification.gap(gear, np.clip(radius, *_flank_radii(gear)), axial)
+    return gap
+
+
+def unloaded_states(compliance: PairCompliance, axes: StateAxes) -> xr.Dataset:
+    """Compute where the rigid flanks first touch, the limit of the transmission error at no load.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over (pmc, centre_distance, misalignment): unloaded_ste (m) and unloaded_centre (m, axial position).
+    """
+    shape = (axes.positions, len(axes.centre_distance), len(axes.misalignment))
+    ste, centre = np.empty(shape), np.empty(shape)
+    pair, roll = compliance.pair, compliance.flanks[0].roll
+    cosine = math.cos(pair.pinion.base_helix_angle)
+    width = _UNLOADED_CELLS * _UNLOADED_WIDTH * pair.pinion.normal_module
+    for c, distance in enumerate(axes.centre_distance):
+        placed = compliance.at_centre_distance(float(distance))
+        kinematics = FlankPair.from_pair(placed.pair, roll[0], roll[-1])
+        for p in range(axes.positions):
+            rotation = p / axes.positions * pair.pinion.angular_pitch
+            cells = lay_cells(kinematics, rotation, placed.teeth, placed.axial, width / 2, _UNLOADED_CELLS)
+            removed = cells.gap + _modification_gap(placed, cells)
+            place = placed.axial[cells.layer]
+            for m, misalignment in enumerate(axes.misalignment):
+                gap = removed + misalignment * place * cosine
+                ste[p, c, m] = gap.min() / cosine
+                centre[p, c, m] = place[gap < gap.min() + _TOUCHING].mean()
+    names = ("pmc", "centre_distance", "misalignment")
+    meaning = {
+        "unloaded_ste": "transmission error at which the flanks first touch, on the transverse line of action",
+        "unloaded_centre": "axial position of the first touch: derivative of unloaded_ste by misalignment",
+    }
+    values = {"unloaded_ste": ste, "unloaded_centre": centre}
+    return xr.Dataset({n: (names, v, {"units": "m", "long_name": meaning[n]}) for n, v in values.items()})
+
+
+def _flank_radii(gear: Gear) -> tuple[float, float]:
+    return min(gear.form_radius, gear.tip_radius), max(gear.form_radius, gear.tip_radius)
+
+
+def _check_on_flanks(compliance: PairCompliance, cells: Cells, force: Floats) -> None:
+    """Refuse contact at a form circle, where the involute ends and the fillet begins."""
+    touching = force > 0
+    for flank, roll in zip(compliance.flanks, (cells.roll, cells.gear_roll), strict=True):
+        margin = (roll - flank.roll[0]) if not flank.gear.internal else (flank.roll[-1] - roll)
+        if (margin[touching] < 0.01 * np.ptp(flank.roll)).any():
+            raise ContactError(f"gear {flank.gear.name}: contact reaches the form circle, where the involute ends")
+
+
+def _cell_width(compliance: PairCompliance, load: float) -> float:
+    """Width of the contact cells along the profile under a normal load, m."""
+    pair, contact = compliance.pair, compliance.contact
+    half_width = hertz_half_width(pair, load / least_contact_length(pair))
+    return 2 * contact.window * half_width / contact.cells
+
+
+def new_start(compliance: PairCompliance, torque: float) -> SearchStart:
+    """Start of a search that knows no other state."""
+    stiffness = 10e9 * compliance.pair.face_width  # two thirds of a usual mesh stiffness: may be too deep
+    return SearchStart(compliance.contact.cells, _normal_load(compliance.pair, torque) / stiffness)
+
+
+def _window_ends(cells: Cells) -> Booleans:
+    """Cells at either side of the window, but for those that a tip edge cuts."""
+    group = cells.tooth * (cells.layer.max() + 1) + cells.layer
+    first = np.diff(group, prepend=group[0] - 1) != 0
+    last = np.append(first[1:], True)
+    return np.asarray((first | last) & ~cells.cut)
+
+
+def _normal_load(pair: GearPair, torque: float) -> float:
+    """Sum of the normal contact forces: every involute contact has the same lever arm r_b cos(beta_b)."""
+    return torque / (pair.pinion.base_radius * math.cos(pair.pinion.base_helix_angle))

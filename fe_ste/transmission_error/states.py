@@ -1,0 +1,284 @@
+"""States of contact and their axes, and how results are gathered over them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from fe_ste.contact.cells import Cells
+from fe_ste.contact.complementarity import ContactSolution
+from fe_ste.contact.kinematics import ContactError
+from fe_ste.geometry.gears import GearPair
+from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.transmission_error.compliance import PairCompliance
+
+
+@dataclass(frozen=True)
+class ContactState:
+    """Solved contact at one position.
+
+    Attributes
+    ----------
+    pmc : float
+    normal_load : float
+        Sum of the normal forces, N.
+    cells : Cells
+    solution : ContactSolution
+    pressure : ndarray (n,)
+        Pa.
+    """
+
+    pmc: float
+    normal_load: float
+    cells: Cells
+    solution: ContactSolution
+    pressure: Floats
+
+
+@dataclass
+class SearchStart:
+    """Where the search for a state begins: what solved states hand on. It never changes what is found.
+
+    A window that contact fills gets more cells of the same width, cells too far apart to touch are left out only if
+    they are, and the complementarity problem has one solution: so a state is the same whichever were solved before.
+
+    Attributes
+    ----------
+    cells : int
+        Cells of a slice across the window.
+    depth : float
+        Reckoned approach beyond the first touch, m.
+    touching : ndarray, optional
+        Addresses, relative to the contact lines, of the cells that carried load.
+    """
+
+    cells: int
+    depth: float
+    touching: Integers | None = None
+
+    def scaled(self, factor: float) -> SearchStart:
+        """Return the start for `factor` times the load; the cells grow with the contact, so their addresses stay."""
+        return replace(self, depth=self.depth * factor)
+
+
+@dataclass(frozen=True)
+class StateAxes:
+    """Axes of a grid of states.
+
+    Attributes
+    ----------
+    positions : int
+        Equally spaced positions of the mesh cycle.
+    torque, centre_distance, misalignment : ndarray
+        N m, m, rad.
+    """
+
+    positions: int
+    torque: Floats
+    centre_distance: Floats
+    misalignment: Floats
+
+    @classmethod
+    def checked(
+        cls,
+        pair: GearPair,
+        torque: float | Sequence[float],
+        positions: int = 50,
+        centre_distance: float | Sequence[float] | None = None,
+        misalignment: float | Sequence[float] = 0.0,
+    ) -> StateAxes:
+        """Return the axes after checking each value; for the errors see `static_transmission_error`."""
+        if positions < 1:
+            raise ValueError(f"positions = {positions}: at least 1 is needed")
+        torques = np.atleast_1d(np.asarray(torque, dtype=float))
+        if not (np.isfinite(torques) & (torques > 0)).all():
+            raise ValueError(
+                f"torque = {torque}: must be positive torques on gear 1; a table belongs to one loaded flank"
+            )
+        misalignments = np.atleast_1d(np.asarray(misalignment, dtype=float))
+        if not np.isfinite(misalignments).all():
+            raise ValueError(f"misalignment = {misalignment}: must be finite angles in rad")
+        own = pair.centre_distance if centre_distance is None else centre_distance
+        distances = np.atleast_1d(np.asarray(own, dtype=float))
+        for distance in distances:
+            pair.with_centre_distance(float(distance))  # refuses before the finite elements, not after
+        return cls(positions, torques, distances, misalignments)
+
+    @property
+    def shape(self) -> tuple[int, int, int, int]:
+        """Number of states along each axis, positions first."""
+        return self.positions, len(self.torque), len(self.centre_distance), len(self.misalignment)
+
+    def coordinates(self) -> dict[str, Floats]:
+        """Return the values along each axis under its name."""
+        return {
+            "pmc": np.arange(self.positions) / self.positions,
+            "torque": self.torque,
+            "centre_distance": self.centre_distance,
+            "misalignment": self.misalignment,
+        }
+
+
+_UNITS = {
+    "pmc": ("1", "position in the mesh cycle"),
+    "torque": ("N m", "static torque on gear 1"),
+    "centre_distance": ("m", "operating centre distance"),
+    "misalignment": ("rad", "rotation of the axes in the plane of action, opening the +z end"),
+    "tooth": ("1", "tooth pair, counted ahead of pair 0, which touches at the pitch point at pmc 0"),
+    "axial_position": ("m", "from the middle of the common face width"),
+    "ste": ("m", "static transmission error on the transverse line of action"),
+    "mesh_stiffness": ("N/m", "secant stiffness on the transverse line of action"),
+    "tangent_stiffness": ("N/m", "tangent stiffness on the transverse line of action"),
+    "line_of_action_force": ("N", "torque on gear 1 over its base radius"),
+    "load_share": ("1", "part of the normal load that a tooth pair carries"),
+    "line_load": ("N/m", "normal load per length of contact line"),
+    "load_centre": ("m", "axial position of the resultant normal load"),
+    "tangent_load_centre": ("m", "axial position of the resultant of a little more load: slope of ste by misalignment"),
+    "tangent_load_share": ("1", "part of a little more load that a tooth pair carries: slope of ste by a gap there"),
+    "max_pressure": ("Pa", "largest contact pressure away from tip edges"),
+    "edge_pressure": ("Pa", "largest contact pressure in cells at a tip edge; depends on their size"),
+    "iterations": ("1", "active-set iterations"),
+    "converged": ("1", "whether the position was solved"),
+}
+
+#: Axes of a table beside the position in the mesh cycle, ``pmc``.
+STATE_AXES = ("torque", "centre_distance", "misalignment")
+
+#: Results of a state that are numbers by themselves.
+RESULTS = ("ste", "tangent_stiffness", "load_centre", "tangent_load_centre", "max_pressure", "edge_pressure")
+
+
+@dataclass
+class StateResults:
+    """Results of states over (pmc, torque, centre_distance, misalignment); those that failed are not a number.
+
+    Attributes
+    ----------
+    teeth : ndarray (t,)
+        Tooth pairs that may touch.
+    axial : ndarray (k,)
+        Middle of the contact slices, m.
+    base_radius : float
+        Of gear 1, m.
+    values : dict
+        Name of a result -> ndarray over the axes.
+    line_load : ndarray (..., t, k)
+    load_share, tangent_load_share : ndarray (..., t)
+    iterations : ndarray
+    failures : list of str
+        Why states failed.
+    """
+
+    teeth: Integers
+    axial: Floats
+    base_radius: float
+    values: dict[str, Floats]
+    line_load: Floats
+    load_share: Floats
+    tangent_load_share: Floats
+    iterations: NDArray[np.int32]
+    failures: list[str] = field(default_factory=list)
+
+    @classmethod
+    def empty(cls, compliance: PairCompliance, shape: tuple[int, int, int, int]) -> StateResults:
+        """Results of `shape` of which none is there yet."""
+        teeth, axial = compliance.teeth, compliance.axial
+        return cls(
+            teeth,
+            axial,
+            compliance.pair.pinion.base_radius,
+            {name: np.full(shape, np.nan) for name in RESULTS},
+            np.full((*shape, len(teeth), len(axial)), np.nan),
+            np.full((*shape, len(teeth)), np.nan),
+            np.full((*shape, len(teeth)), np.nan),
+            np.zeros(shape, dtype=np.int32),
+        )
+
+    @classmethod
+    def from_dataset(cls, like: StateResults, dataset: xr.Dataset) -> StateResults:
+        """Read back a dataset with all tooth pairs; its teeth, slices and base radius are those of `like`."""
+        return cls(
+            like.teeth,
+            like.axial,
+            like.base_radius,
+            {name: dataset[name].to_numpy() for name in RESULTS},
+            dataset["line_load"].to_numpy(),
+            dataset["load_share"].to_numpy(),
+            dataset["tangent_load_share"].to_numpy(),
+            dataset["iterations"].to_numpy(),
+            [line for line in str(dataset.attrs["failures"]).splitlines() if line],
+        )
+
+    def put(
+        self,
+        index: tuple[int, int, int, int],
+        compliance: PairCompliance,
+        torque: float,
+        pmc: float,
+        misalignment: float,
+        state: ContactState | ContactError,
+    ) -> None:
+        """Keep the results of one state, or why there are none."""
+        if isinstance(state, ContactError):
+            distance = compliance.pair.centre_distance
+            self.failures.append(
+                f"pmc {pmc:.3f}, torque {torque:g} N m, centre distance {1e3 * distance:.7g} mm, "
+                f"misalignment {1e6 * misalignment:.4g} urad: {state}"
+            )
+            return
+        cosine = math.cos(compliance.pair.pinion.base_helix_angle)
+        cells, solution = state.cells, state.solution
+        self.values["ste"][index] = solution.approach / cosine
+        self.values["tangent_stiffness"][index] = cosine**2 / solution.approach_per_load
+        axial = compliance.axial[cells.layer]
+        self.values["load_centre"][index] = solution.force @ axial / state.normal_load
+        self.values["tangent_load_centre"][index] = solution.force_per_load @ axial
+        self.values["max_pressure"][index] = state.pressure[~cells.cut].max(initial=0.0)
+        self.values["edge_pressure"][index] = state.pressure[cells.cut].max(initial=0.0)
+        loads = np.zeros((len(self.teeth), len(self.axial)))
+        np.add.at(loads, (cells.tooth - self.teeth[0], cells.layer), solution.force)
+        self.line_load[index] = loads * cosine / compliance.slice_width
+        self.load_share[index] = loads.sum(axis=1) / state.normal_load
+        pair_number = cells.tooth - self.teeth[0]
+        self.tangent_load_share[index] = np.bincount(pair_number, solution.force_per_load, len(self.teeth))
+        self.iterations[index] = solution.iterations
+
+    def insert(self, positions: Sequence[int], part: StateResults) -> None:
+        """Take over the results of some positions."""
+        rows = np.asarray(positions)
+        for name, values in part.values.items():
+            self.values[name][rows] = values
+        for name in ("line_load", "load_share", "tangent_load_share", "iterations"):
+            getattr(self, name)[rows] = getattr(part, name)
+        self.failures += part.failures
+
+    def dataset(self, axes: StateAxes, all_teeth: bool = False) -> xr.Dataset:
+        """Label the results; tooth pairs that never carry load are left out unless `all_teeth` asks for them."""
+        coordinates = axes.coordinates()
+        names = tuple(coordinates)
+        force = np.broadcast_to(axes.torque[:, None, None] / self.base_radius, self.iterations.shape)
+        carries = np.nan_to_num(self.load_share).max(axis=(0, 1, 2, 3)) > 0
+        shown = carries | all_teeth
+        variables: dict[str, tuple[tuple[str, ...], NDArray[Any]]]
+        variables = {name: (names, values) for name, values in self.values.items()}
+        variables |= {
+            "mesh_stiffness": (names, force / self.values["ste"]),
+            "line_of_action_force": (names, force),
+            "load_share": ((*names, "tooth"), self.load_share[..., shown]),
+            "tangent_load_share": ((*names, "tooth"), self.tangent_load_share[..., shown]),
+            "line_load": ((*names, "tooth", "axial_position"), self.line_load[..., shown, :]),
+            "iterations": (names, self.iterations),
+            "converged": (names, np.isfinite(self.values["ste"])),
+        }
+        coordinates |= {"tooth": self.teeth[shown], "axial_position": self.axial}
+        dataset = xr.Dataset(variables, coordinates)
+        for name, (unit, meaning) in _UNITS.items():
+            dataset[name].attrs = {"units": unit, "long_name": meaning}
+        dataset.attrs["failures"] = "\n".join(self.failures)
+        return dataset

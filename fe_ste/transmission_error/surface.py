@@ -1,0 +1,372 @@
+"""Static transmission error between the nodes of a table: one smooth surface over load, position and gear position.
+
+The surface is a cubic in each axis, so that it and its slopes are continuous, and goes through every node. Position is
+periodic. The load axis is the root of the line-of-action force: a flank that touches with a line yields in proportion
+to the force, one that touches in a point faster, and both are smooth in the root. Slopes along it are the table's own
+tangent stiffness, limited where needed so that more load never means less deflection (Fritsch and Carlson, SIAM J.
+Numer. Anal. 17 (1980) 238-246); along misalignment they are the axial position of a little more load, which is exactly
+what s changes by; the other axes take their slopes from parabolas through three nodes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from fe_ste.tools.arrays import Floats, Integers
+
+STENCIL = 4
+"""Nodes of an axis that act between two of them."""
+_ROUND_OFF = 1e-9
+"""Slopes of this part of a piece's mean slope are none."""
+_CHECKS = np.linspace(0.0, 1.0, 9)
+"""Places within a piece at which the surface is checked to rise with the load."""
+
+
+class InterpolationError(ValueError):
+    """A table that no surface can be laid through."""
+
+
+def axis_weights(knots: ArrayLike) -> tuple[Integers, Floats]:
+    """Weights of the nodes in each interval of an axis, continuous with their first derivative.
+
+    Parameters
+    ----------
+    knots : (k,) array
+        Increasing; a single knot means that nothing depends on the axis.
+
+    Returns
+    -------
+    first : (n,) array
+        First node that acts in each of the n = max(1, k - 1) intervals.
+    weights : (n, 4, 4) array
+        Coefficients c of the weight sum_j c[i, a, j] t^j of node first[i] + a in interval i, t from 0 to 1.
+
+    Raises
+    ------
+    InterpolationError
+        If the knots do not increase.
+
+    Examples
+    --------
+    >>> first, weights = axis_weights([0.0, 1.0, 2.0])
+    >>> nodes = np.array([0.0, 1.0, 4.0])  # a parabola comes back exactly
+    >>> float(nodes @ (weights[1, :3] @ 0.5 ** np.arange(4)))
+    2.25
+    """
+    x = np.atleast_1d(np.asarray(knots, dtype=np.float64))
+    count = x.size
+    if count == 1:
+        constant = np.zeros((1, STENCIL, 4))
+        constant[0, 0, 0] = 1.0
+        return np.zeros(1, dtype=np.int64), constant
+    if not np.all(np.diff(x) > 0.0):
+        raise InterpolationError(f"the values of an axis must increase: {x.tolist()}")
+    slopes: Floats = _slope_matrix(x)
+    first = np.clip(np.arange(count - 1) - 1, 0, max(0, count - STENCIL)).astype(np.int64)
+    weights = np.zeros((count - 1, STENCIL, 4))
+    unit = np.eye(count)
+    for i, start in enumerate(first):
+        step = x[i + 1] - x[i]
+        a, b, da, db = unit[i], unit[i + 1], step * slopes[i], step * slopes[i + 1]
+        cubic = np.stack([a, da, 3.0 * (b - a) - 2.0 * da - db, 2.0 * (a - b) + da + db], axis=1)
+        width = min(STENCIL, count)
+        weights[i, :width] = cubic[start : start + width]
+    return first, weights
+
+
+def slope_axis_weights(knots: ArrayLike) -> tuple[Integers, Floats]:
+    """Weights in each interval of an axis whose nodes have a value and a slope each, one after the other.
+
+    As `axis_weights`: the four weights of an interval belong to value and slope at its start and at its end.
+
+    Examples
+    --------
+    >>> first, weights = slope_axis_weights([0.0, 2.0])
+    >>> nodes = np.array([0.0, 0.0, 4.0, 4.0])  # x^2 with its slope
+    >>> float(nodes @ (weights[0] @ 0.5 ** np.arange(4)))
+    1.0
+    """
+    x = np.atleast_1d(np.asarray(knots, dtype=np.float64))
+    if x.size == 1:
+        return axis_weights(x)
+    if not np.all(np.diff(x) > 0.0):
+        raise InterpolationError(f"the values of an axis must increase: {x.tolist()}")
+    step = np.diff(x)[:, None]
+    none = np.zeros((x.size - 1, 4))
+    value, rise = none + [1.0, 0.0, -3.0, 2.0], none + [0.0, 0.0, 3.0, -2.0]
+    start, end = step * [0.0, 1.0, -2.0, 1.0], step * [0.0, 0.0, -1.0, 1.0]
+    return 2 * np.arange(x.size - 1), np.stack([value, start, rise, end], axis=1)
+
+
+def _slope_matrix(x: Floats) -> Floats:
+    """Slope at each node as a combination of the nodal values: of the parabola through three neighbours."""
+    count = x.size
+    if count == 2:
+        return np.full((2, 2), [-1.0, 1.0]) / float(x[1] - x[0])
+    matrix = np.zeros((count, count))
+    for i in range(count):
+        start = min(max(i - 1, 0), count - 3)
+        near = x[start : start + 3]
+        for j in range(3):
+            others = np.delete(near, j)
+            matrix[i, start + j] = (2.0 * x[i] - others.sum()) / np.prod(near[j] - others)
+    return matrix
+
+
+@dataclass(frozen=True)
+class SteSurface:
+    """Static transmission error s(pmc, centre distance, misalignment, force) of one loaded flank.
+
+    Attributes
+    ----------
+    centre_distance : (c,) array
+        Knots, m.
+    misalignment : (a,) array
+        Knots, rad.
+    root_force : (l + 1,) array
+        Knots of the root of the line-of-action force, sqrt(N), from zero.
+    coefficients : (p, c, 2 a or 1, l, 5) array
+        At each node of the other axes, on each piece of the load axis: cubic of s in t from 0 to 1 (m), and the
+        integral of s over the force from zero to the start of the piece (J). Along misalignment the same of the
+        slope follows each node, unless there is one node only.
+    """
+
+    centre_distance: Floats
+    misalignment: Floats
+    root_force: Floats
+    coefficients: Floats
+
+    @classmethod
+    def from_table(cls, dataset: xr.Dataset) -> SteSurface:
+        """Lay the surface through a table (see `fe_ste.static_transmission_error`).
+
+        Raises
+        ------
+        InterpolationError
+            If states are unsolved, or more load gives less deflection.
+        """
+        axes = ("pmc", "centre_distance", "misalignment", "torque")
+        table = dataset.transpose(*axes, ...)
+        if not bool(table["converged"].all()):
+            unsolved = int((~table["converged"].astype(bool)).sum())
+            raise InterpolationError(f"the table holds {unsolved} unsolved states")
+        places = axes[:3]
+        return cls.from_nodes(
+            table["centre_distance"].to_numpy(),
+            table["misalignment"].to_numpy(),
+            table["line_of_action_force"].to_numpy().reshape(-1, table.sizes["torque"])[0],
+            table["ste"].to_numpy(),
+            table["tangent_stiffness"].to_numpy(),
+            table["tangent_load_centre"].to_numpy(),
+            table["unloaded_ste"].transpose(*places).to_numpy(),
+            table["unloaded_centre"].transpose(*places).to_numpy(),
+        )
+
+    @classmethod
+    def from_nodes(
+        cls,
+        centre_distance: ArrayLike,
+        misalignment: ArrayLike,
+        force: ArrayLike,
+        ste: ArrayLike,
+        tangent_stiffness: ArrayLike,
+        tangent_load_centre: ArrayLike = 0.0,
+        unloaded: ArrayLike = 0.0,
+        unloaded_centre: ArrayLike = 0.0,
+    ) -> SteSurface:
+        """Lay the surface through values at the nodes.
+
+        Parameters
+        ----------
+        centre_distance, misalignment : (c,), (a,) arrays
+            m, rad.
+        force : (l,) array
+            Line-of-action forces, N, positive and increasing.
+        ste, tangent_stiffness, tangent_load_centre : (p, c, a, l) arrays
+            m, N/m, m: the last is the derivative of the first by misalignment.
+        unloaded, unloaded_centre : (p, c, a) arrays or floats
+            Transmission error at no load, and its derivative by misalignment, m.
+
+        Raises
+        ------
+        InterpolationError
+            If more load gives less deflection.
+
+        Examples
+        --------
+        >>> one = np.ones((1, 1, 1, 1))
+        >>> surface = SteSurface.from_nodes([0.1], [0.0], [1e3], 1e-6 * one, 1e9 * one)
+        >>> round(surface.ste(500.0, 0.3) * 1e6, 6)
+        0.5
+        """
+        loads = np.atleast_1d(np.asarray(force, dtype=np.float64))
+        if not (np.all(loads > 0.0) and np.all(np.diff(loads) > 0.0)):
+            raise InterpolationError(f"the forces of the load axis must be positive and increase: {loads.tolist()}")
+        values = np.asarray(ste, dtype=np.float64)
+        root = np.concatenate([[0.0], np.sqrt(loads)])
+        nodes = _from_no_load(unloaded, values)
+        slopes = _load_slopes(root, nodes, np.asarray(tangent_stiffness, dtype=np.float64))
+        pieces = _load_pieces(root, nodes, slopes)
+        tilts = np.atleast_1d(np.asarray(misalignment, dtype=np.float64))
+        if tilts.size > 1:
+            centres = _from_no_load(unloaded_centre, np.broadcast_to(tangent_load_centre, values.shape))
+            turning = _load_pieces(root, centres, centres @ _slope_matrix(root).T)
+            pieces = np.stack([pieces, turning], axis=3).reshape(*values.shape[:2], -1, *pieces.shape[3:])
+        surface = cls(np.atleast_1d(np.asarray(centre_distance, dtype=np.float64)), tilts, root, pieces)
+        surface._check_rising()
+        return surface
+
+    def at_nominal(self, centre_distance: float, misalignment: float = 0.0) -> SteSurface:
+        """Surface of gears that stay where they are: the same without the two axes of their position."""
+        values = self.coefficients
+        values = np.einsum("pcalj,c->palj", values, _weights_at(self.centre_distance, centre_distance))
+        values = np.einsum("palj,a->plj", values, _slope_weights_at(self.misalignment, misalignment))[:, None, None]
+        return SteSurface(np.array([centre_distance]), np.array([misalignment]), self.root_force, values)
+
+    def averaged(self) -> SteSurface:
+        """Surface of the mean over the mesh cycle at each load."""
+        mean = self.coefficients.mean(axis=0, keepdims=True)
+        return SteSurface(self.centre_distance, self.misalignment, self.root_force, mean)
+
+    def ste(self, force: float, pmc: float, centre_distance: float | None = None, misalignment: float = 0.0) -> float:
+        """Return the static transmission error (m) at a force (N, from zero to the last of the axis).
+
+        Outside the axes of position it continues along its slope.
+        """
+        a = self.centre_distance[0] if centre_distance is None else centre_distance
+        cubic = self._cubics_at(pmc, float(a), misalignment)
+        root = np.sqrt(force)
+        piece = int(np.clip(np.searchsorted(self.root_force, root, side="right") - 1, 0, len(cubic) - 1))
+        start, end = self.root_force[piece : piece + 2]
+        return float(cubic[piece, :4] @ ((root - start) / (end - start)) ** np.arange(4))
+
+    def mean_stiffness(self, force: float, centre_distance: float, misalignment: float = 0.0) -> float:
+        """Tangent stiffness dF/ds (N/m) of the mean over the mesh cycle at a force (N), at most the axis's last."""
+        surface = self.averaged()
+        cubic = surface._cubics_at(0.0, centre_distance, misalignment)
+        root = min(np.sqrt(force), self.root_force[-1])
+        piece = int(np.clip(np.searchsorted(self.root_force, root, side="right") - 1, 0, len(cubic) - 1))
+        step = self.root_force[piece + 1] - self.root_force[piece]
+        t = (root - self.root_force[piece]) / step
+        slope = cubic[piece, 1] + t * (2.0 * cubic[piece, 2] + t * 3.0 * cubic[piece, 3])
+        return float(2.0 * root * step / slope)
+
+    def _cubics_at(self, pmc: float, centre_distance: float, misalignment: float) -> Floats:
+        """Coefficients (l, 5) at one place of the other axes."""
+        values = np.tensordot(_periodic_weights(len(self.coefficients), pmc), self.coefficients, 1)
+        values = np.tensordot(_weights_at(self.centre_distance, centre_distance), values, 1)
+        return np.asarray(np.tensordot(_slope_weights_at(self.misalignment, misalignment), values, 1))
+
+    def _check_rising(self) -> None:
+        """Make sure that s rises with the load between the nodes too, where weights may be negative."""
+        powers = np.arange(1, 4) * _CHECKS[:, None] ** np.arange(3)
+        count = len(self.coefficients)
+        cycle = np.array([_periodic_weights(count, 0.5 * p / count) for p in range(2 * count)])
+        centre = np.array([_weights_at(self.centre_distance, x) for x in _halved(self.centre_distance)])
+        tilt = np.array([_slope_weights_at(self.misalignment, x) for x in _halved(self.misalignment)])
+        for rows in cycle:  # a position at a time: the whole would be large
+            values = np.tensordot(rows, self.coefficients, 1)
+            values = np.tensordot(tilt, np.tensordot(centre, values, 1), (1, 1))
+            rise = values[..., 1:4].sum(axis=-1)
+            falling = np.argwhere((values[..., 1:4] @ powers.T).min(axis=-1) < -_ROUND_OFF * rise)
+            if falling.size:
+                a, c, piece = falling[0]
+                raise InterpolationError(
+                    f"more load than {self.root_force[piece] ** 2:.6g} N gives less deflection at centre distance "
+                    f"{_halved(self.centre_distance)[c]:.6g} m, misalignment {_halved(self.misalignment)[a]:.4g} rad, "
+                    "between the nodes of the table: lay more of them"
+                )
+
+
+def _load_slopes(root: Floats, nodes: Floats, tangent: Floats) -> Floats:
+    """Slopes ds/d(root of force) at the load nodes, (..., l + 1), limited so that each piece rises throughout."""
+    secants = np.diff(nodes, axis=-1) / np.diff(root)
+    if not np.all(secants > 0.0):
+        p, c, a, piece = np.argwhere(~(secants > 0.0))[0]
+        raise InterpolationError(
+            f"the deflection does not grow from {root[piece] ** 2:.6g} N to {root[piece + 1] ** 2:.6g} N at node "
+            f"{p} of pmc, {c} of centre_distance, {a} of misalignment"
+        )
+    slopes = np.empty_like(nodes)
+    slopes[..., 1:] = 2.0 * root[1:] / tangent
+    slopes[..., 0] = 2.0 * secants[..., 0] - slopes[..., 1]  # a parabola on the first piece
+    limit = np.full_like(nodes, np.inf)
+    limit[..., :-1] = 3.0 * secants
+    limit[..., 1:] = np.minimum(limit[..., 1:], 3.0 * secants)
+    return np.clip(slopes, 0.0, limit)
+
+
+def _load_pieces(root: Floats, nodes: Floats, slopes: Floats) -> Floats:
+    """Cubics of the load axis and the energy before each, (..., l, 5)."""
+    step = np.diff(root)
+    start, rise = nodes[..., :-1], np.diff(nodes, axis=-1)
+    a, b = step * slopes[..., :-1], step * slopes[..., 1:]
+    cubic = np.stack([start, a, 3.0 * rise - 2.0 * a - b, a + b - 2.0 * rise], axis=-1)
+    powers = np.arange(4)
+    # Integral over a piece of s(t) d(root^2), root = start + step t.
+    moments = 2.0 * step[:, None] * (root[:-1, None] / (powers + 1.0) + step[:, None] / (powers + 2.0))
+    pieces = np.einsum("...lj,lj->...l", cubic, moments)
+    before = np.cumsum(pieces, axis=-1) - pieces
+    return np.concatenate([cubic, before[..., None]], axis=-1)
+
+
+def _from_no_load(unloaded: ArrayLike, values: Floats) -> Floats:
+    """Nodes of the load axis with the one at no load before them, (..., l + 1)."""
+    start = np.broadcast_to(np.asarray(unloaded, dtype=np.float64), values.shape[:-1])
+    return np.concatenate([start[..., None], values], axis=-1)
+
+
+def _halved(knots: Floats) -> Floats:
+    """Knots and the places half-way between them."""
+    return np.sort(np.concatenate([knots, 0.5 * (knots[1:] + knots[:-1])]))
+
+
+def _weights_at(knots: Floats, x: float) -> Floats:
+    """Weight of every knot at x, continued along the slope outside."""
+    return np.ones(1) if len(knots) == 1 else _weights_between(knots, x, *axis_weights(knots), len(knots))
+
+
+def _slope_weights_at(knots: Floats, x: float) -> Floats:
+    """Weights of value and slope of every knot at x, continued along the slope outside."""
+    return np.ones(1) if len(knots) == 1 else _weights_between(knots, x, *slope_axis_weights(knots), 2 * len(knots))
+
+
+def _weights_between(knots: Floats, x: float, first: Integers, weights: Floats, count: int) -> Floats:
+    i = int(np.clip(np.searchsorted(knots, x, side="right") - 1, 0, len(knots) - 2))
+    step = knots[i + 1] - knots[i]
+    t = (x - knots[i]) / step
+    inside = min(max(t, 0.0), 1.0)
+    powers = np.arange(4)
+    near = weights[i] @ inside**powers + (t - inside) * (weights[i, :, 1:] @ (powers[1:] * inside ** powers[:3]))
+    full = np.zeros(count)
+    width = min(STENCIL, count)
+    full[first[i] : first[i] + width] = near[:width]
+    return full
+
+
+def _periodic_weights(count: int, pmc: float) -> Floats:
+    """Weight of every position at pmc: cubic with central differences as slopes."""
+    scaled = (pmc - np.floor(pmc)) * count
+    piece = min(int(scaled), count - 1)
+    near = periodic_stencil(scaled - piece)
+    full = np.zeros(count)
+    np.add.at(full, (piece - 1 + np.arange(STENCIL)) % count, near)
+    return full
+
+
+def periodic_stencil(t: float) -> Floats:
+    """Weights of the nodes before, at, after and next but one of an interval, t from 0 to 1.
+
+    Examples
+    --------
+    >>> periodic_stencil(0.0).tolist()
+    [0.0, 1.0, 0.0, 0.0]
+    """
+    square, cube = t * t, t**3
+    return 0.5 * np.array(
+        [2.0 * square - t - cube, 2.0 - 5.0 * square + 3.0 * cube, t + 4.0 * square - 3.0 * cube, cube - square]
+    )

@@ -1,0 +1,260 @@
+"""Look-up tables of the static transmission error of a gear pair: computed, stored, opened again.
+
+A table is one netCDF file that xarray reads without this package. It carries its whole input and the hash of it; a
+file whose hash differs from what is asked for is refused, never used.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass, field
+from functools import cached_property, lru_cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fe_ste.contact.cells import ContactSettings
+from fe_ste.elasticity.flank import HANDOVER_DEPTH, FlankCompliance, flank_compliance
+from fe_ste.elasticity.hexmesh import MeshSettings
+from fe_ste.flanks.modifications import FlankModification
+from fe_ste.geometry.gears import Gear, GearPair
+from fe_ste.tools.files import FileError, Layout, load_dataset, write_dataset
+from fe_ste.tools.versions import TABLE
+from fe_ste.tools.workers import Workers
+from fe_ste.transmission_error.compliance import PairCompliance
+from fe_ste.transmission_error.grid import Checkpoint, Submits, sweep_states
+from fe_ste.transmission_error.search import unloaded_states
+from fe_ste.transmission_error.states import RESULTS, STATE_AXES, StateAxes
+
+#: Beyond this many states the start of processes is repaid.
+_STATES_IN_PROCESS = 1000
+_LAYOUT = Layout(
+    "static transmission error table",
+    TABLE,
+    {name: (name,) for name in ("pmc", *STATE_AXES, "tooth", "axial_position")}
+    | {name: ("pmc", *STATE_AXES) for name in (*RESULTS, "mesh_stiffness", "converged")}
+    | {name: ("pmc", *STATE_AXES, "tooth") for name in ("load_share", "tangent_load_share")},
+    ("input_hash", "failures", "pair", "static_centre_distance", "static_misalignment"),
+)
+
+
+class TableError(FileError):
+    """A table file that is missing, damaged, or belongs to another input."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TableInput:
+    """All that the numbers of a table depend on.
+
+    Parameters
+    ----------
+    pair : GearPair
+    torque : tuple of float
+        Static torques on gear 1, N m.
+    positions : int
+        Positions of the mesh cycle.
+    centre_distance : tuple of float
+        m; empty for the pair's own.
+    misalignment : tuple of float
+        rad.
+    mesh : MeshSettings
+    contact : ContactSettings
+    pinion_modification, gear_modification : FlankModification
+    static_torque : float, optional
+        Which of several torques is that of the static state.
+
+    Examples
+    --------
+    >>> gear = Gear(name="gear", teeth=30, normal_module=3e-3, face_width=20e-3, held_diameter=50e-3)
+    >>> pair = GearPair(name="pair", pinion=gear, gear=gear, centre_distance=90e-3)
+    >>> len(TableInput(pair=pair, torque=(100.0,)).hash)
+    64
+    """
+
+    pair: GearPair
+    torque: tuple[float, ...]
+    positions: int = 50
+    centre_distance: tuple[float, ...] = ()
+    misalignment: tuple[float, ...] = (0.0,)
+    mesh: MeshSettings = field(default_factory=MeshSettings)
+    contact: ContactSettings = field(default_factory=ContactSettings)
+    pinion_modification: FlankModification = field(default_factory=FlankModification)
+    gear_modification: FlankModification = field(default_factory=FlankModification)
+    static_torque: float | None = None
+
+    def resolved(self) -> dict[str, Any]:
+        """Return the input as plain data, with everything that has a default spelled out."""
+        return {"method_version": TABLE, "handover_depth": HANDOVER_DEPTH, **asdict(self)}
+
+    @cached_property
+    def hash(self) -> str:
+        """SHA-256 of the resolved input."""
+        return hashlib.sha256(json.dumps(self.resolved(), sort_keys=True).encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class MeshTable:
+    """Static transmission error of a pair over its axes.
+
+    Attributes
+    ----------
+    dataset : xarray.Dataset
+        See `fe_ste.static_transmission_error`; with the input, its hash and the solver's figures as attributes.
+    """
+
+    dataset: xr.Dataset
+
+    @classmethod
+    def compute(
+        cls,
+        wanted: TableInput,
+        progress: Callable[[int, int], None] | None = None,
+        *,
+        executor: Submits | None = None,
+        partial: Path | None = None,
+    ) -> MeshTable:
+        """Compute a table.
+
+        Parameters
+        ----------
+        wanted : TableInput
+        progress : callable, optional
+            Called with the number of finished states and of all states.
+        executor : optional
+            What the states are sent to, see `fe_ste.transmission_error.grid`; without it two processes share a grid
+            of more than a thousand states, and this process solves fewer.
+        partial : Path, optional
+            File in which finished positions are kept; a computation that was stopped goes on from there.
+
+        Raises
+        ------
+        ValueError, GeometryError
+            As in `fe_ste.static_transmission_error`.
+        SweepError
+            If workers are lost.
+        """
+        pair = wanted.pair
+        axes = StateAxes.checked(
+            pair, wanted.torque, wanted.positions, wanted.centre_distance or None, wanted.misalignment
+        )
+        compliance = prepared_compliance(wanted)
+        checkpoint = None if partial is None else Checkpoint(partial, wanted.hash)
+        with ExitStack() as owned:
+            if executor is None and math.prod(axes.shape) > _STATES_IN_PROCESS:
+                executor = owned.enter_context(Workers())
+            dataset = sweep_states(compliance, axes, executor=executor, checkpoint=checkpoint, progress=progress)
+        dataset = dataset.assign(unloaded_states(compliance, axes))
+        dataset.attrs |= _attributes(wanted, compliance)
+        return cls(dataset)
+
+    @classmethod
+    def open(cls, path: str | Path, wanted: TableInput | None = None) -> MeshTable:
+        """Read a table into memory.
+
+        Parameters
+        ----------
+        path : path
+        wanted : TableInput, optional
+            If given, the table must have been computed from exactly this input.
+
+        Raises
+        ------
+        TableError
+            If the file is missing, damaged, is no table of this version, or belongs to another input.
+        """
+        path = Path(path)
+        try:
+            dataset = load_dataset(path, _LAYOUT)
+        except FileError as error:
+            raise TableError(str(error)) from error
+        if wanted is not None and dataset.attrs["input_hash"] != wanted.hash:
+            raise TableError(f"{path}: was computed from another input; compute it again")
+        return cls(dataset)
+
+    def save(self, path: str | Path) -> None:
+        """Write the table; a file of that name is replaced only by a complete one.
+
+        Parameters
+        ----------
+        path : path
+            Its directory is made if need be.
+        """
+        write_dataset(Path(path), self.dataset)
+
+    @property
+    def input_hash(self) -> str:
+        """Hash of the input the table was computed from."""
+        return str(self.dataset.attrs["input_hash"])
+
+    @property
+    def static_state(self) -> xr.Dataset:
+        """The mesh cycle at the static torque, the pair's own centre distance and without misalignment.
+
+        An axis with one value gives that value.
+
+        Raises
+        ------
+        TableError
+            If an axis has several values and not this one.
+        """
+        chosen = self.dataset
+        for axis in ("torque", "centre_distance", "misalignment"):
+            values = chosen[axis].to_numpy()
+            wanted = float(chosen.attrs.get(f"static_{axis}", math.nan))
+            at = np.flatnonzero(values == wanted) if len(values) > 1 else np.array([0])
+            if not len(at):
+                raise TableError(f"table of {chosen.attrs['pair']}: no {axis} of the static state among its values")
+            chosen = chosen.isel({axis: int(at[0])})
+        return chosen
+
+    @property
+    def failures(self) -> list[str]:
+        """Positions that were not solved, with the reason."""
+        return [line for line in str(self.dataset.attrs["failures"]).splitlines() if line]
+
+
+@lru_cache(maxsize=8)
+def _flank(gear: Gear, side: int, mesh: MeshSettings) -> FlankCompliance:
+    return flank_compliance(gear, side, mesh)
+
+
+def prepared_compliance(wanted: TableInput) -> PairCompliance:
+    """Prepare the pair of a table; flanks are kept, so a planet, which meshes twice on one flank, is computed once."""
+    pair = wanted.pair
+    flanks = (
+        _flank(pair.pinion, 1, wanted.mesh),
+        _flank(pair.gear, -1 if pair.gear.internal else 1, wanted.mesh),
+    )
+    prepared = PairCompliance.from_flanks(pair, flanks, wanted.contact)
+    return prepared.with_modifications(wanted.pinion_modification, wanted.gear_modification)
+
+
+def _attributes(wanted: TableInput, compliance: PairCompliance) -> dict[str, str | int | float]:
+    figures: dict[str, str | int | float] = {}
+    for role, flank in zip(("pinion", "gear"), compliance.flanks, strict=True):
+        figures |= {f"{role}_{name}": value for name, value in flank.figures.items()}
+        figures[f"{role}_held_diameter"] = flank.gear.held_diameter
+    static = {"static_centre_distance": wanted.pair.centre_distance, "static_misalignment": 0.0}
+    if wanted.static_torque is not None:
+        static["static_torque"] = wanted.static_torque
+    packages = ("exugear", "numpy", "scipy", "scikit-fem", "numba")
+    return {
+        "title": f"static transmission error of gear pair {wanted.pair.name}",
+        "pair": wanted.pair.name,
+        "input": json.dumps(wanted.resolved(), sort_keys=True),
+        "input_hash": wanted.hash,
+        "method_version": TABLE,
+        "boundary": "pinion hub held; gear hub (or ring's outer rim) rigid and turning about its axis only",
+        "method": "closed ring of 8-node hexahedra with incompatible modes, half-space near field, linear elastic, "
+        "frictionless contact on the exact rigid gap",
+        **static,
+        **figures,
+        "versions": json.dumps({package: version(package) for package in packages}),
+    }

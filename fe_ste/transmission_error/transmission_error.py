@@ -1,0 +1,139 @@
+"""Static transmission error of a gear pair over the mesh cycle.
+
+Signs. Gear 1 is held, gear 2 turns about its axis under a torque that presses its flank on gear 1. The static
+transmission error is the rotation of gear 2 as a length on the transverse line of action, from the position in which
+the unmodified rigid flanks would roll: positive, the loaded gear yields. ``pmc`` is the part of a mesh cycle by which
+gear 1 has turned in its driving sense from where tooth pair 0 touches at the pitch point in the middle of the common
+face width.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+import xarray as xr
+
+from fe_ste.contact.cells import ContactSettings
+from fe_ste.elasticity.hexmesh import MeshSettings
+from fe_ste.geometry.gears import GearPair
+from fe_ste.tools.threads import one_dense_thread
+from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance
+from fe_ste.transmission_error.search import contact_states, new_start
+from fe_ste.transmission_error.states import StateAxes, StateResults
+
+
+def static_transmission_error(
+    pair: GearPair | PairCompliance,
+    torque: float | Sequence[float],
+    positions: int = 50,
+    *,
+    centre_distance: float | Sequence[float] | None = None,
+    misalignment: float | Sequence[float] = 0.0,
+    mesh: MeshSettings | None = None,
+    contact: ContactSettings | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> xr.Dataset:
+    """Compute the static transmission error over the mesh cycle.
+
+    Parameters
+    ----------
+    pair : GearPair or PairCompliance
+        A prepared `PairCompliance` saves the finite-element part.
+    torque : float or sequence
+        Static torque on gear 1, N m, positive.
+    positions : int
+        Equally spaced positions of the mesh cycle.
+    centre_distance : float or sequence, optional
+        Operating centre distances, m; the pair's own unless given.
+    misalignment : float or sequence
+        Relative rotation of the axes in the plane of action, rad, positive where it opens the gap at the +z end.
+    mesh, contact : optional
+        Discretisation, if `pair` is a `GearPair`.
+    progress : callable, optional
+        Called with the number of finished positions and of all positions.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over (pmc, torque, centre_distance, misalignment): ste (m), mesh_stiffness and tangent_stiffness (N/m),
+        line_of_action_force (N), load_centre and tangent_load_centre (m), load_share and tangent_load_share by
+        ``tooth``, line_load (N/m of contact line) by ``tooth`` and ``axial_position``, max_pressure and edge_pressure
+        (Pa; inside the flank, and in cells at a tip edge, where it depends on the cells), iterations, converged.
+        What is tangent belongs to a little more load, and is the derivative of ste by misalignment or by a gap of one
+        tooth pair under constant load. Positions that failed are not a number; ``failures`` says why.
+
+    Raises
+    ------
+    ValueError
+        If a torque is not positive, a misalignment not finite, or fewer than one position is asked for.
+    GeometryError
+        If the gears cannot run at a centre distance.
+
+    Examples
+    --------
+    >>> from fe_ste.geometry.gears import Gear, GearPair
+    >>> gear = Gear(name="gear", teeth=30, normal_module=3e-3, face_width=20e-3, held_diameter=50e-3)
+    >>> pair = GearPair(name="pair", pinion=gear, gear=gear, centre_distance=90e-3)
+    >>> coarse = MeshSettings(layers=4, flank=8, thickness=6)
+    >>> curve = static_transmission_error(pair, 100.0, positions=2, mesh=coarse, contact=ContactSettings(slices=8))
+    >>> bool((curve.ste > 5e-6).all() and (curve.ste < 20e-6).all())
+    True
+    """
+    geometry = pair.pair if isinstance(pair, PairCompliance) else pair
+    axes = StateAxes.checked(geometry, torque, positions, centre_distance, misalignment)
+    compliance = pair if isinstance(pair, PairCompliance) else pair_compliance(pair, mesh, contact)
+    total = math.prod(axes.shape)
+    tell = (lambda done: progress(done, total)) if progress is not None else None
+    return solve_positions(compliance, axes, range(positions), tell).dataset(axes)
+
+
+def solve_positions(
+    compliance: PairCompliance,
+    axes: StateAxes,
+    positions: Iterable[int],
+    progress: Callable[[int], None] | None = None,
+) -> StateResults:
+    """Solve all states of some positions of a grid.
+
+    Misalignments share the compliance of the contact cells; a solved position hands its contact on to the next, and a
+    torque to the next smaller one at the first position.
+
+    Parameters
+    ----------
+    compliance : PairCompliance
+    axes : StateAxes
+    positions : iterable of int
+        Numbers of the positions; in a row they are solved fastest.
+    progress : callable, optional
+        Called with the number of finished states.
+
+    Returns
+    -------
+    StateResults
+        Of these positions alone.
+    """
+    chosen = list(positions)
+    results = StateResults.empty(compliance, (len(chosen), *axes.shape[1:]))
+    finished = 0
+    with one_dense_thread():
+        for c, distance in enumerate(axes.centre_distance):
+            placed = compliance.at_centre_distance(float(distance))
+            descending = np.argsort(-axes.torque, kind="stable")  # contact that shrinks is found in fewer steps
+            known = float(axes.torque[descending[0]])
+            first = [new_start(placed, known) for _ in axes.misalignment]
+            for t in descending:
+                torque = axes.torque[t]
+                starts = [start.scaled(float(torque) / known) for start in first]
+                known = float(torque)
+                for p, position in enumerate(chosen):
+                    pmc = position / axes.positions
+                    states = contact_states(placed, float(torque), pmc, axes.misalignment, starts)
+                    first = list(starts) if p == 0 else first
+                    for m, state in enumerate(states):
+                        results.put((p, int(t), c, m), placed, float(torque), pmc, float(axes.misalignment[m]), state)
+                        finished += 1
+                        if progress is not None:
+                            progress(finished)
+    return results

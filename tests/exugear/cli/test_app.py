@@ -1,0 +1,315 @@
+"""The command line as a user meets it: what is printed where, and the exit codes."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import json
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+from typer.testing import CliRunner
+
+from exugear.cli.app import app
+from exugear.cli.console import BadInputError, FailedError, exit_codes, interruption
+from exugear.model.gearbox import Gearbox
+from exugear.tooth_mesh.tables import order_tables
+from fe_ste.contact.cells import ContactSettings
+from fe_ste.elasticity.hexmesh import MeshSettings
+from fe_ste.elasticity.sectors import ContactMesh
+from fe_ste.reference.position import NonlinearSettings
+from fe_ste.reference.table import NonlinearInput
+from fe_ste.transmission_error.table import MeshTable, TableInput
+
+CASE = Path(__file__).parents[3] / "cases" / "grc750" / "gearbox.toml"
+
+
+SPUR_PAIR = """
+name = "one spur pair"
+default_inertias = "disc"
+overall = { input = "shaft_1", output = "shaft_2", output_gear = "wheel" }
+static_load = { torques_N_m = { shaft_1 = 100.0 }, locked = ["shaft_2"] }
+
+[gears]
+pinion = { teeth = 20, normal_module_mm = 3.0, face_width_mm = 15.0, held_diameter_mm = 30.0 }
+wheel = { teeth = 30, normal_module_mm = 3.0, face_width_mm = 15.0, held_diameter_mm = 50.0 }
+
+[pairs]
+spur = { pinion = "pinion", gear = "wheel", centre_distance_mm = 75.0 }
+
+[bodies.shaft_1]
+axis_position_mm = [0.0, 0.0]
+wheels_z_mm = { pinion = 0.0 }
+inertia.disc = { mass_kg = 1.0, axial_kg_m2 = 1e-3, transverse_kg_m2 = 1e-3, centre_of_mass_z_mm = 0.0 }
+
+[bodies.shaft_2]
+axis_position_mm = [75.0, 0.0]
+wheels_z_mm = { wheel = 0.0 }
+inertia.disc = { mass_kg = 2.0, axial_kg_m2 = 3e-3, transverse_kg_m2 = 3e-3, centre_of_mass_z_mm = 0.0 }
+
+[joints]
+bearing_1 = { body = "shaft_1", z_mm = 0.0 }
+bearing_2 = { body = "shaft_2", z_mm = 0.0 }
+
+[meshes]
+spur = { pair = "spur", pinion_body = "shaft_1", gear_body = "shaft_2" }
+
+[load_cases]
+still = { torques_N_m = { shaft_1 = 100.0 } }
+"""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def coarse_meshes():
+    """Few elements a tooth: what the numbers are worth is tested elsewhere."""
+    coarse = functools.partial(
+        TableInput,
+        mesh=MeshSettings(layers=4, flank=8, thickness=6),
+        contact=ContactSettings(slices=8),
+    )
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("exugear.tooth_mesh.tables.TableInput", coarse)
+        yield
+
+
+def exugear(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def changed_case(tmp_path, old, new):
+    """Write the case with one piece of its text replaced."""
+    text = CASE.read_text(encoding="utf-8")
+    assert text.count(old) == 1
+    path = tmp_path / "gearbox.toml"
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    return path
+
+
+def test_check_prints_the_ratio_and_the_pairs():
+    outcome = exugear("check", CASE)
+    assert outcome.exit_code == 0, outcome.stderr
+    assert "81.490683" in outcome.stdout
+    assert "sun_planet" in outcome.stdout
+    assert outcome.stderr == ""
+
+
+def test_check_as_json_is_one_object_on_standard_output():
+    outcome = exugear("check", CASE, "--json")
+    summary = json.loads(outcome.stdout)
+    assert outcome.exit_code == 0
+    # Follows from the tooth numbers alone.
+    assert summary["ratio"] == pytest.approx((1 + 99 / 21) * 82 / 23 * 88 / 22, rel=1e-12)
+    assert [pair["teeth"] for pair in summary["pairs"]] == [[21, 39], [39, 99], [23, 82], [22, 88]]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("teeth = 21 ", "teeth = -21 ", ["gears.sun.teeth", "-21", "between 5 and 2000"]),
+        ("teeth = 21 ", "theeth = 21 ", ["gears.sun.theeth", "did you mean 'teeth'"]),
+        ("teeth = 21 ", "teeth 21 ", ["not valid TOML"]),
+    ],
+)
+def test_a_fault_in_the_file_is_one_message_on_standard_error_and_code_2(tmp_path, old, new, said):
+    case = changed_case(tmp_path, old, new)
+    outcome = exugear("check", case)
+    assert outcome.exit_code == 2
+    assert outcome.stdout == ""
+    assert len(outcome.stderr.splitlines()) == 1
+    for words in [str(case), *said]:
+        assert words in outcome.stderr
+
+
+def test_a_missing_file_is_bad_input(tmp_path):
+    outcome = exugear("check", tmp_path / "absent.toml")
+    assert outcome.exit_code == 2
+    assert "absent.toml" in outcome.stderr
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        (BadInputError("x.toml: wrong"), 2, "Bad input: x.toml: wrong"),
+        (FailedError("no solution"), 1, "Failed: no solution"),
+        (KeyboardInterrupt(), 130, "Stopped: finished results are kept"),
+    ],
+)
+def test_exit_codes(error, code, said, capsys):
+    with pytest.raises(SystemExit) as ended, exit_codes():
+        raise error
+    assert ended.value.code == code
+    assert said in capsys.readouterr().err
+
+
+def test_an_error_of_the_program_itself_keeps_its_traceback():
+    with pytest.raises(ZeroDivisionError), exit_codes():
+        raise ZeroDivisionError
+
+
+def test_the_version_is_that_of_the_distribution():
+    assert exugear("--version").stdout.split() == ["exugear", version("exugear")]
+
+
+@pytest.fixture
+def spur_case(tmp_path):
+    path = tmp_path / "spur.toml"
+    path.write_text(SPUR_PAIR, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def computed(tmp_path_factory):
+    """The spur pair's table and pictures, computed once; nobody changes them."""
+    folder = tmp_path_factory.mktemp("computed")
+    case = folder / "spur.toml"
+    case.write_text(SPUR_PAIR, encoding="utf-8")
+    return case, folder / "out", exugear("ste", case, "--positions", 8, "--out", folder / "out", "--json")
+
+
+def test_ste_writes_a_table_and_its_pictures_and_names_them(computed):
+    _, out, outcome = computed
+    assert outcome.exit_code == 0, outcome.stderr
+    summary = json.loads(outcome.stdout)
+    (table,) = summary["tables"]
+    assert table["not_converged"] == 0
+    assert sorted(path.name for path in out.rglob("*.nc")) == ["spur.nc"]
+    assert {"ste.png", "load_share_spur.png"} <= {Path(picture).name for picture in summary["pictures"]}
+    assert all(Path(picture).is_file() for picture in summary["pictures"])
+
+
+def test_xarray_alone_reads_the_table(computed):
+    _, out, outcome = computed
+    with xarray.open_dataset(out / "tables" / "spur.nc") as table:
+        assert dict(table.sizes) | {"pmc": 8, "torque": 1} == dict(table.sizes)
+        # The file holds what the summary says.
+        mean = json.loads(outcome.stdout)["tables"][0]["ste_mean_um"]
+        assert float(table["ste"].mean()) == pytest.approx(1e-6 * mean, rel=1e-12)
+
+
+def test_a_second_run_keeps_what_fits_and_another_number_of_positions_does_not(computed):
+    case, out, _ = computed
+    table = out / "tables" / "spur.nc"
+    written = table.stat().st_mtime_ns
+    outcome = exugear("ste", case, "--positions", 8, "--out", out)
+    assert outcome.exit_code == 0
+    assert "kept" in outcome.stderr
+    assert table.stat().st_mtime_ns == written
+    gearbox = Gearbox.from_toml(case)
+    assert order_tables(gearbox, out, positions=8)[0].stored
+    assert "another input" in order_tables(gearbox, out, positions=9)[0].replaces
+
+
+def test_a_damaged_table_is_computed_again(spur_case, tmp_path):
+    (tmp_path / "tables").mkdir()
+    (tmp_path / "tables" / "spur.nc").write_bytes(b"no netCDF")
+    (order,) = order_tables(Gearbox.from_toml(spur_case), tmp_path)
+    assert order.stored is None
+    assert "spur.nc" in order.replaces
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--mesh", "bevel"], "'bevel'; the pairs are spur"),
+        (["--positions", "3"], "--positions 3: a table for dynamics needs at least 8"),
+        (["--method", "nonlinear", "--grid"], "leave --grid out"),
+        (["--method", "nonlinear", "--mesh", "bevel"], "'bevel'; the pairs are spur"),
+        (["--method", "guess"], "superelement"),
+    ],
+)
+def test_ste_with_bad_options_writes_nothing(spur_case, tmp_path, options, said):
+    out = tmp_path / "out"
+    outcome = exugear("ste", spur_case, "--out", out, *options)
+    assert outcome.exit_code == 2
+    assert said in outcome.stderr
+    assert outcome.stdout == ""
+    assert not out.exists()
+
+
+def test_the_nonlinear_method_writes_a_table_of_its_own_and_goes_on_from_it(spur_case, tmp_path, monkeypatch):
+    mesh = ContactMesh(layers=3, contact_elements=3, growth=1.0, thickness=4, fillet=2, root=1, rim=3, far_flank=4)
+    coarse = functools.partial(NonlinearInput, settings=NonlinearSettings(teeth=3, mesh=mesh))
+    monkeypatch.setattr("exugear.tooth_mesh.reference_tables.NonlinearInput", coarse)
+    command = ("ste", spur_case, "--method", "nonlinear", "--positions", 1, "--out", tmp_path)
+    outcome = exugear(*command, "--json")
+    assert outcome.exit_code == 0, outcome.stderr
+    (summary,) = json.loads(outcome.stdout)["tables"]
+    assert summary["method"] == "nonlinear" and summary["not_converged"] == 0
+    path = tmp_path / "tables" / "spur-nonlinear.nc"
+    assert Path(summary["table"]) == path and path.exists()
+    assert not (tmp_path / "tables" / "spur.nc").exists()
+    # Steel teeth: 14 to 20 N/(mm um) by ISO 6336, softer on an open sector.
+    assert 5e9 < summary["mesh_stiffness_mean_N_per_m"] / 15e-3 < 25e9
+    before = path.stat().st_mtime_ns
+    again = exugear(*command)
+    assert again.exit_code == 0 and "1/1" in again.stdout
+    assert path.stat().st_mtime_ns == before
+    assert not order_tables(Gearbox.from_toml(spur_case), tmp_path)[0].stored
+
+
+def test_a_results_folder_that_is_a_file_is_told_before_the_work(spur_case):
+    outcome = exugear("ste", spur_case, "--out", spur_case)
+    assert outcome.exit_code == 2
+    assert "--out" in outcome.stderr
+
+
+def test_a_pair_without_load_is_bad_input(tmp_path):
+    case = tmp_path / "idle.toml"
+    case.write_text(SPUR_PAIR.replace("shaft_1 = 100.0 }, locked", "shaft_1 = 0.0 }, locked"), encoding="utf-8")
+    outcome = exugear("ste", case, "--out", tmp_path / "out")
+    assert outcome.exit_code == 2
+    assert "pairs.spur" in outcome.stderr
+
+
+def test_positions_that_are_not_solved_are_reported_and_end_with_code_1(computed, tmp_path):
+    case, out, _ = computed
+    (order,) = order_tables(Gearbox.from_toml(case), out, positions=8)
+    data = order.stored.dataset.copy(deep=True)
+    data["converged"][2], data["ste"][2] = False, np.nan
+    data.attrs["failures"] = "pmc 0.250, torque 100 N m: no balance"
+    MeshTable(data).save(tmp_path / "tables" / "spur.nc")
+    shutil.copytree(out / "pictures", tmp_path / "pictures")
+    outcome = exugear("ste", case, "--positions", 8, "--out", tmp_path)
+    assert outcome.exit_code == 1
+    assert "spur: pmc 0.250, torque 100 N m: no balance" in outcome.stderr
+    assert "7/8" in outcome.stdout
+
+
+def test_ctrl_c_ends_with_130_and_leaves_no_half_written_table(spur_case, tmp_path):
+    out = tmp_path / "out"
+    program = "from exugear.cli.app import main; main()"
+    command = [sys.executable, "-c", program, "ste", str(spur_case), "--out", str(out)]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    # The folder is made right before the finite elements, which take seconds.
+    deadline = time.monotonic() + 60.0
+    while not out.exists() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130, said
+    assert "Stopped" in said
+    assert not list(out.rglob("*.nc*"))
+
+
+def test_ctrl_c_that_a_callback_swallowed_still_stops(capsys):
+    with pytest.raises(SystemExit) as end, exit_codes():
+        with contextlib.suppress(KeyboardInterrupt):  # what a finaliser or a library's callback does with it
+            signal.raise_signal(signal.SIGINT)
+        interruption.check()
+    assert end.value.code == 130
+    assert "Stopped" in capsys.readouterr().err
+
+
+def test_work_after_a_stopped_one_is_not_stopped():
+    with pytest.raises(SystemExit), exit_codes():
+        signal.raise_signal(signal.SIGINT)
+    with exit_codes():
+        interruption.check()

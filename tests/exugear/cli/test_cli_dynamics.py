@@ -1,0 +1,233 @@
+"""The verbs of dynamics as a user meets them: what they write and print, and how they end."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from typer.testing import CliRunner
+
+from exugear.cli import app as cli
+from exugear.dynamics.assemble import VARIANTS
+from exugear.model.gearbox import Gearbox
+from exugear.runs.outcome import RunError
+from exugear.runs.runup import SOLVERS
+from exugear.runs.runup import simulate as real_simulate
+from exugear.tooth_mesh.element import MESH_LAWS
+from exugear.tooth_mesh.placement import MeshError
+from exugear.tooth_mesh.stiffness import mesh_stiffness
+from exugear.tooth_mesh.tables import missing_tables, order_tables
+from fe_ste.tools.rendering import RenderingError
+
+from ..floating_case import FLOATING_CASE
+from ..spur_case import COARSE_INPUT, SPUR_CASE
+
+
+@pytest.fixture(autouse=True)
+def coarse_tables(monkeypatch):
+    monkeypatch.setattr("exugear.tooth_mesh.tables.TableInput", COARSE_INPUT)
+
+
+@pytest.fixture
+def case(tmp_path):
+    path = tmp_path / "spur.toml"
+    path.write_text(SPUR_CASE, encoding="utf-8")
+    return path
+
+
+def exugear(*arguments):
+    return CliRunner().invoke(cli.app, [str(argument) for argument in arguments])
+
+
+def iso(verb, case, *more):
+    """Call a verb with the law that needs no tables."""
+    return exugear(verb, case, "--mesh-law", "iso6336", "--out", case.parent / "out", *more)
+
+
+def test_the_choices_offered_are_those_of_the_library():
+    assert [law.value for law in cli.MeshLaw] == list(MESH_LAWS)
+    assert {solver.value for solver in cli.Solver} == set(SOLVERS)
+    # The third variant keeps joints as constraints: a cross-check, not a model for users.
+    assert [variant.value for variant in cli.Variant] == [name for name in VARIANTS if name != "jointed"]
+
+
+@pytest.mark.parametrize("variant", ["rigid", "bushing"])
+@pytest.mark.parametrize("solver", ["compiled", "exudyn"])
+def test_run_writes_results_and_sums_them_up(case, variant, solver):
+    outcome = iso("run", case, "--variant", variant, "--solver", solver, "--duration", 0.02, "--json")
+    assert outcome.exit_code == 0, outcome.stderr
+    summary = json.loads(outcome.stdout)
+    path = Path(summary["file"])
+    assert path == case.parent / "out" / variant / "run_up-iso6336-disc" / "run.nc"
+    with xr.open_dataset(path, engine="h5netcdf") as data:
+        assert data.attrs["complete"] == 1
+        assert len(data.attrs["input_hash"]) == 64
+    # (100 - 140 / 1.5) N m over the inertia referred to the pinion, 1e-2 + 3e-2 / 1.5^2 kg m2; 20 ms less the
+    # end of the filter, 1 ms. Elastic parts of the motion stay under 1 % of it.
+    expected = (100 - 140 / 1.5) / (1e-2 + 3e-2 / 2.25) * 0.02 * 30 / np.pi
+    assert summary["input_speed_rpm"] == pytest.approx(expected, rel=0.08)
+    assert abs(summary["energy_not_accounted_for"]) < 1e-3
+
+
+def test_a_floating_frame_asks_for_exudyn_before_anything_is_computed(tmp_path):
+    case = tmp_path / "case.toml"
+    case.write_text(FLOATING_CASE, encoding="utf-8")
+    outcome = exugear("run", case, "--variant", "flexible", "--load-case", "run_up")
+    assert outcome.exit_code == 2
+    message = " ".join(outcome.stderr.split())
+    assert "bodies.shaft.flexibility = 'ffrf' runs in Exudyn only; add --solver exudyn" in message
+    assert list(tmp_path.iterdir()) == [case]
+    outcome = iso("run", case, "--variant", "flexible", "--solver", "exudyn", "--duration", 0.01, "--json")
+    assert outcome.exit_code == 0, outcome.stderr
+    summary = json.loads(outcome.stdout)
+    assert summary["solver"].endswith("generalized-alpha")
+
+
+def test_a_solid_whose_file_is_missing_is_refused_before_anything_is_written(tmp_path):
+    case = tmp_path / "case.toml"
+    content = SPUR_CASE.replace(
+        "[bodies.shaft_2]",
+        """[bodies.shaft_2]
+flexibility = "elastic"
+solid = { file = "shaft.msh", seats = { bearing_2 = { diameter_mm = 40.0, width_mm = 10.0 } } }
+""",
+    )
+    case.write_text(content, encoding="utf-8")
+    outcome = iso("modes", case, "--variant", "flexible")
+    assert outcome.exit_code == 2
+    assert "bodies.shaft_2.solid.file = 'shaft.msh': no such file" in " ".join(outcome.stderr.split())
+    assert list(tmp_path.iterdir()) == [case]
+
+
+def test_modes_are_those_of_the_closed_form(case):
+    outcome = iso("modes", case, "--variant", "rigid", "--json")
+    assert outcome.exit_code == 0, outcome.stderr
+    summary = json.loads(outcome.stdout)
+    gearbox = Gearbox.from_toml(case)
+    pair = gearbox.pairs["spur"].pair
+    stiffness = mesh_stiffness(gearbox, "iso6336")["spur"][0]
+    flexibility = pair.pinion.base_radius**2 / 1e-2 + pair.gear.base_radius**2 / 3e-2
+    assert [mode["frequency_Hz"] for mode in summary["modes"]] == [
+        0.0,
+        pytest.approx(np.sqrt(stiffness * flexibility) / (2 * np.pi), rel=1e-9),  # one spring, one degree of freedom
+    ]
+    assert summary["modes"][1]["share_of_overall_dte"] == pytest.approx(1.0, abs=1e-12)
+    assert Path(summary["file"]) == case.parent / "out" / "rigid" / "iso6336-disc" / "modes.nc"
+    assert Path(summary["picture"]).is_file()
+
+
+def test_missing_tables_are_computed_first_and_kept_for_the_next_verb(case, tmp_path):
+    out = tmp_path / "out"
+    first = exugear("modes", case, "--variant", "rigid", "--out", out)
+    assert first.exit_code == 0, first.stderr
+    assert "spur" in first.stderr
+    assert "computed first" in first.stderr
+    written = (out / "tables" / "spur.nc").stat().st_mtime_ns
+    second = exugear("run", case, "--variant", "rigid", "--duration", 0.01, "--out", out)
+    assert second.exit_code == 0, second.stderr
+    assert (out / "tables" / "spur.nc").stat().st_mtime_ns == written
+
+
+def test_dynamics_refuses_a_table_of_another_input_but_not_of_other_positions(case, tmp_path):
+    out = tmp_path / "out"
+    gearbox = Gearbox.from_toml(case)
+    order_tables(gearbox, out, positions=9)[0].fill()
+    assert not missing_tables(gearbox, out)
+    assert mesh_stiffness(gearbox, "line_of_action", out)["spur"].shape == (9,)
+    wider = gearbox.varied({"gears.wheel.face_width_mm": 16.0})
+    assert [order.name for order in missing_tables(wider, out)] == ["spur"]
+    with pytest.raises(MeshError, match="another input"):
+        mesh_stiffness(wider, "line_of_action", out)
+
+
+@pytest.mark.parametrize(
+    ("verb", "options", "said"),
+    [
+        ("run", ["--variant", "flexibel"], "'rigid', 'bushing'"),
+        ("run", ["--variant", "rigid", "--inertias", "none"], "sets are disc"),
+        ("modes", ["--variant", "rigid", "--inertias", "none"], "sets are disc"),
+        ("run", ["--variant", "rigid", "--load-case", "nothing"], "load cases are run_up"),
+        ("run", ["--variant", "rigid", "--duration", "-1"], "duration = -1"),
+        ("run", ["--variant", "rigid", "--resume"], "was stopped here"),
+        ("run", ["--variant", "bushing", "--mesh-law", "rigid"], "needs the variant rigid"),
+    ],
+)
+def test_bad_input_is_one_message_and_code_2(case, verb, options, said):
+    outcome = iso(verb, case, *options)
+    assert outcome.exit_code == 2
+    assert outcome.stdout == ""
+    assert said in outcome.stderr
+    assert "Traceback" not in outcome.stderr
+    assert not (case.parent / "out").exists()
+
+
+def test_a_run_that_fails_ends_with_code_1(case, monkeypatch):
+    def failing(*arguments, **options):
+        raise RunError("the state is not finite at t = 0.1 s")
+
+    monkeypatch.setattr("exugear.runs.runup.simulate", failing)
+    outcome = iso("run", case, "--variant", "rigid")
+    assert outcome.exit_code == 1
+    assert "Failed: the state is not finite" in outcome.stderr
+
+
+def test_ctrl_c_keeps_the_run_and_resume_ends_it_as_if_nothing_had_been(case, monkeypatch):
+    def interrupted(*arguments, progress, **options):
+        def press(at):
+            progress(at)
+            os.kill(os.getpid(), signal.SIGINT)
+
+        return real_simulate(*arguments, progress=press, **options)
+
+    duration = ("--variant", "rigid", "--duration", 0.6)
+    with monkeypatch.context() as patch:
+        patch.setattr("exugear.runs.runup.simulate", interrupted)
+        stopped = iso("run", case, *duration)
+    assert stopped.exit_code == 130
+    assert "--resume" in stopped.stderr
+    folder = case.parent / "out" / "rigid" / "run_up-iso6336-disc"
+    assert (folder / "run.partial" / "000001.npz").is_file()
+    assert sorted(path.name for path in folder.iterdir()) == ["run.partial"]
+    resumed = iso("run", case, *duration, "--resume")
+    assert resumed.exit_code == 0, resumed.stderr
+    with xr.open_dataset(folder / "run.nc", engine="h5netcdf") as data:
+        pieces = data["overall_dte"].to_numpy()
+    assert iso("run", case, *duration).exit_code == 0
+    with xr.open_dataset(folder / "run.nc", engine="h5netcdf") as data:
+        assert np.array_equal(data["overall_dte"].to_numpy(), pieces)
+
+
+def test_view_writes_a_page_where_nothing_can_be_rendered(case, monkeypatch):
+    def unable(*arguments, **options):
+        raise RenderingError("3-D pictures need pyvista: pip install")
+
+    monkeypatch.setattr("exugear.pictures.scene.draw_gearbox", unable)
+    outcome = iso("view", case, "--variant", "rigid", "--json")
+    assert outcome.exit_code == 0, outcome.stderr
+    (page,) = json.loads(outcome.stdout)["files"]
+    assert "mode" in Path(page).read_text(encoding="utf-8")
+    assert "pip install" in outcome.stderr
+
+
+@pytest.mark.parametrize("name", ["absent", "empty"])
+def test_report_of_a_folder_without_results_is_bad_input(tmp_path, name):
+    (tmp_path / "empty").mkdir()
+    outcome = exugear("report", tmp_path / name)
+    assert outcome.exit_code == 2
+    assert name in outcome.stderr
+    assert not (tmp_path / name / "report.html").exists()
+
+
+def test_report_says_where_it_is_and_where_the_time_went(case, monkeypatch):
+    monkeypatch.setattr("exugear.report.writer.draw_mode", lambda scene, path: path.write_bytes(b""))
+    for variant in ("rigid", "bushing"):
+        assert iso("modes", case, "--variant", variant).exit_code == 0
+    outcome = exugear("report", case.parent / "out")
+    assert outcome.exit_code == 0, outcome.stderr
+    assert "report.html" in outcome.stdout
+    assert "modes, bushing, disc, iso6336" in outcome.stdout

@@ -1,0 +1,78 @@
+"""Every key of the case model is read somewhere: none is taken and left without effect."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from exugear.bearings import supports
+from exugear.bearings.supports import bearing_matrices, elastic_names
+from exugear.bodies.of_gearbox import check_elastic_body
+from exugear.cli.app import app
+from exugear.dynamics.assemble import assemble
+from exugear.dynamics.readiness import check_parts, lacking, remarks
+from exugear.model import reading as casefile
+from exugear.model.gearbox import Gearbox
+from exugear.model.parts import stiffness_matrix
+from exugear.results.folder import keep_case
+from exugear.tooth_mesh.tables import wanted_table
+
+from ..case_mutations import bases, toml_text
+
+FOR_PEOPLE = {"LoadCaseSection.description", "CatalogueSection.designation"}
+"""Keys that stand in the file and its copy in the results for people to read."""
+
+
+def sections() -> list[type[Any]]:
+    return [kind for kind in vars(casefile).values() if isinstance(kind, type) and issubclass(kind, casefile._Section)]
+
+
+@pytest.fixture
+def read_keys(monkeypatch: pytest.MonkeyPatch) -> set[tuple[str, str]]:
+    """Collect the keys that anything but the case model itself reads."""
+    found: set[tuple[str, str]] = set()
+    plain = casefile._Section.__getattribute__
+
+    def noted(section: Any, name: str) -> Any:
+        if sys._getframe(1).f_code.co_filename != casefile.__file__:
+            found.add((type(section).__name__, name))
+        return plain(section, name)
+
+    monkeypatch.setattr(casefile._Section, "__getattribute__", noted)
+    return found
+
+
+def test_every_key_is_read(read_keys: set[tuple[str, str]], tmp_path: Path) -> None:
+    supports._catalogue_stiffness.cache_clear()  # what other tests had computed would not be read again
+    contents = bases(tmp_path)
+    contents["spur"]["ste"] = {"method": "nonlinear", "positions": 8}
+    for name, content in contents.items():
+        file = tmp_path / f"{name}.toml"
+        file.write_text(toml_text(content), encoding="utf-8")
+        gearbox = Gearbox.from_toml(file)
+        check_parts(gearbox)
+        remarks(gearbox)
+        for pair, spec in gearbox.pairs.items():
+            assert spec.table
+            wanted_table(gearbox, pair, gearbox.ste.positions, gearbox.ste.grid)
+        for variant in ("rigid", "bushing"):
+            lacking(gearbox, variant)
+            assembly = assemble(gearbox, variant, {pair: np.array([1e9]) for pair in gearbox.pairs})
+            assert assembly.weight.shape == (assembly.size,)
+        for support in (*gearbox.bearings, *gearbox.mounts):
+            bearing_matrices(support, gearbox.case.damping.bearing_time_s)
+            stiffness_matrix(support.stiffness)
+        for body in elastic_names(gearbox):
+            check_elastic_body(gearbox, body)
+        assert gearbox.name
+    # Both are refused: the first solves the static state alone, the second finds nothing besides its case.
+    assert CliRunner().invoke(app, ["ste", str(tmp_path / "spur.toml"), "--grid"]).exit_code == 2
+    keep_case(gearbox, tmp_path)
+    assert CliRunner().invoke(app, ["report", str(tmp_path)]).exit_code == 2
+    known = {(kind.__name__, key) for kind in sections() for key in kind.model_fields}
+    assert {f"{kind}.{key}" for kind, key in known - read_keys} <= FOR_PEOPLE

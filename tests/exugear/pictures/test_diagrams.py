@@ -1,0 +1,166 @@
+"""Diagrams of runs and modes show what they are given where the axes say."""
+
+import math
+
+import numpy as np
+import pytest
+
+from exugear.pictures.diagrams import (
+    Sensitivity,
+    plot_campbell,
+    plot_mode_energies,
+    plot_order_levels,
+    plot_sensitivities,
+    plot_waterfalls,
+    pooled_levels,
+)
+from exugear.spectra.resonances import Pick, line_level
+from exugear.spectra.waterfall import OrderLine, Waterfall, waterfall
+
+RATE = 2048.0
+MESH, SECOND = OrderLine("mesh", 60.0), OrderLine("2 × mesh", 120.0)
+FASTEST = 2.0 * math.pi * 10.0  # 600 rpm
+
+
+def run(amplitude=1e-6, unit="m"):
+    time = np.arange(round(8 * RATE)) / RATE
+    angle = 0.5 * FASTEST * time**2 / 8.0
+    signal = amplitude * np.sin(60 * angle)
+    return waterfall(signal, FASTEST * time / 8.0, RATE, window_length=0.1, reference=1e-6, unit=unit)
+
+
+def pick(speed_rpm, level=0.0):
+    speed = speed_rpm * 2 * math.pi / 60.0
+    return Pick(MESH, 1.0, speed, float(MESH.frequency(speed)), level, 10.0, 8.0)
+
+
+def test_waterfalls_share_axes_and_colours():
+    figure = plot_waterfalls({"soft": run(1e-6), "stiff": run(1e-7)}, [MESH, SECOND])
+    soft, stiff, bar = figure.axes
+    assert [soft.get_title(loc="left"), stiff.get_title(loc="left")] == ["soft", "stiff"]
+    assert soft.images[0].get_clim() == stiff.images[0].get_clim()
+    low, high = soft.images[0].get_clim()
+    # The tone of 1 µm is the loudest: 0 dB, in the first windows with hardly a period somewhat more.
+    assert high == pytest.approx(0.0, abs=1.0) and high - low == pytest.approx(110.0)
+    assert soft.get_xlim() == stiff.get_xlim() and soft.get_ylim() == stiff.get_ylim()
+    assert bar.get_ylabel() == "Overall transmission error, level / dB re 1 µm"
+    assert figure.get_supxlabel() == "Hann window 100 ms, overlap 75 %, 0 dB = 1 µm"
+
+
+def test_tone_lies_under_its_order_line():
+    figure = plot_waterfalls({"run": run()}, [MESH], highest_frequency=1000.0)
+    panel = figure.axes[0]
+    levels = panel.images[0].get_array()
+    left, right, bottom, top = panel.images[0].get_extent()
+    column = int(0.75 * levels.shape[1])
+    speed = left + (column + 0.5) / levels.shape[1] * (right - left)
+    loudest = bottom + (np.argmax(levels[:, column]) + 0.5) / levels.shape[0] * (top - bottom)
+    (end_speed, end_frequency) = (panel.lines[0].get_xdata()[1], panel.lines[0].get_ydata()[1])
+    # One window sweeps over 7.5 Hz, a cell is 5 Hz high.
+    assert loudest == pytest.approx(speed * end_frequency / end_speed, abs=0.012)
+    assert end_frequency / end_speed == pytest.approx(1e-3 * 60.0 / 60.0)  # kHz per rpm
+
+
+def test_order_lines_are_named_where_they_leave():
+    panel = plot_waterfalls({"run": run()}, [MESH, SECOND], highest_frequency=800.0).axes[0]
+    named = {text.get_text(): text.xy for text in panel.texts}
+    fastest = panel.get_xlim()[1]
+    assert named["mesh"] == (pytest.approx(fastest), pytest.approx(1e-3 * fastest))
+    assert named["2 × mesh"] == (pytest.approx(400.0), pytest.approx(0.8))  # above: 120 per turn reach 800 Hz
+
+
+def test_marks_are_numbered_at_speed_and_frequency():
+    panel = plot_waterfalls({"run": run()}, [], marks={"run": [pick(300.0), pick(480.0)]}).axes[0]
+    circles = [(line.get_xdata()[0], line.get_ydata()[0]) for line in panel.lines]
+    np.testing.assert_allclose(circles, [(300.0, 0.3), (480.0, 0.48)])
+    assert [text.get_text() for text in panel.texts] == ["1", "2"]
+
+
+def test_different_scales_are_not_drawn_as_one():
+    with pytest.raises(ValueError, match="differ in unit"):
+        plot_waterfalls({"a": run(), "b": run(unit="rad")}, [])
+    with pytest.raises(ValueError, match="no run"):
+        plot_waterfalls({}, [])
+
+
+def test_pooling_keeps_a_line_narrower_than_a_cell():
+    amplitude = np.full((400, 4001), 1e-9)
+    amplitude[:, 1234] = 1.0
+    spectra = Waterfall(
+        time=np.arange(400.0),
+        speed=np.linspace(0.0, 10.0, 400),
+        frequency=np.arange(4001.0),
+        amplitude=amplitude,
+        window="hann",
+        window_length=1.0,
+        overlap=0.75,
+        reference=1.0,
+        unit="m",
+    )
+    cells = pooled_levels(spectra, 4000.0, 10.0, shape=(100, 50))
+    assert cells.shape == (100, 50)
+    np.testing.assert_array_equal(cells[30], 0.0)
+    np.testing.assert_allclose(np.delete(cells, 30, axis=0), -180.0)
+
+
+def test_pooling_leaves_speeds_blank_that_the_run_does_not_reach():
+    cells = pooled_levels(run(), 1000.0, 2 * FASTEST)
+    half = cells.shape[1] // 2
+    assert np.isfinite(cells[:, 5 : half - 5]).all() and np.isnan(cells[:, half + 5 :]).all()
+
+
+def test_order_levels_draw_every_run_on_every_line():
+    runs = {"soft": run(1e-6), "stiff": run(1e-7)}
+    figure = plot_order_levels(runs, [MESH, SECOND], marks={"soft": [pick(300.0, 0.0)]}, eigenfrequencies=[350.0])
+    first, second = figure.axes
+    frequency, level = first.lines[0].get_data()
+    np.testing.assert_allclose(frequency, 1e-3 * MESH.frequency(runs["soft"].speed))
+    np.testing.assert_array_equal(level, line_level(runs["soft"], MESH))
+    assert first.get_title(loc="left") == "order 60: mesh"
+    assert len(first.lines) == 4 and len(second.lines) == 3  # two runs, a mark on the first line, an eigenfrequency
+    assert figure.axes[-1].get_xlabel().endswith("0 dB = 1 µm")
+
+
+def test_campbell_marks_crossings():
+    figure = plot_campbell([200.0, 450.0], [MESH, SECOND], FASTEST, names=["a", "b"], weights=[0.0, 1.0], title="rigid")
+    panel = figure.axes[0]
+    first, second = (np.asarray(points.get_offsets()) for points in panel.collections)
+    np.testing.assert_allclose(first, [(200.0, 0.2), (450.0, 0.45)])  # 60 per turn: 1 Hz per rpm
+    np.testing.assert_allclose(second, [(100.0, 0.2), (225.0, 0.45)])
+    assert [text.get_text() for text in panel.texts] == ["a", "b"]
+
+
+def test_sensitivities_share_the_frequency_axis():
+    values = np.array([0.2, 0.5, 1.0])
+    frequencies = np.column_stack([1000 * values, [np.nan, 3000.0, 3100.0]])
+    sweeps = [
+        Sensitivity("housing factor", values, frequencies, default=0.5),
+        Sensitivity("inertia / kg m²", values, frequencies, weights=np.ones((3, 2)), logarithmic=True),
+    ]
+    figure = plot_sensitivities(sweeps, target=3215.0, window=(500.0, 3500.0), title="bushing")
+    left, right = figure.axes
+    assert left.get_ylim() == right.get_ylim() == (0.5, 3.5)
+    assert right.get_xscale() == "log"
+    np.testing.assert_allclose(left.lines[0].get_ydata(), values)
+    assert "3215 Hz" in [text.get_text() for text in left.texts]
+
+
+def test_sensitivity_of_wrong_shape_is_named():
+    with pytest.raises(ValueError, match="'housing factor'"):
+        plot_sensitivities([Sensitivity("housing factor", np.zeros(3), np.zeros((2, 4)))])
+
+
+def test_energy_bars_are_per_cent_and_gather_the_small():
+    strain = {"mesh": 0.6, "bearing": 0.392, "small": 0.005, "tiny": 0.003}
+    figure = plot_mode_energies(strain, {"shaft": 1.0}, title="3208 Hz")
+    left, right = figure.axes
+    assert [label.get_text() for label in left.get_yticklabels()] == ["mesh", "bearing", "others"]
+    np.testing.assert_allclose([bar.get_width() for bar in left.patches], [60.0, 39.2, 0.8])
+    assert [label.get_text() for label in right.get_yticklabels()] == ["shaft"]
+
+
+def test_pictures_are_written(tmp_path):
+    plot_waterfalls({"a": run(), "b": run()}, [MESH], tmp_path / "waterfall.png")
+    plot_mode_energies({"mesh": 1.0}, {"shaft": 1.0}, tmp_path / "energies.svg")
+    assert (tmp_path / "waterfall.png").stat().st_size > 20_000
+    assert (tmp_path / "energies.svg").read_text().startswith("<?xml")

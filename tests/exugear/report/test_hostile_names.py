@@ -1,0 +1,269 @@
+"""Names and paths of a stranger: pages, pictures and the terminal show them as they are, and obey none of them."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import unicodedata
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import matplotlib.image
+import numpy as np
+import pytest
+from rich.console import Console
+from typer.testing import CliRunner
+
+from exugear.cli import console
+from exugear.cli.app import app
+from exugear.pictures.diagrams import plot_mode_energies
+from exugear.pictures.scene import mode_figure
+from exugear.pictures.shapes import BodyShape, mode_scene, tube_surface
+from exugear.pictures.viewer import write_mode_page
+from exugear.report import page
+from fe_ste.tools.rendering import RenderingError
+
+from ..spur_case import SPUR_CASE
+
+MARKUP = "[/] [bold]:warning:"
+HTML = """@DATA@<img src=x onerror=alert(1)></script><!--<script>'"&"""
+FORMULA = r"$\frac{$ x_1^"
+STEERING = "\x1b[31mred\x1b[2J\x07\x9b1m\r\u202egnp.\u2028\u2066"
+NAME = f"{MARKUP} {HTML} {FORMULA} {STEERING}"
+TITLE = f"{MARKUP} {HTML} {FORMULA} \x9b1m\u202egnp.\u2028\u2066"
+"""What a gearbox file may be named: other control characters are refused."""
+
+
+class Page(HTMLParser):
+    """Elements of a page with their attributes, and its text by the element that it stands in."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.texts: dict[str, str] = {}
+        self.inside = ""
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, dict(attributes)))
+        self.inside = dict(attributes).get("id") or tag
+
+    def handle_endtag(self, tag: str) -> None:
+        self.inside = ""
+
+    def handle_data(self, text: str) -> None:
+        self.texts[self.inside] = self.texts.get(self.inside, "") + text
+
+    @property
+    def active(self) -> list[str]:
+        """What could run or load something: handlers, and addresses that are no data of the page itself."""
+        found = [f"{tag} {key}" for tag, attributes in self.elements for key in attributes if key.startswith("on")]
+        for tag, attributes in self.elements:
+            for key in ("src", "href"):
+                if not (attributes.get(key) or "data:").startswith("data:"):
+                    found.append(f"{tag} {key}={attributes[key]}")
+        return found
+
+
+def tame(text: str) -> bool:
+    """Tell whether a terminal shows all of a text and obeys nothing of it but ends of lines."""
+    return not any(letter != "\n" and unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp") for letter in text) and (
+        not re.search("[\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]", text)
+    )
+
+
+def exugear(*arguments: object) -> Any:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Any]]:
+    """Results folder with a name of its own of a gearbox with a hostile one, and how each verb ended."""
+    folder = tmp_path_factory.mktemp("stranger") / "["  # so that paths hold [/]
+    folder.mkdir()
+    case, out = folder / "].toml", folder / "] :skull: \x1b[1m"
+    text = SPUR_CASE.replace('"one spur pair"', json.dumps(TITLE)) + "\n[report]\nreference_frequency_Hz = 3000.0\n"
+    case.write_text(text, encoding="utf-8")
+    choices = ("--variant", "bushing", "--mesh-law", "iso6336", "--out", out)
+    with pytest.MonkeyPatch.context() as patch:
+
+        def unable(*arguments: Any, **options: Any) -> None:
+            raise RenderingError(f"no picture {MARKUP}")
+
+        for place in ("scene.draw_gearbox", "report.draw_mode"):
+            patch.setattr(f"exugear.{place}", unable)
+        ended = [
+            exugear("check", case),
+            exugear("check", case, "--json"),
+            exugear("modes", case, *choices),
+            exugear("modes", case, *choices, "--json"),
+            exugear("run", case, *choices, "--duration", 0.05),
+            exugear("view", case, *choices),
+            exugear("report", out),
+        ]
+    return out, ended
+
+
+def test_every_verb_ends_well_and_prints_names_and_paths_as_they_are(results: tuple[Path, list[Any]]) -> None:
+    out, ended = results
+    for outcome in ended:
+        assert outcome.exit_code == 0, outcome.stderr
+        assert tame(outcome.stdout + outcome.stderr)
+    checked, _, modes, _, run, view, report = (outcome.stdout + outcome.stderr for outcome in ended)
+    assert f"{MARKUP} {HTML} {FORMULA} " + r"\x9b1m\u202egnp.\u2028\u2066: no fault" in checked
+    for printed in (modes, run, view, report):
+        assert r"[/] :skull: \x1b[1m/" in printed
+    assert f"No pictures: no picture {MARKUP}" in view
+    assert f"Left out: picture of a mode: no picture {MARKUP}" in report
+
+
+def test_json_is_ascii_and_holds_names_as_they_are(results: tuple[Path, list[Any]]) -> None:
+    out, ended = results
+    for outcome in (ended[1], ended[3]):
+        assert outcome.stdout.isascii()
+        assert tame(outcome.stdout)
+    assert json.loads(ended[1].stdout)["name"] == TITLE
+    assert json.loads(ended[3].stdout)["file"].startswith(str(out))
+
+
+@pytest.mark.parametrize("name", ["modes.html", "report.html"])
+def test_no_name_breaks_out_of_a_page(results: tuple[Path, list[Any]], name: str) -> None:
+    out, _ = results
+    (path,) = out.rglob(name)
+    text = path.read_text(encoding="utf-8")
+    found = Page(text)
+    assert found.active == []
+    assert text.count("<script") == text.count("</script>") == (2 if name == "modes.html" else 0)
+    assert text.count("<img") == text.count('<img src="data:image/png;base64,')
+    for place in ("title", "h1"):
+        # The parser takes every end of a line as one of its own.
+        assert found.texts[place].startswith(TITLE)
+    if name == "modes.html":
+        data = json.loads(found.texts["data"])
+        assert data["heading"].startswith(TITLE)
+        assert not re.search("[<>&]", found.texts["data"])
+        assert not re.search(r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|eval\(", text)
+
+
+BROWSER = r"""
+const texts = {options: [], bodies: []};
+const gl = new Proxy(function () {}, { get: () => gl, apply: () => gl });
+class Element {
+  constructor() { this.style = {}; }
+  append(...parts) { texts.bodies.push(...parts.filter(part => typeof part === "string")); }
+  add(option) { texts.options.push(option.text); }
+  getContext() { return gl; }
+}
+class Option { constructor(text) { this.text = text; } }
+const page = require("fs").readFileSync(process.argv[1], "utf8");
+const [data, script] = [...page.matchAll(/<script[^>]*>([^]*?)<\/script>/g)].map(found => found[1]);
+const known = { data: { textContent: data } };
+const document = {
+  getElementById: id => known[id] ??= new Element(),
+  createElement: () => new Element(),
+};
+new Function("document", "Option", "requestAnimationFrame", script)(document, Option, () => {});
+console.log(JSON.stringify(texts));
+"""
+"""What of a browser the mode page needs to begin, its drawing aside: prints the texts that it puts in."""
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="no node to run the page's script")
+def test_the_mode_page_itself_puts_names_in_as_text(tmp_path: Path) -> None:
+    body = BodyShape(HTML, "shaft", tube_surface(0.1, 0.0, 0.5), np.zeros(3))
+    title = f"3215 Hz\n{HTML} {STEERING}"
+    scene = mode_scene((body,), {HTML: [0, 1e-3, 0, 0, 0, 1.0]}, title=title)
+    written = write_mode_page([scene], tmp_path / "modes.html", heading=NAME)
+    found = subprocess.run(["node", "-e", BROWSER, written], capture_output=True, text=True, timeout=60)
+    assert found.returncode == 0, found.stderr
+    assert json.loads(found.stdout) == {"options": [title.replace("\n", ", ")], "bodies": [HTML]}
+
+
+def test_pieces_of_a_page_escape_whatever_a_file_holds() -> None:
+    text = f"{HTML}\udcff"
+    pieces = [
+        page.paragraph(text),
+        page.bullets([text]),
+        page.table([{text: text}]),
+        page.folded(text, "content"),
+        page.section(text, "content"),
+        page.whole(text),
+    ]
+    found = Page("".join(pieces))
+    assert found.active == []
+    assert not [tag for tag, _ in found.elements if tag in ("img", "script")]
+    assert "".join(pieces).encode("utf-8")
+    assert found.texts["td"] == found.texts["summary"] == f"{HTML}?"
+
+
+def test_pictures_take_any_name_and_a_formula_in_it_as_text(tmp_path: Path) -> None:
+    # Warnings are errors here: one of matplotlib's about a control character holds that very character.
+    shares = {FORMULA: 0.7, "$ \x1b\x9b": 0.3}
+    title = f"{FORMULA} {STEERING} \x00\udcff"
+    figure = plot_mode_energies(shares, shares, tmp_path / "energies.png", title=title)
+    assert matplotlib.image.imread(tmp_path / "energies.png").size
+    assert str(figure.get_suptitle()).startswith(FORMULA)
+    picture = mode_figure(np.zeros((40, 60, 3), dtype=np.uint8), 1e-3, title)
+    picture.savefig(tmp_path / "mode.png")
+    assert matplotlib.image.imread(tmp_path / "mode.png").size
+
+
+def printed(line: Any, monkeypatch: pytest.MonkeyPatch, width: int = 80) -> str:
+    """What a terminal is sent by a function of the console."""
+    shown = io.StringIO()
+    for name in ("results", "messages"):
+        monkeypatch.setattr(console, name, Console(file=shown, force_terminal=True, color_system=None, width=width))
+    line()
+    return shown.getvalue()
+
+
+def test_tables_and_bars_show_text_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = [{"pair": f"{MARKUP} {STEERING}", "what": "[/]"}]
+    shown = printed(lambda: console.print_table(MARKUP, rows, ("what",)), monkeypatch, 200)
+    assert shown.count(MARKUP) == 2
+    assert tame(shown)
+
+    def bar() -> None:
+        with console.progress_bar() as progress:
+            progress.add_task(f"{MARKUP} {STEERING}", total=None)
+
+    shown = printed(bar, monkeypatch, 200)
+    assert MARKUP in shown
+    assert "\x1b[31m" not in shown
+    assert "\x07" not in shown
+
+
+def test_a_long_line_of_a_message_keeps_its_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    message = f"case.toml: name = {10**6 * 'x'}: must be shorter\n" + "second line"
+    first, second = printed(lambda: console.note(message), monkeypatch).splitlines()
+    assert len(first) <= console.LONGEST_LINE
+    assert first.startswith("case.toml: name = xxx")
+    assert first.endswith("xxx: must be shorter")
+    assert second == "second line"
+
+
+def test_a_long_value_in_a_case_is_one_short_line(tmp_path: Path) -> None:
+    case = tmp_path / "case.toml"
+    case.write_text(SPUR_CASE.replace("one spur pair", 10**6 * "x"), encoding="utf-8")
+    outcome = exugear("check", case)
+    assert outcome.exit_code == 2
+    assert len(outcome.stderr.splitlines()) == 1
+    assert len(outcome.stderr) <= console.LONGEST_LINE + 1
+    assert f"Bad input: {case}: name = 'xxx" in outcome.stderr
+    assert "at most 200 characters" in outcome.stderr
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such names of files")
+def test_a_path_that_is_no_text_is_printed(tmp_path: Path) -> None:
+    case = os.fsencode(tmp_path) + b"/\xff[]\x1b.toml"
+    command = [sys.executable, "-c", "from exugear.cli.app import main; main()", "check", case]
+    found = subprocess.run(command, capture_output=True, timeout=60)
+    assert found.returncode == 2
+    assert rb"\udcff[]\x1b.toml: no such file" in found.stderr

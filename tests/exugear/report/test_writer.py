@@ -1,0 +1,194 @@
+"""The report of a results folder: one page that needs nothing else, of results that belong to the case."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import tomllib
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from exugear.dynamics.fingerprint import input_hash
+from exugear.dynamics.modes import eigenmodes
+from exugear.dynamics.signals import energy_residual
+from exugear.model.gearbox import Gearbox
+from exugear.model.reading import CaseError
+from exugear.report.writer import ReportError, write_report
+from exugear.results.folder import bodies_folder, keep_case, kept_case, modes_path, note_time, times_spent
+from exugear.runs.runup import simulate
+from exugear.tooth_mesh.stiffness import mesh_stiffness
+from exugear.tooth_mesh.tables import order_tables
+from fe_ste.tools.rendering import RenderingError
+
+from ..spur_case import COARSE_INPUT, SPUR_CASE
+
+LAW = "line_of_action"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def coarse_tables():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("exugear.tooth_mesh.tables.TableInput", COARSE_INPUT)
+        yield
+
+
+@pytest.fixture(autouse=True)
+def no_rendering(monkeypatch):
+    def unable(*arguments, **options):
+        raise RenderingError("3-D pictures need pyvista: pip install 'exugear[pictures]'")
+
+    monkeypatch.setattr("exugear.report.writer.draw_mode", unable)
+    monkeypatch.setattr("exugear.report.writer.draw_elastic_bodies", unable)
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """Table, run-ups and modes of both variants."""
+    folder = tmp_path_factory.mktemp("results")
+    case = folder / "spur.toml"
+    case.write_text(SPUR_CASE, encoding="utf-8")
+    gearbox = Gearbox.from_toml(case)
+    keep_case(gearbox, folder)
+    for order in order_tables(gearbox, folder):
+        order.fill()
+    stiffness = mesh_stiffness(gearbox, LAW, folder)
+    for variant in ("rigid", "bushing"):
+        simulate(gearbox, variant, stiffness, folder, load_case="run_up")
+        eigenmodes(gearbox, variant, stiffness, LAW).save(modes_path(folder, variant, LAW, "disc"))
+    note_time(folder, "a step of the test", 1.5)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def gearbox(results) -> Gearbox:
+    return kept_case(results)
+
+
+def test_the_page_stands_alone_and_names_its_assumptions(results):
+    report = write_report(results, target=1000.0)
+    page = report.path.read_text(encoding="utf-8")
+    assert report.path == results / "report.html"
+    sources = re.findall(r'(?:src|href)="([^"]{0,30})', page)
+    assert sources
+    assert all(source.startswith("data:image/png;base64,") for source in sources)
+    for words in (
+        "Resonances in bushing and not in rigid",
+        "load case run_up, law line_of_action, inertias disc, housing factor 0.5",
+        "Rule: no peak of 3 dB prominence",
+        "a step of the test",
+        "Hann window",
+        "overlap 75 %, 0 dB = 1 µm",
+        input_hash_of(results, "rigid"),
+        "exudyn",
+    ):
+        assert words in page, words
+    assert 'role="alert"' not in page
+    assert report.left_out == ("picture of a mode: 3-D pictures need pyvista: pip install 'exugear[pictures]'",)
+    assert all(path.is_file() for path in report.pictures)
+
+
+def test_flexible_runs_alone_are_reported_with_the_reductions_that_are_kept(results, tmp_path, monkeypatch):
+    shutil.copytree(results / "tables", tmp_path / "tables")
+    shaft = """
+[bodies.shaft_1.shape]
+start_z_mm = -20.0
+sections = [{ length_mm = 80.0, outer_diameter_mm = 25.0 }]
+"""
+    content = tomllib.loads(SPUR_CASE + shaft)
+    content["bodies"]["shaft_1"]["flexibility"] = "nonrotating"
+    content["bearings"]["bearing_1"]["z_mm"] = 40.0
+    content["elasticity"] = {"band_Hz": 12e3, "limit_Hz": 30e3}
+    gearbox = Gearbox.from_dict(content, str(tmp_path / "spur.toml"))
+    keep_case(gearbox, tmp_path)
+    kept = bodies_folder(tmp_path)
+    stiffness = mesh_stiffness(gearbox, LAW, tmp_path)
+    modes = eigenmodes(gearbox, "flexible", stiffness, LAW, folder=kept)
+    modes.save(modes_path(tmp_path, "flexible", LAW, "disc"))
+    simulate(gearbox, "flexible", stiffness, tmp_path, load_case="run_up", duration=0.2)
+    monkeypatch.setattr("exugear.bodies.of_gearbox.reduce_shaft", lambda model: pytest.fail("reduced again"))
+    before = set(kept.iterdir())
+    report = write_report(tmp_path, target=1000.0)
+    assert [line for line in report.left_out if "picture" not in line] == []
+    assert set(kept.iterdir()) == before
+    page = report.path.read_text(encoding="utf-8")
+    assert "Elastic in the variant flexible: shaft_1 (" in page
+    assert "All resonances of variant flexible" in page
+    assert any("shaft_1 itself" in name for name in modes.names)
+
+
+def input_hash_of(results, variant):
+    with xr.open_dataset(results / variant / "run_up-line_of_action-disc" / "run.nc", engine="h5netcdf") as data:
+        return data.attrs["input_hash"]
+
+
+def test_resonances_of_the_runs_are_eigenfrequencies(results, gearbox):
+    report = write_report(results, target=1000.0)
+    stiffness = mesh_stiffness(gearbox, LAW, results)
+    rigid = eigenmodes(gearbox, "rigid", stiffness, LAW).frequency[1]
+    page = report.path.read_text(encoding="utf-8")
+    # The one mode of the rigid variant shows in its run-up and is matched: its frequency stands in a cell.
+    assert f">{rigid:.1f}</td>" in page
+
+
+def test_no_mode_near_is_said_in_words(results):
+    statements = " ".join(write_report(results, target=9000.0).statements)
+    assert "no mode within 5 % of 9000 Hz" in statements
+    assert "near 9000 Hz" not in statements
+
+
+def test_results_of_another_case_are_left_out_by_name(results, gearbox, tmp_path):
+    stale = gearbox.varied({"bearings.bearing_1.stiffness.radial_N_per_m": 3e7})
+    keep_case(stale, results)
+    try:
+        report = write_report(results, target=1000.0)
+    finally:
+        keep_case(gearbox, results)
+    # Hashes are of the whole case: both variants' runs and modes belong to another one; the table does not.
+    assert sum("another input" in line for line in report.left_out) == 4
+    assert "Static transmission error" in report.path.read_text(encoding="utf-8")
+
+
+def test_a_folder_with_nothing_of_its_case_is_refused(gearbox, tmp_path):
+    with pytest.raises(CaseError, match="no results"):
+        write_report(tmp_path)
+    keep_case(gearbox, tmp_path)
+    with pytest.raises(ReportError, match="no such file"):
+        write_report(tmp_path)
+
+
+def test_a_damaged_case_is_one_message(tmp_path):
+    (tmp_path / "case.json").write_text('{"source": ', encoding="utf-8")
+    with pytest.raises(CaseError, match=r"case\.json: cannot be used"):
+        kept_case(tmp_path)
+
+
+def test_times_keep_the_last_of_each_step_and_survive_a_cut_line(tmp_path):
+    note_time(tmp_path, "tables", 90.0)
+    note_time(tmp_path, "run", 2.0)
+    note_time(tmp_path, "tables", 0.1)
+    with (tmp_path / "times.jsonl").open("a", encoding="utf-8") as file:
+        file.write(json.dumps({"step": "cut"})[:-3])
+    assert [(spent.step, spent.seconds) for spent in times_spent(tmp_path)] == [("run", 2.0), ("tables", 0.1)]
+
+
+def test_the_energy_of_the_runs_is_accounted_for(results):
+    for variant in ("rigid", "bushing"):
+        path = results / variant / "run_up-line_of_action-disc" / "run.nc"
+        with xr.open_dataset(path, engine="h5netcdf") as data:
+            assert abs(energy_residual(data)) < 1e-3  # what the power balance asks for
+
+
+def test_the_hash_tells_load_cases_variants_and_tables_apart(gearbox):
+    from exugear.dynamics.assemble import assemble
+
+    stiffness = {"spur": np.array([3.0e8, 3.1e8])}
+    hashes = {
+        input_hash(assemble(gearbox, variant, stiffness if soft else {"spur": np.array([3.0e8, 3.2e8])}), load_case)
+        for variant in ("rigid", "bushing")
+        for soft in (True, False)
+        for load_case in (None, "run_up")
+    }
+    assert len(hashes) == 8
