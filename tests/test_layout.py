@@ -1,91 +1,170 @@
-"""The code keeps to docs/architecture.md: who imports whom, and what a quick start leaves unloaded."""
+"""The code keeps to docs/architecture.md: rooms, who imports whom, sizes; and what a quick start leaves unloaded."""
 
 from __future__ import annotations
 
 import ast
 import re
+import statistics
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("fe_ste", "exugear")
-ALONE_WITH_EXUDYN = {"exugear.solvers.exudyn_model.system", "exugear.solvers.exudyn_model.floating"}
-ROW = re.compile(r"^\| `(\w+)` \| .* \|([^|]*)\|$", re.MULTILINE)
+EXUDYN_ROOM = "exugear.solvers.exudyn_model"
+MOST_MODULES = 12
+MOST_LINES = 600
+MEDIAN_LINES = 250
+MOST_LINES_OF_A_FUNCTION = 60
+MEDIAN_LINES_OF_A_FUNCTION = 8
+
+ROOM = re.compile(r"^### ([\w.]+)$(.*?)(?=^#{2,3} |\Z)", re.MULTILINE | re.DOTALL)
+ROW = re.compile(r"^\| `(\w+)` \|[^|]*\|([^|]*)\|([^|]*)\|$", re.MULTILINE)
 
 
-def declared() -> dict[str, set[str]]:
-    """Module -> modules it may import, in the order of the document."""
+def room_of(module: str) -> str:
+    """Room of a module; one at the top of a package is a room of its own."""
+    folder = module.rpartition(".")[0]
+    return module if folder in PACKAGES else folder
+
+
+@cache
+def documented() -> dict[str, dict[str, tuple[set[str], set[str]]]]:
+    """Room -> module -> modules beside it and rooms above it that it may import, all in the order of the document."""
     text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
-    sections = re.split(r"^## ", text, flags=re.MULTILINE)
-    modules = {}
-    for package in PACKAGES:
-        section = next(s for s in sections if s.startswith(f"{package}\n"))
-        for module, needs in ROW.findall(section):
-            names = re.findall(r"`([\w.]+)`", needs)
-            modules[f"{package}.{module}"] = {n if "." in n else f"{package}.{n}" for n in names}
-    return modules
+    rooms: dict[str, dict[str, tuple[set[str], set[str]]]] = {}
+    for room, section in ROOM.findall(text):
+        package, _, _ = room.partition(".")
+        folder = (
+            room.rpartition(".")[0]
+            if room.rpartition(".")[0] in PACKAGES and not (ROOT / _path(room)).is_dir()
+            else room
+        )
+        rooms[room] = {}
+        for name, beside, above in ROW.findall(section):
+            modules = {f"{folder}.{other}" for other in re.findall(r"`([\w.]+)`", beside)}
+            others = {_whole(other, package) for other in re.findall(r"`([\w.]+)`", above)}
+            rooms[room][f"{folder}.{name}"] = modules, others
+    return rooms
+
+
+def _path(dotted: str) -> Path:
+    return Path(*dotted.split("."))
+
+
+def _whole(room: str, package: str) -> str:
+    """Name of a room with its package, which the document leaves out where it is the reader's own."""
+    return room if room.split(".")[0] in PACKAGES else f"{package}.{room}"
 
 
 def modules_on_disk() -> dict[str, Path]:
     """Module -> file, without the packages' own __init__."""
-    return {
-        f"{package}.{file.stem}": file
-        for package in PACKAGES
-        for file in sorted((ROOT / package).glob("*.py"))
-        if file.stem != "__init__"
-    }
+    files = (file for package in PACKAGES for file in sorted((ROOT / package).rglob("*.py")) if file.stem != "__init__")
+    return {".".join(file.relative_to(ROOT).with_suffix("").parts): file for file in files}
 
 
-def runtime_imports(file: Path) -> set[str]:
-    """Dotted names that a file imports at any time, leaving out what only type checkers read."""
-    tree = ast.parse(file.read_text(encoding="utf-8"))
-    typing_only = {
-        node
-        for block in ast.walk(tree)
-        if isinstance(block, ast.If) and getattr(block.test, "id", "") == "TYPE_CHECKING"
-        for statement in block.body
-        for node in ast.walk(statement)
-    }
+@cache
+def tree_of(file: Path) -> ast.Module:
+    """Syntax tree of a file."""
+    return ast.parse(file.read_text(encoding="utf-8"))
+
+
+def imported(file: Path) -> set[str]:
+    """Dotted names that a file imports anywhere, those for type checkers included."""
     names = set()
-    for node in ast.walk(tree):
-        if node in typing_only:
-            continue
+    for node in ast.walk(tree_of(file)):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
-            in_package = node.module in PACKAGES
-            names |= {f"{node.module}.{a.name}" for a in node.names} if in_package else {node.module}
+            names |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
     return names
 
 
+def lines_of_functions(file: Path) -> list[int]:
+    """Lines of each function's body, its docstring left out."""
+    counts = []
+    for node in ast.walk(tree_of(file)):
+        if isinstance(node, ast.FunctionDef):
+            body = node.body[1:] if ast.get_docstring(node) is not None else node.body
+            counts.append(body[-1].end_lineno - body[0].lineno + 1 if body else 0)
+    return counts
+
+
 MODULES = modules_on_disk()
+ROOMS = tuple(dict.fromkeys(room_of(module) for module in MODULES))
 
 
-def test_every_module_stands_in_the_architecture_and_the_other_way_round():
-    assert set(declared()) == set(MODULES)
+def test_every_room_and_module_stands_in_the_architecture_and_the_other_way_round():
+    assert [module for modules in documented().values() for module in modules] != []
+    assert {module for modules in documented().values() for module in modules} == set(MODULES)
+    assert set(documented()) == set(ROOMS)
 
 
 @pytest.mark.parametrize("module", MODULES)
 def test_a_module_imports_what_the_architecture_says_and_it_stands_above(module):
-    allowed = declared()
-    assert module in allowed, "docs/architecture.md does not list it"
-    above = list(allowed)[: list(allowed).index(module)]
-    own = {name for name in runtime_imports(MODULES[module]) if name in MODULES}
-    assert own == allowed[module]
-    assert own <= set(above)
+    room = room_of(module)
+    assert module in documented().get(room, {}), "docs/architecture.md does not list it"
+    beside, rooms = documented()[room][module]
+    own = {name for name in imported(MODULES[module]) if name in MODULES}
+    assert {name for name in own if room_of(name) == room} == beside
+    assert {room_of(name) for name in own} - {room} == rooms
+    assert beside <= set(_above(documented()[room], module))
+    assert rooms <= set(_above(documented(), room))
+
+
+def _above(listed: dict[str, object], name: str) -> list[str]:
+    return list(listed)[: list(listed).index(name)]
 
 
 @pytest.mark.parametrize("module", [name for name in MODULES if name.startswith("fe_ste.")])
 def test_fe_ste_never_imports_exugear(module):
-    assert not {name for name in runtime_imports(MODULES[module]) if name.split(".")[0] == "exugear"}
+    assert not {name for name in imported(MODULES[module]) if name.split(".")[0] == "exugear"}
 
 
-@pytest.mark.parametrize("module", [name for name in MODULES if name not in ALONE_WITH_EXUDYN])
-def test_only_two_modules_know_exudyn(module):
-    assert "exudyn" not in {name.split(".")[0] for name in runtime_imports(MODULES[module])}
+@pytest.mark.parametrize("module", [name for name in MODULES if room_of(name) != EXUDYN_ROOM])
+def test_only_one_room_knows_exudyn(module):
+    assert "exudyn" not in {name.split(".")[0] for name in imported(MODULES[module])}
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_no_private_name_is_imported(module):
+    private = re.compile(r"^(fe_ste|exugear)\..*\b_(?!_)")
+    assert not [name for name in imported(MODULES[module]) if private.match(name)]
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_no_room_holds_more_modules_than_a_glance_takes_in(room):
+    assert sum(room_of(module) == room for module in MODULES) <= MOST_MODULES
+
+
+def test_modules_and_functions_are_short():
+    lines = {name: len(file.read_text(encoding="utf-8").splitlines()) for name, file in MODULES.items()}
+    assert {name: count for name, count in lines.items() if count > MOST_LINES} == {}
+    assert statistics.median(lines.values()) < MEDIAN_LINES
+    bodies = {name: lines_of_functions(file) for name, file in MODULES.items()}
+    assert {
+        name: max(counts) for name, counts in bodies.items() if max(counts, default=0) > MOST_LINES_OF_A_FUNCTION
+    } == {}
+    assert statistics.median(count for counts in bodies.values() for count in counts) <= MEDIAN_LINES_OF_A_FUNCTION
+
+
+def test_tests_mirror_the_rooms():
+    folders = {
+        f"{package}.{folder.name}"
+        for package in PACKAGES
+        for folder in (ROOT / "tests" / package).iterdir()
+        if folder.is_dir() and any(folder.glob("test_*.py"))
+    }
+    assert folders <= {".".join(room.split(".")[:2]) for room in ROOMS}
+    assert not [
+        file
+        for package in PACKAGES
+        for file in (ROOT / "tests" / package).glob("test_*.py")
+        if f"{package}.{file.stem.removeprefix('test_')}" not in ROOMS
+    ]
 
 
 def left_unloaded(arguments: list[str], heavy: tuple[str, ...]) -> str:

@@ -6,12 +6,12 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from fe_ste.tools.arrays import Floats
 
 from exugear.bearings import contact, matrices, rollers
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Bearing, stiffness_matrix
 from exugear.model.sections import CatalogueSection
+from fe_ste.tools.arrays import Floats
 
 ON_BEARINGS = ("bushing", "flexible")
 """Variants whose bodies sit on bearings."""

@@ -35,7 +35,7 @@ from exugear.bodies.reduced_body import Blank, Figures, Frame, ReducedBody, Redu
 from exugear.bodies.reduction import ReducedPart, lowered, reduce_part
 from exugear.bodies.solid_mesh import SolidError, SolidFile, entity_numbers
 from exugear.bodies.store import kept
-from exugear.versions import REDUCTION
+from exugear.model.versions import REDUCTION
 from fe_ste.elasticity.bricks import gradient_products
 from fe_ste.geometry.gears import Material
 from fe_ste.tools.arrays import Floats, Integers, SparseMatrix

@@ -10,15 +10,15 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from fe_ste.tools.arrays import Floats, SparseMatrix
 from numpy.typing import NDArray
 
 from exugear.bodies.reduced_body import Blank, Figures, ReducedBody, ReductionError, Seat, Surface
 from exugear.bodies.reduction import ReducedPart, lowered, reduce_part, symmetric
 from exugear.bodies.store import kept
 from exugear.bodies.turned_section import STANDARD_SIZE, Harmonic, MeshSize, Motion, SeatBand, Shaft, ShaftSection
-from exugear.versions import REDUCTION
+from exugear.model.versions import REDUCTION
 from fe_ste.geometry.gears import Material
+from fe_ste.tools.arrays import Floats, SparseMatrix
 
 MOTIONS: tuple[Motion, ...] = ("bending", "torsion", "stretching")
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from exugear.bodies.of_gearbox import solid_body
 from exugear.dynamics.assembly import Assembly
-from exugear.versions import MODES, REDUCTION, RUN
+from exugear.model.versions import MODES, REDUCTION, RUN
 from fe_ste.transmission_error.surface import SteSurface
 
 

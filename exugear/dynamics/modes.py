@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 import scipy.optimize
 import xarray as xr
-from fe_ste.tools.arrays import Floats
 from numpy.typing import NDArray
 
 from exugear.bodies.reduced_body import ReducedBody
@@ -25,8 +24,9 @@ from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.linearised import RIGID_BODY_LIMIT, Linearised, growth_rate, linearise, undamped_modes
 from exugear.dynamics.statics import locked_equilibrium
 from exugear.model.gearbox import Gearbox
+from exugear.model.versions import MODES
 from exugear.tooth_mesh.element import Angles, MeshData
-from exugear.versions import MODES
+from fe_ste.tools.arrays import Floats
 from fe_ste.tools.files import Layout, load_dataset, write_dataset
 
 RIGID_COORDINATES = ("x", "y", "z", "tilt_x", "tilt_y", "spin")

@@ -25,11 +25,11 @@ from typing import Any
 import h5netcdf
 import numpy as np
 import xarray as xr
-from fe_ste.tools.arrays import Floats
 from numpy.typing import NDArray
 
 from exugear.dynamics.signals import BALANCE_TERMS, Channels
-from exugear.versions import RUN
+from exugear.model.versions import RUN
+from fe_ste.tools.arrays import Floats
 from fe_ste.tools.files import (
     ErrorKeeper,
     FileError,

@@ -14,7 +14,6 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from fe_ste.tools.arrays import Floats
 
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.fingerprint import input_hash
@@ -24,6 +23,7 @@ from exugear.loads.summary import drive_rate, driven_start_speed, summarise_load
 from exugear.loads.torque_series import torque_series
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import LoadCase
+from exugear.model.versions import RUN
 from exugear.results.decimation import Decimator
 from exugear.results.run_file import EARLIER_PARTIAL_NAME, FINAL_NAME, MESH_TIMES, PARTIAL_NAME, Checkpoint, RunFile
 from exugear.runs.extent import buffer_rows, check_disk, sample_bytes, too_fine
@@ -33,7 +33,7 @@ from exugear.runs.trust import Judge
 from exugear.solvers.compiled.solver import CompiledSystem, Observer
 from exugear.solvers.compiled.step import highest_rate, unstable
 from exugear.solvers.loads import DriveLaw, LoadTable
-from exugear.versions import RUN
+from fe_ste.tools.arrays import Floats
 
 if TYPE_CHECKING:
     from exugear.solvers.exudyn_model.system import MeshRoute

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from exugear.model.versions import RUN
 from exugear.results.run_file import load_run
 from exugear.spectra.comparison import VariantRun, compare, mobility_shares, nearest_mode, read_run, report_mode
 from exugear.spectra.waterfall import OrderLine
-from exugear.versions import RUN
 from fe_ste.tools.files import write_dataset
 
 RATE = 8000.0
