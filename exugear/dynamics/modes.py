@@ -23,6 +23,8 @@ from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.linearised import RIGID_BODY_LIMIT, Linearised, growth_rate, linearise, undamped_modes
 from exugear.dynamics.statics import locked_equilibrium
+from exugear.bodies.of_gearbox import ElasticBody
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.versions import MODES
 from exugear.tooth_mesh.element import Angles, MeshData
@@ -162,40 +164,35 @@ def coordinate_labels(assembly: Assembly) -> list[str]:
 
 def eigenmodes(
     gearbox: Gearbox,
-    variant: str,
+    choice: Choice,
     stiffness: Mapping[str, MeshData],
-    mesh_law: str = "line_of_action",
-    inertias: str | None = None,
+    bodies: Mapping[str, ElasticBody] | None = None,
+    *,
     angles: Angles = "reference",
-    folder: Path | None = None,
 ) -> Modes:
     """Eigenmodes of a gearbox variant at its static load.
 
     Parameters
     ----------
     gearbox : Gearbox
-    variant : {"rigid", "bushing", "flexible"}
+    choice : Choice
+        Variant, mesh law and inertia set.
     stiffness : mapping of pair name to (n,) array
         Mesh stiffness F_bt / STE over the cycle, N/m, for example from the STE tables.
-    mesh_law : str
-        See `exugear.tooth_mesh.element`.
-    inertias : str, optional
-        Inertia set; the file's default otherwise.
+    bodies : mapping of body name to ElasticBody, optional
+        Reduced elastic bodies, which the variant `flexible` needs.
     angles : {"reference", "operating"}
         Angles of the law `seed`.
-    folder : Path, optional
-        Where reductions of elastic bodies are kept and found again.
 
     Examples
     --------
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
     >>> stiffness = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
-    >>> modes = eigenmodes(gearbox, "rigid", stiffness)
+    >>> modes = eigenmodes(gearbox, Choice("rigid"), stiffness)
     >>> len(modes.frequency), modes.names[0]
     (8, 'free rotation of the train')
     """
-    assembly = assemble(gearbox, variant, stiffness, mesh_law, inertias, angles=angles, folder=folder)
-    return modes_of(assembly)
+    return modes_of(assemble(gearbox, choice, stiffness, bodies, angles=angles))
 
 
 def modes_of(assembly: Assembly, preload: bool = True) -> Modes:

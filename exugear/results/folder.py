@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.named_files import NOTHING_MORE, Permissions
 from exugear.model.reading import CaseError, parsed
@@ -65,9 +66,9 @@ def kept_case(folder: Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:
     return Gearbox.from_dict(content, source, permissions)
 
 
-def modes_path(folder: str | Path, variant: str, law: str, inertias: str) -> Path:
-    """Place of the modes of a variant: ``<variant>/<law>-<inertias>/modes.nc``."""
-    return Path(folder) / variant / f"{law}-{inertias}" / "modes.nc"
+def modes_path(folder: str | Path, choice: Choice) -> Path:
+    """Place of the modes of a choice that names its inertia set: ``<variant>/<law>-<inertias>/modes.nc``."""
+    return Path(folder) / choice.variant / f"{choice.mesh_law}-{choice.inertias}" / "modes.nc"
 
 
 def bodies_folder(folder: Path) -> Path:
