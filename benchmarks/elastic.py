@@ -20,6 +20,7 @@ from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.signals import Channels
 from exugear.dynamics.statics import accelerating_start
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.runs.extent import SAMPLE_RATE
 from exugear.runs.runup import BAND
@@ -44,10 +45,10 @@ def reductions(gearbox: Gearbox) -> list[dict[str, Any]]:
     """Unknowns, coordinates and seconds of every elastic body, reduced anew."""
     with tempfile.TemporaryDirectory() as folder:
         first, second = Path(folder) / "first", Path(folder) / "second"
-        assembly = assemble(gearbox, "flexible", stiffness_of(gearbox), folder=first)
+        assembly = assemble(gearbox, Choice("flexible"), stiffness_of(gearbox), folder=first)
         shutil.copytree(first, second)  # another folder, for the process remembers what it took from the first
         begin = time.perf_counter()
-        assemble(gearbox, "flexible", stiffness_of(gearbox), folder=second)
+        assemble(gearbox, Choice("flexible"), stiffness_of(gearbox), folder=second)
         again = time.perf_counter() - begin
         size = sum(file.stat().st_size for file in first.iterdir()) / 1e6
     rows = [
@@ -92,7 +93,7 @@ def steps(gearbox: Gearbox, rounds: int) -> list[dict[str, Any]]:
     }
     rows, systems = [], []
     for name, (case, variant) in cases.items():
-        assembly = assemble(case, variant, stiffness_of(case))
+        assembly = assemble(case, Choice(variant), stiffness_of(case))
         step = choose_step(assembly, SAMPLE_RATE, BAND)
         systems.append(_Steps(assembly, step))
         rows.append({"elastic": name, "coordinates": assembly.size, "step": step})
@@ -120,7 +121,7 @@ def frames(gearbox: Gearbox, rounds: int) -> list[dict[str, Any]]:
     }
     rows, systems = [], []
     for name, (case, variant) in cases.items():
-        assembly = assemble(case, variant, stiffness_of(case))
+        assembly = assemble(case, Choice(variant), stiffness_of(case))
         start = accelerating_start(assembly, LOAD)
         systems.append(exudyn_ways.system_of(assembly, start.q, start.v, LOAD))
         rows.append({"shaft": name, "coordinates": assembly.size})

@@ -21,6 +21,7 @@ from one_variant import LAW, show
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.modes import MOTIONS, Modes, counterparts, eigenmodes
 from exugear.dynamics.statics import locked_equilibrium
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.pictures.diagrams import plot_waterfalls
 from exugear.pictures.elastic_scene import animate_elastic_bodies, draw_elastic_bodies, elastic_scene
@@ -57,19 +58,19 @@ def main(out: Path) -> None:
     keep_case(gearbox, out)
     stiffness = mesh_stiffness(gearbox, LAW, out)
     bodies = bodies_folder(out)
-    modes = {variant: eigenmodes(gearbox, variant, stiffness, LAW, folder=bodies) for variant in VARIANTS}
+    modes = {variant: eigenmodes(gearbox, Choice(variant, LAW), stiffness, folder=bodies) for variant in VARIANTS}
     for variant, found in modes.items():
-        found.save(modes_path(out, variant, LAW, found.assembly.inertias))
-    shafts = eigenmodes(gearbox.varied(SHAFTS_ALONE), "flexible", stiffness, LAW, folder=bodies)
+        found.save(modes_path(out, Choice(variant, LAW, found.assembly.inertias)))
+    shafts = eigenmodes(gearbox.varied(SHAFTS_ALONE), Choice("flexible", LAW), stiffness, folder=bodies)
     print_modes(modes["bushing"], shafts, "bushing -> elastic shafts")
     print_modes(shafts, modes["flexible"], "elastic shafts -> carrier and housing elastic, too", SOLIDS_EXACT)
     print_main_shaft(modes["flexible"], stiffness, bodies)
     print_misalignments(gearbox, stiffness, bodies)
-    folder = modes_path(out, "flexible", LAW, modes["flexible"].assembly.inertias).parent
+    folder = modes_path(out, Choice("flexible", LAW, modes["flexible"].assembly.inertias)).parent
     draw_mode(shafts, bending_and_teeth(shafts), folder / "flexible-mode")
     lines, spectra, picks = order_lines(gearbox), {}, {}
     for variant in VARIANTS:
-        run = simulate(gearbox, variant, stiffness, out, mesh_law=LAW, progress=show)
+        run = simulate(gearbox, Choice(variant, LAW), stiffness, out, progress=show)
         spectra[variant] = run_waterfall(run.path)
         picks[variant] = pick_resonances(spectra[variant], lines, depth=LOUD)
         loudest = print_resonances(variant, picks[variant], modes[variant])
@@ -107,7 +108,7 @@ def print_modes(before: Modes, after: Modes, title: str, highest: float = np.inf
 def print_main_shaft(without: Modes, stiffness: Mapping[str, MeshData], folder: Path) -> None:
     """Print which modes the main shaft with hub and rotor moves and brings."""
     gearbox = without.assembly.gearbox.varied(MAIN_SHAFT)
-    found = eigenmodes(gearbox, "flexible", stiffness, LAW, folder=folder)
+    found = eigenmodes(gearbox, Choice("flexible", LAW), stiffness, folder=folder)
     print_modes(without, found, "flexible -> flexible with main shaft and rotor", MAIN_SHAFT_MODES)
 
 
@@ -127,7 +128,7 @@ def print_misalignment(
     title: str, gearbox: Gearbox, variant: str, stiffness: Mapping[str, MeshData], folder: Path
 ) -> None:
     """Print the misalignment of each mesh."""
-    assembly = assemble(gearbox, variant, stiffness, LAW, folder=folder)
+    assembly = assemble(gearbox, Choice(variant, LAW), stiffness, folder=folder)
     load = gearbox.case.static_load
     q = locked_equilibrium(assembly, load.torques_N_m, load.locked, assembly.mean_meshes)
     values = 1e6 * assembly.gear_positions(q)[:, 1]

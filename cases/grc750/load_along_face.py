@@ -17,6 +17,7 @@ from pathlib import Path
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.statics import locked_equilibrium
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.results.folder import bodies_folder
 from exugear.tooth_mesh.stiffness import mesh_stiffness
@@ -47,7 +48,7 @@ def main(out: Path) -> None:
         "flexible": (gearbox, "flexible"),
     }
     for name, (case, variant) in cases.items():
-        assembly = assemble(case, variant, surfaces, "table", folder=bodies_folder(out))
+        assembly = assemble(case, Choice(variant, "table"), surfaces, folder=bodies_folder(out))
         print(f"{name}: mesh, opening over the face in um, highest over mean line load")
         for mesh, opening, factor in loads_of_meshes(assembly, compliance):
             print(f"  {mesh:15s} {1e6 * opening:6.1f}  {factor:5.2f}", flush=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from exugear.dynamics.modes import eigenmodes
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.pictures.diagrams import plot_campbell, plot_waterfalls
 from exugear.results.folder import keep_case
@@ -25,8 +26,8 @@ def compute(variant: str, out: Path) -> None:
         _ = order.stored or order.fill()
     keep_case(gearbox, out)
     stiffness = mesh_stiffness(gearbox, LAW, out)
-    run = simulate(gearbox, variant, stiffness, out, mesh_law=LAW, progress=show)
-    modes = eigenmodes(gearbox, variant, stiffness, LAW)
+    run = simulate(gearbox, Choice(variant, LAW), stiffness, out, progress=show)
+    modes = eigenmodes(gearbox, Choice(variant, LAW), stiffness)
     modes.save(run.path.with_name("modes.nc"))
     spectra, lines = run_waterfall(run.path), order_lines(gearbox)
     picks = pick_resonances(spectra, lines)

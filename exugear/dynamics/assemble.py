@@ -25,6 +25,7 @@ from exugear.model.seats import node_position, seat_key
 from exugear.tooth_mesh.element import Angles, MeshData, mesh_elements, pack
 from fe_ste.tools.arrays import Floats
 
+
 def assemble(
     gearbox: Gearbox,
     choice: Choice,

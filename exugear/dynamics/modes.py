@@ -17,13 +17,13 @@ import scipy.optimize
 import xarray as xr
 from numpy.typing import NDArray
 
+from exugear.bodies.of_gearbox import ElasticBody
 from exugear.bodies.reduced_body import ReducedBody
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.linearised import RIGID_BODY_LIMIT, Linearised, growth_rate, linearise, undamped_modes
 from exugear.dynamics.statics import locked_equilibrium
-from exugear.bodies.of_gearbox import ElasticBody
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.versions import MODES

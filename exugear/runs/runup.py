@@ -13,9 +13,9 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
+from exugear.bodies.of_gearbox import ElasticBody
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
-from exugear.bodies.of_gearbox import ElasticBody
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.runs.extent import SAMPLE_RATE, check_duration, too_fine

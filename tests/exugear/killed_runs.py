@@ -19,6 +19,7 @@ from pathlib import Path
 import xarray as xr
 
 import fe_ste.tools.files
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.results.run_file import load_run
 from exugear.runs import runup
@@ -78,7 +79,7 @@ def check(case: Path, out: Path, solver: str, every: int) -> dict[str, object]:
 
     def simulate(folder: Path, resume: bool) -> runup.Run:
         options = {"load_case": "run_up", "mesh_law": "iso6336", "duration": DURATION, "solver": solver}
-        return runup.simulate(gearbox, "rigid", stiffness, folder, resume=resume, **options)
+        return runup.simulate(gearbox, Choice("rigid"), stiffness, folder, resume=resume, **options)
 
     def undisturbed() -> Path:
         return simulate(out / "whole", False).path
@@ -88,7 +89,7 @@ def check(case: Path, out: Path, solver: str, every: int) -> dict[str, object]:
         simulate(out / str(number), False)
 
     def taken_up(folder: Path) -> None:
-        directory = runup.run_directory(folder, "rigid", "run_up", "iso6336", "disc")
+        directory = runup.run_directory(folder, Choice("rigid", "iso6336", "disc", load_case="run_up"))
         found = simulate(folder, not runup.refuse_to_resume(directory))
         assert sorted(path.name for path in directory.iterdir()) == ["run.nc"], list(directory.iterdir())
         again = load_run(found.path)

@@ -14,14 +14,15 @@ from exugear.bearings import supports
 from exugear.bearings.supports import bearing_matrices, elastic_names
 from exugear.bodies.of_gearbox import check_elastic_body
 from exugear.cli.app import app
-from exugear.dynamics.assemble import assemble
 from exugear.dynamics.readiness import check_parts, lacking, remarks
 from exugear.model import reading as casefile
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import stiffness_matrix
 from exugear.results.folder import keep_case
 from exugear.tooth_mesh.tables import wanted_table
 
+from ..assembled import assembled
 from ..case_mutations import bases, toml_text
 
 FOR_PEOPLE = {"LoadCaseSection.description", "CatalogueSection.designation"}
@@ -62,7 +63,7 @@ def test_every_key_is_read(read_keys: set[tuple[str, str]], tmp_path: Path) -> N
             wanted_table(gearbox, pair, gearbox.ste.positions, gearbox.ste.grid)
         for variant in ("rigid", "bushing"):
             lacking(gearbox, variant)
-            assembly = assemble(gearbox, variant, {pair: np.array([1e9]) for pair in gearbox.pairs})
+            assembly = assembled(gearbox, Choice(variant), {pair: np.array([1e9]) for pair in gearbox.pairs})
             assert assembly.weight.shape == (assembly.size,)
         for support in (*gearbox.bearings, *gearbox.mounts):
             bearing_matrices(support, gearbox.case.damping.bearing_time_s)

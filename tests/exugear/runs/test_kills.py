@@ -14,6 +14,7 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from exugear.cli import app as cli
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.results.run_file import load_run
 from exugear.runs import runup
@@ -112,7 +113,7 @@ def test_a_full_disk_loses_nothing_that_was_written(
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(runup, "FLUSH_INTERVAL", 0.01 / runup.FLUSH_FACTOR[solver])
         stiffness = mesh_stiffness(gearbox, "iso6336")
-        again = runup.simulate(gearbox, "rigid", stiffness, tmp_path, resume=resume, **options)
+        again = runup.simulate(gearbox, Choice("rigid"), stiffness, tmp_path, resume=resume, **options)
     xr.testing.assert_identical(load_run(again.path), load_run(tmp_path / "whole" / DIRECTORY / "run.nc"))
     assert [path.name for path in (tmp_path / DIRECTORY).iterdir()] == ["run.nc"]
 
@@ -240,7 +241,7 @@ def stopped_run(case: Path, out: Path, **varied: float) -> Path:
     with pytest.MonkeyPatch.context() as patch, pytest.raises(MemoryError):
         patch.setattr(runup, "FLUSH_INTERVAL", 0.0015)
         options = {"load_case": "run_up", "mesh_law": "iso6336", "duration": 0.03, "progress": fail}
-        runup.simulate(gearbox, "rigid", mesh_stiffness(gearbox, "iso6336"), out, **options)
+        runup.simulate(gearbox, Choice("rigid"), mesh_stiffness(gearbox, "iso6336"), out, **options)
     return out / DIRECTORY / "run.partial"
 
 
