@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from fe_ste.tools.arrays import Floats
 from numpy.typing import NDArray
 
 from exugear.bodies.floating import FloatingBody
@@ -41,6 +40,7 @@ from exugear.kernels.turning import TurningArrays
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Bearing, Body
 from exugear.tooth_mesh.element import MeshElement, pack
+from fe_ste.tools.arrays import Floats
 
 
 class VariantError(ValueError):

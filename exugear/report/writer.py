@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from fe_ste.tools.arrays import Floats
 
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly, VariantError
@@ -54,6 +53,7 @@ from exugear.spectra.orders import order_lines
 from exugear.tooth_mesh.placement import MeshError
 from exugear.tooth_mesh.stiffness import iso6336_stiffness, mesh_stiffness
 from exugear.tooth_mesh.tables import fitting_table
+from fe_ste.tools.arrays import Floats
 from fe_ste.tools.files import FileError, write_file
 from fe_ste.tools.rendering import RenderingError
 from fe_ste.transmission_error.surface import SteSurface
