@@ -57,6 +57,7 @@ class Project:
     choice: Choice = Choice()
 
     def __post_init__(self) -> None:
+        """Fill in what the choice leaves open."""
         object.__setattr__(self, "folder", Path(self.folder))
         object.__setattr__(self, "choice", self.choice.of(self.gearbox))
 
@@ -96,12 +97,13 @@ class Project:
         return replace(self, choice=replace(self.choice, **changes))
 
     def __repr__(self) -> str:
+        """One line."""
         choice = self.choice
         chosen = ", ".join(str(what) for what in (choice.variant, choice.mesh_law, choice.inertias, choice.load_case))
         return f"Project({self.gearbox.name!r}, {self.folder}, {chosen})"
 
     def _repr_html_(self) -> str:
-        return f"<p>{html.escape(repr(self))}</p>{self.gearbox._repr_html_()}"
+        return f"<p>{html.escape(repr(self))}</p>"
 
     @property
     def modes_path(self) -> Path:

@@ -34,6 +34,7 @@ from exugear.cli.console import (
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
+    from exugear.bodies.of_gearbox import ElasticBody
     from exugear.dynamics.modes import Modes
     from exugear.model.gearbox import Gearbox
     from exugear.model.parts import PairSpec
@@ -291,6 +292,7 @@ def run(
     Ctrl-C keeps what was reached. Tables that are missing or do not fit the case are computed first.
     """
     with exit_codes():
+        from exugear.model.choice import Choice
         from exugear.runs.run_folder import refuse_if_busy, refuse_to_resume, run_directory
 
         gearbox = read_gearbox(case, files_below, scripts)
@@ -301,7 +303,7 @@ def run(
         _check_solver(gearbox, variant, solver)
         inertias = inertias or gearbox.case.default_inertias
         folder = _results_folder(case, out, make=not resume)
-        directory = run_directory(folder, variant.value, loads, mesh_law.value, inertias)
+        directory = run_directory(folder, Choice(variant.value, mesh_law.value, inertias, loads))
         refuse_if_busy(directory)
         if resume and (reason := refuse_to_resume(directory)):
             raise BadInputError(f"--resume: {reason}; run without it")
@@ -636,10 +638,12 @@ def _check_freedom(gearbox: Gearbox) -> None:
         )
 
 
-def _reduce_elastic_bodies(gearbox: Gearbox, folder: Path, variant: str, inertias: str | None) -> None:
-    """Reduce the elastic bodies of a variant behind a progress bar; kept, they are there at once when asked for."""
+def _reduce_elastic_bodies(
+    gearbox: Gearbox, folder: Path, variant: str, inertias: str | None
+) -> dict[str, ElasticBody]:
+    """Reduce the elastic bodies of a variant behind a progress bar, or find those that are kept."""
     if variant != Variant.flexible:
-        return
+        return {}
     from exugear.bearings.supports import elastic_names
     from exugear.bodies.of_gearbox import reduced_bodies
     from exugear.results.folder import bodies_folder
@@ -653,27 +657,28 @@ def _reduce_elastic_bodies(gearbox: Gearbox, folder: Path, variant: str, inertia
 
         try:
             with _model_errors():
-                reduced_bodies(gearbox, inertias or gearbox.case.default_inertias, bodies_folder(folder), begin)
+                inertia_set = inertias or gearbox.case.default_inertias
+                bodies = reduced_bodies(gearbox, inertia_set, bodies_folder(folder), begin)
         except BadInputError as error:  # a mesh that only reading shows to be none: the work has begun
             raise FailedError(error) from error
         bar.update(task, completed=bar.tasks[task].total)
+        return bodies
 
 
 def _compute_modes(gearbox: Gearbox, folder: Path, variant: str, law: str, inertias: str | None) -> tuple[Modes, Path]:
     from exugear.dynamics.modes import eigenmodes
-    from exugear.results.folder import bodies_folder, modes_path
+    from exugear.model.choice import Choice
+    from exugear.results.folder import modes_path
     from exugear.tooth_mesh.stiffness import mesh_stiffness
 
-    _reduce_elastic_bodies(gearbox, folder, variant, inertias)
+    bodies = _reduce_elastic_bodies(gearbox, folder, variant, inertias)
     with _model_errors():
-        found = eigenmodes(
-            gearbox, variant, mesh_stiffness(gearbox, law, folder), law, inertias, folder=bodies_folder(folder)
-        )
+        found = eigenmodes(gearbox, Choice(variant, law, inertias), mesh_stiffness(gearbox, law, folder), bodies)
     for name, body in found.assembly.elastic_bodies.items():
         figures = body.reduced.figures
         unknowns, took = sum(figures.unknowns.values()), figures.seconds
         note(f"{name}: {unknowns} unknowns reduced to {body.reduced.size} coordinates in {took:.1f} s")
-    return found, found.save(modes_path(folder, variant, law, found.assembly.inertias))
+    return found, found.save(modes_path(folder, found.assembly.choice))
 
 
 def _draw_campbell(found: Modes, path: Path) -> Path:
@@ -747,15 +752,17 @@ def _simulate(
     resume: bool,
 ) -> Run:
     """Run a load case behind a progress bar."""
+    from exugear.model.choice import Choice
     from exugear.runs.outcome import LimitError, RunError
     from exugear.runs.run_folder import refuse_to_resume, run_directory
     from exugear.runs.runup import simulate
     from exugear.tooth_mesh.stiffness import mesh_stiffness
 
-    directory = run_directory(folder, variant, load_case, law, inertias)
+    choice = Choice(variant, law, inertias, load_case)
+    directory = run_directory(folder, choice)
     if not resume and not refuse_to_resume(directory):
         note(f"{directory}: a stopped run is begun anew; --resume would have gone on from it")
-    _reduce_elastic_bodies(gearbox, folder, variant, inertias)
+    bodies = _reduce_elastic_bodies(gearbox, folder, variant, inertias)
     with progress_bar() as bar:
         task = bar.add_task(f"{variant}: start in balance", total=None)
 
@@ -768,12 +775,10 @@ def _simulate(
             with _model_errors():
                 return simulate(
                     gearbox,
-                    variant,
+                    choice,
                     mesh_stiffness(gearbox, law, folder),
                     folder,
-                    load_case=load_case,
-                    mesh_law=law,
-                    inertias=inertias,
+                    bodies=bodies,
                     duration=duration,
                     solver=solver,
                     resume=resume,

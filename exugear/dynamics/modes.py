@@ -23,7 +23,7 @@ from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.linearised import RIGID_BODY_LIMIT, Linearised, growth_rate, linearise, undamped_modes
-from exugear.dynamics.statics import locked_equilibrium
+from exugear.dynamics.statics import static_state
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.versions import MODES
@@ -197,10 +197,7 @@ def eigenmodes(
 
 def modes_of(assembly: Assembly, preload: bool = True) -> Modes:
     """Eigenmodes of an assembly, at its static load or (preload False) unloaded."""
-    load = assembly.gearbox.case.static_load
-    q = np.zeros(assembly.size)
-    if preload:
-        q = locked_equilibrium(assembly, load.torques_N_m, load.locked, assembly.mean_meshes)
+    q = static_state(assembly).q if preload else np.zeros(assembly.size)
     linear = linearise(assembly, q)
     frequency, shapes = undamped_modes(linear.mass, linear.total_stiffness, assembly.motions)
     if assembly.elastic_bodies:  # beyond the band the shafts' own vibrations are only what keeps their statics right

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 import math
 import sys
+import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -20,6 +23,7 @@ from fe_ste.tools.files import FileError, append_line, read_text, write_file
 CASE_FILE = "case.json"
 TIMES_FILE = "times.jsonl"
 REPORT_FILE = "report.html"
+_log = logging.getLogger(__name__)
 
 
 def keep_case(gearbox: Gearbox, folder: Path) -> None:
@@ -105,6 +109,17 @@ def peak_memory() -> float:
 def note_time(folder: Path, step: str, seconds: float) -> None:
     """Add a line to the folder's account of time; processes may do so at once."""
     append_line(folder / TIMES_FILE, json.dumps(asdict(Spent(step, round(seconds, 2), peak_memory()))))
+
+
+@contextmanager
+def time_noted(folder: Path, step: str) -> Iterator[None]:
+    """Note how long a step took, if it ended well; a folder that cannot be written then costs the note alone."""
+    start = time.perf_counter()
+    yield
+    try:
+        note_time(folder, step, time.perf_counter() - start)
+    except OSError as error:  # the work itself is done
+        _log.warning("The time that it took is not noted: %s", error)
 
 
 def times_spent(folder: Path) -> tuple[Spent, ...]:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from exugear.bearings import rollers as bearings
+from exugear.bearings import contact, matrices, rollers
 from exugear.bodies.of_gearbox import shaft_model
 from exugear.bodies.reduced_body import ReducedBody
 from exugear.bodies.turned_section import ShaftSection
@@ -191,9 +191,9 @@ def test_both_solvers_join_the_shaft_to_the_carrier_at_its_seat(flexible: Assemb
 
 def test_the_main_bearing_is_as_stiff_as_two_rows_whose_pressure_lines_meet_on_the_axis(with_shaft: Gearbox) -> None:
     angle = math.radians(11.0)
-    row = bearings.TaperedRollerBearing(bore=0.38, outside_diameter=0.56, width=0.09, contact_angle=angle)
-    pair = bearings.BearingPair(bearing=row, arrangement="X", row_distance=0.47 * math.tan(angle))
-    found = np.diag(bearings.axially_symmetric(bearings.pitch_averaged_tangent(pair, (200e3, 0.0, 0.0))))
+    row = rollers.TaperedRollerBearing(bore=0.38, outside_diameter=0.56, width=0.09, contact_angle=angle)
+    pair = rollers.BearingPair(bearing=row, arrangement="X", row_distance=0.47 * math.tan(angle))
+    found = np.diag(matrices.axially_symmetric(contact.pitch_averaged_tangent(pair, (200e3, 0.0, 0.0))))
     given = with_shaft.case.bearings["main_bearing"].stiffness
     assert given is not None
     assert given.radial_N_per_m == pytest.approx(found[0], rel=0.05)  # given with two digits

@@ -122,10 +122,11 @@ def test_stopped_run_resumes_where_it_was(
 KILLED = """
 import os, signal, sys
 import numpy as np
-import exugear.runs.runup as runup
-from exugear.gearbox import Gearbox
+from exugear.runs import recorder, runup
+from exugear.model.choice import Choice
+from exugear.model.gearbox import Gearbox
 
-runup.FLUSH_INTERVAL = 0.005
+recorder.FLUSH_INTERVAL = 0.005
 gearbox = Gearbox.from_toml(sys.argv[1])
 stiffness = {"sun_planet": 4e9, "ring_planet": 5e9, "intermediate": 3e9, "high_speed": 2e9}
 
@@ -133,7 +134,7 @@ def kill(progress):
     if progress.simulated > 0.012:
         os.kill(os.getpid(), signal.SIGKILL)
 
-runup.simulate(gearbox, "rigid", stiffness, sys.argv[2], duration=0.05, progress=kill)
+runup.simulate(gearbox, Choice("rigid"), stiffness, sys.argv[2], duration=0.05, progress=kill)
 """
 
 
@@ -300,7 +301,8 @@ def test_halving_the_step_changes_6_khz_amplitudes_by_less_than_one_percent(
     gearbox = grc.varied({"load_cases.fast": case})
     amplitudes = []
     for step in (2.5e-5, 1.25e-5):
-        run = simulate(gearbox, Choice("bushing", load_case="fast"), stiffness, tmp_path / str(step), duration=0.3, step=step, sample_rate=40e3)  # fmt: skip
+        choice, out = Choice("bushing", load_case="fast"), tmp_path / str(step)
+        run = simulate(gearbox, choice, stiffness, out, duration=0.3, step=step, sample_rate=40e3)
         data = opened(run.path).sel(time=slice(0.1, 0.29))
         values = data.mesh_dte.sel(mesh="high_speed").to_numpy()
         window = np.hanning(values.size)

@@ -143,11 +143,11 @@ def test_energy_that_a_coarse_step_loses_marks_the_run(tmp_path):
     gearbox = near.varied({"load_cases.run_up": {"torque_series": "jump.csv"}})
     stiffness = stiffness_of(gearbox)
     step = 0.92 * STABILITY_LIMIT / highest_rate(assemble(gearbox, Choice("rigid"), stiffness))
-    options = {"load_case": "run_up", "duration": 0.05}
+    options = {"duration": 0.05}
     coarse = {"step": step, "sample_rate": 1.0 / step}
     with pytest.raises(LimitError, match=r"energy: from t = .* not accounted for, up to [1-9]\d"):
         simulate(gearbox, Choice("rigid"), stiffness, tmp_path / "coarse", **coarse)
-    assert simulate(gearbox, Choice("rigid"), stiffness, tmp_path / "fine", **options).trusted
+    assert simulate(gearbox, Choice("rigid", load_case="run_up"), stiffness, tmp_path / "fine", **options).trusted
 
 
 def judged() -> Judge:
@@ -190,16 +190,18 @@ def test_a_resumed_run_keeps_its_verdict(tmp_path, monkeypatch):
     monkeypatch.setattr("exugear.runs.recorder.FLUSH_INTERVAL", 0.0125)
     gearbox = spur(REVERSED)
     stiffness = stiffness_of(gearbox)
-    options = {"load_case": "run_up", "duration": 0.2}
-    whole = simulate(gearbox, Choice("rigid"), stiffness, tmp_path / "whole", **options)
+    options = {"duration": 0.2}
+    whole = simulate(gearbox, Choice("rigid", load_case="run_up"), stiffness, tmp_path / "whole", **options)
 
     def press_ctrl_c(progress: Progress) -> None:
         if progress.simulated > 0.09:
             os.kill(os.getpid(), signal.SIGINT)
 
-    stopped = simulate(gearbox, Choice("rigid"), stiffness, tmp_path, **options, progress=press_ctrl_c)
+    stopped = simulate(
+        gearbox, Choice("rigid", load_case="run_up"), stiffness, tmp_path, **options, progress=press_ctrl_c
+    )
     assert not stopped.complete and not stopped.trusted
-    resumed = simulate(gearbox, Choice("rigid"), stiffness, tmp_path, **options, resume=True)
+    resumed = simulate(gearbox, Choice("rigid", load_case="run_up"), stiffness, tmp_path, **options, resume=True)
     assert resumed.complete and resumed.reasons == whole.reasons != ()
     one, other = (xr.load_dataset(run.path, engine="h5netcdf") for run in (whole, resumed))
     assert one.state_judgement.identical(other.state_judgement)
@@ -232,12 +234,14 @@ DIVERGED = """
 import sys
 import tomllib
 import numpy as np
-from exugear.assembly import assemble
-from exugear.compiled import CompiledSystem, LoadTable, Observer
-from exugear.channels import Channels
-from exugear.gearbox import Gearbox
-from exugear.kernels import add_mesh_forces
-from exugear.mesh_stiffness import mesh_stiffness
+from exugear.dynamics.assemble import assemble
+from exugear.solvers.compiled.solver import CompiledSystem, Observer
+from exugear.solvers.loads import LoadTable
+from exugear.dynamics.signals import Channels
+from exugear.model.choice import Choice
+from exugear.model.gearbox import Gearbox
+from exugear.kernels.meshes import add_mesh_forces
+from exugear.tooth_mesh.stiffness import mesh_stiffness
 
 sys.path.insert(0, sys.argv[1])
 from spur_case import SPUR_CASE
@@ -252,7 +256,7 @@ for gearbox, law, data in (
     (reference, "table", surfaces(reference)),
     (wobbling, "line_of_action", {name: k * np.ones(50) for name, k in mesh_stiffness(wobbling, "iso6336").items()}),
 ):
-    assembly = assemble(gearbox, "rigid", data, law)
+    assembly = assemble(gearbox, Choice("rigid", law), data)
     rest = np.zeros(assembly.size)
     system = CompiledSystem(assembly, rest, rest, LoadTable(), 1e-6)
     observer = Observer(Channels(assembly), LoadTable())
@@ -357,10 +361,10 @@ def test_a_step_that_is_asked_for_is_bounded_too(tmp_path):
 def test_what_a_run_writes_does_not_depend_on_its_buffers(tmp_path, monkeypatch):
     gearbox = spur()
     stiffness = stiffness_of(gearbox)
-    options = {"load_case": "run_up", "duration": 0.1}
-    plain = simulate(gearbox, Choice("rigid"), stiffness, tmp_path / "plain", **options).path
+    options = {"duration": 0.1}
+    plain = simulate(gearbox, Choice("rigid", load_case="run_up"), stiffness, tmp_path / "plain", **options).path
     monkeypatch.setattr("exugear.runs.extent.BUFFER_BYTES", 400_000)
-    small = simulate(gearbox, Choice("rigid"), stiffness, tmp_path / "small", **options).path
+    small = simulate(gearbox, Choice("rigid", load_case="run_up"), stiffness, tmp_path / "small", **options).path
     one, other = (xr.load_dataset(path, engine="h5netcdf") for path in (plain, small))
     assert one.overall_dte.identical(other.overall_dte)
     assert other.sizes["balance_time"] > one.sizes["balance_time"]  # it did write more often
