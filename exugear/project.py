@@ -47,7 +47,7 @@ class Project:
     --------
     >>> project = Project.from_toml("cases/grc750/gearbox.toml", choice=Choice("bushing", "iso6336"))
     >>> project
-    Project('GRC 750 kW wind turbine gearbox', results/grc750, bushing, iso6336, assemblies, reference)
+    Project('GRC 750 kW', results/grc750, bushing, iso6336, assemblies, reference)
     >>> project.chosen(variant="rigid").assembly().size
     8
     """

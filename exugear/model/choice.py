@@ -31,7 +31,7 @@ class Choice:
     --------
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
     >>> Choice("bushing").of(gearbox)
-    Choice(variant='bushing', mesh_law='line_of_action', inertias='gears', load_case='reference')
+    Choice(variant='bushing', mesh_law='line_of_action', inertias='assemblies', load_case='reference')
     """
 
     variant: str = "bushing"
