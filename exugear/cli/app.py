@@ -160,10 +160,10 @@ def check(case: CaseArgument, files_below: FilesBelowOption = None, as_json: Jso
         loads = _load_summaries(gearbox)
         variants = {variant: lacking(gearbox, variant) for variant in VARIANTS}
         if as_json:
-            summary = {"case": str(case), "name": gearbox.name, "ratio": gearbox.ratio, "pairs": pairs}
+            summary = {"case": str(case), "name": gearbox.name, "ratio": gearbox.train.ratio, "pairs": pairs}
             print_json({**summary, "load_cases": loads, "variants": variants, "warnings": remarks(gearbox)})
         else:
-            say(f"{gearbox.name}: no fault found, ratio {gearbox.ratio:.6f}")
+            say(f"{gearbox.name}: no fault found, ratio {gearbox.train.ratio:.6f}")
             print_table("Gear pairs", [_pair_row(pair) for pair in pairs])
             if loads:
                 title = f"Load cases, rolling at the overall input {gearbox.case.overall.input}"
@@ -628,7 +628,7 @@ def _check_solver(gearbox: Gearbox, variant: Variant, solver: Solver) -> None:
 
 def _check_freedom(gearbox: Gearbox) -> None:
     """Refuse to run a train whose speeds do not follow from one of them."""
-    freedoms = gearbox.kinematic_modes.shape[1]
+    freedoms = gearbox.train.degrees_of_freedom
     if freedoms > 1:
         raise BadInputError(
             f"{gearbox.source}: the gear train has {freedoms} degrees of freedom, and its runs do not work yet; "
@@ -685,7 +685,7 @@ def _draw_campbell(found: Modes, path: Path) -> Path:
     gearbox, least = found.assembly.gearbox, 1e-3
     shares = mobility_shares(found.to_dataset())
     seen = (found.frequency > 0.0) & (shares >= least)
-    highest = max(gearbox.mesh_frequencies(1.0).values())
+    highest = max(gearbox.train.mesh_frequencies(1.0).values())
     top = 1.1 * float(max(found.frequency[seen], default=1.0))
     picture = path.with_name("campbell.png")
     plot_campbell(

@@ -156,10 +156,10 @@ def _coupled(gearbox: Gearbox, body: str) -> set[str]:
 
 
 def _check_static_load(gearbox: Gearbox) -> None:
-    gearbox.static_mesh_forces()
+    gearbox.train.static_mesh_forces()
     if not gearbox.meshes:
         raise gearbox.fault("meshes: none is at work; a gearbox has at least one")
-    _ = gearbox.ratio
+    _ = gearbox.train.ratio
 
 
 def _check_told_once(gearbox: Gearbox) -> None:

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exugear.model.checks import check
 from exugear.model.named_files import LARGEST_TABLE, NOTHING_MORE, NamedFileError, Permissions, named_file
@@ -50,13 +49,12 @@ from exugear.model.sections import (
     PinSection,
     SteSection,
 )
+from exugear.train.train import Train
 from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.checks import GeometryError
 from fe_ste.geometry.gears import Gear, GearPair
 
 RPM = math.pi / 30.0
-UNLOADED = 1e-9
-"""Part of the largest load below which a mesh counts as unloaded: round-off of the balance."""
 DEEPEST_REMOVAL = 0.5
 """Most that a modification or an error may take off a flank, in normal modules: a tooth is 1.6 thick."""
 Section = TypeVar("Section")
@@ -70,7 +68,7 @@ class Gearbox:
     Examples
     --------
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
-    >>> round(gearbox.ratio, 6)
+    >>> round(gearbox.train.ratio, 6)
     81.490683
     >>> sorted(gearbox.pairs)
     ['high_speed', 'intermediate', 'ring_planet', 'sun_planet']
@@ -252,7 +250,7 @@ class Gearbox:
     @cached_property
     def pairs(self) -> dict[str, PairSpec]:
         """Gear pairs with the static torque on gear 1 that the train's statics give."""
-        forces = self.static_mesh_forces()
+        forces = self.train.static_mesh_forces()
         found = {}
         for name, pair in self.gear_pairs.items():
             section = self.case.pairs[name]
@@ -391,135 +389,32 @@ class Gearbox:
         """Load cases by name."""
         return self._all(self._load_case, self.case.load_cases)
 
-    # -- kinematics and statics of the spins -------------------------------------------------------------
-
     @cached_property
     def spinning(self) -> tuple[str, ...]:
         """Names of the bodies that can turn, in the order of the spin vector."""
         return tuple(body.name for body in self.bodies() if not body.fixed)
 
-    def mesh_row(self, mesh: Mesh) -> NDArray[np.float64]:
-        """Return how a mesh closes per unit spins: r_b1 (t1 - tf) +- r_b2 (t2 - tf), flank s = +1, m/rad.
-
-        Plus for an external pair, minus for an internal one; tf is the spin of the frame.
-        """
-        row = np.zeros(len(self.spinning))
-        first = mesh.pair.pinion.base_radius
-        second = mesh.pair.gear.base_radius * (-1.0 if mesh.pair.gear.internal else 1.0)
-        for name, value in ((mesh.pinion, first), (mesh.gear, second), (mesh.frame, -(first + second))):
-            if name in self.spinning:
-                row[self.spinning.index(name)] += value
-        return row
-
     @cached_property
-    def kinematic_modes(self) -> NDArray[np.float64]:
-        """Basis of rolling motions, (bodies, mobility): no mesh closes, no coupling twists."""
-        rows = np.vstack([self.spin_rows, np.zeros((1, len(self.spinning)))])
-        scale = np.abs(rows).max(axis=1, keepdims=True)
-        _, singular, basis = np.linalg.svd(rows / np.where(scale > 0, scale, 1.0))
-        rank = int(np.sum(singular > 1e-9 * singular[0]))
-        return basis[rank:].T
+    def train(self) -> Train:
+        """The gear train: how it rolls, and what its meshes carry in the static state.
 
-    def rolling_speeds(self, body: str, speed: float) -> dict[str, float]:
-        """Spins of all bodies (rad/s) in rolling motion when `body` turns at `speed`.
-
-        In a train of several degrees of freedom, locked bodies other than the overall input and output stand.
-
-        Raises
-        ------
-        CaseError
-            The train is not fixed by that, or the body does not turn with it.
+        Examples
+        --------
+        >>> train = Gearbox.from_toml("cases/grc750/gearbox.toml").train
+        >>> round(train.ratio, 6)
+        81.490683
         """
-        if body not in self.spinning:
-            raise self.fault(f"body {body!r} does not turn; bodies are {', '.join(self.spinning)}")
-        modes = self.kinematic_modes
-        if not modes.shape[1]:
-            raise self.fault("meshes: the gear train cannot turn, its meshes and couplings lock each other")
-        held = self._held_aside(body)
-        rows = modes[[self.spinning.index(name) for name in (body, *held)]]
-        wanted = np.array([speed, *(0.0 for _ in held)])
-        weights, _, rank, _ = np.linalg.lstsq(rows, wanted, rcond=1e-9)
-        if rank < modes.shape[1] or np.abs(rows @ weights - wanted).max() > 1e-9 * abs(speed):
-            raise self.fault(
-                f"the gear train has {modes.shape[1]} degrees of freedom; turning {', '.join((body, *held))} "
-                "does not fix it: name the bodies that are held in static_load.locked"
-            )
-        return dict(zip(self.spinning, (modes @ weights).tolist(), strict=True))
-
-    def _held_aside(self, body: str) -> tuple[str, ...]:
-        """Bodies that stand while `body` turns in a train of several degrees of freedom: the locked ones.
-
-        Not those that turn with it, with the input or with the output, such as a brake behind the output.
-        """
-        modes, overall = self.kinematic_modes, self.case.overall
-        if modes.shape[1] == 1:
-            return ()
-        turning = [modes[self.spinning.index(name)] for name in (body, overall.input, overall.output)]
-        return tuple(
-            name
-            for name in self.case.static_load.locked
-            if not any(_parallel(modes[self.spinning.index(name)], row) for row in turning)
+        overall, load = self.case.overall, self.case.static_load
+        return Train(
+            self.spinning,
+            self.meshes,
+            self.couplings,
+            overall.input,
+            overall.output,
+            load.torques_N_m,
+            load.locked,
+            self.fault,
         )
-
-    @cached_property
-    def ratio(self) -> float:
-        """Spin of the overall output per spin of the overall input."""
-        return self.rolling_speeds(self.case.overall.input, 1.0)[self.case.overall.output]
-
-    def mesh_frequencies(self, speed: float) -> dict[str, float]:
-        """Mesh frequency (Hz) of each mesh when the overall input turns at `speed` rad/s."""
-        spins = {GROUND: 0.0, **self.rolling_speeds(self.case.overall.input, speed)}
-        return {
-            mesh.name: abs(spins.get(mesh.pinion, 0.0) - spins.get(mesh.frame, 0.0))
-            * mesh.pair.pinion.teeth
-            / (2.0 * math.pi)
-            for mesh in self.meshes
-        }
-
-    def static_mesh_forces(self, torques: Mapping[str, float] | None = None) -> dict[str, float]:
-        """Line-of-action force F_bt of each mesh (N) in the static state, least-norm where planets share.
-
-        The sign says which flank of gear 1 carries: positive = the one that faces the sense of +z rotation.
-        `torques` default to the file's static load; the same bodies are locked.
-        """
-        load = self.case.static_load
-        torques = load.torques_N_m if torques is None else torques
-        for key, names in (("torques_N_m", tuple(torques)), ("locked", load.locked)):
-            for name in names:
-                if name not in self.spinning:
-                    raise self.fault(
-                        f"static_load.{key} = {name!r}: no such turning body; bodies are {', '.join(self.spinning)}"
-                    )
-        held = self.kinematic_modes[[self.spinning.index(name) for name in load.locked]]
-        if np.linalg.matrix_rank(held) < len(load.locked):
-            raise self.fault(
-                f"static_load.locked = {list(load.locked)}: more bodies than the train has freedoms, "
-                f"{self.kinematic_modes.shape[1]}; leave one out, for nothing says how they share the load"
-            )
-        applied = np.array([torques.get(name, 0.0) for name in self.spinning])
-        locks = np.array([[float(name == lock) for name in self.spinning] for lock in load.locked])
-        balance = np.vstack([self.spin_rows, locks.reshape(-1, len(self.spinning))]).T
-        forces = np.linalg.lstsq(balance, applied, rcond=1e-12)[0]
-        if np.abs(balance @ forces - applied).max() > 1e-9 * np.abs(applied).max():
-            raise self.fault(
-                f"static_load: the torques {dict(torques)} are not held by locking "
-                f"{', '.join(load.locked) or 'nothing'}"
-            )
-        least = (
-            UNLOADED * np.abs(applied).max() / min((mesh.pair.pinion.base_radius for mesh in self.meshes), default=1.0)
-        )
-        forces = np.where(np.abs(forces) > least, forces, 0.0)
-        return {mesh.name: float(force) for mesh, force in zip(self.meshes, forces, strict=False)}
-
-    @property
-    def spin_rows(self) -> NDArray[np.float64]:
-        """How meshes close and couplings twist per unit spins, (meshes and couplings, spins); m/rad, and 1."""
-        rows = [self.mesh_row(mesh) for mesh in self.meshes]
-        for coupling in self.couplings:
-            rows.append(
-                np.array([float(name == coupling.first) - float(name == coupling.second) for name in self.spinning])
-            )
-        return np.array(rows).reshape(-1, len(self.spinning))
 
     # -- from sections to data ---------------------------------------------------------------------------
 
@@ -728,8 +623,3 @@ def _copied(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {key: _copied(entry) for key, entry in value.items()}
     return list(value) if isinstance(value, list) else value
-
-
-def _parallel(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
-    """Tell whether two bodies' rows of the rolling motions are one up to a factor: they turn together."""
-    return bool(abs(one @ other) > (1.0 - 1e-9) * np.linalg.norm(one) * np.linalg.norm(other))

@@ -223,7 +223,7 @@ def mesh_elements(
     phases, orientation = tooth_places(gearbox, flanks)
     bodies = {body.name: body for body in gearbox.bodies(inertias)}
     time = gearbox.case.damping.mesh_time_s
-    static = gearbox.static_mesh_forces()
+    static = gearbox.train.static_mesh_forces()
     elements = []
     for mesh in gearbox.meshes:
         if mesh.pair.name not in stiffness:

@@ -277,7 +277,7 @@ def test_teeth_apart_and_tables_left_are_counted(grc: Gearbox, tables: dict, tmp
     run = simulate(unloaded, "rigid", tables, tmp_path, mesh_law="table", duration=0.01)
     data = xr.load_dataset(run.path, engine="h5netcdf")
     assert float(data["apart_time"].min()) == pytest.approx(0.01, rel=0.05)
-    heavy = grc.varied({"load_cases.reference.torques_N_m": {"carrier": 7.2e5, "hss": -7.2e5 / grc.ratio}})
+    heavy = grc.varied({"load_cases.reference.torques_N_m": {"carrier": 7.2e5, "hss": -7.2e5 / grc.train.ratio}})
     run = simulate(heavy, "rigid", tables, tmp_path / "heavy", mesh_law="table", duration=0.01)
     data = xr.load_dataset(run.path, engine="h5netcdf")
     assert float(data["outside_time"].min()) == pytest.approx(0.01, rel=0.05)
