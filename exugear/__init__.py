@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["CaseError", "Gearbox", "__version__", "eigenmodes", "simulate"]
 
 _HOMES = {
-    "CaseError": "exugear.model.gearbox",
+    "CaseError": "exugear.model.reading",
     "Gearbox": "exugear.model.gearbox",
     "eigenmodes": "exugear.dynamics.modes",
     "simulate": "exugear.runs.runup",

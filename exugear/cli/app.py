@@ -795,7 +795,7 @@ def _report_run(case: Path, finished: Run, as_json: bool) -> None:
         so_far = "".join(f"\nNot to be trusted so far: {reason}" for reason in finished.reasons)
         raise StoppedError(f"at {finished.end:.3f} s; kept in {finished.path}, --resume goes on from there{so_far}")
     from exugear.dynamics.signals import BALANCE_TERMS, energy_residual
-    from exugear.model.gearbox import RPM
+    from exugear.model.parts import RPM
     from exugear.results.run_file import MESH_TIMES, load_run
 
     data = load_run(finished.path, ("input_speed", *MESH_TIMES, *BALANCE_TERMS))
@@ -1008,7 +1008,7 @@ def _pair_row(pair: dict[str, Any]) -> dict[str, str]:
 def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
     """Sum up what each load case does to the rolling train; one that no run could take is bad input."""
     from exugear.loads.summary import doubts_about, summarise_loads
-    from exugear.model.gearbox import RPM
+    from exugear.model.parts import RPM
     from exugear.runs.extent import check_duration
 
     found = []

@@ -49,7 +49,7 @@ from exugear.kernels.table_law import TableArrays
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Body, Mesh
 from exugear.model.seats import node_position, seat_key
-from exugear.model.sections import GROUND
+from exugear.model.sections.entries import GROUND
 from exugear.tooth_mesh.placement import (
     MeshError,
     MeshGeometry,

@@ -15,7 +15,8 @@ from exugear.cli import app as cli
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.statics import accelerating_start
 from exugear.loads.summary import BURSTING_RIM_SPEED, LoadSummary, doubts_about, summarise_loads
-from exugear.model.gearbox import RPM, Gearbox
+from exugear.model.gearbox import Gearbox
+from exugear.model.parts import RPM
 from exugear.model.reading import CaseError
 from exugear.runs.runup import simulate
 

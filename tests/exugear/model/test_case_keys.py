@@ -16,9 +16,10 @@ from exugear.bodies.of_gearbox import check_elastic_body
 from exugear.cli.app import app
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.readiness import check_parts, lacking, remarks
-from exugear.model import reading as casefile
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import stiffness_matrix
+from exugear.model.sections import bodies, case, connections, entries, gears
+from exugear.model.sections.entries import Section
 from exugear.results.folder import keep_case
 from exugear.tooth_mesh.tables import wanted_table
 
@@ -28,22 +29,28 @@ FOR_PEOPLE = {"LoadCaseSection.description", "CatalogueSection.designation"}
 """Keys that stand in the file and its copy in the results for people to read."""
 
 
-def sections() -> list[type[Any]]:
-    return [kind for kind in vars(casefile).values() if isinstance(kind, type) and issubclass(kind, casefile._Section)]
+CASE_MODEL = (entries, gears, bodies, connections, case)
+"""Modules of the case model."""
+
+
+def sections() -> set[type[Any]]:
+    kinds = {kind for module in CASE_MODEL for kind in vars(module).values() if isinstance(kind, type)}
+    return {kind for kind in kinds if issubclass(kind, Section)}
 
 
 @pytest.fixture
 def read_keys(monkeypatch: pytest.MonkeyPatch) -> set[tuple[str, str]]:
     """Collect the keys that anything but the case model itself reads."""
     found: set[tuple[str, str]] = set()
-    plain = casefile._Section.__getattribute__
+    plain = Section.__getattribute__
+    own_files = {module.__file__ for module in CASE_MODEL}
 
     def noted(section: Any, name: str) -> Any:
-        if sys._getframe(1).f_code.co_filename != casefile.__file__:
+        if sys._getframe(1).f_code.co_filename not in own_files:
             found.add((type(section).__name__, name))
         return plain(section, name)
 
-    monkeypatch.setattr(casefile._Section, "__getattribute__", noted)
+    monkeypatch.setattr(Section, "__getattribute__", noted)
     return found
 
 
