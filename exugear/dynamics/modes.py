@@ -239,7 +239,7 @@ def overall_row(assembly: Assembly) -> Floats:
     radius = assembly.gearbox.gears[overall.output_gear].base_radius
     row = np.zeros(assembly.size)
     row[assembly.spin[overall.output]] += radius
-    row[assembly.spin[overall.input]] -= radius * assembly.gearbox.ratio
+    row[assembly.spin[overall.input]] -= radius * assembly.gearbox.train.ratio
     return row
 
 

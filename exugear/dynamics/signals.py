@@ -15,7 +15,7 @@ from exugear.kernels.inertia import InertiaArrays, kinetic_energies
 from exugear.kernels.meshes import STATE_SIZE, MeshArrays, mesh_state
 from exugear.kernels.springs import SpringArrays
 from exugear.kernels.turning import TurningArrays, turning_energies, turning_memory
-from exugear.model.sections import GROUND
+from exugear.model.sections.entries import GROUND
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import compiled
 

@@ -119,7 +119,7 @@ def _check_solver(gearbox: Gearbox, variant: Variant, solver: Solver) -> None:
 
 def _check_freedom(gearbox: Gearbox) -> None:
     """Refuse to run a train whose speeds do not follow from one of them."""
-    freedoms = gearbox.kinematic_modes.shape[1]
+    freedoms = gearbox.train.degrees_of_freedom
     if freedoms > 1:
         raise BadInputError(
             f"{gearbox.source}: the gear train has {freedoms} degrees of freedom, and its runs do not work yet; "
@@ -197,7 +197,7 @@ def _tell_run(case: Path, finished: Run, as_json: bool) -> None:
         so_far = "".join(f"\nNot to be trusted so far: {reason}" for reason in finished.reasons)
         raise StoppedError(f"at {finished.end:.3f} s; kept in {finished.path}, --resume goes on from there{so_far}")
     from exugear.dynamics.signals import BALANCE_TERMS, energy_residual
-    from exugear.model.gearbox import RPM
+    from exugear.model.parts import RPM
     from exugear.results.run_file import MESH_TIMES, load_run
 
     data = load_run(finished.path, ("input_speed", *MESH_TIMES, *BALANCE_TERMS))
