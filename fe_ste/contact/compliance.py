@@ -218,6 +218,11 @@ class SlicedCompliance:
         rows = BSpline.design_matrix(arc, self.knots, 3)
         return rows.indices.reshape(-1, 4)[:, 0].astype(np.int64), rows.data.reshape(-1, 4)
 
+    def __repr__(self) -> str:
+        """Return one short line."""
+        blocks, slices, _, splines, _ = self.table.shape
+        return f"<SlicedCompliance: {blocks} blocks, {slices} slices, {splines} splines over the profile>"
+
 
 def _contracted(block: Floats, at_slices: Floats, to_splines: Floats) -> Floats:
     """Turn nodal values on the flank grid (f l, f l) into spline coefficients at the slices (k, k, f, f)."""

@@ -19,6 +19,7 @@ from fe_ste.elasticity.hexmesh import MeshSettings, SectionMesh, SectorMesh, sec
 from fe_ste.elasticity.ring import open_chain_faces, ring_faces, uniform_faces
 from fe_ste.geometry.gears import Gear
 from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.notebook import html_table, value_range
 from fe_ste.tools.sparse import Backend, factorise
 from fe_ste.tools.threads import one_dense_thread
 
@@ -91,6 +92,28 @@ class FlankCompliance:
     def lead(self) -> float:
         """Slope d phi / d z of a generator in flank coordinates, rad/m."""
         return _flank_lead(self.gear, self.side)
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        flank = "counter-clockwise" if self.side > 0 else "clockwise"
+        extent = "closed ring" if self.closed else f"open sector of {2 * self.tooth_reach + 1} teeth"
+        return (
+            f"<FlankCompliance of {self.gear.name!r}: {flank} flank, "
+            f"{len(self.roll)} x {len(self.axial)} nodes, {extent}>"
+        )
+
+    def _repr_html_(self) -> str:
+        return html_table(
+            f"compliance of a flank of gear {self.gear.name}",
+            {
+                "flank": "counter-clockwise" if self.side > 0 else "clockwise",
+                "teeth": "closed ring" if self.closed else f"open sector of {2 * self.tooth_reach + 1}",
+                "nodes along the profile": str(len(self.roll)),
+                "nodes along the face": str(len(self.axial)),
+                "hand-over depth": value_range(self.depth, "mm", 1e3),
+            }
+            | {name.replace("_", " "): f"{value}" for name, value in self.figures.items()},
+        )
 
 
 def _flank_lead(gear: Gear, side: int) -> float:

@@ -114,6 +114,10 @@ class SectionMesh:
     minus_cut: Integers
     held: Integers
 
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<SectionMesh: {len(self.points)} nodes, {len(self.quads)} quadrilaterals>"
+
 
 @dataclass(frozen=True)
 class SectorMesh:
@@ -186,6 +190,10 @@ class SectorMesh:
         edges = corners[:, neighbours] - corners[:, :, None]
         edges = edges / np.linalg.norm(edges, axis=-1, keepdims=True)
         return np.asarray(np.linalg.det(edges).min(axis=1))
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<SectorMesh of {self.gear.name!r}: {len(self.points)} nodes, {len(self.hexahedra)} hexahedra>"
 
 
 def sector_mesh(gear: Gear, settings: MeshSettings | None = None) -> SectorMesh:

@@ -103,6 +103,11 @@ class OpenSector:
         element, face = self.contact_faces.T
         return np.asarray(self.hexahedra[element[:, None], HEXAHEDRON_FACES[face]])
 
+    def __repr__(self) -> str:
+        """Return one short line."""
+        nodes, elements, faces = len(self.points), len(self.hexahedra), len(self.tooth)
+        return f"<OpenSector: {nodes} nodes, {elements} hexahedra, {faces} contact faces>"
+
 
 @dataclass(frozen=True)
 class _Place:

@@ -407,6 +407,11 @@ class Bricks:
         count = np.bincount(self.nodes.ravel(), minlength=len(self.points))
         return np.asarray(total / np.maximum(count, 1)[:, None, None])
 
+    def __repr__(self) -> str:
+        """Return one short line."""
+        deformation = "finite" if self.finite else "small"
+        return f"<Bricks: {len(self.nodes)} elements, {len(self.points)} nodes, {deformation} deformation>"
+
 
 def von_mises(stress: Floats) -> Floats:
     """Equivalent stress after von Mises of stresses (..., 3, 3).

@@ -91,6 +91,10 @@ class Surface:
         quarter = np.linalg.norm(diagonals, axis=1) / 8.0
         return summed(self.local, np.repeat(quarter, 4), len(self.nodes))
 
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<Surface: {len(self.facets)} facets>"
+
 
 @dataclass(frozen=True)
 class WeightedGap:

@@ -95,6 +95,11 @@ class ContactModel:
     allowed_overlap: float = 0.0
     hub: TurningHub | None = None
 
+    def __repr__(self) -> str:
+        """Return one short line."""
+        facets = f"surfaces of {len(self.first.facets)} and {len(self.second.facets)} facets"
+        return f"<ContactModel: {len(self.bricks.nodes)} bricks, {len(self.bricks.points)} nodes, {facets}>"
+
 
 @dataclass(frozen=True)
 class NewtonSettings:
@@ -194,6 +199,11 @@ class Equilibrium:
     facing: Booleans
     hub: float
     iterations: tuple[Iteration, ...]
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        touching = np.count_nonzero(self.pressure)
+        return f"<Equilibrium: {touching} of {len(self.pressure)} nodes in contact, {len(self.iterations)} iterations>"
 
 
 @dataclass(frozen=True)

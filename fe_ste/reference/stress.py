@@ -63,6 +63,13 @@ class StressField:
         first = len(self.sectors[0].points)
         return slice(first, None) if number else slice(0, first)
 
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return (
+            f"<StressField of {self.pair.name!r}: pmc {self.pmc:.4g}, torque {self.torque:g} N m, {self.method}, "
+            f"von Mises up to {1e-6 * self.von_mises.max():.4g} MPa>"
+        )
+
 
 def stress_of_position(found: NonlinearPosition) -> StressField:
     """Stresses of a position of the reference analysis."""

@@ -24,6 +24,7 @@ from fe_ste.reference.finite_deformation import von_mises
 from fe_ste.reference.newton import EquilibriumError, Iteration, convergence_table
 from fe_ste.reference.position import NonlinearPosition, NonlinearSettings, nonlinear_position
 from fe_ste.tools.files import FileError, Layout, load_dataset, write_dataset
+from fe_ste.tools.notebook import html_table, value_range
 from fe_ste.tools.versions import NONLINEAR_TABLE
 from fe_ste.transmission_error.table import TableError
 
@@ -95,6 +96,10 @@ class NonlinearInput:
     def hash(self) -> str:
         """SHA-256 of the resolved input."""
         return hashlib.sha256(json.dumps(self.resolved(), sort_keys=True).encode()).hexdigest()
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<NonlinearInput of {self.pair.name!r}: {self.positions} positions, torque {self.torque:g} N m>"
 
 
 @dataclass(frozen=True)
@@ -219,6 +224,25 @@ class NonlinearTable:
         for tooth, share in found.load_share.items():
             dataset["load_share"].loc[{"pmc": dataset["pmc"][number], "tooth": tooth}] = share
         return NonlinearTable(dataset)
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        solved, torque = int(self.dataset["converged"].sum()), value_range(self.dataset["torque"], "N m")
+        pair, positions = self.dataset.attrs["pair"], self.dataset.sizes["pmc"]
+        return f"<NonlinearTable of {pair!r}: {solved} of {positions} positions solved, torque {torque}>"
+
+    def _repr_html_(self) -> str:
+        return html_table(
+            f"gear pair {self.dataset.attrs['pair']} by the reference analysis",
+            {
+                "positions solved": f"{int(self.dataset['converged'].sum())} of {self.dataset.sizes['pmc']}",
+                "torque": value_range(self.dataset["torque"], "N m"),
+                "static transmission error": value_range(self.dataset["ste"], "um", 1e6),
+                "mesh stiffness": value_range(self.dataset["mesh_stiffness"], "N/um", 1e-6),
+                "positions that failed": str(len(self.failures)),
+                "input": self.input_hash[:12],
+            },
+        )
 
 
 def _figures(found: NonlinearPosition) -> dict[str, float]:

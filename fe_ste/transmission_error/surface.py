@@ -17,6 +17,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.notebook import html_table, value_range
 
 STENCIL = 4
 """Nodes of an axis that act between two of them."""
@@ -280,6 +281,24 @@ class SteSurface:
                     f"{_halved(self.centre_distance)[c]:.6g} m, misalignment {_halved(self.misalignment)[a]:.4g} rad, "
                     "between the nodes of the table: lay more of them"
                 )
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return (
+            f"<SteSurface: {len(self.coefficients)} positions, {value_range(self.centre_distance, 'mm', 1e3)}, "
+            f"{value_range(self.misalignment, 'urad', 1e6)}, force up to {self.root_force[-1] ** 2:.5g} N>"
+        )
+
+    def _repr_html_(self) -> str:
+        return html_table(
+            "surface of the static transmission error",
+            {
+                "position in the mesh cycle": f"{len(self.coefficients)} positions",
+                "centre distance": value_range(self.centre_distance, "mm", 1e3),
+                "misalignment": value_range(self.misalignment, "urad", 1e6),
+                "line-of-action force": value_range(self.root_force**2, "N"),
+            },
+        )
 
 
 def _load_slopes(root: Floats, nodes: Floats, tangent: Floats) -> Floats:
