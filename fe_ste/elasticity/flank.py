@@ -210,8 +210,8 @@ def _flank_compliance(
     for (read, loaded), cut_faces in faces.items():
         regular[read, loaded] = sector.displacement(read == loaded, *cut_faces)
         if read == loaded:
-            own = regular[read, loaded] - near
-            regular[read, loaded] = (own + own.T) / 2
+            remainder = regular[read, loaded] - near
+            regular[read, loaded] = (remainder + remainder.T) / 2
     return FlankCompliance(
         gear=gear,
         side=side,
@@ -410,10 +410,10 @@ class _CondensedSector:
             torque += minus @ by_load[middle][read] + plus @ by_load[middle][read + 1]
         return faces, torque
 
-    def displacement(self, own: bool, minus: Floats, plus: Floats) -> Floats:
+    def displacement(self, loaded: bool, minus: Floats, plus: Floats) -> Floats:
         """Compliance (read node, loaded node): at depth under tent loads on the own tooth, on the surface elsewhere."""
         half = len(minus)
-        if own:
+        if loaded:
             nodal = self.fixed_depth + self.static_depth[:, :half] @ minus + self.static_depth[:, half:] @ plus
             return np.asarray(nodal @ self.weights)
         return np.asarray(self.static_surface[:, :half] @ minus + self.static_surface[:, half:] @ plus)

@@ -213,15 +213,15 @@ class NonlinearTable:
         pmc = number / wanted.positions
         others = [line for line in self.failures if not line.startswith(f"position {pmc:.4g} ")]
         try:
-            found = nonlinear_position(wanted.pair, wanted.torque, pmc, wanted.settings, report)
+            position = nonlinear_position(wanted.pair, wanted.torque, pmc, wanted.settings, report)
         except EquilibriumError as error:
             dataset.attrs["failures"] = "\n".join([*others, str(error)])
             return NonlinearTable(dataset)
         dataset.attrs["failures"] = "\n".join(others)
-        dataset.attrs["convergence"] += f"position {pmc:.4g}\n{convergence_table(found.equilibrium.iterations)}\n"
-        for name, value in _figures(found).items():
+        dataset.attrs["convergence"] += f"position {pmc:.4g}\n{convergence_table(position.equilibrium.iterations)}\n"
+        for name, value in _figures(position).items():
             dataset[name].values[number, 0] = value
-        for tooth, share in found.load_share.items():
+        for tooth, share in position.load_share.items():
             dataset["load_share"].loc[{"pmc": dataset["pmc"][number], "tooth": tooth}] = share
         return NonlinearTable(dataset)
 
@@ -245,21 +245,21 @@ class NonlinearTable:
         )
 
 
-def _figures(found: NonlinearPosition) -> dict[str, float]:
-    equilibrium, model = found.equilibrium, found.model
-    force = found.torque / found.pair.pinion.base_radius
+def _figures(position: NonlinearPosition) -> dict[str, float]:
+    equilibrium, model = position.equilibrium, position.model
+    force = position.torque / position.pair.pinion.base_radius
     inside, edge = equilibrium.pressure[equilibrium.facing], equilibrium.mean_pressure[~equilibrium.facing]
     stress = model.bricks.nodal_stress(equilibrium.displacement, equilibrium.modes)
     return {
-        "ste": found.ste,
-        "mesh_stiffness": force / found.ste,
+        "ste": position.ste,
+        "mesh_stiffness": force / position.ste,
         "line_of_action_force": force,
         "max_pressure": inside.max(initial=0.0),
         "edge_pressure": edge.max(initial=0.0),
         "max_von_mises": von_mises(stress).max(),
-        "unknowns": found.unknowns,
+        "unknowns": position.unknowns,
         "iterations": len(equilibrium.iterations),
-        "wall_time": found.wall_time,
+        "wall_time": position.wall_time,
         "converged": True,
     }
 
@@ -267,11 +267,11 @@ def _figures(found: NonlinearPosition) -> dict[str, float]:
 def _without_results(wanted: NonlinearInput) -> xr.Dataset:
     """Table of the right shape with no position solved."""
     names, shape = ("pmc", "torque"), (wanted.positions, 1)
-    whole = ("unknowns", "iterations")
+    counts = ("unknowns", "iterations")
     teeth = np.arange(wanted.settings.teeth) - wanted.settings.teeth // 2
-    floats = [name for name in _UNITS if name not in {*names, *whole, "tooth", "converged", "load_share"}]
+    floats = [name for name in _UNITS if name not in {*names, *counts, "tooth", "converged", "load_share"}]
     variables: dict[str, Any] = {name: (names, np.full(shape, np.nan)) for name in floats}
-    variables |= {name: (names, np.zeros(shape, dtype=np.int64)) for name in whole}
+    variables |= {name: (names, np.zeros(shape, dtype=np.int64)) for name in counts}
     variables["converged"] = (names, np.zeros(shape, dtype=np.bool_))
     variables["load_share"] = ((*names, "tooth"), np.full((*shape, len(teeth)), np.nan))
     axes = {

@@ -66,11 +66,11 @@ class PairCompliance:
         reach, outermost = _teeth_in_contact(pair, flanks)
         teeth = np.arange(-outermost, outermost + 1)
         senses = (1, 1 if pair.gear.internal else -1)
-        one, two = (
+        pinion, gear = (
             SlicedCompliance.from_flank(flank, axial, sense, teeth, reach)
             for flank, sense in zip(flanks, senses, strict=True)
         )
-        return cls(pair, flanks, contact, axial, teeth, reach, (one, two))
+        return cls(pair, flanks, contact, axial, teeth, reach, (pinion, gear))
 
     def at_centre_distance(self, centre_distance: float) -> PairCompliance:
         """Return the same gears at another operating centre distance."""
@@ -165,10 +165,10 @@ def pair_compliance(
     -------
     PairCompliance
     """
-    one, two = (
+    pinion, gear = (
         flank_compliance(
-            gear, side, mesh, open_teeth=open_teeth, incompatible_modes=incompatible_modes, backend=backend
+            wheel, side, mesh, open_teeth=open_teeth, incompatible_modes=incompatible_modes, backend=backend
         )
-        for gear, side in ((pair.pinion, 1), (pair.gear, -1 if pair.gear.internal else 1))
+        for wheel, side in ((pair.pinion, 1), (pair.gear, -1 if pair.gear.internal else 1))
     )
-    return PairCompliance.from_flanks(pair, (one, two), contact)
+    return PairCompliance.from_flanks(pair, (pinion, gear), contact)

@@ -110,8 +110,8 @@ class StateAxes:
         misalignments = np.atleast_1d(np.asarray(misalignment, dtype=float))
         if not np.isfinite(misalignments).all():
             raise ValueError(f"misalignment = {misalignment}: must be finite angles in rad")
-        own = pair.centre_distance if centre_distance is None else centre_distance
-        distances = np.atleast_1d(np.asarray(own, dtype=float))
+        distances_asked = pair.centre_distance if centre_distance is None else centre_distance
+        distances = np.atleast_1d(np.asarray(distances_asked, dtype=float))
         for distance in distances:
             pair.with_centre_distance(float(distance))  # refuses before the finite elements, not after
         return cls(positions, torques, distances, misalignments)
