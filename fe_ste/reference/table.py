@@ -23,8 +23,9 @@ from fe_ste.geometry.gears import GearPair
 from fe_ste.reference.finite_deformation import von_mises
 from fe_ste.reference.newton import EquilibriumError, Iteration, convergence_table
 from fe_ste.reference.position import NonlinearPosition, NonlinearSettings, nonlinear_position
-from fe_ste.tools.files import FileError, Layout, load_dataset, write_dataset
+from fe_ste.tools.files import FileError
 from fe_ste.tools.notebook import html_table, value_range
+from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
 from fe_ste.tools.versions import NONLINEAR_TABLE
 from fe_ste.transmission_error.table import TableError
 

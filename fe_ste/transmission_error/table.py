@@ -25,8 +25,9 @@ from fe_ste.elasticity.flank import HANDOVER_DEPTH, FlankCompliance, flank_compl
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.gears import Gear, GearPair
-from fe_ste.tools.files import FileError, Layout, load_dataset, write_dataset
+from fe_ste.tools.files import FileError
 from fe_ste.tools.notebook import html_table, value_range
+from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
 from fe_ste.tools.versions import TABLE
 from fe_ste.tools.workers import Workers
 from fe_ste.transmission_error.compliance import PairCompliance

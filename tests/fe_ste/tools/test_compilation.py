@@ -20,7 +20,7 @@ COMPILING = "Compiling kernels"
 
 CALLEE = "from fe_ste.tools.compilation import compiled\n\n@compiled\ndef doubled(x):\n    return 2.0 * x\n"
 CALLER = """
-from fe_ste.compilation import compiled
+from fe_ste.tools.compilation import compiled
 from small.callee import doubled
 
 @compiled
@@ -76,7 +76,7 @@ def test_the_contact_s_near_field_follows_its_half_space(tmp_path: Path) -> None
     shutil.copytree(ROOT / "fe_ste", tmp_path / "fe_ste", ignore=shutil.ignore_patterns("__pycache__"))
     expression = "fe_ste.contact.compliance._mean_inverse_distance(0.0, 0.0, 1e-4, 1e-4)"
     before, _ = printed(expression, tmp_path)
-    halfspace = tmp_path / "fe_ste" / "halfspace.py"
+    halfspace = tmp_path / "fe_ste" / "elasticity" / "halfspace.py"
     text = halfspace.read_text(encoding="utf-8")
     start = text.index("return ", text.index("def rectangle_integral("))
     halfspace.write_text(f"{text[:start]}return 2.0 * {text[start + len('return ') :]}", encoding="utf-8")
