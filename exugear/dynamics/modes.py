@@ -29,7 +29,7 @@ from exugear.model.gearbox import Gearbox
 from exugear.model.versions import MODES
 from exugear.tooth_mesh.element import Angles, MeshData
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.files import Layout, load_dataset, write_dataset
+from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
 
 RIGID_COORDINATES = ("x", "y", "z", "tilt_x", "tilt_y", "spin")
 FREE_ROTATION = "free rotation of the train"
