@@ -10,14 +10,15 @@ from exugear.cli.errors import BadInputError, FailedError, model_errors
 from exugear.cli.options import Variant
 
 if TYPE_CHECKING:
+    from exugear.bodies.of_gearbox import ElasticBody
     from exugear.dynamics.modes import Modes
     from exugear.model.gearbox import Gearbox
 
 
-def reduce_elastic_bodies(gearbox: Gearbox, folder: Path, variant: str, inertias: str | None) -> None:
-    """Reduce the elastic bodies of a variant behind a progress bar; kept, they are there at once when asked for."""
+def reduce_elastic_bodies(gearbox: Gearbox, folder: Path, variant: str, inertias: str | None) -> dict[str, ElasticBody]:
+    """Reduce the elastic bodies of a variant behind a progress bar, or find those that are kept."""
     if variant != Variant.flexible:
-        return
+        return {}
     from exugear.bearings.supports import elastic_names
     from exugear.bodies.of_gearbox import reduced_bodies
     from exugear.results.folder import bodies_folder
@@ -31,28 +32,29 @@ def reduce_elastic_bodies(gearbox: Gearbox, folder: Path, variant: str, inertias
 
         try:
             with model_errors():
-                reduced_bodies(gearbox, inertias or gearbox.case.default_inertias, bodies_folder(folder), begin)
+                inertia_set = inertias or gearbox.case.default_inertias
+                bodies = reduced_bodies(gearbox, inertia_set, bodies_folder(folder), begin)
         except BadInputError as error:  # a mesh that only reading shows to be none: the work has begun
             raise FailedError(error) from error
         bar.update(task, completed=bar.tasks[task].total)
+        return bodies
 
 
 def compute_modes(gearbox: Gearbox, folder: Path, variant: str, law: str, inertias: str | None) -> tuple[Modes, Path]:
     """Compute the eigenmodes of a variant and store them; elastic bodies come first."""
     from exugear.dynamics.modes import eigenmodes
-    from exugear.results.folder import bodies_folder, modes_path
+    from exugear.model.choice import Choice
+    from exugear.results.folder import modes_path
     from exugear.tooth_mesh.stiffness import mesh_stiffness
 
-    reduce_elastic_bodies(gearbox, folder, variant, inertias)
+    bodies = reduce_elastic_bodies(gearbox, folder, variant, inertias)
     with model_errors():
-        found = eigenmodes(
-            gearbox, variant, mesh_stiffness(gearbox, law, folder), law, inertias, folder=bodies_folder(folder)
-        )
+        found = eigenmodes(gearbox, Choice(variant, law, inertias), mesh_stiffness(gearbox, law, folder), bodies)
     for name, body in found.assembly.elastic_bodies.items():
         figures = body.reduced.figures
         unknowns, took = sum(figures.unknowns.values()), figures.seconds
         note(f"{name}: {unknowns} unknowns reduced to {body.reduced.size} coordinates in {took:.1f} s")
-    return found, found.save(modes_path(folder, variant, law, found.assembly.inertias))
+    return found, found.save(modes_path(folder, found.assembly.choice))
 
 
 def label_of(found: Modes) -> str:

@@ -53,7 +53,7 @@ def fill_tables(orders: list[TableOrder]) -> dict[str, MeshTable]:
 def _fill_table(order: TableOrder, bar: Progress, task: TaskID) -> MeshTable:
     from fe_ste.geometry.checks import GeometryError
     from fe_ste.tools.sparse import FactorisationError
-    from fe_ste.transmission_error.grid import SweepError
+    from fe_ste.transmission_error.grid import GridError
 
     before = bar.tasks[task].completed
     bar.update(task, description=f"{order.name}: finite elements")
@@ -69,7 +69,7 @@ def _fill_table(order: TableOrder, bar: Progress, task: TaskID) -> MeshTable:
         return order.fill(at_state)
     except GeometryError as error:
         raise BadInputError(f"pairs.{order.name}: {error}") from error
-    except (FactorisationError, SweepError) as error:
+    except (FactorisationError, GridError) as error:
         raise FailedError(f"{order.name}: {error}") from error
 
 

@@ -84,6 +84,7 @@ def run(
     Ctrl-C keeps what was reached. Tables that are missing or do not fit the case are computed first.
     """
     with exit_codes():
+        from exugear.model.choice import Choice
         from exugear.runs.run_folder import refuse_if_busy, refuse_to_resume, run_directory
 
         gearbox = read_gearbox(case, files_below, scripts)
@@ -95,7 +96,7 @@ def run(
         _check_mesh_route(mesh_route, variant, solver)
         inertias = inertias or gearbox.case.default_inertias
         folder = results_folder(case, out, make=not resume)
-        directory = run_directory(folder, variant.value, loads, mesh_law.value, inertias)
+        directory = run_directory(folder, Choice(variant.value, mesh_law.value, inertias, loads))
         refuse_if_busy(directory)
         if resume and (reason := refuse_to_resume(directory)):
             raise BadInputError(f"--resume: {reason}; run without it")
@@ -160,7 +161,7 @@ def _check_mesh_route(route: MeshRoute, variant: Variant, solver: Solver) -> Non
 
 def _check_freedom(gearbox: Gearbox) -> None:
     """Refuse to run a train whose speeds do not follow from one of them."""
-    freedoms = gearbox.kinematic_modes.shape[1]
+    freedoms = gearbox.train.degrees_of_freedom
     if freedoms > 1:
         raise BadInputError(
             f"{gearbox.source}: the gear train has {freedoms} degrees of freedom, and its runs do not work yet; "
@@ -191,15 +192,17 @@ def _simulate(
     resume: bool,
 ) -> Run:
     """Run a load case behind a progress bar."""
+    from exugear.model.choice import Choice
     from exugear.runs.outcome import LimitError, RunError
     from exugear.runs.run_folder import refuse_to_resume, run_directory
     from exugear.runs.runup import simulate
     from exugear.tooth_mesh.stiffness import mesh_stiffness
 
-    directory = run_directory(folder, variant, load_case, law, inertias)
+    choice = Choice(variant, law, inertias, load_case)
+    directory = run_directory(folder, choice)
     if not resume and not refuse_to_resume(directory):
         note(f"{directory}: a stopped run is begun anew; --resume would have gone on from it")
-    reduce_elastic_bodies(gearbox, folder, variant, inertias)
+    bodies = reduce_elastic_bodies(gearbox, folder, variant, inertias)
     with progress_bar() as bar:
         task = bar.add_task(f"{variant}: start in balance", total=None)
 
@@ -212,12 +215,10 @@ def _simulate(
             with model_errors():
                 return simulate(
                     gearbox,
-                    variant,
+                    choice,
                     mesh_stiffness(gearbox, law, folder),
                     folder,
-                    load_case=load_case,
-                    mesh_law=law,
-                    inertias=inertias,
+                    bodies=bodies,
                     duration=duration,
                     solver=solver,
                     mesh_route=mesh_route,
@@ -240,7 +241,7 @@ def _tell_run(case: Path, finished: Run, as_json: bool) -> None:
         so_far = "".join(f"\nNot to be trusted so far: {reason}" for reason in finished.reasons)
         raise StoppedError(f"at {finished.end:.3f} s; kept in {finished.path}, --resume goes on from there{so_far}")
     from exugear.dynamics.signals import BALANCE_TERMS, energy_residual
-    from exugear.model.gearbox import RPM
+    from exugear.model.parts import RPM
     from exugear.results.run_file import MESH_TIMES, load_run
 
     data = load_run(finished.path, ("input_speed", *MESH_TIMES, *BALANCE_TERMS))
