@@ -17,32 +17,21 @@ from typing import Literal
 import numpy as np
 import xarray as xr
 
-from exugear.model.gearbox import Gearbox
+from exugear import Choice, Project
 from exugear.results.run_file import load_run
-from exugear.runs.runup import simulate
-from exugear.tooth_mesh.stiffness import mesh_stiffness
 
-LAW = "iso6336"
+CASE = Path(__file__).with_name("gearbox.toml")
+CHOICE = Choice("bushing", "iso6336")
 ROUTES: tuple[Literal["element", "loads"], ...] = ("element", "loads")
 SIGNALS = ("input_speed", "overall_dte", "mesh_force", "support_force", "kinetic_energy", "elastic_energy")
 
 
 def main(out: Path, duration: float = 0.02) -> dict[str, float]:
     """Run a simulated time (s) both ways, print, and return the largest difference of each signal over its largest."""
-    gearbox = Gearbox.from_toml(Path(__file__).with_name("gearbox.toml"))
-    stiffness = mesh_stiffness(gearbox, LAW)
     runs = {}
     for route in ROUTES:
-        run = simulate(
-            gearbox,
-            "bushing",
-            stiffness,
-            out / route,
-            mesh_law=LAW,
-            duration=duration,
-            solver="exudyn",
-            mesh_route=route,
-        )
+        project = Project.from_toml(CASE, out / route, CHOICE)
+        run = project.run(duration=duration, solver="exudyn", mesh_route=route)
         runs[route] = load_run(run.path, SIGNALS)
         print(f"{route:8s} {duration:g} s simulated in {run.wall:5.1f} s ({runs[route].attrs['solver']})", flush=True)
     differences = {name: difference(runs["element"][name], runs["loads"][name]) for name in SIGNALS}

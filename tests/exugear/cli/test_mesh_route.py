@@ -15,11 +15,11 @@ from typer.testing import CliRunner
 
 from exugear.cli.app import app
 from exugear.cli.verbs.run import MeshRoute
-from exugear.model.gearbox import Gearbox
+from exugear.model.choice import Choice
+from exugear.project import Project
 from exugear.results.run_file import load_run
 from exugear.runs.runup import simulate
 from exugear.solvers.exudyn_model import system
-from exugear.tooth_mesh.stiffness import mesh_stiffness
 
 from ..spur_case import SPUR_CASE
 from ..table_case import surfaces
@@ -74,12 +74,11 @@ def test_both_routes_give_the_same_run_and_each_file_says_which_it_was(case, tmp
 def test_both_routes_give_the_same_run_of_a_whole_gearbox(grc, stiffness, tmp_path, law):
     """By the law whose force is not along its deflection, and by that which knows how gears stand."""
     data = surfaces(grc) if law == "table" else stiffness
-    options = {"mesh_law": law, "duration": 0.003, "solver": "exudyn"}
+    choice, options = Choice("bushing", law), {"duration": 0.003, "solver": "exudyn"}
     runs = [
-        load_run(simulate(grc, "bushing", data, tmp_path / route, mesh_route=route, **options).path, SIGNALS)
-        for route in ("element", "loads")
+        simulate(grc, choice, data, tmp_path / route, mesh_route=route, **options) for route in ("element", "loads")
     ]
-    assert_same_run(*runs)
+    assert_same_run(*(load_run(run.path, SIGNALS) for run in runs))
 
 
 @pytest.mark.parametrize(
@@ -108,17 +107,8 @@ def test_elastic_bodies_are_refused(tmp_path):
 
 
 def test_a_stopped_run_does_not_go_on_by_the_other_route(case, tmp_path):
-    gearbox = Gearbox.from_toml(case)
-    stopped = simulate(
-        gearbox,
-        "bushing",
-        mesh_stiffness(gearbox, "iso6336"),
-        tmp_path,
-        load_case="run_up",
-        mesh_law="iso6336",
-        duration=2.0,
-        progress=lambda at: os.kill(os.getpid(), signal.SIGINT),
-    )
+    project = Project.from_toml(case, tmp_path, Choice("bushing", "iso6336"))
+    stopped = project.run(duration=2.0, progress=lambda at: os.kill(os.getpid(), signal.SIGINT))
     assert not stopped.complete
     options = ("--variant", "bushing", "--duration", 2.0, "--solver", "exudyn", "--mesh-route", "loads", "--resume")
     outcome = run(case, tmp_path, *options)
