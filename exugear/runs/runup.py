@@ -77,7 +77,7 @@ def simulate(
     angles : {"reference", "operating"}
         Angles of the law `seed`.
     mesh_route : {"element", "loads"}
-        See `exugear.solvers.exudyn_model.system`; "loads" is Exudyn's alone.
+        See `exugear.solvers.exudyn_model.system`; "loads" is Exudyn's alone, for the variants bushing and jointed.
     resume : bool
         Go on with a run that was stopped.
     progress : callable, optional
@@ -118,8 +118,9 @@ def simulate(
         if too_fine(step, total, sample_rate):
             raise gearbox.fault(f"{fastest_motion(assembly)}; {too_fine(step, total, sample_rate)}")
     with held(directory):
-        recorder = Recorder(assembly, case, directory, total, step, band, sample_rate, chosen, resume, progress)
-        return recorder.run(mesh_route)
+        return Recorder(
+            assembly, case, directory, total, step, band, sample_rate, chosen, resume, progress, mesh_route
+        ).run()
 
 
 def _solver(asked: str | None, assembly: Assembly, mesh_route: str) -> str:
