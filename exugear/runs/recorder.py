@@ -30,7 +30,8 @@ from exugear.runs.extent import buffer_rows, check_disk, sample_bytes, too_fine
 from exugear.runs.outcome import LimitError, Progress, Run, RunError
 from exugear.runs.run_folder import refuse_to_resume
 from exugear.runs.trust import Judge
-from exugear.solvers.compiled.solver import CompiledSystem, Observer
+from exugear.solvers.compiled.observers import Observer
+from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.compiled.step import highest_rate, unstable
 from exugear.solvers.loads import DriveLaw, LoadTable
 from fe_ste.tools.arrays import Floats

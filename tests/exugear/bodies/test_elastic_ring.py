@@ -16,7 +16,8 @@ from exugear.dynamics.signals import Channels, energy_residual
 from exugear.dynamics.statics import accelerating_start, locked_equilibrium
 from exugear.model.gearbox import Gearbox
 from exugear.runs.runup import simulate
-from exugear.solvers.compiled.solver import CompiledSystem, Observer
+from exugear.solvers.compiled.observers import Observer
+from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.exudyn_model.system import ExudynSystem
 from exugear.solvers.loads import Loading, LoadTable
 

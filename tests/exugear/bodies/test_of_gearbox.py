@@ -17,7 +17,8 @@ from exugear.dynamics.statics import accelerating_start, locked_equilibrium
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
 from exugear.pictures.elastic_scene import animate_elastic_bodies, draw_elastic_bodies, elastic_scene
-from exugear.solvers.compiled.solver import CompiledSystem, Observer
+from exugear.solvers.compiled.observers import Observer
+from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.exudyn_model.system import ExudynSystem
 from exugear.solvers.loads import Loading, LoadTable
 

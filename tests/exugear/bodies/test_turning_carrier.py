@@ -19,7 +19,8 @@ from exugear.dynamics.signals import Channels
 from exugear.dynamics.statics import accelerating_start, locked_equilibrium
 from exugear.model.gearbox import Gearbox
 from exugear.model.named_files import Permissions
-from exugear.solvers.compiled.solver import CompiledSystem, Observer
+from exugear.solvers.compiled.observers import Observer
+from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.exudyn_model.system import ExudynSystem
 from exugear.solvers.loads import Loading, LoadTable
 

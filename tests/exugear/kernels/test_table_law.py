@@ -20,7 +20,8 @@ from exugear.dynamics.statics import locked_equilibrium
 from exugear.kernels.meshes import add_mesh_forces
 from exugear.model.gearbox import Gearbox
 from exugear.runs.runup import simulate
-from exugear.solvers.compiled.solver import CompiledSystem, Observer
+from exugear.solvers.compiled.observers import Observer
+from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.loads import LoadTable
 from exugear.tooth_mesh.element import pack
 from fe_ste.transmission_error.surface import SteSurface

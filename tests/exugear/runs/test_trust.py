@@ -230,12 +230,14 @@ DIVERGED = """
 import sys
 import tomllib
 import numpy as np
-from exugear.assembly import assemble
-from exugear.compiled import CompiledSystem, LoadTable, Observer
-from exugear.channels import Channels
-from exugear.gearbox import Gearbox
-from exugear.kernels import add_mesh_forces
-from exugear.mesh_stiffness import mesh_stiffness
+from exugear.dynamics.assemble import assemble
+from exugear.solvers.compiled.observers import Observer
+from exugear.solvers.compiled.solver import CompiledSystem
+from exugear.solvers.loads import LoadTable
+from exugear.dynamics.signals import Channels
+from exugear.model.gearbox import Gearbox
+from exugear.kernels.meshes import add_mesh_forces
+from exugear.tooth_mesh.stiffness import mesh_stiffness
 
 sys.path.insert(0, sys.argv[1])
 from spur_case import SPUR_CASE

@@ -20,7 +20,8 @@ from exugear.results.run_file import load_run
 from exugear.runs.outcome import RunError
 from exugear.runs.recorder import _loading
 from exugear.runs.runup import simulate
-from exugear.solvers.compiled.solver import CompiledSystem, Observer, refusal
+from exugear.solvers.compiled.observers import Observer
+from exugear.solvers.compiled.solver import CompiledSystem, refusal
 from exugear.solvers.compiled.step import choose_step, highest_rate
 from exugear.solvers.exudyn_model.system import ExudynSystem, exudyn
 from exugear.solvers.loads import DriveLaw, Loading, LoadTable
