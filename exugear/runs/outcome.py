@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -31,6 +34,36 @@ class Progress:
     def speed(self) -> float:
         """Simulated seconds per second of wall time."""
         return self.simulated / self.wall if self.wall > 0.0 else 0.0
+
+
+class ProgressMeter:
+    """Teller of how far a run is.
+
+    Parameters
+    ----------
+    begin, end : float
+        Simulated time at the start and at the end, s.
+    tell : callable, optional
+        Called with each `Progress`.
+    """
+
+    def __init__(self, begin: float, end: float, tell: Callable[[Progress], None] | None) -> None:
+        self._begin, self._end = begin, end
+        self._tell = tell
+        self._wall_start = time.perf_counter()
+
+    @property
+    def wall(self) -> float:
+        """Wall time since the start, s."""
+        return time.perf_counter() - self._wall_start
+
+    def reach(self, now: float) -> None:
+        """Tell that the run has reached a simulated time, s."""
+        if self._tell is None:
+            return
+        wall, done = self.wall, now - self._begin
+        remaining = wall * (self._end - now) / done if done > 0.0 else math.inf
+        self._tell(Progress(now, self._end, wall, remaining))
 
 
 @dataclass(frozen=True)

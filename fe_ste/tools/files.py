@@ -14,7 +14,7 @@ import os
 import secrets
 import stat
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -391,16 +391,26 @@ def open_dataset(path: Path, layout: Layout) -> Iterator[xr.Dataset]:
             yield dataset
 
 
-def load_dataset(path: Path, layout: Layout) -> xr.Dataset:
+def load_dataset(path: Path, layout: Layout, names: Sequence[str] | None = None) -> xr.Dataset:
     """Read a sealed netCDF file into memory.
+
+    Parameters
+    ----------
+    path : Path
+    layout : Layout
+    names : sequence of str, optional
+        Variables; all by default.
 
     Raises
     ------
     FileError
-        As `open_dataset`.
+        As `open_dataset`, or a variable is not there.
     """
     with open_dataset(path, layout) as dataset:
-        return dataset.load()
+        for name in names or ():
+            if name not in dataset.variables:
+                raise FileError(f"{path}: holds no {name}")
+        return dataset.load() if names is None else dataset[list(names)].load()
 
 
 @contextmanager

@@ -119,10 +119,11 @@ def test_stopped_run_resumes_where_it_was(
 KILLED = """
 import os, signal, sys
 import numpy as np
-import exugear.runs.runup as runup
-from exugear.gearbox import Gearbox
+from exugear.model.gearbox import Gearbox
+from exugear.runs import recorder
+from exugear.runs.runup import simulate
 
-runup.FLUSH_INTERVAL = 0.005
+recorder.FLUSH_INTERVAL = 0.005
 gearbox = Gearbox.from_toml(sys.argv[1])
 stiffness = {"sun_planet": 4e9, "ring_planet": 5e9, "intermediate": 3e9, "high_speed": 2e9}
 
@@ -130,7 +131,7 @@ def kill(progress):
     if progress.simulated > 0.012:
         os.kill(os.getpid(), signal.SIGKILL)
 
-runup.simulate(gearbox, "rigid", stiffness, sys.argv[2], duration=0.05, progress=kill)
+simulate(gearbox, "rigid", stiffness, sys.argv[2], duration=0.05, progress=kill)
 """
 
 
