@@ -21,6 +21,7 @@ from timing import CASE, Cost, median, median_row, peak_memory, result, say, sta
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.statics import accelerating_start
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.runs.extent import SAMPLE_RATE
 from exugear.runs.runup import BAND, simulate
@@ -205,7 +206,7 @@ def amplitude_errors(gearbox: Gearbox) -> list[dict[str, Any]]:
     order = gearbox.mesh_frequencies(math.pi / 30.0)["high_speed"]
     rows = []
     for variant in ("rigid", "bushing"):
-        assembly = assemble(gearbox, variant, stiffness_of(gearbox))
+        assembly = assemble(gearbox, Choice(variant), stiffness_of(gearbox))
         exact = {f: excitation_amplitudes(assembly, f / order, 2.5e-6, "RK4") for f in FREQUENCIES}
         kinds = [("RK4", step) for step in (5e-5, 2.5e-5, STEP, 1.25e-5)]
         others = [(method, STEP) for method in (RUNGE_KUTTA, FULL_NEWTON, MODIFIED_NEWTON)]
@@ -318,7 +319,7 @@ def growth(rounds: int) -> list[dict[str, Any]]:
     rows, load = [], {"carrier": 50e3}
     for planets, stages in models:
         gearbox = synthetic(planets, stages)
-        assembly = assemble(gearbox, "bushing", stiffness_of(gearbox))
+        assembly = assemble(gearbox, Choice("bushing"), stiffness_of(gearbox))
         begin = accelerating_start(assembly, load)
         q, v = np.zeros((2, 10000, assembly.size))
         own, others = [], []
@@ -358,12 +359,12 @@ def run_up(variant: str, duration: float) -> dict[str, Any]:
     """Run up with results stored, in this process."""
     gearbox = Gearbox.from_toml(CASE)
     with tempfile.TemporaryDirectory() as directory:
-        simulate(gearbox, variant, stiffness_of(gearbox), directory, duration=0.01)  # loads the compiled code
+        simulate(gearbox, Choice(variant), stiffness_of(gearbox), directory, duration=0.01)  # loads the compiled code
         runs = []
         cost = timed(
-            lambda: runs.append(simulate(gearbox, variant, stiffness_of(gearbox), directory, duration=duration))
+            lambda: runs.append(simulate(gearbox, Choice(variant), stiffness_of(gearbox), directory, duration=duration))
         )
-        assembly = assemble(gearbox, variant, stiffness_of(gearbox))
+        assembly = assemble(gearbox, Choice(variant), stiffness_of(gearbox))
         step = choose_step(assembly, SAMPLE_RATE, BAND)
         return {
             "variant": variant,
@@ -406,7 +407,7 @@ def run_ups(rounds: int, duration: float) -> dict[str, Any]:
 def measure(quick: bool) -> dict[str, Any]:
     """Everything."""
     gearbox = Gearbox.from_toml(CASE)
-    assembly = assemble(gearbox, "bushing", stiffness_of(gearbox))
+    assembly = assemble(gearbox, Choice("bushing"), stiffness_of(gearbox))
     rounds = 1 if quick else 5
     return {
         "rounds": rounds,
@@ -431,7 +432,7 @@ def main() -> None:
         found = run_up(options.run_up, options.duration)
     else:
         gearbox = Gearbox.from_toml(CASE)
-        way = ways(assemble(gearbox, "bushing", stiffness_of(gearbox)), quick=True)[options.way]
+        way = ways(assemble(gearbox, Choice("bushing"), stiffness_of(gearbox)), quick=True)[options.way]
         way.cost_of(way.steps)
         found = {"peak_memory_MB": peak_memory()}
     sys.stdout.write(json.dumps(found))

@@ -326,7 +326,7 @@ class SignalLayout:
     @cached_property
     def count(self) -> int:
         """Columns of a sample."""
-        return max(columns.stop for columns in self._slices.values())
+        return int(max(columns.stop for columns in self._slices.values()))
 
     def __contains__(self, name: str) -> bool:
         """Tell whether a signal has columns."""
@@ -352,7 +352,7 @@ class SignalLayout:
         240
         """
         stored = (signal for signal in self.signals if signal.is_sampled and signal.stored)
-        return sum(int(np.dtype(signal.kind).itemsize) * math.prod(self.shape(signal)) for signal in stored)
+        return sum(np.dtype(signal.kind).itemsize * math.prod(self.shape(signal)) for signal in stored)
 
     def values(self, name: str, rows: Floats) -> Floats:
         """Values (samples, ...) of a signal in samples (samples, columns), with its dimensions after time."""

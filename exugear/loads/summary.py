@@ -12,11 +12,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from fe_ste.tools.arrays import Floats
 
 from exugear.loads.torque_series import torque_series
 from exugear.model.gearbox import UNLOADED, Gearbox
 from exugear.model.parts import LoadCase
+from fe_ste.tools.arrays import Floats
 
 Series = Mapping[str, tuple[Floats, Floats]]
 BURSTING_RIM_SPEED = 300.0

@@ -29,7 +29,7 @@ from fe_ste.tools.files import FileError, Layout, load_dataset, write_dataset
 from fe_ste.tools.versions import TABLE
 from fe_ste.tools.workers import Workers
 from fe_ste.transmission_error.compliance import PairCompliance
-from fe_ste.transmission_error.grid import Checkpoint, Submits, sweep_states
+from fe_ste.transmission_error.grid import Checkpoint, Submits, solve_grid
 from fe_ste.transmission_error.search import unloaded_states
 from fe_ste.transmission_error.states import RESULTS, STATE_AXES, StateAxes
 
@@ -137,7 +137,7 @@ class MeshTable:
         ------
         ValueError, GeometryError
             As in `fe_ste.static_transmission_error`.
-        SweepError
+        GridError
             If workers are lost.
         """
         pair = wanted.pair
@@ -149,7 +149,7 @@ class MeshTable:
         with ExitStack() as owned:
             if executor is None and math.prod(axes.shape) > _STATES_IN_PROCESS:
                 executor = owned.enter_context(Workers())
-            dataset = sweep_states(compliance, axes, executor=executor, checkpoint=checkpoint, progress=progress)
+            dataset = solve_grid(compliance, axes, executor=executor, checkpoint=checkpoint, progress=progress)
         dataset = dataset.assign(unloaded_states(compliance, axes))
         dataset.attrs |= _attributes(wanted, compliance)
         return cls(dataset)

@@ -19,6 +19,7 @@ from pathlib import Path
 import xarray as xr
 
 import fe_ste.tools.files
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.results.run_file import load_run
 from exugear.runs import recorder, runup
@@ -28,6 +29,7 @@ from exugear.tooth_mesh.stiffness import mesh_stiffness
 
 CALLS = ("open", "fsync", "replace", "unlink", "rmdir", "mkdir")
 DURATION = 0.024
+CHOICE = Choice("rigid", "iso6336", "disc", "run_up")
 
 
 def kill_at(number: int) -> None:
@@ -79,8 +81,8 @@ def check(case: Path, out: Path, solver: str, every: int) -> dict[str, object]:
     recorder.FLUSH_INTERVAL = DURATION / 2.5 / recorder.FLUSH_FACTOR[solver]
 
     def simulate(folder: Path, resume: bool) -> Run:
-        options = {"load_case": "run_up", "mesh_law": "iso6336", "duration": DURATION, "solver": solver}
-        return runup.simulate(gearbox, "rigid", stiffness, folder, resume=resume, **options)
+        options = {"duration": DURATION, "solver": solver}
+        return runup.simulate(gearbox, CHOICE, stiffness, folder, resume=resume, **options)
 
     def undisturbed() -> Path:
         return simulate(out / "whole", False).path
@@ -90,7 +92,7 @@ def check(case: Path, out: Path, solver: str, every: int) -> dict[str, object]:
         simulate(out / str(number), False)
 
     def taken_up(folder: Path) -> None:
-        directory = run_directory(folder, "rigid", "run_up", "iso6336", "disc")
+        directory = run_directory(folder, CHOICE)
         found = simulate(folder, not refuse_to_resume(directory))
         assert sorted(path.name for path in directory.iterdir()) == ["run.nc"], list(directory.iterdir())
         again = load_run(found.path)

@@ -12,14 +12,15 @@ import pytest
 from typer.testing import CliRunner
 
 from exugear.cli.app import app
-from exugear.dynamics.assemble import assemble
 from exugear.dynamics.modes import eigenmodes
 from exugear.dynamics.readiness import check_parts, lacking, remarks
 from exugear.dynamics.statics import locked_equilibrium
 from exugear.loads.summary import summarise_loads
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
 
+from ..assembled import assembled, modes_with_bodies
 from ..case_mutations import bases, toml_text
 
 ISO = {"sun_planet": np.array([3.8e9]), "ring_planet": np.array([4.9e9])}
@@ -82,7 +83,7 @@ def test_planets_share_the_load_of_the_carrier(case: Any, count: int) -> None:
 def test_meshes_carry_what_statics_say_under_any_load(case: Any, variant: str, count: int, torque: float) -> None:
     # Rounding of springs of 1e10 N/m is 1e-6 N: under 1 N m it is not below 1e-9 of the load.
     gearbox = case("planetary", **equal_planets(count), static_load__torques_N_m={"carrier": torque}, pins={})
-    assembly = assemble(gearbox, variant, ISO)
+    assembly = assembled(gearbox, Choice(variant), ISO)
     q = locked_equilibrium(assembly, {"carrier": torque}, ["shaft"], assembly.mean_meshes)
     found = assembly.mesh_states(q, np.zeros_like(q), assembly.mean_meshes)[:, 4]
     expected = sum(abs(force) for force in gearbox.static_mesh_forces().values())
@@ -96,7 +97,7 @@ def test_a_brake_that_is_locked_holds_the_train_as_its_shaft_would(case: Any) ->
     assert gearbox.static_mesh_forces() == pytest.approx(plain.static_mesh_forces(), rel=1e-9)
     stiffness = {name: np.array([3e9]) for name in gearbox.pairs}
     for variant in ("rigid", "bushing"):
-        held, free = (eigenmodes(one, variant, stiffness).frequency for one in (gearbox, plain))
+        held, free = (modes_with_bodies(one, Choice(variant), stiffness).frequency for one in (gearbox, plain))
         assert held == pytest.approx(free, rel=1e-6, abs=1e-3)
 
 
@@ -106,8 +107,8 @@ def test_balanced_torques_need_no_lock(case: Any) -> None:
     held = case("spur")
     stiffness = {"spur": np.array([2e8])}
     assert free.static_mesh_forces() == pytest.approx(held.static_mesh_forces())
-    assert eigenmodes(free, "bushing", stiffness).frequency == pytest.approx(
-        eigenmodes(held, "bushing", stiffness).frequency, rel=1e-6, abs=1e-3
+    assert eigenmodes(free, Choice("bushing"), stiffness).frequency == pytest.approx(
+        eigenmodes(held, Choice("bushing"), stiffness).frequency, rel=1e-6, abs=1e-3
     )
 
 
@@ -139,7 +140,7 @@ def test_a_differential_has_modes_and_says_that_it_has_no_runs(
     gearbox = case("planetary", **DIFFERENTIAL, **static)
     assert any("2 degrees of freedom" in line for line in remarks(gearbox))
     for variant in ("rigid", "bushing"):
-        assert (eigenmodes(gearbox, variant, ISO).frequency < 0.1).sum() == 2
+        assert (modes_with_bodies(gearbox, Choice(variant), ISO).frequency < 0.1).sum() == 2
     file = tmp_path / "case.toml"
     file.write_text(toml_text(dict(gearbox.content)), encoding="utf-8")
     outcome = exugear("run", file, "--variant", "rigid", "--mesh-law", "iso6336", "--out", tmp_path / "out")
@@ -153,7 +154,7 @@ def test_a_held_carrier_of_a_train_that_turns_has_modes(case: Any) -> None:
     gearbox = case("planetary", **DIFFERENTIAL, **held)
     assert gearbox.ratio == pytest.approx(-99.0 / 21.0, rel=1e-12)  # Willis, the carrier at rest
     for variant in ("rigid", "bushing"):
-        assert (eigenmodes(gearbox, variant, ISO).frequency < 0.1).sum() == 2
+        assert (modes_with_bodies(gearbox, Choice(variant), ISO).frequency < 0.1).sum() == 2
 
 
 @pytest.mark.parametrize(

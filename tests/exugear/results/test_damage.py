@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 from exugear.cli import app as cli
 from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.modes import load_modes
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
 from exugear.results.folder import kept_case, times_spent
@@ -143,7 +144,7 @@ def test_the_hashes_of_runs_and_modes_differ_by_their_methods(monkeypatch: pytes
 
     gearbox = Gearbox.from_toml(Path(__file__).parents[3] / "cases" / "grc750" / "gearbox.toml")
     stiffness = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
-    assembly = assemble(gearbox, "rigid", stiffness)
+    assembly = assemble(gearbox, Choice("rigid"), stiffness)
     before = input_hash(assembly), input_hash(assembly, "reference")
     monkeypatch.setattr("exugear.dynamics.fingerprint.RUN", 1000)
     assert input_hash(assembly) == before[0]

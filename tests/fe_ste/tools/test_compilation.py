@@ -20,7 +20,7 @@ COMPILING = "Compiling kernels"
 
 CALLEE = "from fe_ste.tools.compilation import compiled\n\n@compiled\ndef doubled(x):\n    return 2.0 * x\n"
 CALLER = """
-from fe_ste.compilation import compiled
+from fe_ste.tools.compilation import compiled
 from small.callee import doubled
 
 @compiled
@@ -178,9 +178,9 @@ def foreign_names(source: str, without_kernels: set[str]) -> Iterator[str]:
 def test_compiled_functions_read_only_what_the_digest_covers() -> None:
     """Constants of a module without kernels would be frozen into machine code that outlives their change."""
     sources = {
-        f"{package}.{file.stem}": file.read_text(encoding="utf-8")
+        ".".join(file.relative_to(ROOT).with_suffix("").parts): file.read_text(encoding="utf-8")
         for package in ("fe_ste", "exugear")
-        for file in (ROOT / package).glob("*.py")
+        for file in (ROOT / package).rglob("*.py")
     }
     with_kernels = {name: text for name, text in sources.items() if "fe_ste.tools.compilation import" in text}
     assert {"fe_ste.contact.compliance", "exugear.solvers.compiled.equations"} <= set(with_kernels)

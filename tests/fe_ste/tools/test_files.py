@@ -168,8 +168,8 @@ import resource, sys
 from pathlib import Path
 import numpy as np
 import xarray as xr
-from fe_ste.files import append_line, write_dataset, write_file
-from fe_ste.plots import finish_figure, new_figure
+from fe_ste.tools.files import append_line, write_dataset, write_file
+from fe_ste.tools.drawing import finish_figure, new_figure
 
 folder = Path(sys.argv[1])
 data = xr.Dataset({"a": ("x", np.random.default_rng(1).random(20000))})
@@ -208,7 +208,7 @@ FAILING = """
 import errno, io, sys
 import h5netcdf
 import numpy as np
-from fe_ste.files import ErrorKeeper
+from fe_ste.tools.files import ErrorKeeper
 
 
 class Full(io.BytesIO):
@@ -263,7 +263,7 @@ def test_a_streamed_file_is_sealed_like_others(tmp_path: Path) -> None:
 HOLDING = """
 import sys, time
 from pathlib import Path
-from fe_ste.files import exclusive
+from fe_ste.tools.files import exclusive
 
 with exclusive(Path(sys.argv[1]), "the run"):
     print("held", flush=True)
@@ -290,7 +290,7 @@ import sys
 from pathlib import Path
 import numpy as np
 import xarray as xr
-from fe_ste.files import write_dataset
+from fe_ste.tools.files import write_dataset
 
 attributes = {"title": "", "method_version": 3}
 for n in range(12):
