@@ -34,7 +34,7 @@ class Variable:
     long_name : str
         What it is, where the name does not say it.
     sign_convention : str
-        What a positive value means, where it can have both signs.
+        What a positive value means, where it can have either sign.
     kind : str
         Type in the file, as NumPy writes it.
     """
@@ -125,7 +125,7 @@ SIGNALS = (
         "mesh_dte",
         ("time", "mesh"),
         "m",
-        sign_convention="flanks approach",
+        sign_convention="the loaded flanks approach",
         kind="f4",
         filled_by=("observe_meshes", "observe_table"),
     ),
@@ -133,7 +133,7 @@ SIGNALS = (
         "mesh_force",
         ("time", "mesh"),
         "N",
-        sign_convention="loaded flanks press",
+        sign_convention="the loaded flank pushes",
         kind="f4",
         filled_by=("observe_meshes", "observe_table"),
     ),
@@ -174,7 +174,7 @@ SIGNALS = (
         "centre_distance_change",
         ("time", "mesh"),
         "m",
-        sign_convention="axes further apart than in the drawing",
+        sign_convention="axes further apart than nominal",
         kind="f4",
         filled_by=("observe_gear_positions", "observe_table"),
         laws="table",
@@ -183,7 +183,7 @@ SIGNALS = (
         "misalignment",
         ("time", "mesh"),
         "rad",
-        sign_convention="gap opens at the +z end",
+        sign_convention="the gap opens at the +z end",
         kind="f4",
         filled_by=("observe_gear_positions", "observe_table"),
         laws="table",
@@ -202,7 +202,7 @@ SIGNALS = (
         "work_of_loads",
         ("balance_time",),
         "J",
-        sign_convention="into the gearbox",
+        sign_convention="put into the motion",
         filled_by=("observe_loads", "observe_elastic_bodies"),
         is_power=True,
     ),
@@ -223,7 +223,7 @@ SIGNALS = (
         "dissipated_energy",
         ("balance_time",),
         "J",
-        sign_convention="out of the gearbox",
+        sign_convention="taken from the motion",
         filled_by=(
             "observe_meshes",
             "observe_table",
@@ -237,7 +237,7 @@ SIGNALS = (
         "work_of_varying_stiffness",
         ("balance_time",),
         "J",
-        sign_convention="out of the gearbox",
+        sign_convention="taken from the motion",
         filled_by=("observe_meshes", "observe_table"),
         is_power=True,
     ),
@@ -245,7 +245,7 @@ SIGNALS = (
         "non_conservative_work",
         ("balance_time",),
         "J",
-        sign_convention="out of the gearbox",
+        sign_convention="taken from the motion",
         filled_by=("observe_meshes",),
         is_power=True,
     ),
@@ -253,7 +253,7 @@ SIGNALS = (
         "bearing_rate_work",
         ("balance_time",),
         "J",
-        sign_convention="out of the gearbox",
+        sign_convention="taken from the motion",
         filled_by=("observe_connectors",),
         is_power=True,
     ),

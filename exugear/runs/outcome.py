@@ -8,6 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from fe_ste.tools.notebook import html_table
+
 
 class RunError(RuntimeError):
     """A run that went wrong; what was reached before is kept."""
@@ -80,6 +82,11 @@ class Run:
         Why it is not to be trusted (`exugear.runs.trust`), none if it is.
     halted : bool
         Whether it was stopped beyond a limit, and cannot go on.
+
+    Examples
+    --------
+    >>> Run(Path("rigid/run.nc"), complete=True, end=0.5, wall=1.25)
+    Run(rigid/run.nc: complete, 0.5 s simulated in 1.2 s, trusted)
     """
 
     path: Path
@@ -93,3 +100,24 @@ class Run:
     def trusted(self) -> bool:
         """Whether the run stayed within the limits of what it may claim."""
         return not self.reasons
+
+    @property
+    def _state(self) -> str:
+        if self.complete:
+            return "complete"
+        return "stopped beyond a limit" if self.halted else "stopped"
+
+    def __repr__(self) -> str:
+        """One line."""
+        trust = "trusted" if self.trusted else "not to be trusted"
+        return f"Run({self.path}: {self._state}, {self.end:g} s simulated in {self.wall:.1f} s, {trust})"
+
+    def _repr_html_(self) -> str:
+        rows = {
+            "file": str(self.path),
+            "state": self._state,
+            "simulated": f"{self.end:g} s",
+            "wall time": f"{self.wall:.1f} s",
+            "to be trusted": "yes" if self.trusted else f"no: {'; '.join(self.reasons)}",
+        }
+        return html_table("Run", rows)

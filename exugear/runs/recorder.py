@@ -93,7 +93,7 @@ class Recorder:
         self._observer = Observer(plan.assembly, start.loads)
         self._layout = self._observer.layout
         self._decimator = Decimator(plan.steps_per_sample, self._layout.count)
-        self._decimator.pending, self._decimator.first = start.state.pending, start.state.pending_first
+        self._decimator.pending, self._decimator.pending_first = start.state.pending, start.state.pending_first
         self._account = EnergyAccount(plan.step, start.state.balance)
         self._mesh_times = start.state.mesh_times
         wanted = FLUSH_FACTOR[plan.solver] * FLUSH_INTERVAL / plan.step
@@ -164,7 +164,7 @@ class Recorder:
             q=q[-1],
             v=v[-1],
             pending=self._decimator.pending,
-            pending_first=self._decimator.first,
+            pending_first=self._decimator.pending_first,
             balance=self._account.balance,
             start_angle=self._start.state.start_angle,
             mesh_times=self._mesh_times,

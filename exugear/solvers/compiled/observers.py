@@ -132,20 +132,20 @@ def observe_connectors(
         move_connector(q, v, n, bodies, connectors, work)
         turn = work.frames[connectors.ends[n, 0]]
         true_rate(n, turn, work)
-        strain, rate, true, own = work.motion[0], work.motion[1], work.motion[2], work.motion[3]
-        own[:] = 0.0
+        strain, rate, derivative, force = work.motion[0], work.motion[1], work.motion[2], work.motion[3]
+        force[:] = 0.0
         for entry in range(connectors.first[n], connectors.first[n + 1]):
             row, column = connectors.row[entry], connectors.column[entry]
             elastic = connectors.stiffness[entry] * strain[column]
             damped = connectors.damping[entry] * rate[column]
-            own[row] += elastic + damped
+            force[row] += elastic + damped
             energy[ELASTIC] += 0.5 * elastic * strain[row]
             energy[DISSIPATED] += damped * rate[row]
-            energy[OF_BEARING_RATES] += elastic * (rate[row] - true[row])
+            energy[OF_BEARING_RATES] += elastic * (rate[row] - derivative[row])
         first = columns.support_force + 3 * connectors.number[n]
         for i in range(3):
             o = 3 * i
-            sample[first + i] = -(turn[o] * own[0] + turn[o + 1] * own[1] + turn[o + 2] * own[2])
+            sample[first + i] = -(turn[o] * force[0] + turn[o + 1] * force[1] + turn[o + 2] * force[2])
 
 
 @kernel
