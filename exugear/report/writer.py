@@ -19,7 +19,7 @@ from exugear.dynamics.assembly import Assembly, VariantError
 from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.modes import Modes, load_modes, modes_of
 from exugear.dynamics.sensitivity import Remedy, Sweep, parameters_of, remedies, sweep_modes
-from exugear.dynamics.signals import BALANCE_TERMS, energy_residual
+from exugear.dynamics.signals import BALANCE_TERMS, MESH_TIMES, energy_residual
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.named_files import Permissions
@@ -37,7 +37,7 @@ from exugear.pictures.shapes import bodies_of, mode_scene, motions_of
 from exugear.pictures.tables import PICTURE_FOLDER
 from exugear.report import page
 from exugear.results.folder import REPORT_FILE, bodies_folder, kept_case, times_spent
-from exugear.results.run_file import FINAL_NAME, MESH_TIMES, PARTIAL_NAME, load_run
+from exugear.results.run_file import FINAL_NAME, PARTIAL_NAME, load_run
 from exugear.runs.trust import verdict_of
 from exugear.spectra.comparison import (
     NEAR,
@@ -68,7 +68,7 @@ SEEN = 0.01
 DRAWN = 0.001
 """Least share for a mode to be drawn in a diagram of sensitivities."""
 MESH_TIME_LABELS = ("longest pull of a mesh", "longest time teeth are apart", "longest time outside a table")
-"""Labels of `exugear.results.run_file.MESH_TIMES`, in their order."""
+"""Labels of `exugear.dynamics.signals.MESH_TIMES`, in their order."""
 PACKAGES = ("exugear", "exudyn", "numpy", "scipy", "numba", "scikit-fem", "xarray", "h5netcdf", "matplotlib", "pyvista")
 
 

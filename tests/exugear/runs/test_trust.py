@@ -235,9 +235,9 @@ import sys
 import tomllib
 import numpy as np
 from exugear.dynamics.assemble import assemble
-from exugear.solvers.compiled.solver import CompiledSystem, Observer
+from exugear.solvers.compiled.observers import Observer
+from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.loads import LoadTable
-from exugear.dynamics.signals import Channels
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.kernels.meshes import add_mesh_forces
@@ -259,7 +259,7 @@ for gearbox, law, data in (
     assembly = assemble(gearbox, Choice("rigid", law), data)
     rest = np.zeros(assembly.size)
     system = CompiledSystem(assembly, rest, rest, LoadTable(), 1e-6)
-    observer = Observer(Channels(assembly), LoadTable())
+    observer = Observer(assembly, LoadTable())
     sign = np.where(np.arange(assembly.size) % 2, -1.0, 1.0)
     for value in values:
         q = (value * sign)[None]
