@@ -18,6 +18,7 @@ from exugear.model.gearbox import Gearbox
 from exugear.model.parts import LoadCase
 from exugear.train.statics import UNLOADED
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.notebook import html_table, value_range
 
 Series = Mapping[str, tuple[Floats, Floats]]
 BURSTING_RIM_SPEED = 300.0
@@ -65,6 +66,27 @@ class LoadSummary:
     mesh_forces: Mapping[str, float]
     flanks: Mapping[str, str]
     reversed_flanks: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return (
+            f"<LoadSummary {self.name!r}: net torque {self.net_torque:g} N m, "
+            f"{self.start_speed:g} to {self.end_speed:g} rad/s>"
+        )
+
+    def _repr_html_(self) -> str:
+        speeds = (self.start_speed, self.end_speed, self.fastest_speed)
+        return html_table(
+            f"load case {self.name} of the rolling train",
+            {
+                "inertia at the input": value_range(self.inertia, "kg m2"),
+                "net torque at the input": value_range(self.net_torque, "N m"),
+                "driven": "yes" if self.driven else "no",
+                "start, end and fastest speed of the input": ", ".join(value_range(speed, "rad/s") for speed in speeds),
+                "flanks": ", ".join(f"{family} {flank}" for family, flank in self.flanks.items()),
+                "on another flank than by the static load": ", ".join(self.reversed_flanks) or "none",
+            },
+        )
 
     @property
     def fastest_rim(self) -> tuple[str, float]:

@@ -13,6 +13,7 @@ from exugear.model.sections.connections import CatalogueSection, StiffnessSectio
 from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.notebook import html_table, value_range
 
 RPM = math.pi / 30.0
 """One revolution a minute, rad/s."""
@@ -44,6 +45,32 @@ class Body:
     fixed: bool
     wheels: Mapping[str, float]
 
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<Body {self.name!r}: {self._kind}, {self.mass:g} kg, {self.axial:g} kg m2 about its axis>"
+
+    def _repr_html_(self) -> str:
+        return html_table(
+            f"body {self.name}",
+            {
+                "kind": self._kind,
+                "axis": _point(self.axis),
+                "centre of mass": value_range(self.centre_of_mass_z, "mm", 1e3),
+                "mass": value_range(self.mass, "kg"),
+                "axial inertia": value_range(self.axial, "kg m2"),
+                "transverse inertia": value_range(self.transverse, "kg m2"),
+                "gears": ", ".join(f"{gear} at {1e3 * z:g} mm" for gear, z in self.wheels.items()) or "none",
+            },
+        )
+
+    @property
+    def _kind(self) -> str:
+        if self.fixed:
+            return "fixed"
+        if self.carrier is not None:
+            return f"planet on {self.carrier}"
+        return "spin only" if self.spin_only else "turning"
+
 
 @dataclass(frozen=True)
 class Joint:
@@ -72,6 +99,30 @@ class Bearing:
     catalogue: CatalogueSection | None
     damping: StiffnessSection | None
     factor: float
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<Bearing {self.name!r}: {self.body} on {self.on} at {_point(self.place)}, {self._source}>"
+
+    def _repr_html_(self) -> str:
+        return html_table(
+            f"bearing {self.name}",
+            {
+                "holds": self.body,
+                "on": self.on,
+                "place": _point(self.place),
+                "stiffness": self._source,
+                "damping": "in proportion to the stiffness" if self.damping is None else "given",
+                "factor of the housing": f"{self.factor:g}",
+            },
+        )
+
+    @property
+    def _source(self) -> str:
+        """Where its stiffness comes from."""
+        if self.catalogue is None:
+            return "stiffness given"
+        return "from catalogue" if self.stiffness is None else "from catalogue and stiffness given"
 
 
 @dataclass(frozen=True)
@@ -113,6 +164,28 @@ class Mesh:
     centre_distance: float
     phase: float | None
 
+    def __repr__(self) -> str:
+        """Return one short line."""
+        pinion, gear = self.pair.pinion, self.pair.gear
+        return (
+            f"<Mesh {self.name!r}: {pinion.name} ({pinion.teeth} teeth) on {self.pinion} with "
+            f"{gear.name} ({gear.teeth} teeth) on {self.gear}>"
+        )
+
+    def _repr_html_(self) -> str:
+        return html_table(
+            f"mesh {self.name}",
+            {
+                "pair": self.pair.name,
+                "gear 1": f"{self.pair.pinion.name} on {self.pinion}",
+                "gear 2": f"{self.pair.gear.name} on {self.gear}",
+                "line of centres turns with": self.frame,
+                "middle of the faces": value_range(self.z, "mm", 1e3),
+                "centre distance": value_range(self.centre_distance, "mm", 1e3),
+                "position angle": value_range(math.degrees(self.position_angle), "deg"),
+            },
+        )
+
 
 @dataclass(frozen=True)
 class WheelDeviation:
@@ -132,6 +205,22 @@ class WheelDeviation:
     eccentricity: float
     eccentricity_angle: float
 
+    def __repr__(self) -> str:
+        """Return one short line."""
+        runout = value_range(2.0 * self.eccentricity, "um", 1e6)
+        return f"<WheelDeviation: {self.teeth} teeth, runout {runout}, pitch {value_range(self.pitch, 'um', 1e6)}>"
+
+    def _repr_html_(self) -> str:
+        return html_table(
+            "errors of a wheel",
+            {
+                "teeth": str(self.teeth),
+                "cumulative pitch on the line of action": value_range(self.pitch, "um", 1e6),
+                "runout": value_range(2.0 * self.eccentricity, "um", 1e6),
+                "angle of the eccentricity": value_range(math.degrees(self.eccentricity_angle), "deg"),
+            },
+        )
+
 
 @dataclass(frozen=True)
 class LoadCase:
@@ -146,6 +235,26 @@ class LoadCase:
     end_speed: float | None
     drive_stiffness: float | None
     description: str
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<LoadCase {self.name!r}: {self.duration:g} s, {self._drive}, torques on {len(self.torques)} bodies>"
+
+    def _repr_html_(self) -> str:
+        rows = {
+            "duration": value_range(self.duration, "s"),
+            "start speed": value_range(self.start_speed / RPM, "rpm"),
+            "drive": self._drive,
+            "torque series": "none" if self.torque_series is None else str(self.torque_series),
+        }
+        torques = {f"torque on {body}": value_range(torque, "N m") for body, torque in self.torques.items()}
+        return html_table(f"load case {self.name}", rows | torques | {"description": self.description})
+
+    @property
+    def _drive(self) -> str:
+        if self.driven_body is None or self.end_speed is None:
+            return "no drive"
+        return f"{self.driven_body} driven to {self.end_speed / RPM:g} rpm"
 
 
 @dataclass(frozen=True)
@@ -173,6 +282,30 @@ class PairSpec:
     table: bool
     flank: int
     modifications: tuple[FlankModification, FlankModification]
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        pinion, gear = self.pair.pinion, self.pair.gear
+        return (
+            f"<PairSpec {self.name!r}: {pinion.teeth} and {gear.teeth} teeth, "
+            f"{self.static_torque:g} N m on gear 1, flank {self.flank:+d}>"
+        )
+
+    def _repr_html_(self) -> str:
+        return html_table(
+            f"gear pair {self.name} in the gearbox",
+            {
+                "gear 1": f"{self.pair.pinion.name}, {self.pair.pinion.teeth} teeth",
+                "gear 2": f"{self.pair.gear.name}, {self.pair.gear.teeth} teeth",
+                "static torque on gear 1": value_range(self.static_torque, "N m"),
+                "loaded flank": f"{self.flank:+d}",
+                "table": "wanted" if self.table else "not wanted",
+            },
+        )
+
+
+def _point(coordinates: tuple[float, ...]) -> str:
+    return f"({', '.join(f'{1e3 * value:.6g}' for value in coordinates)}) mm"
 
 
 def stiffness_matrix(section: StiffnessSection | None) -> Floats:

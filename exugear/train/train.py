@@ -12,6 +12,7 @@ import numpy as np
 from exugear.train.kinematics import CoupledBodies, MeshedBodies, coupling_row, kinematic_modes, mesh_row, turn_together
 from exugear.train.statics import holding_forces, without_round_off
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.notebook import html_table
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +56,25 @@ class Train:
     torques: Mapping[str, float]
     locked: tuple[str, ...]
     fault: Callable[[str], Exception]
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return (
+            f"<Train from {self.input!r} to {self.output!r}: {len(self.spins)} spins, {len(self.meshes)} meshes, "
+            f"{len(self.couplings)} couplings>"
+        )
+
+    def _repr_html_(self) -> str:
+        return html_table(
+            f"train from {self.input} to {self.output}",
+            {
+                "ratio": f"{self.ratio:.6g}",
+                "degrees of freedom": str(self.degrees_of_freedom),
+                "spins": ", ".join(self.spins),
+                "static load": ", ".join(f"{torque:g} N m on {body}" for body, torque in self.torques.items()),
+                "held by": ", ".join(self.locked) or "nothing",
+            },
+        )
 
     @cached_property
     def spin_rows(self) -> Floats:
