@@ -140,8 +140,8 @@ def summarise_loads(
     rates, speeds = _motion(gearbox, case, times, torques @ unit / inertia)
     needed = torques - rates[:, None] * axial * unit
     if case.driven_body is not None:
-        place = names.index(case.driven_body)
-        needed[:, place] -= needed @ unit / unit[place]  # what the machine adds
+        driven = names.index(case.driven_body)
+        needed[:, driven] -= needed @ unit / unit[driven]  # what the machine adds
     forces = _mesh_forces(gearbox, needed)
     fastest = float(np.abs(speeds).max())
     flanks, reversed_flanks = _flanks(gearbox, forces)
@@ -162,19 +162,19 @@ def summarise_loads(
 
 def doubts_about(loads: LoadSummary) -> tuple[str, ...]:
     """Say in words what looks like the wrong sign of a torque, nothing if all is well."""
-    found = []
+    doubts = []
     if loads.reversed_flanks:
-        found.append(
+        doubts.append(
             f"torque sign? {', '.join(loads.reversed_flanks)} loaded on another flank than by the static load, which "
             "tables, stiffness and phases are of"
         )
     body, rim = loads.fastest_rim
     if rim > BURSTING_RIM_SPEED:
-        found.append(
+        doubts.append(
             f"torque sign, or too long? the torques bring a rim on {body} to {rim:.4g} m/s, and wheels of steel burst "
             f"at some {BURSTING_RIM_SPEED:g} m/s; a run stops there"
         )
-    return tuple(found)
+    return tuple(doubts)
 
 
 def rim_radii(gearbox: Gearbox) -> dict[str, float]:
@@ -255,9 +255,9 @@ def _flanks(gearbox: Gearbox, forces: Floats) -> tuple[dict[str, str], tuple[str
     flanks: dict[str, str] = {}
     turned = []
     for m, mesh in enumerate(gearbox.meshes):
-        own = forces[:, m]
-        loaded = ("+" if np.any(own > least) else "") + ("-" if np.any(own < -least) else "")
+        mesh_forces = forces[:, m]
+        loaded = ("+" if np.any(mesh_forces > least) else "") + ("-" if np.any(mesh_forces < -least) else "")
         flanks[mesh.family] = "".join(sign for sign in "+-" if sign in flanks.get(mesh.family, "") + loaded)
-        if np.any(own * np.sign(static[mesh.name]) < -least):
+        if np.any(mesh_forces * np.sign(static[mesh.name]) < -least):
             turned.append(mesh.family)
-    return {family: found or "0" for family, found in flanks.items()}, tuple(dict.fromkeys(turned))
+    return {family: signs or "0" for family, signs in flanks.items()}, tuple(dict.fromkeys(turned))

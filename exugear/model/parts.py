@@ -25,11 +25,23 @@ class Body:
 
     Attributes
     ----------
-    axis : (2,) axis position x, y at zero angles, m
-    centre_of_mass_z : float, m
-    mass, axial, transverse : kg, kg m2, kg m2; mass and transverse are 0 for a spin-only body
-    carrier, orbit_angle : name of the carrier a planet rides on (None else) and its angle there, rad
-    wheels : gear name -> z of the gear's mid-plane, m
+    name, family : str
+        Its name, and that of its section, which planets share.
+    axis : (2,) tuple of float
+        Position x, y of its axis at zero angles, m.
+    centre_of_mass_z : float
+        m.
+    mass, axial, transverse : float
+        Mass, and inertia about its axis and across it, kg, kg m2, kg m2; a spin-only body has inertia about its axis
+        alone.
+    carrier : str, optional
+        Carrier that a planet rides on.
+    orbit_angle : float
+        Its angle there, rad.
+    spin_only, fixed : bool
+        Whether it has no place in space, or does not turn.
+    wheels : mapping of gear name to float
+        Middle of the gear's face width, z, m.
     """
 
     name: str
@@ -74,27 +86,50 @@ class Body:
 
 @dataclass(frozen=True)
 class Joint:
-    """Ideal joint at `place` (m) between `on` and `body` that leaves only the spin about z."""
+    """Ideal joint between `on` and `body` that leaves only the spin about z.
+
+    Attributes
+    ----------
+    name : str
+    body, on : str
+        Bodies that it joins.
+    position : (3,) tuple of float
+        At zero angles, m.
+    """
 
     name: str
     body: str
     on: str
-    place: tuple[float, float, float]
+    position: tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class Bearing:
-    """Compliant support at `place` (m, at zero angles); 6x6 in the axes of `on`, order x y z rx ry rz.
+    """Compliant support: a 6x6 stiffness in the axes of `on`, order x y z rx ry rz.
 
-    `stiffness` holds what the file gives (NaN-free 6x6) with None where only the catalogue is given; `given`
-    marks entries that replace catalogue values. `factor` (housing) is not yet multiplied in.
+    Attributes
+    ----------
+    name, family : str
+        Its name, and that of its section, which planets share.
+    body, on : str
+        Body that is held, and what it sits on.
+    position : (3,) tuple of float
+        At zero angles, m.
+    stiffness : StiffnessSection, optional
+        As the file gives it; beside a catalogue the least stiffness of each direction.
+    catalogue : CatalogueSection, optional
+        Dimensions and loads from which its stiffness follows.
+    damping : StiffnessSection, optional
+        As the file gives it; in proportion to the stiffness otherwise.
+    factor : float
+        Factor of the housing on its stiffness, not yet multiplied in.
     """
 
     name: str
     family: str
     body: str
     on: str
-    place: tuple[float, float, float]
+    position: tuple[float, float, float]
     stiffness: StiffnessSection | None
     catalogue: CatalogueSection | None
     damping: StiffnessSection | None
@@ -102,7 +137,7 @@ class Bearing:
 
     def __repr__(self) -> str:
         """Return one short line."""
-        return f"<Bearing {self.name!r}: {self.body} on {self.on} at {_point(self.place)}, {self._source}>"
+        return f"<Bearing {self.name!r}: {self.body} on {self.on} at {_point(self.position)}, {self._source}>"
 
     def _repr_html_(self) -> str:
         return html_table(
@@ -110,7 +145,7 @@ class Bearing:
             {
                 "holds": self.body,
                 "on": self.on,
-                "place": _point(self.place),
+                "position": _point(self.position),
                 "stiffness": self._source,
                 "damping": "in proportion to the stiffness" if self.damping is None else "given",
                 "factor of the housing": f"{self.factor:g}",
@@ -127,7 +162,18 @@ class Bearing:
 
 @dataclass(frozen=True)
 class Coupling:
-    """Torsional spring (N m/rad) and damper (N m s/rad) between two spins; `seat` is where on elastic bodies."""
+    """Torsional spring and damper between two spins.
+
+    Attributes
+    ----------
+    name : str
+    first, second : str
+        Bodies that it joins.
+    seat : str, optional
+        Bearing at whose seat it acts on elastic bodies.
+    stiffness, damping : float
+        N m/rad, N m s/rad.
+    """
 
     name: str
     first: str
@@ -143,13 +189,23 @@ class Mesh:
 
     Attributes
     ----------
-    pinion, gear : names of the bodies that carry gear 1 and gear 2
-    frame : body whose spin carries the line of centres, or "ground"
-    z : middle of the common face width, m
-    offsets : z of that middle from the middle of gear 1 and of gear 2, m
-    position_angle : polar angle of the line from gear 1's axis to gear 2's axis at zero angles, rad
-    centre_distance : from the bodies' positions, m (the pair's own value agrees within 20 um)
-    phase : PMC at zero angles where the file overrides what geometry gives, else None
+    name, family : str
+        Its name, and that of its section, which meshes of planets share.
+    pair : GearPair
+    pinion, gear : str
+        Bodies that carry gear 1 and gear 2.
+    frame : str
+        Body whose spin carries the line of centres, or "ground".
+    z : float
+        Middle of the common face width, m.
+    offsets : (2,) tuple of float
+        z of that middle from the middle of gear 1 and of gear 2, m.
+    position_angle : float
+        Polar angle of the line from gear 1's axis to gear 2's axis at zero angles, rad.
+    centre_distance : float
+        From the bodies' positions, m; the pair's own value agrees within 20 um.
+    phase : float, optional
+        Position in the mesh cycle at zero angles, where the file overrides what geometry gives.
     """
 
     name: str
@@ -193,11 +249,14 @@ class WheelDeviation:
 
     Attributes
     ----------
-    teeth : number of teeth
-    pitch : (teeth,) by which each loaded flank stands back on the transverse line of action, m; tooth 0 is the first at
-        a positive polar angle at zero body angle, the others follow in the positive sense
-    eccentricity : distance of the teeth's axis from the body's, m
-    eccentricity_angle : its polar angle at zero body angle, rad
+    teeth : int
+    pitch : array (teeth,)
+        By which each loaded flank stands back on the transverse line of action, m. Tooth 0 is the first at a positive
+        polar angle at zero body angle, the others follow in the positive sense.
+    eccentricity : float
+        Distance of the teeth's axis from the body's, m.
+    eccentricity_angle : float
+        Its polar angle at zero body angle, rad.
     """
 
     teeth: int
@@ -224,7 +283,27 @@ class WheelDeviation:
 
 @dataclass(frozen=True)
 class LoadCase:
-    """Loads of a run: torques by body (N m), duration (s), speeds (rad/s) and the drive, if any."""
+    """Loads of a run.
+
+    Attributes
+    ----------
+    name : str
+    torques : mapping of body name to float
+        N m.
+    torque_series : Path, optional
+        File of torques over time.
+    duration : float
+        s.
+    start_speed : float
+        Of the overall input, rad/s.
+    driven_body : str, optional
+        Body whose speed a machine prescribes.
+    end_speed : float, optional
+        Its speed at the end, rad/s.
+    drive_stiffness : float, optional
+        Of the spring between it and the machine, N m/rad.
+    description : str
+    """
 
     name: str
     torques: Mapping[str, float]

@@ -114,9 +114,9 @@ class Train:
             raise self.fault("meshes: the gear train cannot turn, its meshes and couplings lock each other")
         prescribed = (body, *self._standing(body))
         rows = self._modes_of(prescribed)
-        wanted = np.array([speed, *(0.0 for _ in prescribed[1:])])
-        weights, _, rank, _ = np.linalg.lstsq(rows, wanted, rcond=1e-9)
-        if rank < self.degrees_of_freedom or np.abs(rows @ weights - wanted).max() > 1e-9 * abs(speed):
+        speeds = np.array([speed, *(0.0 for _ in prescribed[1:])])
+        weights, _, rank, _ = np.linalg.lstsq(rows, speeds, rcond=1e-9)
+        if rank < self.degrees_of_freedom or np.abs(rows @ weights - speeds).max() > 1e-9 * abs(speed):
             raise self.fault(
                 f"the gear train has {self.degrees_of_freedom} degrees of freedom; turning {', '.join(prescribed)} "
                 "does not fix it: name the bodies that are held in static_load.locked"
