@@ -413,7 +413,7 @@ def _shaft(gearbox: Gearbox, body: Body) -> list[Surface]:
     if not _has_shaft(body):
         return []
     ends = [z + side * 0.5 * gearbox.gears[name].face_width for name, z in body.wheels.items() for side in (-1.0, 1.0)]
-    ends += [bearing.place[2] for bearing in gearbox.bearings if bearing.body == body.name]
+    ends += [bearing.position[2] for bearing in gearbox.bearings if bearing.body == body.name]
     margin = 0.02
     shaft = tube_surface(_shaft_diameter(gearbox, body), min(ends) - margin, max(ends) + margin, centre=body.axis)
     return [shaft]
