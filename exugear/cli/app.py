@@ -713,7 +713,7 @@ def _mode_summaries(found: Modes) -> list[dict[str, Any]]:
     reports = [report_mode(data, place) for place in range(len(found.names))]
     return [
         {
-            "mode": mode.place + 1,
+            "mode": mode.index + 1,
             "frequency_Hz": mode.frequency,
             "damping_ratio": mode.damping_ratio,
             "share_of_overall_dte": mode.share,

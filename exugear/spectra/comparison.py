@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from fe_ste.tools.arrays import Floats
 
 from exugear.results.run_file import load_run
 from exugear.spectra.orders import run_waterfall
@@ -25,6 +24,7 @@ from exugear.spectra.resonances import (
     pick_resonances,
 )
 from exugear.spectra.waterfall import OrderLine, Waterfall
+from fe_ste.tools.arrays import Floats
 
 NEAR = 0.05
 """A mode within this part of a frequency counts as near it."""
@@ -207,7 +207,7 @@ class ModeReport:
 
     Attributes
     ----------
-    place : int
+    index : int
         In the list of modes, from 0.
     frequency, damping_ratio : float
         Hz, share of critical damping.
@@ -225,7 +225,7 @@ class ModeReport:
         Share of kinetic energy by body.
     """
 
-    place: int
+    index: int
     frequency: float
     damping_ratio: float
     name: str
@@ -240,18 +240,18 @@ class ModeReport:
         return abs(self.frequency - frequency) <= tolerance * frequency
 
 
-def report_mode(modes: xr.Dataset, place: int) -> ModeReport:
+def report_mode(modes: xr.Dataset, index: int) -> ModeReport:
     """Gather the figures of one mode."""
-    one = modes.isel(mode=place)
+    one = modes.isel(mode=index)
     amplification = one["amplification"].to_numpy()
     loudest = int(np.argmax(amplification)) if amplification.size else -1
     kinetic = one["kinetic_energy_share"].sum("motion").to_numpy()
     return ModeReport(
-        place=place,
+        index=index,
         frequency=float(one["frequency"]),
         damping_ratio=float(one["damping_ratio"]),
         name=str(one["name"].item()),
-        share=float(mobility_shares(modes)[place]),
+        share=float(mobility_shares(modes)[index]),
         amplification=float(amplification[loudest]) if amplification.size else 0.0,
         mesh=str(modes["mesh"].to_numpy()[loudest]) if amplification.size else "",
         strain=_labelled(element_words(modes), one["strain_energy_share"].to_numpy()),

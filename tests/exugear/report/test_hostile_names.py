@@ -97,8 +97,8 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Any]]:
         def unable(*arguments: Any, **options: Any) -> None:
             raise RenderingError(f"no picture {MARKUP}")
 
-        for place in ("scene.draw_gearbox", "report.draw_mode"):
-            patch.setattr(f"exugear.{place}", unable)
+        for drawing in ("pictures.scene.draw_gearbox", "report.mode_pictures.draw_mode"):
+            patch.setattr(f"exugear.{drawing}", unable)
         ended = [
             exugear("check", case),
             exugear("check", case, "--json"),

@@ -1,0 +1,123 @@
+"""What every section of a report stands on: the case of the folder, its models, and notes for the top of the page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from exugear.dynamics.assemble import assemble
+from exugear.dynamics.assembly import Assembly
+from exugear.model.gearbox import Gearbox
+from exugear.pictures.tables import PICTURE_FOLDER
+from exugear.results.folder import bodies_folder
+from exugear.tooth_mesh.stiffness import mesh_stiffness
+from fe_ste.tools.arrays import Floats
+from fe_ste.transmission_error.surface import SteSurface
+
+REFERENCE_VARIANT = "rigid"
+"""Variant that others are compared with."""
+VISIBLE_SHARE = 0.01
+"""Least share of the overall transmission error's mobility for a mode to be called seen by it."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """What a run or modes were computed of."""
+
+    variant: str
+    law: str
+    inertias: str
+
+    @classmethod
+    def of(cls, attributes: Mapping[str, Any]) -> Model:
+        """Read from the attributes of a file."""
+        return cls(*(str(attributes[key]) for key in ("variant", "mesh_law", "inertias")))
+
+    @property
+    def words(self) -> str:
+        """For headings."""
+        return f"{self.variant}, law {self.law}, inertias {self.inertias}"
+
+    @property
+    def file_part(self) -> str:
+        """For names of files."""
+        return f"{self.variant}-{self.law}-{self.inertias}"
+
+
+@dataclass(frozen=True)
+class Notes:
+    """What sections tell beyond themselves; each list in the order in which it was noted.
+
+    Attributes
+    ----------
+    statements : list of str
+        What the page says in short.
+    distrusted : list of str
+        Runs that are not to be trusted, with the reason.
+    left_out : list of str
+        Files that do not belong to the case, and pictures that could not be made, with the reason.
+    pictures : list of Path
+        Pictures that were made for the page.
+    """
+
+    statements: list[str] = field(default_factory=list)
+    distrusted: list[str] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
+    pictures: list[Path] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Context:
+    """What the sections of one report share.
+
+    Attributes
+    ----------
+    folder : Path
+        The results folder.
+    gearbox : Gearbox
+        The case that is kept in it.
+    target : float or None
+        Frequency (Hz) that modes are looked for at.
+    tell : callable
+        Called with what is being done.
+    notes : Notes
+    assemblies : dict of Model to Assembly
+        Models assembled so far.
+    stiffnesses : dict of law to mesh stiffness
+        Mesh stiffness read so far.
+    """
+
+    folder: Path
+    gearbox: Gearbox
+    target: float | None
+    tell: Callable[[str], None]
+    notes: Notes = field(default_factory=Notes)
+    assemblies: dict[Model, Assembly] = field(default_factory=dict)
+    stiffnesses: dict[str, dict[str, Floats | SteSurface]] = field(default_factory=dict)
+
+    def stiffness(self, law: str) -> dict[str, Floats | SteSurface]:
+        """Mesh stiffness of a law from the tables of the folder, read once."""
+        if law not in self.stiffnesses:
+            self.stiffnesses[law] = mesh_stiffness(self.gearbox, law, self.folder)
+        return self.stiffnesses[law]
+
+    def assembled(self, model: Model) -> Assembly:
+        """Equations of a model, with the tables of the folder, assembled once."""
+        if model not in self.assemblies:
+            stiffness = self.stiffness(model.law)
+            self.assemblies[model] = assemble(
+                self.gearbox, model.variant, stiffness, model.law, model.inertias, folder=bodies_folder(self.folder)
+            )
+        return self.assemblies[model]
+
+    def picture_path(self, name: str) -> Path:
+        """Return where a new picture of the report goes, and note it."""
+        path = self.folder / PICTURE_FOLDER / f"{name}.png"
+        self.notes.pictures.append(path)
+        return path
+
+    def name_of(self, path: Path) -> Path:
+        """Path of a file as seen from the results folder."""
+        return path.relative_to(self.folder)
