@@ -26,8 +26,9 @@ from exugear.pictures.diagrams import plot_waterfalls
 from exugear.pictures.elastic_scene import animate_elastic_bodies, draw_elastic_bodies, elastic_scene
 from exugear.results.folder import bodies_folder, keep_case, modes_path
 from exugear.runs.runup import simulate
-from exugear.spectra.orders import order_lines, run_waterfall
+from exugear.spectra.orders import order_lines
 from exugear.spectra.resonances import Pick, group_by_frequency, match_eigenfrequencies, pick_resonances
+from exugear.spectra.run_spectra import run_waterfall
 from exugear.tooth_mesh.element import MeshData
 from exugear.tooth_mesh.stiffness import mesh_stiffness
 from exugear.tooth_mesh.tables import order_tables

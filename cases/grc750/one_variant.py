@@ -10,8 +10,9 @@ from exugear.pictures.diagrams import plot_campbell, plot_waterfalls
 from exugear.results.folder import keep_case
 from exugear.runs.outcome import Progress
 from exugear.runs.runup import simulate
-from exugear.spectra.orders import order_lines, run_waterfall
+from exugear.spectra.orders import order_lines
 from exugear.spectra.resonances import group_by_frequency, match_eigenfrequencies, pick_resonances
+from exugear.spectra.run_spectra import run_waterfall
 from exugear.tooth_mesh.stiffness import mesh_stiffness
 from exugear.tooth_mesh.tables import order_tables
 

@@ -679,7 +679,7 @@ def _compute_modes(gearbox: Gearbox, folder: Path, variant: str, law: str, inert
 def _draw_campbell(found: Modes, path: Path) -> Path:
     """Draw the modes that the overall transmission error sees, over the speeds of the fastest load case."""
     from exugear.pictures.diagrams import plot_campbell
-    from exugear.spectra.comparison import mobility_shares
+    from exugear.spectra.mode_report import mobility_shares
     from exugear.spectra.orders import order_lines
 
     gearbox, least = found.assembly.gearbox, 1e-3
@@ -707,7 +707,7 @@ def _label(found: Modes) -> str:
 
 
 def _mode_summaries(found: Modes) -> list[dict[str, Any]]:
-    from exugear.spectra.comparison import report_mode
+    from exugear.spectra.mode_report import report_mode
 
     data = found.to_dataset()
     reports = [report_mode(data, place) for place in range(len(found.names))]

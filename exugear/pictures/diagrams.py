@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from exugear.spectra.resonances import Pick, line_level
-from exugear.spectra.waterfall import OrderLine, Waterfall
+from exugear.spectra.orders import OrderLine
+from exugear.spectra.resonances import Pick
+from exugear.spectra.waterfall import Waterfall, line_level
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.drawing import COLOURS, WARNING_COLOUR, drawable, drawing_style, finish_figure, new_figure
 

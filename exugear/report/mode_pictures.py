@@ -13,7 +13,7 @@ from exugear.pictures.shapes import bodies_of, mode_scene, motions_of
 from exugear.report import page
 from exugear.report.context import REFERENCE_VARIANT, VISIBLE_SHARE, Context, Model
 from exugear.report.sensitivity import ModelMatch
-from exugear.spectra.comparison import ModeReport, nearest_mode
+from exugear.spectra.mode_report import ModeReport, nearest_mode
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.rendering import RenderingError
 

@@ -12,7 +12,7 @@ from exugear.report.context import VISIBLE_SHARE, Context, Model
 from exugear.report.mode_pictures import target_mode_pictures
 from exugear.report.sensitivity import sensitivity_part
 from exugear.report.stored import StoredResults
-from exugear.spectra.comparison import NEAR, ModeReport, nearest_mode, report_mode
+from exugear.spectra.mode_report import NEAR, ModeReport, nearest_mode, report_mode
 
 
 def modes_section(context: Context, results: StoredResults) -> str:

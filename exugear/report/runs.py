@@ -8,14 +8,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from exugear.dynamics.signals import BALANCE_TERMS, energy_residual
+from exugear.model.gearbox import RPM
 from exugear.pictures.diagrams import plot_order_levels, plot_waterfalls
 from exugear.report import page
 from exugear.report.context import REFERENCE_VARIANT, Context
 from exugear.report.stored import StoredResults, run_key
 from exugear.results.run_file import MESH_TIMES, load_run
 from exugear.runs.trust import verdict_of
-from exugear.spectra.comparison import RPM, Comparison, Finding, VariantRun, compare
+from exugear.spectra.comparison import Comparison, compare
 from exugear.spectra.orders import order_lines
+from exugear.spectra.run_spectra import Finding, VariantRun
 
 MESH_TIME_LABELS = ("longest pull of a mesh", "longest time teeth are apart", "longest time outside a table")
 """Labels of `exugear.results.run_file.MESH_TIMES`, in their order."""

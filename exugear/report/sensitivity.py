@@ -21,7 +21,7 @@ from exugear.pictures.diagrams import Sensitivity, plot_sensitivities
 from exugear.report import page
 from exugear.report.context import REFERENCE_VARIANT, VISIBLE_SHARE, Context, Model
 from exugear.results.folder import bodies_folder
-from exugear.spectra.comparison import nearest_mode, report_mode
+from exugear.spectra.mode_report import nearest_mode, report_mode
 
 PLOTTED_SHARE = 0.001
 """Least share of the overall transmission error's mobility for a mode to be drawn in a diagram of sensitivities."""

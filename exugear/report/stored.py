@@ -16,8 +16,8 @@ from exugear.model.reading import CaseError
 from exugear.report.context import Context, Model
 from exugear.results.run_file import FINAL_NAME, PARTIAL_NAME, load_run
 from exugear.runs.trust import verdict_of
-from exugear.spectra.comparison import VariantRun, read_run
 from exugear.spectra.orders import order_lines
+from exugear.spectra.run_spectra import VariantRun, read_run
 from exugear.tooth_mesh.placement import MeshError
 from exugear.tooth_mesh.tables import fitting_table
 from fe_ste.tools.files import FileError

@@ -14,8 +14,9 @@ from exugear.pictures.diagrams import (
     plot_waterfalls,
     pooled_levels,
 )
-from exugear.spectra.resonances import Pick, line_level
-from exugear.spectra.waterfall import OrderLine, Waterfall, waterfall
+from exugear.spectra.orders import OrderLine
+from exugear.spectra.resonances import Pick
+from exugear.spectra.waterfall import Waterfall, line_level, waterfall
 
 RATE = 2048.0
 MESH, SECOND = OrderLine("mesh", 60.0), OrderLine("2 × mesh", 120.0)
