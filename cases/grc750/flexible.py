@@ -22,8 +22,8 @@ from exugear.dynamics.assemble import assemble
 from exugear.dynamics.modes import MOTIONS, Modes, counterparts, eigenmodes
 from exugear.dynamics.statics import locked_equilibrium
 from exugear.model.gearbox import Gearbox
-from exugear.pictures.diagrams import plot_waterfalls
 from exugear.pictures.elastic_scene import animate_elastic_bodies, draw_elastic_bodies, elastic_scene
+from exugear.pictures.run_diagrams import plot_waterfalls
 from exugear.results.folder import bodies_folder, keep_case, modes_path
 from exugear.runs.runup import simulate
 from exugear.spectra.orders import order_lines

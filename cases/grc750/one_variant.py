@@ -6,7 +6,8 @@ from pathlib import Path
 
 from exugear.dynamics.modes import eigenmodes
 from exugear.model.gearbox import Gearbox
-from exugear.pictures.diagrams import plot_campbell, plot_waterfalls
+from exugear.pictures.mode_diagrams import plot_campbell
+from exugear.pictures.run_diagrams import plot_waterfalls
 from exugear.results.folder import keep_case
 from exugear.runs.outcome import Progress
 from exugear.runs.runup import simulate

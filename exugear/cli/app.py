@@ -678,7 +678,7 @@ def _compute_modes(gearbox: Gearbox, folder: Path, variant: str, law: str, inert
 
 def _draw_campbell(found: Modes, path: Path) -> Path:
     """Draw the modes that the overall transmission error sees, over the speeds of the fastest load case."""
-    from exugear.pictures.diagrams import plot_campbell
+    from exugear.pictures.mode_diagrams import plot_campbell
     from exugear.spectra.mode_report import mobility_shares
     from exugear.spectra.orders import order_lines
 
@@ -842,8 +842,9 @@ def _print_run(summary: dict[str, Any], outside: float) -> None:
 def _draw_modes(found: Modes, folder: Path, first: int, animation: bool) -> list[Path]:
     """Write the page of all elastic modes, and pictures of the gearbox and one mode if this machine can render."""
     from exugear.pictures.elastic_scene import animate_elastic_bodies, draw_elastic_bodies, elastic_scene
+    from exugear.pictures.motions import mode_scene, motions_of
     from exugear.pictures.scene import animate_mode, draw_gearbox, draw_mode
-    from exugear.pictures.shapes import bodies_of, mode_scene, motions_of
+    from exugear.pictures.shapes import bodies_of
     from exugear.pictures.viewer import write_mode_page
     from fe_ste.tools.rendering import RenderingError
 

@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from exugear.pictures.scene import DISPLACEMENT_COLOURS, body_colours
-from exugear.pictures.shapes import ModeScene, displacement_of
+from exugear.pictures.motions import ModeScene, displacement_of
+from exugear.pictures.scene import DISPLACEMENT_COLOURS, body_colours, channels
 from fe_ste.tools.files import write_file
 
 PAGE_FILES = ("viewer.html", "viewer.js")
@@ -62,12 +62,12 @@ def write_mode_page(
         "first": first,
         "centre": np.round(0.5 * (points.min(axis=0) + points.max(axis=0)), 6).tolist(),
         "radius": round(0.5 * float(np.linalg.norm(np.ptp(points, axis=0))), 6),
-        "colours": [_channels(colour) for colour in DISPLACEMENT_COLOURS],
+        "colours": [_rounded(channels(colour)) for colour in DISPLACEMENT_COLOURS],
         "bodies": [
             {
                 "name": body.name,
                 "fixed": body.fixed,
-                "colour": [round(channel, 4) for channel in colours[body.family]],
+                "colour": _rounded(colours[body.family]),
                 "reference": body.reference.tolist(),
                 "points": _encoded(body.surface.points.astype("<f4")),
                 "triangles": _encoded(body.surface.triangles.astype("<u4")),
@@ -100,9 +100,9 @@ def _mode(scene: ModeScene) -> dict[str, object]:
     return {"title": scene.title, "largest": largest, "motions": motions}
 
 
+def _rounded(colour: Sequence[float]) -> list[float]:
+    return [round(channel, 4) for channel in colour]
+
+
 def _encoded(values: NDArray[np.generic]) -> str:
     return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")
-
-
-def _channels(colour: str) -> list[float]:
-    return [round(int(colour[start : start + 2], 16) / 255.0, 4) for start in (1, 3, 5)]

@@ -8,8 +8,9 @@ import xarray as xr
 
 from exugear.dynamics.assembly import Assembly
 from exugear.pictures.elastic_scene import draw_elastic_bodies, elastic_scene
+from exugear.pictures.motions import mode_scene, motions_of
 from exugear.pictures.scene import draw_mode
-from exugear.pictures.shapes import bodies_of, mode_scene, motions_of
+from exugear.pictures.shapes import bodies_of
 from exugear.report import page
 from exugear.report.context import REFERENCE_VARIANT, VISIBLE_SHARE, Context, Model
 from exugear.report.sensitivity import ModelMatch

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 import xarray as xr
 
-from exugear.pictures.diagrams import plot_mode_energies
+from exugear.pictures.mode_diagrams import plot_mode_energies
 from exugear.report import page
 from exugear.report.context import VISIBLE_SHARE, Context, Model
 from exugear.report.mode_pictures import target_mode_pictures

@@ -9,7 +9,7 @@ import numpy as np
 
 from exugear.dynamics.signals import BALANCE_TERMS, energy_residual
 from exugear.model.gearbox import RPM
-from exugear.pictures.diagrams import plot_order_levels, plot_waterfalls
+from exugear.pictures.run_diagrams import plot_order_levels, plot_waterfalls
 from exugear.report import page
 from exugear.report.context import REFERENCE_VARIANT, Context
 from exugear.report.stored import StoredResults, run_key

@@ -17,7 +17,7 @@ from exugear.dynamics.sensitivity import (
     frequency_matches,
     vary_parameter,
 )
-from exugear.pictures.diagrams import Sensitivity, plot_sensitivities
+from exugear.pictures.mode_diagrams import Sensitivity, plot_sensitivities
 from exugear.report import page
 from exugear.report.context import REFERENCE_VARIANT, VISIBLE_SHARE, Context, Model
 from exugear.results.folder import bodies_folder
