@@ -2,7 +2,7 @@
 
 Raise a number when a change of the method, or of what it rests on, changes what is stored: results of the old
 version are then computed again or refused. A change that leaves all numbers as they are leaves the version, too.
-Tables have theirs in `fe_ste.versions`.
+Tables have theirs in `fe_ste.tools.versions`.
 """
 
 from __future__ import annotations

@@ -1,9 +1,12 @@
 """Compliance of a gear's flank: scikit-fem hexahedra of one tooth sector, condensed and closed to the full ring.
 
-The sector's stiffness matrix is condensed onto its two cut faces; the ring of z equal sectors is then closed
-exactly (ring.py). What is stored per gear is the
-normal displacement of the flank of each tooth under unit normal loads on the flank of one tooth, from which the
-mesh-dependent near field of the loaded tooth is taken out: the contact solver puts the half-space solution there.
+The sector's stiffness matrix is condensed onto its two cut faces. The ring of z equal sectors is then closed exactly
+(`fe_ste.elasticity.ring`). What is stored per gear is the normal displacement of the flank of each tooth under unit
+normal loads on the flank of one tooth. The near field of the loaded tooth depends on the mesh, so it is taken out: the
+contact puts the half-space solution there (`fe_ste.contact.compliance`).
+
+Each gear is described by itself: tooth 0 stands on the x axis, z = 0 is the middle of its face width. Loads and
+displacements of a flank are positive into the material, as a pressing load acts.
 """
 
 from __future__ import annotations
@@ -117,6 +120,7 @@ class FlankCompliance:
 
 
 def _flank_lead(gear: Gear, side: int) -> float:
+    # The roll angle grows towards the tip; whether the generator leans to tip or root at +z depends on hand and side.
     handed = side * (-1 if gear.internal else 1)
     return float(handed * np.tan(gear.base_helix_angle) / gear.base_radius)
 
@@ -210,6 +214,8 @@ def _flank_compliance(
     for (read, loaded), cut_faces in faces.items():
         regular[read, loaded] = sector.displacement(read == loaded, *cut_faces)
         if read == loaded:
+            # At the hand-over depth the half-space takes over the near field from the elements. What is left is smooth,
+            # and symmetric but for the discretisation (Maxwell and Betti).
             remainder = regular[read, loaded] - near
             regular[read, loaded] = (remainder + remainder.T) / 2
     return FlankCompliance(
@@ -286,11 +292,13 @@ def depth_readout(section: SectionMesh, gear: Gear, side: int, depth: float) -> 
         ],
         axis=-1,
     )
+    # The readout stays in the section, where a depth along the normal shows as depth / cos(beta_b).
     targets = points - depth / np.cos(gear.base_helix_angle) * normal
     corners = section.points[section.quads]
     low, high = corners.min(axis=1), corners.max(axis=1)
     nodes, weights = np.empty((len(targets), 4), dtype=np.int64), np.empty((len(targets), 4))
     for number, target in enumerate(targets):
+        # Boxes first: the inverse map is asked of few quadrilaterals.
         near = np.flatnonzero(((low <= target) & (target <= high)).all(axis=1))
         local = _inverse_bilinear(corners[near], target)
         outside = np.abs(local - 0.5).max(axis=1, initial=0.0)
@@ -313,6 +321,7 @@ def _inverse_bilinear(corners: Floats, target: Floats) -> Floats:
         s, t = local[:, :1], local[:, 1:]
         residual = a + s * b + t * c + s * t * d - target
         jacobian = np.stack([b + t * d, c + s * d], axis=-1)
+        # A step is kept near the quadrilateral: far from it the bilinear map may fold.
         local = local - np.clip(np.linalg.solve(jacobian, residual[..., None])[..., 0], -2.0, 2.0)
     return np.asarray(local)
 
@@ -346,10 +355,13 @@ class _CondensedSector:
         faces = np.concatenate([_unknowns(mesh.cut_nodes(-1)), _unknowns(mesh.cut_nodes(1))])
         held = _unknowns(mesh.held_nodes)
         inside = np.setdiff1d(np.arange(stiffness.shape[0]), np.concatenate([faces, held]))
+        # K in blocks: i inside, f faces, held ones zero. One factor of K_ii gives the condensed faces
+        # K_ff - K_fi K_ii^-1 K_if, what loads on the flank do to the faces, and what both do to the read-outs.
         to_faces = stiffness[:, faces] @ turn
         coupling = to_faces[inside].tocsc()
         surface, depth_rows = _flank_functionals(mesh, side, depth)
         torque = _torque_functional(mesh)
+        # Reaction at the held surface is K_h u; its torque is a row like the read-outs.
         held_torque = stiffness[held].T @ torque[held]
         loads = scipy.sparse.hstack([coupling, -surface[inside]]).tocsc()
         readings = scipy.sparse.hstack(
@@ -371,7 +383,7 @@ class _CondensedSector:
         condensed = face_to_face - response[:count, :count]
         return cls(
             backend=name,
-            stiffness=(condensed + condensed.T) / 2,
+            stiffness=(condensed + condensed.T) / 2,  # symmetric but for rounding
             face_load=-response[:count, count:],
             fixed_depth=response[depth_part, count:],
             fixed_surface=response[surface_part, count:],
@@ -414,6 +426,8 @@ class _CondensedSector:
         """Compliance (read node, loaded node): at depth under tent loads on the own tooth, on the surface elsewhere."""
         half = len(minus)
         if loaded:
+            # The displacement with fixed faces and what the faces add. Tent loads are spread over nodes: the half-space
+            # solution that is taken out has the same loads.
             nodal = self.fixed_depth + self.static_depth[:, :half] @ minus + self.static_depth[:, half:] @ plus
             return np.asarray(nodal @ self.weights)
         return np.asarray(self.static_surface[:, :half] @ minus + self.static_surface[:, half:] @ plus)

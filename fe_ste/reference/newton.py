@@ -247,6 +247,8 @@ class _Numbering:
         self.free = np.flatnonzero(~bound.ravel())
         self.count = len(self.free)
         self._hub_elements = np.flatnonzero(on_hub[nodes].any(axis=1))
+        # One number per pair of nodes that share a brick: the entries of all bricks are then summed without a sort at
+        # each iteration, since the pattern of the matrix stays.
         pairs, self._pair_of_block = np.unique(nodes[:, :, None] * size + nodes[:, None, :], return_inverse=True)
         self._columns = pairs % size
         self._starts = np.searchsorted(pairs // size, np.arange(size + 1))
@@ -266,6 +268,8 @@ class _Numbering:
         stiffness: SparseMatrix = whole[self.free][:, self.free]
         if self.model.hub is None:
             return stiffness
+        # The hub's nodes move by motion times one unknown: its column is K motion, its diagonal motion' K motion and
+        # the geometric stiffness of forces whose arms turn.
         unknowns = self.model.bricks.unknowns[self._hub_elements]
         forces = np.einsum("eij,ej->ei", tangent.stiffness[self._hub_elements], motion.ravel()[unknowns])
         coupling = summed(unknowns, forces, size)
@@ -328,6 +332,7 @@ class _Search:
         if not self.model.bricks.finite:
             slope[hub.nodes, :2] = np.stack([-y, x], axis=1) / hub.lever
             return slope * hub_displacement, slope, curvature
+        # A finite rotation: nodes move on circles, and the second derivative points to the axis.
         cosine, sine = math.cos(angle), math.sin(angle)
         turned = np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1)
         displacement[hub.nodes, :2] = turned - np.stack([x, y], axis=1)
@@ -358,11 +363,13 @@ class _Search:
         """Compute forces, tangents and gaps of a state under a part of the load."""
         model = self.model
         tangent = model.bricks.evaluate(state.displacement, state.modes)
+        # In small displacements the contact geometry is that of the undeformed surfaces, and the gap linear.
         if model.bricks.finite:
             contact = weighted_gap(model.bricks.points + state.displacement, model.first, model.second, self.pairs)
         else:
             opened = self.at_rest.gap + self.at_rest.gradient @ state.displacement.ravel()
             contact = replace(self.at_rest, gap=opened)
+        # External and contact forces less the internal ones: zero in equilibrium.
         imbalance = load * model.forces - tangent.force + self.contact_force(contact, state.pressure)
         _, motion, _ = self.hub_motion(state.hub)
         reduced = self.numbering.reduced(imbalance, motion)
@@ -385,6 +392,7 @@ class _Search:
             try:
                 state, active = self._solve_step(state, active, load, number)
             except EquilibriumError as error:
+                # A smaller part of the load from the last equilibrium on, with the contact found there.
                 step /= 2.0
                 if step < _LEAST_LOAD_STEP:
                     raise EquilibriumError(f"{error}; {100 * reached:.3g} % of the load was reached") from error
@@ -445,6 +453,8 @@ class _Search:
 
     def _tested_active(self, now: _Evaluation, active: Booleans) -> Booleans:
         """Nodes that pressure and gap ask to be in contact."""
+        # Complementarity function of Hintermueller, Ito and Kunisch: p - c g > 0, c a modulus over the node's width so
+        # that both terms are pressures of like size.
         width = np.sqrt(self.area)
         test = now.state.pressure - self.model.modulus * now.mean_gap / width
         tolerance = 1e-9 * float(np.abs(now.state.pressure).max())
@@ -465,6 +475,7 @@ class _Search:
     def _newton_step(self, now: _Evaluation, active: Booleans) -> tuple[Floats, Floats]:
         """Step of the unknowns and the pressures after it, from the linearised equilibrium with the gaps closed."""
         _, motion, curvature = self.hub_motion(now.state.hub)
+        # What the hub's nodes are held by does work on the curvature of their paths.
         held_force = self.contact_force(now.contact, now.state.pressure) - now.tangent.force
         stiffness = self.numbering.matrix(now.tangent, motion, -float(np.sum(curvature * held_force)))
         numbers = np.flatnonzero(active)
@@ -473,6 +484,8 @@ class _Search:
         rows = gradient[:, self.numbering.free]
         if self.model.hub is not None:
             rows = scipy.sparse.hstack([rows, scipy.sparse.csr_matrix((gradient @ motion.ravel())[:, None])], "csr")
+        # Augmented Lagrangian on the linearised problem: penalties make the indefinite saddle point system positive
+        # definite; the multipliers are then iterated with the same factor (Uzawa) until the gaps are closed exactly.
         added = _AUGMENTATION * self.model.modulus * np.sqrt(self.area[numbers]) / weight**2
         augmented = stiffness + rows.T @ scipy.sparse.diags_array(added) @ rows
         balance = now.imbalance - self.numbering.reduced(self.contact_force(now.contact, now.state.pressure), motion)
@@ -493,6 +506,7 @@ class _Search:
         self, now: _Evaluation, active: Booleans, step: Floats, pressure: Floats, load: float, at: str
     ) -> tuple[_Evaluation, float]:
         """Shorten the step until it lessens what is out of balance, on the gaps taken as closed."""
+        # Newton's step descends on the norm of what it linearises: halving finds a length that does, if there is one.
         before, length, reason = self._merit(now, active), 1.0, ""
         rounding = 0.1 * self.settings.force_tolerance * load * self.largest_load
         while length >= _LEAST_STEP_LENGTH:
@@ -510,6 +524,7 @@ class _Search:
 
     def _merit(self, now: _Evaluation, active: Booleans) -> float:
         """Norm of what the linearised equations on the nodes taken as `active` are to remove, N."""
+        # Gaps and stray pressures as forces, so that one number compares them.
         gaps = self.model.modulus * np.sqrt(self.area[active]) * now.mean_gap[active]
         pulls = (now.contact.weight * now.state.pressure)[~active]
         return float(np.sqrt(np.sum(now.imbalance**2) + np.sum(gaps**2) + np.sum(pulls**2)))

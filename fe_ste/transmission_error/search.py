@@ -1,4 +1,9 @@
-"""One position of the mesh cycle under one load: the window that contact fills, and the state in it."""
+"""One position in the mesh cycle (pmc) under one load: the window that contact fills, and the state in it.
+
+Where contact will be is not known before it is solved. So cells are laid in a window about each contact line, those
+too far apart to touch are left out, and the problem is solved; if contact then fills the window, or cells left out
+would touch, the start is mended and the search goes on. Frame and signs as in `fe_ste.contact.kinematics`.
+"""
 
 from __future__ import annotations
 
@@ -58,6 +63,7 @@ def least_contact_length(pair: GearPair, samples: int = 100) -> float:
     """Least total length of the contact lines over the mesh cycle, m."""
     axial = np.linspace(-0.5, 0.5, 401) * pair.face_width
     pitch = pair.transverse_base_pitch
+    # A helix shifts the contact along the path by tan(beta_b) times the axial position; a tooth more by a base pitch.
     lines = pair.path_pitch_point + math.tan(pair.pinion.base_helix_angle) * axial
     reach = math.ceil(pair.total_contact_ratio) + 1
     lines = lines + pitch * np.arange(-reach, reach + 1)[:, None]
@@ -245,11 +251,13 @@ class _Search:
         start = self.starts[index]
         depth = solution.approach - gap.min()
         if depth > 0.95 * _GAP_REACH * start.depth:
+            # Cells were left out that touch at this approach: look deeper, but not to where too many teeth took part.
             if depth >= self.too_deep[index]:
                 most = self.compliance.reach + 1
                 raise ContactError(f"contact spreads over more than {most} tooth pairs: the torque is too large")
             self.starts[index] = replace(start, depth=min(1.2 * depth, 0.5 * (depth + self.too_deep[index])))
             return False
+        # Load at the end of the window would go on beyond it.
         if (solution.force[end] > 0).any():
             self.starts[index] = replace(start, cells=start.cells + 2 * math.ceil(_WINDOW_GROWTH * start.cells))
             return False
