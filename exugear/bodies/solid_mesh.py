@@ -23,10 +23,10 @@ from typing import Any
 
 import numpy as np
 import skfem
-from fe_ste.tools.arrays import Floats, Integers
 
 from exugear.bodies.turned_section import SAME, Shaft
 from fe_ste.elasticity.bricks import skfem_mesh
+from fe_ste.tools.arrays import Floats, Integers
 
 CORE = 0.5
 """Radius of the square core of a solid section over that of its first ring of lines."""

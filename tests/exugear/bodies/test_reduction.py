@@ -295,7 +295,7 @@ def test_a_stored_object_is_never_unpickled(tmp_path):
 
 def test_the_version_of_the_method_and_no_comment_decides_on_the_key(monkeypatch):
     before = STEPPED.key
-    monkeypatch.setattr("exugear.bodies.reduction.REDUCTION", 1000)
+    monkeypatch.setattr("exugear.bodies.turned_shaft.REDUCTION", 1000)
     assert STEPPED.key != before
 
 

@@ -102,8 +102,8 @@ import resource, sys
 from pathlib import Path
 import numpy as np
 import xarray as xr
-from fe_ste.tools.drawing import finish_figure, new_figure
 from fe_ste.tools.files import append_line, write_file
+from fe_ste.tools.drawing import finish_figure, new_figure
 from fe_ste.tools.sealed import write_dataset
 
 folder = Path(sys.argv[1])
