@@ -9,14 +9,15 @@ active gaps only makes the matrix positive definite, and the multipliers are ite
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse
 
-from fe_ste.reference.finite_deformation import Bricks, BrickTangent, InvertedElementError
-from fe_ste.reference.mortar import Surface, WeightedGap, facing_pairs, summed, weighted_gap
+from fe_ste.reference.contact_model import ContactModel, Equilibrium, Iteration
+from fe_ste.reference.finite_deformation import BrickTangent, InvertedElementError
+from fe_ste.reference.mortar import WeightedGap, facing_pairs, summed, weighted_gap
 from fe_ste.tools.arrays import Booleans, Floats, Integers, SparseMatrix
 from fe_ste.tools.sparse import FactorisationError, factorise
 from fe_ste.tools.threads import one_dense_thread
@@ -36,69 +37,6 @@ _LEAST_LOAD_STEP = 1.0 / 64.0
 
 class EquilibriumError(RuntimeError):
     """No equilibrium was found; the message says at which load step and iteration."""
-
-
-@dataclass(frozen=True)
-class TurningHub:
-    """Nodes of a rigid hub that turns about an axis along z under a torque.
-
-    Attributes
-    ----------
-    nodes : ndarray
-    axis : ndarray (2,)
-        m.
-    lever : float
-        The unknown is the rotation (positive about +z) times this length, m; negative reverses its sense.
-    force : float
-        Torque over `lever`, N.
-    """
-
-    nodes: Integers
-    axis: Floats
-    lever: float
-    force: float
-
-
-@dataclass(frozen=True)
-class ContactModel:
-    """Elastic bodies, what holds and loads them, and where they may touch.
-
-    Attributes
-    ----------
-    bricks : Bricks
-    first, second : Surface
-        The nodes of the first one carry the contact pressures.
-    held : ndarray of bool (n, 3)
-        Displacements that are zero.
-    forces : ndarray (n, 3)
-        Nodal forces, N; they do not turn with the bodies.
-    hub : TurningHub, optional
-    modulus : float
-        A Young's modulus of the bodies, Pa, for scales.
-    search : float
-        Distance up to which facets count as neighbours, m.
-    reach : float
-        Gap at the edge of the contact expected, m: the first guess are the nodes whose gap is smaller. A guess too wide
-        would crush the smallest bricks.
-    allowed_overlap : float
-        Overlap of the undeformed surfaces that a mesh of chords may have, m.
-    """
-
-    bricks: Bricks
-    first: Surface
-    second: Surface
-    held: Booleans
-    forces: Floats
-    modulus: float
-    search: float
-    reach: float
-    allowed_overlap: float = 0.0
-    hub: TurningHub | None = None
-
-    def __repr__(self) -> str:
-        """Return one short line."""
-        facets = f"surfaces of {len(self.first.facets)} and {len(self.second.facets)} facets"
-        return f"<ContactModel: {len(self.bricks.nodes)} bricks, {len(self.bricks.points)} nodes, {facets}>"
 
 
 @dataclass(frozen=True)
@@ -128,82 +66,6 @@ class NewtonSettings:
             raise ValueError("load_steps must be at least 1 and most_iterations at least 2")
         if not (self.force_tolerance > 0 and self.gap_tolerance > 0):
             raise ValueError("the tolerances must be positive")
-
-
-@dataclass(frozen=True)
-class Iteration:
-    """One Newton iteration, a row of the convergence table.
-
-    Attributes
-    ----------
-    load : float
-        Part of the load.
-    number : int
-        Within the load step, from 1.
-    active : int
-        Nodes in contact.
-    changed : int
-        Nodes whose state changed after it.
-    step_length : float
-        Of the line search.
-    force_error : float
-        Largest force out of balance after it, as part of the largest load.
-    gap_error : float
-        Largest mean gap or overlap left where pressure is, as part of the largest displacement.
-    hub : float
-        Displacement of the hub, m.
-    """
-
-    load: float
-    number: int
-    active: int
-    changed: int
-    step_length: float
-    force_error: float
-    gap_error: float
-    hub: float
-
-
-@dataclass(frozen=True)
-class Equilibrium:
-    """Bodies in equilibrium.
-
-    Attributes
-    ----------
-    displacement : ndarray (n, 3)
-        m.
-    modes : ndarray (m, 3, 3)
-        Incompatible modes.
-    pressure : ndarray (s,)
-        Contact pressure at the nodes of the first surface, Pa.
-    contact_force : ndarray (n, 3)
-        Contact forces on the nodes of both surfaces, N.
-    mean_pressure : ndarray (s,)
-        Contact force on each of these nodes over its contact area, Pa: without the peaks that `pressure` has where an
-        edge of the other surface leaves a node little of its area.
-    weight : ndarray (s,)
-        Contact area of each node, m^2.
-    facing : ndarray of bool (s,)
-        Nodes whose whole area faces the other surface.
-    hub : float
-        Displacement of the hub, m.
-    iterations : tuple of Iteration
-    """
-
-    displacement: Floats
-    modes: Floats
-    pressure: Floats
-    contact_force: Floats
-    mean_pressure: Floats
-    weight: Floats
-    facing: Booleans
-    hub: float
-    iterations: tuple[Iteration, ...]
-
-    def __repr__(self) -> str:
-        """Return one short line."""
-        touching = np.count_nonzero(self.pressure)
-        return f"<Equilibrium: {touching} of {len(self.pressure)} nodes in contact, {len(self.iterations)} iterations>"
 
 
 @dataclass(frozen=True)
@@ -570,14 +432,3 @@ def fixed_body_displacement(model: ContactModel) -> tuple[Floats, Floats]:
     with factorise(numbering.matrix(tangent, displacement, 0.0)) as factor:
         displacement.ravel()[numbering.free] = factor.solve(numbering.reduced(model.forces, displacement))
     return displacement, bricks.stepped_modes(modes, tangent, displacement, 1.0)
-
-
-def convergence_table(iterations: Sequence[Iteration]) -> str:
-    """Lay out the iterations of an analysis as text, one a line."""
-    head = "load %  iteration  in contact  changed  step  force error  gap error     hub um"
-    rows = [
-        f"{100 * row.load:6.4g}  {row.number:9d}  {row.active:10d}  {row.changed:7d}  {row.step_length:4.2f}"
-        f"  {row.force_error:11.1e}  {row.gap_error:9.1e}  {1e6 * row.hub:9.4f}"
-        for row in iterations
-    ]
-    return "\n".join([head, *rows])

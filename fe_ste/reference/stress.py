@@ -11,9 +11,10 @@ from scipy.spatial import cKDTree
 from fe_ste.contact.cells import Cells
 from fe_ste.elasticity.sectors import OpenSector, refined_sectors
 from fe_ste.geometry.gears import GearPair
+from fe_ste.reference.contact_model import ContactModel
 from fe_ste.reference.finite_deformation import von_mises
 from fe_ste.reference.mortar import Surface
-from fe_ste.reference.newton import ContactModel, fixed_body_displacement
+from fe_ste.reference.newton import fixed_body_displacement
 from fe_ste.reference.position import NonlinearPosition, NonlinearSettings, gear_model
 from fe_ste.tools.arrays import Floats
 from fe_ste.transmission_error.compliance import PairCompliance
