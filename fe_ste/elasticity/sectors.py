@@ -1,4 +1,4 @@
-"""Open sectors of some neighbouring teeth of both gears, in their places in the pair, fine where flanks touch.
+"""Open sectors of some neighbouring teeth of both gears, as they stand in the pair, fine where flanks touch.
 
 Frame and tooth numbers are those of `fe_ste.contact.kinematics`. In each layer the flank nodes gather about the contact
 line of that layer; the cut faces between teeth do not move with them.

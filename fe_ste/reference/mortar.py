@@ -233,8 +233,8 @@ def _integrate_pairs(
     shape_one, shape_two, reversed_two = np.empty(4), np.empty(4), np.empty(4)
     normal, apart, triangle = np.empty(3), np.empty(3), np.empty((3, 2))
     for number in range(len(pairs)):
-        one, two = first[pairs[number, 0]], second[pairs[number, 1]]
-        corners_one, corners_two = points[one], points[two]
+        nodes_one, nodes_two = first[pairs[number, 0]], second[pairs[number, 1]]
+        corners_one, corners_two = points[nodes_one], points[nodes_two]
         area = _plane(corners_one, origin, axes)
         _flatten(corners_one, origin, axes, False, flat_one)
         _flatten(corners_two, origin, axes, True, flat_two)
@@ -293,30 +293,33 @@ def _facing_pairs(points: Floats, first: Integers, second: Integers, reach: floa
     count_one, count_two = len(first), len(second)
     low, high = np.empty((count_two, 3)), np.empty((count_two, 3))
     normals = np.empty((count_two, 3))
-    for two in range(count_two):
-        corners = points[second[two]]
+    for facet_two in range(count_two):
+        corners = points[second[facet_two]]
         for axis in range(3):
-            low[two, axis], high[two, axis] = corners[:, axis].min(), corners[:, axis].max()
-        normals[two] = np.cross(corners[2] - corners[0], corners[3] - corners[1])
+            low[facet_two, axis], high[facet_two, axis] = corners[:, axis].min(), corners[:, axis].max()
+        normals[facet_two] = np.cross(corners[2] - corners[0], corners[3] - corners[1])
     pairs = np.empty((64, 2), dtype=np.int64)
     used = 0
-    for one in range(count_one):
-        corners = points[first[one]]
+    for facet_one in range(count_one):
+        corners = points[first[facet_one]]
         normal = np.cross(corners[2] - corners[0], corners[3] - corners[1])
-        for two in range(count_two):
+        for facet_two in range(count_two):
             near = True
             for axis in range(3):
-                if corners[:, axis].min() - reach > high[two, axis] or corners[:, axis].max() + reach < low[two, axis]:
+                if (
+                    corners[:, axis].min() - reach > high[facet_two, axis]
+                    or corners[:, axis].max() + reach < low[facet_two, axis]
+                ):
                     near = False
                     break
             # Facets whose normals agree belong to the backs of teeth.
-            if not near or np.sum(normal * normals[two]) >= 0.0:
+            if not near or np.sum(normal * normals[facet_two]) >= 0.0:
                 continue
             if used == len(pairs):  # compiled code has no growing list of rows
                 larger = np.empty((2 * used, 2), dtype=np.int64)
                 larger[:used] = pairs
                 pairs = larger
-            pairs[used, 0], pairs[used, 1] = one, two
+            pairs[used, 0], pairs[used, 1] = facet_one, facet_two
             used += 1
     return pairs[:used]
 

@@ -180,7 +180,7 @@ def _on_surface(points: Floats, surface: Surface, load_points: Floats, loads: Fl
     middle = corners.mean(axis=1)
     normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    # Facets are long and narrow: the nearest one is where the place lies within its two directions.
+    # Facets are long and narrow: the nearest one is where the point lies within its two directions.
     _, neighbours = cKDTree(middle[:, :2]).query(load_points[:, :2], k=min(_CANDIDATES, len(middle)))
     candidates = np.asarray(neighbours, dtype=np.int64).reshape(len(load_points), -1)
     along, across = corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0]

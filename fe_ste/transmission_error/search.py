@@ -38,8 +38,8 @@ _UNLOADED_WIDTH = 3e-3
 _TOUCHING = 1e-12
 _WINDOW_ATTEMPTS = 20
 
-#: Places across the window that an address tells apart.
-_PLACES = 64
+#: Distances from the contact line, in cells, that an address tells apart.
+_DISTANCES = 64
 
 
 def hertz_half_width(pair: GearPair, line_load: float) -> float:
@@ -147,7 +147,7 @@ class _Window:
     end : ndarray (n,)
         Whether a cell ends the window where no tip edge does.
     address : ndarray (n,)
-        Tooth pair, slice and place relative to the contact line in one number.
+        Tooth pair, slice and distance from the contact line, in cells, in one number.
     gap, near : dict
         Misalignment's index -> gap (n,), m, and which cells are near enough to touch.
     """
@@ -210,9 +210,9 @@ class _Search:
         axial = self.compliance.axial[cells.layer]
         line_roll = pair.working_roll + self.rotation + cells.tooth * pair.pitch_1 + pair.twist_1 * axial
         from_line = 0.5 * radius * (cells.roll**2 - line_roll * np.abs(line_roll)) / self.cell_width
-        from_middle = np.clip(np.rint(from_line) + _PLACES // 2, 0, _PLACES - 1).astype(np.int64)
+        from_middle = np.clip(np.rint(from_line) + _DISTANCES // 2, 0, _DISTANCES - 1).astype(np.int64)
         row = (cells.tooth - self.compliance.teeth[0]) * len(self.compliance.axial) + cells.layer
-        return np.asarray(row * _PLACES + from_middle, dtype=np.int64)
+        return np.asarray(row * _DISTANCES + from_middle, dtype=np.int64)
 
     def solve(self, window: _Window, group: list[int]) -> None:
         """Solve the states of `group`; one that needs other cells stays pending, with a start that asks for them."""
