@@ -53,9 +53,9 @@ def reductions(gearbox: Gearbox) -> list[dict[str, Any]]:
     rows = [
         {
             "body": name,
-            "unknowns": sum(body.reduced.figures.unknowns.values()),
+            "unknowns": sum(body.reduced.summary.unknowns.values()),
             "coordinates": body.reduced.size,
-            "seconds": body.reduced.figures.seconds,
+            "seconds": body.reduced.summary.seconds,
         }
         for name, body in assembly.elastic_bodies.items()
     ]

@@ -19,7 +19,7 @@ import numpy as np
 from one_variant import LAW, show
 
 from exugear.dynamics.assemble import assemble
-from exugear.dynamics.modes import MOTIONS, Modes, counterparts, eigenmodes
+from exugear.dynamics.modes import BODY_MOTIONS, Modes, counterparts, eigenmodes
 from exugear.dynamics.statics import locked_equilibrium
 from exugear.model.gearbox import Gearbox
 from exugear.pictures.diagrams import plot_waterfalls
@@ -137,7 +137,7 @@ def print_misalignment(
 
 def bending_and_teeth(modes: Modes) -> int:
     """Find the mode in which bending of shafts and deflection of teeth come together most."""
-    bending = modes.kinetic[:, :, MOTIONS.index("bending")].sum(axis=1)
+    bending = modes.kinetic[:, :, BODY_MOTIONS.index("bending")].sum(axis=1)
     meshes = modes.strain[:, [name in modes.assembly.mesh_names for name in modes.element_names]].sum(axis=1)
     return int(np.argmax(bending * meshes))
 

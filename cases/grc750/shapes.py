@@ -47,8 +47,8 @@ def solid_models() -> dict[str, SolidModel]:
 
 def described(name: str, body: ReducedBody) -> str:
     """Mass, unknowns, seconds and first free vibrations in one line."""
-    found = body.figures
-    first = ", ".join(f"{f:.0f}" for f in found.free_frequencies["whole"][:4])
+    found = body.summary
+    first = ", ".join(f"{f:.0f}" for f in found.free_interface_frequencies["whole"][:4])
     return (
         f"{name:9s} {body.rigid_inertia.mass:7.0f} kg {found.unknowns['whole']:7d} unknowns {body.size:4d} coordinates "
         f"{found.seconds:5.1f} s   {first} Hz"

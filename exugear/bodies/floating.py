@@ -28,15 +28,15 @@ from numpy.typing import NDArray
 
 from exugear.bodies.reduced_body import ReducedBody, ReductionError, RigidInertia
 from exugear.bodies.solids import ReducedSolid, SolidModel, in_each_direction, reduce_matrices, reduced_body
-from exugear.bodies.store import keep_arrays, kept, kept_arrays
+from exugear.bodies.store import store_arrays, kept, stored_arrays
 from fe_ste.tools.arrays import Complexes, Floats
 
-WHOLE = 0.02
+ORDER_TOLERANCE = 0.02
 """Largest distance of an eigenvalue of S from a whole number."""
-EYE = np.eye(3)
-MOST_CORRECTIONS = 20
+IDENTITY = np.eye(3)
+MOST_NEWTON_STEPS = 20
 """Newton steps to find the coordinates of a state."""
-FOUND = 1e-14
+CORRECTION_TOLERANCE = 1e-14
 """Size of a correction, m or rad, that ends them."""
 
 
@@ -176,11 +176,11 @@ def load_or_reduce_floating(model: SolidModel, folder: Path | None) -> tuple[Red
     name = f"{model.name}-{model.key[:16]}"
     reduced = kept(folder / f"{name}.npz", model.key, lambda: reduced_body(model, matrices()))
     path = folder / f"{name}-floating.npz"
-    arrays = kept_arrays(path, model.key)
+    arrays = stored_arrays(path, model.key)
     if arrays is not None:
         return reduced, _from_arrays(arrays)
     body = floating_body(model, matrices())
-    keep_arrays(path, model.key, {one.name: np.asarray(getattr(body, one.name)) for one in fields(body)})
+    store_arrays(path, model.key, {one.name: np.asarray(getattr(body, one.name)) for one in fields(body)})
     return reduced, body
 
 
@@ -203,8 +203,8 @@ def euler_rotation(parameters: Floats) -> tuple[Floats, Floats]:
     scalar, vector = parameters[0], parameters[1:]
     cross = _skew(vector)
     rates = np.empty((3, 4))
-    rates[:, 0], rates[:, 1:] = -2.0 * vector, 2.0 * (scalar * EYE + cross)
-    return EYE + 2.0 * scalar * cross + 2.0 * cross @ cross, rates
+    rates[:, 0], rates[:, 1:] = -2.0 * vector, 2.0 * (scalar * IDENTITY + cross)
+    return IDENTITY + 2.0 * scalar * cross + 2.0 * cross @ cross, rates
 
 
 @dataclass(frozen=True)
@@ -236,7 +236,7 @@ class FloatingCoordinates:
         self.body = body
         orders, shapes = np.linalg.eigh(1j * body.turning)
         whole = np.round(orders)
-        if np.abs(orders - whole).max() > WHOLE:
+        if np.abs(orders - whole).max() > ORDER_TOLERANCE:
             raise ReductionError(
                 f"body {body.name}: a turn leaves {np.abs(orders - whole).max():.1e} of its modes over; it must be "
                 "a body of revolution, with a finer mesh"
@@ -257,15 +257,15 @@ class FloatingCoordinates:
         count = len(self._arms)
         arms = (self._arms + self._moves @ amplitudes) @ turn.T
         small = _skew(self._turns @ amplitudes)
-        turns = np.concatenate([turn @ (EYE + small + 0.5 * small @ small), turn[None]])  # of the seats and the frame
+        turns = np.concatenate([turn @ (IDENTITY + small + 0.5 * small @ small), turn[None]])  # of the seats and the frame
         angles, to_angles = _tilts_and_spin(turns, near)
         jacobian = np.zeros((self.size, self.count))
         seats = jacobian[: 6 * count].reshape(count, 6, self.count)
-        seats[:, :3, :3] = EYE
+        seats[:, :3, :3] = IDENTITY
         seats[:, :3, 3:7] = -_skew(arms) @ to_velocity
         seats[:, :3, 7:] = turn @ self._moves
         seats[:, 3:, 3:7] = to_angles[:-1] @ to_velocity
-        seats[:, 3:, 7:] = to_angles[:-1] @ turn @ ((EYE + 0.5 * small) @ self._turns)
+        seats[:, 3:, 7:] = to_angles[:-1] @ turn @ ((IDENTITY + 0.5 * small) @ self._turns)
         coordinates = np.empty(self.size)
         at_seats = coordinates[: 6 * count].reshape(count, 6)
         at_seats[:, :3] = q[:3] + arms - self._arms
@@ -294,13 +294,13 @@ class FloatingCoordinates:
         near = float(coordinates[5])
         q, still = np.zeros(self.count), np.zeros(self.count)
         q[3], q[6] = math.cos(near / 2.0) - 1.0, math.sin(near / 2.0)
-        for _ in range(MOST_CORRECTIONS):
+        for _ in range(MOST_NEWTON_STEPS):
             found = self.motion(q, still, near)
             change = np.linalg.lstsq(found.jacobian, coordinates - found.coordinates)[0]
             q = q + change
             parameters = q[3:7] + [1.0, 0.0, 0.0, 0.0]
             q[3:7] = parameters / np.linalg.norm(parameters) - [1.0, 0.0, 0.0, 0.0]
-            if np.abs(change).max() < FOUND * max(1.0, abs(near)):
+            if np.abs(change).max() < CORRECTION_TOLERANCE * max(1.0, abs(near)):
                 break
         else:
             raise ReductionError(f"body {self.body.name}: its state is none of small tilts and deformations")

@@ -18,9 +18,9 @@ from exugear.bodies.floating import FloatingBody, load_or_reduce_floating, with_
 from exugear.bodies.reduced_body import Blank, Frame, ReducedBody, ReductionError, RigidInertia
 from exugear.bodies.reduction import with_rigid_inertia
 from exugear.bodies.solid_mesh import GEOMETRY, MESHES, UNPERMITTED, SolidError, SolidFile, turned_hexahedra
-from exugear.bodies.solids import SolidModel, SolidSeat, kept_file, load_or_reduce_solid, reduce_solid
+from exugear.bodies.solids import SolidModel, SolidSeat, reduction_file, load_or_reduce_solid, reduce_solid
 from exugear.bodies.turned_section import MeshSize, SeatBand, Shaft, ShaftError, ShaftSection, check_shaft
-from exugear.bodies.turned_shaft import ShaftModel, load_or_reduce, reduce_shaft
+from exugear.bodies.turned_shaft import ShaftModel, load_or_reduce_shaft, reduce_shaft
 from exugear.model.gearbox import Gearbox
 from exugear.model.named_files import LARGEST_SOLID
 from exugear.model.parts import Bearing, Body
@@ -371,7 +371,7 @@ def check_solids(gearbox: Gearbox, folder: Path) -> None:
     """
     for key, model in solids_of(gearbox):
         file: SolidFile = model.mesh
-        if file.is_script and not file.scripts and not kept_file(model, folder).is_file():
+        if file.is_script and not file.scripts and not reduction_file(model, folder).is_file():
             raise gearbox.fault(f"{key}.file = {file.path.name!r}: {UNPERMITTED}")
 
 
@@ -473,7 +473,7 @@ def _reduced(hashed: _Hashed, folder: Path | None) -> ReducedBody:
     model = hashed.model
     if isinstance(model, SolidModel):
         return reduce_solid(model) if folder is None else load_or_reduce_solid(model, folder)
-    return reduce_shaft(model) if folder is None else load_or_reduce(model, folder)
+    return reduce_shaft(model) if folder is None else load_or_reduce_shaft(model, folder)
 
 
 @lru_cache(maxsize=16)

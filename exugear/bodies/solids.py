@@ -31,8 +31,8 @@ import numpy as np
 import scipy.sparse
 import skfem
 
-from exugear.bodies.reduced_body import Blank, Figures, Frame, ReducedBody, ReductionError, Seat, Surface
-from exugear.bodies.reduction import ReducedPart, lowered, reduce_part
+from exugear.bodies.reduced_body import Blank, ReductionSummary, Frame, ReducedBody, ReductionError, Seat, Surface
+from exugear.bodies.reduction import ReducedComponent, selective_mass_scaling, reduce_component
 from exugear.bodies.solid_mesh import SolidError, SolidFile, entity_numbers
 from exugear.bodies.store import kept
 from exugear.model.versions import REDUCTION
@@ -43,9 +43,9 @@ from fe_ste.tools.sparse import Backend
 
 ELEMENTS_AT_A_TIME = 1000
 """Elements whose matrices are held together."""
-ON_SURFACE = 1e-3
+SURFACE_TOLERANCE = 1e-3
 """Distance from a seat's surface, as a share of its radius, up to which a corner lies on it."""
-LOPSIDED = 5e-3
+ASYMMETRY_TOLERANCE = 5e-3
 """Relative change of the seats' mass or stiffness by a quarter turn above which a body is none of revolution."""
 
 
@@ -217,7 +217,7 @@ def _facets(mesh: Any, seat: SolidSeat) -> Integers:
     points = points[:, : 3 if mesh.t.shape[0] == 4 else 4]
     radius, height = np.hypot(points[0], points[1]), points[2]
     middle = points.mean(axis=1)
-    slack = ON_SURFACE * seat.radius
+    slack = SURFACE_TOLERANCE * seat.radius
     if seat.width > 0.0:
         on = (np.abs(radius - seat.radius) < slack).all(axis=0) & (np.abs(middle[2]) < seat.width / 2.0)
         on &= np.ptp(height, axis=0) > slack  # an end face may have all its corners on the circle
@@ -332,7 +332,7 @@ class ReducedSolid:
     """
 
     solid: Solid
-    part: ReducedPart
+    part: ReducedComponent
     seconds: float
 
 
@@ -352,7 +352,7 @@ def reduce_matrices(model: SolidModel, backend: Backend | None = None) -> Reduce
     solid = assemble(model.elements, model.material, model.axis)
     rings = [model.blanks.get(name, Blank(0.0, 0.0, 0.0)) for name in names]
     masses = np.diag([m for b in rings for m in (*[b.mass] * 3, b.transverse, b.transverse, b.axial)])
-    part = reduce_part(
+    part = reduce_component(
         solid.mass,
         solid.stiffness,
         seat_rows(solid, model.seats),
@@ -387,7 +387,7 @@ def reduced_body(model: SolidModel, reduced: ReducedSolid) -> ReducedBody:
     """Reduced body from a solid's matrices; errors as `reduce_solid`."""
     began = time.perf_counter()
     part, size = reduced.part, reduced.part.shapes.shape[1]
-    mass, slowed = lowered(part.mass, part.stiffness, model.limit)
+    mass, slowed = selective_mass_scaling(part.mass, part.stiffness, model.limit)
     spin = np.zeros(size)
     for number, seat in enumerate(model.seats if model.frame != "ground" else ()):
         x, y = np.array(seat.centre[:2]) - model.axis
@@ -402,7 +402,7 @@ def reduced_body(model: SolidModel, reduced: ReducedSolid) -> ReducedBody:
         frame=model.frame,
         groups=("inner",) * (size - 6 * len(model.seats)),
         surface=_surface(model, reduced),
-        figures=Figures(
+        figures=ReductionSummary(
             unknowns={"whole": 3 * len(reduced.solid.nodes)},
             seconds=reduced.seconds + time.perf_counter() - began,
             free_frequencies={"whole": part.frequencies},
@@ -411,14 +411,14 @@ def reduced_body(model: SolidModel, reduced: ReducedSolid) -> ReducedBody:
     )
 
 
-def kept_file(model: SolidModel, folder: Path) -> Path:
+def reduction_file(model: SolidModel, folder: Path) -> Path:
     """Place of a solid's reduction in the folder where they are kept."""
     return folder / f"{model.name}-{model.key[:16]}.npz"
 
 
 def load_or_reduce_solid(model: SolidModel, folder: Path) -> ReducedBody:
     """Reduced solid from a folder if it is there for exactly these inputs, else reduced and kept there."""
-    return kept(kept_file(model, folder), model.key, lambda: reduce_solid(model))
+    return kept(reduction_file(model, folder), model.key, lambda: reduce_solid(model))
 
 
 def gyroscopic_matrix(model: SolidModel, reduced: ReducedSolid) -> Floats:
@@ -459,7 +459,7 @@ def gyroscopic_matrix(model: SolidModel, reduced: ReducedSolid) -> Floats:
     return 0.5 * (matrix - matrix.T)
 
 
-def _check_revolution(model: SolidModel, part: ReducedPart) -> None:
+def _check_revolution(model: SolidModel, part: ReducedComponent) -> None:
     quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     count = 6 * len(model.seats)
     turn = np.kron(np.eye(count // 3), quarter)
@@ -468,7 +468,7 @@ def _check_revolution(model: SolidModel, part: ReducedPart) -> None:
         # Entries differ in unit: each is measured by the diagonal entries of its row and column.
         diagonal = np.sqrt(np.maximum(own.diagonal(), np.abs(turn) @ own.diagonal()))
         change = float((np.abs(turn @ own @ turn.T - own) / np.outer(diagonal, diagonal)).max())
-        if change > LOPSIDED or any(np.hypot(*(np.array(seat.centre[:2]) - model.axis)) > 0 for seat in model.seats):
+        if change > ASYMMETRY_TOLERANCE or any(np.hypot(*(np.array(seat.centre[:2]) - model.axis)) > 0 for seat in model.seats):
             raise ReductionError(
                 f"body {model.name}: a quarter turn changes its {name} by {change:.1e}, but the frame 'nonrotating' "
                 "is for bodies of revolution; take 'carrier', or a finer mesh"

@@ -670,7 +670,7 @@ def _compute_modes(gearbox: Gearbox, folder: Path, variant: str, law: str, inert
             gearbox, variant, mesh_stiffness(gearbox, law, folder), law, inertias, folder=bodies_folder(folder)
         )
     for name, body in found.assembly.elastic_bodies.items():
-        figures = body.reduced.figures
+        figures = body.reduced.summary
         unknowns, took = sum(figures.unknowns.values()), figures.seconds
         note(f"{name}: {unknowns} unknowns reduced to {body.reduced.size} coordinates in {took:.1f} s")
     return found, found.save(modes_path(folder, variant, law, found.assembly.inertias))

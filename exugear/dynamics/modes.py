@@ -31,7 +31,7 @@ from fe_ste.tools.files import Layout, load_dataset, write_dataset
 
 RIGID_COORDINATES = ("x", "y", "z", "tilt_x", "tilt_y", "spin")
 FREE_ROTATION = "free rotation of the train"
-MOTIONS = ("spin", "radial", "axial", "tilt", "bending", "twist", "stretch", "deformation")
+BODY_MOTIONS = ("spin", "radial", "axial", "tilt", "bending", "twist", "stretch", "deformation")
 """What a body does: four motions as a rigid body, three deformations of an elastic shaft, the last of other bodies."""
 
 
@@ -46,7 +46,7 @@ class Modes:
     damping_ratio : (n,) share of critical damping, from the damping matrix in the mode
     shapes : (size, n) real, unit modal mass
     strain : (n, elements) share of strain energy by mesh, bearing, coupling and elastic body
-    kinetic : (n, bodies, 8) share of kinetic energy by body and motion, see `MOTIONS`
+    kinetic : (n, bodies, 8) share of kinetic energy by body and motion, see `BODY_MOTIONS`
     overall : (n,) overall DTE of the mode at unit modal mass, m / sqrt(kg)
     amplification : (n, meshes) overall DTE at resonance per amplitude of STE in one mesh, m/m
     names : what moves, in words
@@ -88,7 +88,7 @@ class Modes:
             "coordinate": np.array(coordinate_names, dtype=object),
             "element": np.array(self.element_names, dtype=object),
             "body": np.array([body.name for body in assembly.bodies], dtype=object),
-            "motion": np.array(MOTIONS, dtype=object),
+            "motion": np.array(BODY_MOTIONS, dtype=object),
             "mesh": np.array(assembly.mesh_names, dtype=object),
         }
         attributes = {
@@ -155,7 +155,7 @@ def coordinate_labels(assembly: Assembly) -> list[str]:
     for name, place in assembly.elastic_slices.items():
         reduced = assembly.elastic_bodies[name].reduced
         own = [f"{seat.name}.{motion}" for seat in reduced.seats for motion in RIGID_COORDINATES]
-        own += [f"{group.replace(' ', '_')}_{n}" for n, group in enumerate(reduced.groups, start=1)]
+        own += [f"{group.replace(' ', '_')}_{n}" for n, group in enumerate(reduced.modal_groups, start=1)]
         labels[place] = [f"{name}.{label}" for label in own]
     return labels
 
@@ -252,7 +252,7 @@ def overall_row(assembly: Assembly) -> Floats:
 def _kinetic_shares(assembly: Assembly, shapes: Floats, q: Floats) -> Floats:
     """Share of kinetic energy (n, bodies, motions) of modes about coordinates q."""
     energy = np.diag(assembly.mass_matrix)[:, None] * shapes**2
-    shares = np.zeros((shapes.shape[1], len(assembly.bodies), len(MOTIONS)))
+    shares = np.zeros((shapes.shape[1], len(assembly.bodies), len(BODY_MOTIONS)))
     for n, body in enumerate(assembly.bodies):
         if body.name in assembly.elastic_bodies:
             place = assembly.elastic_slices[body.name]
@@ -283,7 +283,7 @@ def _elastic_energies(body: ReducedBody, shapes: Floats) -> Floats:
     moved = np.diag(inertia)[:, None] * amount**2
     turning = np.einsum("im,ij,jm->m", amount[3:], inertia[3:, 3:], amount[3:])
     moved[3:] *= turning / np.maximum(moved[3:].sum(axis=0), 1e-300)
-    energies = np.zeros((shapes.shape[1], len(MOTIONS)))
+    energies = np.zeros((shapes.shape[1], len(BODY_MOTIONS)))
     energies[:, :4] = np.stack([moved[5], moved[0] + moved[1], moved[2], moved[3] + moved[4]], axis=1)
     deformed = shapes - rigid @ amount
     for block in body.blocks:
@@ -326,7 +326,7 @@ def mode_name(assembly: Assembly, element_names: tuple[str, ...], kinetic: Float
     """
     moving: dict[str, float] = {}
     for body, shares in zip(assembly.bodies, kinetic, strict=True):
-        for motion, share in zip(MOTIONS, shares, strict=True):
+        for motion, share in zip(BODY_MOTIONS, shares, strict=True):
             family = "planets" if body.carrier else body.name
             moving[f"{family} {motion}"] = moving.get(f"{family} {motion}", 0.0) + float(share)
     strained: dict[str, float] = {}

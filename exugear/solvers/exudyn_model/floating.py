@@ -407,8 +407,8 @@ def add_floating_body(mbs: Any, body: FloatingBody, rotation: Rotation = "euler_
     euler = rotation == "euler_parameters"
     kind = exudyn.NodeType.RotationEulerParameters if euler else exudyn.NodeType.RotationRxyz
     made = frame_integrals(body, kind).AddObjectFFRFreducedOrder(mbs, positionRef=body.centre.tolist())
-    if body.slowing.any():
-        mbs.AddObject(items.ObjectGenericODE2(nodeNumbers=[made["nGenericODE2"]], massMatrix=np.diag(body.slowing)))
+    if body.added_mass.any():
+        mbs.AddObject(items.ObjectGenericODE2(nodeNumbers=[made["nGenericODE2"]], massMatrix=np.diag(body.added_mass)))
     return made["nRigidBody"], made["nGenericODE2"]
 
 

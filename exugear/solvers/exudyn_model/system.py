@@ -218,10 +218,10 @@ class ExudynSystem:
             nodes.append(
                 self.mbs.AddNode(
                     items.NodeGenericODE2(
-                        referenceCoordinates=[0.0] * len(reduced.groups),
+                        referenceCoordinates=[0.0] * len(reduced.modal_groups),
                         initialCoordinates=q[inner].tolist(),
                         initialCoordinates_t=v[inner].tolist(),
-                        numberOfODE2Coordinates=len(reduced.groups),
+                        numberOfODE2Coordinates=len(reduced.modal_groups),
                     )
                 )
             )

@@ -17,7 +17,7 @@ from exugear.bodies.turned_shaft import ShaftModel, reduce_shaft
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.linearised import linearise
-from exugear.dynamics.modes import MOTIONS, eigenmodes, modes_of
+from exugear.dynamics.modes import BODY_MOTIONS, eigenmodes, modes_of
 from exugear.dynamics.statics import accelerating_start
 from exugear.model.gearbox import Gearbox
 from exugear.solvers.compiled.solver import CompiledSystem
@@ -94,7 +94,7 @@ def test_the_shaft_alone_bends_free_as_a_timoshenko_beam(model: ShaftModel) -> N
     shaft = reduce_shaft(replace(model, sections=sections, seats=seats, blanks={}))
     mass, stiffness, _ = beam(sections, [])
     expected = frequencies(mass, stiffness)[2:4]
-    assert shaft.figures.free_frequencies["bending"][:2] == pytest.approx(expected, rel=4e-3)
+    assert shaft.summary.free_interface_frequencies["bending"][:2] == pytest.approx(expected, rel=4e-3)
 
 
 def test_the_rotor_on_its_bearings_nods_as_on_a_beam(model: ShaftModel, reduced: ReducedBody) -> None:
@@ -109,9 +109,9 @@ def test_the_rotor_on_its_bearings_nods_as_on_a_beam(model: ShaftModel, reduced:
     free = [n for n in range(len(mass)) if n not in (at["shrink_disc"], at["shrink_disc"] + 1)]
     expected = frequencies(mass[np.ix_(free, free)], stiffness[np.ix_(free, free)])[:2]
     held = reduced.stiffness.copy()
-    across = reduced.seat("main_bearing")
+    across = reduced.first_coordinate("main_bearing")
     held[across, across] += MAIN_BEARING
-    clamp = reduced.seat("shrink_disc")
+    clamp = reduced.first_coordinate("shrink_disc")
     plane = next(block for block in reduced.blocks if across in block)
     left = [n for n in plane if n not in range(clamp, clamp + 6)]
     found = frequencies(reduced.mass[np.ix_(left, left)], held[np.ix_(left, left)])[:2]
@@ -130,7 +130,7 @@ def twist_per_torque(model: ShaftModel) -> float:
 
 
 def test_the_shaft_winds_up_as_its_sections_say(reduced: ReducedBody, model: ShaftModel, with_shaft: Gearbox) -> None:
-    hub, disc = (reduced.seat(seat) + 5 for seat in ("torque", "shrink_disc"))
+    hub, disc = (reduced.first_coordinate(seat) + 5 for seat in ("torque", "shrink_disc"))
     free = [n for n in next(block for block in reduced.blocks if hub in block) if n != disc]
     load = np.array([float(n == hub) for n in free])
     wound = np.linalg.solve(reduced.stiffness[np.ix_(free, free)], load)[free.index(hub)]
@@ -148,7 +148,7 @@ def test_the_rotor_turns_against_the_gearbox_as_two_inertias(flexible: Assembly,
     train = 240e3 / state.rates["carrier"] - rotor
     assert train == pytest.approx(5.97e3, rel=1e-3)  # 5.96e3 by the case file, and the shaft beyond the main bearing
     wound = modes.strain[:, modes.element_names.index("main_shaft_body")] > 0.8
-    turning = modes.kinetic[:, :, MOTIONS.index("spin")].sum(axis=1) > 0.8
+    turning = modes.kinetic[:, :, BODY_MOTIONS.index("spin")].sum(axis=1) > 0.8
     (seen,) = np.flatnonzero(wound & turning)
 
     def two_inertias(stiffness: float) -> float:

@@ -18,7 +18,7 @@ from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly, VariantError
 from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.linearised import linearise
-from exugear.dynamics.modes import MOTIONS, counterparts, eigenmodes, modes_of
+from exugear.dynamics.modes import BODY_MOTIONS, counterparts, eigenmodes, modes_of
 from exugear.dynamics.signals import Channels, energy_residual
 from exugear.dynamics.statics import accelerating_start, locked_equilibrium
 from exugear.model.gearbox import Gearbox
@@ -163,8 +163,8 @@ def test_modes_tell_of_the_housing(housed: Assembly) -> None:
     assert any(name.startswith("box radial") for name in modes.names)
     names = [body.name for body in housed.bodies]
     shares = modes.kinetic[:, names.index("box")].max(axis=0)
-    assert shares[MOTIONS.index("deformation")] > 0.05
-    assert shares[[MOTIONS.index(motion) for motion in ("bending", "twist", "stretch")]].max() == 0.0
+    assert shares[BODY_MOTIONS.index("deformation")] > 0.05
+    assert shares[[BODY_MOTIONS.index(motion) for motion in ("bending", "twist", "stretch")]].max() == 0.0
     scene = elastic_scene(housed, modes.shapes[:, 3])
     assert len(scene.bodies) == 1
     assert not scene.gears
@@ -300,7 +300,7 @@ def test_the_grc_stands_on_its_mounts_with_elastic_housing(grc: Gearbox, stiffne
     # The published finite-element analysis of the real rear housing has tilts of 0.12 to 0.54 mrad at 401 kN m.
     housing, place = assembly.elastic_bodies["housing"].reduced, assembly.elastic_slices["housing"]
     tilts = [
-        np.hypot(*q[place][housing.seat(name) + 3 : housing.seat(name) + 5]) for name in ("lss_bc", "ims_bc", "hss_bc")
+        np.hypot(*q[place][housing.first_coordinate(name) + 3 : housing.first_coordinate(name) + 5]) for name in ("lss_bc", "ims_bc", "hss_bc")
     ]
     assert 1e-4 < max(tilts) < 1e-3
     run = simulate(grc, "flexible", stiffness, tmp_path, load_case="generating", duration=0.02)

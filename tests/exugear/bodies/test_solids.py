@@ -219,7 +219,7 @@ def test_tetrahedra_and_hexahedra_of_a_tube_agree():
     frequencies = []
     for mesh in (turned_hexahedra(shaft, 8), tetrahedra(tube, 0.06, curvature=8)):
         found = reduce_solid(SolidModel("tube", mesh, STEEL, TUBE_SEATS, "ground", 4000.0, 1e6))
-        frequencies.append(found.figures.free_frequencies["whole"][:3])
+        frequencies.append(found.summary.free_interface_frequencies["whole"][:3])
     assert frequencies[1] == pytest.approx(frequencies[0], rel=2e-3)
 
 
@@ -305,7 +305,7 @@ def test_a_reduction_is_kept_and_every_input_has_its_own_key(tmp_path: Path):
     assert [file.stat().st_mtime_ns for file in tmp_path.iterdir()] == stamps
     assert np.array_equal(first.mass, again.mass)
     assert np.array_equal(first.surface.quads, again.surface.quads)
-    assert first.figures.unknowns == again.figures.unknowns == {"whole": 3 * mesh.doflocs.shape[1]}
+    assert first.summary.unknowns == again.summary.unknowns == {"whole": 3 * mesh.doflocs.shape[1]}
     others = [
         replace(bar, mesh=tetrahedra(lambda occ: occ.addBox(-0.1, -0.1, 0.0, 0.2, 0.2, 0.3), 0.1)),
         replace(bar, frame="ground"),
@@ -390,8 +390,8 @@ def test_the_ring_of_the_grc_turns_oval_as_a_thin_ring(shapes):
     radius, thickness = (0.595 + 0.5235) / 2, 0.595 - 0.5235
     speed = math.sqrt(model.material.youngs_modulus / model.material.density)
     expected = 6 / math.sqrt(5) * thickness / math.sqrt(12) * speed / radius**2 / (2 * math.pi)
-    assert ring.figures.free_frequencies["whole"][:2] == pytest.approx([expected, expected], rel=1e-2)
-    assert ring.free_frequencies[:2] == pytest.approx(ring.figures.free_frequencies["whole"][:2], rel=1e-6)
+    assert ring.summary.free_interface_frequencies["whole"][:2] == pytest.approx([expected, expected], rel=1e-2)
+    assert ring.free_frequencies[:2] == pytest.approx(ring.summary.free_interface_frequencies["whole"][:2], rel=1e-6)
 
 
 @needs_gmsh

@@ -12,7 +12,7 @@ import skfem
 
 from exugear.bodies.floating import FloatingBody, floating_body
 from exugear.bodies.reduced_body import Blank
-from exugear.bodies.reduction import lowered
+from exugear.bodies.reduction import selective_mass_scaling
 from exugear.bodies.solid_mesh import turned_hexahedra
 from exugear.bodies.solids import ReducedSolid, SolidModel, SolidSeat, gyroscopic_matrix, reduce_matrices
 from exugear.bodies.turned_section import MeshSize, SeatBand, Shaft, ShaftSection
@@ -85,14 +85,14 @@ def on_bearings(model: SolidModel, bearings: np.ndarray, vibration: np.ndarray |
     """Both descriptions of a body whose elastic vibrations begin with what the modes have of given seat velocities."""
     reduced, body = reduce_matrices(model), floating_body(model)
     stiffness = reduced.part.stiffness
-    mass, _ = lowered(reduced.part.mass, stiffness, model.limit)
+    mass, _ = selective_mass_scaling(reduced.part.mass, stiffness, model.limit)
     turned = scipy.linalg.eigh(stiffness, mass)[1]
     seats = 6 * len(model.seats)
     moved = np.kron(np.ones((len(model.seats), 1)), np.eye(6))[:, :3] @ VELOCITY
     initial = turned.T @ mass @ np.concatenate([moved, np.zeros(len(mass) - seats)])
     # Signs of modes, and directions in a pair of equal frequencies, are each description's own.
     wanted = np.zeros(seats) if vibration is None else vibration
-    exact = int(np.count_nonzero(body.slowing == 0.0))  # what is slowed down is there for statics
+    exact = int(np.count_nonzero(body.added_mass == 0.0))  # what is slowed down is there for statics
     rates = np.zeros(len(body.stiffness))
     rates[:exact] = np.linalg.lstsq(body.at_seats[:, :exact], wanted)[0]
     initial[6 : 6 + exact] += np.linalg.lstsq(turned[:seats, 6 : 6 + exact], wanted)[0]
