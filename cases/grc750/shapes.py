@@ -13,7 +13,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from exugear.bodies.of_gearbox import solid_body
+from exugear.bodies.of_gearbox.solids import solid_body
 from exugear.bodies.reduced_body import ReducedBody
 from exugear.bodies.solids import SolidModel, load_or_reduce_solid
 from exugear.model.gearbox import Gearbox

@@ -1,4 +1,4 @@
-"""Reductions of elastic bodies, kept in files by the hash of their input."""
+"""Reductions of elastic bodies, stored in files by the hash of their input."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from exugear.bodies.reduced_body import ReductionSummary, ReducedBody, Seat, Surface
+from exugear.bodies.reduced_body import ReducedBody, ReductionSummary, Seat, Surface
 from fe_ste.tools.files import FileError, read_sealed, write_sealed
 
 _log = logging.getLogger(__name__)

@@ -11,12 +11,24 @@ from pathlib import Path
 
 import numpy as np
 
+from exugear.bodies.finite_elements.shaft_sections import STANDARD_SIZE, MeshSize, SeatBand, ShaftSection
+from exugear.bodies.finite_elements.turned_section import Harmonic, HarmonicName, Shaft
 from exugear.bodies.reduced_body import (
-    SPIN, TILT_X, TILT_Y, UX, UY, UZ, Blank, ReducedBody, ReductionError, ReductionSummary, Seat, Surface,
+    SPIN,
+    TILT_X,
+    TILT_Y,
+    UX,
+    UY,
+    UZ,
+    Blank,
+    ReducedBody,
+    ReductionError,
+    ReductionSummary,
+    Seat,
+    Surface,
 )
-from exugear.bodies.reduction import ReducedComponent, selective_mass_scaling, reduce_component, symmetric
+from exugear.bodies.reduction import ReducedComponent, reduce_component, selective_mass_scaling, symmetric
 from exugear.bodies.store import load_or_reduce
-from exugear.bodies.turned_section import STANDARD_SIZE, Harmonic, HarmonicName, MeshSize, SeatBand, Shaft, ShaftSection
 from exugear.model.versions import REDUCTION
 from fe_ste.geometry.gears import Material
 from fe_ste.tools.arrays import Floats, Integers, SparseMatrix
@@ -65,7 +77,7 @@ def reduce_shaft(model: ShaftModel) -> ReducedBody:
 
     Raises
     ------
-    exugear.bodies.turned_section.ShaftError
+    exugear.bodies.finite_elements.shaft_sections.ShaftError
         A shaft that cannot be, or a seat that does not lie on it.
     ReductionError
         A blank without its seat, or too few seats.

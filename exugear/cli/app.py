@@ -512,7 +512,7 @@ def _check_choices(
     load_case: str | None = None,
 ) -> None:
     """Refuse what the gearbox does not have, or may not do, before anything is written into the results folder."""
-    from exugear.bodies.of_gearbox import check_solids
+    from exugear.bodies.of_gearbox.solids import check_solids
     from exugear.dynamics.readiness import lacking
     from exugear.results.folder import bodies_folder
 
@@ -555,7 +555,7 @@ def _tell_doubts(gearbox: Gearbox, load_case: str) -> None:
 
 def _tell_scripts(gearbox: Gearbox) -> None:
     """Check the solids, and say which of them only a script makes."""
-    from exugear.bodies.of_gearbox import solids_of
+    from exugear.bodies.of_gearbox.solids import solids_of
 
     with _model_errors():
         for key, model in solids_of(gearbox):
@@ -641,7 +641,7 @@ def _reduce_elastic_bodies(gearbox: Gearbox, folder: Path, variant: str, inertia
     if variant != Variant.flexible:
         return
     from exugear.bearings.supports import elastic_names
-    from exugear.bodies.of_gearbox import reduced_bodies
+    from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies
     from exugear.results.folder import bodies_folder
 
     with progress_bar() as bar:

@@ -18,11 +18,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from fe_ste.tools.arrays import Floats
 from numpy.typing import NDArray
 
 from exugear.bodies.floating import FloatingBody
-from exugear.bodies.of_gearbox import ElasticBody
+from exugear.bodies.of_gearbox.elastic_bodies import ElasticBody
 from exugear.bodies.turning_frame import TurningBody, turning_arrays
 from exugear.kernels.connectors import ConnectorArrays, add_connector_forces, connector_load
 from exugear.kernels.elastic import ElasticArrays, add_elastic_forces, scratch_for, set_elastic_accelerations
@@ -41,6 +40,7 @@ from exugear.kernels.turning import TurningArrays
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Bearing, Body
 from exugear.tooth_mesh.element import MeshElement, pack
+from fe_ste.tools.arrays import Floats
 
 
 class VariantError(ValueError):

@@ -102,6 +102,6 @@ def _pairs_with_axes(gearbox: Gearbox) -> list[str]:
 
 
 def _build_elastic_body(gearbox: Gearbox, name: str) -> None:
-    from exugear.bodies.of_gearbox import check_elastic_body
+    from exugear.bodies.of_gearbox.elastic_bodies import check_elastic_body
 
     check_elastic_body(gearbox, name)

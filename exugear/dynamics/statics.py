@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
-from fe_ste.tools.arrays import Floats
 
 from exugear.dynamics.assembly import Assembly
 from exugear.kernels.meshes import MeshArrays
+from fe_ste.tools.arrays import Floats
 
 STEP = 1e-7
 """Difference step of the Newton matrices, m and rad: far above round-off, far below any radius."""

@@ -26,7 +26,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from exugear.bodies.floating import FloatingBody, FloatingCoordinates, FloatingMotion, euler_rotation
+from exugear.bodies.floating import FloatingBody
+from exugear.bodies.floating_coordinates import FloatingCoordinates, FloatingMotion
+from exugear.bodies.rotations import euler_rotation
 from exugear.dynamics.assembly import Assembly
 from exugear.kernels.connectors import ConnectorArrays, add_connector_forces
 from exugear.kernels.meshes import MeshArrays
@@ -417,7 +419,7 @@ def frame_integrals(body: FloatingBody, kind: Any) -> Any:
 
     A skew matrix s(f) with s(f) v = f x v gives s(f)' s(g) = (f . g) 1 - g f' and s(f)' g = g x f.
     """
-    own, first = body.moments, body.first
+    own, first = body.second_moments, body.first_moments
     modes, seats = len(body.stiffness), len(body.seats)
     products = np.einsum("aafg,bc->bcfg", own, np.eye(3)) - own.transpose(1, 0, 2, 3)
     turned = np.stack([own[a, b] - own[b, a] for a, b in ((2, 1), (0, 2), (1, 0))])

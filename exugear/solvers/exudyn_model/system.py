@@ -23,7 +23,6 @@ from collections.abc import Callable
 from typing import Any, Literal
 
 import numpy as np
-from fe_ste.tools.arrays import Floats
 from numpy.typing import NDArray
 
 from exugear.bodies.reduced_body import ReducedBody
@@ -34,6 +33,7 @@ from exugear.model.parts import Body, Joint
 from exugear.model.seats import node_position, seat_key
 from exugear.solvers.exudyn_model.floating import FloatingBodies, SolverFailure
 from exugear.solvers.loads import Drive, Loading
+from fe_ste.tools.arrays import Floats
 
 MeshRoute = Literal["element", "loads"]
 Observer = Callable[[float, Floats, Floats], bool]
@@ -227,8 +227,8 @@ class ExudynSystem:
             )
             self._elastic_nodes[name] = nodes
             elastic = self.assembly.elastic_bodies[name]
-            self._nodes[name] = self._nodes[seat_key(name, elastic.main)]
-            for item, seat_name in elastic.shared.items():
+            self._nodes[name] = self._nodes[seat_key(name, elastic.main_seat)]
+            for item, seat_name in elastic.shared_seats.items():
                 key, shared = seat_key(name, item), seat_key(name, seat_name)
                 self._nodes[key], self._seat_places[key] = self._nodes[shared], self._seat_places[shared]
             if name in self.assembly.turning:

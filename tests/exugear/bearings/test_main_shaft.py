@@ -10,9 +10,9 @@ import pytest
 import scipy.linalg
 
 from exugear.bearings import rollers as bearings
-from exugear.bodies.of_gearbox import shaft_model
+from exugear.bodies.finite_elements.shaft_sections import ShaftSection
+from exugear.bodies.of_gearbox.shafts import shaft_model
 from exugear.bodies.reduced_body import ReducedBody
-from exugear.bodies.turned_section import ShaftSection
 from exugear.bodies.turned_shaft import ShaftModel, reduce_shaft
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly

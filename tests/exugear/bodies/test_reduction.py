@@ -11,10 +11,11 @@ import pytest
 import scipy.linalg
 import scipy.sparse.linalg
 
+from exugear.bodies.finite_elements.shaft_sections import MeshSize, SeatBand, ShaftSection
+from exugear.bodies.finite_elements.turned_section import Shaft
 from exugear.bodies.reduced_body import Blank, ReducedBody, ReductionError, RigidInertia
-from exugear.bodies.reduction import with_stiffness_factor, with_rigid_inertia
+from exugear.bodies.reduction import with_rigid_inertia, with_stiffness_factor
 from exugear.bodies.store import stored_arrays
-from exugear.bodies.turned_section import MeshSize, SeatBand, Shaft, ShaftSection
 from exugear.bodies.turned_shaft import ShaftModel, load_or_reduce_shaft, reduce_shaft
 from fe_ste.geometry.gears import Material
 from fe_ste.tools.files import write_sealed

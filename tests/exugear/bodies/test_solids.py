@@ -18,20 +18,16 @@ import scipy.sparse
 import scipy.sparse.linalg
 import skfem
 
-from exugear.bodies import solid_mesh
+from exugear.bodies.finite_elements import second_order, solid_files
+from exugear.bodies.finite_elements.second_order import SolidError
+from exugear.bodies.finite_elements.shaft_sections import MeshSize, SeatBand, ShaftSection
+from exugear.bodies.finite_elements.solid_files import read_solid, tetrahedra
+from exugear.bodies.finite_elements.solid_matrices import assemble
+from exugear.bodies.finite_elements.solid_seats import SolidSeat, seat_rows
+from exugear.bodies.finite_elements.turned_hexahedra import turned_hexahedra
+from exugear.bodies.finite_elements.turned_section import Shaft
 from exugear.bodies.reduced_body import Blank, ReducedBody, ReductionError
-from exugear.bodies.solid_mesh import SolidError, read_solid, tetrahedra, turned_hexahedra
-from exugear.bodies.solids import (
-    SolidModel,
-    SolidSeat,
-    assemble,
-    gyroscopic_matrix,
-    load_or_reduce_solid,
-    reduce_matrices,
-    reduce_solid,
-    seat_rows,
-)
-from exugear.bodies.turned_section import MeshSize, SeatBand, Shaft, ShaftSection
+from exugear.bodies.solids import SolidModel, gyroscopic_matrix, load_or_reduce_solid, reduce_matrices, reduce_solid
 from exugear.bodies.turned_shaft import ShaftModel, reduce_shaft
 from fe_ste.geometry.gears import Material
 from fe_ste.tools.sparse import factorise
@@ -203,7 +199,7 @@ TUBE_SEATS = (
 def test_a_broken_pipe_stays_an_error_after_meshing():
     """Else a process that meshed a solid would end without a word when a worker of its sweep is lost."""
     code = (
-        "import os\nfrom exugear.bodies.solid_mesh import tetrahedra\n"
+        "import os\nfrom exugear.bodies.finite_elements.solid_files import tetrahedra\n"
         "tetrahedra(lambda occ: occ.addBox(0.0, 0.0, 0.0, 1.0, 0.5, 0.25), 0.5)\n"
         "reader, writer = os.pipe()\nos.close(reader)\n"
         "try:\n    os.write(writer, b'x')\nexcept BrokenPipeError:\n    print('an error')\n"
@@ -236,7 +232,7 @@ def test_meshes_are_read_from_files(tmp_path, suffix, options, kind):
     if kind.startswith("hexa"):
         straight = skfem.MeshHex.init_tensor(*[np.linspace(0, s, 2) for s in (2, 1, 1)])
         cells, points = straight.t.T[:, np.argsort([6, 2, 5, 7, 1, 3, 4, 0])], straight.p.T
-    edges = solid_mesh._TET_EDGES if kind == "tetra10" else solid_mesh._HEX_EDGES
+    edges = second_order.TET_EDGES if kind == "tetra10" else second_order.HEX_EDGES
     if kind in ("tetra10", "hexahedron20"):
         middles = points[cells[:, edges]].mean(axis=2).reshape(-1, 3)
         extra = len(points) + np.arange(len(middles)).reshape(len(cells), -1)
@@ -268,7 +264,7 @@ def test_a_missing_system_library_is_named(monkeypatch):
     def missing(name: str) -> Any:
         raise OSError("libGLU.so.1: cannot open shared object file")
 
-    monkeypatch.setattr(solid_mesh.importlib, "import_module", missing)
+    monkeypatch.setattr(solid_files.importlib, "import_module", missing)
     with pytest.raises(SolidError, match=r"libGLU\.so\.1.*install libglu1-mesa"):
         tetrahedra(tube, 0.1)
 

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from exugear.bearings import supports
 from exugear.bearings.supports import bearing_matrices, elastic_names
-from exugear.bodies.of_gearbox import check_elastic_body
+from exugear.bodies.of_gearbox.elastic_bodies import check_elastic_body
 from exugear.cli.app import app
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.readiness import check_parts, lacking, remarks

@@ -25,9 +25,18 @@ from typing import Any, Literal
 import numpy as np
 import scipy.sparse
 import skfem
-from fe_ste.tools.arrays import Booleans, Floats, Integers, SparseMatrix
 
+from exugear.bodies.finite_elements.shaft_sections import (
+    SAME,
+    STANDARD_SIZE,
+    MeshSize,
+    SeatBand,
+    ShaftSection,
+    check_sections,
+    locate,
+)
 from fe_ste.geometry.gears import Material
+from fe_ste.tools.arrays import Booleans, Floats, Integers, SparseMatrix
 
 HarmonicName = Literal["bending", "torsion", "stretching"]
 FIELDS: dict[HarmonicName, int] = {"bending": 3, "torsion": 1, "stretching": 2}
@@ -36,70 +45,6 @@ GRADING = 0.35
 """Ratio of neighbouring element sizes towards a re-entrant corner."""
 INTEGRATION_ORDER = 5
 """Exact for the mass matrix but for the factor r; the strains' 1/r is no polynomial anyway."""
-MOST_ELEMENTS = 50_000
-"""Most elements over a half-section: 10 m of shaft with 3 m diameter; 4 GB."""
-SAME = 1e-9
-"""Two places (m) this close are one."""
-
-
-class ShaftError(ValueError):
-    """A shaft that cannot be, or a seat that does not lie on it."""
-
-
-@dataclass(frozen=True)
-class ShaftSection:
-    """A cylindrical piece of a shaft: length, outer and inner diameter, m.
-
-    Raises
-    ------
-    ShaftError
-        Length or outer diameter not positive, or no wall between the diameters.
-    """
-
-    length: float
-    outer_diameter: float
-    inner_diameter: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Refuse what cannot be turned."""
-        if self.length <= 0.0 or self.outer_diameter <= 0.0 or not 0.0 <= self.inner_diameter < self.outer_diameter:
-            raise ShaftError(
-                f"section of length {self.length:g} m and diameters {self.outer_diameter:g} over "
-                f"{self.inner_diameter:g} m: it needs a positive length and a wall"
-            )
-
-
-@dataclass(frozen=True)
-class MeshSize:
-    """Element sizes over the half-section.
-
-    Attributes
-    ----------
-    axial, radial : largest element, m
-    grading : number of lines that close in on each shoulder
-    """
-
-    axial: float = 0.025
-    radial: float = 0.0125
-    grading: int = 3
-
-
-STANDARD_SIZE = MeshSize()
-
-
-@dataclass(frozen=True)
-class SeatBand:
-    """Where something sits on a shaft: a band of the outer surface, or a plane cross-section if it has no width.
-
-    Attributes
-    ----------
-    z : middle, m from the beginning of the first section
-    width : m; 0 for the cross-section
-    """
-
-    name: str
-    z: float
-    width: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -173,7 +118,7 @@ class Shaft:
         self.seats = tuple(seats)
         self.size = size
         self._ends = np.concatenate([[0.0], np.cumsum([section.length for section in sections])])
-        _check_sections(self.sections)
+        check_sections(self.sections)
         self._bands = [self._locate(seat) for seat in self.seats]
         radii, heights = self._lines()
         self.mesh = _half_section(radii, heights, self._solid)
@@ -334,9 +279,7 @@ class Shaft:
                 rows.append(row.T.ravel())
         return np.array(rows).reshape(len(rows), fields * self.nodes.shape[1])
 
-    def _surface(
-        self, seat: SeatBand, section: ShaftSection, low: float, high: float
-    ) -> tuple[Integers, Floats]:
+    def _surface(self, seat: SeatBand, section: ShaftSection, low: float, high: float) -> tuple[Integers, Floats]:
         """Nodes of a seat's surface and their share of its area, by Simpson's rule over each element's edge."""
         r, z = self.nodes
         if seat.width > 0.0:
@@ -397,56 +340,6 @@ class Shaft:
         values = np.zeros((fields * self.nodes.shape[1], shapes.shape[1]))
         values[self.free_unknowns(harmonic)] = shapes
         return values.reshape(self.nodes.shape[1], fields, -1)
-
-
-def locate(sections: Sequence[ShaftSection], seat: SeatBand) -> tuple[ShaftSection, float, float]:
-    """Section under a seat, lower and upper edge (m); neighbours of one diameter count as one.
-
-    Raises
-    ------
-    ShaftError
-        The seat lies outside the shaft or across a step.
-    """
-    ends = np.concatenate([[0.0], np.cumsum([section.length for section in sections])])
-    low, high = seat.z - seat.width / 2.0, seat.z + seat.width / 2.0
-    if low < -SAME or high > ends[-1] + SAME:
-        raise ShaftError(f"seat {seat.name}: it reaches from {low:g} to {high:g} m, the shaft from 0 to {ends[-1]:g} m")
-    under = [
-        section
-        for section, start, end in zip(sections, ends[:-1], ends[1:], strict=True)
-        if (start < high - SAME and end > low + SAME) or (seat.width == 0.0 and start - SAME <= low <= end + SAME)
-    ]
-    if seat.width > 0.0 and len({section.outer_diameter for section in under}) > 1:
-        raise ShaftError(f"seat {seat.name}: a shoulder lies between {low:g} and {high:g} m; move or narrow it")
-    return max(under, key=lambda section: section.outer_diameter), low, high
-
-
-def check_shaft(sections: Sequence[ShaftSection], seats: Sequence[SeatBand], size: MeshSize = STANDARD_SIZE) -> None:
-    """Refuse a shaft before it is meshed.
-
-    Raises
-    ------
-    ShaftError
-        Sections that do not touch each other, seats that do not lie on them, or more elements than memory holds.
-    """
-    _check_sections(tuple(sections))
-    for seat in seats:
-        locate(sections, seat)
-    length, radius = sum(s.length for s in sections), max(s.outer_diameter for s in sections) / 2.0
-    elements = length / size.axial * radius / size.radial
-    if elements > MOST_ELEMENTS:
-        raise ShaftError(
-            f"a shaft of {length:g} m and {2.0 * radius:g} m diameter needs {elements:.0f} elements over its section; "
-            f"{MOST_ELEMENTS} are the most"
-        )
-
-
-def _check_sections(sections: tuple[ShaftSection, ...]) -> None:
-    if not sections:
-        raise ShaftError("a shaft needs at least one section")
-    for number, (left, right) in enumerate(zip(sections[:-1], sections[1:], strict=True), start=1):
-        if min(left.outer_diameter, right.outer_diameter) <= max(left.inner_diameter, right.inner_diameter):
-            raise ShaftError(f"sections {number} and {number + 1} do not touch: the bore of one clears the other")
 
 
 def _by_field(scalar: Floats, factors: Sequence[float]) -> Floats:
