@@ -583,7 +583,7 @@ def _time_noted(folder: Path, step: str) -> Iterator[None]:
 @contextmanager
 def _model_errors() -> Iterator[None]:
     """Turn errors of the model's parts into those of the command line."""
-    from exugear.bearings.rollers import BearingError
+    from exugear.bearings.rows import BearingError
     from exugear.dynamics.assembly import VariantError
     from exugear.dynamics.statics import BalanceError
     from exugear.model.reading import CaseError

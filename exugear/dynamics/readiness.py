@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from exugear.bearings.rollers import BearingError
+from exugear.bearings.rows import BearingError
 from exugear.bearings.supports import ON_BEARINGS, bearing_matrices, elastic_names, unsupported
 from exugear.dynamics.restraint import free_motion
 from exugear.loads.torque_series import torque_series

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from exugear.bearings import rollers as bearings
+from exugear.bearings.contact import pitch_averaged_tangent
+from exugear.bearings.matrices import axially_symmetric
+from exugear.bearings.rollers import BearingPair, TaperedRollerBearing
 from exugear.bodies.finite_elements.shaft_sections import ShaftSection
 from exugear.bodies.of_gearbox.shafts import shaft_model
 from exugear.bodies.reduced_body import ReducedBody
@@ -189,9 +191,9 @@ def test_both_solvers_join_the_shaft_to_the_carrier_at_its_seat(flexible: Assemb
 
 def test_the_main_bearing_is_as_stiff_as_two_rows_whose_pressure_lines_meet_on_the_axis(with_shaft: Gearbox) -> None:
     angle = math.radians(11.0)
-    row = bearings.TaperedRollerBearing(bore=0.38, outside_diameter=0.56, width=0.09, contact_angle=angle)
-    pair = bearings.BearingPair(bearing=row, arrangement="X", row_distance=0.47 * math.tan(angle))
-    found = np.diag(bearings.axially_symmetric(bearings.pitch_averaged_tangent(pair, (200e3, 0.0, 0.0))))
+    row = TaperedRollerBearing(bore=0.38, outside_diameter=0.56, width=0.09, contact_angle=angle)
+    pair = BearingPair(bearing=row, arrangement="X", row_distance=0.47 * math.tan(angle))
+    found = np.diag(axially_symmetric(pitch_averaged_tangent(pair, (200e3, 0.0, 0.0))))
     given = with_shaft.case.bearings["main_bearing"].stiffness
     assert given is not None
     assert given.radial_N_per_m == pytest.approx(found[0], rel=0.05)  # given with two digits

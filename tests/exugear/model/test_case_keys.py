@@ -48,7 +48,7 @@ def read_keys(monkeypatch: pytest.MonkeyPatch) -> set[tuple[str, str]]:
 
 
 def test_every_key_is_read(read_keys: set[tuple[str, str]], tmp_path: Path) -> None:
-    supports._catalogue_stiffness.cache_clear()  # what other tests had computed would not be read again
+    supports.catalogue_stiffness.cache_clear()  # what other tests had computed would not be read again
     contents = bases(tmp_path)
     contents["spur"]["ste"] = {"method": "nonlinear", "positions": 8}
     for name, content in contents.items():
