@@ -212,7 +212,7 @@ class Recorder:
         self.file.note("trusted", 0 if against else 1)
 
     def _integrate_in_exudyn(self, mesh_route: MeshRoute) -> None:
-        from exugear.solvers.exudyn_model.floating import SolverFailure
+        from exugear.solvers.exudyn_model.library import SolverFailure
         from exugear.solvers.exudyn_model.system import ExudynSystem
 
         system = ExudynSystem(self.assembly, self.q, self.v, _loading(self.loads), mesh_route)

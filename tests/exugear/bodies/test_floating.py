@@ -27,7 +27,8 @@ from exugear.model.reading import CaseError
 from exugear.runs.outcome import RunError
 from exugear.runs.runup import simulate
 from exugear.solvers.compiled.solver import refusal
-from exugear.solvers.exudyn_model.floating import elements, exudyn, frame_integrals
+from exugear.solvers.exudyn_model.floating_object import frame_integrals
+from exugear.solvers.exudyn_model.library import elements, exudyn
 from exugear.solvers.exudyn_model.system import ExudynSystem
 from exugear.solvers.loads import Drive, Loading
 from fe_ste.geometry.gears import Material

@@ -22,7 +22,8 @@ from exugear.runs.recorder import _loading
 from exugear.runs.runup import simulate
 from exugear.solvers.compiled.solver import CompiledSystem, Observer, refusal
 from exugear.solvers.compiled.step import choose_step, highest_rate
-from exugear.solvers.exudyn_model.system import ExudynSystem, exudyn
+from exugear.solvers.exudyn_model.library import exudyn
+from exugear.solvers.exudyn_model.system import ExudynSystem
 from exugear.solvers.loads import DriveLaw, Loading, LoadTable
 from exugear.spectra.waterfall import harmonics, order_cut
 
