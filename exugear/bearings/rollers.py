@@ -11,7 +11,7 @@ from typing import Literal
 
 from exugear.bearings.contact import pitch_averaged_tangent
 from exugear.bearings.rows import BearingError, RollerBearing, RollerRow
-from exugear.model.sections import CatalogueSection
+from exugear.model.sections.connections import CatalogueSection
 from fe_ste.tools.arrays import Floats
 
 CYLINDRICAL_ROLLER_PROFILE = 0.00035

@@ -11,7 +11,7 @@ from exugear.bearings import matrices
 from exugear.bearings.rollers import cylindrical_roller_stiffness, tapered_roller_stiffness
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Bearing, stiffness_matrix
-from exugear.model.sections import CatalogueSection
+from exugear.model.sections.connections import CatalogueSection
 from fe_ste.tools.arrays import Floats
 
 ON_BEARINGS = ("bushing", "flexible")

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import scipy.optimize
-from fe_ste.tools.arrays import Floats
 from numpy.typing import NDArray
 
+from exugear.bodies.of_gearbox.elastic_bodies import ElasticBody
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.modes import Modes, modes_of
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Body
 from exugear.tooth_mesh.element import MeshData
+from fe_ste.tools.arrays import Floats
 
 FRACTIONS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
 """Parts of the default value that a parameter without a natural range takes."""
@@ -144,23 +145,21 @@ def followers(before: Modes, after: Modes, order: NDArray[np.int64]) -> NDArray[
 
 def parameters_of(
     gearbox: Gearbox,
-    variant: str,
+    choice: Choice,
     stiffness: Mapping[str, MeshData],
-    law: str,
-    inertias: str,
-    folder: Path | None = None,
+    bodies_of: Callable[[Gearbox], Mapping[str, ElasticBody]] | None = None,
 ) -> tuple[Parameter, ...]:
     """Parameters of a gearbox that were assumed: those that the variant has.
 
     Parameters
     ----------
     gearbox : Gearbox
-    variant, law, inertias : str
+    choice : Choice
         The model that is varied.
     stiffness : mapping of pair name to (n,) array
         Mesh stiffness over the cycle, N/m.
-    folder : Path, optional
-        Where reductions of elastic bodies are kept and found again.
+    bodies_of : callable, optional
+        Reduced elastic bodies of a varied gearbox, which the variant `flexible` needs.
 
     Returns
     -------
@@ -172,15 +171,17 @@ def parameters_of(
     --------
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
     >>> stiffness = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
-    >>> [parameter.label for parameter in parameters_of(gearbox, "rigid", stiffness, "line_of_action", "gears")]
+    >>> [parameter.label for parameter in parameters_of(gearbox, Choice("rigid"), stiffness)]
     ['axial inertia of hss / kg m²', 'mesh damping time / µs']
     """
 
     def built(changes: Mapping[str, float]) -> Assembly:
-        return assemble(gearbox.varied(changes), variant, stiffness, law, inertias, folder=folder)
+        varied = gearbox.varied(changes)
+        return assemble(varied, choice, stiffness, bodies_of(varied) if bodies_of else None)
 
+    inertias = choice.inertia_set(gearbox)
     found = []
-    base = assemble(gearbox, variant, stiffness, law, inertias, folder=folder)
+    base = built({})
     if any(support.factor != 1.0 for support in base.supports):
         default = gearbox.case.housing.factor
         values = tuple(sorted({*HOUSING, default}))

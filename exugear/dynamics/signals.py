@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import xarray as xr
-from fe_ste.tools.arrays import Floats, Integers
 
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.modes import overall_row
@@ -16,7 +15,8 @@ from exugear.kernels.inertia import InertiaArrays, kinetic_energies
 from exugear.kernels.meshes import STATE_SIZE, MeshArrays, mesh_state
 from exugear.kernels.springs import SpringArrays
 from exugear.kernels.turning import TurningArrays, turning_energies, turning_memory
-from exugear.model.sections import GROUND
+from exugear.model.sections.entries import GROUND
+from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import compiled
 
 BALANCE_TERMS = (

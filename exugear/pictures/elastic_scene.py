@@ -9,7 +9,6 @@ from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
-from fe_ste.tools.arrays import Floats, Pixels
 from numpy.typing import NDArray
 
 from exugear.bodies.reduced_body import Surface
@@ -17,6 +16,7 @@ from exugear.dynamics.assembly import Assembly
 from exugear.model.seats import seat_key
 from exugear.pictures.scene import displacement_map, look, quad_mesh, write_animation
 from exugear.pictures.shapes import BodyShape, gear_surface, placed
+from fe_ste.tools.arrays import Floats, Pixels
 from fe_ste.tools.drawing import drawing_style, finish_figure, new_figure
 from fe_ste.tools.rendering import drawn_part, offscreen_plotter, place_picture, rendered_image, without_margins
 

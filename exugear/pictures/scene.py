@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from fe_ste.tools.arrays import Floats, Integers, Pixels
 
 from exugear.pictures.shapes import BodyShape, ModeScene, placed
+from fe_ste.tools.arrays import Floats, Integers, Pixels
 from fe_ste.tools.drawing import COLOURS, drawing_style, finish_figure, new_figure
 from fe_ste.tools.files import write_file
 from fe_ste.tools.rendering import drawn_part, offscreen_plotter, place_picture, rendered_image, without_margins

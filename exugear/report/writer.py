@@ -5,21 +5,22 @@ from __future__ import annotations
 import math
 import platform
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from fe_ste.tools.arrays import Floats
 
+from exugear.bodies.of_gearbox.elastic_bodies import ElasticBody, reduced_bodies
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly, VariantError
 from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.modes import Modes, load_modes, modes_of
 from exugear.dynamics.sensitivity import Remedy, Sweep, parameters_of, remedies, sweep_modes
 from exugear.dynamics.signals import BALANCE_TERMS, energy_residual
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.named_files import Permissions
 from exugear.model.reading import CaseError
@@ -54,6 +55,7 @@ from exugear.spectra.orders import order_lines
 from exugear.tooth_mesh.placement import MeshError
 from exugear.tooth_mesh.stiffness import iso6336_stiffness, mesh_stiffness
 from exugear.tooth_mesh.tables import fitting_table
+from fe_ste.tools.arrays import Floats
 from fe_ste.tools.files import FileError, write_file
 from fe_ste.tools.rendering import RenderingError
 from fe_ste.transmission_error.surface import SteSurface
@@ -86,6 +88,11 @@ class Model:
     def of(cls, attributes: Mapping[str, Any]) -> Model:
         """Read from the attributes of a file."""
         return cls(*(str(attributes[key]) for key in ("variant", "mesh_law", "inertias")))
+
+    @property
+    def choice(self) -> Choice:
+        """The choice that it stands for."""
+        return Choice(self.variant, self.law, self.inertias)
 
     @property
     def words(self) -> str:
@@ -150,10 +157,15 @@ class _Writer:
         """Equations of a model, with the tables of the folder."""
         if model not in self.models:
             stiffness = self.stiffness(model.law)
-            self.models[model] = assemble(
-                self.gearbox, model.variant, stiffness, model.law, model.inertias, folder=bodies_folder(self.folder)
-            )
+            bodies = self.bodies_of(model)(self.gearbox)
+            self.models[model] = assemble(self.gearbox, model.choice, stiffness, bodies)
         return self.models[model]
+
+    def bodies_of(self, model: Model) -> Callable[[Gearbox], dict[str, ElasticBody]]:
+        """Reduced elastic bodies of a gearbox, varied or not, as a model has them."""
+        if model.variant != "flexible":
+            return lambda gearbox: {}
+        return lambda gearbox: reduced_bodies(gearbox, model.inertias, bodies_folder(self.folder))
 
     def fits(self, path: Path, attributes: Mapping[str, Any]) -> bool:
         """Tell whether a file was computed from the case of the folder; if not, say why it is left out."""
@@ -239,7 +251,7 @@ def write_report(
 
 
 def _subtitle(gearbox: Gearbox) -> str:
-    return f"Ratio {gearbox.ratio:.6f}; case {gearbox.source}."
+    return f"Ratio {gearbox.train.ratio:.6f}; case {gearbox.source}."
 
 
 def _tables(writer: _Writer) -> dict[str, MeshTable]:
@@ -342,7 +354,7 @@ def _waterfall_picture(
     writer: _Writer, runs: Sequence[VariantRun], comparisons: Sequence[Comparison], label: str, file_part: str
 ) -> str:
     lines = order_lines(writer.gearbox)
-    fundamental = max(writer.gearbox.mesh_frequencies(2.0 * math.pi).values())
+    fundamental = max(writer.gearbox.train.mesh_frequencies(2.0 * math.pi).values())
     fastest = max(float(run.spectra.speed.max()) for run in runs)
     top = min(1.1 * fundamental * fastest / (2.0 * math.pi), *(float(run.spectra.frequency[-1]) for run in runs))
     marks = {c.first.variant: [finding.strongest for finding in c.only_first] for c in comparisons}
@@ -523,8 +535,7 @@ def _sensitivity(writer: _Writer, modes: Mapping[Model, xr.Dataset]) -> tuple[st
     for model in sorted(compliant, key=lambda model: model.inertias != writer.gearbox.case.default_inertias):
         writer.tell(f"sensitivities of {model.words}")
         stiffness = writer.stiffness(model.law)
-        kept = bodies_folder(writer.folder)
-        parameters = parameters_of(writer.gearbox, model.variant, stiffness, model.law, model.inertias, kept)
+        parameters = parameters_of(writer.gearbox, model.choice, stiffness, writer.bodies_of(model))
         sweeps = [sweep_modes(parameter) for parameter in parameters]
         found += [(model, remedy) for remedy in remedies(sweeps, writer.target, SEEN)]
         content.append(_sweeps_picture(writer, model, sweeps))
@@ -569,9 +580,10 @@ def _remedy_row(writer: _Writer, model: Model, remedy: Remedy) -> dict[str, obje
 def _counterpart(writer: _Writer, model: Model, remedy: Remedy) -> float:
     """Frequency (Hz) of the nearest mode that is seen in the stiff variant under the same assumption."""
     stiffness = writer.stiffness(model.law)
+    choice = replace(model.choice, variant=STIFF)
     same = [
         parameter
-        for parameter in parameters_of(writer.gearbox, STIFF, stiffness, model.law, model.inertias)
+        for parameter in parameters_of(writer.gearbox, choice, stiffness)
         if parameter.label == remedy.parameter.label
     ]
     stiff = same[0].build(remedy.value) if same else writer.assembled(Model(STIFF, model.law, model.inertias))

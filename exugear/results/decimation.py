@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from fe_ste.tools.arrays import Floats
 
+from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import compiled
 
 TAPS_PER_FACTOR = 31

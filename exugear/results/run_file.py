@@ -30,16 +30,8 @@ from numpy.typing import NDArray
 from exugear.dynamics.signals import BALANCE_TERMS, Channels
 from exugear.model.versions import RUN
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.files import (
-    ErrorKeeper,
-    FileError,
-    Layout,
-    open_dataset,
-    open_sealed,
-    replacement,
-    seal,
-    write_sealed,
-)
+from fe_ste.tools.files import FileError, replacement
+from fe_ste.tools.sealed import ErrorKeeper, Layout, open_dataset, open_sealed, seal, write_sealed
 
 FINAL_NAME = "run.nc"
 PARTIAL_NAME = "run.partial"

@@ -63,11 +63,13 @@ class Recorder:
         solver: str,
         resume: bool,
         progress: Callable[[Progress], None] | None,
+        mesh_route: MeshRoute = "element",
     ) -> None:
         self.assembly = assembly
         self.step = step
         self.band = band
         self.solver = solver
+        self.mesh_route = mesh_route
         self._rate = highest_rate(assembly)
         if solver == "compiled" and unstable(self._rate, step):
             raise RunError(unstable(self._rate, step))
@@ -145,13 +147,14 @@ class Recorder:
             "input_hash": input_hash(assembly, case.name),
             "method_version": RUN,
             "housing_factor": assembly.housing_factor,
-            "ratio": gearbox.ratio,
+            "ratio": gearbox.train.ratio,
             "output_base_radius": self.channels.radius,
-            "highest_order": max(gearbox.mesh_frequencies(2.0 * math.pi).values()),
+            "highest_order": max(gearbox.train.mesh_frequencies(2.0 * math.pi).values()),
             "step": self.step,
             "band": self.band,
             "fastest_eigenvalue": self._rate,
             "solver": self._solver_name,
+            "mesh_route": self.mesh_route,
             "complete": 0,
         }
 
@@ -159,7 +162,8 @@ class Recorder:
     def _solver_name(self) -> str:
         if self.solver == "compiled":
             return "compiled, RK4"
-        return f"Exudyn {version('exudyn')}, {'generalized-alpha' if self._is_implicit else 'RK44'}"
+        meshes = ", meshes as loads" if self.mesh_route == "loads" else ""
+        return f"Exudyn {version('exudyn')}, {'generalized-alpha' if self._is_implicit else 'RK44'}{meshes}"
 
     @property
     def _is_implicit(self) -> bool:
@@ -172,7 +176,7 @@ class Recorder:
             if key not in ("complete", "solver") and kept.get(key) != value:
                 raise RunError(f"{self.partial_path}: was run with {key} = {kept.get(key)}, not {value}; start anew")
 
-    def run(self, mesh_route: MeshRoute) -> Run:
+    def run(self) -> Run:
         """Integrate to the end, or to the first fault or interruption."""
         self._wall_start = time.perf_counter()
         with _interruption(self):
@@ -181,7 +185,7 @@ class Recorder:
             elif self.solver == "compiled":
                 self._integrate()
             else:
-                self._integrate_in_exudyn(mesh_route)
+                self._integrate_in_exudyn()
             self._flush()
             if self._fault:
                 self._note_verdict()
@@ -211,11 +215,11 @@ class Recorder:
         self.file.note("verdict", "; ".join(against) or "within all limits")
         self.file.note("trusted", 0 if against else 1)
 
-    def _integrate_in_exudyn(self, mesh_route: MeshRoute) -> None:
+    def _integrate_in_exudyn(self) -> None:
         from exugear.solvers.exudyn_model.library import SolverFailure
         from exugear.solvers.exudyn_model.system import ExudynSystem
 
-        system = ExudynSystem(self.assembly, self.q, self.v, _loading(self.loads), mesh_route)
+        system = ExudynSystem(self.assembly, self.q, self.v, _loading(self.loads), self.mesh_route)
         start = self.first_step * self.step
         try:
             system.run(start, self.steps - self.first_step, self.step, self._observe, not self._is_implicit)

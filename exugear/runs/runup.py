@@ -13,10 +13,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
+from exugear.bodies.of_gearbox.elastic_bodies import ElasticBody
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
-from exugear.results.folder import bodies_folder
 from exugear.runs.extent import SAMPLE_RATE, check_duration, too_fine
 from exugear.runs.outcome import Progress, Run, RunError
 from exugear.runs.recorder import Recorder
@@ -37,13 +38,11 @@ BAND = 6.4e3
 
 def simulate(
     gearbox: Gearbox,
-    variant: str,
+    choice: Choice,
     stiffness: Mapping[str, MeshData],
     out: str | Path,
     *,
-    load_case: str = "reference",
-    mesh_law: str = "line_of_action",
-    inertias: str | None = None,
+    bodies: Mapping[str, ElasticBody] | None = None,
     duration: float | None = None,
     step: float | None = None,
     band: float = BAND,
@@ -59,13 +58,14 @@ def simulate(
     Parameters
     ----------
     gearbox : Gearbox
-    variant : {"rigid", "bushing", "flexible", "jointed"}
+    choice : Choice
+        Variant, mesh law, inertia set and load case.
     stiffness : mapping of pair name to (n,) array
         Mesh stiffness over the cycle, see `exugear.tooth_mesh.stiffness.mesh_stiffness`.
     out : path
         Results directory.
-    load_case, mesh_law, inertias, angles : str
-        As in the gearbox file and `exugear.tooth_mesh.element`.
+    bodies : mapping of body name to ElasticBody, optional
+        Reduced elastic bodies, which the variant `flexible` needs.
     duration : float, optional
         Simulated time, s; the load case's by default.
     step : float, optional
@@ -74,8 +74,10 @@ def simulate(
         Highest frequency whose amplitude is kept, and stored rate, Hz; the rate must divide the steps.
     solver : {"compiled", "exudyn"}, optional
         The compiled one where it applies by default; a body in a floating frame needs Exudyn.
+    angles : {"reference", "operating"}
+        Angles of the law `seed`.
     mesh_route : {"element", "loads"}
-        See `exugear.solvers.exudyn_model.system`; "loads" is Exudyn's alone.
+        See `exugear.solvers.exudyn_model.system`; "loads" is Exudyn's alone, for the variants bushing and jointed.
     resume : bool
         Go on with a run that was stopped.
     progress : callable, optional
@@ -102,13 +104,13 @@ def simulate(
     LimitError
         A limit of `exugear.runs.trust` that no run may go beyond; softer ones end in `Run.reasons`.
     """
-    if load_case not in gearbox.load_cases:
-        raise gearbox.fault(f"no load case {load_case!r}; load cases are {', '.join(gearbox.load_cases)}")
-    case = gearbox.load_cases[load_case]
+    choice = choice.of(gearbox)
+    if choice.load_case not in gearbox.load_cases:
+        raise gearbox.fault(f"no load case {choice.load_case!r}; load cases are {', '.join(gearbox.load_cases)}")
+    case = gearbox.load_cases[choice.load_case]
     check_duration(gearbox, case, duration, sample_rate)
-    folder = bodies_folder(Path(out))
-    assembly = assemble(gearbox, variant, stiffness, mesh_law, inertias, angles=angles, folder=folder)
-    directory = run_directory(out, variant, load_case, mesh_law, assembly.inertias)
+    assembly = assemble(gearbox, choice, stiffness, bodies, angles=angles)
+    directory = run_directory(out, choice)
     total = case.duration if duration is None else duration
     chosen = _solver(solver, assembly, mesh_route)
     if step is None:
@@ -116,8 +118,9 @@ def simulate(
         if too_fine(step, total, sample_rate):
             raise gearbox.fault(f"{fastest_motion(assembly)}; {too_fine(step, total, sample_rate)}")
     with held(directory):
-        recorder = Recorder(assembly, case, directory, total, step, band, sample_rate, chosen, resume, progress)
-        return recorder.run(mesh_route)
+        return Recorder(
+            assembly, case, directory, total, step, band, sample_rate, chosen, resume, progress, mesh_route
+        ).run()
 
 
 def _solver(asked: str | None, assembly: Assembly, mesh_route: str) -> str:

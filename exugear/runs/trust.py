@@ -14,11 +14,11 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from fe_ste.tools.arrays import Floats
 
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.signals import BALANCE_TERMS
 from exugear.loads.summary import BURSTING_RIM_SPEED, LoadSummary, rim_radii
+from fe_ste.tools.arrays import Floats
 
 ENERGY, RIM, SPEED, DEFLECTION, ACCOUNT = range(5)
 """Rows of the running figures of a `Judge`; the last holds what the account of energy began with, and its scale."""

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from fe_ste.tools.arrays import Floats
 
 from exugear.results.run_file import load_run
 from exugear.spectra.orders import run_waterfall
@@ -25,6 +24,7 @@ from exugear.spectra.resonances import (
     pick_resonances,
 )
 from exugear.spectra.waterfall import OrderLine, Waterfall
+from fe_ste.tools.arrays import Floats
 
 NEAR = 0.05
 """A mode within this part of a frequency counts as near it."""

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 import scipy.signal
-from fe_ste.tools.arrays import Floats
 from numpy.typing import ArrayLike
+
+from fe_ste.tools.arrays import Floats
 
 
 def sweep_limited_resolution(sweep_rate: ArrayLike) -> Floats:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.signal
-from fe_ste.tools.arrays import Floats
 from numpy.typing import ArrayLike
 
 from exugear.spectra.waterfall import OrderLine, Waterfall
+from fe_ste.tools.arrays import Floats
 
 
 @dataclass(frozen=True)

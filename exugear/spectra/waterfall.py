@@ -14,10 +14,10 @@ from functools import cached_property
 
 import numpy as np
 import scipy.signal
-from fe_ste.tools.arrays import Complexes, Floats
 from numpy.typing import ArrayLike
 
 from exugear.spectra.resampling import amplitude_spectrum, sweep_limited_resolution
+from fe_ste.tools.arrays import Complexes, Floats
 
 
 @dataclass(frozen=True)

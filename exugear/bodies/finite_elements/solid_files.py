@@ -150,7 +150,7 @@ def _meshed(load: Callable[[Any], None], size: float, curvature: int, unit: floa
 
 
 def _keep_broken_pipes() -> None:
-    """Make a broken pipe an error again: gmsh leaves it to end the process, and with it a sweep that lost a worker."""
+    """Make a broken pipe an error again: gmsh leaves it to end the process, and with it a grid that lost a worker."""
     if hasattr(signal, "SIGPIPE") and threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGPIPE, signal.SIG_IGN)
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from exugear.bodies.reduced_body import Blank, Frame
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Bearing, Body
-from exugear.model.sections import BlankSection, MaterialSection
+from exugear.model.sections.bodies import BlankSection
+from exugear.model.sections.gears import MaterialSection
 from fe_ste.geometry.gears import Material
 
 

@@ -14,7 +14,7 @@ from exugear.bodies.solids import SolidModel
 from exugear.bodies.turned_shaft import ShaftModel
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Body
-from exugear.model.sections import ShapeSection
+from exugear.model.sections.bodies import ShapeSection
 
 TORQUE_SEAT = "torque"
 """Name of the seat where torques and couplings act."""

@@ -16,7 +16,7 @@ from exugear.bodies.solids import SolidModel, reduction_file
 from exugear.model.gearbox import Gearbox
 from exugear.model.named_files import LARGEST_SOLID
 from exugear.model.parts import Body
-from exugear.model.sections import SolidSeatSection, SolidSection
+from exugear.model.sections.bodies import SolidSeatSection, SolidSection
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 
-from fe_ste.tools.arrays import Floats, Integers
-
 from exugear.kernels.table_law import FIRST_TWO, piece_at, surface_law
 from exugear.solvers.compiled.arrays import Meshes, Work
+from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import kernel
 
 

@@ -16,15 +16,17 @@ from exugear.bodies.finite_elements.shaft_sections import ShaftSection
 from exugear.bodies.of_gearbox.shafts import shaft_model
 from exugear.bodies.reduced_body import ReducedBody
 from exugear.bodies.turned_shaft import ShaftModel, reduce_shaft
-from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.linearised import linearise
-from exugear.dynamics.modes import BODY_MOTIONS, eigenmodes, modes_of
+from exugear.dynamics.modes import BODY_MOTIONS, modes_of
 from exugear.dynamics.statics import accelerating_start
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.exudyn_model.system import ExudynSystem
 from exugear.solvers.loads import Loading, LoadTable
+
+from ..assembled import assembled, modes_with_bodies
 
 TORQUE = {"main_shaft": 240e3}
 YOUNG, SHEAR, DENSITY = 206e9, 206e9 / 2.6, 7850.0
@@ -51,7 +53,7 @@ def reduced(model: ShaftModel) -> ReducedBody:
 
 @pytest.fixture(scope="module")
 def flexible(with_shaft: Gearbox, stiffness: dict) -> Assembly:
-    return assemble(with_shaft, "flexible", stiffness)
+    return assembled(with_shaft, Choice("flexible"), stiffness)
 
 
 def beam(sections: tuple[ShaftSection, ...], lines: list[float]) -> tuple[np.ndarray, np.ndarray, list[float]]:
@@ -168,7 +170,7 @@ def test_the_rotor_turns_against_the_gearbox_as_two_inertias(flexible: Assembly,
 def test_rigid_variants_take_the_shaft_as_a_rigid_body(
     grc: Gearbox, with_shaft: Gearbox, stiffness: dict, variant: str
 ) -> None:
-    plain, found = (eigenmodes(case, variant, stiffness) for case in (grc, with_shaft))
+    plain, found = (modes_with_bodies(case, Choice(variant), stiffness) for case in (grc, with_shaft))
     assert found.frequency[0] == 0.0
     assert found.frequency[1] > 1.0
     assert len(found.frequency) == len(plain.frequency) + (1 if variant == "rigid" else 6)

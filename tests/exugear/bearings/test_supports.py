@@ -12,7 +12,7 @@ from exugear.bearings.matrices import axially_symmetric
 from exugear.bearings.rollers import BearingPair, CylindricalRollerBearing
 from exugear.bearings.supports import CATALOGUE_LAWS, bearing_matrices, catalogue_stiffness
 from exugear.model.gearbox import Gearbox
-from exugear.model.sections import CatalogueSection
+from exugear.model.sections.connections import CatalogueSection
 
 SECTION = CatalogueSection(
     type="cylindrical_roller",

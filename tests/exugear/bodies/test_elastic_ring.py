@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.signals import Channels, energy_residual
 from exugear.dynamics.statics import accelerating_start, locked_equilibrium
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
-from exugear.runs.runup import simulate
 from exugear.solvers.compiled.solver import CompiledSystem, Observer
 from exugear.solvers.exudyn_model.system import ExudynSystem
 from exugear.solvers.loads import Loading, LoadTable
 
+from ..assembled import assembled, simulated
 from ..ring_case import ring_content
 from ..rounding import allowed_difference
 
@@ -47,7 +47,7 @@ def stage(grc: Gearbox, tmp_path_factory: pytest.TempPathFactory) -> Gearbox:
 
 @pytest.fixture(scope="module")
 def ringed(stage: Gearbox, stiffness: dict) -> Assembly:
-    return assemble(stage, "flexible", stiffness)
+    return assembled(stage, Choice("flexible"), stiffness)
 
 
 def turned(assembly: Assembly, angle: float) -> tuple[np.ndarray, np.ndarray]:
@@ -55,7 +55,7 @@ def turned(assembly: Assembly, angle: float) -> tuple[np.ndarray, np.ndarray]:
     start = accelerating_start(assembly, LOAD, 20.0)
     random = np.random.default_rng(7)
     q = start.q + 1e-6 * random.normal(size=assembly.size)
-    q += assembly.rolling_velocity(np.zeros(assembly.size), assembly.gearbox.rolling_speeds("carrier", angle))
+    q += assembly.rolling_velocity(np.zeros(assembly.size), assembly.gearbox.train.rolling_speeds("carrier", angle))
     for body in assembly.bodies:
         if body.carrier is not None:  # their orbit is an arc
             o = assembly.coordinates[body.name][0]
@@ -77,7 +77,7 @@ def test_load_and_deflection_do_not_depend_on_where_the_planets_stand(stage: Gea
     found = []
     for first in (0.0, 13.0, 20.0):
         angles = [first, first + 120.0, first + 240.0]
-        assembly = assemble(stage.varied({"bodies.planet.planet_angles_deg": angles}), "flexible", stiffness)
+        assembly = assembled(stage.varied({"bodies.planet.planet_angles_deg": angles}), Choice("flexible"), stiffness)
         load = stage.case.static_load
         q = locked_equilibrium(assembly, load.torques_N_m, load.locked, assembly.mean_meshes)
         states = assembly.mesh_states(q, 0 * q, assembly.mean_meshes)
@@ -143,6 +143,6 @@ def test_the_account_of_energy_closes_on_an_elastic_ring(stage: Gearbox, stiffne
     # Loads' work = change of energies + dissipated + work of k(PMC): as asked of the other variants, through a third
     # of a revolution of the carrier, so that every planet crosses three sectors.
     case = stage.varied({"load_cases.run_up.start_speed_rpm": 200.0})
-    run = simulate(case, "flexible", stiffness, tmp_path, load_case="run_up", duration=0.1)
+    run = simulated(case, Choice("flexible", load_case="run_up"), stiffness, tmp_path, duration=0.1)
     with xr.open_dataset(run.path) as data:
         assert abs(energy_residual(data)) < 1e-6

@@ -18,7 +18,7 @@ from exugear.bodies.reduction import with_rigid_inertia, with_stiffness_factor
 from exugear.bodies.store import stored_arrays
 from exugear.bodies.turned_shaft import ShaftModel, load_or_reduce_shaft, reduce_shaft
 from fe_ste.geometry.gears import Material
-from fe_ste.tools.files import write_sealed
+from fe_ste.tools.sealed import write_sealed
 
 from ...fe_ste.damage import damages
 

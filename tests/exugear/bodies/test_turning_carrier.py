@@ -11,18 +11,19 @@ import numpy as np
 import pytest
 import skfem
 
-from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.linearised import linearise
-from exugear.dynamics.modes import eigenmodes, modes_of
+from exugear.dynamics.modes import modes_of
 from exugear.dynamics.signals import Channels
 from exugear.dynamics.statics import accelerating_start, locked_equilibrium
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.named_files import Permissions
 from exugear.solvers.compiled.solver import CompiledSystem, Observer
 from exugear.solvers.exudyn_model.system import ExudynSystem
 from exugear.solvers.loads import Loading, LoadTable
 
+from ..assembled import assembled, modes_with_bodies
 from ..limit_case import unchecked
 
 pytestmark = pytest.mark.skipif(importlib.util.find_spec("meshio") is None, reason="meshio (extra mesh) is missing")
@@ -54,7 +55,7 @@ def carrying(grc_shafts: Gearbox, tmp_path_factory: pytest.TempPathFactory) -> G
 
 @pytest.fixture(scope="module")
 def flexible(carrying: Gearbox, stiffness: dict) -> Assembly:
-    return assemble(carrying, "flexible", stiffness)
+    return assembled(carrying, Choice("flexible"), stiffness)
 
 
 def turned_state(assembly: Assembly, angle: float, speed: float = 22.5) -> tuple[np.ndarray, np.ndarray]:
@@ -63,7 +64,7 @@ def turned_state(assembly: Assembly, angle: float, speed: float = 22.5) -> tuple
     random = np.random.default_rng(7)
     q = start.q + 1e-6 * random.normal(size=assembly.size)
     v = start.v + 1e-2 * random.normal(size=assembly.size)
-    speeds = assembly.gearbox.rolling_speeds("carrier", angle)
+    speeds = assembly.gearbox.train.rolling_speeds("carrier", angle)
     c, s = np.cos(angle), np.sin(angle)
     for body in assembly.bodies:
         o = assembly.coordinates[body.name][5]
@@ -89,11 +90,11 @@ def turned_state(assembly: Assembly, angle: float, speed: float = 22.5) -> tuple
 def test_a_stiff_carrier_is_the_rigid_one(grc_shafts: Gearbox, carrying: Gearbox, stiffness: dict) -> None:
     # Second method: the shafts elastic, the carrier a rigid body, which it becomes as one over its stiffness.
     limit = {"elasticity.limit_Hz": 1e6}  # no masses are added to slow anything down
-    rigid = eigenmodes(grc_shafts.varied(limit), "flexible", stiffness).frequency[1:60]
+    rigid = modes_with_bodies(grc_shafts.varied(limit), Choice("flexible"), stiffness).frequency[1:60]
     gaps = []
     for factor in (10.0, 100.0):
         modulus = {"bodies.carrier.solid.material.youngs_modulus_GPa": 206.0 * factor}
-        found = eigenmodes(unchecked(carrying, modulus | limit), "flexible", stiffness).frequency[1:60]
+        found = modes_with_bodies(unchecked(carrying, modulus | limit), Choice("flexible"), stiffness).frequency[1:60]
         assert np.all(found < rigid * (1 + 1e-6))  # compliance can only lower
         gaps.append(np.abs(found / rigid - 1).mean())
     assert gaps[1] < 1e-4
@@ -103,7 +104,7 @@ def test_a_stiff_carrier_is_the_rigid_one(grc_shafts: Gearbox, carrying: Gearbox
 def test_compiled_accelerations_are_those_of_the_plain_kernels(
     carrying: Gearbox, flexible: Assembly, stiffness: dict
 ) -> None:
-    for assembly in (flexible, assemble(carrying.varied(HEAVY), "flexible", stiffness)):
+    for assembly in (flexible, assembled(carrying.varied(HEAVY), Choice("flexible"), stiffness)):
         for angle in (0.0, 0.7, -40.0):
             q, v = turned_state(assembly, angle)
             found = CompiledSystem(assembly, q, v, LoadTable(LOAD), STEP).accelerations()
@@ -124,7 +125,7 @@ def test_signals_and_energies_are_those_of_the_plain_kernels(flexible: Assembly)
 @pytest.mark.parametrize("keys", [{}, HEAVY])
 def test_the_account_of_energy_of_a_run_closes(carrying: Gearbox, stiffness: dict, keys: dict) -> None:
     # 20 ms at 46 rpm; powers by Simpson's rule over the steps, whose error is far below.
-    assembly = assemble(carrying.varied(keys), "flexible", stiffness)
+    assembly = assembled(carrying.varied(keys), Choice("flexible"), stiffness)
     start = accelerating_start(assembly, LOAD, -4.8)
     q, v = np.empty((2, 2001, assembly.size))
     q[0], v[0] = start.q, start.v
@@ -186,7 +187,9 @@ def test_a_run_starts_in_steady_rotation_of_the_carrier(flexible: Assembly) -> N
     # Its deflection under load, inertia and centrifugal forces turns with it: no vibration is left at the start.
     start = accelerating_start(flexible, LOAD, 22.5)
     a = flexible.accelerations(start.q, start.v, flexible.torque_vector(LOAD))
-    expected = flexible.rolling_acceleration(start.q, flexible.gearbox.rolling_speeds("carrier", 22.5), start.rates)
+    expected = flexible.rolling_acceleration(
+        start.q, flexible.gearbox.train.rolling_speeds("carrier", 22.5), start.rates
+    )
     place = flexible.elastic_slices["carrier"]
     assert np.abs(a - expected)[place].max() < 1e-6 * np.abs(expected[place]).max()
 

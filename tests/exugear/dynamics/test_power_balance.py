@@ -13,17 +13,19 @@ import numba
 import numpy as np
 import pytest
 
-from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.signals import Channels
 from exugear.dynamics.statics import accelerating_start
 from exugear.kernels.connectors import ConnectorArrays, add_connector_forces
 from exugear.kernels.meshes import STATE_SIZE, add_mesh_forces, mesh_state
 from exugear.kernels.springs import add_spring_forces
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.compiled.step import choose_step
 from exugear.solvers.loads import LoadTable
+
+from ..assembled import assembled
 
 LOAD = {"carrier": 240e3, "hss": -3000.0}
 SHARE = 1e-5
@@ -151,7 +153,7 @@ def assert_balanced(account: Account, own_share: float) -> None:
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
 def test_power_of_each_mesh_and_of_the_whole(grc: Gearbox, stiffness: dict, variant: str) -> None:
     """From 46 rpm on: high-speed mesh at 1.4 kHz."""
-    assert_balanced(account_of(assemble(grc, variant, stiffness), -4.8, 0.1), own_share=1e-3)
+    assert_balanced(account_of(assembled(grc, Choice(variant), stiffness), -4.8, 0.1), own_share=1e-3)
 
 
 @pytest.mark.validation
@@ -159,4 +161,4 @@ def test_power_of_each_mesh_and_of_the_whole(grc: Gearbox, stiffness: dict, vari
 def test_power_of_each_mesh_and_of_the_whole_up_to_full_speed(grc: Gearbox, stiffness: dict, variant: str) -> None:
     """Last ten seconds of the run-up, from 143 to 215 rpm."""
     # At the end a step covers eight pieces of k(PMC), which the quadrature of its power feels.
-    assert_balanced(account_of(assemble(grc, variant, stiffness), -15.0, 10.0), own_share=1e-2)
+    assert_balanced(account_of(assembled(grc, Choice(variant), stiffness), -15.0, 10.0), own_share=1e-2)

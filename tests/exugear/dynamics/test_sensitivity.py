@@ -15,6 +15,7 @@ from exugear.dynamics.sensitivity import (
     scaled_bearings,
     sweep_modes,
 )
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.tooth_mesh.stiffness import mesh_stiffness
 
@@ -27,7 +28,7 @@ def spur() -> Gearbox:
 
 
 def parameter(gearbox: Gearbox, variant: str, start: str, stiffness: dict) -> Parameter:
-    found = parameters_of(gearbox, variant, stiffness, "line_of_action", gearbox.case.default_inertias)
+    found = parameters_of(gearbox, Choice(variant, "line_of_action", gearbox.case.default_inertias), stiffness)
     return next(one for one in found if one.label.startswith(start))
 
 
@@ -67,7 +68,7 @@ def test_a_crossing_leads_to_the_assumption_that_brings_the_mode_there(spur):
 def test_the_housing_factor_counts_only_where_there_are_bearings(spur):
     stiffness = mesh_stiffness(spur, "iso6336")
     labels = {
-        variant: [one.label for one in parameters_of(spur, variant, stiffness, "line_of_action", "disc")]
+        variant: [one.label for one in parameters_of(spur, Choice(variant, "line_of_action", "disc"), stiffness)]
         for variant in ("rigid", "bushing")
     }
     assert "housing factor" not in labels["rigid"]
@@ -97,7 +98,7 @@ def test_modes_are_followed_through_a_crossing(grc, stiffness):
 
 def test_inertias_no_rigid_body_has_are_not_built(grc, stiffness):
     # The set "gears" has a light pinion: a large axial inertia needs a larger transverse one with it.
-    found = parameters_of(grc, "bushing", stiffness, "line_of_action", "gears")
+    found = parameters_of(grc, Choice("bushing", "line_of_action", "gears"), stiffness)
     inertia = next(one for one in found if one.label.startswith("axial inertia"))
     built = inertia.build(max(inertia.values)).gearbox.body("hss", "gears")
     assert built.axial == max(inertia.values)

@@ -97,7 +97,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Any]]:
         def unable(*arguments: Any, **options: Any) -> None:
             raise RenderingError(f"no picture {MARKUP}")
 
-        for place in ("scene.draw_gearbox", "report.draw_mode"):
+        for place in ("pictures.scene.draw_gearbox", "report.writer.draw_mode"):
             patch.setattr(f"exugear.{place}", unable)
         ended = [
             exugear("check", case),
