@@ -19,7 +19,8 @@ import numpy as np
 from one_variant import grc_project, show
 
 from exugear import Choice, Modes, Project, static_state
-from exugear.dynamics.modes import BODY_MOTIONS, counterparts, modes_of
+from exugear.dynamics.energy_shares import BODY_MOTIONS
+from exugear.dynamics.modes import counterparts, modes_of
 from exugear.pictures.diagrams import plot_waterfalls
 from exugear.pictures.elastic_scene import animate_elastic_bodies, draw_elastic_bodies, elastic_scene
 from exugear.spectra.orders import order_lines, run_waterfall

@@ -166,8 +166,10 @@ class BearingState:
 
     def __repr__(self) -> str:
         """Displacement and load in one line."""
-        displacement = ", ".join(f"{1e6 * value:.3g}" for value in self.displacement[:3])
-        load = ", ".join(f"{1e-3 * value:.3g}" for value in self.load[:3])
+        displacement, load = (
+            ", ".join(f"{round(value, 3) + 0.0:.3g}" for value in values.tolist())
+            for values in (1e6 * self.displacement[:3], 1e-3 * self.load[:3])
+        )
         rollers = f"{np.count_nonzero(self.roller_load)} of {len(self.roller_load)} rollers loaded"
         return f"<BearingState ({displacement}) um under ({load}) kN, {rollers}>"
 

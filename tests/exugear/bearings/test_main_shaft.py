@@ -17,8 +17,9 @@ from exugear.bodies.of_gearbox.shafts import shaft_model
 from exugear.bodies.reduced_body import ReducedBody
 from exugear.bodies.turned_shaft import ShaftModel, reduce_shaft
 from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.energy_shares import BODY_MOTIONS
 from exugear.dynamics.linearised import linearise
-from exugear.dynamics.modes import BODY_MOTIONS, modes_of
+from exugear.dynamics.modes import modes_of
 from exugear.dynamics.statics import accelerating_start
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox

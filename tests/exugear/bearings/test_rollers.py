@@ -280,6 +280,12 @@ def test_laminae_have_converged_at_thirty():
     assert coarse.tangent[4, 4] == pytest.approx(fine.tangent[4, 4], rel=1e-2)
 
 
+def test_a_state_shows_itself_in_one_line():
+    state = equilibrium(NJ2232, (129.9e3, 0.0, 0.0))
+    carrying = np.count_nonzero(state.roller_load)
+    assert repr(state) == f"<BearingState (33.3, 0, 0) um under (130, 0, 0) kN, {carrying} of 17 rollers loaded>"
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [

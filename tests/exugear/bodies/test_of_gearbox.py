@@ -257,6 +257,13 @@ def test_modes_on_rigid_shafts_are_found_again_on_stiff_ones(grc: Gearbox, stiff
     assert share[alone].min() > 0.99
 
 
+def test_elastic_bodies_show_themselves_in_one_line(flexible: Assembly) -> None:
+    for name, body in flexible.elastic_bodies.items():
+        assert name in repr(body) and repr(body.reduced) in repr(body)
+        assert f"{len(body.reduced.seats)} seats, {len(body.reduced.modal_groups)} modal coordinates" in repr(body)
+        assert len(repr(body)) < 200
+
+
 def test_modes_are_their_own_counterparts(flexible: Assembly) -> None:
     modes = modes_of(flexible)
     place, share = counterparts(modes, modes)

@@ -17,9 +17,10 @@ from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies
 from exugear.bodies.of_gearbox.solids import solid_body
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly, VariantError
+from exugear.dynamics.energy_shares import BODY_MOTIONS
 from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.linearised import linearise
-from exugear.dynamics.modes import BODY_MOTIONS, counterparts, eigenmodes, modes_of
+from exugear.dynamics.modes import counterparts, eigenmodes, modes_of
 from exugear.dynamics.signals import Channels, energy_residual
 from exugear.dynamics.statics import accelerating_start, locked_equilibrium
 from exugear.model.choice import Choice
