@@ -5,8 +5,8 @@ from the same assembly, so they solve the same equations in the same coordinates
 
 Bodies with six coordinates come first, in the order of the file, then those with their spin alone. In the
 variant `rigid` every body has its spin alone: ideal joints leave nothing else, and a planet rides on its
-carrier's spin. In the variant `flexible` elastic bodies follow, with six coordinates at each seat and their inner
-amplitudes: a gear or a bearing sits on a seat as it would on a rigid body. A fixed body, such as the housing, is the
+carrier's spin. In the variant `flexible` elastic bodies follow, with six coordinates at each seat and their modal
+coordinates: a gear or a bearing sits on a seat as it would on a rigid body. A fixed body, such as the housing, is the
 ground itself unless it is elastic; then it moves on its mounts, and what sits in it sits on its seats.
 """
 

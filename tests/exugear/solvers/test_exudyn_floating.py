@@ -94,7 +94,7 @@ def on_bearings(model: SolidModel, bearings: np.ndarray, vibration: np.ndarray |
     initial = turned.T @ mass @ np.concatenate([moved, np.zeros(len(mass) - seats)])
     # Signs of modes, and directions in a pair of equal frequencies, are each description's own.
     wanted = np.zeros(seats) if vibration is None else vibration
-    exact = int(np.count_nonzero(body.added_mass == 0.0))  # what is slowed down is there for statics
+    exact = int(np.count_nonzero(body.added_mass == 0.0))  # modes with added mass are there for statics
     rates = np.zeros(len(body.stiffness))
     rates[:exact] = np.linalg.lstsq(body.at_seats[:, :exact], wanted)[0]
     initial[6 : 6 + exact] += np.linalg.lstsq(turned[:seats, 6 : 6 + exact], wanted)[0]
