@@ -28,9 +28,9 @@ from exugear.results.folder import bodies_folder, keep_case, modes_path
 from exugear.runs.runup import simulate
 from exugear.spectra.orders import order_lines, run_waterfall
 from exugear.spectra.resonances import Pick, group_by_frequency, match_eigenfrequencies, pick_resonances
-from exugear.tooth_mesh.element import MeshData
-from exugear.tooth_mesh.stiffness import mesh_stiffness
-from exugear.tooth_mesh.tables import order_tables
+from exugear.tooth_mesh.law import MeshData
+from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear.tooth_mesh.tables import requested_tables
 
 VARIANTS = ("rigid", "bushing", "flexible")
 MAIN_SHAFT_MODES = 500.0
@@ -52,8 +52,8 @@ SAME_MODE = 0.5
 def main(out: Path) -> None:
     """Compute what is missing, then print and draw."""
     gearbox = Gearbox.from_toml(Path(__file__).with_name("gearbox.toml"))
-    for order in order_tables(gearbox, out):
-        _ = order.stored or order.fill()
+    for request in requested_tables(gearbox, out):
+        _ = request.stored or request.compute()
     keep_case(gearbox, out)
     stiffness = mesh_stiffness(gearbox, LAW, out)
     bodies = bodies_folder(out)

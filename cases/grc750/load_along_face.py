@@ -19,8 +19,8 @@ from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.statics import locked_equilibrium
 from exugear.model.gearbox import Gearbox
 from exugear.results.folder import bodies_folder
-from exugear.tooth_mesh.stiffness import mesh_stiffness
-from exugear.tooth_mesh.tables import order_tables, wanted_table
+from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear.tooth_mesh.tables import requested_tables, wanted_table
 from fe_ste.transmission_error.compliance import PairCompliance
 from fe_ste.transmission_error.face_load import face_load_factor
 from fe_ste.transmission_error.table import prepared_compliance
@@ -35,8 +35,8 @@ RIGID_BODIES = ("carrier", "housing")
 def main(out: Path) -> None:
     """Compute tables that are missing, then print a line for each variant."""
     gearbox = Gearbox.from_toml(Path(__file__).with_name("gearbox.toml"))
-    for order in order_tables(gearbox, out, grid=True):
-        _ = order.stored or order.fill()
+    for request in requested_tables(gearbox, out, grid=True):
+        _ = request.stored or request.compute()
     surfaces = mesh_stiffness(gearbox, "table", out)
     compliance = lru_cache(lambda pair: prepared_compliance(wanted_table(gearbox, pair, POSITIONS)))
     shafts = gearbox.varied({f"bodies.{name}.flexibility": "none" for name in RIGID_BODIES})

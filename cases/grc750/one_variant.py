@@ -12,8 +12,8 @@ from exugear.runs.outcome import Progress
 from exugear.runs.runup import simulate
 from exugear.spectra.orders import order_lines, run_waterfall
 from exugear.spectra.resonances import group_by_frequency, match_eigenfrequencies, pick_resonances
-from exugear.tooth_mesh.stiffness import mesh_stiffness
-from exugear.tooth_mesh.tables import order_tables
+from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear.tooth_mesh.tables import requested_tables
 
 LAW = "line_of_action"
 
@@ -21,8 +21,8 @@ LAW = "line_of_action"
 def compute(variant: str, out: Path) -> None:
     """Compute what is missing, then print and draw."""
     gearbox = Gearbox.from_toml(Path(__file__).with_name("gearbox.toml"))
-    for order in order_tables(gearbox, out):
-        _ = order.stored or order.fill()
+    for request in requested_tables(gearbox, out):
+        _ = request.stored or request.compute()
     keep_case(gearbox, out)
     stiffness = mesh_stiffness(gearbox, LAW, out)
     run = simulate(gearbox, variant, stiffness, out, mesh_law=LAW, progress=show)

@@ -41,7 +41,7 @@ def compute_modes(gearbox: Gearbox, folder: Path, variant: str, law: str, inerti
     """Compute the eigenmodes of a variant and store them; elastic bodies come first."""
     from exugear.dynamics.modes import eigenmodes
     from exugear.results.folder import bodies_folder, modes_path
-    from exugear.tooth_mesh.stiffness import mesh_stiffness
+    from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 
     reduce_elastic_bodies(gearbox, folder, variant, inertias)
     with model_errors():

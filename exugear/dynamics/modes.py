@@ -25,7 +25,8 @@ from exugear.dynamics.linearised import RIGID_BODY_LIMIT, Linearised, growth_rat
 from exugear.dynamics.statics import locked_equilibrium
 from exugear.model.gearbox import Gearbox
 from exugear.model.versions import MODES
-from exugear.tooth_mesh.element import Angles, MeshData
+from exugear.tooth_mesh.law import Angles, MeshData
+from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.files import Layout, load_dataset, write_dataset
 
@@ -235,7 +236,7 @@ def modes_of(assembly: Assembly, preload: bool = True) -> Modes:
             mode_name(assembly, element_names, kinetic[m], strain[m]) if elastic[m] else "free rotation of the train"
             for m in range(frequency.size)
         ),
-        growth_rate=growth_rate(linear) if assembly.law != "rigid" else 0.0,
+        growth_rate=growth_rate(linear) if LAWS[assembly.law].has_force else 0.0,
     )
 
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from fe_ste.tools.arrays import Floats
 
 from exugear.bearings.supports import bearing_matrices, elastic_names, mounts_at_work
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Body
 from exugear.tooth_mesh.placement import line_of_action_row, loaded_flanks
+from fe_ste.tools.arrays import Floats
 
 LENGTH = 0.1
 """Length (m) that turns a tilt into a displacement, so that both are compared."""

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import scipy.optimize
-from fe_ste.tools.arrays import Floats
 from numpy.typing import NDArray
 
 from exugear.dynamics.assemble import assemble
@@ -16,7 +15,8 @@ from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.modes import Modes, modes_of
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Body
-from exugear.tooth_mesh.element import MeshData
+from exugear.tooth_mesh.law import MeshData
+from fe_ste.tools.arrays import Floats
 
 FRACTIONS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
 """Parts of the default value that a parameter without a natural range takes."""

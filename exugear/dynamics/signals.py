@@ -12,10 +12,12 @@ from exugear.dynamics.modes import overall_row
 from exugear.kernels.connectors import ConnectorArrays, connector_load, connector_motion
 from exugear.kernels.elastic import ElasticArrays, elastic_energies, scratch_for
 from exugear.kernels.inertia import InertiaArrays, kinetic_energies
-from exugear.kernels.meshes import STATE_SIZE, MeshArrays, mesh_state
+from exugear.kernels.meshes import DEFLECTION, ENERGY, FORCE, OUTSIDE, STATE_SIZE, MeshArrays
 from exugear.kernels.springs import SpringArrays
 from exugear.kernels.turning import TurningArrays, turning_energies, turning_memory
 from exugear.model.sections import GROUND
+from exugear.tooth_mesh.laws.forms import mesh_state
+from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import compiled
 
@@ -51,8 +53,8 @@ def mesh_signals(q: Floats, v: Floats, meshes: MeshArrays, out: Floats) -> None:
     for n in range(q.shape[0]):
         mesh_state(q[n], v[n], meshes, state)
         for m in range(count):
-            out[n, m] = state[m, 0]
-            out[n, count + m] = state[m, 4]
+            out[n, m] = state[m, DEFLECTION]
+            out[n, count + m] = state[m, FORCE]
 
 
 @compiled
@@ -85,7 +87,7 @@ def joint_signals(
         for m in range(meshes.cycles.size):
             psi = q[n, meshes.coordinates[m, 12]] if meshes.coordinates[m, 12] >= 0 else 0.0
             cosine, sine = math.cos(psi), math.sin(psi)
-            scalar, row = state[m, 4] / meshes.line_of_action[m], meshes.force[m]
+            scalar, row = state[m, FORCE] / meshes.line_of_action[m], meshes.force[m]
             if scalar < 0.0 and meshes.table.shape[m, 0] > 0:  # the other flank pushes
                 scalar, row = -scalar, meshes.table.back[m]
             for end in range(2):
@@ -113,7 +115,7 @@ def mesh_energies(q: Floats, v: Floats, meshes: MeshArrays, state: Floats, out: 
     mesh_state(q, v, meshes, state)
     for m in range(meshes.cycles.size):
         for i in range(4):
-            out[i] += state[m, 5 + i]
+            out[i] += state[m, ENERGY + i]
 
 
 @compiled
@@ -201,7 +203,7 @@ class Channels:
         joints = assembly.gearbox.joints if assembly.variant == "rigid" else ()
         self.support_names = assembly.connector_names or tuple(joint.name for joint in joints)
         self._joints = _joint_arrays(assembly) if joints else None
-        self.has_places = assembly.law == "table"
+        self.has_places = LAWS[assembly.law].signals_positions
         first = 2 + 2 * len(self.mesh_names) + 3 * len(self.support_names)
         places = 3 * len(self.mesh_names) if self.has_places else 0
         self.count = first + places
@@ -229,7 +231,7 @@ class Channels:
         """Change of centre distance, misalignment, and whether outside the table, (3, meshes)."""
         centre, misalignment = self.assembly.gear_positions(q).T
         nominal = [element.mesh.centre_distance for element in self.assembly.elements]
-        return np.array([centre - nominal, misalignment, self.assembly.mesh_states(q, v)[:, 9]])
+        return np.array([centre - nominal, misalignment, self.assembly.mesh_states(q, v)[:, OUTSIDE]])
 
     def mesh_deflections(self, signals: Floats) -> Floats:
         """DTE of each mesh among the columns of `sample`, (samples, meshes), m."""

@@ -52,7 +52,8 @@ from exugear.spectra.comparison import (
 )
 from exugear.spectra.orders import order_lines
 from exugear.tooth_mesh.placement import MeshError
-from exugear.tooth_mesh.stiffness import iso6336_stiffness, mesh_stiffness
+from exugear.tooth_mesh.laws.iso6336 import iso6336_stiffness
+from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.tooth_mesh.tables import fitting_table
 from fe_ste.tools.files import FileError, write_file
 from fe_ste.tools.rendering import RenderingError

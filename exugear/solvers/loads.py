@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from fe_ste.tools.arrays import Floats
-
 from exugear.dynamics.assembly import Assembly
+from fe_ste.tools.arrays import Floats
 
 
 @dataclass(frozen=True)

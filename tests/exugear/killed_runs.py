@@ -22,7 +22,7 @@ import fe_ste.tools.files
 from exugear.model.gearbox import Gearbox
 from exugear.results.run_file import load_run
 from exugear.runs import runup
-from exugear.tooth_mesh.stiffness import mesh_stiffness
+from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 
 CALLS = ("open", "fsync", "replace", "unlink", "rmdir", "mkdir")
 DURATION = 0.024

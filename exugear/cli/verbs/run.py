@@ -21,6 +21,7 @@ from exugear.cli.errors import (
     model_errors,
 )
 from exugear.cli.options import (
+    USUAL_LAW,
     CaseArgument,
     FilesBelowOption,
     InertiasOption,
@@ -32,7 +33,7 @@ from exugear.cli.options import (
     Variant,
     VariantOption,
 )
-from exugear.cli.tables import fill_missing_tables
+from exugear.cli.tables import compute_missing_tables
 
 if TYPE_CHECKING:
     from exugear.model.gearbox import Gearbox
@@ -50,7 +51,7 @@ class Solver(StrEnum):
 def run(
     case: CaseArgument,
     variant: VariantOption,
-    mesh_law: LawOption = MeshLaw.line_of_action,
+    mesh_law: LawOption = USUAL_LAW,
     inertias: InertiasOption = None,
     load_case: Annotated[
         str | None, typer.Option("--load-case", metavar="NAME", help="Load case. (default: the first of the file)")
@@ -85,7 +86,7 @@ def run(
         if resume and (reason := refuse_to_resume(directory)):
             raise BadInputError(f"--resume: {reason}; run without it")
         _tell_doubts(gearbox, loads)
-        fill_missing_tables(gearbox, folder, mesh_law)
+        compute_missing_tables(gearbox, folder, mesh_law)
         with time_noted(folder, f"run, {variant}, {loads}, {inertias}, {mesh_law}, solver {solver}"):
             finished = _simulate(
                 gearbox, folder, variant.value, mesh_law.value, inertias, loads, solver.value, duration, resume
@@ -98,9 +99,10 @@ def _check_extent(
 ) -> None:
     """Refuse a simulated time that is too short, or whose results do not fit on the disk."""
     from exugear.runs.extent import check_disk, check_duration, sample_bytes
+    from exugear.tooth_mesh.laws.registry import LAWS
 
     supports = gearbox.joints if variant is Variant.rigid else gearbox.bearings
-    size = sample_bytes(len(gearbox.meshes), len(supports), law is MeshLaw.table)
+    size = sample_bytes(len(gearbox.meshes), len(supports), LAWS[law].signals_positions)
     with model_errors():
         check_duration(gearbox, gearbox.load_cases[load_case], duration)
         check_disk(gearbox, gearbox.load_cases[load_case], folder, duration, sample_bytes=size)
@@ -151,7 +153,7 @@ def _simulate(
     from exugear.runs.outcome import LimitError, RunError
     from exugear.runs.run_folder import refuse_to_resume, run_directory
     from exugear.runs.runup import simulate
-    from exugear.tooth_mesh.stiffness import mesh_stiffness
+    from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 
     directory = run_directory(folder, variant, load_case, law, inertias)
     if not resume and not refuse_to_resume(directory):

@@ -9,15 +9,24 @@ import numpy as np
 from exugear.dynamics.modes import overall_row
 from exugear.dynamics.signals import Channels
 from exugear.kernels.elastic import elastic_energies
-from exugear.kernels.table_law import FIRST_TWO
+from exugear.kernels.fast_meshes import (
+    ALONG_FORCE,
+    LAST_DEFLECTION,
+    LAST_FORCE,
+    LAST_OUTSIDE,
+    Meshes,
+    mesh_row,
+)
+from exugear.kernels.table_law import ENERGY_DERIVATIVES
 from exugear.kernels.travelling import place_travelling
 from exugear.kernels.turning import turning_energies
-from exugear.solvers.compiled.arrays import Bodies, Connectors, Equations, Joints, Meshes, Work
+from exugear.solvers.compiled.arrays import Bodies, Connectors, Equations, Joints, Work
 from exugear.solvers.compiled.connectors import move_connector, place_bodies
 from exugear.solvers.compiled.equations import set_loads
-from exugear.solvers.compiled.meshes import mesh_motion, mesh_row, mesh_stiffness, table_mesh
+from exugear.solvers.compiled.meshes import mesh_law, mesh_motion
 from exugear.solvers.compiled.packing import equations_of, work_for
 from exugear.solvers.loads import LoadTable
+from exugear.tooth_mesh.laws.table import TABLE_FORM, fast_table_force
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import kernel
 
@@ -25,11 +34,11 @@ from fe_ste.tools.compilation import kernel
 @kernel
 def place_signals(q: Floats, v: Floats, m: int, meshes: Meshes, work: Work, places: Floats) -> None:
     """Fill change of centre distance (m) and misalignment (rad) of mesh m."""
-    table, index, place = meshes.table, meshes.coordinates[m], meshes.place[m]
+    table, index, axis = meshes.table, meshes.coordinates[m], meshes.axis[m]
     c, s = work.turns[meshes.slot[m], 0], work.turns[meshes.slot[m], 1]
     count = meshes.coordinates.shape[0]
-    places[m] = mesh_row(q, v, index, place, table.centre[m], c, s, work.gradient[1])[0]
-    tilted = mesh_row(q, v, index, place, table.tilt[m], c, s, work.gradient[1])[0]
+    places[m] = mesh_row(q, v, index, axis, table.centre[m], c, s, work.mesh.gradient[ALONG_FORCE])[0]
+    tilted = mesh_row(q, v, index, axis, table.misalignment[m], c, s, work.mesh.gradient[ALONG_FORCE])[0]
     places[count + m] = table.nominal[m, 2] + tilted
 
 
@@ -39,28 +48,29 @@ def observe_meshes(q: Floats, v: Floats, meshes: Meshes, work: Work, signals: Fl
 
     With tables, change of centre distance, misalignment and whether outside the table follow at the end (3 m,).
 
-    The scalar force of each mesh, or that along its line of action, is left in `work.states[:, 3]`.
+    The scalar force of each mesh, or that along its line of action, is left in `work.mesh.states`.
     """
     count = meshes.coordinates.shape[0]
     for m in range(count):
-        if meshes.table.shape[m, 0] > 0:
-            force = table_mesh(q, v, m, FIRST_TWO + 1, meshes, work, energy)
-            work.states[m, 3] = force
-            signals[m], signals[count + m] = work.states[m, 0], force
+        if meshes.form[m] == TABLE_FORM:
+            c, s = work.turns[meshes.slot[m], 0], work.turns[meshes.slot[m], 1]
+            force = fast_table_force(q, v, m, ENERGY_DERIVATIVES, meshes, c, s, work.mesh, energy)
+            work.mesh.states[m, LAST_FORCE] = force
+            signals[m], signals[count + m] = work.mesh.states[m, LAST_DEFLECTION], force
             places = signals[signals.size - 3 * count :]
-            places[m], places[count + m], places[2 * count + m] = 0.0, meshes.table.nominal[m, 2], work.states[m, 2]
+            places[m], places[count + m] = 0.0, meshes.table.nominal[m, 2]
+            places[2 * count + m] = work.mesh.states[m, LAST_OUTSIDE]
             if meshes.spinning[m] == 0:
                 place_signals(q, v, m, meshes, work, places)
             continue
         delta, rate, acting = mesh_motion(q, v, m, meshes, work)
-        k, slope = mesh_stiffness(q, m, meshes)
-        force = k * delta + meshes.damping[m] * rate
-        work.states[m, 3] = force
+        elastic, _, _, stored, cycle_power = mesh_law(q, v, m, delta, meshes)
+        force = elastic + meshes.damping[m] * rate
+        work.mesh.states[m, LAST_FORCE] = force
         signals[m], signals[count + m] = delta, force * meshes.line_of_action[m]
-        cycling = meshes.cycles[m] * (v[meshes.coordinates[m, 5]] - v[meshes.coordinates[m, 12]])
-        energy[1] += 0.5 * k * delta * delta
+        energy[1] += stored
         energy[3] += meshes.damping[m] * rate * rate
-        energy[4] -= 0.5 * slope * cycling * delta * delta
+        energy[4] += cycle_power
         energy[5] += force * (acting - rate)
 
 
@@ -114,7 +124,7 @@ def observe_joints(v: Floats, meshes: Meshes, joints: Joints, work: Work, signal
         for end in range(2):
             j = joints.ends[m, end]
             if j >= 0:
-                force = work.states[m, 3]
+                force = work.mesh.states[m, LAST_FORCE]
                 row = meshes.force[m]
                 if force < 0.0 and meshes.table.shape[m, 0] > 0:  # the other flank pushes
                     force, row = -force, meshes.table.back[m]

@@ -23,17 +23,19 @@ from collections.abc import Callable
 from typing import Any, Literal
 
 import numpy as np
-from fe_ste.tools.arrays import Floats
 from numpy.typing import NDArray
 
 from exugear.bodies.reduced_body import ReducedBody
 from exugear.bodies.turning_frame import TurningBody
 from exugear.dynamics.assembly import Assembly, VariantError
-from exugear.kernels.meshes import ROW_SIZE, MeshArrays, add_mesh_forces
+from exugear.kernels.meshes import ROW_SIZE, MeshArrays
 from exugear.model.parts import Body, Joint
 from exugear.model.seats import node_position, seat_key
 from exugear.solvers.exudyn_model.floating import FloatingBodies, SolverFailure
 from exugear.solvers.loads import Drive, Loading
+from exugear.tooth_mesh.laws.forms import add_mesh_forces
+from exugear.tooth_mesh.laws.registry import LAWS
+from fe_ste.tools.arrays import Floats
 
 MeshRoute = Literal["element", "loads"]
 Observer = Callable[[float, Floats, Floats], bool]
@@ -148,7 +150,7 @@ class ExudynSystem:
                 f += assembly.mesh_forces(q, v, meshes)
             return f @ motions
 
-        has_jacobian = loading.drive is None and with_meshes and assembly.law != "rigid"
+        has_jacobian = loading.drive is None and with_meshes and LAWS[assembly.law].has_force
         self.mbs.AddObject(
             items.ObjectGenericODE2(
                 nodeNumbers=[node],

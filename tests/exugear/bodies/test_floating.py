@@ -24,7 +24,7 @@ from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
 from exugear.runs.outcome import RunError
 from exugear.runs.runup import simulate
-from exugear.solvers.compiled.solver import refusal
+from exugear.solvers.compiled.solver import unsupported_reason
 from exugear.solvers.exudyn_model.floating import elements, exudyn, frame_integrals
 from exugear.solvers.exudyn_model.system import ExudynSystem
 from exugear.solvers.loads import Drive, Loading
@@ -261,8 +261,9 @@ def test_a_run_goes_on_from_its_own_state(floating: Assembly) -> None:
 def test_the_compiled_solver_leaves_floating_frames_to_exudyn(
     floating: Assembly, gearbox: Gearbox, stiffness: dict, tmp_path: Path
 ) -> None:
-    assert refusal(floating) == "bodies.shaft.flexibility = 'ffrf' runs in Exudyn only, 'nonrotating' in both"
-    assert refusal(in_the_frame_that_does_not_turn(floating)) == ""
+    told = "bodies.shaft.flexibility = 'ffrf' runs in Exudyn only, 'nonrotating' in both"
+    assert unsupported_reason(floating) == told
+    assert unsupported_reason(in_the_frame_that_does_not_turn(floating)) == ""
     with pytest.raises(RunError, match="flexibility = 'ffrf' runs in Exudyn only.*use --solver exudyn"):
         simulate(gearbox, "flexible", stiffness, tmp_path, load_case="steady", solver="compiled")
 

@@ -16,7 +16,7 @@ from exugear.dynamics.sensitivity import (
     sweep_modes,
 )
 from exugear.model.gearbox import Gearbox
-from exugear.tooth_mesh.stiffness import mesh_stiffness
+from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 
 from ..spur_case import SPUR_CASE
 

@@ -17,7 +17,7 @@ from exugear.cli import app as cli
 from exugear.model.gearbox import Gearbox
 from exugear.results.run_file import load_run
 from exugear.runs import runup
-from exugear.tooth_mesh.stiffness import mesh_stiffness
+from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 from fe_ste.tools.files import FileError
 from fe_ste.transmission_error.table import MeshTable
 
@@ -267,8 +267,8 @@ from exugear.gearbox import Gearbox
 from tests.exugear.spur_case import COARSE_INPUT
 
 exugear.tooth_mesh.tables.TableInput = COARSE_INPUT
-(order,) = exugear.tooth_mesh.tables.order_tables(Gearbox.from_toml(sys.argv[1]), Path(sys.argv[2]))
-order.fill()
+(request,) = exugear.tooth_mesh.tables.requested_tables(Gearbox.from_toml(sys.argv[1]), Path(sys.argv[2]))
+request.compute()
 """
 
 

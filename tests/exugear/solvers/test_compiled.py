@@ -21,7 +21,7 @@ from exugear.runs.outcome import RunError
 from exugear.runs.recorder import _loading
 from exugear.runs.runup import simulate
 from exugear.solvers.compiled.observers import Observer
-from exugear.solvers.compiled.solver import CompiledSystem, refusal
+from exugear.solvers.compiled.solver import CompiledSystem, unsupported_reason
 from exugear.solvers.compiled.step import choose_step, highest_rate
 from exugear.solvers.exudyn_model.system import ExudynSystem, exudyn
 from exugear.solvers.loads import DriveLaw, Loading, LoadTable
@@ -313,7 +313,7 @@ def test_unstable_step_is_refused(grc: Gearbox, stiffness: dict, tmp_path: Path)
 
 
 def test_what_it_cannot_take_is_refused_with_the_way_out(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
-    assert refusal(assemble(grc, "bushing", stiffness)) == ""
+    assert unsupported_reason(assemble(grc, "bushing", stiffness)) == ""
     with pytest.raises(RunError, match="jointed keeps ideal joints as constraints.*use --solver exudyn"):
         simulate(grc, "jointed", stiffness, tmp_path, duration=0.01, solver="compiled")
     with pytest.raises(RunError, match="user-function loads exist in Exudyn only.*use --solver exudyn"):
