@@ -26,6 +26,7 @@ from exugear.solvers.compiled.step import choose_step, highest_rate
 from exugear.solvers.exudyn_model.system import ExudynSystem, exudyn
 from exugear.solvers.loads import DriveLaw, Loading, LoadTable
 from exugear.spectra.waterfall import harmonics, order_cut
+from exugear.tooth_mesh.laws.registry import LAWS
 
 from ..rounding import allowed_difference
 
@@ -64,7 +65,7 @@ def with_full_matrices(assembly: Assembly, off_axis: float) -> Assembly:
 
 def assemblies(grc: Gearbox, stiffness: dict) -> Iterator[Assembly]:
     for variant in ("rigid", "bushing"):
-        for law in ("line_of_action", "seed", "constant"):
+        for law in (name for name, law in LAWS.items() if law.has_force and not law.needs_axes):
             yield assemble(grc, variant, stiffness, law)
     yield assemble(grc, "rigid", {}, "rigid")
     yield with_full_matrices(assemble(grc, "bushing", stiffness), off_axis=0.05)

@@ -13,10 +13,11 @@ from exugear.kernels.meshes import STATE_SIZE, periodic_cubic, stiffness_at
 from exugear.model.gearbox import Gearbox
 from exugear.tooth_mesh.element import mesh_elements
 from exugear.tooth_mesh.laws.forms import add_mesh_forces, mesh_state
+from exugear.tooth_mesh.laws.registry import LAWS as ALL_LAWS
 from exugear.tooth_mesh.laws.registry import law_of
 from exugear.tooth_mesh.placement import MeshError, MeshGeometry, loaded_flanks, mesh_phases
 
-LAWS = ["line_of_action", "seed", "constant", "iso6336"]
+LAWS = [name for name, law in ALL_LAWS.items() if law.has_force and not law.needs_axes]
 RATED = 22.1 * math.pi / 30
 
 
