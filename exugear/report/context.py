@@ -14,7 +14,7 @@ from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.pictures.tables import PICTURE_FOLDER
 from exugear.results.folder import bodies_folder
-from exugear.tooth_mesh.stiffness import mesh_stiffness
+from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 from fe_ste.tools.arrays import Floats
 from fe_ste.transmission_error.surface import SteSurface
 
