@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exugear.bodies.floating import FloatingBody
+from exugear.bodies.floating_body import FloatingBody
 from exugear.bodies.reduced_body import SEAT_COORDINATES, SPIN, ReductionError
 from exugear.bodies.rotations import IDENTITY, euler_rotation, skew, tilts_and_spin
 from fe_ste.tools.arrays import Complexes, Floats
