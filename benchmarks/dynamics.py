@@ -20,12 +20,13 @@ from timing import CASE, Cost, median, median_row, peak_memory, result, say, sta
 
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.signals import Channels
 from exugear.dynamics.statics import accelerating_start
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.runs.extent import SAMPLE_RATE
 from exugear.runs.runup import BAND, simulate
-from exugear.solvers.compiled.solver import CompiledSystem, Observer
+from exugear.solvers.compiled.observers import Observer
+from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.compiled.step import choose_step
 from exugear.solvers.loads import LoadTable
 
@@ -144,7 +145,7 @@ def compare_ways(assembly: Assembly, rounds: int, quick: bool) -> list[dict[str,
 
 def shares_of_a_step(assembly: Assembly, rounds: int) -> dict[str, float]:
     """Share of a compiled step that goes when bearings, or meshes, are left out; gears rolling without load."""
-    speeds = assembly.gearbox.rolling_speeds("carrier", START_SPEED)
+    speeds = assembly.gearbox.train.rolling_speeds("carrier", START_SPEED)
     q = np.zeros(assembly.size)
     v = assembly.rolling_velocity(q, speeds)
     bare = {
@@ -192,18 +193,20 @@ def excitation_amplitudes(assembly: Assembly, rpm: float, step: float, method: s
     element = assembly.elements[assembly.mesh_names.index("high_speed")]
     cycle = element.cycles * q[:, assembly.spin[element.mesh.pinion]]
     window = np.hanning(len(q))
-    values = Observer(Channels(assembly), LoadTable(RATED)).observe(np.zeros(len(q)), q, v)[0]
-    values = values[:, [1, 2 + assembly.mesh_names.index("high_speed")]]
+    observer = Observer(assembly, LoadTable(RATED))
+    signals, _, _ = observer.observe(np.zeros(len(q)), q, v)
+    high_speed = observer.layout["mesh_dte"].start + assembly.mesh_names.index("high_speed")
+    values = signals[:, [observer.layout["overall_dte_angle"].start, high_speed]]
     values = values - window @ values / window.sum()
     return np.abs(2.0 * (window * np.exp(-2j * np.pi * cycle)) @ values) / window.sum()
 
 
 def amplitude_errors(gearbox: Gearbox) -> list[dict[str, Any]]:
     """Error of the overall and of the high-speed DTE at 1, 3 and 6.4 kHz against RK4 at 2.5 us."""
-    order = gearbox.mesh_frequencies(math.pi / 30.0)["high_speed"]
+    order = gearbox.train.mesh_frequencies(math.pi / 30.0)["high_speed"]
     rows = []
     for variant in ("rigid", "bushing"):
-        assembly = assemble(gearbox, variant, stiffness_of(gearbox))
+        assembly = assemble(gearbox, Choice(variant), stiffness_of(gearbox))
         exact = {f: excitation_amplitudes(assembly, f / order, 2.5e-6, "RK4") for f in FREQUENCIES}
         kinds = [("RK4", step) for step in (5e-5, 2.5e-5, STEP, 1.25e-5)]
         others = [(method, STEP) for method in (RUNGE_KUTTA, FULL_NEWTON, MODIFIED_NEWTON)]
@@ -316,7 +319,7 @@ def growth(rounds: int) -> list[dict[str, Any]]:
     rows, load = [], {"carrier": 50e3}
     for planets, stages in models:
         gearbox = synthetic(planets, stages)
-        assembly = assemble(gearbox, "bushing", stiffness_of(gearbox))
+        assembly = assemble(gearbox, Choice("bushing"), stiffness_of(gearbox))
         begin = accelerating_start(assembly, load)
         q, v = np.zeros((2, 10000, assembly.size))
         own, others = [], []
@@ -356,12 +359,12 @@ def run_up(variant: str, duration: float) -> dict[str, Any]:
     """Run up with results stored, in this process."""
     gearbox = Gearbox.from_toml(CASE)
     with tempfile.TemporaryDirectory() as directory:
-        simulate(gearbox, variant, stiffness_of(gearbox), directory, duration=0.01)  # loads the compiled code
+        simulate(gearbox, Choice(variant), stiffness_of(gearbox), directory, duration=0.01)  # loads the compiled code
         runs = []
         cost = timed(
-            lambda: runs.append(simulate(gearbox, variant, stiffness_of(gearbox), directory, duration=duration))
+            lambda: runs.append(simulate(gearbox, Choice(variant), stiffness_of(gearbox), directory, duration=duration))
         )
-        assembly = assemble(gearbox, variant, stiffness_of(gearbox))
+        assembly = assemble(gearbox, Choice(variant), stiffness_of(gearbox))
         step = choose_step(assembly, SAMPLE_RATE, BAND)
         return {
             "variant": variant,
@@ -404,7 +407,7 @@ def run_ups(rounds: int, duration: float) -> dict[str, Any]:
 def measure(quick: bool) -> dict[str, Any]:
     """Everything."""
     gearbox = Gearbox.from_toml(CASE)
-    assembly = assemble(gearbox, "bushing", stiffness_of(gearbox))
+    assembly = assemble(gearbox, Choice("bushing"), stiffness_of(gearbox))
     rounds = 1 if quick else 5
     return {
         "rounds": rounds,
@@ -429,7 +432,7 @@ def main() -> None:
         found = run_up(options.run_up, options.duration)
     else:
         gearbox = Gearbox.from_toml(CASE)
-        way = ways(assemble(gearbox, "bushing", stiffness_of(gearbox)), quick=True)[options.way]
+        way = ways(assemble(gearbox, Choice("bushing"), stiffness_of(gearbox)), quick=True)[options.way]
         way.cost_of(way.steps)
         found = {"peak_memory_MB": peak_memory()}
     sys.stdout.write(json.dumps(found))

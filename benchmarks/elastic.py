@@ -16,14 +16,16 @@ import numpy as np
 from dynamics import LOAD, stiffness_of
 from timing import CASE, median, say, timed
 
+from exugear.bodies.of_gearbox import reduced_bodies
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.signals import Channels
 from exugear.dynamics.statics import accelerating_start
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.runs.extent import SAMPLE_RATE
 from exugear.runs.runup import BAND
-from exugear.solvers.compiled.solver import CompiledSystem, Observer
+from exugear.solvers.compiled.observers import Observer
+from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.compiled.step import choose_step
 from exugear.solvers.loads import LoadTable
 
@@ -40,14 +42,20 @@ def with_elastic(gearbox: Gearbox, names: tuple[str, ...], **flexibility: str) -
     return gearbox.varied({**changes, **{f"bodies.{name}.flexibility": word for name, word in flexibility.items()}})
 
 
+def assembled(gearbox: Gearbox, variant: str) -> Assembly:
+    """Equations of a variant, its elastic bodies reduced first."""
+    bodies = reduced_bodies(gearbox, gearbox.case.default_inertias) if variant == "flexible" else {}
+    return assemble(gearbox, Choice(variant), stiffness_of(gearbox), bodies)
+
+
 def reductions(gearbox: Gearbox) -> list[dict[str, Any]]:
     """Unknowns, coordinates and seconds of every elastic body, reduced anew."""
     with tempfile.TemporaryDirectory() as folder:
         first, second = Path(folder) / "first", Path(folder) / "second"
-        assembly = assemble(gearbox, "flexible", stiffness_of(gearbox), folder=first)
+        bodies = reduced_bodies(gearbox, gearbox.case.default_inertias, first)
         shutil.copytree(first, second)  # another folder, for the process remembers what it took from the first
         begin = time.perf_counter()
-        assemble(gearbox, "flexible", stiffness_of(gearbox), folder=second)
+        reduced_bodies(gearbox, gearbox.case.default_inertias, second)
         again = time.perf_counter() - begin
         size = sum(file.stat().st_size for file in first.iterdir()) / 1e6
     rows = [
@@ -57,7 +65,7 @@ def reductions(gearbox: Gearbox) -> list[dict[str, Any]]:
             "coordinates": body.reduced.size,
             "seconds": body.reduced.figures.seconds,
         }
-        for name, body in assembly.elastic_bodies.items()
+        for name, body in bodies.items()
     ]
     say("elastic bodies: reduced")
     return [*rows, {"body": "all, kept on disk", "seconds": again, "file_MB": size}]
@@ -73,7 +81,7 @@ class _Steps:
         self.q, self.v = np.zeros((2, self.number, assembly.size))
         self.times = step * np.arange(self.number)
         self._system = CompiledSystem(assembly, start.q, start.v, loads, step)
-        self._observer = Observer(Channels(assembly), loads)
+        self._observer = Observer(assembly, loads)
 
     def costs(self) -> tuple[float, float]:
         """Microseconds of processor time for a step, and for a step with its signals and energies."""
@@ -92,7 +100,7 @@ def steps(gearbox: Gearbox, rounds: int) -> list[dict[str, Any]]:
     }
     rows, systems = [], []
     for name, (case, variant) in cases.items():
-        assembly = assemble(case, variant, stiffness_of(case))
+        assembly = assembled(case, variant)
         step = choose_step(assembly, SAMPLE_RATE, BAND)
         systems.append(_Steps(assembly, step))
         rows.append({"elastic": name, "coordinates": assembly.size, "step": step})
@@ -120,7 +128,7 @@ def frames(gearbox: Gearbox, rounds: int) -> list[dict[str, Any]]:
     }
     rows, systems = [], []
     for name, (case, variant) in cases.items():
-        assembly = assemble(case, variant, stiffness_of(case))
+        assembly = assembled(case, variant)
         start = accelerating_start(assembly, LOAD)
         systems.append(exudyn_ways.system_of(assembly, start.q, start.v, LOAD))
         rows.append({"shaft": name, "coordinates": assembly.size})

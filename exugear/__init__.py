@@ -9,19 +9,43 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from exugear.dynamics.modes import eigenmodes
+    from exugear.dynamics.modes import Modes, eigenmodes
+    from exugear.dynamics.statics import static_state
+    from exugear.model.choice import Choice
     from exugear.model.gearbox import Gearbox
     from exugear.model.reading import CaseError
+    from exugear.project import Project
+    from exugear.report.writer import write_report
+    from exugear.runs.outcome import Run
     from exugear.runs.runup import simulate
 
-__all__ = ["CaseError", "Gearbox", "__version__", "eigenmodes", "simulate"]
-
+#: Public names and the modules they stand in.
 _HOMES = {
-    "CaseError": "exugear.model.gearbox",
+    "CaseError": "exugear.model.reading",
+    "Choice": "exugear.model.choice",
     "Gearbox": "exugear.model.gearbox",
+    "Modes": "exugear.dynamics.modes",
+    "Project": "exugear.project",
+    "Run": "exugear.runs.outcome",
     "eigenmodes": "exugear.dynamics.modes",
     "simulate": "exugear.runs.runup",
+    "static_state": "exugear.dynamics.statics",
+    "write_report": "exugear.report.writer",
 }
+
+__all__ = [
+    "CaseError",
+    "Choice",
+    "Gearbox",
+    "Modes",
+    "Project",
+    "Run",
+    "__version__",
+    "eigenmodes",
+    "simulate",
+    "static_state",
+    "write_report",
+]
 
 
 def __getattr__(name: str) -> Any:

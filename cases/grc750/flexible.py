@@ -11,27 +11,20 @@ some minutes.
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from one_variant import LAW, show
+from one_variant import grc_project, show
 
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.modes import MOTIONS, Modes, counterparts, eigenmodes
-from exugear.dynamics.statics import locked_equilibrium
-from exugear.model.gearbox import Gearbox
+from exugear import Choice, Modes, Project, static_state
+from exugear.dynamics.modes import MOTIONS, counterparts, modes_of
 from exugear.pictures.elastic_scene import animate_elastic_bodies, draw_elastic_bodies, elastic_scene
 from exugear.pictures.run_diagrams import plot_waterfalls
-from exugear.results.folder import bodies_folder, keep_case, modes_path
-from exugear.runs.runup import simulate
 from exugear.spectra.orders import order_lines
 from exugear.spectra.resonances import Pick, group_by_frequency, match_eigenfrequencies, pick_resonances
 from exugear.spectra.run_spectra import run_waterfall
-from exugear.tooth_mesh.element import MeshData
-from exugear.tooth_mesh.stiffness import mesh_stiffness
-from exugear.tooth_mesh.tables import order_tables
 
 VARIANTS = ("rigid", "bushing", "flexible")
 MAIN_SHAFT_MODES = 500.0
@@ -50,33 +43,38 @@ SAME_MODE = 0.5
 """Overlap from which on a mode counts as the same one, moved."""
 
 
-def main(out: Path) -> None:
+def main() -> None:
     """Compute what is missing, then print and draw."""
-    gearbox = Gearbox.from_toml(Path(__file__).with_name("gearbox.toml"))
-    for order in order_tables(gearbox, out):
-        _ = order.stored or order.fill()
-    keep_case(gearbox, out)
-    stiffness = mesh_stiffness(gearbox, LAW, out)
-    bodies = bodies_folder(out)
-    modes = {variant: eigenmodes(gearbox, variant, stiffness, LAW, folder=bodies) for variant in VARIANTS}
-    for variant, found in modes.items():
-        found.save(modes_path(out, variant, LAW, found.assembly.inertias))
-    shafts = eigenmodes(gearbox.varied(SHAFTS_ALONE), "flexible", stiffness, LAW, folder=bodies)
+    project = grc_project(Choice("flexible"))
+    project.tables()
+    projects = {variant: project.chosen(variant=variant) for variant in VARIANTS}
+    modes = {variant: chosen.modes() for variant, chosen in projects.items()}
+    shafts = modes_of_varied(project, SHAFTS_ALONE)
     print_modes(modes["bushing"], shafts, "bushing -> elastic shafts")
     print_modes(shafts, modes["flexible"], "elastic shafts -> carrier and housing elastic, too", SOLIDS_EXACT)
-    print_main_shaft(modes["flexible"], stiffness, bodies)
-    print_misalignments(gearbox, stiffness, bodies)
-    folder = modes_path(out, "flexible", LAW, modes["flexible"].assembly.inertias).parent
+    with_main_shaft = modes_of_varied(project, MAIN_SHAFT)
+    print_modes(modes["flexible"], with_main_shaft, "flexible -> flexible with main shaft and rotor", MAIN_SHAFT_MODES)
+    print_misalignments(project)
+    folder = project.modes_path.parent
     draw_mode(shafts, bending_and_teeth(shafts), folder / "flexible-mode")
-    lines, spectra, picks = order_lines(gearbox), {}, {}
-    for variant in VARIANTS:
-        run = simulate(gearbox, variant, stiffness, out, mesh_law=LAW, progress=show)
-        spectra[variant] = run_waterfall(run.path)
+    lines, spectra, picks = order_lines(project.gearbox), {}, {}
+    for variant, chosen in projects.items():
+        spectra[variant] = run_waterfall(chosen.run(progress=show).path)
         picks[variant] = pick_resonances(spectra[variant], lines, depth=LOUD)
         loudest = print_resonances(variant, picks[variant], modes[variant])
     draw_mode(modes["flexible"], loudest, folder / "loudest-mode")
     plot_waterfalls(spectra, lines, folder / "waterfalls.png", marks=picks)
     print(f"pictures in {folder}")
+
+
+def varied(project: Project, changes: dict[str, object], variant: str = "flexible") -> Project:
+    """Return a project with some keys of the gearbox file replaced; tables and reductions stay where they are."""
+    return replace(project.chosen(variant=variant), gearbox=project.gearbox.varied(changes))
+
+
+def modes_of_varied(project: Project, changes: dict[str, object]) -> Modes:
+    """Eigenmodes of the variant `flexible` of a varied gearbox, which are not kept."""
+    return modes_of(varied(project, changes).assembly())
 
 
 def print_resonances(variant: str, picks: Sequence[Pick], modes: Modes) -> int:
@@ -105,35 +103,21 @@ def print_modes(before: Modes, after: Modes, title: str, highest: float = np.inf
             print(f"{after.frequency[mode]:7.1f}  {after.names[mode]}")
 
 
-def print_main_shaft(without: Modes, stiffness: Mapping[str, MeshData], folder: Path) -> None:
-    """Print which modes the main shaft with hub and rotor moves and brings."""
-    gearbox = without.assembly.gearbox.varied(MAIN_SHAFT)
-    found = eigenmodes(gearbox, "flexible", stiffness, LAW, folder=folder)
-    print_modes(without, found, "flexible -> flexible with main shaft and rotor", MAIN_SHAFT_MODES)
-
-
-def print_misalignments(gearbox: Gearbox, stiffness: Mapping[str, MeshData], folder: Path) -> None:
+def print_misalignments(project: Project) -> None:
     """Print the misalignment of each mesh under the static load, output locked, for more and more elastic bodies."""
     print("misalignment under 240 kN m, output locked, rad / 1e6")
-    rigid = gearbox.varied(SHAFTS_ALONE)
-    print_misalignment("bushing", rigid, "bushing", stiffness, folder)
-    for name, case in (("elastic shafts", rigid), ("all elastic", gearbox)):
-        for more, changes in (("", {}), (", main shaft", MAIN_SHAFT)):
-            print_misalignment(f"{name}{more}", case.varied(changes), "flexible", stiffness, folder)
-            heavy = case.varied({**changes, **WEIGHT})
-            print_misalignment(f"{name}{more}, gravity on", heavy, "flexible", stiffness, folder)
+    print_misalignment("bushing", varied(project, SHAFTS_ALONE, "bushing"))
+    for name, changes in (("elastic shafts", SHAFTS_ALONE), ("all elastic", {})):
+        for more, shaft in (("", {}), (", main shaft", MAIN_SHAFT)):
+            print_misalignment(f"{name}{more}", varied(project, {**changes, **shaft}))
+            print_misalignment(f"{name}{more}, gravity on", varied(project, {**changes, **shaft, **WEIGHT}))
 
 
-def print_misalignment(
-    title: str, gearbox: Gearbox, variant: str, stiffness: Mapping[str, MeshData], folder: Path
-) -> None:
+def print_misalignment(title: str, project: Project) -> None:
     """Print the misalignment of each mesh."""
-    assembly = assemble(gearbox, variant, stiffness, LAW, folder=folder)
-    load = gearbox.case.static_load
-    q = locked_equilibrium(assembly, load.torques_N_m, load.locked, assembly.mean_meshes)
-    values = 1e6 * assembly.gear_positions(q)[:, 1]
-    words = ", ".join(f"{mesh} {value:.0f}" for mesh, value in zip(assembly.mesh_names, values, strict=True))
-    print(f"{title}: {words}")
+    state = static_state(project.assembly())
+    values = zip(state.assembly.mesh_names, 1e6 * state.misalignment, strict=True)
+    print(f"{title}: {', '.join(f'{mesh} {value:.0f}' for mesh, value in values)}")
 
 
 def bending_and_teeth(modes: Modes) -> int:
@@ -152,4 +136,4 @@ def draw_mode(modes: Modes, chosen: int, path: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path("results/grc750"))
+    main()

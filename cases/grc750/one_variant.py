@@ -2,45 +2,41 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
-from exugear.dynamics.modes import eigenmodes
-from exugear.model.gearbox import Gearbox
+from exugear import Choice, Project
 from exugear.pictures.mode_diagrams import plot_campbell
 from exugear.pictures.run_diagrams import plot_waterfalls
-from exugear.results.folder import keep_case
 from exugear.runs.outcome import Progress
-from exugear.runs.runup import simulate
 from exugear.spectra.orders import order_lines
 from exugear.spectra.resonances import group_by_frequency, match_eigenfrequencies, pick_resonances
 from exugear.spectra.run_spectra import run_waterfall
-from exugear.tooth_mesh.stiffness import mesh_stiffness
-from exugear.tooth_mesh.tables import order_tables
 
-LAW = "line_of_action"
+CASE = Path(__file__).with_name("gearbox.toml")
 
 
-def compute(variant: str, out: Path) -> None:
+def compute(variant: str) -> None:
     """Compute what is missing, then print and draw."""
-    gearbox = Gearbox.from_toml(Path(__file__).with_name("gearbox.toml"))
-    for order in order_tables(gearbox, out):
-        _ = order.stored or order.fill()
-    keep_case(gearbox, out)
-    stiffness = mesh_stiffness(gearbox, LAW, out)
-    run = simulate(gearbox, variant, stiffness, out, mesh_law=LAW, progress=show)
-    modes = eigenmodes(gearbox, variant, stiffness, LAW)
-    modes.save(run.path.with_name("modes.nc"))
-    spectra, lines = run_waterfall(run.path), order_lines(gearbox)
+    project = grc_project(Choice(variant))
+    project.tables()
+    run, modes = project.run(progress=show), project.modes()
+    spectra, lines = run_waterfall(run.path), order_lines(project.gearbox)
     picks = pick_resonances(spectra, lines)
-    found = group_by_frequency(picks)
-    print(f"\nvariant {variant}, law {LAW}, inertias {modes.assembly.inertias}; {spectra.description}")
-    for resonance, mode in zip(found, match_eigenfrequencies(found, modes.frequency), strict=True):
+    resonances = group_by_frequency(picks)
+    print(f"\n{project}; {spectra.description}")
+    for resonance, mode in zip(resonances, match_eigenfrequencies(resonances, modes.frequency), strict=True):
         name = "no eigenfrequency within the resolution" if mode is None else modes.names[mode]
         print(f"{resonance.frequency:7.0f} Hz  {resonance.picks[0].level:6.1f} dB  {name}")
     plot_waterfalls({variant: spectra}, lines, run.path.with_name("waterfall.png"), marks={variant: picks})
     fastest = float(spectra.speed.max())
     plot_campbell(modes.frequency[1:], lines, fastest, run.path.with_name("campbell.png"), title=variant)
     print(f"pictures in {run.path.parent}")
+
+
+def grc_project(choice: Choice) -> Project:
+    """Take up the GRC with the results folder that the command line names, results/grc750 without one."""
+    return Project.from_toml(CASE, sys.argv[1] if len(sys.argv) > 1 else None, choice)
 
 
 def show(progress: Progress) -> None:

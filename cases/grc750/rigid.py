@@ -7,10 +7,7 @@ Results go to results/grc750 by default; tables that are there already are used 
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 from one_variant import compute
 
 if __name__ == "__main__":
-    compute("rigid", Path(sys.argv[1]) if len(sys.argv) > 1 else Path("results/grc750"))
+    compute("rigid")

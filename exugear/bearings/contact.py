@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from fe_ste.tools.arrays import Floats
 from numpy.typing import ArrayLike, NDArray
 
 from exugear.bearings.rollers import BearingError, RollerBearing, RollerRow
+from fe_ste.tools.arrays import Floats
 
 LINE_CONTACT_EXPONENT = 10.0 / 9.0
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from fe_ste.tools.arrays import Floats
 from numpy.typing import ArrayLike
 
 from exugear.bearings.rollers import BearingError
+from fe_ste.tools.arrays import Floats
 
 
 def axially_symmetric(stiffness: Floats) -> Floats:

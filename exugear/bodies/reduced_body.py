@@ -9,8 +9,9 @@ from typing import Literal
 
 import numpy as np
 import scipy.sparse.csgraph
-from fe_ste.tools.arrays import Floats
 from numpy.typing import NDArray
+
+from fe_ste.tools.arrays import Floats
 
 Frame = Literal["nonrotating", "carrier", "ground"]
 

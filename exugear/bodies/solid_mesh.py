@@ -23,10 +23,10 @@ from typing import Any
 
 import numpy as np
 import skfem
-from fe_ste.tools.arrays import Floats, Integers
 
 from exugear.bodies.turned_section import SAME, Shaft
 from fe_ste.elasticity.bricks import skfem_mesh
+from fe_ste.tools.arrays import Floats, Integers
 
 CORE = 0.5
 """Radius of the square core of a solid section over that of its first ring of lines."""
@@ -260,7 +260,7 @@ def _meshed(load: Callable[[Any], None], size: float, curvature: int, unit: floa
 
 
 def _keep_broken_pipes() -> None:
-    """Make a broken pipe an error again: gmsh leaves it to end the process, and with it a sweep that lost a worker."""
+    """Make a broken pipe an error again: gmsh leaves it to end the process, and with it a grid that lost a worker."""
     if hasattr(signal, "SIGPIPE") and threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGPIPE, signal.SIG_IGN)
 

@@ -25,10 +25,10 @@ from typing import Any, Literal
 import numpy as np
 import scipy.sparse
 import skfem
-from fe_ste.tools.arrays import Floats, SparseMatrix
 from numpy.typing import NDArray
 
 from fe_ste.geometry.gears import Material
+from fe_ste.tools.arrays import Floats, SparseMatrix
 
 Motion = Literal["bending", "torsion", "stretching"]
 GRADING = 0.35

@@ -5,55 +5,67 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
-from typing import Literal, get_args
 
 import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
 from exugear.bearings.supports import ON_BEARINGS, bearing_matrices, elastic_names, mounts_at_work, unsupported
-from exugear.bodies.of_gearbox import ElasticBody, reduced_bodies
+from exugear.bodies.of_gearbox import ElasticBody
 from exugear.dynamics.assembly import Assembly, VariantError
 from exugear.kernels.connectors import ConnectorArrays, no_connectors
 from exugear.kernels.elastic import ElasticArrays, no_elastic
 from exugear.kernels.inertia import InertiaArrays
 from exugear.kernels.springs import SpringArrays
 from exugear.kernels.travelling import TravellingArrays, no_travelling
+from exugear.model.choice import VARIANTS, Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Bearing, Body
 from exugear.model.seats import node_position, seat_key
 from exugear.tooth_mesh.element import Angles, MeshData, mesh_elements, pack
 from fe_ste.tools.arrays import Floats
 
-Variant = Literal["rigid", "bushing", "flexible", "jointed"]
-VARIANTS: tuple[str, ...] = get_args(Variant)
-
 
 def assemble(
     gearbox: Gearbox,
-    variant: str,
+    choice: Choice,
     stiffness: Mapping[str, MeshData],
-    law: str = "line_of_action",
-    inertias: str | None = None,
+    bodies: Mapping[str, ElasticBody] | None = None,
+    *,
     flanks: Mapping[str, int] | None = None,
     angles: Angles = "reference",
-    folder: Path | None = None,
 ) -> Assembly:
-    """Assemble a variant; arguments as in `exugear.tooth_mesh.element.mesh_elements`.
+    """Put the equations of motion of a gearbox together.
 
-    Elastic bodies are reduced for the variant `flexible`; in `folder` their reductions are kept and found again.
+    Parameters
+    ----------
+    gearbox : Gearbox
+    choice : Choice
+        Variant, mesh law and inertia set.
+    stiffness : mapping of pair name to (n,) array, or to the table's surface
+        Mesh stiffness over the cycle, N/m: see `exugear.tooth_mesh.element.mesh_elements`.
+    bodies : mapping of body name to ElasticBody, optional
+        Reduced elastic bodies, which the variant `flexible` needs: see `exugear.bodies.of_gearbox.reduced_bodies`.
+    flanks, angles
+        As in `exugear.tooth_mesh.element.mesh_elements`.
 
     Raises
     ------
     VariantError
-        Unknown variant, or supports missing for it.
+        Unknown variant, or supports or elastic bodies missing for it.
     MeshError
         Unknown law, or no stiffness for a pair at work.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> stiffness = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
+    >>> assemble(gearbox, Choice("rigid"), stiffness).size
+    8
     """
+    variant, law, inertias = choice.variant, choice.mesh_law, choice.inertia_set(gearbox)
     if variant not in VARIANTS:
         raise VariantError(f"variant {variant!r} is unknown; variants are {', '.join(VARIANTS)}")
-    inertias = inertias or gearbox.case.default_inertias
     elastic = elastic_names(gearbox) if variant == "flexible" else ()
     moving = [body for body in gearbox.bodies(inertias) if not body.fixed or body.name in elastic]
     lacking = unsupported(gearbox, variant)
@@ -61,7 +73,7 @@ def assemble(
         raise VariantError(f"variant {variant}: {lacking}")
     if law == "rigid" and variant != "rigid":
         raise VariantError(f"mesh law rigid: its gears only roll, which needs the variant rigid, not {variant}")
-    flexible = reduced_bodies(gearbox, inertias, folder) if variant == "flexible" else {}
+    flexible = _chosen_bodies(elastic, bodies or {})
     rigid = [body for body in moving if body.name not in flexible]
     six = [body for body in rigid if variant != "rigid" and not body.spin_only]
     alone = [body for body in rigid if body not in six]
@@ -76,9 +88,7 @@ def assemble(
     elements = () if law == "rigid" else mesh_elements(gearbox, stiffness, *settings)
     return Assembly(
         gearbox=gearbox,
-        variant=variant,
-        law=law,
-        inertias=inertias,
+        choice=replace(choice, inertias=inertias),
         bodies=(*six, *alone, *(body for body in moving if body.name in flexible)),
         coordinates=coordinates,
         size=size,
@@ -94,6 +104,17 @@ def assemble(
         elastic=elastic_arrays(flexible, size, gearbox.case.damping.body_time_s),
         motions=_rolling_motions(gearbox, coordinates) if law == "rigid" else np.eye(size),
     )
+
+
+def _chosen_bodies(names: tuple[str, ...], bodies: Mapping[str, ElasticBody]) -> dict[str, ElasticBody]:
+    """Reduced bodies of the elastic ones, in their order."""
+    missing = [name for name in names if name not in bodies]
+    if missing:
+        raise VariantError(
+            f"variant flexible: no reduced body for {', '.join(missing)}; "
+            "give what exugear.bodies.of_gearbox.reduced_bodies returns"
+        )
+    return {name: bodies[name] for name in names}
 
 
 def _take_seats(
@@ -236,7 +257,7 @@ def _inertia(variant: str, six: list[Body], alone: list[Body]) -> InertiaArrays:
 
 def _rolling_motions(gearbox: Gearbox, coordinates: Mapping[str, tuple[int, ...]]) -> Floats:
     """Motions of the spins (size, n) in which no mesh closes; couplings may twist."""
-    rows = np.array([gearbox.mesh_row(mesh) for mesh in gearbox.meshes])
+    rows = gearbox.train.spin_rows[: len(gearbox.meshes)]
     order = [coordinates[name][5] for name in gearbox.spinning]
     motions = np.zeros((len(order), len(order) - np.linalg.matrix_rank(rows)))
     motions[order] = scipy.linalg.null_space(rows / np.abs(rows).max(axis=1, keepdims=True))

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from fe_ste.tools.arrays import Floats
 from numpy.typing import NDArray
 
 from exugear.bodies.floating import FloatingBody
@@ -38,9 +37,11 @@ from exugear.kernels.meshes import (
 from exugear.kernels.springs import SpringArrays, add_spring_forces
 from exugear.kernels.travelling import TravellingArrays, follow, share_travelling_forces, travelling_tangent
 from exugear.kernels.turning import TurningArrays
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Bearing, Body
 from exugear.tooth_mesh.element import MeshElement, pack
+from fe_ste.tools.arrays import Floats
 
 
 class VariantError(ValueError):
@@ -53,7 +54,7 @@ class Assembly:
 
     Attributes
     ----------
-    gearbox, variant, law, inertias : what was assembled
+    gearbox, choice : what was assembled; the choice names its inertia set
     bodies : moving bodies in the order of their coordinates, elastic fixed ones among them
     coordinates : the six state indices of each body by name, -1 where there is none; of an elastic body those of
         its main seat, and those of each seat under `exugear.model.seats.seat_key`
@@ -69,9 +70,7 @@ class Assembly:
     """
 
     gearbox: Gearbox
-    variant: str
-    law: str
-    inertias: str
+    choice: Choice
     bodies: tuple[Body, ...]
     coordinates: Mapping[str, tuple[int, ...]]
     size: int
@@ -86,6 +85,21 @@ class Assembly:
     elastic_bodies: Mapping[str, ElasticBody]
     elastic: ElasticArrays
     motions: Floats
+
+    @property
+    def variant(self) -> str:
+        """How bodies are held."""
+        return self.choice.variant
+
+    @property
+    def law(self) -> str:
+        """Mesh law."""
+        return self.choice.mesh_law
+
+    @property
+    def inertias(self) -> str:
+        """Inertia set."""
+        return self.choice.inertia_set(self.gearbox)
 
     def has_six(self, body: Body) -> bool:
         """Tell whether a body is rigid with all six coordinates."""

@@ -27,10 +27,12 @@ def input_hash(assembly: Assembly, load_case: str | None = None) -> str:
     Examples
     --------
     >>> from exugear.dynamics.assemble import assemble
-    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> from exugear.model.choice import Choice
+    >>> from exugear.model.gearbox import Gearbox
+    >>> gearbox, choice = Gearbox.from_toml("cases/grc750/gearbox.toml"), Choice("bushing")
     >>> softer = gearbox.varied({"housing.factor": 0.2})
     >>> stiffness = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
-    >>> input_hash(assemble(gearbox, "bushing", stiffness)) == input_hash(assemble(softer, "bushing", stiffness))
+    >>> input_hash(assemble(gearbox, choice, stiffness)) == input_hash(assemble(softer, choice, stiffness))
     False
     """
     gearbox = assembly.gearbox

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 import scipy.optimize
-from fe_ste.tools.arrays import Floats
 
 from exugear.bodies.turning_frame import TurningBody
 from exugear.dynamics.assembly import Assembly
 from exugear.kernels.connectors import ConnectorArrays, add_connector_forces
 from exugear.kernels.meshes import MeshArrays
 from exugear.kernels.springs import SpringArrays, add_spring_forces
+from fe_ste.tools.arrays import Floats
 
 DIFFERENCE_STEP = 1e-6
 RIGID_BODY_LIMIT = 0.1

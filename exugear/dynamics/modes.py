@@ -17,17 +17,20 @@ import scipy.optimize
 import xarray as xr
 from numpy.typing import NDArray
 
+from exugear.bodies.of_gearbox import ElasticBody
 from exugear.bodies.reduced_body import ReducedBody
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.linearised import RIGID_BODY_LIMIT, Linearised, growth_rate, linearise, undamped_modes
-from exugear.dynamics.statics import locked_equilibrium
+from exugear.dynamics.statics import static_state
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.versions import MODES
 from exugear.tooth_mesh.element import Angles, MeshData
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.files import Layout, load_dataset, write_dataset
+from fe_ste.tools.notebook import html_table, value_range
+from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
 
 RIGID_COORDINATES = ("x", "y", "z", "tilt_x", "tilt_y", "spin")
 FREE_ROTATION = "free rotation of the train"
@@ -64,6 +67,24 @@ class Modes:
     amplification: Floats
     names: tuple[str, ...]
     growth_rate: float
+
+    def __repr__(self) -> str:
+        """One line."""
+        assembly = self.assembly
+        chosen = f"{assembly.variant}, {assembly.law}, {assembly.inertias}"
+        return f"Modes({chosen}: {self.frequency.size}, {value_range(self.frequency, 'Hz')})"
+
+    def _repr_html_(self) -> str:
+        assembly = self.assembly
+        rows = {
+            "variant": assembly.variant,
+            "mesh law": assembly.law,
+            "inertia set": assembly.inertias,
+            "modes": str(self.frequency.size),
+            "frequency": value_range(self.frequency, "Hz"),
+            "fastest growth": f"{self.growth_rate:.3g} 1/s",
+        }
+        return html_table(f"Modes of {assembly.gearbox.name}", rows)
 
     def nearest(self, frequency: float) -> int:
         """Find the number of the mode nearest to a frequency (Hz)."""
@@ -162,48 +183,40 @@ def coordinate_labels(assembly: Assembly) -> list[str]:
 
 def eigenmodes(
     gearbox: Gearbox,
-    variant: str,
+    choice: Choice,
     stiffness: Mapping[str, MeshData],
-    mesh_law: str = "line_of_action",
-    inertias: str | None = None,
+    bodies: Mapping[str, ElasticBody] | None = None,
+    *,
     angles: Angles = "reference",
-    folder: Path | None = None,
 ) -> Modes:
     """Eigenmodes of a gearbox variant at its static load.
 
     Parameters
     ----------
     gearbox : Gearbox
-    variant : {"rigid", "bushing", "flexible"}
+    choice : Choice
+        Variant, mesh law and inertia set.
     stiffness : mapping of pair name to (n,) array
         Mesh stiffness F_bt / STE over the cycle, N/m, for example from the STE tables.
-    mesh_law : str
-        See `exugear.tooth_mesh.element`.
-    inertias : str, optional
-        Inertia set; the file's default otherwise.
+    bodies : mapping of body name to ElasticBody, optional
+        Reduced elastic bodies, which the variant `flexible` needs.
     angles : {"reference", "operating"}
         Angles of the law `seed`.
-    folder : Path, optional
-        Where reductions of elastic bodies are kept and found again.
 
     Examples
     --------
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
     >>> stiffness = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
-    >>> modes = eigenmodes(gearbox, "rigid", stiffness)
+    >>> modes = eigenmodes(gearbox, Choice("rigid"), stiffness)
     >>> len(modes.frequency), modes.names[0]
     (8, 'free rotation of the train')
     """
-    assembly = assemble(gearbox, variant, stiffness, mesh_law, inertias, angles=angles, folder=folder)
-    return modes_of(assembly)
+    return modes_of(assemble(gearbox, choice, stiffness, bodies, angles=angles))
 
 
 def modes_of(assembly: Assembly, preload: bool = True) -> Modes:
     """Eigenmodes of an assembly, at its static load or (preload False) unloaded."""
-    load = assembly.gearbox.case.static_load
-    q = np.zeros(assembly.size)
-    if preload:
-        q = locked_equilibrium(assembly, load.torques_N_m, load.locked, assembly.mean_meshes)
+    q = static_state(assembly).q if preload else np.zeros(assembly.size)
     linear = linearise(assembly, q)
     frequency, shapes = undamped_modes(linear.mass, linear.total_stiffness, assembly.motions)
     if assembly.elastic_bodies:  # beyond the band the shafts' own vibrations are only what keeps their statics right
@@ -245,7 +258,7 @@ def overall_row(assembly: Assembly) -> Floats:
     radius = assembly.gearbox.gears[overall.output_gear].base_radius
     row = np.zeros(assembly.size)
     row[assembly.spin[overall.output]] += radius
-    row[assembly.spin[overall.input]] -= radius * assembly.gearbox.ratio
+    row[assembly.spin[overall.input]] -= radius * assembly.gearbox.train.ratio
     return row
 
 

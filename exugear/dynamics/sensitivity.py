@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import scipy.optimize
 
+from exugear.bodies.of_gearbox import ElasticBody
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.modes import Modes, modes_of
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Body
 from exugear.tooth_mesh.element import MeshData
@@ -154,23 +155,21 @@ def follow_modes(before: Modes, after: Modes, followed: Integers) -> Integers:
 
 def assumed_parameters(
     gearbox: Gearbox,
-    variant: str,
+    choice: Choice,
     stiffness: Mapping[str, MeshData],
-    law: str,
-    inertias: str,
-    folder: Path | None = None,
+    bodies_of: Callable[[Gearbox], Mapping[str, ElasticBody]] | None = None,
 ) -> tuple[Parameter, ...]:
     """Parameters of a gearbox that were assumed: those that the variant has.
 
     Parameters
     ----------
     gearbox : Gearbox
-    variant, law, inertias : str
+    choice : Choice
         The model that is varied.
     stiffness : mapping of pair name to (n,) array
         Mesh stiffness over the cycle, N/m.
-    folder : Path, optional
-        Where reductions of elastic bodies are kept and found again.
+    bodies_of : callable, optional
+        Reduced elastic bodies of a varied gearbox, which the variant `flexible` needs.
 
     Returns
     -------
@@ -182,15 +181,17 @@ def assumed_parameters(
     --------
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
     >>> stiffness = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
-    >>> [parameter.label for parameter in assumed_parameters(gearbox, "rigid", stiffness, "line_of_action", "gears")]
+    >>> [parameter.label for parameter in assumed_parameters(gearbox, Choice("rigid"), stiffness)]
     ['axial inertia of hss / kg m²', 'mesh damping time / µs']
     """
 
     def built(changes: Mapping[str, float]) -> Assembly:
-        return assemble(gearbox.varied(changes), variant, stiffness, law, inertias, folder=folder)
+        varied = gearbox.varied(changes)
+        return assemble(varied, choice, stiffness, bodies_of(varied) if bodies_of else None)
 
+    inertias = choice.inertia_set(gearbox)
     parameters = []
-    base = assemble(gearbox, variant, stiffness, law, inertias, folder=folder)
+    base = built({})
     if any(support.factor != 1.0 for support in base.supports):
         default = gearbox.case.housing.factor
         values = tuple(sorted({*HOUSING_FACTORS, default}))

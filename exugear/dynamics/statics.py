@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
-from fe_ste.tools.arrays import Floats
 
 from exugear.dynamics.assembly import Assembly
 from exugear.kernels.meshes import MeshArrays
+from fe_ste.tools.arrays import Floats
 
 STEP = 1e-7
 """Difference step of the Newton matrices, m and rad: far above round-off, far below any radius."""
@@ -112,6 +112,66 @@ def locked_equilibrium(
     return np.asarray(free @ solve(start, meshes))
 
 
+@dataclass(frozen=True)
+class StaticState:
+    """A variant at rest under the static load of its gearbox file, mesh stiffness at its mean over the cycle.
+
+    Attributes
+    ----------
+    assembly : Assembly
+    q : (size,) array
+        Coordinates, m and rad.
+    """
+
+    assembly: Assembly
+    q: Floats
+
+    @property
+    def centre_distance(self) -> Floats:
+        """Centre distance of each mesh, m."""
+        return np.asarray(self.assembly.gear_positions(self.q)[:, 0])
+
+    @property
+    def misalignment(self) -> Floats:
+        """Misalignment of each mesh, rad."""
+        return np.asarray(self.assembly.gear_positions(self.q)[:, 1])
+
+    @property
+    def mesh_force(self) -> Floats:
+        """Transverse force F_bt of each mesh on the line of action, N; positive, the loaded flank pushes."""
+        states = self.assembly.mesh_states(self.q, np.zeros_like(self.q), self.assembly.mean_meshes)
+        return np.asarray(states[:, 4])
+
+    def __repr__(self) -> str:
+        """One line."""
+        meshes = zip(self.assembly.mesh_names, 1e6 * self.misalignment, strict=True)
+        tilts = ", ".join(f"{mesh} {tilt:.0f}" for mesh, tilt in meshes)
+        return f"StaticState({self.assembly.variant}: misalignment in rad / 1e6: {tilts})"
+
+
+def static_state(assembly: Assembly) -> StaticState:
+    """Rest under the static load of the gearbox file, its locked bodies held.
+
+    Raises
+    ------
+    BalanceError
+        The structure is free to move, or Newton's method does not converge.
+
+    Examples
+    --------
+    >>> from exugear.dynamics.assemble import assemble
+    >>> from exugear.model.choice import Choice
+    >>> from exugear.model.gearbox import Gearbox
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> stiffness = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
+    >>> state = static_state(assemble(gearbox, Choice("rigid"), stiffness))
+    >>> bool((state.mesh_force > 0.0).all())
+    True
+    """
+    load = assembly.gearbox.case.static_load
+    return StaticState(assembly, locked_equilibrium(assembly, load.torques_N_m, load.locked, assembly.mean_meshes))
+
+
 def _held(assembly: Assembly, torques: Mapping[str, float], locked: Sequence[str]) -> list[str]:
     """Bodies to hold so that the train cannot roll: the locked ones, then such as carry no torque by being held.
 
@@ -121,7 +181,7 @@ def _held(assembly: Assembly, torques: Mapping[str, float], locked: Sequence[str
         The locked bodies leave the train free to roll, and the torques would make it.
     """
     gearbox, held = assembly.gearbox, list(locked)
-    rolling, row = gearbox.kinematic_modes, gearbox.spinning.index
+    rolling, row = gearbox.train.kinematic_modes, gearbox.spinning.index
     free = rolling @ scipy.linalg.null_space(rolling[[row(name) for name in held]]) if held else rolling
     applied = np.array([torques.get(name, 0.0) for name in gearbox.spinning])
     if free.size and np.abs(free.T @ applied).max() > 1e-9 * np.abs(applied).max():
@@ -178,7 +238,7 @@ def accelerating_start(
     """
     gearbox = assembly.gearbox
     reference = gearbox.case.overall.input
-    unit = gearbox.rolling_speeds(reference, 1.0)
+    unit = gearbox.train.rolling_speeds(reference, 1.0)
     speeds = {name: value * input_speed for name, value in unit.items()}
     applied = assembly.torque_vector(torques)
     pinned = assembly.spin[reference]

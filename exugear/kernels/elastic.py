@@ -11,9 +11,9 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from fe_ste.tools.arrays import Floats, Integers
 from numpy.typing import NDArray
 
+from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import kernel, summing_kernel
 
 

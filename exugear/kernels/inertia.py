@@ -6,7 +6,6 @@ import math
 from typing import NamedTuple
 
 from fe_ste.tools.arrays import Floats, Integers
-
 from fe_ste.tools.compilation import compiled
 
 

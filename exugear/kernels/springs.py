@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from fe_ste.tools.arrays import Floats, Integers
-
 from fe_ste.tools.compilation import compiled
 
 

@@ -20,8 +20,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from fe_ste.tools.arrays import Floats, Integers
 
+from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import compiled, kernel
 
 

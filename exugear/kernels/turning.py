@@ -29,9 +29,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from fe_ste.tools.arrays import Floats, Integers
 
 from exugear.kernels.elastic import LANES, row_product
+from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import kernel
 
 

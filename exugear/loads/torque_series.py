@@ -5,11 +5,11 @@ from __future__ import annotations
 import csv
 
 import numpy as np
-from fe_ste.tools.arrays import Floats
 
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import LoadCase
 from exugear.model.reading import CaseError, fault_line, shortened
+from fe_ste.tools.arrays import Floats
 
 
 def torque_series(gearbox: Gearbox, case: LoadCase) -> dict[str, tuple[Floats, Floats]]:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from fe_ste.tools.arrays import Floats
 
 from exugear.model.parts import Body
+from fe_ste.tools.arrays import Floats
 
 
 def seat_key(body: str, item: str) -> str:

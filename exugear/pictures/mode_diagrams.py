@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from exugear.model.gearbox import RPM
+from exugear.model.parts import RPM
 from exugear.spectra.orders import OrderLine
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.drawing import COLOURS, WARNING_COLOUR, drawable, drawing_style, finish_figure, new_figure

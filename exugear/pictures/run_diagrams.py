@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from exugear.model.gearbox import RPM
+from exugear.model.parts import RPM
 from exugear.spectra.orders import OrderLine
 from exugear.spectra.resonances import Pick
 from exugear.spectra.waterfall import Waterfall, line_level

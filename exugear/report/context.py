@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from exugear.bodies.of_gearbox import ElasticBody, reduced_bodies
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.pictures.tables import PICTURE_FOLDER
 from exugear.results.folder import bodies_folder
@@ -34,6 +36,11 @@ class Model:
     def of(cls, attributes: Mapping[str, Any]) -> Model:
         """Read from the attributes of a file."""
         return cls(*(str(attributes[key]) for key in ("variant", "mesh_law", "inertias")))
+
+    @property
+    def choice(self) -> Choice:
+        """The choice that it stands for."""
+        return Choice(self.variant, self.law, self.inertias)
 
     @property
     def words(self) -> str:
@@ -107,10 +114,15 @@ class Context:
         """Equations of a model, with the tables of the folder, assembled once."""
         if model not in self.assemblies:
             stiffness = self.stiffness(model.law)
-            self.assemblies[model] = assemble(
-                self.gearbox, model.variant, stiffness, model.law, model.inertias, folder=bodies_folder(self.folder)
-            )
+            bodies = self.bodies_of(model)(self.gearbox)
+            self.assemblies[model] = assemble(self.gearbox, model.choice, stiffness, bodies)
         return self.assemblies[model]
+
+    def bodies_of(self, model: Model) -> Callable[[Gearbox], dict[str, ElasticBody]]:
+        """Reduced elastic bodies of a gearbox, varied or not, as a model has them."""
+        if model.variant != "flexible":
+            return lambda gearbox: {}
+        return lambda gearbox: reduced_bodies(gearbox, model.inertias, bodies_folder(self.folder))
 
     def picture_path(self, name: str) -> Path:
         """Return where a new picture of the report goes, and note it."""

@@ -7,20 +7,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from exugear.dynamics.signals import BALANCE_TERMS, energy_residual
-from exugear.model.gearbox import RPM
+from exugear.dynamics.signals import BALANCE_TERMS, MESH_TIMES, energy_residual
+from exugear.model.parts import RPM
 from exugear.pictures.run_diagrams import plot_order_levels, plot_waterfalls
 from exugear.report import page
 from exugear.report.context import REFERENCE_VARIANT, Context
 from exugear.report.stored import StoredResults, run_key
-from exugear.results.run_file import MESH_TIMES, load_run
+from exugear.results.run_file import load_run
 from exugear.runs.trust import verdict_of
 from exugear.spectra.comparison import Comparison, compare
 from exugear.spectra.orders import order_lines
 from exugear.spectra.run_spectra import Finding, VariantRun
 
 MESH_TIME_LABELS = ("longest pull of a mesh", "longest time teeth are apart", "longest time outside a table")
-"""Labels of `exugear.results.run_file.MESH_TIMES`, in their order."""
+"""Labels of `exugear.dynamics.signals.MESH_TIMES`, in their order."""
 
 
 def runs_section(context: Context, results: StoredResults) -> str:
@@ -65,7 +65,7 @@ def _waterfall_picture(
     context: Context, runs: Sequence[VariantRun], comparisons: Sequence[Comparison], label: str, file_part: str
 ) -> str:
     lines = order_lines(context.gearbox)
-    fundamental = max(context.gearbox.mesh_frequencies(2.0 * math.pi).values())
+    fundamental = max(context.gearbox.train.mesh_frequencies(2.0 * math.pi).values())
     fastest = max(float(run.spectra.speed.max()) for run in runs)
     top = min(1.1 * fundamental * fastest / (2.0 * math.pi), *(float(run.spectra.frequency[-1]) for run in runs))
     marks = {c.first.variant: [finding.strongest for finding in c.only_first] for c in comparisons}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
@@ -20,7 +20,6 @@ from exugear.dynamics.sensitivity import (
 from exugear.pictures.mode_diagrams import Sensitivity, plot_sensitivities
 from exugear.report import page
 from exugear.report.context import REFERENCE_VARIANT, VISIBLE_SHARE, Context, Model
-from exugear.results.folder import bodies_folder
 from exugear.spectra.mode_report import nearest_mode, report_mode
 
 PLOTTED_SHARE = 0.001
@@ -66,8 +65,7 @@ def _varied_models(context: Context, modes: Mapping[Model, xr.Dataset]) -> list[
 
 def _variations(context: Context, model: Model) -> list[ParameterVariation]:
     stiffness = context.stiffness(model.law)
-    kept = bodies_folder(context.folder)
-    parameters = assumed_parameters(context.gearbox, model.variant, stiffness, model.law, model.inertias, kept)
+    parameters = assumed_parameters(context.gearbox, model.choice, stiffness, context.bodies_of(model))
     return [vary_parameter(parameter) for parameter in parameters]
 
 
@@ -162,11 +160,9 @@ def _match_row(context: Context, found: ModelMatch, target: float) -> dict[str, 
 def _reference_frequency(context: Context, found: ModelMatch, target: float) -> float:
     """Frequency (Hz) of the nearest visible mode of the reference variant under the same assumption."""
     model, match = found.model, found.match
-    parameters = assumed_parameters(
-        context.gearbox, REFERENCE_VARIANT, context.stiffness(model.law), model.law, model.inertias
-    )
+    reference = replace(model, variant=REFERENCE_VARIANT)
+    parameters = assumed_parameters(context.gearbox, reference.choice, context.stiffness(model.law))
     same = next((parameter for parameter in parameters if parameter.label == match.parameter.label), None)
-    reference = Model(REFERENCE_VARIANT, model.law, model.inertias)
     assembly = same.build(match.value) if same else context.assembled(reference)
     nearest = nearest_mode(modes_of(assembly).to_dataset(), target, VISIBLE_SHARE)
     return nearest.frequency if nearest else math.nan

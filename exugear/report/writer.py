@@ -111,7 +111,7 @@ def _head(context: Context) -> str:
     warning = "Runs that are not to be trusted; what follows shows them all the same"
     parts = [
         page.alert(warning, notes.distrusted) if notes.distrusted else "",
-        page.paragraph(f"Ratio {gearbox.ratio:.6f}; case {gearbox.source}."),
+        page.paragraph(f"Ratio {gearbox.train.ratio:.6f}; case {gearbox.source}."),
         page.section("In short", page.bullets(notes.statements)),
         page.section("Left out", page.bullets(notes.left_out)) if notes.left_out else "",
         assumptions_section(context),

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 import math
 import sys
+import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.named_files import NOTHING_MORE, Permissions
 from exugear.model.reading import CaseError, parsed
@@ -19,6 +23,7 @@ from fe_ste.tools.files import FileError, append_line, read_text, write_file
 CASE_FILE = "case.json"
 TIMES_FILE = "times.jsonl"
 REPORT_FILE = "report.html"
+_log = logging.getLogger(__name__)
 
 
 def keep_case(gearbox: Gearbox, folder: Path) -> None:
@@ -65,9 +70,9 @@ def kept_case(folder: Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:
     return Gearbox.from_dict(content, source, permissions)
 
 
-def modes_path(folder: str | Path, variant: str, law: str, inertias: str) -> Path:
-    """Place of the modes of a variant: ``<variant>/<law>-<inertias>/modes.nc``."""
-    return Path(folder) / variant / f"{law}-{inertias}" / "modes.nc"
+def modes_path(folder: str | Path, choice: Choice) -> Path:
+    """Place of the modes of a choice that names its inertia set: ``<variant>/<law>-<inertias>/modes.nc``."""
+    return Path(folder) / choice.variant / f"{choice.mesh_law}-{choice.inertias}" / "modes.nc"
 
 
 def bodies_folder(folder: Path) -> Path:
@@ -104,6 +109,17 @@ def peak_memory() -> float:
 def note_time(folder: Path, step: str, seconds: float) -> None:
     """Add a line to the folder's account of time; processes may do so at once."""
     append_line(folder / TIMES_FILE, json.dumps(asdict(Spent(step, round(seconds, 2), peak_memory()))))
+
+
+@contextmanager
+def time_noted(folder: Path, step: str) -> Iterator[None]:
+    """Note how long a step took, if it ended well; a folder that cannot be written then costs the note alone."""
+    start = time.perf_counter()
+    yield
+    try:
+        note_time(folder, step, time.perf_counter() - start)
+    except OSError as error:  # the work itself is done
+        _log.warning("The time that it took is not noted: %s", error)
 
 
 def times_spent(folder: Path) -> tuple[Spent, ...]:

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.signal
 from numpy.typing import ArrayLike
 
-from exugear.model.gearbox import RPM
+from exugear.model.parts import RPM
 from exugear.spectra.orders import OrderLine
 from exugear.spectra.waterfall import overlapping_frames
 from fe_ste.tools.arrays import Complexes, Floats

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.signal
 from numpy.typing import ArrayLike
 
-from exugear.model.gearbox import RPM
+from exugear.model.parts import RPM
 from exugear.spectra.orders import OrderLine
 from exugear.spectra.waterfall import Waterfall, line_level
 from fe_ste.tools.arrays import Floats

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from exugear.model.gearbox import RPM
+from exugear.model.parts import RPM
 from exugear.results.run_file import load_run
 from exugear.spectra.mode_report import mobility_shares
 from exugear.spectra.orders import OrderLine

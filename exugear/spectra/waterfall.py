@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from exugear.model.gearbox import RPM
+from exugear.model.parts import RPM
 from exugear.spectra.orders import OrderLine
 from exugear.spectra.spectrum import amplitude_spectrum, sweep_limited_resolution
 from fe_ste.tools.arrays import Floats

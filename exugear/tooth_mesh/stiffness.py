@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from fe_ste.tools.arrays import Floats
 
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import PairSpec
 from exugear.tooth_mesh.placement import MeshError
 from exugear.tooth_mesh.tables import fitting_table, table_path
 from fe_ste.standards.iso6336 import mesh_stiffness as iso_stiffness
+from fe_ste.tools.arrays import Floats
 from fe_ste.transmission_error.surface import InterpolationError, SteSurface
 from fe_ste.transmission_error.table import TableError
 

@@ -12,13 +12,13 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from fe_ste.tools.arrays import Floats
 from numpy.typing import NDArray
 
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Mesh, WheelDeviation
 from exugear.tooth_mesh.placement import MeshGeometry, ToothContact
 from fe_ste.geometry.gears import GearPair
+from fe_ste.tools.arrays import Floats
 
 SAMPLES_PER_TOOTH = 32
 """Samples of an error over a pitch: ten harmonics of the mesh, to a per cent."""

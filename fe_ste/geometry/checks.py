@@ -7,16 +7,13 @@ from __future__ import annotations
 
 import math
 import numbers
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fe_ste.geometry.fillet import root_fillet
+from fe_ste.geometry.gear_relations import UncheckedGear
 from fe_ste.geometry.involute import involute
-
-if TYPE_CHECKING:
-    from fe_ste.geometry.gears import Gear, GearPair
-
+from fe_ste.geometry.pair_relations import UncheckedPair
 
 LEAST_TEETH = 5
 """Fewest teeth; below lie worms and pump rotors."""
@@ -36,12 +33,12 @@ class GeometryError(ValueError):
     """A gear or gear pair that cannot be made or cannot run."""
 
 
-def check_gear(gear: Gear) -> None:
+def check_gear(gear: UncheckedGear) -> None:
     """Refuse a gear that cannot be made.
 
     Parameters
     ----------
-    gear : Gear
+    gear : UncheckedGear
         The gear, possibly of nonsensical values.
 
     Raises
@@ -60,12 +57,12 @@ def check_gear(gear: Gear) -> None:
     _check_held_diameter(gear)
 
 
-def check_gear_pair(pair: GearPair) -> None:
+def check_gear_pair(pair: UncheckedPair) -> None:
     """Refuse a pair that does not fit, does not touch or interferes.
 
     Parameters
     ----------
-    pair : GearPair
+    pair : UncheckedPair
         Two gears that passed `check_gear`.
 
     Raises
@@ -86,11 +83,11 @@ def check_gear_pair(pair: GearPair) -> None:
         _check_tips_pass(pair)
 
 
-def _refuse_gear(gear: Gear, key: str, value: str, remedy: str) -> GeometryError:
+def _refuse_gear(gear: UncheckedGear, key: str, value: str, remedy: str) -> GeometryError:
     return GeometryError(f"gear '{gear.name}': {key} = {value} {remedy}")
 
 
-def _refuse_pair(pair: GearPair, key: str, value: str, remedy: str) -> GeometryError:
+def _refuse_pair(pair: UncheckedPair, key: str, value: str, remedy: str) -> GeometryError:
     return GeometryError(f"gear pair '{pair.name}': {key} = {value} {remedy}")
 
 
@@ -106,7 +103,7 @@ def _is_number(value: object) -> bool:
     return isinstance(value, numbers.Real) and not isinstance(value, bool) and math.isfinite(value)
 
 
-def _check_values(gear: Gear) -> None:
+def _check_values(gear: UncheckedGear) -> None:
     """Check each number by itself: finite, of the right sign, within the range of the relations."""
     teeth: object = gear.teeth
     if not isinstance(teeth, numbers.Integral) or isinstance(teeth, bool) or teeth < LEAST_TEETH:
@@ -135,7 +132,7 @@ def _check_values(gear: Gear) -> None:
     _check_ranges(gear)
 
 
-def _check_ranges(gear: Gear) -> None:
+def _check_ranges(gear: UncheckedGear) -> None:
     least, most = PRESSURE_ANGLE_RANGE
     angle = gear.normal_pressure_angle
     if not _is_number(angle) or not least <= angle <= most:
@@ -150,7 +147,7 @@ def _check_ranges(gear: Gear) -> None:
         raise _refuse_gear(gear, "material.poissons_ratio", f"{ratio!r}", "must be at least 0 and below 0.5")
 
 
-def _check_circles(gear: Gear) -> None:
+def _check_circles(gear: UncheckedGear) -> None:
     """Refuse teeth or spaces of no width at the reference circle, and tips that are not beyond the root."""
     if not 0.0 < gear.reference_half_angle < 0.5 * gear.angular_pitch:
         what = "tooth" if gear.reference_half_angle <= 0.0 else "tooth space"
@@ -164,7 +161,7 @@ def _check_circles(gear: Gear) -> None:
         raise _refuse_gear(gear, "tip_diameter", _mm(2.0 * tip), remedy)
 
 
-def _check_generating_rack(gear: Gear) -> None:
+def _check_generating_rack(gear: UncheckedGear) -> None:
     """Refuse a rounding that does not fit on the rack's tooth."""
     if gear.rack_tip_half_land >= -LENGTH_TOLERANCE * gear.normal_module:
         return
@@ -178,7 +175,7 @@ def _check_generating_rack(gear: Gear) -> None:
     raise _refuse_gear(gear, "rack.tip_radius", f"{radius:g}", remedy)
 
 
-def _check_undercut(gear: Gear) -> None:
+def _check_undercut(gear: UncheckedGear) -> None:
     """Refuse a rack whose straight flank reaches so deep that it cuts back into the involute."""
     lacking = -gear.form_roll_length * math.sin(gear.transverse_pressure_angle)
     if lacking > LENGTH_TOLERANCE * gear.normal_module:
@@ -194,7 +191,7 @@ def _check_undercut(gear: Gear) -> None:
         raise _refuse_gear(gear, "tip_diameter", _mm(2.0 * gear.tip_radius), remedy)
 
 
-def _check_internal_space(gear: Gear) -> None:
+def _check_internal_space(gear: UncheckedGear) -> None:
     """Refuse a tip without involute, a space closed at the root, a fillet higher than the tooth."""
     if gear.tip_radius <= gear.base_radius:
         base = _mm(2.0 * gear.base_radius)
@@ -209,7 +206,7 @@ def _check_internal_space(gear: Gear) -> None:
         raise _refuse_gear(gear, "rack.tip_radius", f"{gear.rack.tip_radius:g}", remedy)
 
 
-def _check_tip_thickness(gear: Gear) -> None:
+def _check_tip_thickness(gear: UncheckedGear) -> None:
     thickness = gear.tip_thickness / gear.normal_module
     if thickness < LEAST_TIP_THICKNESS:
         word = "larger" if gear.internal else "smaller"
@@ -220,7 +217,7 @@ def _check_tip_thickness(gear: Gear) -> None:
         raise _refuse_gear(gear, "tip_diameter", _mm(2.0 * gear.tip_radius), remedy)
 
 
-def _check_held_diameter(gear: Gear) -> None:
+def _check_held_diameter(gear: UncheckedGear) -> None:
     root = 2.0 * gear.root_radius
     if (root - gear.held_diameter) * gear.outward <= 0.0:
         word = "above" if gear.internal else "below"
@@ -228,7 +225,7 @@ def _check_held_diameter(gear: Gear) -> None:
         raise _refuse_gear(gear, "held_diameter", _mm(gear.held_diameter), remedy)
 
 
-def _check_teeth_of_mates(pair: GearPair) -> None:
+def _check_teeth_of_mates(pair: UncheckedPair) -> None:
     pinion, gear = pair.pinion, pair.gear
     if pinion.internal:
         remedy = "is an internal gear: the external gear of the pair must be the pinion"
@@ -239,7 +236,7 @@ def _check_teeth_of_mates(pair: GearPair) -> None:
         raise _refuse_pair(pair, f"teeth of '{gear.name}'", f"{gear.teeth}", remedy)
 
 
-def _check_equal_rack(pair: GearPair) -> None:
+def _check_equal_rack(pair: UncheckedPair) -> None:
     pinion, gear = pair.pinion, pair.gear
     if not math.isclose(pinion.normal_module, gear.normal_module, rel_tol=LENGTH_TOLERANCE):
         remedy = f"must equal that of '{pinion.name}', {_mm(pinion.normal_module)}"
@@ -250,7 +247,7 @@ def _check_equal_rack(pair: GearPair) -> None:
         raise _refuse_pair(pair, f"normal_pressure_angle of '{gear.name}'", value, remedy)
 
 
-def _check_hands(pair: GearPair) -> None:
+def _check_hands(pair: UncheckedPair) -> None:
     """Refuse hands that do not mate: external mates have opposite hands, internal mates the same."""
     needed = -pair.gear.outward * pair.pinion.helix_angle
     if not math.isclose(pair.gear.helix_angle, needed, rel_tol=LENGTH_TOLERANCE, abs_tol=LENGTH_TOLERANCE):
@@ -262,7 +259,7 @@ def _check_hands(pair: GearPair) -> None:
         raise _refuse_pair(pair, f"helix_angle of '{pair.gear.name}'", _deg(pair.gear.helix_angle), remedy)
 
 
-def _check_centre_distance(pair: GearPair) -> None:
+def _check_centre_distance(pair: UncheckedPair) -> None:
     if not _is_number(pair.centre_distance) or pair.centre_distance <= 0.0:
         remedy = "must be a finite number above zero, also for an internal pair"
         raise _refuse_pair(pair, "centre_distance", f"{pair.centre_distance!r}", remedy)
@@ -272,7 +269,7 @@ def _check_centre_distance(pair: GearPair) -> None:
         raise _refuse_pair(pair, "centre_distance", _mm(pair.centre_distance), remedy)
 
 
-def _check_backlash(pair: GearPair) -> None:
+def _check_backlash(pair: UncheckedPair) -> None:
     backlash, limit = pair.circumferential_backlash, pair.backlash_free_centre_distance
     if backlash >= -LENGTH_TOLERANCE * pair.pinion.normal_module:
         return
@@ -285,7 +282,7 @@ def _check_backlash(pair: GearPair) -> None:
     raise _refuse_pair(pair, "centre_distance", _mm(pair.centre_distance), remedy)
 
 
-def _check_tip_clearances(pair: GearPair) -> None:
+def _check_tip_clearances(pair: UncheckedPair) -> None:
     for tip, root, clearance in (
         (pair.pinion, pair.gear, pair.pinion_tip_clearance),
         (pair.gear, pair.pinion, pair.gear_tip_clearance),
@@ -297,7 +294,7 @@ def _check_tip_clearances(pair: GearPair) -> None:
             raise _refuse_pair(pair, f"tip_diameter of '{tip.name}'", _mm(2.0 * tip.tip_radius), remedy)
 
 
-def _check_tip_interference(pair: GearPair) -> None:
+def _check_tip_interference(pair: UncheckedPair) -> None:
     """Refuse a tip that touches its mate below the form circle, where the mate has a fillet."""
     tolerance = LENGTH_TOLERANCE * pair.pinion.normal_module
     reach_of_gear = pair.pinion_roll_length(pair.gear.tip_roll_length)
@@ -316,14 +313,14 @@ def _check_tip_interference(pair: GearPair) -> None:
             raise _refuse_pair(pair, f"tip_diameter of '{tip.name}'", _mm(2.0 * tip.tip_radius), remedy)
 
 
-def _check_contact(pair: GearPair) -> None:
+def _check_contact(pair: UncheckedPair) -> None:
     ratio = pair.transverse_contact_ratio
     if ratio < 1.0:
         remedy = f"must be at least 1: no contact at centre_distance = {_mm(pair.centre_distance)}"
         raise _refuse_pair(pair, "transverse contact ratio", f"{ratio:.4f}", remedy)
 
 
-def _check_fillet_clearance(pair: GearPair) -> None:
+def _check_fillet_clearance(pair: UncheckedPair) -> None:
     """Refuse a tip whose corner, outside the path of contact, cuts into the root fillet of its mate."""
     for tip, mate in ((pair.pinion, pair.gear), (pair.gear, pair.pinion)):
         gap = corner_to_fillet_gap(pair, tip, mate)
@@ -336,7 +333,7 @@ def _check_fillet_clearance(pair: GearPair) -> None:
             raise _refuse_pair(pair, f"tip_diameter of '{tip.name}'", _mm(2.0 * tip.tip_radius), remedy)
 
 
-def corner_to_fillet_gap(pair: GearPair, tip: Gear, mate: Gear) -> float:
+def corner_to_fillet_gap(pair: UncheckedPair, tip: UncheckedGear, mate: UncheckedGear) -> float:
     """Least gap between the way of a tip corner and the mate's root fillet.
 
     The corner leaves the line of action at the end of the path of contact and goes deeper than there. The
@@ -344,9 +341,9 @@ def corner_to_fillet_gap(pair: GearPair, tip: Gear, mate: Gear) -> float:
 
     Parameters
     ----------
-    pair : GearPair
+    pair : UncheckedPair
         The pair.
-    tip, mate : Gear
+    tip, mate : UncheckedGear
         The gear whose tip corner moves and the gear whose fillet it passes.
 
     Returns
@@ -373,7 +370,7 @@ def corner_to_fillet_gap(pair: GearPair, tip: Gear, mate: Gear) -> float:
     return float(np.min(seen_radius * (mate_tooth - half_angle - seen_angle)))
 
 
-def _check_tips_pass(pair: GearPair) -> None:
+def _check_tips_pass(pair: UncheckedPair) -> None:
     """Refuse an internal pair whose tips collide outside the path of contact, where the tip circles cross."""
     swallowed = pair.pinion.tip_radius >= pair.centre_distance + pair.gear.tip_radius
     if swallowed or internal_tip_gap(pair) < 0.0:
@@ -385,14 +382,14 @@ def _check_tips_pass(pair: GearPair) -> None:
         raise _refuse_pair(pair, "difference in teeth", f"{difference}", remedy)
 
 
-def internal_tip_gap(pair: GearPair) -> float:
+def internal_tip_gap(pair: UncheckedPair) -> float:
     """Gap between mating tip corners of an internal pair where the tip circles cross.
 
     The flanks are taken in contact, as on the path of contact; the back flanks have the backlash in addition.
 
     Parameters
     ----------
-    pair : GearPair
+    pair : UncheckedPair
         An internal pair whose tip circles cross.
 
     Returns

@@ -21,7 +21,8 @@ from typing import Protocol
 import numpy as np
 import xarray as xr
 
-from fe_ste.tools.files import FileError, Layout, load_dataset, write_dataset
+from fe_ste.tools.files import FileError
+from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
 from fe_ste.tools.versions import TABLE
 from fe_ste.tools.workers import Workers, stop_if_asked
 from fe_ste.transmission_error.compliance import PairCompliance
@@ -47,12 +48,12 @@ _LAYOUT = Layout(
 _log = logging.getLogger(__name__)
 
 
-class SweepError(RuntimeError):
-    """A sweep whose workers were lost; the message says what is kept."""
+class GridError(RuntimeError):
+    """A grid whose workers were lost; the message says what is kept."""
 
 
 class Submits(Protocol):
-    """What a sweep asks of an executor."""
+    """What a grid asks of an executor."""
 
     def submit(self, fn: Callable[..., StateResults], /, *args: object) -> Future[StateResults]:
         """Schedule a call and return its future."""
@@ -61,14 +62,14 @@ class Submits(Protocol):
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """File in which a sweep keeps the positions that are finished.
+    """File in which a grid keeps the positions that are finished.
 
     Parameters
     ----------
     path : Path
         Replaced as a whole at each writing, so that it can be read at any time, by xarray too.
     input_hash : str
-        Hash of the sweep's input; a file of another input is not taken up.
+        Hash of the grid's input; a file of another input is not taken up.
     """
 
     path: Path
@@ -99,7 +100,7 @@ class Checkpoint:
         write_dataset(self.path, dataset)
 
 
-def sweep_states(
+def solve_grid(
     compliance: PairCompliance,
     axes: StateAxes,
     *,
@@ -118,7 +119,7 @@ def sweep_states(
     checkpoint : Checkpoint, optional
         Where finished positions are kept, and looked for first.
     progress : callable, optional
-        Called with the number of finished states and of all states. What it raises, such as Ctrl-C, ends the sweep
+        Called with the number of finished states and of all states. What it raises, such as Ctrl-C, ends the grid
         after the finished positions are stored.
 
     Returns
@@ -128,7 +129,7 @@ def sweep_states(
 
     Raises
     ------
-    SweepError
+    GridError
         If workers are lost.
     """
     results = StateResults.empty(compliance, axes.shape)
@@ -143,7 +144,11 @@ def sweep_states(
     stored = time.monotonic()
     try:
         blocks = _blocks(axes, finished)
-        done = _here(compliance, axes, blocks, tell) if executor is None else _sent(compliance, axes, blocks, executor)
+        done = (
+            _solved_here(compliance, axes, blocks, tell)
+            if executor is None
+            else _solved_by_workers(compliance, axes, blocks, executor)
+        )
         for positions, part in done:
             results.insert(positions, part)
             finished.update(positions)
@@ -166,19 +171,18 @@ def _blocks(axes: StateAxes, finished: set[int]) -> list[list[int]]:
     return [left[start : start + length] for start in range(0, len(left), length)]
 
 
-def _here(
+def _solved_here(
     compliance: PairCompliance, axes: StateAxes, blocks: list[list[int]], tell: Callable[[int], None]
 ) -> Iterator[tuple[list[int], StateResults]]:
     for positions in blocks:
         yield positions, solve_positions(compliance, axes, positions, tell)
 
 
-def _sent(
+def _solved_by_workers(
     compliance: PairCompliance, axes: StateAxes, blocks: list[list[int]], executor: Submits
 ) -> Iterator[tuple[list[int], StateResults]]:
     """Yield blocks in the order in which workers finish them."""
-    one = compliance
-    packed = pickle.dumps((one.pair, one.flanks, one.contact, one.modifications, one.tooth_gap))
+    packed = _packed(compliance)
     with _cancelled_on_error(executor) as waiting:
         for positions in blocks:
             waiting[executor.submit(solve_block, packed, axes, positions)] = positions
@@ -187,8 +191,8 @@ def _sent(
                 try:
                     yield waiting.pop(future), future.result()
                 except BrokenExecutor as error:
-                    raise SweepError(
-                        f"a worker of the sweep ended before its work was done ({error}); finished positions are kept"
+                    raise GridError(
+                        f"a worker of the grid ended before its work was done ({error}); finished positions are kept"
                     ) from error
 
 
@@ -217,6 +221,13 @@ def solve_block(packed: bytes, axes: StateAxes, positions: list[int]) -> StateRe
     """
     stop_if_asked()
     return solve_positions(_unpacked(packed), axes, positions, lambda solved: stop_if_asked())
+
+
+def _packed(compliance: PairCompliance) -> bytes:
+    """Pickle what a worker needs to make the compliance of a pair again: fewer bytes than all that it holds."""
+    return pickle.dumps(
+        (compliance.pair, compliance.flanks, compliance.contact, compliance.modifications, compliance.tooth_gap)
+    )
 
 
 @lru_cache(maxsize=1)

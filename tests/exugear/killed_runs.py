@@ -19,13 +19,18 @@ from pathlib import Path
 import xarray as xr
 
 import fe_ste.tools.files
+import fe_ste.tools.sealed
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.results.run_file import load_run
-from exugear.runs import runup
+from exugear.runs import recorder, runup
+from exugear.runs.outcome import Run
+from exugear.runs.run_folder import refuse_to_resume, run_directory
 from exugear.tooth_mesh.stiffness import mesh_stiffness
 
 CALLS = ("open", "fsync", "replace", "unlink", "rmdir", "mkdir")
 DURATION = 0.024
+CHOICE = Choice("rigid", "iso6336", "disc", "run_up")
 
 
 def kill_at(number: int) -> None:
@@ -47,7 +52,7 @@ def kill_at(number: int) -> None:
 
     for name in CALLS:
         setattr(os, name, counted(getattr(os, name)))
-    plain = fe_ste.tools.files._write_all
+    plain = fe_ste.tools.files.write_all
 
     def write_all(file, content) -> None:
         if reached():
@@ -55,7 +60,8 @@ def kill_at(number: int) -> None:
             os.kill(os.getpid(), signal.SIGKILL)
         plain(file, content)
 
-    fe_ste.tools.files._write_all = write_all
+    for module in (fe_ste.tools.files, fe_ste.tools.sealed):
+        module.write_all = write_all
 
 
 def in_fork(work: Callable[[], None]) -> int:
@@ -74,11 +80,11 @@ def in_fork(work: Callable[[], None]) -> int:
 def check(case: Path, out: Path, solver: str, every: int) -> dict[str, object]:
     gearbox = Gearbox.from_toml(case)
     stiffness = mesh_stiffness(gearbox, "iso6336")
-    runup.FLUSH_INTERVAL = DURATION / 2.5 / runup.FLUSH_FACTOR[solver]
+    recorder.FLUSH_INTERVAL = DURATION / 2.5 / recorder.FLUSH_FACTOR[solver]
 
-    def simulate(folder: Path, resume: bool) -> runup.Run:
-        options = {"load_case": "run_up", "mesh_law": "iso6336", "duration": DURATION, "solver": solver}
-        return runup.simulate(gearbox, "rigid", stiffness, folder, resume=resume, **options)
+    def simulate(folder: Path, resume: bool) -> Run:
+        options = {"duration": DURATION, "solver": solver}
+        return runup.simulate(gearbox, CHOICE, stiffness, folder, resume=resume, **options)
 
     def undisturbed() -> Path:
         return simulate(out / "whole", False).path
@@ -88,8 +94,8 @@ def check(case: Path, out: Path, solver: str, every: int) -> dict[str, object]:
         simulate(out / str(number), False)
 
     def taken_up(folder: Path) -> None:
-        directory = runup.run_directory(folder, "rigid", "run_up", "iso6336", "disc")
-        found = simulate(folder, not runup.refuse_to_resume(directory))
+        directory = run_directory(folder, CHOICE)
+        found = simulate(folder, not refuse_to_resume(directory))
         assert sorted(path.name for path in directory.iterdir()) == ["run.nc"], list(directory.iterdir())
         again = load_run(found.path)
         if solver == "compiled":

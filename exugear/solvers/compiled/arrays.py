@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from fe_ste.tools.arrays import Floats, Integers
-
 from exugear.kernels.elastic import ElasticArrays, ElasticMotion
 from exugear.kernels.table_law import Scratch, TableArrays
 from exugear.kernels.travelling import TravellingArrays
 from exugear.kernels.turning import TurningArrays
+from fe_ste.tools.arrays import Floats, Integers
 
 
 class Bodies(NamedTuple):

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 
-from fe_ste.tools.arrays import Floats, Integers
-
 from exugear.kernels.table_law import FIRST_TWO, piece_at, surface_law
 from exugear.solvers.compiled.arrays import Meshes, Work
+from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import kernel
 
 
@@ -205,45 +204,3 @@ def add_meshes(q: Floats, v: Floats, meshes: Meshes, work: Work) -> None:
             acting = work.gradient[1 - meshes.conjugate[m]]
             for i in range(13):
                 f[index[i]] -= force * acting[i]
-
-
-@kernel
-def place_signals(q: Floats, v: Floats, m: int, meshes: Meshes, work: Work, places: Floats) -> None:
-    """Fill change of centre distance (m) and misalignment (rad) of mesh m."""
-    table, index, place = meshes.table, meshes.coordinates[m], meshes.place[m]
-    c, s = work.turns[meshes.slot[m], 0], work.turns[meshes.slot[m], 1]
-    count = meshes.coordinates.shape[0]
-    places[m] = mesh_row(q, v, index, place, table.centre[m], c, s, work.gradient[1])[0]
-    tilted = mesh_row(q, v, index, place, table.tilt[m], c, s, work.gradient[1])[0]
-    places[count + m] = table.nominal[m, 2] + tilted
-
-
-@kernel
-def observe_meshes(q: Floats, v: Floats, meshes: Meshes, work: Work, signals: Floats, energy: Floats) -> None:
-    """Fill deflection and F_bt of each mesh into signals (2 m,); add energy and powers (see `observe`).
-
-    With tables, change of centre distance, misalignment and whether outside the table follow at the end (3 m,).
-
-    The scalar force of each mesh, or that along its line of action, is left in `work.states[:, 3]`.
-    """
-    count = meshes.coordinates.shape[0]
-    for m in range(count):
-        if meshes.table.shape[m, 0] > 0:
-            force = table_mesh(q, v, m, FIRST_TWO + 1, meshes, work, energy)
-            work.states[m, 3] = force
-            signals[m], signals[count + m] = work.states[m, 0], force
-            places = signals[signals.size - 3 * count :]
-            places[m], places[count + m], places[2 * count + m] = 0.0, meshes.table.nominal[m, 2], work.states[m, 2]
-            if meshes.spinning[m] == 0:
-                place_signals(q, v, m, meshes, work, places)
-            continue
-        delta, rate, acting = mesh_motion(q, v, m, meshes, work)
-        k, slope = mesh_stiffness(q, m, meshes)
-        force = k * delta + meshes.damping[m] * rate
-        work.states[m, 3] = force
-        signals[m], signals[count + m] = delta, force * meshes.line_of_action[m]
-        cycling = meshes.cycles[m] * (v[meshes.coordinates[m, 5]] - v[meshes.coordinates[m, 12]])
-        energy[1] += 0.5 * k * delta * delta
-        energy[3] += meshes.damping[m] * rate * rate
-        energy[4] -= 0.5 * slope * cycling * delta * delta
-        energy[5] += force * (acting - rate)

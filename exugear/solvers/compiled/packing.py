@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from fe_ste.tools.arrays import Floats
 from numpy.typing import NDArray
 
 from exugear.dynamics.assembly import Assembly
@@ -11,9 +10,10 @@ from exugear.kernels.connectors import ConnectorArrays
 from exugear.kernels.elastic import elastic_motion, scratch_for
 from exugear.kernels.table_law import scratch_memory
 from exugear.kernels.turning import turning_memory
-from exugear.model.sections import GROUND
+from exugear.model.sections.entries import GROUND
 from exugear.solvers.compiled.arrays import Bodies, Connectors, Equations, Joints, Loads, Meshes, Springs, Work
 from exugear.solvers.loads import LoadTable
+from fe_ste.tools.arrays import Floats
 
 ROUND_OFF = 1e-14
 """Entries of a bearing's matrix this small beside its diagonal are left-overs of rotating it, and left out."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.linalg
-from fe_ste.tools.arrays import Floats
 from numpy.typing import NDArray
 
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.linearised import Linearised, linearise
 from exugear.dynamics.modes import coordinate_labels
+from fe_ste.tools.arrays import Floats
 
 STABILITY_LIMIT = 2.6
 """Below this |lambda| h the method is stable for every damped motion, oscillating or creeping."""

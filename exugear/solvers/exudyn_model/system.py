@@ -23,7 +23,6 @@ from collections.abc import Callable
 from typing import Any, Literal
 
 import numpy as np
-from fe_ste.tools.arrays import Floats
 from numpy.typing import NDArray
 
 from exugear.bodies.reduced_body import ReducedBody
@@ -34,6 +33,7 @@ from exugear.model.parts import Body, Joint
 from exugear.model.seats import node_position, seat_key
 from exugear.solvers.exudyn_model.floating import FloatingBodies, SolverFailure
 from exugear.solvers.loads import Drive, Loading
+from fe_ste.tools.arrays import Floats
 
 MeshRoute = Literal["element", "loads"]
 Observer = Callable[[float, Floats, Floats], bool]

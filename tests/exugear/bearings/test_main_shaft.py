@@ -9,20 +9,22 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from exugear.bearings import rollers as bearings
+from exugear.bearings import contact, matrices, rollers
 from exugear.bodies.of_gearbox import shaft_model
 from exugear.bodies.reduced_body import ReducedBody
 from exugear.bodies.turned_section import ShaftSection
 from exugear.bodies.turned_shaft import ShaftModel, reduce_shaft
-from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.linearised import linearise
-from exugear.dynamics.modes import MOTIONS, eigenmodes, modes_of
+from exugear.dynamics.modes import MOTIONS, modes_of
 from exugear.dynamics.statics import accelerating_start
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.exudyn_model.system import ExudynSystem
 from exugear.solvers.loads import Loading, LoadTable
+
+from ..assembled import assembled, modes_with_bodies
 
 TORQUE = {"main_shaft": 240e3}
 YOUNG, SHEAR, DENSITY = 206e9, 206e9 / 2.6, 7850.0
@@ -49,7 +51,7 @@ def reduced(model: ShaftModel) -> ReducedBody:
 
 @pytest.fixture(scope="module")
 def flexible(with_shaft: Gearbox, stiffness: dict) -> Assembly:
-    return assemble(with_shaft, "flexible", stiffness)
+    return assembled(with_shaft, Choice("flexible"), stiffness)
 
 
 def beam(sections: tuple[ShaftSection, ...], lines: list[float]) -> tuple[np.ndarray, np.ndarray, list[float]]:
@@ -166,7 +168,7 @@ def test_the_rotor_turns_against_the_gearbox_as_two_inertias(flexible: Assembly,
 def test_rigid_variants_take_the_shaft_as_a_rigid_body(
     grc: Gearbox, with_shaft: Gearbox, stiffness: dict, variant: str
 ) -> None:
-    plain, found = (eigenmodes(case, variant, stiffness) for case in (grc, with_shaft))
+    plain, found = (modes_with_bodies(case, Choice(variant), stiffness) for case in (grc, with_shaft))
     assert found.frequency[0] == 0.0
     assert found.frequency[1] > 1.0
     assert len(found.frequency) == len(plain.frequency) + (1 if variant == "rigid" else 6)
@@ -189,9 +191,9 @@ def test_both_solvers_join_the_shaft_to_the_carrier_at_its_seat(flexible: Assemb
 
 def test_the_main_bearing_is_as_stiff_as_two_rows_whose_pressure_lines_meet_on_the_axis(with_shaft: Gearbox) -> None:
     angle = math.radians(11.0)
-    row = bearings.TaperedRollerBearing(bore=0.38, outside_diameter=0.56, width=0.09, contact_angle=angle)
-    pair = bearings.BearingPair(bearing=row, arrangement="X", row_distance=0.47 * math.tan(angle))
-    found = np.diag(bearings.axially_symmetric(bearings.pitch_averaged_tangent(pair, (200e3, 0.0, 0.0))))
+    row = rollers.TaperedRollerBearing(bore=0.38, outside_diameter=0.56, width=0.09, contact_angle=angle)
+    pair = rollers.BearingPair(bearing=row, arrangement="X", row_distance=0.47 * math.tan(angle))
+    found = np.diag(matrices.axially_symmetric(contact.pitch_averaged_tangent(pair, (200e3, 0.0, 0.0))))
     given = with_shaft.case.bearings["main_bearing"].stiffness
     assert given is not None
     assert given.radial_N_per_m == pytest.approx(found[0], rel=0.05)  # given with two digits

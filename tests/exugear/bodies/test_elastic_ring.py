@@ -10,16 +10,18 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.signals import Channels, energy_residual
+from exugear.dynamics.signals import energy_residual
 from exugear.dynamics.statics import accelerating_start, locked_equilibrium
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
-from exugear.runs.runup import simulate
-from exugear.solvers.compiled.solver import CompiledSystem, Observer
+from exugear.solvers.compiled.observers import Observer
+from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.exudyn_model.system import ExudynSystem
 from exugear.solvers.loads import Loading, LoadTable
 
+from ..assembled import assembled, simulated
+from ..plain_signals import energies_of, sampled
 from ..ring_case import ring_content
 from ..rounding import allowed_difference
 
@@ -47,7 +49,7 @@ def stage(grc: Gearbox, tmp_path_factory: pytest.TempPathFactory) -> Gearbox:
 
 @pytest.fixture(scope="module")
 def ringed(stage: Gearbox, stiffness: dict) -> Assembly:
-    return assemble(stage, "flexible", stiffness)
+    return assembled(stage, Choice("flexible"), stiffness)
 
 
 def turned(assembly: Assembly, angle: float) -> tuple[np.ndarray, np.ndarray]:
@@ -55,7 +57,7 @@ def turned(assembly: Assembly, angle: float) -> tuple[np.ndarray, np.ndarray]:
     start = accelerating_start(assembly, LOAD, 20.0)
     random = np.random.default_rng(7)
     q = start.q + 1e-6 * random.normal(size=assembly.size)
-    q += assembly.rolling_velocity(np.zeros(assembly.size), assembly.gearbox.rolling_speeds("carrier", angle))
+    q += assembly.rolling_velocity(np.zeros(assembly.size), assembly.gearbox.train.rolling_speeds("carrier", angle))
     for body in assembly.bodies:
         if body.carrier is not None:  # their orbit is an arc
             o = assembly.coordinates[body.name][0]
@@ -77,7 +79,7 @@ def test_load_and_deflection_do_not_depend_on_where_the_planets_stand(stage: Gea
     found = []
     for first in (0.0, 13.0, 20.0):
         angles = [first, first + 120.0, first + 240.0]
-        assembly = assemble(stage.varied({"bodies.planet.planet_angles_deg": angles}), "flexible", stiffness)
+        assembly = assembled(stage.varied({"bodies.planet.planet_angles_deg": angles}), Choice("flexible"), stiffness)
         load = stage.case.static_load
         q = locked_equilibrium(assembly, load.torques_N_m, load.locked, assembly.mean_meshes)
         states = assembly.mesh_states(q, 0 * q, assembly.mean_meshes)
@@ -119,10 +121,10 @@ def test_compiled_right_hand_side_is_that_of_the_plain_kernels(ringed: Assembly)
     expected = ringed.accelerations(q, v, ringed.torque_vector(LOAD))
     # Rounding of places of 1 m, 1e-16 m each, of displacements of 1e-6 m.
     assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
-    signals, energies, _ = Observer(Channels(ringed), loads).observe(np.zeros(1), q[None], v[None])
-    plain = Channels(ringed).sample(q[None], v[None])
+    signals, energies, _ = Observer(ringed, loads).observe(np.zeros(1), q[None], v[None])
+    plain = sampled(ringed, q[None], v[None])
     assert np.all(np.abs(signals - plain) < allowed_difference(plain, len(ringed.mesh_names)))
-    assert energies[0] == pytest.approx(Channels(ringed).energies(q[None], v[None])[0, :2], rel=1e-9)
+    assert energies[0] == pytest.approx(energies_of(ringed, q[None], v[None])[0, :2], rel=1e-9)
 
 
 def test_compiled_solver_and_exudyn_run_alike(ringed: Assembly) -> None:
@@ -143,6 +145,6 @@ def test_the_account_of_energy_closes_on_an_elastic_ring(stage: Gearbox, stiffne
     # Loads' work = change of energies + dissipated + work of k(PMC): as asked of the other variants, through a third
     # of a revolution of the carrier, so that every planet crosses three sectors.
     case = stage.varied({"load_cases.run_up.start_speed_rpm": 200.0})
-    run = simulate(case, "flexible", stiffness, tmp_path, load_case="run_up", duration=0.1)
+    run = simulated(case, Choice("flexible", load_case="run_up"), stiffness, tmp_path, duration=0.1)
     with xr.open_dataset(run.path) as data:
         assert abs(energy_residual(data)) < 1e-6

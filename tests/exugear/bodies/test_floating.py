@@ -16,20 +16,20 @@ from exugear.bodies.of_gearbox import shaft_model, solid_of_shaft
 from exugear.bodies.reduced_body import Blank, ReductionError
 from exugear.bodies.solids import SolidModel, SolidSeat, reduce_matrices, reduce_solid
 from exugear.bodies.turned_section import MeshSize
-from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.signals import energy_residual
 from exugear.dynamics.statics import accelerating_start
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
 from exugear.runs.outcome import RunError
-from exugear.runs.runup import simulate
 from exugear.solvers.compiled.solver import refusal
 from exugear.solvers.exudyn_model.floating import elements, exudyn, frame_integrals
 from exugear.solvers.exudyn_model.system import ExudynSystem
 from exugear.solvers.loads import Drive, Loading
 from fe_ste.geometry.gears import Material
 
+from ..assembled import assembled, simulated
 from ..floating_case import FLOATING_CASE
 
 LOAD = {"shaft": 6.0, "wheel": 9.0}
@@ -56,7 +56,7 @@ def model(gearbox: Gearbox) -> SolidModel:
 
 @pytest.fixture(scope="module")
 def floating(gearbox: Gearbox, stiffness: dict) -> Assembly:
-    return assemble(gearbox, "flexible", stiffness)
+    return assembled(gearbox, Choice("flexible"), stiffness)
 
 
 def in_the_frame_that_does_not_turn(assembly: Assembly) -> Assembly:
@@ -194,7 +194,7 @@ def test_the_grc_runs_alike_in_both_frames(grc_shafts: Gearbox) -> None:
     mean = {"sun_planet": 3.77e9, "ring_planet": 4.85e9, "intermediate": 3.07e9, "high_speed": 1.93e9}
     shape = 1.0 + 0.05 * np.cos(2.0 * np.pi * np.arange(50) / 50)
     stiffness = {name: value * shape for name, value in mean.items()}
-    both = assemble(grc_shafts.varied({"bodies.hss.flexibility": "ffrf"}), "flexible", stiffness)
+    both = assembled(grc_shafts.varied({"bodies.hss.flexibility": "ffrf"}), Choice("flexible"), stiffness)
     rated = (1000, 1e-5, {"carrier": 240e3, "hss": -3000.0}, 22.5 * math.pi / 30.0)
     expected, wanted_dte = trajectories(in_the_frame_that_does_not_turn(both), *rated)
     found, dte = trajectories(both, *rated)
@@ -210,7 +210,7 @@ def test_the_grc_runs_alike_in_both_frames(grc_shafts: Gearbox) -> None:
 def test_all_that_acts_on_a_floating_body_acts_as_in_the_other_frame(gearbox: Gearbox, stiffness: dict) -> None:
     # Weight, a coupling to another inertia, a torque that varies and a drive; each of them moves the shaft.
     heavy = gearbox.varied({"gravity.acceleration_m_per_s2": [0.0, -9.81, 0.0], "bodies.motor.enabled": True})
-    floating = assemble(heavy, "flexible", stiffness)
+    floating = assembled(heavy, Choice("flexible"), stiffness)
     plain = in_the_frame_that_does_not_turn(floating)
     start = accelerating_start(floating, LOAD, SPEED)
     angle = float(start.q[floating.spin["shaft"]])
@@ -264,12 +264,12 @@ def test_the_compiled_solver_leaves_floating_frames_to_exudyn(
     assert refusal(floating) == "bodies.shaft.flexibility = 'ffrf' runs in Exudyn only, 'nonrotating' in both"
     assert refusal(in_the_frame_that_does_not_turn(floating)) == ""
     with pytest.raises(RunError, match="flexibility = 'ffrf' runs in Exudyn only.*use --solver exudyn"):
-        simulate(gearbox, "flexible", stiffness, tmp_path, load_case="steady", solver="compiled")
+        simulated(gearbox, Choice("flexible", load_case="steady"), stiffness, tmp_path, solver="compiled")
 
 
 def test_a_run_keeps_its_account_of_energy(gearbox: Gearbox, stiffness: dict, tmp_path: Path) -> None:
-    finished = simulate(
-        gearbox, "flexible", stiffness, tmp_path, load_case="run_up", duration=0.004, step=1e-5, sample_rate=2e4
+    finished = simulated(
+        gearbox, Choice("flexible", load_case="run_up"), stiffness, tmp_path, duration=0.004, step=1e-5, sample_rate=2e4
     )
     assert finished.complete
     with xr.open_dataset(finished.path, engine="h5netcdf") as data:

@@ -12,16 +12,20 @@ from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly, VariantError
 from exugear.dynamics.linearised import linearise
 from exugear.dynamics.modes import counterparts, eigenmodes, modes_of
-from exugear.dynamics.signals import Channels
+from exugear.dynamics.signals import signal_layout
 from exugear.dynamics.statics import accelerating_start, locked_equilibrium
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
 from exugear.pictures.elastic_scene import animate_elastic_bodies, draw_elastic_bodies, elastic_scene
-from exugear.solvers.compiled.solver import CompiledSystem, Observer
+from exugear.solvers.compiled.observers import Observer
+from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.exudyn_model.system import ExudynSystem
 from exugear.solvers.loads import Loading, LoadTable
 
+from ..assembled import assembled, modes_with_bodies
 from ..limit_case import unchecked
+from ..plain_signals import energies_of, sampled
 from ..rounding import allowed_difference
 
 LOAD = {"carrier": 240e3, "hss": -3000.0}
@@ -36,7 +40,7 @@ def grc(grc_shafts: Gearbox) -> Gearbox:
 
 @pytest.fixture(scope="module")
 def flexible(grc: Gearbox, stiffness: dict) -> Assembly:
-    return assemble(grc, "flexible", stiffness)
+    return assembled(grc, Choice("flexible"), stiffness)
 
 
 def spinning(assembly: Assembly, angle: float = 0.7) -> tuple[np.ndarray, np.ndarray]:
@@ -45,7 +49,7 @@ def spinning(assembly: Assembly, angle: float = 0.7) -> tuple[np.ndarray, np.nda
     random = np.random.default_rng(7)
     q = start.q + 1e-6 * random.normal(size=assembly.size)
     v = start.v + 1e-2 * random.normal(size=assembly.size)
-    turned = assembly.rolling_velocity(np.zeros(assembly.size), assembly.gearbox.rolling_speeds("carrier", angle))
+    turned = assembly.rolling_velocity(np.zeros(assembly.size), assembly.gearbox.train.rolling_speeds("carrier", angle))
     planets = [body for body in assembly.bodies if body.carrier is not None]
     for body in planets:  # their orbit is an arc
         o = assembly.coordinates[body.name][0]
@@ -56,12 +60,12 @@ def spinning(assembly: Assembly, angle: float = 0.7) -> tuple[np.ndarray, np.nda
 
 def test_stiffer_shafts_tend_to_the_variant_bushing(grc: Gearbox, stiffness: dict) -> None:
     # Masses are the rigid bodies' by construction; what is left of the difference falls as one over the stiffness.
-    rigid = eigenmodes(grc, "bushing", stiffness).frequency[1:]
+    rigid = eigenmodes(grc, Choice("bushing"), stiffness).frequency[1:]
     gaps = []
     for factor in (10.0, 100.0):
         moduli = {f"bodies.{name}.shape.material.youngs_modulus_GPa": 206.0 * factor for name in SHAFTS}
         case = unchecked(grc, {**moduli, "elasticity.limit_Hz": 1e6})
-        found = eigenmodes(case, "flexible", stiffness).frequency[1 : len(rigid) + 1]
+        found = modes_with_bodies(case, Choice("flexible"), stiffness).frequency[1 : len(rigid) + 1]
         assert np.all(found < rigid * (1 + 1e-8))  # compliance can only lower
         gaps.append((np.abs(found / rigid - 1).max(), np.abs(found / rigid - 1).mean()))
     assert gaps[1][0] < 0.015
@@ -85,7 +89,7 @@ def test_shapes_of_the_grc_weigh_about_what_is_printed(flexible: Assembly, grc: 
 
 
 def test_turning_the_whole_train_stores_nothing(flexible: Assembly) -> None:
-    turned = flexible.rolling_velocity(np.zeros(flexible.size), flexible.gearbox.rolling_speeds("carrier", 1e-8))
+    turned = flexible.rolling_velocity(np.zeros(flexible.size), flexible.gearbox.train.rolling_speeds("carrier", 1e-8))
     forces = flexible.forces(turned, np.zeros(flexible.size), flexible.mean_meshes)
     one = np.zeros(flexible.size)
     one[flexible.coordinates["hss.hs_pinion"][5]] = 1e-8  # small enough for the planets' arcs
@@ -96,7 +100,7 @@ def test_turning_the_whole_train_stores_nothing(flexible: Assembly) -> None:
 def test_a_locked_output_winds_the_shafts_up_as_their_torsion_says(flexible: Assembly, grc: Gearbox) -> None:
     # Between pinion and coupling the high-speed shaft carries the whole torque: seats at 266.5 and 864 mm.
     q = locked_equilibrium(flexible, grc.case.static_load.torques_N_m, ["hss"], flexible.mean_meshes)
-    torque = 240e3 / grc.ratio
+    torque = 240e3 / grc.train.ratio
     # 80 GPa; the pinion's seat feeds its torque in over its width, so its mean angle is that of its middle or less.
     shear = 206e9 / 2.6
     pieces = [(0.060, 0.100), (0.0655, 0.105), (0.112, 0.110), (0.360, 0.105)]
@@ -130,7 +134,7 @@ def test_matrices_of_exudyn_are_those_of_the_assembly(flexible: Assembly) -> Non
 
 
 def test_accelerations_are_those_of_the_plain_kernels(flexible: Assembly, grc: Gearbox, stiffness: dict) -> None:
-    heavy = assemble(grc.varied({"gravity.acceleration_m_per_s2": [0.0, -9.81, 0.0]}), "flexible", stiffness)
+    heavy = assembled(grc.varied({"gravity.acceleration_m_per_s2": [0.0, -9.81, 0.0]}), Choice("flexible"), stiffness)
     for assembly in (flexible, heavy):
         q, v = spinning(assembly)
         found = CompiledSystem(assembly, q, v, LoadTable(LOAD), STEP).accelerations()
@@ -156,27 +160,25 @@ def test_gyroscopic_forces_follow_the_actual_speed(flexible: Assembly) -> None:
 
 
 def test_signals_and_energies_are_those_of_the_plain_kernels(flexible: Assembly) -> None:
-    channels = Channels(flexible)
     states = [spinning(flexible, angle) for angle in (0.0, 0.7)]
     q, v = (np.array(values) for values in zip(*states, strict=True))
-    signals, energies, powers = Observer(channels, LoadTable(LOAD)).observe(np.zeros(2), q, v)
-    expected = channels.sample(q, v)
+    signals, energies, powers = Observer(flexible, LoadTable(LOAD)).observe(np.zeros(2), q, v)
+    expected = sampled(flexible, q, v)
     assert np.all(np.abs(signals - expected) < allowed_difference(expected, len(flexible.mesh_names)))
-    plain = channels.energies(q, v)
+    plain = energies_of(flexible, q, v)
     scale = np.abs(plain).max(axis=0) + np.abs(plain[:, 2]).max()
     assert (np.abs(np.column_stack([energies, powers[:, 1:]]) - plain) / scale).max() < 1e-9
 
 
 def test_power_is_balanced_at_every_state(flexible: Assembly) -> None:
     # d/dt of kinetic and elastic energy = loads - damping - work of k(PMC) - other; central difference in time.
-    channels = Channels(flexible)
     q, v = spinning(flexible)
     applied = flexible.torque_vector(LOAD)
     a = flexible.accelerations(q, v, applied)
     h = 1e-8
-    early, late = (channels.energies((q + s * h * v)[None], (v + s * h * a)[None])[0] for s in (-1.0, 1.0))
+    early, late = (energies_of(flexible, (q + s * h * v)[None], (v + s * h * a)[None])[0] for s in (-1.0, 1.0))
     change = (late[:2].sum() - early[:2].sum()) / (2.0 * h)
-    powers = channels.energies(q[None], v[None])[0, 2:]
+    powers = energies_of(flexible, q[None], v[None])[0, 2:]
     assert change == pytest.approx(v @ applied - powers.sum(), rel=1e-4)
 
 
@@ -194,13 +196,13 @@ def trajectories(assembly: Assembly, steps: int) -> tuple[np.ndarray, np.ndarray
 
     ExudynSystem(assembly, start.q, start.v, Loading(LOAD)).run(0.0, steps, STEP, keep)
     states = np.array(rows)
-    channels = Channels(assembly)
-    return channels.sample(q, v), channels.sample(states[:, 0], states[:, 1])
+    return sampled(assembly, q, v), sampled(assembly, states[:, 0], states[:, 1])
 
 
 def test_the_compiled_solver_follows_exudyn(flexible: Assembly) -> None:
     found, expected = trajectories(flexible, 500)
-    columns = slice(1, 2 + 2 * len(flexible.mesh_names))
+    layout = signal_layout(flexible)
+    columns = slice(layout["overall_dte_angle"].start, layout["mesh_force"].stop)
     moving = expected[:, columns] - expected[:, columns].mean(axis=0)
     error = np.sqrt(np.mean((found - expected)[:, columns] ** 2, axis=0) / np.mean(moving**2, axis=0))
     assert error.max() < 1e-5
@@ -215,7 +217,7 @@ def test_reductions_are_kept_in_a_folder(grc: Gearbox, tmp_path: Path) -> None:
 
 def test_a_bearing_longer_than_its_seat_is_refused_by_name(grc: Gearbox, stiffness: dict) -> None:
     with pytest.raises(CaseError, match=r"bodies\.ims\.shape: seat ims_a: a shoulder lies between"):
-        assemble(grc.varied({"bearings.ims_a.z_mm": 160.0}), "flexible", stiffness)
+        assembled(grc.varied({"bearings.ims_a.z_mm": 160.0}), Choice("flexible"), stiffness)
     with pytest.raises(CaseError, match=r"bodies\.hss\.shape\.blanks\.flange: no such seat; seats are hs_pinion"):
         flange = {"mass_kg": 1.0, "axial_kg_m2": 1.0, "transverse_kg_m2": 1.0}
         shaft_model(grc.varied({"bodies.hss.shape.blanks.flange": flange}), "hss")
@@ -224,11 +226,11 @@ def test_a_bearing_longer_than_its_seat_is_refused_by_name(grc: Gearbox, stiffne
     with pytest.raises(CaseError, match=r"bodies\.carrier\.flexibility = 'nonrotating': the body carries planets"):
         solid_body(grc.varied({"bodies.carrier.flexibility": "nonrotating"}), "carrier")
     with pytest.raises(VariantError, match="no body is elastic"):
-        assemble(grc.varied({f"bodies.{name}.flexibility": "none" for name in SHAFTS}), "flexible", stiffness)
+        assembled(grc.varied({f"bodies.{name}.flexibility": "none" for name in SHAFTS}), Choice("flexible"), stiffness)
 
 
 def test_weight_is_that_of_the_bodies(grc: Gearbox, stiffness: dict) -> None:
-    heavy = assemble(grc.varied({"gravity.acceleration_m_per_s2": [0.0, -9.81, 0.0]}), "flexible", stiffness)
+    heavy = assembled(grc.varied({"gravity.acceleration_m_per_s2": [0.0, -9.81, 0.0]}), Choice("flexible"), stiffness)
     for name, place in heavy.elastic_slices.items():
         down = heavy.elastic_bodies[name].reduced.rigid_motions((0.0, 0.0, 0.0))[:, 1]
         assert down @ heavy.weight[place] == pytest.approx(-9.81 * grc.body(name).mass, rel=1e-9)
@@ -236,15 +238,15 @@ def test_weight_is_that_of_the_bodies(grc: Gearbox, stiffness: dict) -> None:
 
 def test_damping_of_shafts_is_a_key_of_the_case(grc: Gearbox, stiffness: dict) -> None:
     quiet = grc.varied({"damping.body_time_s": 0.0})
-    assembly = assemble(quiet, "flexible", stiffness)
+    assembly = assembled(quiet, Choice("flexible"), stiffness)
     linear = linearise(assembly, np.zeros(assembly.size))
     assert not linear.damping["lss_body"].any()
 
 
 def test_modes_on_rigid_shafts_are_found_again_on_stiff_ones(grc: Gearbox, stiffness: dict) -> None:
-    rigid = eigenmodes(grc, "bushing", stiffness)
+    rigid = eigenmodes(grc, Choice("bushing"), stiffness)
     moduli = {f"bodies.{name}.shape.material.youngs_modulus_GPa": 206e3 for name in SHAFTS}
-    stiff = eigenmodes(unchecked(grc, {**moduli, "elasticity.limit_Hz": 1e6}), "flexible", stiffness)
+    stiff = modes_with_bodies(unchecked(grc, {**moduli, "elasticity.limit_Hz": 1e6}), Choice("flexible"), stiffness)
     place, share = counterparts(rigid, stiff)
     # Equal frequencies share a plane of shapes, in which overlaps are free to mix.
     gaps = np.diff(rigid.frequency) > 0.01 * rigid.frequency[1:]
@@ -287,4 +289,4 @@ def test_a_scene_shows_every_shaft_with_its_gears(flexible: Assembly, tmp_path: 
 
 def test_a_variant_without_elastic_bodies_has_no_such_scene(grc: Gearbox, stiffness: dict) -> None:
     with pytest.raises(ValueError, match="variant bushing has no elastic bodies"):
-        elastic_scene(assemble(grc, "bushing", stiffness), np.zeros(43))
+        elastic_scene(assemble(grc, Choice("bushing"), stiffness), np.zeros(43))

@@ -17,7 +17,7 @@ from exugear.bodies.store import kept_arrays
 from exugear.bodies.turned_section import MeshSize, SeatBand, Shaft, ShaftSection
 from exugear.bodies.turned_shaft import ShaftModel, load_or_reduce, reduce_shaft
 from fe_ste.geometry.gears import Material
-from fe_ste.tools.files import write_sealed
+from fe_ste.tools.sealed import write_sealed
 
 from ...fe_ste.damage import damages
 
@@ -295,7 +295,7 @@ def test_a_stored_object_is_never_unpickled(tmp_path):
 
 def test_the_version_of_the_method_and_no_comment_decides_on_the_key(monkeypatch):
     before = STEPPED.key
-    monkeypatch.setattr("exugear.bodies.reduction.REDUCTION", 1000)
+    monkeypatch.setattr("exugear.bodies.turned_shaft.REDUCTION", 1000)
     assert STEPPED.key != before
 
 

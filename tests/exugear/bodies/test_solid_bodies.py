@@ -19,20 +19,22 @@ from exugear.dynamics.assembly import Assembly, VariantError
 from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.linearised import linearise
 from exugear.dynamics.modes import MOTIONS, counterparts, eigenmodes, modes_of
-from exugear.dynamics.signals import Channels, energy_residual
+from exugear.dynamics.signals import energy_residual
 from exugear.dynamics.statics import accelerating_start, locked_equilibrium
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.named_files import Permissions
 from exugear.model.reading import CaseError
 from exugear.pictures.elastic_scene import elastic_scene
-from exugear.runs.runup import simulate
 from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.exudyn_model.system import ExudynSystem
 from exugear.solvers.loads import Loading, LoadTable
 from fe_ste.tools.sparse import factorise
 
+from ..assembled import assembled, modes_with_bodies, simulated
 from ..box_case import box_content
 from ..limit_case import unchecked
+from ..plain_signals import sampled
 
 STIFFNESS = {"spur": 2e8 * (1.0 + 0.1 * np.cos(2.0 * np.pi * np.arange(16) / 16))}
 LOAD = {"shaft_1": 100.0, "shaft_2": 140.0}
@@ -60,7 +62,7 @@ def box(tmp_path_factory: pytest.TempPathFactory) -> Gearbox:
 
 @pytest.fixture(scope="module")
 def housed(box: Gearbox) -> Assembly:
-    return assemble(box, "flexible", STIFFNESS)
+    return assembled(box, Choice("flexible"), STIFFNESS)
 
 
 def moving(assembly: Assembly) -> tuple[np.ndarray, np.ndarray]:
@@ -95,7 +97,7 @@ def test_seats_of_the_housing_give_way_as_those_of_the_whole_model(box: Gearbox,
 
 def test_a_stiffer_housing_tends_to_one_that_is_the_ground(box: Gearbox) -> None:
     # On the ground its bearings have no factor: the seats that it stood for are rigid.
-    rigid = eigenmodes(box.varied({"housing.factor": 1.0}), "bushing", STIFFNESS)
+    rigid = eigenmodes(box.varied({"housing.factor": 1.0}), Choice("bushing"), STIFFNESS)
     gaps = []
     for factor in (1e3, 1e4):
         mounts = {
@@ -110,7 +112,7 @@ def test_a_stiffer_housing_tends_to_one_that_is_the_ground(box: Gearbox) -> None
                 "elasticity.limit_Hz": 1e8,
             },
         )
-        found = eigenmodes(stiff, "flexible", STIFFNESS)
+        found = modes_with_bodies(stiff, Choice("flexible"), STIFFNESS)
         place, share = counterparts(rigid, found)
         assert share[1:].min() > 0.9
         gaps.append(np.abs(found.frequency[place][1:] / rigid.frequency[1:] - 1.0).max())
@@ -119,7 +121,7 @@ def test_a_stiffer_housing_tends_to_one_that_is_the_ground(box: Gearbox) -> None
 
 
 def test_the_housing_factor_is_for_housings_that_are_the_ground(box: Gearbox, housed: Assembly) -> None:
-    ground = assemble(box, "bushing", STIFFNESS)
+    ground = assemble(box, Choice("bushing"), STIFFNESS)
     assert ground.connector_names == ("bearing_1", "bearing_2")
     assert housed.connector_names == ("bearing_1", "bearing_2", "foot")
     assert np.allclose(ground.connectors.stiffness, 0.5 * housed.connectors.stiffness[:2])
@@ -141,7 +143,7 @@ def test_a_housing_neither_turns_nor_has_gyroscopic_forces(housed: Assembly) -> 
 
 
 def test_weight_and_mass_of_a_housing_are_those_of_its_solid(box: Gearbox) -> None:
-    heavy = assemble(box.varied({"gravity.acceleration_m_per_s2": [0.0, -9.81, 0.0]}), "flexible", STIFFNESS)
+    heavy = assembled(box.varied({"gravity.acceleration_m_per_s2": [0.0, -9.81, 0.0]}), Choice("flexible"), STIFFNESS)
     mass = 7850.0 * 0.125 * 0.05 * 0.012
     body, place = heavy.elastic_bodies["box"], heavy.elastic_slices["box"]
     assert body.own.mass == pytest.approx(mass, rel=1e-9)
@@ -196,14 +198,13 @@ def test_the_compiled_solver_follows_exudyn_and_the_plain_kernels(housed: Assemb
         return True
 
     ExudynSystem(housed, q, v, Loading(LOAD)).run(0.0, steps, STEP, keep)
-    channels = Channels(housed)
-    found, expected = channels.sample(*states), channels.sample(*np.swapaxes(np.array(rows), 0, 1))
+    found, expected = sampled(housed, *states), sampled(housed, *np.swapaxes(np.array(rows), 0, 1))
     swing = np.mean((expected - expected.mean(axis=0)) ** 2, axis=0)
     assert np.sqrt(np.mean((found - expected) ** 2, axis=0) / swing).max() < 1e-5
 
 
 def test_work_of_the_loads_is_accounted_for(box: Gearbox, tmp_path: Path) -> None:
-    run = simulate(box, "flexible", STIFFNESS, tmp_path, load_case="run_up", duration=0.05)
+    run = simulated(box, Choice("flexible", load_case="run_up"), STIFFNESS, tmp_path, duration=0.05)
     data = xr.load_dataset(run.path, engine="h5netcdf")
     # Everything is accounted for, so only the quadrature of the powers is left.
     assert abs(energy_residual(data)) < 1e-6
@@ -286,7 +287,7 @@ def test_a_gear_in_sectors_has_a_seat_for_each(box: Gearbox) -> None:
 @pytest.mark.validation
 def test_the_grc_stands_on_its_mounts_with_elastic_housing(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
     # Second way: equilibrium of the whole gearbox. What goes in and does not come out is held by the trunnions' couple.
-    assembly = assemble(grc, "flexible", stiffness, folder=tmp_path / "bodies")
+    assembly = assembled(grc, Choice("flexible"), stiffness, folder=tmp_path / "bodies")
     load = grc.case.static_load
     q = locked_equilibrium(assembly, load.torques_N_m, load.locked, assembly.mean_meshes)
     loads = assembly.bearing_loads(q, np.zeros(assembly.size))
@@ -295,7 +296,7 @@ def test_the_grc_stands_on_its_mounts_with_elastic_housing(grc: Gearbox, stiffne
     )
     held = abs(0.9 * (right[1] - left[1]))
     # Mounts tilt with the housing (5 mrad), and couples of second order go with that.
-    assert held == pytest.approx(240e3 * (1.0 - 1.0 / grc.ratio), rel=1e-4)
+    assert held == pytest.approx(240e3 * (1.0 - 1.0 / grc.train.ratio), rel=1e-4)
     assert np.abs((left + right + shaft)[:3]).max() < 1e-4 * np.abs(left[1])
     # The published finite-element analysis of the real rear housing has tilts of 0.12 to 0.54 mrad at 401 kN m.
     housing, place = assembly.elastic_bodies["housing"].reduced, assembly.elastic_slices["housing"]
@@ -303,7 +304,7 @@ def test_the_grc_stands_on_its_mounts_with_elastic_housing(grc: Gearbox, stiffne
         np.hypot(*q[place][housing.seat(name) + 3 : housing.seat(name) + 5]) for name in ("lss_bc", "ims_bc", "hss_bc")
     ]
     assert 1e-4 < max(tilts) < 1e-3
-    run = simulate(grc, "flexible", stiffness, tmp_path, load_case="generating", duration=0.02)
+    run = simulated(grc, Choice("flexible", load_case="generating"), stiffness, tmp_path, duration=0.02)
     assert abs(energy_residual(xr.load_dataset(run.path, engine="h5netcdf"))) < 1e-6
 
 
@@ -311,10 +312,10 @@ def test_results_know_the_file_of_a_solid(box: Gearbox, housed: Assembly, tmp_pa
     before = input_hash(housed)
     content = box_content(tmp_path)
     same = Gearbox.from_dict(content, str(tmp_path / "case.toml"))
-    assert input_hash(assemble(same, "flexible", STIFFNESS)) == before
+    assert input_hash(assembled(same, Choice("flexible"), STIFFNESS)) == before
     text = (tmp_path / "plate.vtu").read_bytes()
     (tmp_path / "plate.vtu").write_bytes(text + b"\n")
-    assert input_hash(assemble(same, "flexible", STIFFNESS)) != before
+    assert input_hash(assembled(same, Choice("flexible"), STIFFNESS)) != before
 
 
 def test_faults_name_body_key_and_what_would_be_right(tmp_path: Path, monkeypatch: Any) -> None:
@@ -324,7 +325,7 @@ def test_faults_name_body_key_and_what_would_be_right(tmp_path: Path, monkeypatc
 
     def refused(changes: dict[str, Any], match: str) -> None:
         with pytest.raises((CaseError, VariantError), match=match):
-            assemble(box.varied(changes), "flexible", STIFFNESS)
+            assembled(box.varied(changes), Choice("flexible"), STIFFNESS)
 
     solid, seats = "bodies.box.solid", box.content["bodies"]["box"]["solid"]["seats"]
     refused({f"{solid}.file": "none.vtu"}, r"bodies\.box\.solid\.file = 'none\.vtu': no such file")

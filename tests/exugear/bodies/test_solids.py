@@ -201,7 +201,7 @@ TUBE_SEATS = (
 @pytest.mark.skipif(sys.platform == "win32", reason="no such signal")
 @needs_gmsh
 def test_a_broken_pipe_stays_an_error_after_meshing():
-    """Else a process that meshed a solid would end without a word when a worker of its sweep is lost."""
+    """Else a process that meshed a solid would end without a word when a worker of its grid is lost."""
     code = (
         "import os\nfrom exugear.bodies.solid_mesh import tetrahedra\n"
         "tetrahedra(lambda occ: occ.addBox(0.0, 0.0, 0.0, 1.0, 0.5, 0.25), 0.5)\n"

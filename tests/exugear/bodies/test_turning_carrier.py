@@ -11,19 +11,22 @@ import numpy as np
 import pytest
 import skfem
 
-from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.linearised import linearise
-from exugear.dynamics.modes import eigenmodes, modes_of
-from exugear.dynamics.signals import Channels
+from exugear.dynamics.modes import modes_of
+from exugear.dynamics.signals import signal_layout
 from exugear.dynamics.statics import accelerating_start, locked_equilibrium
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.named_files import Permissions
-from exugear.solvers.compiled.solver import CompiledSystem, Observer
+from exugear.solvers.compiled.observers import Observer
+from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.exudyn_model.system import ExudynSystem
 from exugear.solvers.loads import Loading, LoadTable
 
+from ..assembled import assembled, modes_with_bodies
 from ..limit_case import unchecked
+from ..plain_signals import energies_of, sampled
 
 pytestmark = pytest.mark.skipif(importlib.util.find_spec("meshio") is None, reason="meshio (extra mesh) is missing")
 
@@ -54,7 +57,7 @@ def carrying(grc_shafts: Gearbox, tmp_path_factory: pytest.TempPathFactory) -> G
 
 @pytest.fixture(scope="module")
 def flexible(carrying: Gearbox, stiffness: dict) -> Assembly:
-    return assemble(carrying, "flexible", stiffness)
+    return assembled(carrying, Choice("flexible"), stiffness)
 
 
 def turned_state(assembly: Assembly, angle: float, speed: float = 22.5) -> tuple[np.ndarray, np.ndarray]:
@@ -63,7 +66,7 @@ def turned_state(assembly: Assembly, angle: float, speed: float = 22.5) -> tuple
     random = np.random.default_rng(7)
     q = start.q + 1e-6 * random.normal(size=assembly.size)
     v = start.v + 1e-2 * random.normal(size=assembly.size)
-    speeds = assembly.gearbox.rolling_speeds("carrier", angle)
+    speeds = assembly.gearbox.train.rolling_speeds("carrier", angle)
     c, s = np.cos(angle), np.sin(angle)
     for body in assembly.bodies:
         o = assembly.coordinates[body.name][5]
@@ -89,11 +92,11 @@ def turned_state(assembly: Assembly, angle: float, speed: float = 22.5) -> tuple
 def test_a_stiff_carrier_is_the_rigid_one(grc_shafts: Gearbox, carrying: Gearbox, stiffness: dict) -> None:
     # Second method: the shafts elastic, the carrier a rigid body, which it becomes as one over its stiffness.
     limit = {"elasticity.limit_Hz": 1e6}  # no masses are added to slow anything down
-    rigid = eigenmodes(grc_shafts.varied(limit), "flexible", stiffness).frequency[1:60]
+    rigid = modes_with_bodies(grc_shafts.varied(limit), Choice("flexible"), stiffness).frequency[1:60]
     gaps = []
     for factor in (10.0, 100.0):
         modulus = {"bodies.carrier.solid.material.youngs_modulus_GPa": 206.0 * factor}
-        found = eigenmodes(unchecked(carrying, modulus | limit), "flexible", stiffness).frequency[1:60]
+        found = modes_with_bodies(unchecked(carrying, modulus | limit), Choice("flexible"), stiffness).frequency[1:60]
         assert np.all(found < rigid * (1 + 1e-6))  # compliance can only lower
         gaps.append(np.abs(found / rigid - 1).mean())
     assert gaps[1] < 1e-4
@@ -103,7 +106,7 @@ def test_a_stiff_carrier_is_the_rigid_one(grc_shafts: Gearbox, carrying: Gearbox
 def test_compiled_accelerations_are_those_of_the_plain_kernels(
     carrying: Gearbox, flexible: Assembly, stiffness: dict
 ) -> None:
-    for assembly in (flexible, assemble(carrying.varied(HEAVY), "flexible", stiffness)):
+    for assembly in (flexible, assembled(carrying.varied(HEAVY), Choice("flexible"), stiffness)):
         for angle in (0.0, 0.7, -40.0):
             q, v = turned_state(assembly, angle)
             found = CompiledSystem(assembly, q, v, LoadTable(LOAD), STEP).accelerations()
@@ -113,10 +116,9 @@ def test_compiled_accelerations_are_those_of_the_plain_kernels(
 
 
 def test_signals_and_energies_are_those_of_the_plain_kernels(flexible: Assembly) -> None:
-    channels = Channels(flexible)
     q, v = turned_state(flexible, 0.7)
-    _, energies, powers = Observer(channels, LoadTable(LOAD)).observe(np.zeros(1), q[None], v[None])
-    plain = channels.energies(q[None], v[None])
+    _, energies, powers = Observer(flexible, LoadTable(LOAD)).observe(np.zeros(1), q[None], v[None])
+    plain = energies_of(flexible, q[None], v[None])
     scale = np.abs(plain) + np.abs(plain[:, 2]).max()
     assert (np.abs(np.column_stack([energies, powers[:, 1:]]) - plain) / scale).max() < 1e-9
 
@@ -124,12 +126,12 @@ def test_signals_and_energies_are_those_of_the_plain_kernels(flexible: Assembly)
 @pytest.mark.parametrize("keys", [{}, HEAVY])
 def test_the_account_of_energy_of_a_run_closes(carrying: Gearbox, stiffness: dict, keys: dict) -> None:
     # 20 ms at 46 rpm; powers by Simpson's rule over the steps, whose error is far below.
-    assembly = assemble(carrying.varied(keys), "flexible", stiffness)
+    assembly = assembled(carrying.varied(keys), Choice("flexible"), stiffness)
     start = accelerating_start(assembly, LOAD, -4.8)
     q, v = np.empty((2, 2001, assembly.size))
     q[0], v[0] = start.q, start.v
     assert CompiledSystem(assembly, start.q, start.v, LoadTable(LOAD), STEP).advance(0, q[1:], v[1:]) == 2000
-    _, energies, powers = Observer(Channels(assembly), LoadTable(LOAD)).observe(STEP * np.arange(2001), q, v)
+    _, energies, powers = Observer(assembly, LoadTable(LOAD)).observe(STEP * np.arange(2001), q, v)
     weights = np.full(2001, 2.0)
     weights[1::2], weights[[0, -1]] = 4.0, 1.0
     work = STEP / 3.0 * weights @ powers
@@ -171,9 +173,9 @@ def test_the_compiled_solver_follows_exudyn(flexible: Assembly) -> None:
 
     ExudynSystem(flexible, start.q, start.v, Loading(LOAD)).run(0.0, 500, STEP, keep)
     states = np.array(rows)
-    channels = Channels(flexible)
-    columns = slice(1, 2 + 2 * len(flexible.mesh_names))
-    found, expected = (channels.sample(*both)[:, columns] for both in ((q, v), (states[:, 0], states[:, 1])))
+    layout = signal_layout(flexible)
+    columns = slice(layout["overall_dte_angle"].start, layout["mesh_force"].stop)
+    found, expected = (sampled(flexible, *both)[:, columns] for both in ((q, v), (states[:, 0], states[:, 1])))
     error = np.sqrt(np.mean((found - expected) ** 2, axis=0) / np.var(expected, axis=0))
     assert error.max() < 1e-5
     # The carrier's own coordinates, too: by their motion against a steady turning.
@@ -186,7 +188,9 @@ def test_a_run_starts_in_steady_rotation_of_the_carrier(flexible: Assembly) -> N
     # Its deflection under load, inertia and centrifugal forces turns with it: no vibration is left at the start.
     start = accelerating_start(flexible, LOAD, 22.5)
     a = flexible.accelerations(start.q, start.v, flexible.torque_vector(LOAD))
-    expected = flexible.rolling_acceleration(start.q, flexible.gearbox.rolling_speeds("carrier", 22.5), start.rates)
+    expected = flexible.rolling_acceleration(
+        start.q, flexible.gearbox.train.rolling_speeds("carrier", 22.5), start.rates
+    )
     place = flexible.elastic_slices["carrier"]
     assert np.abs(a - expected)[place].max() < 1e-6 * np.abs(expected[place]).max()
 

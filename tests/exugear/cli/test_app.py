@@ -19,7 +19,7 @@ import xarray
 from typer.testing import CliRunner
 
 from exugear.cli.app import app
-from exugear.cli.console import BadInputError, FailedError, exit_codes, interruption
+from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption
 from exugear.model.gearbox import Gearbox
 from exugear.tooth_mesh.tables import order_tables
 from fe_ste.contact.cells import ContactSettings

@@ -12,7 +12,9 @@ import pytest
 import xarray as xr
 from typer.testing import CliRunner
 
-from exugear.cli import app as cli
+from exugear.cli.app import app
+from exugear.cli.options import MeshLaw, Variant
+from exugear.cli.verbs.run import Solver
 from exugear.dynamics.assemble import VARIANTS
 from exugear.model.gearbox import Gearbox
 from exugear.runs.outcome import RunError
@@ -41,7 +43,7 @@ def case(tmp_path):
 
 
 def exugear(*arguments):
-    return CliRunner().invoke(cli.app, [str(argument) for argument in arguments])
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 def iso(verb, case, *more):
@@ -50,10 +52,10 @@ def iso(verb, case, *more):
 
 
 def test_the_choices_offered_are_those_of_the_library():
-    assert [law.value for law in cli.MeshLaw] == list(MESH_LAWS)
-    assert {solver.value for solver in cli.Solver} == set(SOLVERS)
+    assert [law.value for law in MeshLaw] == list(MESH_LAWS)
+    assert {solver.value for solver in Solver} == set(SOLVERS)
     # The third variant keeps joints as constraints: a cross-check, not a model for users.
-    assert [variant.value for variant in cli.Variant] == [name for name in VARIANTS if name != "jointed"]
+    assert [variant.value for variant in Variant] == [name for name in VARIANTS if name != "jointed"]
 
 
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])

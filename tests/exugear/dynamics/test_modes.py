@@ -15,9 +15,12 @@ from exugear.dynamics.assemble import assemble
 from exugear.dynamics.linearised import linearise
 from exugear.dynamics.modes import FREE_ROTATION, eigenmodes, modes_of
 from exugear.dynamics.statics import locked_equilibrium
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.solvers.exudyn_model.system import ExudynSystem
 from exugear.solvers.loads import Loading
+
+from ..assembled import modes_with_bodies
 
 STIFFNESS = {"sun_planet": np.array([3e8]), "ring_planet": np.array([4e8])}
 
@@ -139,7 +142,7 @@ def lumped_frequencies(gearbox: Gearbox, planets: int) -> np.ndarray:
 @pytest.mark.parametrize("planets", [3, 4])
 def test_planetary_frequencies_equal_the_lumped_model(planets: int) -> None:
     gearbox = planetary(24, 24, planets)
-    modes = modes_of(assemble(gearbox, "bushing", STIFFNESS), preload=False)
+    modes = modes_of(assemble(gearbox, Choice("bushing"), STIFFNESS), preload=False)
     in_plane = modes.kinetic[:, :, :2].sum(axis=(1, 2)) > 0.5
     expected = lumped_frequencies(gearbox, planets)
     found = np.sort(modes.frequency[in_plane])
@@ -152,7 +155,7 @@ def test_planetary_frequencies_equal_the_lumped_model(planets: int) -> None:
 def test_multiplicities_of_planetary_modes(planets: int) -> None:
     """Rotational modes are single, translational ones double, planet modes (N > 3) of multiplicity N - 3."""
     frequency = lumped_frequencies(planetary(24, 24, planets), planets)
-    modes = modes_of(assemble(planetary(24, 24, planets), "bushing", STIFFNESS), preload=False)
+    modes = modes_of(assemble(planetary(24, 24, planets), Choice("bushing"), STIFFNESS), preload=False)
     in_plane = modes.kinetic[:, :, :2].sum(axis=(1, 2)) > 0.5
     found = modes.frequency[in_plane]
     count = [int(np.sum(np.abs(found - f) < 1e-5 * f)) for f in frequency]
@@ -161,29 +164,29 @@ def test_multiplicities_of_planetary_modes(planets: int) -> None:
 
 
 def test_damping_ratio_of_proportional_damping_is_pi_f_times_its_time(grc: Gearbox, stiffness: dict) -> None:
-    modes = eigenmodes(grc, "bushing", stiffness)
+    modes = eigenmodes(grc, Choice("bushing"), stiffness)
     # The preload makes K unsymmetric by 0.1 %, c is proportional to the symmetric unloaded tangent.
     assert modes.damping_ratio == pytest.approx(math.pi * 4e-6 * modes.frequency, rel=5e-3, abs=1e-9)
 
 
 def test_train_has_one_free_rotation(grc: Gearbox, stiffness: dict) -> None:
     for variant in ("rigid", "bushing"):
-        modes = eigenmodes(grc, variant, stiffness)
+        modes = modes_with_bodies(grc, Choice(variant), stiffness)
         assert modes.names.count(FREE_ROTATION) == 1
         assert modes.frequency[0] == 0.0
         assert modes.frequency[1] > 10.0
         spin = [modes.shapes[modes.assembly.spin[name], 0] for name in ("carrier", "hss")]
-        assert spin[1] / spin[0] == pytest.approx(grc.ratio, rel=1e-6)
+        assert spin[1] / spin[0] == pytest.approx(grc.train.ratio, rel=1e-6)
 
 
 def test_energy_shares_sum_to_one(grc: Gearbox, stiffness: dict) -> None:
-    modes = eigenmodes(grc, "bushing", stiffness)
+    modes = eigenmodes(grc, Choice("bushing"), stiffness)
     assert modes.strain[1:].sum(axis=1) == pytest.approx(np.ones(len(modes.frequency) - 1), rel=1e-12)
     assert modes.kinetic.sum(axis=(1, 2)) == pytest.approx(np.ones(len(modes.frequency)), rel=1e-12)
 
 
 def test_exudyn_finds_the_same_frequencies(grc: Gearbox, stiffness: dict) -> None:
-    assembly = assemble(grc, "bushing", stiffness)
+    assembly = assemble(grc, Choice("bushing"), stiffness)
     load = grc.case.static_load
     q = locked_equilibrium(assembly, load.torques_N_m, load.locked, assembly.mean_meshes)
     system = ExudynSystem(assembly, q, np.zeros(assembly.size), Loading(load.torques_N_m), meshes=assembly.mean_meshes)
@@ -195,23 +198,23 @@ def test_exudyn_finds_the_same_frequencies(grc: Gearbox, stiffness: dict) -> Non
 
 
 def test_inertia_sets_move_the_upper_modes(grc: Gearbox, stiffness: dict) -> None:
-    light = eigenmodes(grc, "rigid", stiffness, inertias="gears")
-    heavy = eigenmodes(grc, "rigid", stiffness, inertias="assemblies")
+    light = eigenmodes(grc, Choice("rigid", inertias="gears"), stiffness)
+    heavy = eigenmodes(grc, Choice("rigid", inertias="assemblies"), stiffness)
     assert light.frequency[-1] > 2.0 * heavy.frequency[-1]
     assert "hss spin" in light.names[-1]
 
 
 def test_seed_law_flutters_on_soft_bearings_unless_damped(grc: Gearbox, stiffness: dict) -> None:
     """Its force has parts that its deflection does not see: the tangent is unsymmetric."""
-    light = eigenmodes(grc, "bushing", stiffness, "seed")
+    light = eigenmodes(grc, Choice("bushing", "seed"), stiffness)
     assert light.growth_rate > 1.0
     damped = grc.varied({"damping.bearing_time_s": 2.5e-5, "damping.mesh_time_s": 2.5e-5})
-    assert eigenmodes(damped, "bushing", stiffness, "seed").growth_rate < 1e-3
-    assert eigenmodes(grc, "bushing", stiffness).growth_rate < 1e-3
+    assert eigenmodes(damped, Choice("bushing", "seed"), stiffness).growth_rate < 1e-3
+    assert eigenmodes(grc, Choice("bushing"), stiffness).growth_rate < 1e-3
 
 
 def test_modes_file_is_readable_by_xarray_alone(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
-    modes = eigenmodes(grc, "rigid", stiffness)
+    modes = eigenmodes(grc, Choice("rigid"), stiffness)
     data = xr.load_dataset(modes.save(tmp_path / "modes.nc"), engine="h5netcdf")
     assert np.array_equal(data.frequency.to_numpy(), modes.frequency)
     assert data.attrs["inertias"] == "assemblies"
@@ -222,7 +225,7 @@ def sun_force(gearbox: Gearbox, speed: float) -> tuple[np.ndarray, float]:
     """Radial force on the sun (samples, 2) in a steady run, in the carrier's frame, and the mean mesh force."""
     cycle = 2 * np.pi * np.arange(50) / 50
     shape = 1 + 0.1 * np.cos(cycle) + 0.05 * np.cos(2 * cycle) + 0.03 * np.cos(3 * cycle) + 0.02 * np.cos(4 * cycle)
-    assembly = assemble(gearbox, "bushing", {"sun_planet": 3e8 * shape, "ring_planet": 4e8 * shape})
+    assembly = assemble(gearbox, Choice("bushing"), {"sun_planet": 3e8 * shape, "ring_planet": 4e8 * shape})
     q = locked_equilibrium(assembly, {"sun": 500.0}, ["carrier", "ring"])
     v = np.zeros(assembly.size)
     # The carrier stands, the sun turns: planets and ring roll with it, all as deflected by the load.
@@ -230,7 +233,7 @@ def sun_force(gearbox: Gearbox, speed: float) -> tuple[np.ndarray, float]:
     for step in range(600):
         angle = speed * step * 2e-5
         at = q.copy()
-        modes = gearbox.kinematic_modes
+        modes = gearbox.train.kinematic_modes
         roll = np.linalg.lstsq(
             modes[[gearbox.spinning.index(name) for name in ("sun", "carrier")]],
             np.array([angle, 0.0]), rcond=None,
@@ -283,7 +286,7 @@ def test_parametric_response_of_a_single_pair_equals_scipy() -> None:
     gearbox = single_pair()
     mean, epsilon = 2e8, 0.2
     shape = 1 + epsilon * np.cos(2 * np.pi * np.arange(50) / 50)
-    assembly = assemble(gearbox, "rigid", {"pair": mean * shape})
+    assembly = assemble(gearbox, Choice("rigid"), {"pair": mean * shape})
     radius = gearbox.gears["first"].base_radius
     inertias = np.array([1e-2, 2e-2])
     effective = 1.0 / np.sum(radius**2 / inertias)
@@ -320,11 +323,17 @@ def test_parametric_response_of_a_single_pair_equals_scipy() -> None:
 
 def test_linearisation_ignores_the_slope_of_the_stiffness(grc: Gearbox, stiffness: dict) -> None:
     """Otherwise k' times the deflection would hold the free rotation."""
-    assembly = assemble(grc, "rigid", stiffness)
+    assembly = assemble(grc, Choice("rigid"), stiffness)
     load = grc.case.static_load
     q = locked_equilibrium(assembly, load.torques_N_m, load.locked, assembly.mean_meshes)
     rolling = np.zeros(assembly.size)
-    for name, value in grc.rolling_speeds("carrier", 1.0).items():
+    for name, value in grc.train.rolling_speeds("carrier", 1.0).items():
         rolling[assembly.spin[name]] = value
     stiff = linearise(assembly, q).total_stiffness
     assert np.abs(stiff @ rolling).max() < 1e-9 * np.abs(stiff).max()
+
+
+def test_modes_show_themselves_in_a_line_and_a_small_table(grc: Gearbox, stiffness: dict) -> None:
+    modes = eigenmodes(grc, Choice("rigid"), stiffness)
+    assert repr(modes).startswith(f"Modes(rigid, line_of_action, assemblies: {modes.frequency.size}, 0 to ")
+    assert f"<th>modes</th><td>{modes.frequency.size}</td>" in modes._repr_html_()

@@ -13,17 +13,20 @@ import numba
 import numpy as np
 import pytest
 
-from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.signals import Channels
+from exugear.dynamics.signals import signal_layout
 from exugear.dynamics.statics import accelerating_start
 from exugear.kernels.connectors import ConnectorArrays, add_connector_forces
 from exugear.kernels.meshes import STATE_SIZE, add_mesh_forces, mesh_state
 from exugear.kernels.springs import add_spring_forces
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.compiled.step import choose_step
 from exugear.solvers.loads import LoadTable
+
+from ..assembled import assembled
+from ..plain_signals import energies_of, sampled
 
 LOAD = {"carrier": 240e3, "hss": -3000.0}
 SHARE = 1e-5
@@ -92,7 +95,7 @@ def account_of(assembly: Assembly, start_speed: float, duration: float) -> Accou
     """Run by the compiled solver and integrate all powers over its raw steps, chunk by chunk."""
     start = accelerating_start(assembly, LOAD, start_speed)
     step = choose_step(assembly, 20e3, 6.4e3)
-    channels = Channels(assembly)
+    layout = signal_layout(assembly)
     meshes = [assembly.meshes.one(m) for m in range(len(assembly.elements))]
     bearings = [
         ConnectorArrays._make(a[n : n + 1] for a in assembly.connectors) for n in range(len(assembly.connector_names))
@@ -106,9 +109,9 @@ def account_of(assembly: Assembly, start_speed: float, duration: float) -> Accou
         q, v = np.empty((2, size + 1, assembly.size))
         q[0], v[0] = last
         assert system.advance(done, q[1:], v[1:]) == size
-        signals = channels.sample(q, v)
-        delta = signals[:, 2 : 2 + count]
-        force = signals[:, 2 + count : 2 + 2 * count] / assembly.meshes.line_of_action
+        signals = sampled(assembly, q, v)
+        delta = layout.values("mesh_dte", signals)
+        force = layout.values("mesh_force", signals) / assembly.meshes.line_of_action
         powers = np.empty((count, size + 1, 4))
         for mesh, out in zip(meshes, powers, strict=True):
             mesh_powers(q, v, mesh, mesh.damping[0], out)
@@ -116,7 +119,7 @@ def account_of(assembly: Assembly, start_speed: float, duration: float) -> Accou
         for bearing, out in zip(bearings, others[:-1], strict=True):
             bearing_powers(q, v, bearing, out)
         spring_powers(q, v, assembly.springs, others[-1])
-        kinetic = channels.energies(q[[0, -1]], v[[0, -1]])[:, 0]
+        kinetic = energies_of(assembly, q[[0, -1]], v[[0, -1]])[:, 0]
         energies += [np.append(powers[:, n, 3], kinetic[n]) for n in (0, -1)]
         total += np.concatenate(
             [
@@ -151,7 +154,7 @@ def assert_balanced(account: Account, own_share: float) -> None:
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
 def test_power_of_each_mesh_and_of_the_whole(grc: Gearbox, stiffness: dict, variant: str) -> None:
     """From 46 rpm on: high-speed mesh at 1.4 kHz."""
-    assert_balanced(account_of(assemble(grc, variant, stiffness), -4.8, 0.1), own_share=1e-3)
+    assert_balanced(account_of(assembled(grc, Choice(variant), stiffness), -4.8, 0.1), own_share=1e-3)
 
 
 @pytest.mark.validation
@@ -159,4 +162,4 @@ def test_power_of_each_mesh_and_of_the_whole(grc: Gearbox, stiffness: dict, vari
 def test_power_of_each_mesh_and_of_the_whole_up_to_full_speed(grc: Gearbox, stiffness: dict, variant: str) -> None:
     """Last ten seconds of the run-up, from 143 to 215 rpm."""
     # At the end a step covers eight pieces of k(PMC), which the quadrature of its power feels.
-    assert_balanced(account_of(assemble(grc, variant, stiffness), -15.0, 10.0), own_share=1e-2)
+    assert_balanced(account_of(assembled(grc, Choice(variant), stiffness), -15.0, 10.0), own_share=1e-2)

@@ -15,6 +15,7 @@ from exugear.dynamics.sensitivity import (
     scaled_bearings,
     vary_parameter,
 )
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.tooth_mesh.stiffness import mesh_stiffness
 
@@ -27,7 +28,9 @@ def spur() -> Gearbox:
 
 
 def parameter(gearbox: Gearbox, variant: str, start: str, stiffness: dict) -> Parameter:
-    parameters = assumed_parameters(gearbox, variant, stiffness, "line_of_action", gearbox.case.default_inertias)
+    parameters = assumed_parameters(
+        gearbox, Choice(variant, "line_of_action", gearbox.case.default_inertias), stiffness
+    )
     return next(parameter for parameter in parameters if parameter.label.startswith(start))
 
 
@@ -66,12 +69,10 @@ def test_a_crossing_leads_to_the_assumption_that_brings_the_mode_there(spur):
 
 def test_the_housing_factor_counts_only_where_there_are_bearings(spur):
     stiffness = mesh_stiffness(spur, "iso6336")
-    labels = {
-        variant: [
-            parameter.label for parameter in assumed_parameters(spur, variant, stiffness, "line_of_action", "disc")
-        ]
-        for variant in ("rigid", "bushing")
-    }
+    labels = {}
+    for variant in ("rigid", "bushing"):
+        parameters = assumed_parameters(spur, Choice(variant, "line_of_action", "disc"), stiffness)
+        labels[variant] = [parameter.label for parameter in parameters]
     assert "housing factor" not in labels["rigid"]
     assert "housing factor" in labels["bushing"]
     assert not any(label.startswith("planet") for label in labels["bushing"])
@@ -99,7 +100,7 @@ def test_modes_are_followed_through_a_crossing(grc, stiffness):
 
 def test_inertias_no_rigid_body_has_are_not_built(grc, stiffness):
     # The set "gears" has a light pinion: a large axial inertia needs a larger transverse one with it.
-    parameters = assumed_parameters(grc, "bushing", stiffness, "line_of_action", "gears")
+    parameters = assumed_parameters(grc, Choice("bushing", "line_of_action", "gears"), stiffness)
     inertia = next(parameter for parameter in parameters if parameter.label.startswith("axial inertia"))
     built = inertia.build(max(inertia.values)).gearbox.body("hss", "gears")
     assert built.axial == max(inertia.values)

@@ -11,7 +11,10 @@ from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.statics import BalanceError, accelerating_start, locked_equilibrium
 from exugear.kernels.connectors import ConnectorArrays, add_connector_forces
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
+
+from ..assembled import assembled
 
 TORQUE = {"carrier": 240e3}
 # Line-of-action forces of the specification, kN: sums over the planets, intermediate, high speed.
@@ -20,7 +23,7 @@ FORCES = {"sun_planet": 422.4e3, "ring_planet": 422.4e3, "intermediate": 128.7e3
 
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
 def test_locked_output_gives_the_mesh_forces_of_the_statics(grc: Gearbox, stiffness: dict, variant: str) -> None:
-    assembly = assemble(grc, variant, stiffness)
+    assembly = assembled(grc, Choice(variant), stiffness)
     q = locked_equilibrium(assembly, TORQUE, ["hss"])
     force = dict(zip(assembly.mesh_names, assembly.mesh_states(q, 0 * q)[:, 4], strict=True))
     for family, expected in FORCES.items():
@@ -36,7 +39,7 @@ def test_locked_output_gives_the_mesh_forces_of_the_statics(grc: Gearbox, stiffn
 
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
 def test_lock_carries_the_torque_over_the_ratio(grc: Gearbox, stiffness: dict, variant: str) -> None:
-    assembly = assemble(grc, variant, stiffness)
+    assembly = assembled(grc, Choice(variant), stiffness)
     q = locked_equilibrium(assembly, TORQUE, ["hss"])
     lock = (assembly.forces(q, 0 * q) + assembly.torque_vector(TORQUE))[assembly.spin["hss"]]
     # Tilted shafts change the lever arms by their deflection over radius, 1e-5.
@@ -44,7 +47,7 @@ def test_lock_carries_the_torque_over_the_ratio(grc: Gearbox, stiffness: dict, v
 
 
 def test_ring_carries_the_difference_of_carrier_and_sun_torque(grc: Gearbox, stiffness: dict) -> None:
-    assembly = assemble(grc, "bushing", stiffness)
+    assembly = assemble(grc, Choice("bushing"), stiffness)
     q = locked_equilibrium(assembly, TORQUE, ["hss"])
     states = assembly.mesh_states(q, 0 * q)
     base_radius = grc.gears["ring"].base_radius
@@ -58,7 +61,7 @@ def test_ring_carries_the_difference_of_carrier_and_sun_torque(grc: Gearbox, sti
 
 def test_bearing_reactions_balance_the_mesh_forces(grc: Gearbox, stiffness: dict) -> None:
     """All external loads on all bodies: ring mesh forces, bearings to ground, torques; forces and moments."""
-    assembly = assemble(grc, "bushing", stiffness)
+    assembly = assemble(grc, Choice("bushing"), stiffness)
     q = locked_equilibrium(assembly, TORQUE, ["hss"])
     rest = np.zeros(assembly.size)
     force, moment = np.zeros(3), np.zeros(3)
@@ -105,7 +108,7 @@ def to_moment(coordinates: np.ndarray, generalized: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
 @pytest.mark.parametrize(("case", "sense"), [("reference", -1), ("generating", 1)])
 def test_run_starts_in_uniform_acceleration(grc: Gearbox, stiffness: dict, variant: str, case: str, sense: int) -> None:
-    assembly = assemble(grc, variant, stiffness)
+    assembly = assembled(grc, Choice(variant), stiffness)
     torques = grc.load_cases[case].torques
     start = accelerating_start(assembly, torques)
     # 4.47 kN m over 5.97e3 kg m2, 215 rpm in 30 s.
@@ -120,7 +123,7 @@ def test_run_starts_in_uniform_acceleration(grc: Gearbox, stiffness: dict, varia
 
 def test_start_at_speed_is_steady(grc: Gearbox, stiffness: dict) -> None:
     """At rated speed the planets pull outwards; the start holds them there."""
-    assembly = assemble(grc, "bushing", stiffness)
+    assembly = assemble(grc, Choice("bushing"), stiffness)
     speed = 22.1 * math.pi / 30
     start = accelerating_start(assembly, grc.load_cases["rated"].torques, speed)
     found = assembly.accelerations(start.q, start.v, assembly.torque_vector(grc.load_cases["rated"].torques))
@@ -129,7 +132,7 @@ def test_start_at_speed_is_steady(grc: Gearbox, stiffness: dict) -> None:
 
 
 def test_speed_driven_start_solves_for_the_drive_torque(grc: Gearbox, stiffness: dict) -> None:
-    assembly = assemble(grc, "bushing", stiffness)
+    assembly = assemble(grc, Choice("bushing"), stiffness)
     start = accelerating_start(assembly, TORQUE, driven=("hss", 0.0))
     assert start.drive_torque == pytest.approx(-2945.1, rel=5e-5)
 
@@ -137,8 +140,8 @@ def test_speed_driven_start_solves_for_the_drive_torque(grc: Gearbox, stiffness:
 @pytest.mark.parametrize("law", ["rigid", "line_of_action"])
 def test_train_near_balance_starts_with_what_its_loads_leave(grc: Gearbox, stiffness: dict, law: str) -> None:
     """Net torque over referred inertia, whatever share of the loads is left over."""
-    assembly = assemble(grc, "rigid", {} if law == "rigid" else stiffness, law)
-    ratios = grc.rolling_speeds("carrier", 1.0)
+    assembly = assemble(grc, Choice("rigid", law), {} if law == "rigid" else stiffness)
+    ratios = grc.train.rolling_speeds("carrier", 1.0)
     inertia = sum(assembly.mass_matrix[i, i] * ratios[name] ** 2 for name, i in assembly.spin.items())
     for share in np.geomspace(1.0, 1e-6, 25):
         loads = {"carrier": 240e3, "hss": -240e3 * (1.0 - share) / ratios["hss"]}
@@ -149,6 +152,6 @@ def test_train_near_balance_starts_with_what_its_loads_leave(grc: Gearbox, stiff
 
 
 def test_unheld_structure_is_reported(grc: Gearbox, stiffness: dict) -> None:
-    assembly = assemble(grc, "rigid", stiffness)
+    assembly = assemble(grc, Choice("rigid"), stiffness)
     with pytest.raises(BalanceError):
         locked_equilibrium(assembly, TORQUE, [])

@@ -15,16 +15,19 @@ import xarray as xr
 
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.signals import Channels
 from exugear.dynamics.statics import locked_equilibrium
 from exugear.kernels.meshes import add_mesh_forces
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.runs.runup import simulate
-from exugear.solvers.compiled.solver import CompiledSystem, Observer
+from exugear.solvers.compiled.observers import Observer
+from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.loads import LoadTable
 from exugear.tooth_mesh.element import pack
 from fe_ste.transmission_error.surface import SteSurface
 
+from ..assembled import assembled, simulated
+from ..plain_signals import energies_of, sampled
 from ..spur_case import SPUR_CASE
 from ..table_case import surfaces
 
@@ -58,7 +61,7 @@ def without_meshes(assembly: Assembly) -> Assembly:
 
 def cases(grc: Gearbox, tables: dict) -> Iterator[tuple[Assembly, np.ndarray, np.ndarray]]:
     for variant in VARIANTS:
-        assembly = assemble(grc, variant, tables, "table")
+        assembly = assembled(grc, Choice(variant, "table"), tables)
         for flank in (1, -1):
             yield assembly, *in_contact(assembly, 3, flank)
 
@@ -66,7 +69,7 @@ def cases(grc: Gearbox, tables: dict) -> Iterator[tuple[Assembly, np.ndarray, np
 @pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize("flank", [1, -1])
 def test_jacobian_equals_finite_differences(grc: Gearbox, tables: dict, variant: str, flank: int) -> None:
-    assembly = assemble(grc, variant, tables, "table")
+    assembly = assembled(grc, Choice(variant, "table"), tables)
     q, v = in_contact(assembly, 2, flank)
     assert np.all(flank * assembly.mesh_states(q, v)[:, 4] > 0.0)
     jq, jv = assembly.mesh_jacobians(q, v)
@@ -89,7 +92,7 @@ def test_jacobian_equals_finite_differences(grc: Gearbox, tables: dict, variant:
 def test_force_is_the_gradient_of_the_potential_at_frozen_position(
     grc: Gearbox, tables: dict, variant: str, flank: int
 ) -> None:
-    assembly = frozen(assemble(grc, variant, tables, "table"))
+    assembly = frozen(assembled(grc, Choice(variant, "table"), tables))
     bare = without_meshes(assembly)
     q, _ = in_contact(assembly, 2, flank)
     rest = np.zeros(assembly.size)
@@ -110,17 +113,16 @@ def test_compiled_solver_has_the_same_forces_signals_and_energies(grc: Gearbox, 
         found = CompiledSystem(assembly, q, v, LoadTable(load), 1e-5).accelerations()
         expected = assembly.accelerations(q, v, assembly.torque_vector(load))
         assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
-        channels = Channels(assembly)
-        signals, energies, powers = Observer(channels, LoadTable(load)).observe(np.zeros(1), q[None], v[None])
-        sample = channels.sample(q[None], v[None])
+        signals, energies, powers = Observer(assembly, LoadTable(load)).observe(np.zeros(1), q[None], v[None])
+        sample = sampled(assembly, q[None], v[None])
         assert np.abs(signals - sample).max() < 1e-9 * np.abs(sample).max()
-        plain = channels.energies(q[None], v[None])
+        plain = energies_of(assembly, q[None], v[None])
         scale = np.abs(plain).max()
         assert np.abs(np.column_stack([energies, powers[:, 1:]]) - plain).max() < 1e-9 * scale
 
 
 def test_flanks_apart_feel_nothing(grc: Gearbox, tables: dict) -> None:
-    assembly = assemble(grc, "bushing", tables, "table")
+    assembly = assemble(grc, Choice("bushing", "table"), tables)
     q = np.zeros(assembly.size)
     load = grc.case.static_load
     q = locked_equilibrium(assembly, load.torques_N_m, load.locked)
@@ -134,7 +136,7 @@ def test_flanks_apart_feel_nothing(grc: Gearbox, tables: dict) -> None:
 
 
 def test_other_flank_touches_after_the_backlash(grc: Gearbox, tables: dict) -> None:
-    assembly = assemble(grc, "rigid", tables, "table")
+    assembly = assemble(grc, Choice("rigid", "table"), tables)
     element = assembly.elements[-1]
     assert element.table is not None
     pair = element.mesh.pair.with_centre_distance(element.mesh.centre_distance)
@@ -152,7 +154,7 @@ def test_other_flank_touches_after_the_backlash(grc: Gearbox, tables: dict) -> N
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_static_deflection_is_the_tables(grc: Gearbox, tables: dict, variant: str) -> None:
     """Against the surface evaluated apart from the kernel, at the place where the gears really stand."""
-    assembly = assemble(grc, variant, tables, "table")
+    assembly = assembled(grc, Choice(variant, "table"), tables)
     load = grc.case.static_load
     q = locked_equilibrium(assembly, load.torques_N_m, load.locked)
     found = assembly.mesh_states(q, 0 * q)
@@ -175,7 +177,7 @@ def test_other_sense_of_load_is_the_same_pair_turned_about_the_line_of_centres()
     for case, sign in ((content, np.ones(12)), (reversed_load, turn)):
         gearbox = Gearbox.from_dict(case)
         surface = asymmetric_surface(gearbox)
-        assembly = assemble(gearbox, "bushing", {"spur": surface}, "table")
+        assembly = assemble(gearbox, Choice("bushing", "table"), {"spur": surface})
         element = assembly.elements[0]
         assert element.flank == (1 if sign[1] > 0 else -1)
         q = disturbance.copy()
@@ -205,7 +207,7 @@ def test_no_energy_is_gained_on_a_closed_path_at_frozen_position(
     grc: Gearbox, tables: dict, size: float, limit: float
 ) -> None:
     """Work of the meshes along a closed path of all coordinates, integrated over its angle."""
-    assembly = frozen(assemble(grc, "bushing", tables, "table"))
+    assembly = frozen(assemble(grc, Choice("bushing", "table"), tables))
     q, _ = in_contact(assembly, 5)
     one, two = size * np.random.default_rng(11).normal(size=(2, assembly.size))
     rest = np.zeros(assembly.size)
@@ -225,7 +227,7 @@ def test_no_energy_is_gained_on_a_closed_path_at_frozen_position(
 
 def test_misalignment_is_positive_where_it_opens_the_gap_at_the_plus_z_end(grc: Gearbox, tables: dict) -> None:
     """Against the flanks' approach computed at two planes of the gear."""
-    assembly = assemble(grc, "bushing", tables, "table")
+    assembly = assemble(grc, Choice("bushing", "table"), tables)
     random = np.random.default_rng(4)
     q = 1e-5 * random.normal(size=assembly.size)
     element = assembly.elements[-1]
@@ -245,7 +247,7 @@ def test_misalignment_is_positive_where_it_opens_the_gap_at_the_plus_z_end(grc: 
 def test_both_solvers_write_the_same_run(grc: Gearbox, tables: dict, tmp_path: Path, variant: str) -> None:
     one, two = (
         xr.load_dataset(
-            simulate(grc, variant, tables, tmp_path / s, mesh_law="table", duration=0.02, solver=s).path,
+            simulated(grc, Choice(variant, "table"), tables, tmp_path / s, duration=0.02, solver=s).path,
             engine="h5netcdf",
         )
         for s in ("compiled", "exudyn")
@@ -262,7 +264,7 @@ def test_both_solvers_write_the_same_run(grc: Gearbox, tables: dict, tmp_path: P
 
 
 def test_run_accounts_for_its_energy(grc: Gearbox, tables: dict, tmp_path: Path) -> None:
-    run = simulate(grc, "bushing", tables, tmp_path, mesh_law="table", duration=0.2)
+    run = simulate(grc, Choice("bushing", "table"), tables, tmp_path, duration=0.2)
     data = xr.load_dataset(run.path, engine="h5netcdf")
     stored = data.kinetic_energy + data.elastic_energy
     spent = data.dissipated_energy + data.work_of_varying_stiffness + data.non_conservative_work
@@ -274,24 +276,24 @@ def test_run_accounts_for_its_energy(grc: Gearbox, tables: dict, tmp_path: Path)
 def test_teeth_apart_and_tables_left_are_counted(grc: Gearbox, tables: dict, tmp_path: Path) -> None:
     """At a hundredth of the static load a torque that reverses for a moment takes the teeth apart."""
     unloaded = grc.varied({"load_cases.reference.torques_N_m": {"carrier": 0.0, "hss": 0.0}})
-    run = simulate(unloaded, "rigid", tables, tmp_path, mesh_law="table", duration=0.01)
+    run = simulate(unloaded, Choice("rigid", "table"), tables, tmp_path, duration=0.01)
     data = xr.load_dataset(run.path, engine="h5netcdf")
     assert float(data["apart_time"].min()) == pytest.approx(0.01, rel=0.05)
-    heavy = grc.varied({"load_cases.reference.torques_N_m": {"carrier": 7.2e5, "hss": -7.2e5 / grc.ratio}})
-    run = simulate(heavy, "rigid", tables, tmp_path / "heavy", mesh_law="table", duration=0.01)
+    heavy = grc.varied({"load_cases.reference.torques_N_m": {"carrier": 7.2e5, "hss": -7.2e5 / grc.train.ratio}})
+    run = simulate(heavy, Choice("rigid", "table"), tables, tmp_path / "heavy", duration=0.01)
     data = xr.load_dataset(run.path, engine="h5netcdf")
     assert float(data["outside_time"].min()) == pytest.approx(0.01, rel=0.05)
 
 
 def test_resumed_run_is_bitwise_the_whole_one(grc: Gearbox, tables: dict, tmp_path: Path) -> None:
-    whole = simulate(grc, "bushing", tables, tmp_path / "whole", mesh_law="table", duration=1.5)
+    whole = simulate(grc, Choice("bushing", "table"), tables, tmp_path / "whole", duration=1.5)
 
     def stop(progress: object) -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        simulate(grc, "bushing", tables, tmp_path / "parts", mesh_law="table", duration=1.5, progress=stop)
-    parts = simulate(grc, "bushing", tables, tmp_path / "parts", mesh_law="table", duration=1.5, resume=True)
+        simulate(grc, Choice("bushing", "table"), tables, tmp_path / "parts", duration=1.5, progress=stop)
+    parts = simulate(grc, Choice("bushing", "table"), tables, tmp_path / "parts", duration=1.5, resume=True)
     one, two = (xr.load_dataset(run.path, engine="h5netcdf") for run in (whole, parts))
     for name in ("overall_dte", "mesh_force", "misalignment", "state_q"):
         assert np.array_equal(one[name].to_numpy(), two[name].to_numpy()), name

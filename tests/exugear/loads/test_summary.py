@@ -15,7 +15,9 @@ from exugear.cli import app as cli
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.statics import accelerating_start
 from exugear.loads.summary import BURSTING_RIM_SPEED, LoadSummary, doubts_about, summarise_loads
-from exugear.model.gearbox import RPM, Gearbox
+from exugear.model.choice import Choice
+from exugear.model.gearbox import Gearbox
+from exugear.model.parts import RPM
 from exugear.model.reading import CaseError
 from exugear.runs.runup import simulate
 
@@ -58,7 +60,7 @@ def test_two_gears_accelerate_as_by_hand():
 @pytest.mark.parametrize("name", ["reference", "generating", "rated"])
 def test_the_reference_gearbox_is_loaded_as_at_the_start_of_its_runs(grc: Gearbox, stiffness: dict, name: str) -> None:
     case = grc.load_cases[name]
-    assembly = assemble(grc, "rigid", stiffness, "constant")
+    assembly = assemble(grc, Choice("rigid", "constant"), stiffness)
     start = accelerating_start(assembly, case.torques, case.start_speed)
     loads = summarise_loads(grc, case)
     rate = (loads.end_speed - loads.start_speed) / case.duration
@@ -71,10 +73,10 @@ def test_a_drive_holds_what_the_torques_do_not(grc: Gearbox, stiffness: dict) ->
     case = grc.load_cases["speed_driven"]
     loads = summarise_loads(grc, case)
     assert loads.net_torque == pytest.approx(240e3)
-    assert loads.end_speed == pytest.approx(1800.0 * RPM / grc.ratio, rel=1e-12)
+    assert loads.end_speed == pytest.approx(1800.0 * RPM / grc.train.ratio, rel=1e-12)
     half = summarise_loads(grc, case, duration=2.5)  # the ramp is the load case's; a shorter run ends on it
     assert half.end_speed == pytest.approx(0.5 * loads.end_speed, rel=1e-12)
-    assembly = assemble(grc, "rigid", stiffness, "constant")
+    assembly = assemble(grc, Choice("rigid", "constant"), stiffness)
     rate = 1800.0 * RPM / case.duration
     start = accelerating_start(assembly, case.torques, 0.0, ("hss", rate))
     forces = assembly.mesh_states(start.q, start.v)[:, 4] * [element.flank for element in assembly.elements]
@@ -94,7 +96,7 @@ def test_a_torque_series_is_integrated_and_its_flanks_are_told(tmp_path):
 def test_a_run_reaches_the_speed_that_was_told(tmp_path):
     gearbox = spur(torques_N_m={"shaft_1": 100.0, "shaft_2": 140.0}, duration_s=0.5)
     loads = summarise_loads(gearbox, gearbox.load_cases["run_up"])
-    run = simulate(gearbox, "rigid", {}, tmp_path, load_case="run_up", mesh_law="rigid")
+    run = simulate(gearbox, Choice("rigid", "rigid", load_case="run_up"), {}, tmp_path)
     data = xr.load_dataset(run.path, engine="h5netcdf")
     assert float(data.input_speed[-1]) == pytest.approx(loads.end_speed * float(data.time[-1]) / 0.5, rel=1e-9)
 
@@ -144,7 +146,7 @@ def test_check_reads_the_torque_series_too(tmp_path):
 
 
 def test_planets_count_with_their_orbits(grc: Gearbox) -> None:
-    unit = grc.rolling_speeds("carrier", 1.0)
+    unit = grc.train.rolling_speeds("carrier", 1.0)
     bodies = grc.bodies()
     spins = sum(body.axial * unit[body.name] ** 2 for body in bodies if not body.fixed)
     orbits = sum(body.mass * 0.308**2 for body in bodies if body.carrier)

@@ -14,15 +14,16 @@ import xarray as xr
 from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.modes import eigenmodes
 from exugear.dynamics.signals import energy_residual
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
 from exugear.report.writer import ReportError, write_report
 from exugear.results.folder import bodies_folder, keep_case, kept_case, modes_path, note_time, times_spent
-from exugear.runs.runup import simulate
 from exugear.tooth_mesh.stiffness import mesh_stiffness
 from exugear.tooth_mesh.tables import order_tables
 from fe_ste.tools.rendering import RenderingError
 
+from ..assembled import assembled, modes_with_bodies, simulated
 from ..spur_case import COARSE_INPUT, SPUR_CASE
 
 LAW = "line_of_action"
@@ -56,8 +57,10 @@ def results(tmp_path_factory):
         order.fill()
     stiffness = mesh_stiffness(gearbox, LAW, folder)
     for variant in ("rigid", "bushing"):
-        simulate(gearbox, variant, stiffness, folder, load_case="run_up")
-        eigenmodes(gearbox, variant, stiffness, LAW).save(modes_path(folder, variant, LAW, "disc"))
+        simulated(gearbox, Choice(variant, load_case="run_up"), stiffness, folder)
+        modes_with_bodies(gearbox, Choice(variant, LAW), stiffness).save(
+            modes_path(folder, Choice(variant, LAW, "disc"))
+        )
     note_time(folder, "a step of the test", 1.5)
     return folder
 
@@ -105,9 +108,9 @@ sections = [{ length_mm = 80.0, outer_diameter_mm = 25.0 }]
     keep_case(gearbox, tmp_path)
     kept = bodies_folder(tmp_path)
     stiffness = mesh_stiffness(gearbox, LAW, tmp_path)
-    modes = eigenmodes(gearbox, "flexible", stiffness, LAW, folder=kept)
-    modes.save(modes_path(tmp_path, "flexible", LAW, "disc"))
-    simulate(gearbox, "flexible", stiffness, tmp_path, load_case="run_up", duration=0.2)
+    modes = modes_with_bodies(gearbox, Choice("flexible", LAW), stiffness, folder=kept)
+    modes.save(modes_path(tmp_path, Choice("flexible", LAW, "disc")))
+    simulated(gearbox, Choice("flexible", load_case="run_up"), stiffness, tmp_path, duration=0.2)
     monkeypatch.setattr("exugear.bodies.of_gearbox.reduce_shaft", lambda model: pytest.fail("reduced again"))
     before = set(kept.iterdir())
     report = write_report(tmp_path, target=1000.0)
@@ -127,7 +130,7 @@ def input_hash_of(results, variant):
 def test_resonances_of_the_runs_are_eigenfrequencies(results, gearbox):
     report = write_report(results, target=1000.0)
     stiffness = mesh_stiffness(gearbox, LAW, results)
-    rigid = eigenmodes(gearbox, "rigid", stiffness, LAW).frequency[1]
+    rigid = eigenmodes(gearbox, Choice("rigid", LAW), stiffness).frequency[1]
     page = report.path.read_text(encoding="utf-8")
     # The one mode of the rigid variant shows in its run-up and is matched: its frequency stands in a cell.
     assert f">{rigid:.1f}</td>" in page
@@ -182,11 +185,12 @@ def test_the_energy_of_the_runs_is_accounted_for(results):
 
 
 def test_the_hash_tells_load_cases_variants_and_tables_apart(gearbox):
-    from exugear.dynamics.assemble import assemble
 
     stiffness = {"spur": np.array([3.0e8, 3.1e8])}
     hashes = {
-        input_hash(assemble(gearbox, variant, stiffness if soft else {"spur": np.array([3.0e8, 3.2e8])}), load_case)
+        input_hash(
+            assembled(gearbox, Choice(variant), stiffness if soft else {"spur": np.array([3.0e8, 3.2e8])}), load_case
+        )
         for variant in ("rigid", "bushing")
         for soft in (True, False)
         for load_case in (None, "run_up")

@@ -12,11 +12,13 @@ from typer.testing import CliRunner
 from exugear.cli import app as cli
 from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.modes import load_modes
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
 from exugear.results.folder import kept_case, times_spent
 from exugear.results.run_file import load_run
-from fe_ste.tools.files import FileError, write_dataset
+from fe_ste.tools.files import FileError
+from fe_ste.tools.sealed import write_dataset
 
 from ...fe_ste.damage import damages
 from ..runs.test_kills import stopped_run
@@ -120,8 +122,8 @@ def test_an_account_of_times_with_nonsense_in_it_serves_as_far_as_it_can(out: Pa
 
 
 def test_results_of_an_earlier_version_of_a_method_do_not_fit(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("exugear.results.folder.MODES", 1000)
-    monkeypatch.setattr("exugear.results.folder.RUN", 1000)
+    monkeypatch.setattr("exugear.dynamics.fingerprint.MODES", 1000)
+    monkeypatch.setattr("exugear.dynamics.fingerprint.RUN", 1000)
     outcome = exugear("report", out)
     assert outcome.exit_code == 2
     assert f"{MODES}: was computed from another input; compute it again" in outcome.stderr
@@ -143,8 +145,8 @@ def test_the_hashes_of_runs_and_modes_differ_by_their_methods(monkeypatch: pytes
 
     gearbox = Gearbox.from_toml(Path(__file__).parents[3] / "cases" / "grc750" / "gearbox.toml")
     stiffness = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
-    assembly = assemble(gearbox, "rigid", stiffness)
+    assembly = assemble(gearbox, Choice("rigid"), stiffness)
     before = input_hash(assembly), input_hash(assembly, "reference")
-    monkeypatch.setattr("exugear.results.folder.RUN", 1000)
+    monkeypatch.setattr("exugear.dynamics.fingerprint.RUN", 1000)
     assert input_hash(assembly) == before[0]
     assert input_hash(assembly, "reference") != before[1]

@@ -14,9 +14,11 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from exugear.cli import app as cli
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.results.run_file import load_run
-from exugear.runs import runup
+from exugear.runs import recorder, runup
+from exugear.runs.outcome import Progress
 from exugear.tooth_mesh.stiffness import mesh_stiffness
 from fe_ste.tools.files import FileError
 from fe_ste.transmission_error.table import MeshTable
@@ -73,19 +75,20 @@ def test_a_run_killed_at_any_write_resumes(case: Path, tmp_path: Path, solver: s
 STOPPED_LATE = """
 import json, resource, sys
 from pathlib import Path
-from exugear import runup
-from exugear.gearbox import Gearbox
-from exugear.mesh_stiffness import mesh_stiffness
+from exugear.runs import recorder, runup
+from exugear.model.choice import Choice
+from exugear.model.gearbox import Gearbox
+from exugear.tooth_mesh.stiffness import mesh_stiffness
 
 case, out, solver, room = sys.argv[1:]
 gearbox = Gearbox.from_toml(case)
-runup.FLUSH_INTERVAL = 0.01 / runup.FLUSH_FACTOR[solver]
-options = {"load_case": "run_up", "mesh_law": "iso6336", "duration": 0.1, "solver": solver}
+recorder.FLUSH_INTERVAL = 0.01 / recorder.FLUSH_FACTOR[solver]
+options = {"duration": 0.1, "solver": solver}
 stiffness = mesh_stiffness(gearbox, "iso6336")
-runup.simulate(gearbox, "rigid", stiffness, Path(out) / "whole", **options)
+runup.simulate(gearbox, Choice("rigid", "iso6336", load_case="run_up"), stiffness, Path(out) / "whole", **options)
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(room), int(room)))
 try:
-    runup.simulate(gearbox, "rigid", stiffness, Path(out), **options)
+    runup.simulate(gearbox, Choice("rigid", "iso6336", load_case="run_up"), stiffness, Path(out), **options)
 except OSError as error:
     print(json.dumps([error.filename, error.strerror]))
 """
@@ -108,11 +111,13 @@ def test_a_full_disk_loses_nothing_that_was_written(
     assert left == ([] if room == 5_000 else [f"{n:06d}.npz" for n in range(1, len(left) + 1)])
     resume = bool(left)
     gearbox = Gearbox.from_toml(case)
-    options = {"load_case": "run_up", "mesh_law": "iso6336", "duration": 0.1, "solver": solver}
+    options = {"duration": 0.1, "solver": solver}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(runup, "FLUSH_INTERVAL", 0.01 / runup.FLUSH_FACTOR[solver])
+        patch.setattr(recorder, "FLUSH_INTERVAL", 0.01 / recorder.FLUSH_FACTOR[solver])
         stiffness = mesh_stiffness(gearbox, "iso6336")
-        again = runup.simulate(gearbox, "rigid", stiffness, tmp_path, resume=resume, **options)
+        again = runup.simulate(
+            gearbox, Choice("rigid", "iso6336", load_case="run_up"), stiffness, tmp_path, resume=resume, **options
+        )
     xr.testing.assert_identical(load_run(again.path), load_run(tmp_path / "whole" / DIRECTORY / "run.nc"))
     assert [path.name for path in (tmp_path / DIRECTORY).iterdir()] == ["run.nc"]
 
@@ -163,12 +168,13 @@ def test_a_full_disk_ends_each_verb_with_a_sentence(case: Path, small_disk: Path
 SLOW = """
 import sys, time
 from pathlib import Path
-from exugear import runup
-from exugear.gearbox import Gearbox
-from exugear.mesh_stiffness import mesh_stiffness
+from exugear.runs import recorder, runup
+from exugear.model.choice import Choice
+from exugear.model.gearbox import Gearbox
+from exugear.tooth_mesh.stiffness import mesh_stiffness
 
 case, out, go = map(Path, sys.argv[1:])
-runup.FLUSH_INTERVAL = 0.0025
+recorder.FLUSH_INTERVAL = 0.0025
 
 def wait(at):
     print("begun", flush=True)
@@ -177,7 +183,7 @@ def wait(at):
 
 gearbox = Gearbox.from_toml(case)
 stiffness = mesh_stiffness(gearbox, "iso6336")
-runup.simulate(gearbox, "rigid", stiffness, out, load_case="run_up", mesh_law="iso6336", duration=0.03, progress=wait)
+runup.simulate(gearbox, Choice("rigid", "iso6336", load_case="run_up"), stiffness, out, duration=0.03, progress=wait)
 """
 
 
@@ -233,14 +239,16 @@ def stopped_run(case: Path, out: Path, **varied: float) -> Path:
     """A run that was stopped after some pieces; their folder."""
     gearbox = Gearbox.from_toml(case).varied(varied)
 
-    def fail(at: runup.Progress) -> None:
+    def fail(at: Progress) -> None:
         if at.simulated > 0.02:
             raise MemoryError
 
     with pytest.MonkeyPatch.context() as patch, pytest.raises(MemoryError):
-        patch.setattr(runup, "FLUSH_INTERVAL", 0.0015)
-        options = {"load_case": "run_up", "mesh_law": "iso6336", "duration": 0.03, "progress": fail}
-        runup.simulate(gearbox, "rigid", mesh_stiffness(gearbox, "iso6336"), out, **options)
+        patch.setattr(recorder, "FLUSH_INTERVAL", 0.0015)
+        options = {"duration": 0.03, "progress": fail}
+        runup.simulate(
+            gearbox, Choice("rigid", "iso6336", load_case="run_up"), mesh_stiffness(gearbox, "iso6336"), out, **options
+        )
     return out / DIRECTORY / "run.partial"
 
 
@@ -263,7 +271,7 @@ FILLING = """
 import sys
 from pathlib import Path
 import exugear.tooth_mesh.tables
-from exugear.gearbox import Gearbox
+from exugear.model.gearbox import Gearbox
 from tests.exugear.spur_case import COARSE_INPUT
 
 exugear.tooth_mesh.tables.TableInput = COARSE_INPUT

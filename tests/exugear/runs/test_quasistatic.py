@@ -13,6 +13,7 @@ from scipy.interpolate import CubicSpline
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.statics import locked_equilibrium
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.tooth_mesh.element import pack
 from fe_ste.transmission_error.surface import SteSurface
@@ -32,7 +33,7 @@ def at_position(assembly: Assembly, pmc: float) -> Assembly:
 def largest_error(gearbox: Gearbox, tables: dict[str, xr.Dataset], positions: int) -> float:
     """Largest relative difference of deflections from the curves at the static load, all meshes and positions."""
     surfaces = {name: SteSurface.from_table(table) for name, table in tables.items()}
-    assembly = assemble(gearbox, "rigid", surfaces, "table")
+    assembly = assemble(gearbox, Choice("rigid", "table"), surfaces)
     curves = {}
     for name, table in tables.items():
         curve = table.ste.isel(torque=FACTORS.index(1.0), centre_distance=0, misalignment=0).to_numpy()

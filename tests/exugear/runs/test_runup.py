@@ -15,14 +15,16 @@ import scipy.signal
 import xarray as xr
 
 from exugear.dynamics.signals import BALANCE_TERMS
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.named_files import Permissions
 from exugear.model.reading import CaseError
-from exugear.results.decimation import Decimator, low_pass
 from exugear.results.run_file import load_run
 from exugear.runs.outcome import Progress, RunError
 from exugear.runs.runup import simulate
 from exugear.solvers.exudyn_model.system import ExudynSystem
+
+from ..assembled import simulated
 
 
 def opened(path: Path) -> xr.Dataset:
@@ -41,7 +43,7 @@ def balance_residual(data: xr.Dataset) -> float:
 def test_work_of_the_loads_is_accounted_for(
     grc_shafts: Gearbox, stiffness: dict, tmp_path: Path, variant: str, case: str
 ) -> None:
-    run = simulate(grc_shafts, variant, stiffness, tmp_path, load_case=case, duration=0.3)
+    run = simulated(grc_shafts, Choice(variant, load_case=case), stiffness, tmp_path, duration=0.3)
     data = opened(run.path)
     # 0.1 % is asked for. Everything is accounted for, so only the quadrature of the powers is left.
     assert abs(balance_residual(data)) < 1e-6
@@ -52,28 +54,28 @@ def test_work_of_the_loads_is_accounted_for(
 def test_seed_law_shows_its_non_conservative_work(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
     # With the light damping of the case the law's unsymmetric tangent makes a bearing mode flutter.
     damped = grc.varied({"damping.bearing_time_s": 2.5e-5, "damping.mesh_time_s": 2.5e-5})
-    data = opened(simulate(damped, "bushing", stiffness, tmp_path, mesh_law="seed", duration=0.3).path)
+    data = opened(simulate(damped, Choice("bushing", "seed"), stiffness, tmp_path, duration=0.3).path)
     assert abs(balance_residual(data)) < 1e-6
     assert abs(float(data.non_conservative_work[-1])) > 1e-3
-    conservative = opened(simulate(damped, "bushing", stiffness, tmp_path, duration=0.3).path)
+    conservative = opened(simulate(damped, Choice("bushing"), stiffness, tmp_path, duration=0.3).path)
     assert abs(float(conservative.non_conservative_work[-1])) < 1e-9
 
 
 def test_run_starts_without_a_shock(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
     """Mesh forces stay at their static value while the mesh cycle hardly moves."""
-    data = opened(simulate(grc, "bushing", stiffness, tmp_path, duration=0.05).path)
+    data = opened(simulate(grc, Choice("bushing"), stiffness, tmp_path, duration=0.05).path)
     force = data.mesh_force.sel(mesh="high_speed")
     # 30 ms at 0.75 rad/s2 turn the high-speed mesh by 0.1 of a cycle; a step of load would ring by 100 %.
     assert float(np.ptp(force.to_numpy())) < 0.01 * float(force.mean())
 
 
 def test_file_carries_what_was_run_and_units(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
-    run = simulate(grc, "bushing", stiffness, tmp_path, duration=0.01)
+    run = simulate(grc, Choice("bushing"), stiffness, tmp_path, duration=0.01)
     assert run.path == tmp_path / "bushing" / "reference-line_of_action-assemblies" / "run.nc"
     data = opened(run.path)
     assert data.attrs["inertias"] == "assemblies"
     assert data.attrs["complete"] == 1
-    assert data["mesh_force"].attrs["units"] == "N"
+    assert data["mesh_force"].attrs == {"units": "N", "sign_convention": "the loaded flank pushes"}
     assert list(data.mesh.values[:2]) == ["sun_planet_1", "sun_planet_2"]
     assert data.sizes["support"] == 14
     assert np.diff(data.time) == pytest.approx(5e-5, rel=1e-9)
@@ -82,7 +84,7 @@ def test_file_carries_what_was_run_and_units(grc: Gearbox, stiffness: dict, tmp_
 
 
 def test_joint_forces_of_the_rigid_variant_balance_the_torque(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
-    data = opened(simulate(grc, "rigid", stiffness, tmp_path, duration=0.005).path)
+    data = opened(simulate(grc, Choice("rigid"), stiffness, tmp_path, duration=0.005).path)
     pin = data.support_force.sel(support="pin_1").isel(time=0)
     # First planet at +x: the pin pushes it in +y with 240 kNm / 3 / 0.308 m; 0.5 % goes into acceleration.
     assert float(pin[1]) == pytest.approx(240e3 / 3 / 0.308, rel=0.02)
@@ -94,17 +96,17 @@ def test_stopped_run_resumes_where_it_was(
     grc: Gearbox, stiffness: dict, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("exugear.runs.recorder.FLUSH_INTERVAL", 0.0025)
-    whole = opened(simulate(grc, "rigid", stiffness, tmp_path / "whole", duration=0.05).path)
+    whole = opened(simulate(grc, Choice("rigid"), stiffness, tmp_path / "whole", duration=0.05).path)
 
     def press_ctrl_c(progress: Progress) -> None:
         if progress.simulated > 0.019:
             os.kill(os.getpid(), signal.SIGINT)
 
-    stopped = simulate(grc, "rigid", stiffness, tmp_path, duration=0.05, progress=press_ctrl_c)
+    stopped = simulate(grc, Choice("rigid"), stiffness, tmp_path, duration=0.05, progress=press_ctrl_c)
     assert not stopped.complete
     assert stopped.path.name == "run.partial"
     assert 0.015 < float(opened(stopped.path).time[-1]) < 0.025
-    resumed = simulate(grc, "rigid", stiffness, tmp_path, duration=0.05, resume=True)
+    resumed = simulate(grc, Choice("rigid"), stiffness, tmp_path, duration=0.05, resume=True)
     assert resumed.complete
     assert not stopped.path.exists()
     data = opened(resumed.path)
@@ -119,10 +121,11 @@ def test_stopped_run_resumes_where_it_was(
 KILLED = """
 import os, signal, sys
 import numpy as np
-import exugear.runs.runup as runup
-from exugear.gearbox import Gearbox
+from exugear.runs import recorder, runup
+from exugear.model.choice import Choice
+from exugear.model.gearbox import Gearbox
 
-runup.FLUSH_INTERVAL = 0.005
+recorder.FLUSH_INTERVAL = 0.005
 gearbox = Gearbox.from_toml(sys.argv[1])
 stiffness = {"sun_planet": 4e9, "ring_planet": 5e9, "intermediate": 3e9, "high_speed": 2e9}
 
@@ -130,7 +133,7 @@ def kill(progress):
     if progress.simulated > 0.012:
         os.kill(os.getpid(), signal.SIGKILL)
 
-runup.simulate(gearbox, "rigid", stiffness, sys.argv[2], duration=0.05, progress=kill)
+runup.simulate(gearbox, Choice("rigid"), stiffness, sys.argv[2], duration=0.05, progress=kill)
 """
 
 
@@ -144,7 +147,7 @@ def test_a_killed_run_can_be_read(grc: Gearbox, tmp_path: Path) -> None:
 
 def test_resuming_another_run_is_refused(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
     with pytest.raises(RunError, match="no run of these choices was stopped"):
-        simulate(grc, "rigid", stiffness, tmp_path, duration=0.01, resume=True)
+        simulate(grc, Choice("rigid"), stiffness, tmp_path, duration=0.01, resume=True)
 
 
 def test_not_finite_state_stops_the_run_at_once(
@@ -160,7 +163,7 @@ def test_not_finite_state_stops_the_run_at_once(
 
     monkeypatch.setattr(ExudynSystem, "run", poisoned)
     with pytest.raises(RunError, match=r"not finite at t = 0.004.*what was reached"):
-        simulate(grc, "rigid", stiffness, tmp_path, duration=0.01, solver="exudyn")
+        simulate(grc, Choice("rigid"), stiffness, tmp_path, duration=0.01, solver="exudyn")
     partial = tmp_path / "rigid" / "reference-line_of_action-assemblies" / "run.partial"
     assert float(opened(partial).time[-1]) > 0.002
 
@@ -175,24 +178,24 @@ def test_silently_cut_step_is_detected(
 
     monkeypatch.setattr(ExudynSystem, "run", halving)
     with pytest.raises(RunError, match="cut the step"):
-        simulate(grc, "rigid", stiffness, tmp_path, duration=0.01, solver="exudyn")
+        simulate(grc, Choice("rigid"), stiffness, tmp_path, duration=0.01, solver="exudyn")
 
 
 def test_sample_rate_must_fit_the_step(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
     with pytest.raises(RunError, match="does not fit the step"):
-        simulate(grc, "rigid", stiffness, tmp_path, duration=0.01, step=2.5e-5, sample_rate=15e3)
+        simulate(grc, Choice("rigid"), stiffness, tmp_path, duration=0.01, step=2.5e-5, sample_rate=15e3)
 
 
 def test_speed_driven_run_keeps_its_speed(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
-    run = simulate(grc, "rigid", stiffness, tmp_path, load_case="speed_driven", duration=0.2)
+    run = simulate(grc, Choice("rigid", load_case="speed_driven"), stiffness, tmp_path, duration=0.2)
     speed = opened(run.path).input_speed
-    ramp = 1800 * np.pi / 30 / grc.ratio / 5.0
+    ramp = 1800 * np.pi / 30 / grc.train.ratio / 5.0
     # The drive's spring lets the train swing by a small part of the ramp.
     assert float(speed[-1]) == pytest.approx(ramp * float(speed.time[-1]), rel=2e-2)
 
 
 def test_constant_speed_run_stays_at_rated_speed(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
-    run = simulate(grc, "bushing", stiffness, tmp_path, load_case="rated", duration=0.1)
+    run = simulate(grc, Choice("bushing", load_case="rated"), stiffness, tmp_path, duration=0.1)
     speed = opened(run.path).input_speed.to_numpy()
     assert speed.mean() == pytest.approx(22.1 * np.pi / 30, rel=1e-3)  # the meshes make it sway by 0.4 %
 
@@ -202,7 +205,7 @@ def test_torque_series_from_a_file(grc: Gearbox, stiffness: dict, tmp_path: Path
     table.write_text("time_s,carrier_N_m,hss_N_m\n0,240e3,-2945.12\n0.02,240e3,-2945.12\n0.04,241e3,-2945.12\n")
     case = {"torque_series": str(table), "duration_s": 0.04}
     gearbox = replace(grc, permissions=Permissions(below=tmp_path)).varied({"load_cases.measured": case})
-    data = opened(simulate(gearbox, "rigid", stiffness, tmp_path, load_case="measured").path)
+    data = opened(simulate(gearbox, Choice("rigid", load_case="measured"), stiffness, tmp_path).path)
     assert abs(float(data.input_speed.sel(time=0.015, method="nearest"))) < 1e-5
     # The ramp of 1 kNm over 20 ms brings 10 Nm s on 5.97e3 kg m2.
     assert float(data.input_speed[-1]) == pytest.approx(10.0 / 5.97e3, rel=0.2)
@@ -223,11 +226,11 @@ def test_wrong_torque_series_is_named(grc: Gearbox, stiffness: dict, tmp_path: P
     permitted = replace(grc, permissions=Permissions(below=tmp_path))
     gearbox = permitted.varied({"load_cases.measured": {"torque_series": str(table)}})
     with pytest.raises(CaseError, match=words):
-        simulate(gearbox, "rigid", stiffness, tmp_path, load_case="measured", duration=0.01)
+        simulate(gearbox, Choice("rigid", load_case="measured"), stiffness, tmp_path, duration=0.01)
 
 
 def test_run_with_rigid_meshes(grc: Gearbox, tmp_path: Path) -> None:
-    data = opened(simulate(grc, "rigid", {}, tmp_path, mesh_law="rigid", duration=0.05).path)
+    data = opened(simulate(grc, Choice("rigid", "rigid"), {}, tmp_path, duration=0.05).path)
     assert data.sizes["mesh"] == 0
     # Nothing yields between input and output but round-off of the angles.
     assert float(np.abs(data.overall_dte).max()) < 1e-12
@@ -236,30 +239,12 @@ def test_run_with_rigid_meshes(grc: Gearbox, tmp_path: Path) -> None:
 
 def test_unknown_load_case_is_named(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
     with pytest.raises(CaseError, match="no load case 'storm'"):
-        simulate(grc, "rigid", stiffness, tmp_path, load_case="storm")
-
-
-def test_decimation_keeps_the_band_and_removes_what_would_fold() -> None:
-    time = np.arange(8000) / 40e3
-    rows = np.column_stack([np.sin(2 * np.pi * 7e3 * time), np.sin(2 * np.pi * 12.8e3 * time)])
-    decimator = Decimator(2, 2)
-    results = np.vstack([decimator.push(part)[1] for part in np.array_split(rows, 7)])
-    first = decimator.half + decimator.half % 2
-    expected = rows[first::2, 0][: len(results)]
-    assert np.abs(results[:, 0] - expected).max() < 2e-4  # passband ripple of an 80 dB design
-    assert np.abs(results[:, 1]).max() < 2e-4  # twice the 6.4 kHz mesh would fold to 7.2 kHz
-
-
-def test_low_pass_is_the_one_that_scipy_designs() -> None:
-    for factor in (2, 3, 5):
-        half = 31 * factor // 2
-        expected = scipy.signal.firwin(2 * half + 1, 1.0 / factor, window=("kaiser", 8.0))
-        assert np.abs(low_pass(factor, half) - expected).max() < 1e-15
+        simulate(grc, Choice("rigid", load_case="storm"), stiffness, tmp_path)
 
 
 def test_equal_planets_in_phase_load_the_sun_evenly(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
     """Rigid variant at speed: equal forces 120 degrees apart leave nothing on the sun at any harmonic."""
-    data = opened(simulate(grc, "rigid", stiffness, tmp_path, load_case="rated", duration=0.1).path)
+    data = opened(simulate(grc, Choice("rigid", load_case="rated"), stiffness, tmp_path, duration=0.1).path)
     force = data.mesh_force.to_numpy()[:, :3].astype(float)
     angles = 2 * np.pi * np.arange(3) / 3
     radial = np.hypot(force @ np.cos(angles), force @ np.sin(angles))
@@ -274,7 +259,7 @@ def test_mesh_frequencies_stand_out_of_the_spectrum(
     grc: Gearbox, stiffness: dict, tmp_path: Path, variant: str
 ) -> None:
     """Constant 22.1 rpm: peaks at 1.65000, 7.80952, 29.87992 Hz per rpm within the resolution of the run."""
-    data = opened(simulate(grc, variant, stiffness, tmp_path, load_case="rated", duration=3.0).path)
+    data = opened(simulated(grc, Choice(variant, load_case="rated"), stiffness, tmp_path, duration=3.0).path)
     data = data.sel(time=slice(0.5, None))
     rpm = abs(float(data.input_speed.mean())) * 30 / np.pi
     values = scipy.signal.detrend(data.overall_dte.to_numpy(), type="linear") * np.hanning(data.sizes["time"])
@@ -297,10 +282,8 @@ def test_halving_the_step_changes_6_khz_amplitudes_by_less_than_one_percent(
     gearbox = grc.varied({"load_cases.fast": case})
     amplitudes = []
     for step in (2.5e-5, 1.25e-5):
-        run = simulate(
-            gearbox, "bushing", stiffness, tmp_path / str(step), load_case="fast", duration=0.3, step=step,
-            sample_rate=40e3,
-        )  # fmt: skip
+        choice, out = Choice("bushing", load_case="fast"), tmp_path / str(step)
+        run = simulate(gearbox, choice, stiffness, out, duration=0.3, step=step, sample_rate=40e3)
         data = opened(run.path).sel(time=slice(0.1, 0.29))
         values = data.mesh_dte.sel(mesh="high_speed").to_numpy()
         window = np.hanning(values.size)

@@ -22,6 +22,7 @@ from exugear.cli import app as cli
 from exugear.dynamics.assemble import assemble
 from exugear.kernels.table_law import piece_at
 from exugear.loads.summary import summarise_loads
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.report.writer import write_report
 from exugear.results.run_file import load_run
@@ -31,6 +32,7 @@ from exugear.runs.trust import LIMITS, Judge, verdict_of
 from exugear.solvers.compiled.step import STABILITY_LIMIT, highest_rate
 from exugear.tooth_mesh.stiffness import mesh_stiffness
 
+from ..assembled import simulated
 from ..spur_case import SPUR_CASE
 
 BALANCED = "{ shaft_1 = 100.0, shaft_2 = 140.0 }"
@@ -118,7 +120,7 @@ def test_a_good_run_is_trusted(tmp_path):
 def test_parametric_instability_is_stopped_at_a_part_of_the_tooth_height(tmp_path, solver):
     gearbox = spur()
     samples = float(stiffness_of(gearbox)["spur"][0]) * (1.0 + 0.4 * np.cos(2.0 * np.pi * np.arange(50) / 50))
-    assembly = assemble(gearbox, "rigid", {"spur": samples})
+    assembly = assemble(gearbox, Choice("rigid"), {"spur": samples})
     twice = 2.0 * highest_rate(assembly) / 20 * 30 / np.pi  # mesh frequency at twice the eigenfrequency
     gearbox = gearbox.varied(
         {
@@ -127,7 +129,7 @@ def test_parametric_instability_is_stopped_at_a_part_of_the_tooth_height(tmp_pat
         }
     )
     with pytest.raises(LimitError, match=r"the teeth of mesh spur, 6.75 mm high, give way by more than 5 %") as error:
-        simulate(gearbox, "rigid", {"spur": samples}, tmp_path, load_case="run_up", duration=0.6, solver=solver)
+        simulate(gearbox, Choice("rigid", load_case="run_up"), {"spur": samples}, tmp_path, duration=0.6, solver=solver)
     assert not error.value.run.trusted
     assert verdict_of(attributes(error.value.run.path)).startswith("deflection: at t = 0.00")
 
@@ -140,18 +142,18 @@ def test_energy_that_a_coarse_step_loses_marks_the_run(tmp_path):
     near = replace(spur(), source=str(tmp_path / "spur.toml"))
     gearbox = near.varied({"load_cases.run_up": {"torque_series": "jump.csv"}})
     stiffness = stiffness_of(gearbox)
-    step = 0.92 * STABILITY_LIMIT / highest_rate(assemble(gearbox, "rigid", stiffness))
-    options = {"load_case": "run_up", "duration": 0.05}
+    step = 0.92 * STABILITY_LIMIT / highest_rate(assemble(gearbox, Choice("rigid"), stiffness))
+    options = {"duration": 0.05}
     coarse = {"step": step, "sample_rate": 1.0 / step}
     with pytest.raises(LimitError, match=r"energy: from t = .* not accounted for, up to [1-9]\d"):
-        simulate(gearbox, "rigid", stiffness, tmp_path / "coarse", **options, **coarse)
-    assert simulate(gearbox, "rigid", stiffness, tmp_path / "fine", **options).trusted
+        simulate(gearbox, Choice("rigid"), stiffness, tmp_path / "coarse", **coarse)
+    assert simulate(gearbox, Choice("rigid", load_case="run_up"), stiffness, tmp_path / "fine", **options).trusted
 
 
 def judged() -> Judge:
     """Judge of the spur case, which nothing has happened to yet."""
     gearbox = spur()
-    assembly = assemble(gearbox, "rigid", stiffness_of(gearbox))
+    assembly = assemble(gearbox, Choice("rigid"), stiffness_of(gearbox))
     return Judge(assembly, summarise_loads(gearbox, gearbox.load_cases["run_up"]))
 
 
@@ -188,16 +190,18 @@ def test_a_resumed_run_keeps_its_verdict(tmp_path, monkeypatch):
     monkeypatch.setattr("exugear.runs.recorder.FLUSH_INTERVAL", 0.0125)
     gearbox = spur(REVERSED)
     stiffness = stiffness_of(gearbox)
-    options = {"load_case": "run_up", "duration": 0.2}
-    whole = simulate(gearbox, "rigid", stiffness, tmp_path / "whole", **options)
+    options = {"duration": 0.2}
+    whole = simulate(gearbox, Choice("rigid", load_case="run_up"), stiffness, tmp_path / "whole", **options)
 
     def press_ctrl_c(progress: Progress) -> None:
         if progress.simulated > 0.09:
             os.kill(os.getpid(), signal.SIGINT)
 
-    stopped = simulate(gearbox, "rigid", stiffness, tmp_path, **options, progress=press_ctrl_c)
+    stopped = simulate(
+        gearbox, Choice("rigid", load_case="run_up"), stiffness, tmp_path, **options, progress=press_ctrl_c
+    )
     assert not stopped.complete and not stopped.trusted
-    resumed = simulate(gearbox, "rigid", stiffness, tmp_path, **options, resume=True)
+    resumed = simulate(gearbox, Choice("rigid", load_case="run_up"), stiffness, tmp_path, **options, resume=True)
     assert resumed.complete and resumed.reasons == whole.reasons != ()
     one, other = (xr.load_dataset(run.path, engine="h5netcdf") for run in (whole, resumed))
     assert one.state_judgement.identical(other.state_judgement)
@@ -206,7 +210,7 @@ def test_a_resumed_run_keeps_its_verdict(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
 def test_the_reference_gearbox_runs_far_inside_the_limits(grc, stiffness, tmp_path, variant):
-    run = simulate(grc, variant, stiffness, tmp_path, duration=0.3)
+    run = simulated(grc, Choice(variant), stiffness, tmp_path, duration=0.3)
     assert run.reasons == ()
     judged = xr.load_dataset(run.path, engine="h5netcdf").state_judgement.to_numpy()
     assert judged[0, 0] < 1e-3 * LIMITS.energy_marked
@@ -217,7 +221,7 @@ def test_the_reference_gearbox_runs_far_inside_the_limits(grc, stiffness, tmp_pa
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
 @pytest.mark.parametrize("inertias", ["assemblies", "gears"])
 def test_whole_run_ups_of_the_reference_gearbox_are_trusted(grc, stiffness, tmp_path, variant, inertias):
-    run = simulate(grc, variant, stiffness, tmp_path, inertias=inertias)
+    run = simulated(grc, Choice(variant, inertias=inertias), stiffness, tmp_path)
     data = xr.load_dataset(run.path, engine="h5netcdf")
     assert run.reasons == ()
     assert data.state_judgement.to_numpy()[0, 0] < 1e-3 * LIMITS.energy_marked
@@ -230,12 +234,14 @@ DIVERGED = """
 import sys
 import tomllib
 import numpy as np
-from exugear.assembly import assemble
-from exugear.compiled import CompiledSystem, LoadTable, Observer
-from exugear.channels import Channels
-from exugear.gearbox import Gearbox
-from exugear.kernels import add_mesh_forces
-from exugear.mesh_stiffness import mesh_stiffness
+from exugear.dynamics.assemble import assemble
+from exugear.solvers.compiled.observers import Observer
+from exugear.solvers.compiled.solver import CompiledSystem
+from exugear.solvers.loads import LoadTable
+from exugear.model.choice import Choice
+from exugear.model.gearbox import Gearbox
+from exugear.kernels.meshes import add_mesh_forces
+from exugear.tooth_mesh.stiffness import mesh_stiffness
 
 sys.path.insert(0, sys.argv[1])
 from spur_case import SPUR_CASE
@@ -250,10 +256,10 @@ for gearbox, law, data in (
     (reference, "table", surfaces(reference)),
     (wobbling, "line_of_action", {name: k * np.ones(50) for name, k in mesh_stiffness(wobbling, "iso6336").items()}),
 ):
-    assembly = assemble(gearbox, "rigid", data, law)
+    assembly = assemble(gearbox, Choice("rigid", law), data)
     rest = np.zeros(assembly.size)
     system = CompiledSystem(assembly, rest, rest, LoadTable(), 1e-6)
-    observer = Observer(Channels(assembly), LoadTable())
+    observer = Observer(assembly, LoadTable())
     sign = np.where(np.arange(assembly.size) % 2, -1.0, 1.0)
     for value in values:
         q = (value * sign)[None]
@@ -287,12 +293,12 @@ def test_a_place_that_is_no_number_falls_into_some_piece():
 def test_a_run_that_diverges_names_the_time_and_is_marked(tmp_path):
     gearbox = spur()
     stiffness = stiffness_of(gearbox)
-    assembly = assemble(gearbox, "rigid", stiffness)
+    assembly = assemble(gearbox, Choice("rigid"), stiffness)
     soft = {"spur": stiffness["spur"] * (1.0 + 0.9 * np.cos(2.0 * np.pi * np.arange(50) / 50))}
     # Chosen for the mean stiffness, the step is not stable at the peak of this one.
     step = 0.97 * STABILITY_LIMIT / highest_rate(assembly)
     with pytest.raises(RunError, match=r"not finite at t = 0\.\d+ s; .*what was reached"):
-        simulate(gearbox, "rigid", soft, tmp_path, load_case="run_up", step=step, sample_rate=1.0 / step)
+        simulate(gearbox, Choice("rigid", load_case="run_up"), soft, tmp_path, step=step, sample_rate=1.0 / step)
     assert verdict_of(attributes(next(tmp_path.rglob("run.partial")))).startswith("the state is not finite")
 
 
@@ -342,23 +348,23 @@ def test_a_motion_too_fast_to_follow_is_named_before_anything_is_allocated(tmp_p
     )
     words = r"the fastest motion, .* rad/s, is of shaft_1\.[xy] against bearing_1; step = .* steps, .*1000 are"
     with pytest.raises(ValueError, match=words):
-        simulate(stiff, "bushing", stiffness_of(stiff), tmp_path / "out", load_case="run_up")
+        simulate(stiff, Choice("bushing", load_case="run_up"), stiffness_of(stiff), tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
 def test_a_step_that_is_asked_for_is_bounded_too(tmp_path):
     gearbox = spur()
     with pytest.raises(RunError, match=r"step = 1e-12 s: 1e\+12 steps, 5e\+07 for each stored sample"):
-        simulate(gearbox, "rigid", stiffness_of(gearbox), tmp_path, load_case="run_up", step=1e-12)
+        simulate(gearbox, Choice("rigid", load_case="run_up"), stiffness_of(gearbox), tmp_path, step=1e-12)
 
 
 def test_what_a_run_writes_does_not_depend_on_its_buffers(tmp_path, monkeypatch):
     gearbox = spur()
     stiffness = stiffness_of(gearbox)
-    options = {"load_case": "run_up", "duration": 0.1}
-    plain = simulate(gearbox, "rigid", stiffness, tmp_path / "plain", **options).path
+    options = {"duration": 0.1}
+    plain = simulate(gearbox, Choice("rigid", load_case="run_up"), stiffness, tmp_path / "plain", **options).path
     monkeypatch.setattr("exugear.runs.extent.BUFFER_BYTES", 400_000)
-    small = simulate(gearbox, "rigid", stiffness, tmp_path / "small", **options).path
+    small = simulate(gearbox, Choice("rigid", load_case="run_up"), stiffness, tmp_path / "small", **options).path
     one, other = (xr.load_dataset(path, engine="h5netcdf") for path in (plain, small))
     assert one.overall_dte.identical(other.overall_dte)
     assert other.sizes["balance_time"] > one.sizes["balance_time"]  # it did write more often

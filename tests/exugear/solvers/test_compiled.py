@@ -13,20 +13,23 @@ import xarray as xr
 
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.signals import Channels
+from exugear.dynamics.signals import signal_layout
 from exugear.dynamics.statics import accelerating_start
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.results.run_file import load_run
 from exugear.runs.outcome import RunError
-from exugear.runs.recorder import _loading
 from exugear.runs.runup import simulate
-from exugear.solvers.compiled.solver import CompiledSystem, Observer, refusal
+from exugear.solvers.compiled.observers import Observer
+from exugear.solvers.compiled.solver import CompiledSystem, refusal
 from exugear.solvers.compiled.step import choose_step, highest_rate
 from exugear.solvers.exudyn_model.system import ExudynSystem, exudyn
 from exugear.solvers.loads import DriveLaw, Loading, LoadTable
 from exugear.spectra.order_cut import order_cut
 from exugear.spectra.orders import harmonics
 
+from ..assembled import assembled, simulated
+from ..plain_signals import energies_of, sampled
 from ..rounding import allowed_difference
 
 LOAD = {"carrier": 240e3, "hss": -3000.0}
@@ -40,7 +43,7 @@ def disturbed(assembly: Assembly, angle: float = 0.7) -> tuple[np.ndarray, np.nd
     q = start.q + 1e-5 * random.normal(size=assembly.size)
     v = start.v + 0.1 * random.normal(size=assembly.size)
     bodies = {body.name: body for body in assembly.bodies}
-    for name, unit in assembly.gearbox.rolling_speeds("carrier", 1.0).items():
+    for name, unit in assembly.gearbox.train.rolling_speeds("carrier", 1.0).items():
         q[assembly.spin[name]] += unit * angle
         carrier = bodies[name].carrier
         if carrier is not None and assembly.has_six(bodies[name]):
@@ -65,11 +68,11 @@ def with_full_matrices(assembly: Assembly, off_axis: float) -> Assembly:
 def assemblies(grc: Gearbox, stiffness: dict) -> Iterator[Assembly]:
     for variant in ("rigid", "bushing"):
         for law in ("line_of_action", "seed", "constant"):
-            yield assemble(grc, variant, stiffness, law)
-    yield assemble(grc, "rigid", {}, "rigid")
-    yield with_full_matrices(assemble(grc, "bushing", stiffness), off_axis=0.05)
+            yield assembled(grc, Choice(variant, law), stiffness)
+    yield assemble(grc, Choice("rigid", "rigid"), {})
+    yield with_full_matrices(assemble(grc, Choice("bushing"), stiffness), off_axis=0.05)
     heavy = grc.varied({"gravity.acceleration_m_per_s2": [0.0, -9.81, 0.0]})
-    yield assemble(heavy, "bushing", stiffness)
+    yield assemble(heavy, Choice("bushing"), stiffness)
 
 
 def test_accelerations_are_those_of_the_plain_kernels(grc: Gearbox, stiffness: dict) -> None:
@@ -84,7 +87,7 @@ def test_accelerations_are_those_of_the_plain_kernels(grc: Gearbox, stiffness: d
 
 
 def test_gears_that_only_roll_accelerate_together(grc: Gearbox) -> None:
-    assembly = assemble(grc, "rigid", {}, "rigid")
+    assembly = assemble(grc, Choice("rigid", "rigid"), {})
     rest = np.zeros(assembly.size)
     found = CompiledSystem(assembly, rest, rest, LoadTable(LOAD), STEP).accelerations()
     free = assembly.motions
@@ -94,13 +97,12 @@ def test_gears_that_only_roll_accelerate_together(grc: Gearbox) -> None:
 
 def test_signals_and_energies_are_those_of_the_plain_kernels(grc: Gearbox, stiffness: dict) -> None:
     for assembly in assemblies(grc, stiffness):
-        channels = Channels(assembly)
         states = [disturbed(assembly, angle) for angle in (0.0, 0.7)]
         q, v = (np.array(values) for values in zip(*states, strict=True))
-        signals, energies, powers = Observer(channels, LoadTable(LOAD)).observe(np.zeros(2), q, v)
-        expected = channels.sample(q, v)
+        signals, energies, powers = Observer(assembly, LoadTable(LOAD)).observe(np.zeros(2), q, v)
+        expected = sampled(assembly, q, v)
         assert np.all(np.abs(signals - expected) < allowed_difference(expected, len(assembly.mesh_names)))
-        plain = channels.energies(q, v)
+        plain = energies_of(assembly, q, v)
         # The non-conservative power is a small difference of large ones: measured by what is dissipated, too.
         scale = np.abs(plain).max(axis=0) + np.abs(plain[:, 2]).max()
         assert (np.abs(np.column_stack([energies, powers[:, 1:]]) - plain) / scale).max() < 1e-9
@@ -109,7 +111,7 @@ def test_signals_and_energies_are_those_of_the_plain_kernels(grc: Gearbox, stiff
 
 
 def test_loads_over_time_are_those_that_exudyn_gets(grc: Gearbox, stiffness: dict) -> None:
-    assembly = assemble(grc, "rigid", stiffness)
+    assembly = assemble(grc, Choice("rigid"), stiffness)
     times = np.array([0.0, 0.01, 0.015, 0.5])
     loads = LoadTable(
         constant={"carrier": 10.0},
@@ -118,7 +120,7 @@ def test_loads_over_time_are_those_that_exudyn_gets(grc: Gearbox, stiffness: dic
     )
     q, v = disturbed(assembly)
     system = CompiledSystem(assembly, q, v, loads, STEP)
-    plain = _loading(loads)
+    plain = loads.as_functions()
     for t in (0.0, 0.012, 0.3, 0.7, 0.005):  # forwards, beyond the end, and back again
         applied = plain.generalized(assembly, t, q, v)
         assert system.accelerations(t) == pytest.approx(assembly.accelerations(q, v, applied), rel=1e-12)
@@ -141,7 +143,7 @@ def exudyn_accelerations(assembly: Assembly, q: np.ndarray, v: np.ndarray) -> np
 
 @pytest.mark.parametrize("matrices", ["catalogue bearings", "coupled 6x6"])
 def test_accelerations_equal_exudyns_body_by_body(grc: Gearbox, stiffness: dict, matrices: str) -> None:
-    assembly = assemble(grc, "bushing", stiffness)
+    assembly = assemble(grc, Choice("bushing"), stiffness)
     angle = 0.7
     if matrices == "coupled 6x6":  # these hold the spins too, which only makes sense near zero
         assembly, angle = with_full_matrices(assembly, off_axis=0.0), 0.0
@@ -190,14 +192,19 @@ def dynamic_error(found: np.ndarray, expected: np.ndarray) -> float:
     return float(np.max(np.sqrt(np.mean((found - expected) ** 2, axis=0) / np.mean(dynamic**2, axis=0))))
 
 
+def errors_and_mesh_forces(assembly: Assembly) -> slice:
+    """Columns of the transmission errors, overall and of the meshes, and of the forces of the meshes."""
+    layout = signal_layout(assembly)
+    return slice(layout["overall_dte_angle"].start, layout["mesh_force"].stop)
+
+
 def assert_exudyn_agrees(grc: Gearbox, stiffness: dict, steps: int, limit: float) -> None:
     """Overall DTE, DTE and forces of the meshes from 46 rpm on: high-speed mesh at 1.4 kHz."""
-    assembly = assemble(grc, "bushing", stiffness)
+    assembly = assemble(grc, Choice("bushing"), stiffness)
     start = accelerating_start(assembly, LOAD, -4.8)
-    channels = Channels(assembly)
-    found = channels.sample(*compiled_trajectory(assembly, start.q, start.v, steps))
-    expected = channels.sample(*exudyn_trajectory(assembly, start.q, start.v, steps))
-    columns = slice(1, 2 + 2 * len(channels.mesh_names))
+    found = sampled(assembly, *compiled_trajectory(assembly, start.q, start.v, steps))
+    expected = sampled(assembly, *exudyn_trajectory(assembly, start.q, start.v, steps))
+    columns = errors_and_mesh_forces(assembly)
     assert dynamic_error(found[:, columns], expected[:, columns]) < limit
 
 
@@ -213,25 +220,24 @@ def test_bushing_variant_follows_exudyn_over_half_a_second(grc: Gearbox, stiffne
 @pytest.mark.validation
 def test_rigid_variant_follows_the_jointed_model_of_exudyn(grc: Gearbox, stiffness: dict) -> None:
     """Over 0.5 s; generalized-alpha of second order, extrapolated from two steps to none."""
-    minimal, jointed = assemble(grc, "rigid", stiffness), assemble(grc, "jointed", stiffness)
-    speed, duration, sampled = -4.8, 0.5, 5e-5
+    minimal, jointed = assemble(grc, Choice("rigid"), stiffness), assemble(grc, Choice("jointed"), stiffness)
+    speed, duration, interval = -4.8, 0.5, 5e-5
     start = accelerating_start(minimal, LOAD, speed)
-    speeds = {n: u * speed for n, u in grc.rolling_speeds("carrier", 1.0).items()}
+    speeds = {n: u * speed for n, u in grc.train.rolling_speeds("carrier", 1.0).items()}
     q = np.zeros(jointed.size)
     for name, index in jointed.spin.items():
         q[index] = start.q[minimal.spin[name]]
     v = jointed.rolling_velocity(q, speeds)
-    joint_channels, channels = Channels(jointed), Channels(minimal)
-    count = 2 + 2 * len(channels.mesh_names)
+    columns = errors_and_mesh_forces(minimal)
     coarse, fine = (
-        joint_channels.sample(*exudyn_trajectory(jointed, q, v, round(duration / step), step, round(sampled / step)))[
-            :, 1:count
+        sampled(jointed, *exudyn_trajectory(jointed, q, v, round(duration / step), step, round(interval / step)))[
+            :, columns
         ]
         for step in (1e-5, 5e-6)
     )
     expected = (4.0 * fine - coarse) / 3.0
     q, v = compiled_trajectory(minimal, start.q, start.v, round(duration / 5e-6), 5e-6)
-    found = channels.sample(q[::10], v[::10])[:, 1:count]
+    found = sampled(minimal, q[::10], v[::10])[:, columns]
     assert dynamic_error(found, expected) < 1e-3
 
 
@@ -242,7 +248,8 @@ def opened(path: Path) -> xr.Dataset:
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
 def test_repeated_runs_are_bitwise_equal(grc: Gearbox, stiffness: dict, tmp_path: Path, variant: str) -> None:
     one, two = (
-        opened(simulate(grc, variant, stiffness, tmp_path / name, duration=0.3).path) for name in ("one", "two")
+        opened(simulated(grc, Choice(variant), stiffness, tmp_path / name, duration=0.3).path)
+        for name in ("one", "two")
     )
     assert one.identical(two)
 
@@ -251,7 +258,7 @@ def test_resumed_run_is_bitwise_the_whole_one(
     grc: Gearbox, stiffness: dict, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("exugear.runs.recorder.FLUSH_INTERVAL", 0.01)
-    whole = opened(simulate(grc, "bushing", stiffness, tmp_path / "whole", duration=0.12).path)
+    whole = opened(simulate(grc, Choice("bushing"), stiffness, tmp_path / "whole", duration=0.12).path)
     plain, calls = CompiledSystem.advance, []
 
     def interrupted(self: CompiledSystem, first: int, q: np.ndarray, v: np.ndarray) -> int:
@@ -263,10 +270,10 @@ def test_resumed_run_is_bitwise_the_whole_one(
         return plain(self, first, q, v)
 
     monkeypatch.setattr(CompiledSystem, "advance", interrupted)
-    stopped = simulate(grc, "bushing", stiffness, tmp_path, duration=0.12)
+    stopped = simulate(grc, Choice("bushing"), stiffness, tmp_path, duration=0.12)
     assert not stopped.complete
     assert 0.0 < stopped.end < 0.12
-    resumed = opened(simulate(grc, "bushing", stiffness, tmp_path, duration=0.12, resume=True).path)
+    resumed = opened(simulate(grc, Choice("bushing"), stiffness, tmp_path, duration=0.12, resume=True).path)
     for name in ("time", "overall_dte", "mesh_force", "support_force", "state_q", "state_v"):
         assert np.array_equal(resumed[name], whole[name]), name
 
@@ -283,14 +290,14 @@ def test_not_finite_state_is_named_and_what_was_reached_is_kept(
 
     monkeypatch.setattr(CompiledSystem, "advance", poisoned)
     with pytest.raises(RunError, match=r"not finite at t = 0.004025 s; what was reached"):
-        simulate(grc, "rigid", stiffness, tmp_path, duration=0.01)
+        simulate(grc, Choice("rigid"), stiffness, tmp_path, duration=0.01)
     partial = tmp_path / "rigid" / "reference-line_of_action-assemblies" / "run.partial"
     assert float(opened(partial).time[-1]) == pytest.approx(0.004 - 31 * STEP, abs=2 * STEP)  # half the filter
 
 
 def test_step_follows_from_band_and_eigenfrequencies(grc: Gearbox, stiffness: dict) -> None:
-    assembly = assemble(grc, "bushing", stiffness)
-    assert choose_step(assemble(grc, "rigid", stiffness), 20e3, 6.4e3) == 2.5e-5  # excitation at 6.4 kHz
+    assembly = assemble(grc, Choice("bushing"), stiffness)
+    assert choose_step(assemble(grc, Choice("rigid"), stiffness), 20e3, 6.4e3) == 2.5e-5  # excitation at 6.4 kHz
     assert choose_step(assembly, 20e3, 6.4e3) == pytest.approx(1 / 60e3)  # resonance at 1.9 kHz
     assert choose_step(assembly, 20e3, 500.0) == 5e-5  # which is out of this band
     stiff = replace(assembly, connectors=assembly.connectors._replace(stiffness=400 * assembly.connectors.stiffness))
@@ -300,32 +307,32 @@ def test_step_follows_from_band_and_eigenfrequencies(grc: Gearbox, stiffness: di
 
 
 def test_file_tells_solver_step_and_what_it_follows_from(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
-    attributes = opened(simulate(grc, "bushing", stiffness, tmp_path, duration=0.01).path).attrs
+    attributes = opened(simulate(grc, Choice("bushing"), stiffness, tmp_path, duration=0.01).path).attrs
     assert attributes["solver"] == "compiled, RK4"
     assert attributes["step"] == pytest.approx(1 / 60e3)
     assert attributes["band"] == 6.4e3
-    assert attributes["fastest_eigenvalue"] == pytest.approx(highest_rate(assemble(grc, "bushing", stiffness)))
+    assert attributes["fastest_eigenvalue"] == pytest.approx(highest_rate(assemble(grc, Choice("bushing"), stiffness)))
 
 
 def test_unstable_step_is_refused(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
     with pytest.raises(RunError, match=r"step = 0.0005 s is not stable.*use 0.00017 s or less"):
-        simulate(grc, "bushing", stiffness, tmp_path, duration=0.03, step=5e-4, sample_rate=2e3)
+        simulate(grc, Choice("bushing"), stiffness, tmp_path, duration=0.03, step=5e-4, sample_rate=2e3)
 
 
 def test_what_it_cannot_take_is_refused_with_the_way_out(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
-    assert refusal(assemble(grc, "bushing", stiffness)) == ""
+    assert refusal(assemble(grc, Choice("bushing"), stiffness)) == ""
     with pytest.raises(RunError, match="jointed keeps ideal joints as constraints.*use --solver exudyn"):
-        simulate(grc, "jointed", stiffness, tmp_path, duration=0.01, solver="compiled")
+        simulate(grc, Choice("jointed"), stiffness, tmp_path, duration=0.01, solver="compiled")
     with pytest.raises(RunError, match="user-function loads exist in Exudyn only.*use --solver exudyn"):
-        simulate(grc, "bushing", stiffness, tmp_path, duration=0.01, solver="compiled", mesh_route="loads")
-    run = simulate(grc, "bushing", stiffness, tmp_path, duration=0.002, mesh_route="loads")
+        simulate(grc, Choice("bushing"), stiffness, tmp_path, duration=0.01, solver="compiled", mesh_route="loads")
+    run = simulate(grc, Choice("bushing"), stiffness, tmp_path, duration=0.002, mesh_route="loads")
     assert "Exudyn" in opened(run.path).attrs["solver"]
 
 
 @pytest.mark.parametrize("case", ["speed_driven", "reference"])
 def test_both_solvers_write_the_same_run(grc: Gearbox, stiffness: dict, tmp_path: Path, case: str) -> None:
     one, two = (
-        opened(simulate(grc, "rigid", stiffness, tmp_path / s, load_case=case, duration=0.02, solver=s).path)
+        opened(simulate(grc, Choice("rigid", load_case=case), stiffness, tmp_path / s, duration=0.02, solver=s).path)
         for s in ("compiled", "exudyn")
     )
     for name in ("time", "overall_dte", "mesh_force", "support_force", "input_speed", "work_of_loads"):
@@ -337,7 +344,7 @@ def test_both_solvers_write_the_same_run(grc: Gearbox, stiffness: dict, tmp_path
 
 def excitation_amplitudes(assembly: Assembly, rpm: float, step: float) -> np.ndarray:
     """Amplitudes of overall DTE and high-speed DTE at the high-speed mesh frequency, constant speed (rpm)."""
-    load = {"carrier": 240e3, "hss": -240e3 / assembly.gearbox.ratio}
+    load = {"carrier": 240e3, "hss": -240e3 / assembly.gearbox.train.ratio}
     start = accelerating_start(assembly, load, rpm * np.pi / 30.0)
     every, steps = round(2.5e-5 / step), round(0.4 / step)
     q, v = np.empty((2, steps, assembly.size))
@@ -346,8 +353,9 @@ def excitation_amplitudes(assembly: Assembly, rpm: float, step: float) -> np.nda
     element = assembly.elements[assembly.mesh_names.index("high_speed")]
     cycle = element.cycles * q[:, assembly.spin[element.mesh.pinion]]
     window = np.hanning(len(q))
-    channels = Channels(assembly)
-    values = channels.sample(q, v)[:, [1, 2 + channels.mesh_names.index("high_speed")]]
+    layout = signal_layout(assembly)
+    high_speed = layout["mesh_dte"].start + assembly.mesh_names.index("high_speed")
+    values = sampled(assembly, q, v)[:, [layout["overall_dte_angle"].start, high_speed]]
     values = values - window @ values / window.sum()
     return np.abs(2.0 * (window * np.exp(-2j * np.pi * cycle)) @ values) / window.sum()
 
@@ -358,8 +366,8 @@ def excitation_amplitudes(assembly: Assembly, rpm: float, step: float) -> np.nda
 def test_amplitude_error_of_the_chosen_step(
     grc: Gearbox, stiffness: dict, variant: str, frequency: float, limit: float
 ) -> None:
-    assembly = assemble(grc, variant, stiffness)
-    rpm = frequency / grc.mesh_frequencies(np.pi / 30.0)["high_speed"]
+    assembly = assembled(grc, Choice(variant), stiffness)
+    rpm = frequency / grc.train.mesh_frequencies(np.pi / 30.0)["high_speed"]
     found = excitation_amplitudes(assembly, rpm, choose_step(assembly, 20e3, 6.4e3))
     expected = excitation_amplitudes(assembly, rpm, 2.5e-6)
     # Under 1 % is asked for at 6.4 kHz; the method's order leaves a twentieth of that at half the frequency.
@@ -373,9 +381,9 @@ def test_order_cuts_of_the_run_up_stay_at_half_the_step(
 ) -> None:
     """30 s from rest to 215 rpm, overall DTE along the first three harmonics of each stage."""
     cuts = []
-    chosen = choose_step(assemble(grc, variant, stiffness), 20e3, 6.4e3)
+    chosen = choose_step(assembled(grc, Choice(variant), stiffness), 20e3, 6.4e3)
     for step in (chosen, chosen / 2):
-        run = simulate(grc, variant, stiffness, tmp_path / f"{step:g}", step=step)
+        run = simulated(grc, Choice(variant), stiffness, tmp_path / f"{step:g}", step=step)
         data = opened(run.path)
         rate = 1.0 / float(data.time[1] - data.time[0])
         signal = scipy.signal.sosfiltfilt(
@@ -383,7 +391,7 @@ def test_order_cuts_of_the_run_up_stay_at_half_the_step(
         )
         lines = [
             line
-            for name, order in grc.mesh_frequencies(2.0 * np.pi).items()
+            for name, order in grc.train.mesh_frequencies(2.0 * np.pi).items()
             for line in harmonics(name, order, 3)
             if line.frequency(22.5) < 8e3  # the flat part of the stored band
         ]

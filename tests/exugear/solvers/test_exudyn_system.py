@@ -12,16 +12,19 @@ from exugear.dynamics.modes import modes_of
 from exugear.dynamics.statics import StartState, accelerating_start
 from exugear.kernels.connectors import add_connector_forces
 from exugear.kernels.springs import add_spring_forces
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.solvers.exudyn_model.system import ExudynSystem
 from exugear.solvers.loads import Loading
+
+from ..assembled import assembled
 
 LOAD = {"carrier": 240e3, "hss": -3000.0}
 STEP = 2.5e-5
 
 
 def started(grc: Gearbox, stiffness: dict, variant: str, speed: float = 0.0) -> tuple[Assembly, StartState]:
-    assembly = assemble(grc, variant, stiffness)
+    assembly = assembled(grc, Choice(variant), stiffness)
     return assembly, accelerating_start(assembly, LOAD, speed)
 
 
@@ -62,7 +65,7 @@ def test_repeated_runs_are_bitwise_equal(grc: Gearbox, stiffness: dict) -> None:
 
 def test_matrices_of_exudyn_are_those_of_the_assembly(grc: Gearbox, stiffness: dict) -> None:
     """Bearings and couplings at rest, meshes left out."""
-    assembly = assemble(grc, "bushing", stiffness)
+    assembly = assemble(grc, Choice("bushing"), stiffness)
     rest = np.zeros(assembly.size)
     system = ExudynSystem(assembly, rest, rest, Loading(), with_meshes=False)
     mass, stiff, damping = system.linearised()
@@ -100,7 +103,7 @@ def test_exudyn_follows_the_assemblys_equations_of_motion(grc: Gearbox, stiffnes
 
 
 def test_joint_null_space_is_the_minimal_model(grc: Gearbox, stiffness: dict) -> None:
-    jointed, minimal = assemble(grc, "jointed", stiffness), assemble(grc, "rigid", stiffness)
+    jointed, minimal = assemble(grc, Choice("jointed"), stiffness), assemble(grc, Choice("rigid"), stiffness)
     rest = np.zeros(jointed.size)
     system = ExudynSystem(jointed, rest, rest, Loading(), with_meshes=False)
     motions, mass = system.joint_null_space()
@@ -110,7 +113,7 @@ def test_joint_null_space_is_the_minimal_model(grc: Gearbox, stiffness: dict) ->
 
 def test_jointed_model_follows_the_minimal_one(grc: Gearbox, stiffness: dict) -> None:
     minimal, start = started(grc, stiffness, "rigid")
-    jointed = assemble(grc, "jointed", stiffness)
+    jointed = assemble(grc, Choice("jointed"), stiffness)
     q, v = np.zeros(jointed.size), np.zeros(jointed.size)
     for body in jointed.bodies:
         q[jointed.spin[body.name]] = start.q[minimal.spin[body.name]]
@@ -133,7 +136,7 @@ def test_loads_route_needs_bodies(grc: Gearbox, stiffness: dict) -> None:
 
 def test_gravity_acts_on_the_masses(grc: Gearbox, stiffness: dict) -> None:
     gearbox = grc.varied({"gravity.acceleration_m_per_s2": [0.0, -9.81, 0.0]})
-    assembly = assemble(gearbox, "bushing", stiffness)
+    assembly = assemble(gearbox, Choice("bushing"), stiffness)
     rest = np.zeros(assembly.size)
     system = ExudynSystem(assembly, rest, rest, Loading(), with_meshes=False)
     step = 1e-8
@@ -150,9 +153,9 @@ def test_gravity_acts_on_the_masses(grc: Gearbox, stiffness: dict) -> None:
 
 def test_rigid_meshes_leave_the_train_and_its_couplings(grc: Gearbox) -> None:
     """Two bodies about one spring: everything geared together, and the brake behind its coupling."""
-    assembly = assemble(grc, "rigid", {}, "rigid")
+    assembly = assemble(grc, Choice("rigid", "rigid"), {})
     assert assembly.motions.shape[1] == 2
-    spins = grc.rolling_speeds("carrier", grc.rolling_speeds("hss", 1.0)["carrier"])
+    spins = grc.train.rolling_speeds("carrier", grc.train.rolling_speeds("hss", 1.0)["carrier"])
     referred = sum(assembly.mass_matrix[i, i] * spins[n] ** 2 for n, i in assembly.spin.items() if n != "brake")
     frequency = np.sqrt(1e6 * (1 / 0.39 + 1 / referred)) / (2 * np.pi)
     assert modes_of(assembly).frequency == pytest.approx([0.0, frequency], rel=1e-9)
@@ -161,4 +164,4 @@ def test_rigid_meshes_leave_the_train_and_its_couplings(grc: Gearbox) -> None:
     carrier = rows[-1, 1 + assembly.size + assembly.spin["carrier"]]
     assert carrier == pytest.approx(start.rates["carrier"] * 0.01, rel=1e-9)
     with pytest.raises(VariantError, match="needs the variant rigid"):
-        assemble(grc, "bushing", {}, "rigid")
+        assemble(grc, Choice("bushing", "rigid"), {})

@@ -22,6 +22,7 @@ from scipy.integrate import solve_ivp
 
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.loads import LoadTable
@@ -140,7 +141,7 @@ def oscillator() -> Oscillator:
     gearbox = gearbox.varied({"damping.mesh_time_s": time})
     positions = np.array([compliance(p / 50) for p in range(50)])[:, None, None, None]
     surface = SteSurface.from_nodes([0.075], [0.0], [FORCE], positions * FORCE, 1.0 / positions)
-    assembly = assemble(gearbox, "rigid", {"spur": surface}, "table")
+    assembly = assemble(gearbox, Choice("rigid", "table"), {"spur": surface})
     table = assembly.elements[0].table
     assert table is not None
     return Oscillator(assembly, mass, time, table.backlash, assembly.elements[0].phase, table.back_phase)

@@ -12,7 +12,7 @@ import xarray as xr
 from exugear.model.versions import RUN
 from exugear.spectra.orders import OrderLine
 from exugear.spectra.waterfall import waterfall
-from fe_ste.tools.files import write_dataset
+from fe_ste.tools.sealed import write_dataset
 
 RATE = 8192.0
 MESH = OrderLine("mesh", 60.0)

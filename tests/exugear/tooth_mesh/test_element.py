@@ -10,9 +10,12 @@ import pytest
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.kernels.meshes import STATE_SIZE, add_mesh_forces, mesh_state, periodic_cubic, stiffness_at
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.tooth_mesh.element import mesh_elements
 from exugear.tooth_mesh.placement import MeshError, MeshGeometry, loaded_flanks, mesh_phases
+
+from ..assembled import assembled
 
 LAWS = ["line_of_action", "seed", "constant", "iso6336"]
 RATED = 22.1 * math.pi / 30
@@ -20,7 +23,7 @@ RATED = 22.1 * math.pi / 30
 
 def rolled(assembly: Assembly, angle: float) -> np.ndarray:
     """Coordinates after the carrier has rolled through an angle, nothing deflected."""
-    spins = assembly.gearbox.rolling_speeds("carrier", angle)
+    spins = assembly.gearbox.train.rolling_speeds("carrier", angle)
     q = np.zeros(assembly.size)
     c, s = math.cos(angle), math.sin(angle)
     for body in assembly.bodies:
@@ -54,8 +57,8 @@ def states(assembly: Assembly, q: np.ndarray, v: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("law", ["line_of_action", "seed"])
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
 def test_rolling_at_rated_speed_has_no_deflection_rate(grc: Gearbox, stiffness: dict, law: str, variant: str) -> None:
-    assembly = assemble(grc, variant, stiffness, law)
-    speeds = grc.rolling_speeds("carrier", RATED)
+    assembly = assembled(grc, Choice(variant, law), stiffness)
+    speeds = grc.train.rolling_speeds("carrier", RATED)
     for angle in (0.0, 0.4, 100.0):
         q = rolled(assembly, angle)
         found = states(assembly, q, assembly.rolling_velocity(q, speeds))
@@ -65,7 +68,7 @@ def test_rolling_at_rated_speed_has_no_deflection_rate(grc: Gearbox, stiffness: 
 
 
 def test_mesh_cycle_runs_once_per_tooth(grc: Gearbox, stiffness: dict) -> None:
-    assembly = assemble(grc, "bushing", stiffness)
+    assembly = assemble(grc, Choice("bushing"), stiffness)
     start = states(assembly, rolled(assembly, 0.0), np.zeros(assembly.size))[:, 2]
     # A carrier angle of one ring tooth turns sun and ring meshes by a whole cycle.
     later = states(assembly, rolled(assembly, 2 * math.pi / 99), np.zeros(assembly.size))[:, 2]
@@ -76,7 +79,7 @@ def test_mesh_cycle_runs_once_per_tooth(grc: Gearbox, stiffness: dict) -> None:
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
 def test_jacobian_equals_finite_differences(grc: Gearbox, stiffness: dict, law: str, variant: str) -> None:
-    assembly = assemble(grc, variant, stiffness, law)
+    assembly = assembled(grc, Choice(variant, law), stiffness)
     q, v = random_state(assembly)
     jq, jv = assembly.mesh_jacobians(q, v)
     step = 1e-6
@@ -92,7 +95,7 @@ def test_jacobian_equals_finite_differences(grc: Gearbox, stiffness: dict, law: 
 
 
 def test_force_is_the_gradient_of_the_mesh_energy(grc: Gearbox, stiffness: dict) -> None:
-    assembly = assemble(grc, "bushing", stiffness, "constant")
+    assembly = assemble(grc, Choice("bushing", "constant"), stiffness)
     q, _ = random_state(assembly)
     rest = np.zeros(assembly.size)
 
@@ -108,7 +111,7 @@ def test_force_is_the_gradient_of_the_mesh_energy(grc: Gearbox, stiffness: dict)
 
 @pytest.mark.parametrize("law", ["line_of_action", "seed"])
 def test_power_into_the_bodies_is_the_mesh_power(grc: Gearbox, stiffness: dict, law: str) -> None:
-    assembly = assemble(grc, "bushing", stiffness, law)
+    assembly = assemble(grc, Choice("bushing", law), stiffness)
     q, v = random_state(assembly)
     found = states(assembly, q, v)
     power = mesh_forces(assembly, q, v) @ v
@@ -123,7 +126,7 @@ def test_power_into_the_bodies_is_the_mesh_power(grc: Gearbox, stiffness: dict, 
 @pytest.mark.parametrize("law", ["line_of_action", "seed"])
 def test_forces_and_moments_of_all_meshes_balance(grc: Gearbox, stiffness: dict, law: str) -> None:
     """Moved or turned as a whole with a turning ring, the gears gain nothing: forces are internal."""
-    assembly = assemble(grc, "bushing", stiffness, law)
+    assembly = assemble(grc, Choice("bushing", law), stiffness)
     q = rolled(assembly, 0.7) + 1e-5 * np.random.default_rng(3).normal(size=assembly.size)
     f = mesh_forces(assembly, q, np.zeros(assembly.size))
     names = ["lss", "ims", "hss", "planet_1", "planet_2", "planet_3"]

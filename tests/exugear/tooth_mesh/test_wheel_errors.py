@@ -12,6 +12,7 @@ import xarray as xr
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.statics import accelerating_start, locked_equilibrium
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
 from exugear.runs.runup import simulate
@@ -21,6 +22,7 @@ from exugear.tooth_mesh.element import pack
 from exugear.tooth_mesh.placement import MeshGeometry, loaded_flanks, tooth_places
 from exugear.tooth_mesh.wheel_errors import contact_line_shares
 
+from ..assembled import assembled
 from ..table_case import surfaces
 
 LOAD = {"carrier": 240e3}
@@ -48,7 +50,7 @@ def high_speed(assembly: Assembly) -> int:
 def deflection_at(assembly: Assembly, mesh: int, angle: float) -> float:
     """Deflection of a mesh when the train has rolled through an angle of the mesh's gear 1."""
     element = assembly.elements[mesh]
-    spins = assembly.gearbox.rolling_speeds(element.mesh.pinion, angle)
+    spins = assembly.gearbox.train.rolling_speeds(element.mesh.pinion, angle)
     q = np.zeros(assembly.size)
     for name, spin in spins.items():
         q[assembly.spin[name]] = spin
@@ -73,7 +75,7 @@ def test_a_tooth_standing_back_shows_once_a_revolution(grc: Gearbox, stiffness: 
     one = [0.0] * teeth
     one[5] = 10.0
     case = grc.varied({"deviations": {"pinion": {"body": "hss", "gear": "hs_pinion", "cumulative_pitch_um": one}}})
-    assembly = assemble(case, "rigid", stiffness)
+    assembly = assemble(case, Choice("rigid"), stiffness)
     mesh = high_speed(assembly)
     angles = 2.0 * math.pi * np.arange(teeth * 40) / (teeth * 40)
     error = -np.array([deflection_at(assembly, mesh, angle) for angle in angles])
@@ -97,7 +99,7 @@ def test_run_out_is_the_way_of_the_axis_along_the_line_of_action(grc: Gearbox, s
     case = grc.varied(
         {"deviations": {"sun": {"body": "lss", "gear": "sun", "runout_um": 60.0, "runout_angle_deg": 30.0}}}
     )
-    plain, bent = assemble(grc, "bushing", stiffness), assemble(case, "bushing", stiffness)
+    plain, bent = assemble(grc, Choice("bushing"), stiffness), assemble(case, Choice("bushing"), stiffness)
     o = plain.coordinates["lss"][0]
     for angle in (0.0, 0.7, 2.0):
         q = np.zeros(plain.size)
@@ -114,7 +116,7 @@ def test_run_out_is_the_way_of_the_axis_along_the_line_of_action(grc: Gearbox, s
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
 def test_compiled_solver_and_tangent_know_the_errors(pitched: Gearbox, stiffness: dict, law: str, variant: str) -> None:
     data = surfaces(pitched) if law == "table" else stiffness
-    assembly = assemble(pitched, variant, data, law)
+    assembly = assembled(pitched, Choice(variant, law), data)
     load = pitched.case.static_load
     q = locked_equilibrium(assembly, load.torques_N_m, load.locked)
     random = np.random.default_rng(2)
@@ -123,7 +125,7 @@ def test_compiled_solver_and_tangent_know_the_errors(pitched: Gearbox, stiffness
     expected = assembly.accelerations(q, v, assembly.torque_vector(LOAD))
     assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
     jq, _ = assembly.mesh_jacobians(q, v)
-    bare = assemble(pitched, variant, data, law)
+    bare = assembled(pitched, Choice(variant, law), data)
 
     def force(at: np.ndarray) -> np.ndarray:
         return np.asarray(bare.forces(at, v))
@@ -154,7 +156,7 @@ def test_planets_with_a_pin_out_of_place_share_as_by_hand(grc: Gearbox, stiffnes
     load = grc.case.static_load
     forces = []
     for gearbox in (grc, case):
-        assembly = assemble(gearbox, "rigid", constant, "constant")
+        assembly = assemble(gearbox, Choice("rigid", "constant"), constant)
         q = locked_equilibrium(assembly, load.torques_N_m, load.locked)
         states = dict(zip(assembly.mesh_names, assembly.mesh_states(q, 0 * q), strict=True))
         forces.append(np.array([states[f"sun_planet_{n}"][4] for n in (1, 2, 3)]))
@@ -175,7 +177,7 @@ def test_planets_with_a_pin_out_of_place_share_as_by_hand(grc: Gearbox, stiffnes
 def test_bearings_carry_a_displaced_planet_along(grc: Gearbox, stiffness: dict) -> None:
     """Unloaded and out of mesh the planet stands where its pin is."""
     case = grc.varied({"pins": {"late": {"body": "planet_2", "tangential_um": 25.0}}})
-    assembly = assemble(case, "bushing", stiffness)
+    assembly = assemble(case, Choice("bushing"), stiffness)
     x, y = case.pin_offsets["planet_2"]
     assert math.hypot(x, y) == pytest.approx(25e-6, rel=1e-12)
     q = np.zeros(assembly.size)
@@ -192,7 +194,7 @@ def test_exudyn_has_the_same_pins_and_errors(pitched: Gearbox, stiffness: dict, 
     case = pitched.varied({"pins": {"late": {"body": "planet_2", "tangential_um": 25.0, "radial_um": -5.0}}})
     one, two = (
         xr.load_dataset(
-            simulate(case, "bushing", stiffness, tmp_path / solver, duration=0.01, solver=solver).path,
+            simulate(case, Choice("bushing"), stiffness, tmp_path / solver, duration=0.01, solver=solver).path,
             engine="h5netcdf",
         )
         for solver in ("compiled", "exudyn")
@@ -211,8 +213,10 @@ def test_a_displaced_planet_gives_the_sidebands_of_its_orbit(grc: Gearbox, stiff
     speed = 20.0
     levels = []
     for gearbox in (grc, case):
-        assembly = assemble(gearbox, "bushing", {n: np.array([v.mean()]) for n, v in stiffness.items()}, "constant")
-        balanced = {"carrier": 240e3, "hss": -240e3 / gearbox.ratio}
+        assembly = assemble(
+            gearbox, Choice("bushing", "constant"), {n: np.array([v.mean()]) for n, v in stiffness.items()}
+        )
+        balanced = {"carrier": 240e3, "hss": -240e3 / gearbox.train.ratio}
         start = accelerating_start(assembly, balanced, speed)
         step = 2.0 * math.pi / speed / 16384
         q, v = np.empty((2, 16384, assembly.size))
@@ -228,7 +232,7 @@ def test_pitch_errors_put_sidebands_of_the_shaft_beside_the_mesh(pitched: Gearbo
     clean = pitched.varied({"deviations": {}})
     spectra = []
     for gearbox in (clean, pitched):
-        assembly = assemble(gearbox, "rigid", stiffness)
+        assembly = assemble(gearbox, Choice("rigid"), stiffness)
         element = assembly.elements[high_speed(assembly)]
         teeth = element.mesh.pair.pinion.teeth
         angles = 2.0 * math.pi * np.arange(teeth * 32) / (teeth * 32)

@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[3]
 #: Two workers that sleep, and more calls, too long for the pipe to the workers, that wait.
 SLEEPERS = """
 import os, signal, sys, time
-from fe_ste.workers import Workers
+from fe_ste.tools.workers import Workers
 
 def stop(*_):
     raise KeyboardInterrupt

@@ -22,7 +22,7 @@ from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.tools.workers import Workers
 from fe_ste.transmission_error.compliance import PairCompliance
-from fe_ste.transmission_error.grid import Checkpoint, SweepError, sweep_states
+from fe_ste.transmission_error.grid import Checkpoint, GridError, solve_grid
 from fe_ste.transmission_error.search import contact_state, unloaded_states
 from fe_ste.transmission_error.states import StateAxes, StateResults
 from fe_ste.transmission_error.table import MeshTable, TableError
@@ -64,7 +64,7 @@ def compliance() -> PairCompliance:
 
 @pytest.fixture(scope="module")
 def grid(compliance: PairCompliance) -> xr.Dataset:
-    return sweep_states(compliance, AXES)
+    return solve_grid(compliance, AXES)
 
 
 def test_every_state_equals_the_one_solved_alone(compliance: PairCompliance, grid: xr.Dataset) -> None:
@@ -132,14 +132,14 @@ def test_any_executor_gives_the_same_grid(compliance: PairCompliance, grid: xr.D
 
     with ThreadPoolExecutor(2) as threads:
         for executor in (Immediate(), threads):
-            same(sweep_states(compliance, AXES, executor=executor), grid)
+            same(solve_grid(compliance, AXES, executor=executor), grid)
 
 
 @pytest.mark.usefixtures("small_blocks")
 def test_processes_give_the_same_grid(compliance: PairCompliance, grid: xr.Dataset) -> None:
     seen = []
     with Workers(1) as pool:
-        data = sweep_states(compliance, AXES, executor=pool, progress=lambda done, of: seen.append((done, of)))
+        data = solve_grid(compliance, AXES, executor=pool, progress=lambda done, of: seen.append((done, of)))
     same(data, grid)
     assert seen[-1] == (54, 54)
 
@@ -157,19 +157,19 @@ def stop_after(states: int) -> Callable[[int, int], None]:
 
 
 @pytest.mark.usefixtures("small_blocks")
-def test_a_stopped_sweep_keeps_what_is_finished_and_goes_on_from_there(
+def test_a_stopped_grid_keeps_what_is_finished_and_goes_on_from_there(
     compliance: PairCompliance, grid: xr.Dataset, tmp_path: Path
 ) -> None:
     checkpoint = Checkpoint(tmp_path / "helical.partial.nc", "this input")
     with pytest.raises(Stopped):
-        sweep_states(compliance, AXES, checkpoint=checkpoint, progress=stop_after(40))
+        solve_grid(compliance, AXES, checkpoint=checkpoint, progress=stop_after(40))
     with xr.open_dataset(checkpoint.path, engine="h5netcdf") as partial:
         assert partial["solved"].values.tolist() == [1, 1, 0]
         assert np.array_equal(np.isfinite(partial["ste"]).all(("torque", "centre_distance", "misalignment")), [1, 1, 0])
     with pytest.raises(TableError):  # a part is never taken for a table
         MeshTable.open(checkpoint.path)
     counted: list[int] = []
-    rest = sweep_states(compliance, AXES, checkpoint=checkpoint, progress=lambda done, of: counted.append(done))
+    rest = solve_grid(compliance, AXES, checkpoint=checkpoint, progress=lambda done, of: counted.append(done))
     assert counted == list(range(37, 55))
     same(rest, grid)
 
@@ -200,8 +200,8 @@ def test_lost_workers_are_reported_and_finished_positions_kept(compliance: PairC
         for worker in multiprocessing.active_children():
             worker.kill()
 
-    with Workers(1) as pool, pytest.raises(SweepError, match="finished positions are kept"):
-        sweep_states(compliance, AXES, executor=pool, checkpoint=checkpoint, progress=kill)
+    with Workers(1) as pool, pytest.raises(GridError, match="finished positions are kept"):
+        solve_grid(compliance, AXES, executor=pool, checkpoint=checkpoint, progress=kill)
     assert 1 <= len(checkpoint.load(StateResults.empty(compliance, AXES.shape))) < 3
 
 

@@ -1,0 +1,60 @@
+"""Arguments and options that several verbs share."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+CaseArgument = Annotated[Path, typer.Argument(metavar="CASE.toml", help="The gearbox file.", show_default=False)]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print a summary as one JSON object.")]
+OutOption = Annotated[
+    Path | None,
+    typer.Option("--out", metavar="DIR", help="Results folder. (default: results/FOLDER-OF-THE-CASE)"),
+]
+
+
+class Variant(StrEnum):
+    """How the shafts are held: on ideal joints, on their rolling bearings, or these with elastic bodies."""
+
+    rigid = "rigid"
+    bushing = "bushing"
+    flexible = "flexible"
+
+
+class MeshLaw(StrEnum):
+    """How teeth in mesh push each other."""
+
+    rigid = "rigid"
+    constant = "constant"
+    iso6336 = "iso6336"
+    seed = "seed"
+    line_of_action = "line_of_action"
+    table = "table"
+
+
+VariantOption = Annotated[Variant, typer.Option(help="How the shafts are held.", show_default=False)]
+LawOption = Annotated[MeshLaw, typer.Option("--mesh-law", help="How teeth in mesh push each other.")]
+FilesBelowOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--files-below",
+        metavar="DIR",
+        envvar="EXUGEAR_FILES_BELOW",
+        help="A further folder that files may lie in which the gearbox file names. (default: its own alone)",
+        show_default=False,
+    ),
+]
+ScriptsOption = Annotated[
+    bool,
+    typer.Option(
+        "--allow-scripts",
+        envvar="EXUGEAR_ALLOW_SCRIPTS",
+        help="Let gmsh scripts run that the gearbox file names; they can do all that you can.",
+    ),
+]
+InertiasOption = Annotated[
+    str | None, typer.Option("--inertias", metavar="SET", help="Inertia set. (default: as the file says)")
+]

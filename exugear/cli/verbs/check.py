@@ -1,0 +1,123 @@
+"""The verb `check`: read and check a gearbox file, compute nothing."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from exugear.cli.case import read_gearbox
+from exugear.cli.console import note, print_json, print_table, say
+from exugear.cli.errors import exit_codes, model_errors
+from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption
+
+if TYPE_CHECKING:
+    from exugear.model.gearbox import Gearbox
+    from exugear.model.parts import PairSpec
+
+
+def check(case: CaseArgument, files_below: FilesBelowOption = None, as_json: JsonOption = False) -> None:
+    """Read and check a gearbox file, and sum up its load cases; compute nothing."""
+    with exit_codes():
+        from exugear.dynamics.readiness import VARIANTS, lacking, remarks
+
+        gearbox = read_gearbox(case, files_below, tell=False)
+        _tell_scripts(gearbox)
+        pairs = [_pair_summary(name, spec) for name, spec in gearbox.pairs.items()]
+        loads = _load_summaries(gearbox)
+        variants = {variant: lacking(gearbox, variant) for variant in VARIANTS}
+        if as_json:
+            summary = {"case": str(case), "name": gearbox.name, "ratio": gearbox.train.ratio, "pairs": pairs}
+            print_json({**summary, "load_cases": loads, "variants": variants, "warnings": remarks(gearbox)})
+        else:
+            say(f"{gearbox.name}: no fault found, ratio {gearbox.train.ratio:.6f}")
+            print_table("Gear pairs", [_pair_row(pair) for pair in pairs])
+            if loads:
+                title = f"Load cases, rolling at the overall input {gearbox.case.overall.input}"
+                print_table(title, [_load_row(one) for one in loads], ("loaded flanks",))
+            for variant, reason in variants.items():
+                say(f"variant {variant}: {f'not possible, {reason}' if reason else 'possible'}")
+            for line in remarks(gearbox):
+                note(f"Warning: {line}", style="yellow")
+        for one in loads:
+            for doubt in one["doubts"]:
+                note(f"load_cases.{one['load_case']}: {doubt}", style="yellow")
+
+
+def _tell_scripts(gearbox: Gearbox) -> None:
+    """Check the solids, and say which of them only a script makes."""
+    from exugear.bodies.of_gearbox import solids_of
+
+    with model_errors():
+        for key, model in solids_of(gearbox):
+            if model.mesh.is_script:
+                note(
+                    f"{key}.file = {model.mesh.path.name!r}: a gmsh script can run any command, so modes, run and "
+                    "view want --allow-scripts or EXUGEAR_ALLOW_SCRIPTS=1 for the variant flexible",
+                    style="yellow",
+                )
+
+
+def _pair_summary(name: str, spec: PairSpec) -> dict[str, Any]:
+    pair = spec.pair
+    return {
+        "pair": name,
+        "teeth": [pair.pinion.teeth, pair.gear.teeth],
+        "centre_distance_mm": 1e3 * pair.centre_distance,
+        "pressure_angle_deg": math.degrees(pair.working_pressure_angle),
+        "transverse_contact_ratio": pair.transverse_contact_ratio,
+        "overlap_ratio": pair.overlap_ratio,
+        "torque_gear_1_N_m": spec.static_torque,
+    }
+
+
+def _pair_row(pair: dict[str, Any]) -> dict[str, str]:
+    return {
+        "pair": pair["pair"],
+        "teeth": "{}/{}".format(*pair["teeth"]),
+        "centre dist.\nmm": f"{pair['centre_distance_mm']:.3f}",
+        "press. angle\ndeg": f"{pair['pressure_angle_deg']:.3f}",
+        "contact ratio\n+ overlap": f"{pair['transverse_contact_ratio']:.3f} + {pair['overlap_ratio']:.3f}",
+        "torque 1\nN m": f"{pair['torque_gear_1_N_m']:.1f}",
+    }
+
+
+def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
+    """Sum up what each load case does to the rolling train; one that no run could take is bad input."""
+    from exugear.loads.summary import doubts_about, summarise_loads
+    from exugear.model.parts import RPM
+    from exugear.runs.extent import check_duration
+
+    found = []
+    with model_errors():
+        for name, case in gearbox.load_cases.items():
+            check_duration(gearbox, case)
+            loads = summarise_loads(gearbox, case)
+            body, rim = loads.fastest_rim
+            found.append(
+                {
+                    "load_case": name,
+                    "net_torque_N_m": loads.net_torque,
+                    "driven": loads.driven,
+                    "duration_s": case.duration,
+                    "start_speed_rpm": loads.start_speed / RPM,
+                    "end_speed_rpm": loads.end_speed / RPM,
+                    "fastest_rim_m_per_s": rim,
+                    "fastest_rim_on": body,
+                    "loaded_flanks": dict(loads.flanks),
+                    "reversed_flanks": list(loads.reversed_flanks),
+                    "doubts": list(doubts_about(loads)),
+                }
+            )
+    return found
+
+
+def _load_row(summary: dict[str, Any]) -> dict[str, str]:
+    turned = summary["reversed_flanks"]
+    flanks = (f"{name} {sign}{'!' if name in turned else ''}" for name, sign in summary["loaded_flanks"].items())
+    return {
+        "load case": summary["load_case"],
+        "net torque\nN m": f"{summary['net_torque_N_m']:.6g}" + (" (driven)" if summary["driven"] else ""),
+        "end speed\nrpm": f"{summary['end_speed_rpm']:.4g}",
+        "fastest rim\nm/s": f"{summary['fastest_rim_m_per_s']:.3g}",
+        "loaded flanks": ", ".join(flanks),
+    }

@@ -1,0 +1,113 @@
+"""The verb `modes`: eigenmodes of a variant at its static load, with a Campbell diagram."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from exugear.cli.case import check_choices, read_gearbox, results_folder, time_noted
+from exugear.cli.console import note, print_json, print_table, say
+from exugear.cli.dynamics import compute_modes, label_of
+from exugear.cli.errors import exit_codes
+from exugear.cli.options import (
+    CaseArgument,
+    FilesBelowOption,
+    InertiasOption,
+    JsonOption,
+    LawOption,
+    MeshLaw,
+    OutOption,
+    ScriptsOption,
+    VariantOption,
+)
+from exugear.cli.tables import fill_missing_tables
+
+if TYPE_CHECKING:
+    from exugear.dynamics.modes import Modes
+
+
+def modes(
+    case: CaseArgument,
+    variant: VariantOption,
+    mesh_law: LawOption = MeshLaw.line_of_action,
+    inertias: InertiasOption = None,
+    out: OutOption = None,
+    files_below: FilesBelowOption = None,
+    scripts: ScriptsOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Compute the eigenmodes of a variant at its static load, with a Campbell diagram.
+
+    Tables that are missing or do not fit the case are computed first.
+    """
+    with exit_codes():
+        gearbox = read_gearbox(case, files_below, scripts)
+        check_choices(gearbox, variant, mesh_law, inertias, results_folder(case, out, make=False))
+        folder = results_folder(case, out)
+        fill_missing_tables(gearbox, folder, mesh_law)
+        with time_noted(folder, f"modes, {variant}, {inertias or gearbox.case.default_inertias}, {mesh_law}"):
+            found, path = compute_modes(gearbox, folder, variant.value, mesh_law.value, inertias)
+            picture = _draw_campbell(found, path)
+        rows = _mode_summaries(found)
+        if found.growth_rate > 0.0:
+            note(f"Unstable: disturbances grow by up to {found.growth_rate:.3g} 1/s; a run diverges", style="yellow")
+        if as_json:
+            assembly = found.assembly
+            label = {"variant": assembly.variant, "mesh_law": assembly.law, "inertias": assembly.inertias}
+            print_json({"case": str(case), **label, "modes": rows, "file": str(path), "picture": str(picture)})
+            return
+        print_table(f"Modes of {label_of(found)}", [_mode_row(row) for row in rows], ("what moves",))
+        say(f"Modes in {path}, diagram in {picture}")
+
+
+def _draw_campbell(found: Modes, path: Path) -> Path:
+    """Draw the modes that the overall transmission error sees, over the speeds of the fastest load case."""
+    from exugear.pictures.mode_diagrams import plot_campbell
+    from exugear.spectra.mode_report import mobility_shares
+    from exugear.spectra.orders import order_lines
+
+    gearbox, least = found.assembly.gearbox, 1e-3
+    shares = mobility_shares(found.to_dataset())
+    seen = (found.frequency > 0.0) & (shares >= least)
+    highest = max(gearbox.train.mesh_frequencies(1.0).values())
+    top = 1.1 * float(max(found.frequency[seen], default=1.0))
+    picture = path.with_name("campbell.png")
+    plot_campbell(
+        found.frequency[seen],
+        order_lines(gearbox),
+        top / highest,
+        picture,
+        weights=(shares[seen] / shares.max()) ** 0.5,
+        highest_frequency=top,
+        title=f"{label_of(found)}: modes with a share over {100 * least:g} %",
+    )
+    return picture
+
+
+def _mode_summaries(found: Modes) -> list[dict[str, Any]]:
+    from exugear.spectra.mode_report import report_mode
+
+    data = found.to_dataset()
+    reports = [report_mode(data, place) for place in range(len(found.names))]
+    return [
+        {
+            "mode": mode.index + 1,
+            "frequency_Hz": mode.frequency,
+            "damping_ratio": mode.damping_ratio,
+            "share_of_overall_dte": mode.share,
+            "amplification": mode.amplification,
+            "name": mode.name,
+        }
+        for mode in reports
+    ]
+
+
+def _mode_row(summary: dict[str, Any]) -> dict[str, str]:
+    return {
+        "no.": str(summary["mode"]),
+        "Hz": f"{summary['frequency_Hz']:.1f}",
+        "damping\n%": f"{100 * summary['damping_ratio']:.2f}",
+        "DTE share\n%": f"{100 * summary['share_of_overall_dte']:.2f}",
+        "amplif.": f"{summary['amplification']:.2f}",
+        "what moves": summary["name"],
+    }

@@ -1,0 +1,64 @@
+"""The verb `report`: one web page of a results folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from exugear.cli.case import check_files_below, time_noted
+from exugear.cli.console import note, print_json, print_table, progress_bar, say
+from exugear.cli.errors import BadInputError, exit_codes
+from exugear.cli.options import FilesBelowOption, JsonOption
+
+
+def report(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Results folder.", show_default=False)],
+    near: Annotated[
+        float | None,
+        typer.Option(min=1.0, metavar="HZ", help="Frequency to look for modes at. (default: as the case says)"),
+    ] = None,
+    files_below: FilesBelowOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Write a report of a results folder: one web page with pictures, tables, assumptions, and where time went.
+
+    Compares the variants whose runs and modes are there. gmsh scripts never run: what they would make must be there.
+    """
+    with exit_codes():
+        from exugear.model.reading import CaseError
+        from exugear.report.writer import ReportError, write_report
+
+        check_files_below(files_below)
+        if not folder.is_dir():
+            raise BadInputError(f"{folder}: no such folder; name the one that `exugear run` wrote into")
+        try:
+            with time_noted(folder, "report"), progress_bar() as bar:
+                task = bar.add_task("report", total=None)
+                written = write_report(folder, near, lambda what: bar.update(task, description=what), files_below)
+        except (CaseError, ReportError) as error:
+            raise BadInputError(error) from error
+        _tell_report(folder, written.path, written.statements, written.left_out, as_json)
+
+
+def _tell_report(
+    folder: Path, path: Path, statements: tuple[str, ...], left_out: tuple[str, ...], as_json: bool
+) -> None:
+    from exugear.results.folder import times_spent
+
+    spent = times_spent(folder)
+    for line in left_out:
+        note(f"Left out: {line}", style="yellow")
+    if as_json:
+        times = {entry.step: entry.seconds for entry in spent}
+        print_json({"report": str(path), "statements": list(statements), "left_out": list(left_out), "seconds": times})
+        return
+    for line in statements:
+        say(f"- {line}")
+    rows = [
+        {"step": entry.step, "wall s": f"{entry.seconds:.1f}", "peak MB": f"{1e-6 * entry.memory:.0f}"}
+        for entry in spent
+    ]
+    print_table("Where the time went, the last time of each step (steps side by side overlap)", rows, ("step",))
+    say(f"Report: {path}")

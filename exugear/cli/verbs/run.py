@@ -1,0 +1,285 @@
+"""The verb `run`: a load case in time."""
+
+from __future__ import annotations
+
+import math
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from exugear.cli.case import check_choices, read_gearbox, results_folder, time_noted
+from exugear.cli.console import note, print_json, progress_bar, say
+from exugear.cli.dynamics import reduce_elastic_bodies
+from exugear.cli.errors import (
+    BadInputError,
+    FailedError,
+    StoppedError,
+    exit_codes,
+    interruption,
+    model_errors,
+)
+from exugear.cli.options import (
+    CaseArgument,
+    FilesBelowOption,
+    InertiasOption,
+    JsonOption,
+    LawOption,
+    MeshLaw,
+    OutOption,
+    ScriptsOption,
+    Variant,
+    VariantOption,
+)
+from exugear.cli.tables import fill_missing_tables
+
+if TYPE_CHECKING:
+    from exugear.model.gearbox import Gearbox
+    from exugear.runs.outcome import Progress as RunProgress
+    from exugear.runs.outcome import Run
+
+
+class Solver(StrEnum):
+    """What integrates: the compiled loop, or Exudyn as the model of record."""
+
+    compiled = "compiled"
+    exudyn = "exudyn"
+
+
+class MeshRoute(StrEnum):
+    """How forces of meshes enter Exudyn: by one element for all, or by a load with a user function on each gear."""
+
+    element = "element"
+    loads = "loads"
+
+
+def run(
+    case: CaseArgument,
+    variant: VariantOption,
+    mesh_law: LawOption = MeshLaw.line_of_action,
+    inertias: InertiasOption = None,
+    load_case: Annotated[
+        str | None, typer.Option("--load-case", metavar="NAME", help="Load case. (default: the first of the file)")
+    ] = None,
+    solver: Annotated[Solver, typer.Option(help="What integrates.")] = Solver.compiled,
+    mesh_route: Annotated[
+        MeshRoute,
+        typer.Option(
+            "--mesh-route",
+            help="How mesh forces enter Exudyn; loads is its textbook way, slow, with the variant bushing.",
+        ),
+    ] = MeshRoute.element,
+    duration: Annotated[
+        float | None, typer.Option(metavar="S", help="Simulated time, s. (default: the load case's)")
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with a run that was stopped.")] = False,
+    out: OutOption = None,
+    files_below: FilesBelowOption = None,
+    scripts: ScriptsOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Run a load case in time; results are written while it goes on.
+
+    Ctrl-C keeps what was reached. Tables that are missing or do not fit the case are computed first.
+    """
+    with exit_codes():
+        from exugear.model.choice import Choice
+        from exugear.runs.run_folder import refuse_if_busy, refuse_to_resume, run_directory
+
+        gearbox = read_gearbox(case, files_below, scripts)
+        loads = load_case or next(iter(gearbox.load_cases), "")
+        check_choices(gearbox, variant, mesh_law, inertias, results_folder(case, out, make=False), loads)
+        _check_freedom(gearbox)
+        _check_extent(gearbox, variant, mesh_law, loads, duration, out or Path("results"))
+        _check_solver(gearbox, variant, solver)
+        _check_mesh_route(mesh_route, variant, solver)
+        inertias = inertias or gearbox.case.default_inertias
+        folder = results_folder(case, out, make=not resume)
+        directory = run_directory(folder, Choice(variant.value, mesh_law.value, inertias, loads))
+        refuse_if_busy(directory)
+        if resume and (reason := refuse_to_resume(directory)):
+            raise BadInputError(f"--resume: {reason}; run without it")
+        _tell_doubts(gearbox, loads)
+        fill_missing_tables(gearbox, folder, mesh_law)
+        route = ", meshes as loads" if mesh_route is MeshRoute.loads else ""
+        with time_noted(folder, f"run, {variant}, {loads}, {inertias}, {mesh_law}, solver {solver}{route}"):
+            finished = _simulate(
+                gearbox,
+                folder,
+                variant.value,
+                mesh_law.value,
+                inertias,
+                loads,
+                solver.value,
+                mesh_route.value,
+                duration,
+                resume,
+            )
+        _tell_run(case, finished, as_json)
+
+
+def _check_extent(
+    gearbox: Gearbox, variant: Variant, law: MeshLaw, load_case: str, duration: float | None, folder: Path
+) -> None:
+    """Refuse a simulated time that is too short, or whose results do not fit on the disk."""
+    from exugear.runs.extent import check_disk, check_duration, sample_bytes
+
+    supports = gearbox.joints if variant is Variant.rigid else gearbox.bearings
+    size = sample_bytes(len(gearbox.meshes), len(supports), law is MeshLaw.table)
+    with model_errors():
+        check_duration(gearbox, gearbox.load_cases[load_case], duration)
+        check_disk(gearbox, gearbox.load_cases[load_case], folder, duration, sample_bytes=size)
+
+
+def _check_solver(gearbox: Gearbox, variant: Variant, solver: Solver) -> None:
+    """Refuse a solver that cannot run what the file asks for, before anything is computed."""
+    floating = [name for name, body in gearbox.case.bodies.items() if body.flexibility == "ffrf"]
+    if variant is Variant.flexible and solver is Solver.compiled and floating:
+        raise BadInputError(
+            f"--solver compiled: bodies.{floating[0]}.flexibility = 'ffrf' runs in Exudyn only; "
+            "add --solver exudyn, or choose 'nonrotating'"
+        )
+
+
+def _check_mesh_route(route: MeshRoute, variant: Variant, solver: Solver) -> None:
+    """Refuse loads on bodies where there are no loads, or no rigid bodies, before anything is computed."""
+    if route is MeshRoute.element:
+        return
+    if variant is not Variant.bushing:
+        why = "has no bodies, only their spins" if variant is Variant.rigid else "has elastic bodies"
+        raise BadInputError(
+            f"--mesh-route loads: its loads act on rigid bodies, and the variant {variant} {why}; "
+            "take --variant bushing, or --mesh-route element"
+        )
+    if solver is not Solver.exudyn:
+        raise BadInputError(
+            f"--mesh-route loads: loads with user functions exist in Exudyn only, not in the solver {solver}; "
+            "add --solver exudyn"
+        )
+
+
+def _check_freedom(gearbox: Gearbox) -> None:
+    """Refuse to run a train whose speeds do not follow from one of them."""
+    freedoms = gearbox.train.degrees_of_freedom
+    if freedoms > 1:
+        raise BadInputError(
+            f"{gearbox.source}: the gear train has {freedoms} degrees of freedom, and its runs do not work yet; "
+            "fix a body (fixed = true) or couple two, or take `exugear modes`"
+        )
+
+
+def _tell_doubts(gearbox: Gearbox, load_case: str) -> None:
+    """Say what looks like the wrong sign of a torque."""
+    from exugear.loads.summary import doubts_about, summarise_loads
+
+    with model_errors():
+        doubts = doubts_about(summarise_loads(gearbox, gearbox.load_cases[load_case]))
+    for doubt in doubts:
+        note(f"load_cases.{load_case}: {doubt}", style="yellow")
+
+
+def _simulate(
+    gearbox: Gearbox,
+    folder: Path,
+    variant: str,
+    law: str,
+    inertias: str,
+    load_case: str,
+    solver: Literal["compiled", "exudyn"],
+    mesh_route: Literal["element", "loads"],
+    duration: float | None,
+    resume: bool,
+) -> Run:
+    """Run a load case behind a progress bar."""
+    from exugear.model.choice import Choice
+    from exugear.runs.outcome import LimitError, RunError
+    from exugear.runs.run_folder import refuse_to_resume, run_directory
+    from exugear.runs.runup import simulate
+    from exugear.tooth_mesh.stiffness import mesh_stiffness
+
+    choice = Choice(variant, law, inertias, load_case)
+    directory = run_directory(folder, choice)
+    if not resume and not refuse_to_resume(directory):
+        note(f"{directory}: a stopped run is begun anew; --resume would have gone on from it")
+    bodies = reduce_elastic_bodies(gearbox, folder, variant, inertias)
+    with progress_bar() as bar:
+        task = bar.add_task(f"{variant}: start in balance", total=None)
+
+        def show(at: RunProgress) -> None:
+            interruption.check()
+            text = f"{variant}: {at.simulated:.2f} of {at.total:g} s, {at.speed:.2f} simulated s per s"
+            bar.update(task, completed=at.simulated, total=at.total, description=text)
+
+        try:
+            with model_errors():
+                return simulate(
+                    gearbox,
+                    choice,
+                    mesh_stiffness(gearbox, law, folder),
+                    folder,
+                    bodies=bodies,
+                    duration=duration,
+                    solver=solver,
+                    mesh_route=mesh_route,
+                    resume=resume,
+                    progress=show,
+                )
+        except LimitError as error:
+            return error.run
+        except RunError as error:
+            raise FailedError(error) from error
+        except KeyboardInterrupt:
+            if refuse_to_resume(directory):
+                raise
+            raise StoppedError(f"kept in {directory}, --resume goes on from there") from None
+
+
+def _tell_run(case: Path, finished: Run, as_json: bool) -> None:
+    """Print what a run reached; end with 130 if the user stopped it, with 1 if it is not to be trusted."""
+    if not finished.complete and not finished.halted:
+        so_far = "".join(f"\nNot to be trusted so far: {reason}" for reason in finished.reasons)
+        raise StoppedError(f"at {finished.end:.3f} s; kept in {finished.path}, --resume goes on from there{so_far}")
+    from exugear.dynamics.signals import BALANCE_TERMS, MESH_TIMES, energy_residual
+    from exugear.model.parts import RPM
+    from exugear.results.run_file import load_run
+
+    data = load_run(finished.path, ("input_speed", *MESH_TIMES, *BALANCE_TERMS))
+    outside = float(data["outside_time"].max())
+    summary = {
+        "case": str(case),
+        **{key: str(data.attrs[key]) for key in ("variant", "load_case", "mesh_law", "inertias", "solver")},
+        "file": str(finished.path),
+        "simulated_s": finished.end,
+        "wall_s": round(finished.wall, 2),
+        "input_speed_rpm": float(data["input_speed"][-1]) / RPM,
+        "energy_not_accounted_for": energy_residual(data),
+        "longest_pull_of_a_mesh_s": float(data["pulling_time"].max()),
+        "longest_time_apart_s": float(data["apart_time"].max()),
+        "longest_time_outside_table_s": outside,
+        "complete": finished.complete,
+        "trusted": finished.trusted,
+        "reasons": list(finished.reasons),
+    }
+    if as_json:
+        unknown = {key for key, value in summary.items() if isinstance(value, float) and not math.isfinite(value)}
+        print_json({key: None if key in unknown else value for key, value in summary.items()})
+    else:
+        _print_run(summary, outside)
+    if not finished.trusted:
+        what = "the run is" if finished.complete else f"the run was stopped at {finished.end:.4g} s and is"
+        raise FailedError("\n".join([f"{what} not to be trusted:", *finished.reasons, f"It is in {finished.path}"]))
+
+
+def _print_run(summary: dict[str, Any], outside: float) -> None:
+    say(
+        f"{summary['variant']}, {summary['load_case']}, law {summary['mesh_law']}, inertias {summary['inertias']}: "
+        f"{summary['simulated_s']:g} s simulated in {summary['wall_s']:.1f} s ({summary['solver']}), "
+        f"{summary['input_speed_rpm']:.1f} rpm reached"
+    )
+    if outside > 0.0:
+        say(
+            f"A mesh was outside its table for {outside:.3g} s, where the table goes on in a straight line: "
+            "outside_time in the results names the mesh; widen the axes of [ste]"
+        )
+    say(f"Results in {summary['file']}")

@@ -1,0 +1,218 @@
+"""The verb `ste`: tables of the static transmission error, with pictures."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from exugear.cli.case import make_results_folder, read_gearbox, time_noted
+from exugear.cli.console import note, print_json, print_table, progress_bar, say
+from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption
+from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption, OutOption
+from exugear.cli.tables import fill_tables
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
+
+    from exugear.model.gearbox import Gearbox
+    from exugear.tooth_mesh.reference_tables import ReferenceOrder
+    from exugear.tooth_mesh.tables import TableOrder
+    from fe_ste.reference.newton import Iteration
+    from fe_ste.reference.table import NonlinearTable
+    from fe_ste.transmission_error.table import MeshTable
+
+#: Fewer positions of the mesh cycle would not show the harmonics that dynamics ask of a table.
+LEAST_TABLE_POSITIONS = 8
+
+
+class Method(StrEnum):
+    """How the teeth deflect: by condensed finite elements, or by the full non-linear analysis they are checked by."""
+
+    superelement = "superelement"
+    nonlinear = "nonlinear"
+
+
+def ste(
+    case: CaseArgument,
+    mesh: Annotated[
+        list[str] | None,
+        typer.Option("--mesh", metavar="NAME", help="Gear pair to compute; repeatable. (default: all)"),
+    ] = None,
+    positions: Annotated[
+        int | None,
+        typer.Option(
+            min=1, max=2000, help="Positions of the mesh cycle. (default: as the file says, 50; nonlinear: 10)"
+        ),
+    ] = None,
+    method: Annotated[
+        Method | None,
+        typer.Option(
+            help="How the teeth deflect; nonlinear takes a minute or two a position. (default: as the file says)"
+        ),
+    ] = None,
+    grid: Annotated[
+        bool,
+        typer.Option("--grid", help="Over load, centre distance and misalignment too, with the axes of the file."),
+    ] = False,
+    out: OutOption = None,
+    files_below: FilesBelowOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Compute the static transmission error of the gear pairs, with pictures.
+
+    Tables already there are kept if they were computed from the same input. Those of the method nonlinear lie beside
+    the others and serve to check them; dynamics do not use them.
+    """
+    with exit_codes():
+        from exugear.pictures.tables import draw_curves
+        from exugear.tooth_mesh.tables import stored_tables
+
+        gearbox = read_gearbox(case, files_below)
+        if (method or Method(gearbox.ste.method)) is Method.nonlinear:
+            if grid:
+                raise BadInputError("--grid: the method nonlinear computes the static state alone; leave --grid out")
+            _compute_references(gearbox, case, out, mesh or [], positions, as_json)
+            return
+        if positions is not None and positions < LEAST_TABLE_POSITIONS:
+            raise BadInputError(f"--positions {positions}: a table for dynamics needs at least {LEAST_TABLE_POSITIONS}")
+        orders, folder = _order_tables(gearbox, case, out, mesh or [], positions, grid)
+        with time_noted(folder, "tables of transmission error"):
+            tables = fill_tables(orders)
+        with time_noted(folder, "pictures of the tables"):
+            beside = stored_tables(gearbox, folder, positions)
+            pictures = draw_curves({**beside, **tables}, folder) + _draw_contacts(orders, tables, folder)
+        _tell_tables(case, folder, orders, tables, pictures, as_json)
+
+
+def _order_tables(
+    gearbox: Gearbox, case: Path, out: Path | None, names: list[str], positions: int | None, grid: bool
+) -> tuple[list[TableOrder], Path]:
+    from exugear.model.reading import CaseError
+    from exugear.results.folder import keep_case
+    from exugear.tooth_mesh.tables import order_tables
+
+    folder = out or Path("results") / case.resolve().parent.name
+    try:
+        orders = order_tables(gearbox, folder, names, positions, grid)
+    except CaseError as error:
+        raise BadInputError(error) from error
+    make_results_folder(folder)
+    keep_case(gearbox, folder)
+    for order in orders:
+        if order.stored:
+            note(f"{order.name}: kept {order.path}, computed from the same input")
+        elif order.replaces:
+            note(order.replaces)
+    return orders, folder
+
+
+def _compute_references(
+    gearbox: Gearbox, case: Path, out: Path | None, names: list[str], positions: int | None, as_json: bool
+) -> None:
+    """Run the reference analysis of the pairs and report; each position is kept as soon as it is solved."""
+    from exugear.model.reading import CaseError
+    from exugear.results.folder import keep_case
+    from exugear.tooth_mesh.reference_tables import order_references, summarise_reference
+
+    folder = out or Path("results") / case.resolve().parent.name
+    try:
+        orders = order_references(gearbox, folder, names, positions)
+    except CaseError as error:
+        raise BadInputError(error) from error
+    make_results_folder(folder)
+    keep_case(gearbox, folder)
+    tables = {}
+    with time_noted(folder, "reference analysis"), progress_bar() as bar:
+        task = bar.add_task("", total=sum(order.wanted.positions for order in orders))
+        for order in orders:
+            tables[order.name] = _fill_reference(order, bar, task)
+    summaries = [summarise_reference(order, tables[order.name]) for order in orders]
+    if as_json:
+        print_json({"case": str(case), "tables": summaries})
+    else:
+        print_table("Static transmission error, non-linear finite elements", [_ste_row(row) for row in summaries])
+        say(f"Tables in {folder / 'tables'}")
+    failures = [f"{name}: {line}" for name, table in tables.items() for line in table.failures]
+    if failures:
+        raise FailedError("\n".join(["positions that are not solved:", *failures]))
+
+
+def _fill_reference(order: ReferenceOrder, bar: Progress, task: TaskID) -> NonlinearTable:
+    from fe_ste.geometry.checks import GeometryError
+
+    before = bar.tasks[task].completed
+
+    def at_iteration(done: int, of: int, iteration: Iteration | None) -> None:
+        interruption.check()
+        text = f"{order.name}: {done} of {of} positions"
+        if iteration is not None:
+            text += f", {100 * iteration.load:.3g} % of the load, iteration {iteration.number}"
+        bar.update(task, completed=before + done, description=text)
+
+    try:
+        return order.fill(at_iteration)
+    except GeometryError as error:
+        raise BadInputError(f"pairs.{order.name}: {error}") from error
+
+
+def _draw_contacts(orders: list[TableOrder], tables: dict[str, MeshTable], folder: Path) -> list[Path]:
+    """Draw the teeth in contact where the picture is missing or the table is new; return all such pictures."""
+    from exugear.pictures.tables import contact_picture, draw_contact
+    from fe_ste.contact.kinematics import ContactError
+    from fe_ste.tools.rendering import RenderingError
+
+    pictures: list[Path] = []
+    with progress_bar() as bar:
+        for order in bar.track(orders, description="pictures of the teeth"):
+            path = contact_picture(order.name, folder)
+            try:
+                if not (order.stored and path.exists()):
+                    draw_contact(order, tables[order.name], folder)
+            except ContactError as error:
+                note(f"No picture of the teeth of {order.name}: {error}", style="yellow")
+                continue
+            except RenderingError as error:
+                note(f"No pictures of the teeth: {error}", style="yellow")
+                break
+            pictures.append(path)
+    return pictures
+
+
+def _tell_tables(
+    case: Path,
+    folder: Path,
+    orders: list[TableOrder],
+    tables: dict[str, MeshTable],
+    pictures: list[Path],
+    as_json: bool,
+) -> None:
+    from exugear.tooth_mesh.tables import summarise
+
+    summaries = [summarise(order, tables[order.name]) for order in orders]
+    if as_json:
+        print_json({"case": str(case), "tables": summaries, "pictures": [str(path) for path in pictures]})
+    else:
+        print_table("Static transmission error", [_ste_row(summary) for summary in summaries])
+        say(f"Tables in {folder / 'tables'}, pictures in {folder / 'pictures'}")
+    failures = [f"{name}: {line}" for name, table in tables.items() for line in table.failures]
+    if failures:
+        raise FailedError("\n".join(["positions that are not solved:", *failures]))
+
+
+def _ste_row(summary: dict[str, Any]) -> dict[str, str]:
+    def shown(key: str, form: str, factor: float = 1.0) -> str:
+        return "-" if summary[key] is None else format(factor * summary[key], form)
+
+    solved = summary["states"] - summary["not_converged"]
+    return {
+        "pair": summary["pair"],
+        "torque 1\nN m": shown("torque_gear_1_N_m", ".1f"),
+        "mean\nµm": shown("ste_mean_um", ".2f"),
+        "peak-peak\nµm": shown("ste_peak_to_peak_um", ".3f"),
+        "stiffness\nMN/m": shown("mesh_stiffness_mean_N_per_m", ".1f", 1e-6),
+        "pressure\nMPa": shown("max_pressure_MPa", ".0f"),
+        "states\nsolved": f"{solved}/{summary['states']}",
+    }

@@ -1,0 +1,106 @@
+"""The verb `view`: the gearbox and its modes in three dimensions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from exugear.cli.case import check_choices, read_gearbox, results_folder
+from exugear.cli.console import note, print_json, say
+from exugear.cli.dynamics import compute_modes, label_of
+from exugear.cli.errors import BadInputError, exit_codes
+from exugear.cli.options import (
+    CaseArgument,
+    FilesBelowOption,
+    InertiasOption,
+    JsonOption,
+    LawOption,
+    MeshLaw,
+    OutOption,
+    ScriptsOption,
+    Variant,
+)
+from exugear.cli.tables import fill_missing_tables
+
+if TYPE_CHECKING:
+    from exugear.dynamics.modes import Modes
+
+
+def view(
+    case: CaseArgument,
+    variant: Annotated[Variant, typer.Option(help="How the shafts are held.")] = Variant.bushing,
+    mesh_law: LawOption = MeshLaw.line_of_action,
+    inertias: InertiasOption = None,
+    near: Annotated[
+        float | None,
+        typer.Option(
+            min=0.0, metavar="HZ", help="Frequency whose nearest mode is shown first. (default: as the file says)"
+        ),
+    ] = None,
+    animation: Annotated[bool, typer.Option("--gif", help="Write that mode as an animated picture, too.")] = False,
+    out: OutOption = None,
+    files_below: FilesBelowOption = None,
+    scripts: ScriptsOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Show the gearbox and its modes in three dimensions: a web page that stands alone, and pictures."""
+    with exit_codes():
+        gearbox = read_gearbox(case, files_below, scripts)
+        check_choices(gearbox, variant, mesh_law, inertias, results_folder(case, out, make=False))
+        folder = results_folder(case, out)
+        fill_missing_tables(gearbox, folder, mesh_law)
+        found, path = compute_modes(gearbox, folder, variant.value, mesh_law.value, inertias)
+        wanted = gearbox.case.report.reference_frequency_Hz if near is None else near
+        first = int(found.overall.argmax()) if wanted is None else found.nearest(wanted)
+        written = _draw_modes(found, path.parent, first, animation)
+        if as_json:
+            print_json({"case": str(case), "mode": first + 1, "files": [str(file) for file in written]})
+            return
+        for file in written:
+            say(str(file))
+
+
+def _draw_modes(found: Modes, folder: Path, first: int, animation: bool) -> list[Path]:
+    """Write the page of all elastic modes, and pictures of the gearbox and one mode if this machine can render."""
+    from exugear.pictures.elastic_scene import animate_elastic_bodies, draw_elastic_bodies, elastic_scene
+    from exugear.pictures.motions import mode_scene, motions_of
+    from exugear.pictures.scene import animate_mode, draw_gearbox, draw_mode
+    from exugear.pictures.shapes import bodies_of
+    from exugear.pictures.viewer import write_mode_page
+    from fe_ste.tools.rendering import RenderingError
+
+    assembly = found.assembly
+    bodies = bodies_of(assembly.gearbox)
+    drawn = {body.name for body in bodies}
+    scenes = {}
+    for place, name in enumerate(found.names):
+        motions = motions_of(assembly.bodies, assembly.coordinates, assembly.rigid_part(found.shapes[:, place]))
+        moving = {body: motion for body, motion in motions.items() if body in drawn}
+        if found.frequency[place] > 0.0 and any(motion.any() for motion in moving.values()):
+            scenes[place] = mode_scene(bodies, moving, title=f"{found.frequency[place]:.0f} Hz: {name}")
+    if not scenes:
+        raise BadInputError(f"{label_of(found)}: no elastic mode to show")
+    places = list(scenes)
+    shown = places.index(first) if first in scenes else 0
+    heading = f"{assembly.gearbox.name}, {label_of(found)}"
+    if assembly.elastic_bodies:
+        heading += "; elastic bodies move here as a whole, without their deformation"
+    written = [write_mode_page(list(scenes.values()), folder / "modes.html", heading=heading, first=shown)]
+    scene = scenes[places[shown]]
+    stem = folder / f"mode_{places[shown] + 1}"
+    try:
+        draw_gearbox(bodies, folder / "gearbox.png", title=assembly.gearbox.name)
+        still, animated = stem.with_suffix(".png"), stem.with_suffix(".gif")
+        if assembly.elastic_bodies:
+            deformed = elastic_scene(assembly, found.shapes[:, places[shown]], title=scene.title)
+            draw_elastic_bodies(deformed, still)
+            written += [animate_elastic_bodies(deformed, animated)] if animation else []
+        else:
+            draw_mode(scene, still)
+            written += [animate_mode(scene, animated)] if animation else []
+        written += [folder / "gearbox.png", still]
+    except RenderingError as error:
+        note(f"No pictures: {error}", style="yellow")
+    return written

@@ -1,0 +1,222 @@
+"""A gearbox, the folder of its results and the choices made: tables, bodies, modes, runs and the report from there.
+
+The command line, the case scripts and a notebook stand on this one noun. It computes what is missing, takes what is
+there and fits, and writes into its folder only.
+"""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from exugear.bodies.of_gearbox import ElasticBody, reduced_bodies
+from exugear.dynamics.assemble import assemble
+from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.modes import Modes, eigenmodes
+from exugear.model.choice import Choice
+from exugear.model.gearbox import Gearbox
+from exugear.model.named_files import NOTHING_MORE, Permissions
+from exugear.report.writer import Report, write_report
+from exugear.results.folder import bodies_folder, keep_case, kept_case, modes_path, time_noted
+from exugear.results.run_file import FINAL_NAME
+from exugear.runs.outcome import Run
+from exugear.runs.run_folder import run_directory
+from exugear.runs.runup import simulate
+from exugear.tooth_mesh.element import MeshData
+from exugear.tooth_mesh.stiffness import mesh_stiffness
+from exugear.tooth_mesh.tables import TableOrder, missing_tables, order_tables
+from fe_ste.transmission_error.table import MeshTable
+
+
+@dataclass(frozen=True)
+class Project:
+    """A gearbox with the folder of its results and the choices made.
+
+    Attributes
+    ----------
+    gearbox : Gearbox
+    folder : Path
+        Results folder; made when something is written.
+    choice : Choice
+        Variant, mesh law, inertia set and load case, nothing left open.
+
+    Examples
+    --------
+    >>> project = Project.from_toml("cases/grc750/gearbox.toml", choice=Choice("bushing", "iso6336"))
+    >>> project
+    Project('GRC 750 kW', results/grc750, bushing, iso6336, assemblies, reference)
+    >>> project.chosen(variant="rigid").assembly().size
+    8
+    """
+
+    gearbox: Gearbox
+    folder: Path
+    choice: Choice = Choice()
+
+    def __post_init__(self) -> None:
+        """Fill in what the choice leaves open."""
+        object.__setattr__(self, "folder", Path(self.folder))
+        object.__setattr__(self, "choice", self.choice.of(self.gearbox))
+
+    @classmethod
+    def from_toml(
+        cls,
+        case: str | Path,
+        folder: str | Path | None = None,
+        choice: Choice | None = None,
+        permissions: Permissions = NOTHING_MORE,
+    ) -> Project:
+        """Read a gearbox file; without a folder, results go to ``results/<folder of the file>``.
+
+        Raises
+        ------
+        CaseError
+            Anything wrong with the file.
+        """
+        gearbox = Gearbox.from_toml(case, permissions)
+        return cls(gearbox, default_folder(case) if folder is None else Path(folder), choice or Choice())
+
+    @classmethod
+    def from_folder(
+        cls, folder: str | Path, choice: Choice | None = None, permissions: Permissions = NOTHING_MORE
+    ) -> Project:
+        """Take up the gearbox that the results of a folder belong to.
+
+        Raises
+        ------
+        CaseError
+            The folder holds no results, or what it says of its case cannot be used.
+        """
+        return cls(kept_case(Path(folder), permissions), Path(folder), choice or Choice())
+
+    def chosen(self, **changes: Any) -> Project:
+        """Return the same gearbox and folder with other choices: `variant`, `mesh_law`, `inertias`, `load_case`."""
+        return replace(self, choice=replace(self.choice, **changes))
+
+    def __repr__(self) -> str:
+        """One line."""
+        choice = self.choice
+        chosen = ", ".join(str(what) for what in (choice.variant, choice.mesh_law, choice.inertias, choice.load_case))
+        return f"Project({self.gearbox.name!r}, {self.folder}, {chosen})"
+
+    def _repr_html_(self) -> str:
+        return f"<p>{html.escape(repr(self))}</p>"
+
+    @property
+    def modes_path(self) -> Path:
+        """File of the modes."""
+        return modes_path(self.folder, self.choice)
+
+    @property
+    def run_directory(self) -> Path:
+        """Folder of the run: its files, what was stopped included."""
+        return run_directory(self.folder, self.choice)
+
+    @property
+    def run_path(self) -> Path:
+        """File of the finished run."""
+        return self.run_directory / FINAL_NAME
+
+    def requested_tables(
+        self, names: Iterable[str] = (), positions: int | None = None, *, grid: bool = False
+    ) -> list[TableOrder]:
+        """List tables and find those that are there: see `exugear.tooth_mesh.tables.order_tables`."""
+        return order_tables(self.gearbox, self.folder, names, positions, grid)
+
+    def tables(
+        self,
+        names: Iterable[str] = (),
+        positions: int | None = None,
+        *,
+        grid: bool = False,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> dict[str, MeshTable]:
+        """Transmission error tables by gear pair; those that are missing are computed, which takes minutes.
+
+        Parameters
+        ----------
+        names : iterable of str
+            Pairs; all that the file wants a table of by default.
+        positions : int, optional
+            Positions of the mesh cycle; without it what the file says.
+        grid : bool
+            Over load, centre distance and misalignment, too.
+        progress : callable, optional
+            Called with the number of finished states of the table at work, and of all its states.
+        """
+        self.keep_case()
+        orders = self.requested_tables(names, positions, grid=grid)
+        return {order.name: order.stored or order.fill(progress) for order in orders}
+
+    def missing_tables(self) -> list[TableOrder]:
+        """Tables that the mesh law needs, and that are not there or belong to another input."""
+        if self.choice.mesh_law in ("rigid", "iso6336"):
+            return []
+        return missing_tables(self.gearbox, self.folder, grid=self.choice.mesh_law == "table")
+
+    def stiffness(self) -> dict[str, MeshData]:
+        """Mesh stiffness by gear pair, as the mesh law needs it; tables that are missing are computed first."""
+        for order in self.missing_tables():
+            self.keep_case()
+            order.fill()
+        return dict(mesh_stiffness(self.gearbox, self.choice.mesh_law, self.folder))
+
+    def bodies(self, begin: Callable[[str], None] | None = None) -> dict[str, ElasticBody]:
+        """Reduced elastic bodies of the variant by name; those that are missing are reduced and kept.
+
+        Parameters
+        ----------
+        begin : callable, optional
+            Called with the name of each body before it is reduced.
+        """
+        if self.choice.variant != "flexible":
+            return {}
+        inertias = self.choice.inertia_set(self.gearbox)
+        return reduced_bodies(self.gearbox, inertias, bodies_folder(self.folder), begin)
+
+    def assembly(self) -> Assembly:
+        """Equations of motion."""
+        return assemble(self.gearbox, self.choice, self.stiffness(), self.bodies())
+
+    def modes(self) -> Modes:
+        """Eigenmodes at the static load, written to `modes_path`."""
+        stiffness, bodies = self.stiffness(), self.bodies()
+        self.keep_case()
+        choice = self.choice
+        with time_noted(self.folder, f"modes, {choice.variant}, {choice.inertias}, {choice.mesh_law}"):
+            modes = eigenmodes(self.gearbox, choice, stiffness, bodies)
+            modes.save(self.modes_path)
+        return modes
+
+    def run(self, **options: Any) -> Run:
+        """Run the load case in time; options as those of `exugear.runs.runup.simulate`.
+
+        Results are written to `run_directory` while it goes on.
+        """
+        stiffness, bodies = self.stiffness(), self.bodies()
+        self.keep_case()
+        return simulate(self.gearbox, self.choice, stiffness, self.folder, bodies=bodies, **options)
+
+    def report(self, near: float | None = None, tell: Callable[[str], None] | None = None) -> Report:
+        """Write the report of all that the folder holds: see `exugear.report.writer.write_report`."""
+        with time_noted(self.folder, "report"):
+            return write_report(self.folder, near, tell, self.gearbox.permissions.below)
+
+    def keep_case(self) -> None:
+        """Make the folder, and write into it which gearbox its results belong to."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        keep_case(self.gearbox, self.folder)
+
+
+def default_folder(case: str | Path) -> Path:
+    """Results folder of a gearbox file that no other was named for.
+
+    Examples
+    --------
+    >>> default_folder("cases/grc750/gearbox.toml").as_posix()
+    'results/grc750'
+    """
+    return Path("results") / Path(case).resolve().parent.name

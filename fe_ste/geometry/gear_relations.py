@@ -1,0 +1,244 @@
+"""Macro geometry of one cylindrical gear: its inputs, and what follows from them by the relations of ISO 21771.
+
+Nothing is refused here: the checks ask an unchecked gear for its radii and angles to tell what is wrong with it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal, overload
+
+import numpy as np
+
+from fe_ste.geometry.involute import involute
+from fe_ste.tools.arrays import Floats
+
+
+@dataclass(frozen=True)
+class BasicRack:
+    """Basic rack tooth profile (ISO 53), in normal modules.
+
+    Parameters
+    ----------
+    addendum : float
+        Addendum of the gear tooth, h_aP*.
+    dedendum : float
+        Dedendum of the gear tooth, h_fP*.
+    tip_radius : float
+        Tip radius of the generating rack, rho_fP*: fillet radius at the root of the basic rack.
+    """
+
+    addendum: float = 1.0
+    dedendum: float = 1.25
+    tip_radius: float = 0.38
+
+
+@dataclass(frozen=True)
+class Material:
+    """Isotropic linear elastic material.
+
+    Parameters
+    ----------
+    youngs_modulus : float
+        Pa.
+    poissons_ratio : float
+        Dimensionless.
+    density : float
+        kg/m^3.
+    """
+
+    youngs_modulus: float = 206e9
+    poissons_ratio: float = 0.3
+    density: float = 7850.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class UncheckedGear:
+    """Inputs of a gear that may be impossible, with all that follows from them; for the inputs see `Gear`."""
+
+    name: str
+    teeth: int
+    normal_module: float
+    normal_pressure_angle: float = math.radians(20.0)
+    helix_angle: float = 0.0
+    profile_shift: float = 0.0
+    face_width: float
+    held_diameter: float
+    internal: bool = False
+    rack: BasicRack = BasicRack()
+    tip_diameter: float | None = None
+    root_diameter: float | None = None
+    tooth_thinning: float = 0.0
+    material: Material = Material()
+
+    @property
+    def outward(self) -> int:
+        """Direction in which the teeth point: +1 away from the axis, -1 towards it."""
+        return -1 if self.internal else 1
+
+    @property
+    def hand(self) -> Literal["right", "left", "spur"]:
+        """Hand of the helix."""
+        if self.helix_angle == 0.0:
+            return "spur"
+        return "right" if self.helix_angle > 0.0 else "left"
+
+    @property
+    def transverse_module(self) -> float:
+        """Module in the transverse section, m."""
+        return self.normal_module / math.cos(self.helix_angle)
+
+    @property
+    def transverse_pressure_angle(self) -> float:
+        """Pressure angle at the reference circle in the transverse section, rad."""
+        return math.atan(math.tan(self.normal_pressure_angle) / math.cos(self.helix_angle))
+
+    @property
+    def base_helix_angle(self) -> float:
+        """Helix angle at the base cylinder, rad, signed like `helix_angle`."""
+        return math.asin(math.sin(self.helix_angle) * math.cos(self.normal_pressure_angle))
+
+    @property
+    def reference_radius(self) -> float:
+        """Radius of the reference circle, m."""
+        return 0.5 * self.teeth * self.transverse_module
+
+    @property
+    def base_radius(self) -> float:
+        """Radius of the base circle, m."""
+        return self.reference_radius * math.cos(self.transverse_pressure_angle)
+
+    @property
+    def tip_radius(self) -> float:
+        """Radius of the tip circle, m."""
+        if self.tip_diameter is not None:
+            return 0.5 * self.tip_diameter
+        height = self.profile_shift + self.outward * self.rack.addendum
+        return self.reference_radius + self.normal_module * height
+
+    @property
+    def root_radius(self) -> float:
+        """Radius of the root circle, m."""
+        if self.root_diameter is not None:
+            return 0.5 * self.root_diameter
+        depth = self.outward * self.rack.dedendum - self.profile_shift
+        return self.reference_radius - self.normal_module * depth
+
+    @property
+    def dedendum_factor(self) -> float:
+        """Dedendum of the rack that reaches the root circle, in normal modules (ISO 21771: h_fP*)."""
+        depth = self.reference_radius + self.normal_module * self.profile_shift - self.root_radius
+        return self.outward * depth / self.normal_module
+
+    @property
+    def angular_pitch(self) -> float:
+        """Angle between neighbouring teeth, rad."""
+        return 2.0 * math.pi / self.teeth
+
+    @property
+    def transverse_base_pitch(self) -> float:
+        """Distance of neighbouring flanks along the transverse line of action, m."""
+        return self.angular_pitch * self.base_radius
+
+    @property
+    def reference_half_angle(self) -> float:
+        """Polar half angle of the tooth at the reference circle, rad."""
+        shift = 2.0 * self.outward * self.profile_shift * math.tan(self.normal_pressure_angle)
+        return (0.5 * math.pi + shift - self.tooth_thinning / self.transverse_module) / self.teeth
+
+    @property
+    def tip_thickness(self) -> float:
+        """Tooth thickness at the tip circle in the normal section, m."""
+        helix_angle = math.atan(self.tip_radius / self.reference_radius * math.tan(self.helix_angle))
+        return 2.0 * self.tip_radius * self.half_angle(self.tip_radius) * math.cos(helix_angle)
+
+    @property
+    def form_radius(self) -> float:
+        """Radius at which the involute ends and the root fillet begins, m."""
+        return math.hypot(self.base_radius, self.form_roll_length)
+
+    @property
+    def tip_roll_length(self) -> float:
+        """Roll length of the tip circle, ``sqrt(r_a^2 - r_b^2)``, m."""
+        return math.sqrt(self.tip_radius**2 - self.base_radius**2)
+
+    @property
+    def form_roll_length(self) -> float:
+        """Roll length at which the involute meets the root fillet, m; negative if the flank is undercut.
+
+        External: the last straight point of the generating rack, followed down the line of action.
+        Internal: the centre of the fillet lies on the involute shifted by the fillet radius into the tooth
+        space, which is an involute of the same base circle.
+        """
+        if self.internal:
+            radius = self.fillet_radius
+            return radius + math.sqrt((self.root_radius - radius) ** 2 - self.base_radius**2)
+        straight = self.dedendum_factor - self.rack.tip_radius * (1.0 - math.sin(self.normal_pressure_angle))
+        depth = (straight - self.profile_shift) * self.normal_module
+        angle = self.transverse_pressure_angle
+        return self.base_radius * math.tan(angle) - depth / math.sin(angle)
+
+    @property
+    def fillet_radius(self) -> float:
+        """Radius of the rack tip that cuts the root fillet, or of an internal gear's fillet itself, m.
+
+        The arc of an internal gear is no larger than the one that touches both flanks and the root circle.
+        """
+        radius = self.rack.tip_radius * self.normal_module
+        if not self.internal or self._internal_fillet_centre_angle(radius) <= 0.5 * self.angular_pitch:
+            return radius
+        # The angle is a convex, growing function of the radius: Newton's method from above converges.
+        for _ in range(50):
+            profile_angle = math.acos(self.base_radius / (self.root_radius - radius))
+            excess = self._internal_fillet_centre_angle(radius) - 0.5 * self.angular_pitch
+            step = excess * self.base_radius / (1.0 - math.sin(profile_angle))
+            radius -= step
+            if step < 1e-15 * self.root_radius:
+                break
+        return radius
+
+    @property
+    def fillet_centre_angle(self) -> float:
+        """Polar angle of the centre of an internal gear's root fillet, from the middle of the tooth, rad."""
+        return min(self._internal_fillet_centre_angle(self.fillet_radius), 0.5 * self.angular_pitch)
+
+    def _internal_fillet_centre_angle(self, radius: float) -> float:
+        """Polar angle of the centre of the circle that touches the root circle and the involute."""
+        return self.half_angle(self.root_radius - radius) + radius / self.base_radius
+
+    @property
+    def rack_tip_half_land(self) -> float:
+        """Half width of the flat tip of the generating rack between its tip radii, normal section, m.
+
+        Thinner teeth are cut by a rack whose teeth are wider by as much; zero is a full-fillet rack.
+        """
+        angle, rack = self.normal_pressure_angle, self.rack
+        taper = (self.dedendum_factor - rack.tip_radius) * math.tan(angle) + rack.tip_radius / math.cos(angle)
+        widening = 0.5 * self.tooth_thinning * math.cos(self.helix_angle)
+        return self.normal_module * (0.25 * math.pi - taper) + widening
+
+    @overload
+    def half_angle(self, radius: float) -> float: ...
+
+    @overload
+    def half_angle(self, radius: Floats) -> Floats: ...
+
+    def half_angle(self, radius: float | Floats) -> float | Floats:
+        """Polar half angle of the tooth, bounded by its involutes, at a radius (ISO 21771).
+
+        Parameters
+        ----------
+        radius : float or array
+            m. There is no involute inside the base circle: the result is NaN there.
+
+        Returns
+        -------
+        float or array
+            rad; falls with the radius for external, grows for internal teeth. Thinning is included.
+        """
+        with np.errstate(invalid="ignore"):
+            profile_angle = np.arccos(self.base_radius / np.asarray(radius, dtype=np.float64))
+        fall = np.tan(profile_angle) - profile_angle - involute(self.transverse_pressure_angle)
+        half_angle = self.reference_half_angle - self.outward * fall
+        return half_angle if isinstance(radius, np.ndarray) else float(half_angle)
