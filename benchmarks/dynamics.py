@@ -145,7 +145,7 @@ def compare_ways(assembly: Assembly, rounds: int, quick: bool) -> list[dict[str,
 
 def shares_of_a_step(assembly: Assembly, rounds: int) -> dict[str, float]:
     """Share of a compiled step that goes when bearings, or meshes, are left out; gears rolling without load."""
-    speeds = assembly.gearbox.rolling_speeds("carrier", START_SPEED)
+    speeds = assembly.gearbox.train.rolling_speeds("carrier", START_SPEED)
     q = np.zeros(assembly.size)
     v = assembly.rolling_velocity(q, speeds)
     bare = {
@@ -203,7 +203,7 @@ def excitation_amplitudes(assembly: Assembly, rpm: float, step: float, method: s
 
 def amplitude_errors(gearbox: Gearbox) -> list[dict[str, Any]]:
     """Error of the overall and of the high-speed DTE at 1, 3 and 6.4 kHz against RK4 at 2.5 us."""
-    order = gearbox.mesh_frequencies(math.pi / 30.0)["high_speed"]
+    order = gearbox.train.mesh_frequencies(math.pi / 30.0)["high_speed"]
     rows = []
     for variant in ("rigid", "bushing"):
         assembly = assemble(gearbox, Choice(variant), stiffness_of(gearbox))

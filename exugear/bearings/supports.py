@@ -10,7 +10,7 @@ import numpy as np
 from exugear.bearings import contact, matrices, rollers
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Bearing, stiffness_matrix
-from exugear.model.sections import CatalogueSection
+from exugear.model.sections.connections import CatalogueSection
 from fe_ste.tools.arrays import Floats
 
 ON_BEARINGS = ("bushing", "flexible")

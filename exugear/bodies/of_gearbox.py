@@ -24,7 +24,8 @@ from exugear.bodies.turned_shaft import ShaftModel, load_or_reduce, reduce_shaft
 from exugear.model.gearbox import Gearbox
 from exugear.model.named_files import LARGEST_SOLID
 from exugear.model.parts import Bearing, Body
-from exugear.model.sections import BlankSection, MaterialSection, ShapeSection, SolidSeatSection, SolidSection
+from exugear.model.sections.bodies import BlankSection, ShapeSection, SolidSeatSection, SolidSection
+from exugear.model.sections.gears import MaterialSection
 from fe_ste.geometry.gears import Material
 
 SOLID_SIZE = MeshSize(0.05, 0.05, 1)

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exugear.bodies.reduced_body import Figures, ReducedBody, Seat, Surface
-from fe_ste.tools.files import FileError, read_sealed, write_sealed
+from fe_ste.tools.files import FileError
+from fe_ste.tools.sealed import read_sealed, write_sealed
 
 _log = logging.getLogger(__name__)
 

@@ -257,7 +257,7 @@ def _inertia(variant: str, six: list[Body], alone: list[Body]) -> InertiaArrays:
 
 def _rolling_motions(gearbox: Gearbox, coordinates: Mapping[str, tuple[int, ...]]) -> Floats:
     """Motions of the spins (size, n) in which no mesh closes; couplings may twist."""
-    rows = np.array([gearbox.mesh_row(mesh) for mesh in gearbox.meshes])
+    rows = gearbox.train.spin_rows[: len(gearbox.meshes)]
     order = [coordinates[name][5] for name in gearbox.spinning]
     motions = np.zeros((len(order), len(order) - np.linalg.matrix_rank(rows)))
     motions[order] = scipy.linalg.null_space(rows / np.abs(rows).max(axis=1, keepdims=True))

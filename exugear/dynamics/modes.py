@@ -29,8 +29,8 @@ from exugear.model.gearbox import Gearbox
 from exugear.model.versions import MODES
 from exugear.tooth_mesh.element import Angles, MeshData
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.files import Layout, load_dataset, write_dataset
 from fe_ste.tools.notebook import html_table, value_range
+from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
 
 RIGID_COORDINATES = ("x", "y", "z", "tilt_x", "tilt_y", "spin")
 FREE_ROTATION = "free rotation of the train"
@@ -258,7 +258,7 @@ def overall_row(assembly: Assembly) -> Floats:
     radius = assembly.gearbox.gears[overall.output_gear].base_radius
     row = np.zeros(assembly.size)
     row[assembly.spin[overall.output]] += radius
-    row[assembly.spin[overall.input]] -= radius * assembly.gearbox.ratio
+    row[assembly.spin[overall.input]] -= radius * assembly.gearbox.train.ratio
     return row
 
 

@@ -63,7 +63,7 @@ def remarks(gearbox: Gearbox) -> tuple[str, ...]:
     for name, spec in gearbox.pairs.items():
         if not spec.static_torque > 0.0 and any(mesh.pair.name == name for mesh in gearbox.meshes):
             found.append(f"pairs.{name}: carries no torque in [static_load], and so gets no table")
-    freedoms = gearbox.kinematic_modes.shape[1]
+    freedoms = gearbox.train.degrees_of_freedom
     if freedoms > 1:
         found.append(f"meshes: the train has {freedoms} degrees of freedom; modes are possible, runs are not yet")
     return tuple(found)

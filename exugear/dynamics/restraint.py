@@ -105,8 +105,8 @@ def _motion_at(body: Body, place: Floats) -> Floats:
 
 def _rolling_motions(gearbox: Gearbox, moving: list[Body], first: Mapping[str, int]) -> Floats:
     """Orthonormal rolling motions (n, size): spins, and the orbit of planets with their carrier."""
-    motions = np.zeros((gearbox.kinematic_modes.shape[1], 6 * len(moving)))
-    spins = dict(zip(gearbox.spinning, gearbox.kinematic_modes, strict=True))
+    motions = np.zeros((gearbox.train.degrees_of_freedom, 6 * len(moving)))
+    spins = dict(zip(gearbox.spinning, gearbox.train.kinematic_modes, strict=True))
     for body in moving:
         begin = first[body.name]
         motions[:, begin + 5] = LENGTH * spins.get(body.name, 0.0)

@@ -181,7 +181,7 @@ def _held(assembly: Assembly, torques: Mapping[str, float], locked: Sequence[str
         The locked bodies leave the train free to roll, and the torques would make it.
     """
     gearbox, held = assembly.gearbox, list(locked)
-    rolling, row = gearbox.kinematic_modes, gearbox.spinning.index
+    rolling, row = gearbox.train.kinematic_modes, gearbox.spinning.index
     free = rolling @ scipy.linalg.null_space(rolling[[row(name) for name in held]]) if held else rolling
     applied = np.array([torques.get(name, 0.0) for name in gearbox.spinning])
     if free.size and np.abs(free.T @ applied).max() > 1e-9 * np.abs(applied).max():
@@ -238,7 +238,7 @@ def accelerating_start(
     """
     gearbox = assembly.gearbox
     reference = gearbox.case.overall.input
-    unit = gearbox.rolling_speeds(reference, 1.0)
+    unit = gearbox.train.rolling_speeds(reference, 1.0)
     speeds = {name: value * input_speed for name, value in unit.items()}
     applied = assembly.torque_vector(torques)
     pinned = assembly.spin[reference]

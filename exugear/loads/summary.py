@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.loads.torque_series import torque_series
-from exugear.model.gearbox import UNLOADED, Gearbox
+from exugear.model.gearbox import Gearbox
 from exugear.model.parts import LoadCase
+from exugear.train.statics import UNLOADED
 from fe_ste.tools.arrays import Floats
 
 Series = Mapping[str, tuple[Floats, Floats]]
@@ -46,7 +47,7 @@ class LoadSummary:
     rim_speeds : mapping of body name to float
         Speed of the fastest gear's rim on each body with gears at `fastest_speed`, m/s.
     mesh_forces : mapping of mesh name to float
-        F_bt at the start, N; its sign says which flank of gear 1 carries, as in `Gearbox.static_mesh_forces`.
+        F_bt at the start, N; its sign says which flank of gear 1 carries, as in `Train.static_mesh_forces`.
     flanks : mapping of mesh family to str
         Loaded flanks in the course of the load case: ``+``, ``-``, ``+-`` for both, ``0`` for none.
     reversed_flanks : tuple of str
@@ -108,7 +109,7 @@ def summarise_loads(
     series = torque_series(gearbox, case) if series is None else series
     total = case.duration if duration is None else duration
     names = gearbox.spinning
-    rolling = gearbox.rolling_speeds(gearbox.case.overall.input, 1.0)
+    rolling = gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)
     unit = np.array([rolling[name] for name in names])
     axial = _axial_inertias(gearbox, inertias)
     inertia = float(axial @ unit**2)
@@ -216,18 +217,18 @@ def driven_start_speed(gearbox: Gearbox, case: LoadCase) -> float:
 
 def _drive_ratio(gearbox: Gearbox, case: LoadCase) -> float:
     """Spin of the driven body per spin of the overall input."""
-    return gearbox.rolling_speeds(gearbox.case.overall.input, 1.0)[str(case.driven_body)]
+    return gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)[str(case.driven_body)]
 
 
 def _mesh_forces(gearbox: Gearbox, applied: Floats) -> Floats:
     """F_bt (times, meshes) that torques in balance (times, bodies) load meshes with; least-norm where they share."""
-    forces = np.linalg.lstsq(gearbox.spin_rows.T, applied.T, rcond=1e-12)[0]
+    forces = np.linalg.lstsq(gearbox.train.spin_rows.T, applied.T, rcond=1e-12)[0]
     return np.asarray(forces[: len(gearbox.meshes)].T)
 
 
 def _flanks(gearbox: Gearbox, forces: Floats) -> tuple[dict[str, str], tuple[str, ...]]:
     """Find loaded flanks by mesh family, and the families that load another than the static load does."""
-    static = gearbox.static_mesh_forces()
+    static = gearbox.train.static_mesh_forces()
     least = UNLOADED * float(np.abs(forces).max(initial=0.0))
     flanks: dict[str, str] = {}
     turned = []

@@ -1,22 +1,22 @@
-"""The parts of a gearbox checked against each other: masses, places, assembly of planets, what holds what."""
+"""The parts of a gearbox checked against each other: masses, places, assembly of planets, what holds what.
+
+Each function takes the parts that it compares and yields faults as texts: key, value and what would be right.
+"""
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from exugear.model.parts import stiffness_matrix
+from exugear.model.parts import Bearing, Body, Coupling, Joint, Mesh, stiffness_matrix
 from exugear.model.reading import CaseError, shortened
-from exugear.model.sections import GROUND, BearingSection, StiffnessSection
-
-if TYPE_CHECKING:
-    from exugear.model.gearbox import Gearbox
-    from exugear.model.parts import Body, Mesh
-
+from exugear.model.sections.case import CaseFile, OverallSection
+from exugear.model.sections.connections import BearingSection, StiffnessSection
+from exugear.model.sections.entries import GROUND
+from fe_ste.geometry.gears import Gear
 
 CENTRE_DISTANCE_TOLERANCE = 2e-5
 """Allowed difference between a pair's centre distance and the positions of its bodies, m."""
@@ -30,62 +30,47 @@ LARGEST_MATRICES = 2e9
 """Largest memory of all matrices of the elements together, bytes: each is over the coordinates of all bodies."""
 
 
-def check(gearbox: Gearbox) -> None:
-    """Check the parts of a gearbox against each other.
-
-    Each stage needs those before it, so that all faults of the first stage that has any are told.
+def check(stages: Iterable[Iterable[Callable[[], object]]]) -> None:
+    """Run checks in stages; each stage needs those before it.
 
     Raises
     ------
     CaseError
-        Parts that cannot be, inertia sets incomplete, positions that contradict a centre distance, planets that cannot
-        be assembled or collide, a body joined to nothing, a static load that nothing holds.
+        All faults of the first stage that has any.
     """
-    for stage in _STAGES:
+    for stage in stages:
         faults: list[str] = []
         for step in stage:
             try:
-                step(gearbox)
+                step()
             except CaseError as error:
                 faults += error.faults
         if faults:
             raise CaseError(*faults)
 
 
-def _raise_all(gearbox: Gearbox, faults: Iterable[str]) -> None:
-    """Raise what was found, a line each."""
-    found = [line for fault in faults for line in gearbox.fault(fault).faults]
-    if found:
-        raise CaseError(*found)
-
-
-def _check_bodies(gearbox: Gearbox) -> None:
-    _raise_all(gearbox, _faults_of_bodies(gearbox))
-
-
-def _faults_of_bodies(gearbox: Gearbox) -> Iterator[str]:
-    """Names that are taken, carriers that cannot be, wheels that are no gears."""
-    sections = gearbox.case.bodies
-    if GROUND in sections:
+def faults_of_bodies(case: CaseFile) -> Iterator[str]:
+    """Tell names that are taken, carriers that cannot be, wheels that are no gears."""
+    if GROUND in case.bodies:
         yield f"bodies.{GROUND}: {GROUND} is the name of what stands still; choose another"
-    names: dict[str, str] = {}
-    for family, section in sections.items():
+    families: dict[str, str] = {}
+    for family, section in case.bodies.items():
         count = len(section.planet_angles_deg)
         for name in [f"{family}_{number}" for number in range(1, count + 1)] or [family]:
-            if name in names:
-                yield f"bodies.{family}: planets are numbered, and bodies.{names[name]} is {name}, too; rename one"
-            names[name] = family
+            if name in families:
+                yield f"bodies.{family}: planets are numbered, and bodies.{families[name]} is {name}, too; rename one"
+            families[name] = family
         for gear in section.wheels_z_mm:
-            if gear not in gearbox.case.gears:
-                yield f"bodies.{family}.wheels_z_mm.{gear}: no such gear; gears are {', '.join(gearbox.case.gears)}"
+            if gear not in case.gears:
+                yield f"bodies.{family}.wheels_z_mm.{gear}: no such gear; gears are {', '.join(case.gears)}"
         if section.enabled and section.carrier is not None:
-            yield from _faults_of_carrier(gearbox, f"bodies.{family}.carrier = {section.carrier!r}", section.carrier)
+            yield from _faults_of_carrier(case, f"bodies.{family}.carrier = {section.carrier!r}", section.carrier)
 
 
-def _faults_of_carrier(gearbox: Gearbox, key: str, name: str) -> Iterator[str]:
-    carrier = gearbox.case.bodies.get(name)
+def _faults_of_carrier(case: CaseFile, key: str, name: str) -> Iterator[str]:
+    carrier = case.bodies.get(name)
     if carrier is None:
-        yield f"{key}: no such body; bodies are {', '.join(gearbox.case.bodies)}"
+        yield f"{key}: no such body; bodies are {', '.join(case.bodies)}"
     elif not carrier.enabled:
         yield f"{key}: that body is not enabled"
     elif carrier.carrier is not None:
@@ -96,86 +81,80 @@ def _faults_of_carrier(gearbox: Gearbox, key: str, name: str) -> Iterator[str]:
         yield f"{key}: a spin-only body has no place, and so carries no planets"
 
 
-def _check_inertia_sets(gearbox: Gearbox) -> None:
-    if not gearbox.inertia_sets:
-        raise gearbox.fault("bodies: none turns; a gearbox has at least one body without fixed = true")
-    if gearbox.case.default_inertias not in gearbox.inertia_sets:
-        raise gearbox.fault(
-            f"default_inertias = {gearbox.case.default_inertias!r}: no such set; "
-            f"sets are {', '.join(gearbox.inertia_sets)}"
-        )
-    for inertias in gearbox.inertia_sets:
-        gearbox.bodies(inertias)
+def faults_of_inertia_sets(default: str, inertia_sets: Sequence[str]) -> Iterator[str]:
+    """Tell that no body moves, or that the default set is none of those that bodies have."""
+    if not inertia_sets:
+        yield "bodies: none turns; a gearbox has at least one body without fixed = true"
+    elif default not in inertia_sets:
+        yield f"default_inertias = {default!r}: no such set; sets are {', '.join(inertia_sets)}"
 
 
-def _check_size(gearbox: Gearbox) -> None:
-    """Refuse what no memory holds: each element has a stiffness and a damping over all coordinates."""
-    elements = len(gearbox.meshes) + len(gearbox.bearings) + len(gearbox.mounts) + len(gearbox.couplings)
-    coordinates = 6 * len(gearbox.bodies())
+def faults_of_size(bodies: int, elements: int) -> Iterator[str]:
+    """Tell what no memory holds: each element has a stiffness and a damping over all coordinates.
+
+    Parameters
+    ----------
+    bodies, elements : int
+        Numbers of bodies, and of meshes, bearings, mounts and couplings together.
+    """
+    coordinates = 6 * bodies
     if 16.0 * elements * coordinates**2 > LARGEST_MATRICES:
-        raise gearbox.fault(
-            f"bodies: {len(gearbox.bodies())} with {elements} meshes, bearings and couplings are too many: their "
+        yield (
+            f"bodies: {bodies} with {elements} meshes, bearings and couplings are too many: their "
             f"matrices take more than {1e-9 * LARGEST_MATRICES:g} GB"
         )
 
 
-def _check_overall(gearbox: Gearbox) -> None:
-    overall = gearbox.case.overall
+def faults_of_overall(overall: OverallSection, spinning: Sequence[str]) -> Iterator[str]:
+    """Tell an overall input or output that does not turn, or that both are one."""
     for key in ("input", "output"):
-        if getattr(overall, key) not in gearbox.spinning:
-            raise gearbox.fault(
-                f"overall.{key} = {getattr(overall, key)!r}: no such turning body; "
-                f"bodies are {', '.join(gearbox.spinning)}"
-            )
+        if getattr(overall, key) not in spinning:
+            yield (f"overall.{key} = {getattr(overall, key)!r}: no such turning body; bodies are {', '.join(spinning)}")
+            return
     if overall.input == overall.output:
-        raise gearbox.fault(f"overall.output = {overall.output!r}: is the input, too; name the body at the other end")
+        yield f"overall.output = {overall.output!r}: is the input, too; name the body at the other end"
 
 
-def _check_output_gear(gearbox: Gearbox) -> None:
-    """Let the overall transmission error be a length on a gear of the output; a carrier has none, and so any serves."""
-    overall = gearbox.case.overall
-    if overall.output_gear not in gearbox.gears:
-        raise gearbox.fault(
-            f"overall.output_gear = {overall.output_gear!r}: no such gear; gears are {', '.join(gearbox.gears)}"
-        )
-    turning = _coupled(gearbox, overall.output)
-    known = [gear for body in gearbox.bodies() if body.name in turning for gear in body.wheels]
+def faults_of_output_gear(
+    overall: OverallSection, gears: Collection[str], bodies: Iterable[Body], couplings: Sequence[Coupling]
+) -> Iterator[str]:
+    """Tell an output gear that does not turn with the output.
+
+    The overall transmission error is a length on it. A carrier has no gear, and so any serves.
+    """
+    if overall.output_gear not in gears:
+        yield f"overall.output_gear = {overall.output_gear!r}: no such gear; gears are {', '.join(gears)}"
+        return
+    turning = _coupled(couplings, overall.output)
+    known = [gear for body in bodies if body.name in turning for gear in body.wheels]
     if known and overall.output_gear not in known:
-        raise gearbox.fault(
+        yield (
             f"overall.output_gear = {overall.output_gear!r}: does not turn with {overall.output}; "
             f"gears that do are {', '.join(known)}"
         )
 
 
-def _coupled(gearbox: Gearbox, body: str) -> set[str]:
+def _coupled(couplings: Sequence[Coupling], body: str) -> set[str]:
     """Bodies that couplings tie to one, and itself: all turn at one speed."""
     reached = {body}
-    for _ in gearbox.couplings:
-        reached |= {name for c in gearbox.couplings if {c.first, c.second} & reached for name in (c.first, c.second)}
+    for _ in couplings:
+        reached |= {name for c in couplings if {c.first, c.second} & reached for name in (c.first, c.second)}
     return reached
 
 
-def _check_static_load(gearbox: Gearbox) -> None:
-    gearbox.static_mesh_forces()
-    if not gearbox.meshes:
-        raise gearbox.fault("meshes: none is at work; a gearbox has at least one")
-    _ = gearbox.ratio
+def faults_of_repetition(
+    case: CaseFile, deviations: Collection[tuple[str, str]], pin_offsets: Collection[str]
+) -> Iterator[str]:
+    """Tell errors of a wheel or a pin that are given twice: a second section would replace the first."""
+    if len(deviations) < len(case.deviations):
+        yield "deviations: two of them are of one wheel; give its errors together"
+    elif len(pin_offsets) < len(case.pins):
+        yield "pins: two of them are of one planet; give its errors together"
 
 
-def _check_told_once(gearbox: Gearbox) -> None:
-    """Let errors of a wheel or a pin be told once: a second section would replace the first."""
-    if len(gearbox.deviations) < len(gearbox.case.deviations):
-        raise gearbox.fault("deviations: two of them are of one wheel; give its errors together")
-    if len(gearbox.pin_offsets) < len(gearbox.case.pins):
-        raise gearbox.fault("pins: two of them are of one planet; give its errors together")
-
-
-def _check_mass_properties(gearbox: Gearbox) -> None:
-    _raise_all(gearbox, _faults_of_mass_properties(gearbox))
-
-
-def _faults_of_mass_properties(gearbox: Gearbox) -> Iterator[str]:
-    for family, section in gearbox.case.bodies.items():
+def faults_of_mass_properties(case: CaseFile) -> Iterator[str]:
+    """Tell mass properties that are missing."""
+    for family, section in case.bodies.items():
         for inertias, values in section.inertia.items():
             if section.spin_only:
                 continue
@@ -187,12 +166,9 @@ def _faults_of_mass_properties(gearbox: Gearbox) -> Iterator[str]:
                     )
 
 
-def _check_centre_distances(gearbox: Gearbox) -> None:
-    _raise_all(gearbox, _faults_of_centre_distances(gearbox))
-
-
-def _faults_of_centre_distances(gearbox: Gearbox) -> Iterator[str]:
-    for mesh in gearbox.meshes:
+def faults_of_centre_distances(meshes: Iterable[Mesh], bodies: Mapping[str, Body]) -> Iterator[str]:
+    """Tell bodies whose positions contradict the centre distance of their pair, or the axis of their carrier."""
+    for mesh in meshes:
         difference = mesh.centre_distance - mesh.pair.centre_distance
         if abs(difference) > CENTRE_DISTANCE_TOLERANCE:
             yield (
@@ -201,8 +177,8 @@ def _faults_of_centre_distances(gearbox: Gearbox) -> Iterator[str]:
                 f"they may differ by {CENTRE_DISTANCE_TOLERANCE * 1e3:g} mm"
             )
         for body in (mesh.pinion, mesh.gear):
-            if mesh.frame != GROUND and gearbox.body(body).carrier is None:
-                apart = math.dist(gearbox.body(body).axis, gearbox.body(mesh.frame).axis)
+            if mesh.frame != GROUND and bodies[body].carrier is None:
+                apart = math.dist(bodies[body].axis, bodies[mesh.frame].axis)
                 if apart > AXIS_TOLERANCE:
                     yield (
                         f"meshes.{mesh.family}: {body} stands {apart * 1e3:.4f} mm off the axis of {mesh.frame}, whose "
@@ -210,43 +186,40 @@ def _faults_of_centre_distances(gearbox: Gearbox) -> Iterator[str]:
                     )
 
 
-def _check_planets(gearbox: Gearbox) -> None:
-    _raise_all(gearbox, _faults_of_planets(gearbox))
-
-
-def _faults_of_planets(gearbox: Gearbox) -> Iterator[str]:
-    """Planets that run into each other, of one set or of several on a carrier, and such as cannot be assembled."""
-    planets = [body for body in gearbox.bodies() if body.carrier is not None]
+def faults_of_planets(
+    case: CaseFile, bodies: Iterable[Body], gears: Mapping[str, Gear], meshes: Sequence[Mesh]
+) -> Iterator[str]:
+    """Tell planets that run into each other, of one set or of several on a carrier, and such as cannot be assembled."""
+    planets = [body for body in bodies if body.carrier is not None]
     told = set()
-    for one, two in itertools.combinations(planets, 2):
-        if (one.family, two.family) in told or one.carrier != two.carrier:
+    for planet, other in itertools.combinations(planets, 2):
+        if (planet.family, other.family) in told or planet.carrier != other.carrier:
             continue
-        for first, second in itertools.product(one.wheels, two.wheels):
-            if not _side_by_side(gearbox, one, first, two, second):
-                continue
-            gap = math.dist(one.axis, two.axis)
-            needed = gearbox.gears[first].tip_radius + gearbox.gears[second].tip_radius
-            if gap <= needed:
-                told.add((one.family, two.family))
-                angles = [round(angle, 4) for angle in gearbox.case.bodies[one.family].planet_angles_deg]
-                yield (
-                    f"bodies.{one.family}.planet_angles_deg = {shortened(angles)}: {one.name} and {two.name} collide, "
-                    f"their axes are {gap * 1e3:.2f} mm apart, their tips need more than {needed * 1e3:.2f} mm"
-                )
-                break
-    for family in gearbox.case.bodies:
-        yield from _faults_of_assembly(gearbox, family, [body for body in planets if body.family == family])
+        if any({mesh.pinion, mesh.gear} == {planet.name, other.name} for mesh in meshes):
+            continue
+        collision = next(_collisions(case, planet, other, gears), None)
+        if collision is not None:
+            told.add((planet.family, other.family))
+            yield collision
+    for family in case.bodies:
+        yield from _faults_of_assembly(family, [body for body in planets if body.family == family], meshes)
 
 
-def _side_by_side(gearbox: Gearbox, one: Body, first: str, two: Body, second: str) -> bool:
-    """Tell whether two wheels of planets share a place along the axis and do not mesh with each other."""
-    if any({mesh.pinion, mesh.gear} == {one.name, two.name} for mesh in gearbox.meshes):
-        return False
-    reach = 0.5 * (gearbox.gears[first].face_width + gearbox.gears[second].face_width)
-    return abs(one.wheels[first] - two.wheels[second]) < reach
+def _collisions(case: CaseFile, planet: Body, other: Body, gears: Mapping[str, Gear]) -> Iterator[str]:
+    """Tell wheels of two planets that share a place along the axis and overlap."""
+    gap = math.dist(planet.axis, other.axis)
+    for wheel, other_wheel in itertools.product(planet.wheels, other.wheels):
+        reach = 0.5 * (gears[wheel].face_width + gears[other_wheel].face_width)
+        needed = gears[wheel].tip_radius + gears[other_wheel].tip_radius
+        if abs(planet.wheels[wheel] - other.wheels[other_wheel]) < reach and gap <= needed:
+            angles = [round(angle, 4) for angle in case.bodies[planet.family].planet_angles_deg]
+            yield (
+                f"bodies.{planet.family}.planet_angles_deg = {shortened(angles)}: {planet.name} and {other.name} "
+                f"collide, their axes are {gap * 1e3:.2f} mm apart, their tips need more than {needed * 1e3:.2f} mm"
+            )
 
 
-def _faults_of_assembly(gearbox: Gearbox, family: str, planets: list[Body]) -> Iterator[str]:
+def _faults_of_assembly(family: str, planets: Sequence[Body], meshes: Sequence[Mesh]) -> Iterator[str]:
     """Compare every planet with the first: going round two meshes must close on whole teeth.
 
     With tooth numbers zp of the planet wheel and zc of the central wheel (negative for an external one),
@@ -254,9 +227,7 @@ def _faults_of_assembly(gearbox: Gearbox, family: str, planets: list[Body]) -> I
     between sun and ring this is the familiar (z_sun + z_ring) angle / 2 pi = integer.
     """
     for planet in planets[1:]:
-        teeth = [
-            _teeth_on_planet(mesh, planet.name) for mesh in gearbox.meshes if planet.name in (mesh.pinion, mesh.gear)
-        ]
+        teeth = [_teeth_on_planet(mesh, planet.name) for mesh in meshes if planet.name in (mesh.pinion, mesh.gear)]
         angle = planet.orbit_angle - planets[0].orbit_angle
         for planet_teeth, central_teeth in teeth[1:]:
             whole = math.gcd(planet_teeth, teeth[0][0])
@@ -278,68 +249,70 @@ def _teeth_on_planet(mesh: Mesh, planet: str) -> tuple[int, int]:
     return gear.teeth, -pinion.teeth
 
 
-def _check_connected(gearbox: Gearbox) -> None:
-    links = [(mesh.pinion, mesh.gear) for mesh in gearbox.meshes]
-    links += [(coupling.first, coupling.second) for coupling in gearbox.couplings]
-    links += [(body.name, body.carrier) for body in gearbox.bodies() if body.carrier]
-    names = [body.name for body in gearbox.bodies() if not body.fixed]
-    reached = {gearbox.case.overall.input}
+def faults_of_connection(
+    case: CaseFile, bodies: Iterable[Body], meshes: Iterable[Mesh], couplings: Iterable[Coupling]
+) -> Iterator[str]:
+    """Tell bodies that no mesh, coupling or carrier joins to the overall input."""
+    bodies = tuple(bodies)
+    links = [(mesh.pinion, mesh.gear) for mesh in meshes]
+    links += [(coupling.first, coupling.second) for coupling in couplings]
+    links += [(body.name, body.carrier) for body in bodies if body.carrier]
+    reached = {case.overall.input}
     while True:
         more = {b for pair in links for a, b in (pair, pair[::-1]) if a in reached} - reached
         if not more:
             break
         reached |= more
-    lost = [name for name in names if name not in reached]
+    lost = [body.name for body in bodies if not body.fixed and body.name not in reached]
     if lost:
         aside = [
             f"; couplings.{name} stands aside while bodies.{section.instead_of} is enabled"
-            for name, section in gearbox.case.couplings.items()
+            for name, section in case.couplings.items()
             if section.instead_of is not None and set(section.bodies) & set(lost)
         ]
-        raise gearbox.fault(
-            f"bodies {', '.join(lost)} are joined to {gearbox.case.overall.input} by no "
+        yield (
+            f"bodies {', '.join(lost)} are joined to {case.overall.input} by no "
             f"mesh, coupling or carrier{''.join(aside)}; the gear train must be one connected whole"
         )
 
 
-def _check_couplings(gearbox: Gearbox) -> None:
-    """Let torsion take one path: couplings form no loop, and bearings between turning bodies leave it to them."""
-    paths: dict[str, dict[str, list[str]]] = {name: {name: []} for name in gearbox.spinning}
-    for coupling in gearbox.couplings:
-        one, two = paths[coupling.first], paths[coupling.second]
-        if coupling.second in one:
-            raise gearbox.fault(
-                f"couplings {', '.join([*one[coupling.second], coupling.name])} form a loop: {coupling.first} and "
-                f"{coupling.second} are joined twice; leave one of them out"
+def faults_of_torsion(
+    spinning: Sequence[str], couplings: Iterable[Coupling], bearings: Iterable[Bearing]
+) -> Iterator[str]:
+    """Tell torsion that takes two paths: couplings in a loop, and bearings between bodies that both turn."""
+    paths: dict[str, dict[str, list[str]]] = {name: {name: []} for name in spinning}
+    for coupling in couplings:
+        from_first, from_second = paths[coupling.first], paths[coupling.second]
+        if coupling.second in from_first:
+            yield (
+                f"couplings {', '.join([*from_first[coupling.second], coupling.name])} form a loop: {coupling.first} "
+                f"and {coupling.second} are joined twice; leave one of them out"
             )
-        for start, first in list(one.items()):
-            for end, second in list(two.items()):
-                paths[start][end] = [*first[::-1], coupling.name, *second]
+            return
+        for start, to_start in list(from_first.items()):
+            for end, to_end in list(from_second.items()):
+                paths[start][end] = [*to_start[::-1], coupling.name, *to_end]
                 paths[end][start] = paths[start][end][::-1]
-    for bearing in gearbox.bearings:
-        given = bearing.stiffness
-        torsion = 0.0 if given is None else stiffness_matrix(given)[5, 5]
-        if torsion and bearing.on in gearbox.spinning:
-            raise gearbox.fault(
+    for bearing in bearings:
+        torsion = stiffness_matrix(bearing.stiffness)[5, 5]
+        if torsion and bearing.on in spinning:
+            yield (
                 f"bearings.{bearing.family}.stiffness: torsion {torsion:g} N m/rad between {bearing.on} and "
                 f"{bearing.body}, which both turn; give it in a [couplings] table, which knows that they turn together"
             )
+            return
 
 
-def _check_supports(gearbox: Gearbox) -> None:
-    _raise_all(gearbox, _faults_of_supports(gearbox))
-
-
-def _faults_of_supports(gearbox: Gearbox) -> Iterator[str]:
-    """Stiffness and damping that no support has: unsymmetric, indefinite, or none at all."""
-    for table, sections in (("bearings", gearbox.case.bearings), ("mounts", gearbox.case.mounts)):
+def faults_of_supports(case: CaseFile) -> Iterator[str]:
+    """Tell stiffness and damping that no support has: unsymmetric, indefinite, or none at all."""
+    for table, sections in (("bearings", case.bearings), ("mounts", case.mounts)):
         for name, section in sections.items():
             key = f"{table}.{name}"
-            given, damping = section.stiffness, section.damping
+            stiffness, damping = section.stiffness, section.damping
             catalogue = isinstance(section, BearingSection) and section.catalogue is not None
-            if given is not None:
-                yield from _faults_of_matrix(f"{key}.stiffness", given)
-                if not catalogue and not np.any(stiffness_matrix(given)):
+            if stiffness is not None:
+                yield from _faults_of_matrix(f"{key}.stiffness", stiffness)
+                if not catalogue and not np.any(stiffness_matrix(stiffness)):
                     yield f"{key}.stiffness: is zero in all directions; give at least one above zero"
             if damping is not None:
                 yield from _faults_of_matrix(f"{key}.damping", damping)
@@ -353,7 +326,7 @@ def _faults_of_matrix(key: str, section: StiffnessSection) -> Iterator[str]:
     scale = np.sqrt(np.abs(np.diag(matrix)))
     scaled = matrix / np.outer(*[np.where(scale > 0.0, scale, 1.0)] * 2)
     skew = np.abs(scaled - scaled.T)
-    row, column = (int(place) for place in np.unravel_index(np.argmax(skew), skew.shape))
+    row, column = (int(index) for index in np.unravel_index(np.argmax(skew), skew.shape))
     if skew[row, column] > MATRIX_TOLERANCE:
         yield (
             f"{key}.matrix: is not symmetric: {matrix[row, column]:g} in row {row + 1}, column {column + 1}, but "
@@ -363,53 +336,35 @@ def _faults_of_matrix(key: str, section: StiffnessSection) -> Iterator[str]:
         yield f"{key}.matrix: is indefinite, some displacement would release energy; no eigenvalue may be below zero"
 
 
-def _check_names(gearbox: Gearbox) -> None:
-    """Meshes, supports and couplings share one list in the results, where each name stands once."""
-    names = [("meshes", mesh.name) for mesh in gearbox.meshes]
-    names += [("bearings", bearing.name) for bearing in gearbox.bearings]
-    names += [("mounts", mount.name) for mount in gearbox.mounts]
-    names += [("couplings", coupling.name) for coupling in gearbox.couplings]
-    seen: dict[str, str] = {}
-    for section, name in names:
-        if name in seen:
-            raise gearbox.fault(f"{section}.{name}: one of [{seen[name]}] has this name, too; rename one")
-        seen[name] = section
+def faults_of_names(parts: Mapping[str, Sequence[Mesh | Bearing | Coupling]]) -> Iterator[str]:
+    """Tell a name that stands twice among meshes, supports and couplings: they share one list in the results.
+
+    `parts` are by their table in the file.
+    """
+    tables: dict[str, str] = {}
+    for table, members in parts.items():
+        for part in members:
+            if part.name in tables:
+                yield f"{table}.{part.name}: one of [{tables[part.name]}] has this name, too; rename one"
+                return
+            tables[part.name] = table
 
 
-def _check_joints(gearbox: Gearbox) -> None:
-    bodies = {body.name: body for body in gearbox.bodies()}
-    seen: dict[str, str] = {}
-    for joint in gearbox.joints:
+def faults_of_joints(joints: Iterable[Joint], bodies: Mapping[str, Body]) -> Iterator[str]:
+    """Tell the first joint that its body cannot have: fixed, joined twice, or a planet's away from its carrier."""
+    joined: dict[str, str] = {}
+    for joint in joints:
         body = bodies[joint.body]
         if body.fixed or body.spin_only:
-            raise gearbox.fault(f"joints.{joint.name}.body = {joint.body!r}: a fixed or spin-only body takes no joint")
-        if joint.body in seen:
-            raise gearbox.fault(
+            yield f"joints.{joint.name}.body = {joint.body!r}: a fixed or spin-only body takes no joint"
+            return
+        if joint.body in joined:
+            yield (
                 f"joints.{joint.name}.body = {joint.body!r}: the body already turns "
-                f"on {seen[joint.body]}; a second ideal joint on the same axis is redundant"
+                f"on {joined[joint.body]}; a second ideal joint on the same axis is redundant"
             )
+            return
         if body.carrier is not None and joint.on != body.carrier:
-            raise gearbox.fault(
-                f"joints.{joint.name}.on = {joint.on!r}: a planet turns on its carrier {body.carrier!r}"
-            )
-        seen[joint.body] = joint.name
-
-
-_STAGES: tuple[tuple[Callable[[Gearbox], object], ...], ...] = (
-    (_check_bodies, _check_mass_properties, lambda gearbox: gearbox.gears),
-    (_check_inertia_sets, lambda gearbox: gearbox.modifications, lambda gearbox: gearbox.gear_pairs),
-    (_check_overall, lambda gearbox: gearbox.bearings, lambda gearbox: gearbox.meshes),
-    (
-        lambda gearbox: gearbox.joints,
-        lambda gearbox: gearbox.mounts,
-        lambda gearbox: gearbox.couplings,
-        lambda gearbox: gearbox.load_cases,
-        lambda gearbox: gearbox.deviations,
-        lambda gearbox: gearbox.pin_offsets,
-        _check_centre_distances,
-        _check_planets,
-    ),
-    (_check_size, _check_connected, _check_couplings, _check_supports, _check_names, _check_joints, _check_told_once),
-    (_check_output_gear, _check_static_load),
-)
-"""What is checked together; each stage needs those before it."""
+            yield f"joints.{joint.name}.on = {joint.on!r}: a planet turns on its carrier {body.carrier!r}"
+            return
+        joined[joint.body] = joint.name

@@ -1,25 +1,21 @@
-"""The parts of a gearbox as data in SI: bodies, supports, meshes, load cases; gears as their sections give them."""
+"""The parts of a gearbox as data in SI: bodies, supports, meshes, load cases."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from exugear.model.sections import CatalogueSection, GearSection, ModificationSection, StiffnessSection
-from fe_ste.flanks.modifications import (
-    FlankModification,
-    Relief,
-    ReliefShape,
-    radius_at_roll_length_from_root,
-    radius_at_roll_length_from_tip,
-)
-from fe_ste.flanks.topography import FlankTopography
-from fe_ste.geometry.gears import BasicRack, Gear, GearPair, Material
+from exugear.model.sections.connections import CatalogueSection, StiffnessSection
+from fe_ste.flanks.modifications import FlankModification
+from fe_ste.geometry.gears import GearPair
+from fe_ste.tools.arrays import Floats
+
+RPM = math.pi / 30.0
+"""One revolution a minute, rad/s."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +128,7 @@ class WheelDeviation:
     """
 
     teeth: int
-    pitch: NDArray[np.float64]
+    pitch: Floats
     eccentricity: float
     eccentricity_angle: float
 
@@ -179,7 +175,7 @@ class PairSpec:
     modifications: tuple[FlankModification, FlankModification]
 
 
-def stiffness_matrix(section: StiffnessSection | None) -> NDArray[np.float64]:
+def stiffness_matrix(section: StiffnessSection | None) -> Floats:
     """Stiffness or damping (6, 6) as a section gives it; zeros for none."""
     if section is None:
         return np.zeros((6, 6))
@@ -187,61 +183,3 @@ def stiffness_matrix(section: StiffnessSection | None) -> NDArray[np.float64]:
         return np.array(section.matrix, dtype=np.float64)
     radial, tilt = section.radial_N_per_m, section.tilt_N_m_per_rad
     return np.diag([radial, radial, section.axial_N_per_m, tilt, tilt, section.torsion_N_m_per_rad])
-
-
-def gear_from(name: str, section: GearSection) -> Gear:
-    """Gear from its section: millimetres to metres, degrees to radians."""
-    return Gear(
-        name=name,
-        teeth=section.teeth,
-        normal_module=section.normal_module_mm * 1e-3,
-        normal_pressure_angle=math.radians(section.normal_pressure_angle_deg),
-        helix_angle=math.radians(section.helix_angle_deg),
-        profile_shift=section.profile_shift,
-        face_width=section.face_width_mm * 1e-3,
-        held_diameter=section.held_diameter_mm * 1e-3,
-        internal=section.internal,
-        rack=BasicRack(section.rack.addendum, section.rack.dedendum, section.rack.tip_radius),
-        tip_diameter=None if section.tip_diameter_mm is None else section.tip_diameter_mm * 1e-3,
-        root_diameter=None if section.root_diameter_mm is None else section.root_diameter_mm * 1e-3,
-        tooth_thinning=section.tooth_thinning_mm * 1e-3,
-        material=Material(
-            youngs_modulus=section.material.youngs_modulus_GPa * 1e9,
-            poissons_ratio=section.material.poissons_ratio,
-            density=section.material.density_kg_per_m3,
-        ),
-    )
-
-
-def modification_from(gear: Gear, section: GearSection, find: Callable[[str], Path]) -> FlankModification:
-    """Modification of a gear from its section, tried on the gear; `find` gives the path of the topography it names."""
-    given = section.modification
-    if given is None:
-        return FlankModification()
-    modification = FlankModification(
-        tip_relief=_relief(gear, given, "tip", radius_at_roll_length_from_tip),
-        root_relief=_relief(gear, given, "root", radius_at_roll_length_from_root),
-        profile_crowning=1e-6 * given.profile_crowning_um,
-        lead_crowning=1e-6 * given.lead_crowning_um,
-        profile_slope=1e-6 * given.profile_slope_um,
-        helix_slope=1e-6 * given.helix_slope_um,
-        twist=1e-6 * given.twist_um,
-        topography=None if given.topography is None else FlankTopography.from_csv(find(given.topography)),
-    )
-    modification.gap(gear, np.array(gear.tip_radius), np.array(0.0))  # refuses a relief that starts off the involute
-    return modification
-
-
-def _relief(
-    gear: Gear, given: ModificationSection, kind: str, from_end: Callable[[Gear, float], float]
-) -> Relief | None:
-    length_mm = getattr(given, f"{kind}_relief_length_mm")
-    start_roll_deg = getattr(given, f"{kind}_relief_start_roll_deg")
-    if length_mm is not None:
-        radius = from_end(gear, 1e-3 * length_mm)
-    elif start_roll_deg is not None:
-        radius = gear.base_radius * math.hypot(1.0, math.radians(start_roll_deg))
-    else:
-        return None
-    shape = ReliefShape(getattr(given, f"{kind}_relief_shape"))
-    return Relief(1e-6 * getattr(given, f"{kind}_relief_um"), radius, shape)

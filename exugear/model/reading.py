@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from exugear.model.named_files import LARGEST_CASE, NamedFileError, check_regular
-from exugear.model.sections import CaseFile
+from exugear.model.sections.case import CaseFile
 
 SHOWN_FAULTS = 20
 LONGEST_FAULT = 280

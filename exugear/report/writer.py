@@ -251,7 +251,7 @@ def write_report(
 
 
 def _subtitle(gearbox: Gearbox) -> str:
-    return f"Ratio {gearbox.ratio:.6f}; case {gearbox.source}."
+    return f"Ratio {gearbox.train.ratio:.6f}; case {gearbox.source}."
 
 
 def _tables(writer: _Writer) -> dict[str, MeshTable]:
@@ -354,7 +354,7 @@ def _waterfall_picture(
     writer: _Writer, runs: Sequence[VariantRun], comparisons: Sequence[Comparison], label: str, file_part: str
 ) -> str:
     lines = order_lines(writer.gearbox)
-    fundamental = max(writer.gearbox.mesh_frequencies(2.0 * math.pi).values())
+    fundamental = max(writer.gearbox.train.mesh_frequencies(2.0 * math.pi).values())
     fastest = max(float(run.spectra.speed.max()) for run in runs)
     top = min(1.1 * fundamental * fastest / (2.0 * math.pi), *(float(run.spectra.frequency[-1]) for run in runs))
     marks = {c.first.variant: [finding.strongest for finding in c.only_first] for c in comparisons}

@@ -26,7 +26,8 @@ from numpy.typing import NDArray
 from exugear.dynamics.signals import BALANCE_TERMS, MESH_TIMES, SignalLayout
 from exugear.results.variables import GROWING, VARIABLES
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.files import FileError, open_sealed, write_sealed
+from fe_ste.tools.files import FileError
+from fe_ste.tools.sealed import open_sealed, write_sealed
 
 _PIECE_NAME = re.compile(r"\d{6}\.npz")
 _log = logging.getLogger(__name__)

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from exugear.model.versions import RUN
 from exugear.results.pieces import Piece, RunPieces, discard_pieces, whole_pieces
 from exugear.results.variables import GROWING, VARIABLES
-from fe_ste.tools.files import ErrorKeeper, FileError, Layout, load_dataset, replacement, seal
+from fe_ste.tools.files import FileError, replacement
+from fe_ste.tools.sealed import ErrorKeeper, Layout, load_dataset, seal
 
 FINAL_NAME = "run.nc"
 PARTIAL_NAME = "run.partial"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from exugear.runs.interruption import Interruption
@@ -13,25 +11,20 @@ from exugear.runs.start import RunStart
 from exugear.solvers.compiled.solver import CompiledSystem
 from fe_ste.tools.arrays import Floats
 
-if TYPE_CHECKING:
-    from exugear.solvers.exudyn_model.system import MeshRoute
-
 STEPS_AT_ONCE = 2000
 """Steps of one call of the compiled solver: Ctrl-C is heard between calls, and a step takes up to half a ms."""
 STEP_TOLERANCE = 1e-3
 """How far Exudyn's clock may be from the step that is due, in steps."""
 
 
-def integrate(
-    plan: RunPlan, start: RunStart, recorder: Recorder, interruption: Interruption, mesh_route: MeshRoute
-) -> None:
+def integrate(plan: RunPlan, start: RunStart, recorder: Recorder, interruption: Interruption) -> None:
     """Integrate as planned; the recorder takes the states and any fault."""
     if start.state.step >= plan.steps:  # a kill fell between the last step and the joining of the pieces
         recorder.last_time = start.state.step * plan.step
     elif plan.solver == "compiled":
         _integrate_compiled(plan, start, recorder, interruption)
     else:
-        _integrate_in_exudyn(plan, start, recorder, interruption, mesh_route)
+        _integrate_in_exudyn(plan, start, recorder, interruption)
 
 
 def _integrate_compiled(plan: RunPlan, start: RunStart, recorder: Recorder, interruption: Interruption) -> None:
@@ -49,15 +42,13 @@ def _integrate_compiled(plan: RunPlan, start: RunStart, recorder: Recorder, inte
         done += good
 
 
-def _integrate_in_exudyn(
-    plan: RunPlan, start: RunStart, recorder: Recorder, interruption: Interruption, mesh_route: MeshRoute
-) -> None:
+def _integrate_in_exudyn(plan: RunPlan, start: RunStart, recorder: Recorder, interruption: Interruption) -> None:
     """Let Exudyn hand over each state."""
     from exugear.solvers.exudyn_model.floating import SolverFailure
     from exugear.solvers.exudyn_model.system import ExudynSystem
 
     state, step = start.state, plan.step
-    system = ExudynSystem(plan.assembly, state.q, state.v, start.loads.as_functions(), mesh_route)
+    system = ExudynSystem(plan.assembly, state.q, state.v, start.loads.as_functions(), plan.mesh_route)
     follow = _StepFollower(plan, start, recorder, interruption)
     try:
         system.run(state.step * step, plan.steps - state.step, step, follow, not plan.is_implicit)

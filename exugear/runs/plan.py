@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.fingerprint import input_hash
@@ -16,6 +16,9 @@ from exugear.results.run_file import FINAL_NAME, PARTIAL_NAME
 from exugear.runs.extent import too_fine
 from exugear.runs.outcome import RunError
 from exugear.solvers.compiled.step import highest_rate, unstable
+
+if TYPE_CHECKING:
+    from exugear.solvers.exudyn_model.system import MeshRoute
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +43,8 @@ class RunPlan:
         Magnitude of the fastest eigenvalue, rad/s.
     solver : str
         ``compiled`` or ``exudyn``.
+    mesh_route : {"element", "loads"}
+        See `exugear.solvers.exudyn_model.system`.
     """
 
     assembly: Assembly
@@ -51,6 +56,7 @@ class RunPlan:
     band: float
     fastest_rate: float
     solver: str
+    mesh_route: MeshRoute
 
     @property
     def final_path(self) -> Path:
@@ -84,20 +90,22 @@ class RunPlan:
             "input_hash": input_hash(assembly, self.case.name),
             "method_version": RUN,
             "housing_factor": assembly.housing_factor,
-            "ratio": gearbox.ratio,
+            "ratio": gearbox.train.ratio,
             "output_base_radius": gearbox.gears[gearbox.case.overall.output_gear].base_radius,
-            "highest_order": max(gearbox.mesh_frequencies(2.0 * math.pi).values()),
+            "highest_order": max(gearbox.train.mesh_frequencies(2.0 * math.pi).values()),
             "step": self.step,
             "band": self.band,
             "fastest_eigenvalue": self.fastest_rate,
             "solver": self._solver_name(),
+            "mesh_route": self.mesh_route,
             "complete": 0,
         }
 
     def _solver_name(self) -> str:
         if self.solver == "compiled":
             return "compiled, RK4"
-        return f"Exudyn {version('exudyn')}, {'generalized-alpha' if self.is_implicit else 'RK44'}"
+        meshes = ", meshes as loads" if self.mesh_route == "loads" else ""
+        return f"Exudyn {version('exudyn')}, {'generalized-alpha' if self.is_implicit else 'RK44'}{meshes}"
 
 
 def plan_run(
@@ -109,6 +117,7 @@ def plan_run(
     band: float,
     sample_rate: float,
     solver: str,
+    mesh_route: MeshRoute,
 ) -> RunPlan:
     """Plan a run of so many seconds.
 
@@ -129,4 +138,4 @@ def plan_run(
             f"use {1.0 / (steps_per_sample * step):g} Hz"
         )
     steps = round(total / step)
-    return RunPlan(assembly, case, directory, step, steps, steps_per_sample, band, fastest_rate, solver)
+    return RunPlan(assembly, case, directory, step, steps, steps_per_sample, band, fastest_rate, solver, mesh_route)

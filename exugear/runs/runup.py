@@ -82,7 +82,7 @@ def simulate(
     angles : {"reference", "operating"}
         Angles of the law `seed`.
     mesh_route : {"element", "loads"}
-        See `exugear.solvers.exudyn_model.system`; "loads" is Exudyn's alone.
+        See `exugear.solvers.exudyn_model.system`; "loads" is Exudyn's alone, for the variants bushing and jointed.
     resume : bool
         Go on with a run that was stopped.
     progress : callable, optional
@@ -123,21 +123,19 @@ def simulate(
         if too_fine(step, total, sample_rate):
             raise gearbox.fault(f"{fastest_motion(assembly)}; {too_fine(step, total, sample_rate)}")
     with held(directory):
-        plan = plan_run(assembly, case, directory, total, step, band, sample_rate, chosen)
+        plan = plan_run(assembly, case, directory, total, step, band, sample_rate, chosen, mesh_route)
         if not resume:
             size = signal_layout(assembly).sample_bytes
             check_disk(gearbox, case, directory, total, sample_rate, sample_bytes=size)
-        return _carry_out(plan, prepare_start(plan, resume), mesh_route, progress)
+        return _carry_out(plan, prepare_start(plan, resume), progress)
 
 
-def _carry_out(
-    plan: RunPlan, start: RunStart, mesh_route: MeshRoute, progress: Callable[[Progress], None] | None
-) -> Run:
+def _carry_out(plan: RunPlan, start: RunStart, progress: Callable[[Progress], None] | None) -> Run:
     """Integrate to the end, or to the first fault or interruption, and join the pieces of a complete run."""
     meter = ProgressMeter(start.state.step * plan.step, plan.duration, progress)
     recorder = Recorder(plan, start, meter.reach)
     with interruptible() as interruption:
-        integrate(plan, start, recorder, interruption, mesh_route)
+        integrate(plan, start, recorder, interruption)
         recorder.flush()
         if recorder.fault:
             recorder.note_verdict()

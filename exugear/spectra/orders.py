@@ -28,7 +28,7 @@ def order_lines(gearbox: Gearbox, count: int = 3) -> tuple[OrderLine, ...]:
     >>> [(line.name, round(line.order, 3)) for line in order_lines(gearbox, 1)]
     [('sun_planet', 99.0), ('intermediate', 468.571), ('high_speed', 1792.795)]
     """
-    once = gearbox.mesh_frequencies(2.0 * math.pi)  # one turn per second
+    once = gearbox.train.mesh_frequencies(2.0 * math.pi)  # one turn per second
     lines: list[OrderLine] = []
     seen: list[float] = []
     for mesh in gearbox.meshes:

@@ -49,7 +49,7 @@ from exugear.kernels.table_law import TableArrays
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Body, Mesh
 from exugear.model.seats import node_position, seat_key
-from exugear.model.sections import GROUND
+from exugear.model.sections.entries import GROUND
 from exugear.tooth_mesh.placement import (
     MeshError,
     MeshGeometry,
@@ -223,7 +223,7 @@ def mesh_elements(
     phases, orientation = tooth_places(gearbox, flanks)
     bodies = {body.name: body for body in gearbox.bodies(inertias)}
     time = gearbox.case.damping.mesh_time_s
-    static = gearbox.static_mesh_forces()
+    static = gearbox.train.static_mesh_forces()
     elements = []
     for mesh in gearbox.meshes:
         if mesh.pair.name not in stiffness:

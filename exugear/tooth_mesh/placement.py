@@ -112,7 +112,7 @@ class ToothContact:
 
 def loaded_flanks(gearbox: Gearbox, torques: Mapping[str, float] | None = None) -> dict[str, int]:
     """Tell the loaded flank s of each mesh under the static load, or other torques at the same locks."""
-    forces = gearbox.static_mesh_forces(torques)
+    forces = gearbox.train.static_mesh_forces(torques)
     return {name: -1 if force < 0.0 else 1 for name, force in forces.items()}
 
 

@@ -123,6 +123,11 @@ class Cells:
         """Return the cells for which `keep` holds."""
         return Cells(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
 
+    def __repr__(self) -> str:
+        """Return one short line."""
+        tooth_pairs, cut = np.unique(self.tooth), np.count_nonzero(self.cut)
+        return f"<Cells: {len(self.tooth)} on {len(tooth_pairs)} tooth pairs, {cut} cut by a tip edge>"
+
 
 def lay_cells(
     pair: FlankPair, rotation: float, teeth: Integers, axial: Floats, half_window: float, count: int

@@ -39,6 +39,11 @@ class ContactSolution:
     force_per_load: Floats
     iterations: int
 
+    def __repr__(self) -> str:
+        """Return one short line."""
+        loaded, approach = np.count_nonzero(self.force), 1e6 * self.approach
+        return f"<ContactSolution: {loaded} of {len(self.force)} cells in contact, approach {approach:.4g} um>"
+
 
 def solve_complementarity(
     compliance: Floats, gap: Floats, load: float, guess: Booleans, max_iterations: int = 60

@@ -86,27 +86,27 @@ def _add_half_spaces(
     along, strength = np.empty(5), np.empty(5)
     for g in range(len(groups) - 1):
         for h in range(g + 1):
-            one, other = groups[g], groups[h]
-            if tooth[one] != tooth[other]:
+            row_start, column_start = groups[g], groups[h]
+            if tooth[row_start] != tooth[column_start]:
                 continue
-            apart, together = axial[one] - axial[other], axial[one] + axial[other]
+            apart, together = axial[row_start] - axial[column_start], axial[row_start] + axial[column_start]
             along[0], strength[0] = apart / pair.base_helix_cosine, surface[0] + surface[1]
             for image in range(4):
                 body, sign = image // 2, 2.0 * (image % 2) - 1.0
                 along[image + 1] = (together - 2.0 * sign * ends[body]) / pair.base_helix_cosine
                 strength[image + 1] = mirror[body] * surface[body]
-            rolls, halves = roll[other : groups[h + 1]], half_across[other : groups[h + 1]]
+            rolls, halves = roll[column_start : groups[h + 1]], half_across[column_start : groups[h + 1]]
             shift = pair.twist_1 * apart
-            for i in range(one, groups[g + 1]):
-                row = matrix[i, other : groups[h + 1]]
+            for i in range(row_start, groups[g + 1]):
+                row = matrix[i, column_start : groups[h + 1]]
                 for load in range(5):
                     if strength[load] == 0.0:
                         continue
-                    place = (strength[load], roll[i], scale, shift, along[load], half_across[i], half_along)
+                    geometry = (strength[load], roll[i], scale, shift, along[load], half_across[i], half_along)
                     if abs(along[load]) >= from_afar:
-                        _add_far(row, *place, rolls, halves)
+                        _add_far(row, *geometry, rolls, halves)
                     else:
-                        _add_near(row, *place, rolls, halves)
+                        _add_near(row, *geometry, rolls, halves)
 
 
 @summing
@@ -115,7 +115,7 @@ def _add_regular(
     groups: Integers,
     tooth: Integers,
     layer: Integers,
-    first: Integers,
+    first_spline: Integers,
     weights: Floats,
     table: Floats,
     number: Integers,
@@ -125,21 +125,25 @@ def _add_regular(
     read = np.empty(table.shape[4])
     for g in range(len(groups) - 1):
         for h in range(g + 1):
-            one, other, end = groups[g], groups[h], groups[h + 1]
-            block = table[number[tooth[one] - first_tooth, tooth[other] - first_tooth], layer[one], layer[other]]
-            lowest, highest = first[other], first[other]
-            for j in range(other, end):
-                lowest, highest = min(lowest, first[j]), max(highest, first[j])
-            for i in range(one, groups[g + 1]):
+            row_start, column_start, column_end = groups[g], groups[h], groups[h + 1]
+            block = table[
+                number[tooth[row_start] - first_tooth, tooth[column_start] - first_tooth],
+                layer[row_start],
+                layer[column_start],
+            ]
+            lowest, highest = first_spline[column_start], first_spline[column_start]
+            for j in range(column_start, column_end):
+                lowest, highest = min(lowest, first_spline[j]), max(highest, first_spline[j])
+            for i in range(row_start, groups[g + 1]):
                 for b in range(lowest, highest + 4):
                     read[b] = (
-                        weights[i, 0] * block[first[i], b]
-                        + weights[i, 1] * block[first[i] + 1, b]
-                        + weights[i, 2] * block[first[i] + 2, b]
-                        + weights[i, 3] * block[first[i] + 3, b]
+                        weights[i, 0] * block[first_spline[i], b]
+                        + weights[i, 1] * block[first_spline[i] + 1, b]
+                        + weights[i, 2] * block[first_spline[i] + 2, b]
+                        + weights[i, 3] * block[first_spline[i] + 3, b]
                     )
-                for j in range(other, end):
-                    at = first[j]
+                for j in range(column_start, column_end):
+                    at = first_spline[j]
                     matrix[i, j] += (
                         weights[j, 0] * read[at]
                         + weights[j, 1] * read[at + 1]
@@ -218,6 +222,11 @@ class SlicedCompliance:
         rows = BSpline.design_matrix(arc, self.knots, 3)
         return rows.indices.reshape(-1, 4)[:, 0].astype(np.int64), rows.data.reshape(-1, 4)
 
+    def __repr__(self) -> str:
+        """Return one short line."""
+        blocks, slices, _, splines, _ = self.table.shape
+        return f"<SlicedCompliance: {blocks} blocks, {slices} slices, {splines} splines over the profile>"
+
 
 def _contracted(block: Floats, at_slices: Floats, to_splines: Floats) -> Floats:
     """Turn nodal values on the flank grid (f l, f l) into spline coefficients at the slices (k, k, f, f)."""
@@ -256,8 +265,8 @@ def compliance_matrix(
         np.array([flank.mirror for flank in flanks]),
     )
     for part, roll in zip(sliced, (cells.roll, cells.gear_roll), strict=True):
-        first, weights = part.weights(roll)
+        first_spline, weights = part.weights(roll)
         blocks = (part.table, part.number, part.first_tooth)
-        _add_regular(matrix, groups, cells.tooth, cells.layer, first, weights, *blocks)
+        _add_regular(matrix, groups, cells.tooth, cells.layer, first_spline, weights, *blocks)
     _mirror_lower(matrix)
     return matrix

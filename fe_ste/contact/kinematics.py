@@ -34,22 +34,22 @@ class FlankPair(NamedTuple):
     @classmethod
     def from_pair(cls, pair: GearPair, form_roll: float, tip_roll: float) -> FlankPair:
         """Collect the numbers of `pair`; `form_roll` and `tip_roll` bound the flank of gear 1."""
-        one, two, angle = pair.pinion, pair.gear, pair.working_pressure_angle
+        pinion, gear, working_angle = pair.pinion, pair.gear, pair.working_pressure_angle
         return cls(
-            base_radius_1=one.base_radius,
-            base_radius_2=two.base_radius,
+            base_radius_1=pinion.base_radius,
+            base_radius_2=gear.base_radius,
             centre_distance=pair.centre_distance,
-            working_involute=math.tan(angle) - angle,
-            working_roll=math.tan(angle),
-            pitch_1=one.angular_pitch,
-            pitch_2=two.angular_pitch,
-            twist_1=math.tan(one.base_helix_angle) / one.base_radius,
-            twist_2=math.tan(two.base_helix_angle) / two.base_radius,
-            base_helix_cosine=math.cos(one.base_helix_angle),
-            kind=-1.0 if two.internal else 1.0,
+            working_involute=math.tan(working_angle) - working_angle,
+            working_roll=math.tan(working_angle),
+            pitch_1=pinion.angular_pitch,
+            pitch_2=gear.angular_pitch,
+            twist_1=math.tan(pinion.base_helix_angle) / pinion.base_radius,
+            twist_2=math.tan(gear.base_helix_angle) / gear.base_radius,
+            base_helix_cosine=math.cos(pinion.base_helix_angle),
+            kind=-1.0 if gear.internal else 1.0,
             form_roll_1=form_roll,
             tip_roll_1=tip_roll,
-            tip_radius_2=two.tip_radius,
+            tip_radius_2=gear.tip_radius,
         )
 
 

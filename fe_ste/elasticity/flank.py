@@ -19,6 +19,7 @@ from fe_ste.elasticity.hexmesh import MeshSettings, SectionMesh, SectorMesh, sec
 from fe_ste.elasticity.ring import open_chain_faces, ring_faces, uniform_faces
 from fe_ste.geometry.gears import Gear
 from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.notebook import html_table, value_range
 from fe_ste.tools.sparse import Backend, factorise
 from fe_ste.tools.threads import one_dense_thread
 
@@ -91,6 +92,28 @@ class FlankCompliance:
     def lead(self) -> float:
         """Slope d phi / d z of a generator in flank coordinates, rad/m."""
         return _flank_lead(self.gear, self.side)
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        flank = "counter-clockwise" if self.side > 0 else "clockwise"
+        extent = "closed ring" if self.closed else f"open sector of {2 * self.tooth_reach + 1} teeth"
+        return (
+            f"<FlankCompliance of {self.gear.name!r}: {flank} flank, "
+            f"{len(self.roll)} x {len(self.axial)} nodes, {extent}>"
+        )
+
+    def _repr_html_(self) -> str:
+        return html_table(
+            f"compliance of a flank of gear {self.gear.name}",
+            {
+                "flank": "counter-clockwise" if self.side > 0 else "clockwise",
+                "teeth": "closed ring" if self.closed else f"open sector of {2 * self.tooth_reach + 1}",
+                "nodes along the profile": str(len(self.roll)),
+                "nodes along the face": str(len(self.axial)),
+                "hand-over depth": value_range(self.depth, "mm", 1e3),
+            }
+            | {name.replace("_", " "): f"{value}" for name, value in self.figures.items()},
+        )
 
 
 def _flank_lead(gear: Gear, side: int) -> float:
@@ -187,8 +210,8 @@ def _flank_compliance(
     for (read, loaded), cut_faces in faces.items():
         regular[read, loaded] = sector.displacement(read == loaded, *cut_faces)
         if read == loaded:
-            own = regular[read, loaded] - near
-            regular[read, loaded] = (own + own.T) / 2
+            remainder = regular[read, loaded] - near
+            regular[read, loaded] = (remainder + remainder.T) / 2
     return FlankCompliance(
         gear=gear,
         side=side,
@@ -387,10 +410,10 @@ class _CondensedSector:
             torque += minus @ by_load[middle][read] + plus @ by_load[middle][read + 1]
         return faces, torque
 
-    def displacement(self, own: bool, minus: Floats, plus: Floats) -> Floats:
+    def displacement(self, loaded: bool, minus: Floats, plus: Floats) -> Floats:
         """Compliance (read node, loaded node): at depth under tent loads on the own tooth, on the surface elsewhere."""
         half = len(minus)
-        if own:
+        if loaded:
             nodal = self.fixed_depth + self.static_depth[:, :half] @ minus + self.static_depth[:, half:] @ plus
             return np.asarray(nodal @ self.weights)
         return np.asarray(self.static_surface[:, :half] @ minus + self.static_surface[:, half:] @ plus)

@@ -114,6 +114,10 @@ class SectionMesh:
     minus_cut: Integers
     held: Integers
 
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<SectionMesh: {len(self.points)} nodes, {len(self.quads)} quadrilaterals>"
+
 
 @dataclass(frozen=True)
 class SectorMesh:
@@ -187,6 +191,10 @@ class SectorMesh:
         edges = edges / np.linalg.norm(edges, axis=-1, keepdims=True)
         return np.asarray(np.linalg.det(edges).min(axis=1))
 
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<SectorMesh of {self.gear.name!r}: {len(self.points)} nodes, {len(self.hexahedra)} hexahedra>"
+
 
 def sector_mesh(gear: Gear, settings: MeshSettings | None = None) -> SectorMesh:
     """Mesh one tooth sector of `gear`.
@@ -235,23 +243,26 @@ def _checked(mesh: SectorMesh) -> SectorMesh:
     return mesh
 
 
-def refined_sector_mesh(gear: Gear, settings: MeshSettings, flank_places: Floats, across_places: Floats) -> SectorMesh:
-    """Mesh one tooth sector with flank nodes at places of one's own in each layer.
+def refined_sector_mesh(
+    gear: Gear, settings: MeshSettings, flank_fractions: Floats, across_fractions: Floats
+) -> SectorMesh:
+    """Mesh one tooth sector whose flank nodes lie elsewhere in each layer.
 
     Parameters
     ----------
     gear : Gear
     settings : MeshSettings
-        Its numbers `flank` and `thickness` must be those of the places.
-    flank_places : ndarray (layers + 1, flank + 1)
+        Its numbers `flank` and `thickness` must be those of the fractions.
+    flank_fractions : ndarray (layers + 1, flank + 1)
         Arc length of the flank nodes as part of the involute's from form to tip circle, ascending from 0 to 1.
-    across_places : ndarray (thickness + 1,)
-        Places through the tooth, ascending from 0 on its clockwise to 1 on its counter-clockwise flank.
+    across_fractions : ndarray (thickness + 1,)
+        Distance through the tooth as part of its thickness, ascending from 0 on its clockwise to 1 on its
+        counter-clockwise flank.
 
     Returns
     -------
     SectorMesh
-        The cut faces and the held surface are those of `sector_mesh`, whatever the places.
+        The cut faces and the held surface are those of `sector_mesh`, whatever the fractions.
 
     Raises
     ------
@@ -259,7 +270,7 @@ def refined_sector_mesh(gear: Gear, settings: MeshSettings, flank_places: Floats
         If a section folds.
     """
     profile = tooth_profile(gear)
-    sections = [_section_mesh(gear, settings, profile, places, across_places) for places in flank_places]
+    sections = [_section_mesh(gear, settings, profile, fractions, across_fractions) for fractions in flank_fractions]
     half_width = gear.face_width / 2
     return _checked(
         SectorMesh(
@@ -276,11 +287,11 @@ def _section_mesh(
     gear: Gear,
     settings: MeshSettings,
     profile: ToothProfile,
-    flank_places: Floats,
-    across_places: Floats,
+    flank_fractions: Floats,
+    across_fractions: Floats,
 ) -> SectionMesh:
-    flank_roll, upper, lower = _half_boundary(gear, profile, settings, flank_places)
-    core = _core_block(gear, upper, across_places)
+    flank_roll, upper, lower = _half_boundary(gear, profile, settings, flank_fractions)
+    core = _core_block(gear, upper, across_fractions)
     rim_centre, rim_plus = _rim_blocks(gear, core, upper[0], lower, settings)
     rim_minus = rim_plus[::-1] * np.array([1.0, -1.0])
 
@@ -288,14 +299,14 @@ def _section_mesh(
     quads = np.concatenate([_quads(ids) for ids in (core_id, centre_id, plus_id, minus_id)])
     if gear.internal:  # the blocks run towards the axis there, which mirrors them
         quads = quads[:, ::-1]
-    first = settings.fillet
+    flank_start = settings.fillet
     by_roll = slice(None, None, -1) if gear.internal else slice(None)
     return SectionMesh(
         points=points,
         quads=quads,
         flank_roll=flank_roll[by_roll],
-        plus_flank=core_id[-1, first:][by_roll],
-        minus_flank=core_id[0, first:][by_roll],
+        plus_flank=core_id[-1, flank_start:][by_roll],
+        minus_flank=core_id[0, flank_start:][by_roll],
         plus_cut=plus_id[-1],
         minus_cut=minus_id[0],
         held=np.unique(np.concatenate([centre_id[:, 0], plus_id[:, 0], minus_id[:, 0]])),
@@ -303,13 +314,13 @@ def _section_mesh(
 
 
 def _half_boundary(
-    gear: Gear, profile: ToothProfile, settings: MeshSettings, flank_places: Floats
+    gear: Gear, profile: ToothProfile, settings: MeshSettings, flank_fractions: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Roll angles from form to tip, boundary of the tooth core from split to tip, of the root from split to pi/z."""
     roll_form, roll_tip = (
         np.sqrt((radius / gear.base_radius) ** 2 - 1.0) for radius in (profile.form_radius, profile.tip_radius)
     )
-    roll = np.sqrt(roll_form**2 + flank_places * (roll_tip**2 - roll_form**2))
+    roll = np.sqrt(roll_form**2 + flank_fractions * (roll_tip**2 - roll_form**2))
     radius = gear.base_radius * np.sqrt(1.0 + roll**2)
     angle = gear.half_angle(radius)
     involute = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
@@ -329,8 +340,8 @@ def _half_boundary(
     return roll, np.concatenate([upper_fillet[:-1], involute]), lower
 
 
-def _along(curve: Floats, length: Floats, at: Floats) -> Floats:
-    return np.stack([np.interp(at, length, curve[:, 0]), np.interp(at, length, curve[:, 1])], axis=-1)
+def _along(curve: Floats, length: Floats, arc: Floats) -> Floats:
+    return np.stack([np.interp(arc, length, curve[:, 0]), np.interp(arc, length, curve[:, 1])], axis=-1)
 
 
 def _core_block(gear: Gear, plus_edge: Floats, across: Floats) -> Floats:

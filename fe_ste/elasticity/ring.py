@@ -84,8 +84,8 @@ def ring_faces(sector: Floats, load: Floats, teeth: int, reach: int) -> dict[int
     for _ in range(reach):
         rests.append(joined(sector, rests[-1]))
     rest = rests.pop()
-    whole = sector + np.block([[blocks(rest)[3], blocks(rest)[2]], [blocks(rest)[1], blocks(rest)[0]]])
-    solution = scipy.linalg.solve(whole, load, assume_a="pos", check_finite=False)
+    closed = sector + np.block([[blocks(rest)[3], blocks(rest)[2]], [blocks(rest)[1], blocks(rest)[0]]])
+    solution = scipy.linalg.solve(closed, load, assume_a="pos", check_finite=False)
     faces = {0: solution[:half], 1: solution[half:]}
     for step in range(1, reach + 1):
         rest_mm, rest_mp, rest_pm, rest_pp = blocks(rests.pop())

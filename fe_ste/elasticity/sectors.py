@@ -103,9 +103,14 @@ class OpenSector:
         element, face = self.contact_faces.T
         return np.asarray(self.hexahedra[element[:, None], HEXAHEDRON_FACES[face]])
 
+    def __repr__(self) -> str:
+        """Return one short line."""
+        nodes, elements, faces = len(self.points), len(self.hexahedra), len(self.tooth)
+        return f"<OpenSector: {nodes} nodes, {elements} hexahedra, {faces} contact faces>"
+
 
 @dataclass(frozen=True)
-class _Place:
+class _Placement:
     """Where a gear of a pair stands: which it is, loaded side, angle of tooth 0, sense of the tooth numbers, axis."""
 
     number: int
@@ -116,13 +121,15 @@ class _Place:
     axis_x: float
 
 
-def _places(pair: GearPair, pmc: float) -> tuple[_Place, _Place]:
-    one, two = pair.pinion, pair.gear
-    first = _Place(0, one, 1, pmc * one.angular_pitch - one.half_angle(pair.pinion_working_radius), 1, 0.0)
-    half_angle, rolled = two.half_angle(pair.gear_working_radius), pmc * two.angular_pitch
-    if two.internal:
-        return first, _Place(1, two, -1, rolled + half_angle, 1, -pair.centre_distance)
-    return first, _Place(1, two, 1, math.pi - rolled - half_angle, -1, pair.centre_distance)
+def _placements(pair: GearPair, pmc: float) -> tuple[_Placement, _Placement]:
+    pinion, gear = pair.pinion, pair.gear
+    pinion_placement = _Placement(
+        0, pinion, 1, pmc * pinion.angular_pitch - pinion.half_angle(pair.pinion_working_radius), 1, 0.0
+    )
+    half_angle, rolled = gear.half_angle(pair.gear_working_radius), pmc * gear.angular_pitch
+    if gear.internal:
+        return pinion_placement, _Placement(1, gear, -1, rolled + half_angle, 1, -pair.centre_distance)
+    return pinion_placement, _Placement(1, gear, 1, math.pi - rolled - half_angle, -1, pair.centre_distance)
 
 
 def placed_sectors(pair: GearPair, settings: MeshSettings, teeth: int, pmc: float) -> tuple[OpenSector, OpenSector]:
@@ -140,8 +147,10 @@ def placed_sectors(pair: GearPair, settings: MeshSettings, teeth: int, pmc: floa
     -------
     OpenSector, OpenSector
     """
-    one, two = (_joined(place, [sector_mesh(place.gear, settings)] * teeth) for place in _places(pair, pmc))
-    return one, two
+    pinion, gear = (
+        _joined(placement, [sector_mesh(placement.gear, settings)] * teeth) for placement in _placements(pair, pmc)
+    )
+    return pinion, gear
 
 
 def refined_sectors(
@@ -164,10 +173,10 @@ def refined_sectors(
     OpenSector, OpenSector
     """
     sectors = []
-    for place in _places(pair, pmc):
-        numbers = place.sense * (np.arange(teeth) - teeth // 2)
-        meshes = [_refined_tooth(pair, place, settings, int(number), pmc, half_width) for number in numbers]
-        sectors.append(_joined(place, meshes))
+    for placement in _placements(pair, pmc):
+        numbers = placement.sense * (np.arange(teeth) - teeth // 2)
+        meshes = [_refined_tooth(pair, placement, settings, int(number), pmc, half_width) for number in numbers]
+        sectors.append(_joined(placement, meshes))
     return sectors[0], sectors[1]
 
 
@@ -176,33 +185,33 @@ def contact_line_rolls(pair: GearPair, tooth: int, pmc: float, axial: Floats) ->
 
     Below zero where the line lies beyond a base circle.
     """
-    one = pair.pinion
-    twist = math.tan(one.base_helix_angle) / one.base_radius
-    roll = math.tan(pair.working_pressure_angle) + (pmc + tooth) * one.angular_pitch + twist * axial
-    tangent, length = pair.base_tangent_length, one.base_radius * roll
+    pinion = pair.pinion
+    twist = math.tan(pinion.base_helix_angle) / pinion.base_radius
+    roll = math.tan(pair.working_pressure_angle) + (pmc + tooth) * pinion.angular_pitch + twist * axial
+    tangent, length = pair.base_tangent_length, pinion.base_radius * roll
     return roll, (tangent + length if pair.gear.internal else tangent - length) / pair.gear.base_radius
 
 
 def _refined_tooth(
-    pair: GearPair, place: _Place, settings: ContactMesh, tooth: int, pmc: float, half_width: float
+    pair: GearPair, placement: _Placement, settings: ContactMesh, tooth: int, pmc: float, half_width: float
 ) -> SectorMesh:
-    gear = place.gear
+    gear = placement.gear
     axial = np.linspace(-gear.face_width / 2, gear.face_width / 2, settings.layers + 1)
-    roll = np.maximum(contact_line_rolls(pair, tooth, pmc, axial)[place.number], 0.0)
+    roll = np.maximum(contact_line_rolls(pair, tooth, pmc, axial)[placement.number], 0.0)
     form, tip = ((radius / gear.base_radius) ** 2 - 1.0 for radius in (gear.form_radius, gear.tip_radius))
     length = gear.base_radius * abs(tip - form) / 2.0
-    place_on_flank = (roll**2 - form) / (tip - form)
-    touches = bool(((place_on_flank > -_LINE_MARGIN) & (place_on_flank < 1.0 + _LINE_MARGIN)).any())
+    fraction_on_flank = (roll**2 - form) / (tip - form)
+    touches = bool(((fraction_on_flank > -_LINE_MARGIN) & (fraction_on_flank < 1.0 + _LINE_MARGIN)).any())
     smallest = 2.0 * half_width / settings.contact_elements
     band = settings.band * half_width
     if touches:
         within = 2.0 * _elements_within(length / 2.0, smallest, band, settings.growth)
         count = max(math.ceil(within), settings.far_flank)
-        centres = np.clip(place_on_flank, 0.0, 1.0) * length
-        flank_places = np.stack([_gathered(c, length, count, smallest, band, settings.growth) for c in centres])
+        centres = np.clip(fraction_on_flank, 0.0, 1.0) * length
+        flank_fractions = np.stack([_gathered(c, length, count, smallest, band, settings.growth) for c in centres])
     else:
         count = settings.far_flank
-        flank_places = np.tile(np.linspace(0.0, 1.0, count + 1), (settings.layers + 1, 1))
+        flank_fractions = np.tile(np.linspace(0.0, 1.0, count + 1), (settings.layers + 1, 1))
     counts = MeshSettings(
         layers=settings.layers,
         flank=count,
@@ -212,7 +221,7 @@ def _refined_tooth(
         rim=settings.rim,
     )
     across = _graded(settings.thickness, smallest / (0.5 * math.pi * gear.transverse_module))
-    return refined_sector_mesh(gear, counts, flank_places, 1.0 - across[::-1] if place.side > 0 else across)
+    return refined_sector_mesh(gear, counts, flank_fractions, 1.0 - across[::-1] if placement.side > 0 else across)
 
 
 def _elements_within(distance: float, smallest: float, band: float, growth: float) -> float:
@@ -223,18 +232,18 @@ def _elements_within(distance: float, smallest: float, band: float, growth: floa
 
 
 def _gathered(centre: float, length: float, count: int, smallest: float, band: float, growth: float) -> Floats:
-    """Places 0..1 of `count` elements over a length, smallest about `centre`."""
+    """Fractions 0..1 that bound `count` elements over a length, smallest about `centre`."""
     fine = np.linspace(0.0, length, 2001)
     below = _elements_within(centre, smallest, band, growth)
     passed = np.array([_elements_within(abs(at - centre), smallest, band, growth) for at in fine])
     passed = below + np.where(fine < centre, -passed, passed)
-    places = np.interp(np.linspace(0.0, passed[-1], count + 1), passed, fine) / length
-    places[0], places[-1] = 0.0, 1.0
-    return np.asarray(places)
+    fractions = np.interp(np.linspace(0.0, passed[-1], count + 1), passed, fine) / length
+    fractions[0], fractions[-1] = 0.0, 1.0
+    return np.asarray(fractions)
 
 
 def _graded(count: int, first: float) -> Floats:
-    """Places 0..1 of `count` elements that grow geometrically from `first`."""
+    """Fractions 0..1 that bound `count` elements that grow geometrically from `first`."""
     if first * count >= 1.0:
         return np.linspace(0.0, 1.0, count + 1)
     low, high = 1.0, 1e3
@@ -248,21 +257,21 @@ def _graded(count: int, first: float) -> Floats:
     return np.asarray(np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum())
 
 
-def _joined(place: _Place, meshes: list[SectorMesh]) -> OpenSector:
+def _joined(placement: _Placement, meshes: list[SectorMesh]) -> OpenSector:
     """Join tooth sectors, counted counter-clockwise, with the middle one at the gear's angle."""
-    gear = place.gear
+    gear = placement.gear
     numbers = np.arange(len(meshes)) - len(meshes) // 2
     first_point = np.cumsum([0] + [len(mesh.points) for mesh in meshes])
     first_brick = np.cumsum([0] + [len(mesh.hexahedra) for mesh in meshes])
     points, bricks, held, faces, tooth, brick_tooth = [], [], [], [], [], []
     for copy, (mesh, number) in enumerate(zip(meshes, numbers, strict=True)):
-        points.append(_turned(mesh.points, place.angle + number * gear.angular_pitch))
+        points.append(_turned(mesh.points, placement.angle + number * gear.angular_pitch))
         bricks.append(mesh.hexahedra + first_point[copy])
         held.append(mesh.held_nodes + first_point[copy])
-        own = _flank_faces(mesh, place.side)
-        faces.append(own + np.array([first_brick[copy], 0]))
-        tooth.append(np.full(len(own), place.sense * number))
-        brick_tooth.append(np.full(len(mesh.hexahedra), place.sense * number))
+        flank_faces = _flank_faces(mesh, placement.side)
+        faces.append(flank_faces + np.array([first_brick[copy], 0]))
+        tooth.append(np.full(len(flank_faces), placement.sense * number))
+        brick_tooth.append(np.full(len(mesh.hexahedra), placement.sense * number))
     all_points = np.concatenate(points)
     target = np.arange(len(all_points))
     for copy in range(1, len(meshes)):
@@ -274,7 +283,7 @@ def _joined(place: _Place, meshes: list[SectorMesh]) -> OpenSector:
         target[ahead] = target[behind]
     kept, renumbered = np.unique(target, return_inverse=True)
     return OpenSector(
-        points=all_points[kept] + np.array([place.axis_x, 0.0, 0.0]),
+        points=all_points[kept] + np.array([placement.axis_x, 0.0, 0.0]),
         hexahedra=renumbered[np.concatenate(bricks)],
         held=np.unique(renumbered[np.concatenate(held)]),
         contact_faces=np.concatenate(faces),

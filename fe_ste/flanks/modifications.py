@@ -17,6 +17,7 @@ from fe_ste.flanks.topography import FlankTopography
 from fe_ste.geometry.checks import GeometryError
 from fe_ste.geometry.gears import Gear
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.notebook import html_table, value_range
 
 
 class ReliefShape(StrEnum):
@@ -154,6 +155,23 @@ class FlankModification:
         if self.topography is not None:
             gap = gap + self.topography.gap(gear, radius, z)
         return gap
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        amounts = ", ".join(f"{kind} {amount}" for kind, amount in self._amounts().items())
+        return f"<FlankModification: {amounts or 'none'}>"
+
+    def _repr_html_(self) -> str:
+        return html_table("flank modification", self._amounts() or {"material removed": "none"})
+
+    def _amounts(self) -> dict[str, str]:
+        """Kind of modification -> amount, of those that there are."""
+        names = ("profile_crowning", "lead_crowning", "profile_slope", "helix_slope", "twist")
+        amounts = {"tip_relief": self.tip_relief, "root_relief": self.root_relief}
+        removed = {name: relief.amount for name, relief in amounts.items() if relief}
+        removed |= {name: getattr(self, name) for name in names if getattr(self, name)}
+        shown = {name.replace("_", " "): value_range(amount, "um", 1e6) for name, amount in removed.items()}
+        return shown | ({"topography": "by a grid"} if self.topography else {})
 
 
 def _check_removal(key: str, amount: float) -> None:

@@ -19,11 +19,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fe_ste.geometry.checks import GeometryError
 from fe_ste.geometry.gears import Gear
-from fe_ste.tools.arrays import Floats
+from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.notebook import value_range
 
 
 @dataclass(frozen=True)
@@ -127,12 +127,17 @@ class FlankTopography:
                 f"gear '{gear.name}': topography: its radii end at {1e3 * self.radius[-1]:.4f} mm, inside the "
                 f"base circle of {1e3 * gear.base_radius:.4f} mm, where no involute is"
             )
-        i, s = _place(nodes, along)
-        j, t = _place(np.array(self.axial), across)
+        i, s = _interval(nodes, along)
+        j, t = _interval(np.array(self.axial), across)
         values = np.array(self.removed)
         low = (1.0 - t) * values[i, j] + t * values[i, j + 1]
         high = (1.0 - t) * values[i + 1, j] + t * values[i + 1, j + 1]
         return np.asarray((1.0 - s) * low + s * high, dtype=np.float64)
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        radii, removed = value_range(self.radius, "mm", 1e3), value_range(self.removed, "um", 1e6)
+        return f"<FlankTopography: {len(self.radius)} x {len(self.axial)} points, radius {radii}, {removed} removed>"
 
 
 def _number(path: Path, line: int, cell: str) -> float:
@@ -155,7 +160,7 @@ def _roll_length(gear: Gear, radius: Floats) -> Floats:
     return np.sqrt(np.maximum(np.asarray(radius) ** 2 - gear.base_radius**2, 0.0))
 
 
-def _place(nodes: Floats, at: Floats) -> tuple[NDArray[np.int64], Floats]:
+def _interval(nodes: Floats, at: Floats) -> tuple[Integers, Floats]:
     """Interval of `nodes` that holds each value, and the part of it that lies below the value."""
     within = np.clip(at, nodes[0], nodes[-1])
     interval = np.clip(np.searchsorted(nodes, within, side="right") - 1, 0, len(nodes) - 2)

@@ -51,6 +51,11 @@ class ToothProfile:
         """
         return cartesian(radius, self.gear.half_angle(radius))
 
+    def __repr__(self) -> str:
+        """Return one short line."""
+        tip, form, root = (f"{1e3 * radius:.6g}" for radius in (self.tip_radius, self.form_radius, self.root_radius))
+        return f"<ToothProfile of {self.gear.name!r}: tip radius {tip} mm, form {form} mm, root {root} mm>"
+
 
 def tooth_profile(gear: Gear) -> ToothProfile:
     """Profile of one tooth of a gear, transverse section.

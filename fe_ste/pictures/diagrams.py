@@ -146,7 +146,7 @@ def _at_load(dataset: xr.Dataset, number: int) -> xr.Dataset:
 class _Cycle:
     """A quantity over the mesh cycle, in the unit of the picture."""
 
-    position: Floats
+    pmc: Floats
     values: Floats
     converged: Booleans
 
@@ -184,25 +184,25 @@ def _cycle(dataset: xr.Dataset, name: str, factor: float) -> _Cycle:
 
 def _draw_cycle(panel: Axes, curve: _Cycle, colour: str, span: float) -> None:
     # The first position again at the end: it is the same state one pitch on.
-    position = np.append(curve.position, curve.position[0] + 1.0)
+    pmc = np.append(curve.pmc, curve.pmc[0] + 1.0)
     shown = np.where(curve.valid, curve.values, np.nan)
-    panel.plot(position, np.append(shown, shown[0]), color=colour, marker="o", markersize=2.2)
+    panel.plot(pmc, np.append(shown, shown[0]), color=colour, marker="o", markersize=2.2)
     lowest, highest = curve.middle - 0.5 * span, curve.middle + 0.5 * span
     # What has not converged may be anything: keep its mark inside the panel.
     inside = np.clip(np.where(np.isfinite(curve.values), curve.values, curve.middle), lowest, highest)
-    mark_not_converged(panel, curve.position[~curve.valid], inside[~curve.valid])
+    mark_not_converged(panel, curve.pmc[~curve.valid], inside[~curve.valid])
     panel.set(xlim=(0.0, 1.0), ylim=(lowest, highest))
 
 
-def mark_not_converged(panel: Axes, position: Floats, height: Floats) -> None:
+def mark_not_converged(panel: Axes, pmc: Floats, height: Floats) -> None:
     """Cross out positions in red and count them in the legend; without positions do nothing."""
-    if not position.size:
+    if not pmc.size:
         return
-    label = f"{position.size} not converged"
-    (crosses,) = panel.plot(position, height, "x", color=WARNING_COLOUR, zorder=5, label=label)
+    label = f"{pmc.size} not converged"
+    (crosses,) = panel.plot(pmc, height, "x", color=WARNING_COLOUR, zorder=5, label=label)
     crosses.set(markersize=6.0, markeredgewidth=1.6, clip_on=False)
-    for place in position:
-        panel.axvline(place, color=WARNING_COLOUR, linewidth=0.6, alpha=0.4)
+    for value in pmc:
+        panel.axvline(value, color=WARNING_COLOUR, linewidth=0.6, alpha=0.4)
     panel.legend(loc="best")
 
 
@@ -245,13 +245,13 @@ def plot_load_share(dataset: xr.Dataset, path: str | Path | None = None, title: 
         for step, row in enumerate(order):
             colour, shown = COLOURS[row % len(COLOURS)], _carried(share[row])
             label = f"tooth pair {teeth[row]:+d}" if teeth[row] else "tooth pair 0"
-            over_cycle.plot(total.position, shown, color=colour, marker="o", markersize=2.2, label=label)
-            over_way.plot(total.position + step, shown, color=colour, marker="o", markersize=2.2)
+            over_cycle.plot(total.pmc, shown, color=colour, marker="o", markersize=2.2, label=label)
+            over_way.plot(total.pmc + step, shown, color=colour, marker="o", markersize=2.2)
         highest = 1.12 * float(np.nanmax(share, initial=1.0))
         over_cycle.set(xlim=(0.0, 1.0), ylim=(0.0, highest), xlabel="Position in mesh cycle")
         over_cycle.set_ylabel("Load share / %")
         over_cycle.legend(loc="best")
-        missing = total.position[~total.valid]
+        missing = total.pmc[~total.valid]
         mark_not_converged(over_cycle, missing, np.zeros(missing.size))
         over_way.set(xlim=(0.0, max(1, len(order))), xlabel="Way of one tooth pair in mesh cycles")
         figure.suptitle(title, fontsize=9.5)

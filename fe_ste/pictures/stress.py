@@ -165,10 +165,10 @@ class _LoadedFlank:
         )
 
 
-def _top_stress(field: StressField, place: Floats) -> float:
+def _top_stress(field: StressField, point: Floats) -> float:
     """Upper end of the stress colours: the highest in the section, not the peaks at edges of other teeth."""
     points = np.concatenate([sector.points for sector in field.sectors])
-    apart = np.abs(points - place)
+    apart = np.abs(points - point)
     shown = np.hypot(apart[:, 0], apart[:, 1]) < 0.5 * _SECTION_HEIGHT * field.pair.pinion.transverse_module
     layer = apart[:, 2] <= max(float(apart[shown, 2].min()), 0.02 * field.pair.face_width)
     return float(field.von_mises[shown & layer].max())

@@ -57,6 +57,10 @@ class HexahedraMesh:
         grid = pyvista.UnstructuredGrid({pyvista.CellType.HEXAHEDRON: self.hexahedra}, self.points)
         return grid.extract_surface(algorithm="geometry")
 
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<HexahedraMesh: {len(self.points)} nodes, {len(self.hexahedra)} hexahedra>"
+
 
 def draw_tooth_contact(
     pinion: HexahedraMesh,

@@ -97,8 +97,8 @@ def _brick(
     strains, stresses = np.empty((33, 6)), np.empty((33, 6))
     rows, columns = (0, 1, 2, 0, 1, 2), (0, 1, 2, 1, 2, 0)
     for point in range(_POINTS):
-        here = gradients[point * _FUNCTIONS : (point + 1) * _FUNCTIONS]
-        whole, deviation = _gradient(motion, here), _gradient(motion, here - mean)
+        at_point = gradients[point * _FUNCTIONS : (point + 1) * _FUNCTIONS]
+        whole, deviation = _gradient(motion, at_point), _gradient(motion, at_point - mean)
         if finite and _determinant(whole + np.eye(3)) <= 0.0:
             return False
         stress = _stress(whole, deviation, lame, shear, finite)
@@ -108,11 +108,11 @@ def _brick(
                 row = 3 * i + a
                 for k in range(6):
                     b, c = rows[k], columns[k]
-                    strain = mean_deformation[a, b] * here[i, c]
+                    strain = mean_deformation[a, b] * at_point[i, c]
                     if finite:
                         strain += deviation[a, b] * mean[i, c]
                     if k > 2:  # both halves of a shear
-                        strain += mean_deformation[a, c] * here[i, b]
+                        strain += mean_deformation[a, c] * at_point[i, b]
                         if finite:
                             strain += deviation[a, c] * mean[i, b]
                     strains[row, k] = strain
@@ -128,7 +128,7 @@ def _brick(
                     total += strains[row, k] * stresses[column, k]
                 matrix[row, column] += total
         if finite:
-            _add_geometric_stiffness(here, mean, volume * stress, matrix)
+            _add_geometric_stiffness(at_point, mean, volume * stress, matrix)
     for row in range(33):
         for column in range(row):
             matrix[row, column] = matrix[column, row]
@@ -136,10 +136,10 @@ def _brick(
 
 
 @compiled
-def _add_geometric_stiffness(here: Floats, mean: Floats, stress: Floats, matrix: Floats) -> None:
+def _add_geometric_stiffness(at_point: Floats, mean: Floats, stress: Floats, matrix: Floats) -> None:
     """Add the stress times the second derivative of the strain, which has no square of the deviation."""
-    deviation = here - mean
-    whole = here @ stress @ here.T - deviation @ stress @ deviation.T
+    deviation = at_point - mean
+    whole = at_point @ stress @ at_point.T - deviation @ stress @ deviation.T
     for i in range(_FUNCTIONS):
         for j in range(i, _FUNCTIONS):
             for a in range(3):
@@ -241,8 +241,8 @@ def _cauchy_stress(
         motion[8:] = modes[element]
         mean = _mean_gradients(gradients[element], volumes[element])
         for point in range(_POINTS):
-            here = gradients[element, point * _FUNCTIONS : (point + 1) * _FUNCTIONS]
-            whole, deviation = _gradient(motion, here), _gradient(motion, here - mean)
+            at_point = gradients[element, point * _FUNCTIONS : (point + 1) * _FUNCTIONS]
+            whole, deviation = _gradient(motion, at_point), _gradient(motion, at_point - mean)
             stress = _stress(whole, deviation, lame[element], shear[element], finite)
             if finite:
                 deformation = whole + np.eye(3)
@@ -406,6 +406,11 @@ class Bricks:
         np.add.at(total, self.nodes, at_corners)
         count = np.bincount(self.nodes.ravel(), minlength=len(self.points))
         return np.asarray(total / np.maximum(count, 1)[:, None, None])
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        deformation = "finite" if self.finite else "small"
+        return f"<Bricks: {len(self.nodes)} elements, {len(self.points)} nodes, {deformation} deformation>"
 
 
 def von_mises(stress: Floats) -> Floats:

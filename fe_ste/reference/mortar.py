@@ -38,15 +38,15 @@ _RULE_POINTS = np.array(
 )
 
 
-def summed(places: Integers, values: Floats, count: int) -> Floats:
-    """Add up the values that belong to each place, (count,).
+def summed(numbers: Integers, values: Floats, count: int) -> Floats:
+    """Add up the values that have the same number from 0, (count,).
 
     Examples
     --------
     >>> summed(np.array([0, 2, 0]), np.array([1.0, 2.0, 3.0]), 3).tolist()
     [4.0, 0.0, 2.0]
     """
-    return np.asarray(np.bincount(places.ravel(), values.ravel(), minlength=count), dtype=np.float64)
+    return np.asarray(np.bincount(numbers.ravel(), values.ravel(), minlength=count), dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class Surface:
 
     @cached_property
     def local(self) -> Integers:
-        """Place (k, 4) of each facet's corners in `nodes`."""
+        """Number (k, 4) of each facet's corners in `nodes`."""
         return np.searchsorted(self.nodes, self.facets)
 
     def normals(self, points: Floats) -> Floats:
@@ -90,6 +90,10 @@ class Surface:
         diagonals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
         quarter = np.linalg.norm(diagonals, axis=1) / 8.0
         return summed(self.local, np.repeat(quarter, 4), len(self.nodes))
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<Surface: {len(self.facets)} facets>"
 
 
 @dataclass(frozen=True)
@@ -126,16 +130,16 @@ def _cut(polygon: Floats, count: int, window: Floats, result: Floats, spare: Flo
         along_x, along_y = end[0] - start[0], end[1] - start[1]
         kept = 0
         for corner in range(count):
-            here, ahead = result[corner], result[(corner + 1) % count]
-            inside = along_x * (here[1] - start[1]) - along_y * (here[0] - start[0])
-            inside_ahead = along_x * (ahead[1] - start[1]) - along_y * (ahead[0] - start[0])
+            corner_point, next_point = result[corner], result[(corner + 1) % count]
+            inside = along_x * (corner_point[1] - start[1]) - along_y * (corner_point[0] - start[0])
+            inside_next = along_x * (next_point[1] - start[1]) - along_y * (next_point[0] - start[0])
             if inside >= 0.0:
-                spare[kept] = here
+                spare[kept] = corner_point
                 kept += 1
-            if (inside > 0.0 and inside_ahead < 0.0) or (inside < 0.0 and inside_ahead > 0.0):
-                share = inside / (inside - inside_ahead)
-                spare[kept, 0] = here[0] + share * (ahead[0] - here[0])
-                spare[kept, 1] = here[1] + share * (ahead[1] - here[1])
+            if (inside > 0.0 and inside_next < 0.0) or (inside < 0.0 and inside_next > 0.0):
+                share = inside / (inside - inside_next)
+                spare[kept, 0] = corner_point[0] + share * (next_point[0] - corner_point[0])
+                spare[kept, 1] = corner_point[1] + share * (next_point[1] - corner_point[1])
                 kept += 1
         count = kept
         result[:count] = spare[:count]
@@ -285,7 +289,7 @@ def _facing_pairs(points: Floats, first: Integers, second: Integers, reach: floa
         for axis in range(3):
             low[two, axis], high[two, axis] = corners[:, axis].min(), corners[:, axis].max()
         normals[two] = np.cross(corners[2] - corners[0], corners[3] - corners[1])
-    found = np.empty((64, 2), dtype=np.int64)
+    pairs = np.empty((64, 2), dtype=np.int64)
     used = 0
     for one in range(count_one):
         corners = points[first[one]]
@@ -298,13 +302,13 @@ def _facing_pairs(points: Floats, first: Integers, second: Integers, reach: floa
                     break
             if not near or np.sum(normal * normals[two]) >= 0.0:
                 continue
-            if used == len(found):
+            if used == len(pairs):
                 larger = np.empty((2 * used, 2), dtype=np.int64)
-                larger[:used] = found
-                found = larger
-            found[used, 0], found[used, 1] = one, two
+                larger[:used] = pairs
+                pairs = larger
+            pairs[used, 0], pairs[used, 1] = one, two
             used += 1
-    return found[:used]
+    return pairs[:used]
 
 
 def facing_pairs(points: Floats, first: Surface, second: Surface, reach: float) -> Integers:

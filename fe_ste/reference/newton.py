@@ -95,6 +95,11 @@ class ContactModel:
     allowed_overlap: float = 0.0
     hub: TurningHub | None = None
 
+    def __repr__(self) -> str:
+        """Return one short line."""
+        facets = f"surfaces of {len(self.first.facets)} and {len(self.second.facets)} facets"
+        return f"<ContactModel: {len(self.bricks.nodes)} bricks, {len(self.bricks.points)} nodes, {facets}>"
+
 
 @dataclass(frozen=True)
 class NewtonSettings:
@@ -195,6 +200,11 @@ class Equilibrium:
     hub: float
     iterations: tuple[Iteration, ...]
 
+    def __repr__(self) -> str:
+        """Return one short line."""
+        touching = np.count_nonzero(self.pressure)
+        return f"<Equilibrium: {touching} of {len(self.pressure)} nodes in contact, {len(self.iterations)} iterations>"
+
 
 @dataclass(frozen=True)
 class _State:
@@ -222,7 +232,7 @@ class _Numbering:
     model: ContactModel
     free: Integers = field(init=False)
     count: int = field(init=False)
-    _place: Integers = field(init=False)
+    _pair_of_block: Integers = field(init=False)
     _columns: Integers = field(init=False)
     _starts: Integers = field(init=False)
     _hub_elements: Integers = field(init=False)
@@ -237,7 +247,7 @@ class _Numbering:
         self.free = np.flatnonzero(~bound.ravel())
         self.count = len(self.free)
         self._hub_elements = np.flatnonzero(on_hub[nodes].any(axis=1))
-        pairs, self._place = np.unique(nodes[:, :, None] * size + nodes[:, None, :], return_inverse=True)
+        pairs, self._pair_of_block = np.unique(nodes[:, :, None] * size + nodes[:, None, :], return_inverse=True)
         self._columns = pairs % size
         self._starts = np.searchsorted(pairs // size, np.arange(size + 1))
 
@@ -250,7 +260,7 @@ class _Numbering:
         by_node = tangent.stiffness.reshape(-1, 8, 3, 8, 3)
         for a in range(3):
             for b in range(3):
-                blocks[:, a, b] = summed(self._place, by_node[:, :, a, :, b], len(blocks))
+                blocks[:, a, b] = summed(self._pair_of_block, by_node[:, :, a, :, b], len(blocks))
         size = motion.size
         whole: SparseMatrix = scipy.sparse.bsr_matrix((blocks, self._columns, self._starts), shape=(size, size)).tocsr()
         stiffness: SparseMatrix = whole[self.free][:, self.free]
@@ -295,10 +305,10 @@ class _Search:
         gap = self._facing_gap(self.at_rest)
         deepest = int(np.argmin(gap))
         if gap[deepest] < -self.model.allowed_overlap:
-            where = self.model.bricks.points[self.model.first.nodes[deepest]]
-            place = ", ".join(f"{1e3 * value:.3f}" for value in where)
+            point = self.model.bricks.points[self.model.first.nodes[deepest]]
+            coordinates = ", ".join(f"{1e3 * value:.3f}" for value in point)
             raise EquilibriumError(
-                f"the surfaces overlap by {-1e6 * gap[deepest]:.3g} um at the start, near ({place}) mm; "
+                f"the surfaces overlap by {-1e6 * gap[deepest]:.3g} um at the start, near ({coordinates}) mm; "
                 f"at most {1e6 * self.model.allowed_overlap:.3g} um is allowed"
             )
         if not np.isfinite(gap).any():
@@ -310,20 +320,20 @@ class _Search:
     def hub_motion(self, hub_displacement: float) -> tuple[Floats, Floats, Floats]:
         """Displacement of the hub's nodes, and its first and second derivative by the hub's displacement, (n, 3)."""
         hub, points = self.model.hub, self.model.bricks.points
-        value, first, second = np.zeros_like(points), np.zeros_like(points), np.zeros_like(points)
+        displacement, slope, curvature = np.zeros_like(points), np.zeros_like(points), np.zeros_like(points)
         if hub is None:
-            return value, first, second
+            return displacement, slope, curvature
         x, y = (points[hub.nodes, :2] - hub.axis).T
         angle = hub_displacement / hub.lever
         if not self.model.bricks.finite:
-            first[hub.nodes, :2] = np.stack([-y, x], axis=1) / hub.lever
-            return first * hub_displacement, first, second
+            slope[hub.nodes, :2] = np.stack([-y, x], axis=1) / hub.lever
+            return slope * hub_displacement, slope, curvature
         cosine, sine = math.cos(angle), math.sin(angle)
         turned = np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1)
-        value[hub.nodes, :2] = turned - np.stack([x, y], axis=1)
-        first[hub.nodes, :2] = np.stack([-turned[:, 1], turned[:, 0]], axis=1) / hub.lever
-        second[hub.nodes, :2] = -turned / hub.lever**2
-        return value, first, second
+        displacement[hub.nodes, :2] = turned - np.stack([x, y], axis=1)
+        slope[hub.nodes, :2] = np.stack([-turned[:, 1], turned[:, 0]], axis=1) / hub.lever
+        curvature[hub.nodes, :2] = -turned / hub.lever**2
+        return displacement, slope, curvature
 
     def _moved(self, state: _State, step: Floats, tangent: BrickTangent, length: float, pressure: Floats) -> _State:
         """State after `length` times a step of the unknowns."""
@@ -404,32 +414,32 @@ class _Search:
 
     def _solve_step(self, state: _State, active: Booleans, load: float, number: int) -> tuple[_State, Booleans]:
         """Newton iterations of one load step."""
-        place = f"load step {number} ({100 * load:.4g} % of the load)"
+        load_step = f"load step {number} ({100 * load:.4g} % of the load)"
         try:
-            now = self.evaluate(state, load)
+            current = self.evaluate(state, load)
         except InvertedElementError as error:
-            raise EquilibriumError(f"{place}, iteration 0: {error}") from error
+            raise EquilibriumError(f"{load_step}, iteration 0: {error}") from error
         for iteration in range(1, self.settings.most_iterations + 1):
-            at = f"{place}, iteration {iteration}"
+            where = f"{load_step}, iteration {iteration}"
             try:
-                step, pressure = self._newton_step(now, active)
+                step, pressure = self._newton_step(current, active)
             except FactorisationError as error:
                 raise EquilibriumError(
-                    f"{at}: a rigid-body motion is left free, or contact is lost: {error}"
+                    f"{where}: a rigid-body motion is left free, or contact is lost: {error}"
                 ) from error
-            now, length = self._line_search(now, active, step, pressure, load, at)
-            tested = self._tested_active(now, active)
+            current, length = self._line_search(current, active, step, pressure, load, where)
+            tested = self._tested_active(current, active)
             changed = int(np.sum(tested != active))
-            row = self._row(now, active, load, iteration, changed, length)
+            row = self._row(current, active, load, iteration, changed, length)
             self.history.append(row)
             if self.report is not None:
                 self.report(row)
             settled = row.force_error < self.settings.force_tolerance and row.gap_error < self.settings.gap_tolerance
             if changed == 0 and settled:
-                return now.state, active
+                return current.state, active
             active = tested
         raise EquilibriumError(
-            f"{at}: not converged, force error {row.force_error:.1e}, gap error {row.gap_error:.1e}, "
+            f"{where}: not converged, force error {row.force_error:.1e}, gap error {row.gap_error:.1e}, "
             f"{row.changed} nodes still change"
         )
 
@@ -454,9 +464,9 @@ class _Search:
 
     def _newton_step(self, now: _Evaluation, active: Booleans) -> tuple[Floats, Floats]:
         """Step of the unknowns and the pressures after it, from the linearised equilibrium with the gaps closed."""
-        _, motion, second = self.hub_motion(now.state.hub)
+        _, motion, curvature = self.hub_motion(now.state.hub)
         held_force = self.contact_force(now.contact, now.state.pressure) - now.tangent.force
-        stiffness = self.numbering.matrix(now.tangent, motion, -float(np.sum(second * held_force)))
+        stiffness = self.numbering.matrix(now.tangent, motion, -float(np.sum(curvature * held_force)))
         numbers = np.flatnonzero(active)
         gradient = now.contact.gradient[numbers]
         weight = now.contact.weight[numbers]

@@ -27,7 +27,8 @@ from fe_ste.reference.newton import (
     TurningHub,
     solve_contact,
 )
-from fe_ste.transmission_error.search import hertz_half_width, least_contact_length
+from fe_ste.tools.notebook import html_table, value_range
+from fe_ste.transmission_error.search import hertz_half_width, least_contact_length, normal_load
 
 #: Mesh stiffness per face width for the first guess of the approach, N/m^2 (ISO 6336-1: 14 to 20 N/(mm um)).
 _USUAL_STIFFNESS = 14e9
@@ -59,6 +60,11 @@ class NonlinearSettings:
         """Refuse sectors without a tooth in the middle."""
         if self.teeth < 1 or self.teeth % 2 == 0:
             raise ValueError(f"teeth = {self.teeth}: must be an odd number")
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        strains = "finite deformation" if self.finite_deformation else "small strains"
+        return f"<NonlinearSettings: sectors of {self.teeth} teeth, {self.mesh.layers} layers, {strains}>"
 
 
 @dataclass(frozen=True)
@@ -104,6 +110,27 @@ class NonlinearPosition:
         """Displacements, held ones too."""
         return int(self.model.held.size)
 
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return (
+            f"<NonlinearPosition of {self.pair.name!r}: pmc {self.pmc:.4g}, torque {self.torque:g} N m, "
+            f"ste {1e6 * self.ste:.5g} um>"
+        )
+
+    def _repr_html_(self) -> str:
+        return html_table(
+            f"gear pair {self.pair.name} by the reference analysis",
+            {
+                "position in the mesh cycle": f"{self.pmc:.4g}",
+                "torque": value_range(self.torque, "N m"),
+                "static transmission error": value_range(self.ste, "um", 1e6),
+                "load share": ", ".join(f"tooth pair {tooth}: {share:.1%}" for tooth, share in self.load_share.items()),
+                "unknowns": str(self.unknowns),
+                "Newton iterations": str(len(self.equilibrium.iterations)),
+                "wall time": value_range(self.wall_time, "s"),
+            },
+        )
+
 
 def nonlinear_position(
     pair: GearPair,
@@ -142,7 +169,7 @@ def nonlinear_position(
         raise ValueError(f"torque = {torque}: must be a positive torque on gear 1")
     settings = settings or NonlinearSettings()
     started = time.perf_counter()
-    half_width = hertz_half_width(pair, normal_force(pair, torque) / least_contact_length(pair))
+    half_width = hertz_half_width(pair, normal_load(pair, torque) / least_contact_length(pair))
     sectors = refined_sectors(pair, settings.mesh, settings.teeth, pmc, half_width)
     model = gear_model(pair, torque, sectors, settings.finite_deformation)
     try:
@@ -162,11 +189,6 @@ def nonlinear_position(
     )
 
 
-def normal_force(pair: GearPair, torque: float) -> float:
-    """Sum of the normal contact forces under a torque on gear 1, N: all contacts have the lever r_b cos(beta_b)."""
-    return torque / (pair.pinion.base_radius * math.cos(pair.pinion.base_helix_angle))
-
-
 def gear_model(
     pair: GearPair, torque: float, sectors: tuple[OpenSector, OpenSector], finite_deformation: bool = True
 ) -> ContactModel:
@@ -183,27 +205,27 @@ def gear_model(
     sectors : tuple of OpenSector
     finite_deformation : bool
     """
-    one, two = sectors
-    points = np.concatenate([one.points, two.points])
-    shift = len(one.points)
-    material_of = np.repeat([0, 1], [len(one.hexahedra), len(two.hexahedra)])
+    pinion_sector, gear_sector = sectors
+    points = np.concatenate([pinion_sector.points, gear_sector.points])
+    shift = len(pinion_sector.points)
+    material_of = np.repeat([0, 1], [len(pinion_sector.hexahedra), len(gear_sector.hexahedra)])
     held = np.zeros_like(points, dtype=np.bool_)
-    held[one.held] = True
-    kind = -1.0 if pair.gear.internal else 1.0
+    held[pinion_sector.held] = True
+    mate_sign = -1.0 if pair.gear.internal else 1.0
     module = pair.pinion.normal_module
     approach = torque / pair.pinion.base_radius / (_USUAL_STIFFNESS * pair.face_width)
-    line_load = normal_force(pair, torque) / least_contact_length(pair)
+    line_load = normal_load(pair, torque) / least_contact_length(pair)
     compliance = sum((1 - g.material.poissons_ratio**2) / g.material.youngs_modulus for g in (pair.pinion, pair.gear))
     return ContactModel(
         bricks=Bricks.from_mesh(
             points,
-            np.concatenate([one.hexahedra, two.hexahedra + shift]),
+            np.concatenate([pinion_sector.hexahedra, gear_sector.hexahedra + shift]),
             (pair.pinion.material, pair.gear.material),
             material_of,
             finite=finite_deformation,
         ),
-        first=Surface(one.facets),
-        second=Surface(two.facets + shift),
+        first=Surface(pinion_sector.facets),
+        second=Surface(gear_sector.facets + shift),
         held=held,
         forces=np.zeros_like(points),
         modulus=pair.pinion.material.youngs_modulus,
@@ -211,9 +233,9 @@ def gear_model(
         reach=2.0 * line_load * compliance / math.pi,
         allowed_overlap=_ALLOWED_OVERLAP * module,
         hub=TurningHub(
-            nodes=two.held + shift,
-            axis=np.array([kind * pair.centre_distance, 0.0]),
-            lever=kind * pair.gear.base_radius,
+            nodes=gear_sector.held + shift,
+            axis=np.array([mate_sign * pair.centre_distance, 0.0]),
+            lever=mate_sign * pair.gear.base_radius,
             force=torque / pair.pinion.base_radius,
         ),
     )

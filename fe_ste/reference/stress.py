@@ -60,19 +60,26 @@ class StressField:
 
     def nodes_of(self, number: int) -> slice:
         """Place of the nodes of gear 1 (`number` 0) or gear 2 (1) in the nodal values."""
-        first = len(self.sectors[0].points)
-        return slice(first, None) if number else slice(0, first)
+        pinion_nodes = len(self.sectors[0].points)
+        return slice(pinion_nodes, None) if number else slice(0, pinion_nodes)
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return (
+            f"<StressField of {self.pair.name!r}: pmc {self.pmc:.4g}, torque {self.torque:g} N m, {self.method}, "
+            f"von Mises up to {1e-6 * self.von_mises.max():.4g} MPa>"
+        )
 
 
-def stress_of_position(found: NonlinearPosition) -> StressField:
+def stress_of_position(position: NonlinearPosition) -> StressField:
     """Stresses of a position of the reference analysis."""
-    equilibrium, model = found.equilibrium, found.model
+    equilibrium, model = position.equilibrium, position.model
     return StressField(
-        pair=found.pair,
-        torque=found.torque,
-        pmc=found.pmc,
+        pair=position.pair,
+        torque=position.torque,
+        pmc=position.pmc,
         method="non-linear",
-        sectors=found.sectors,
+        sectors=position.sectors,
         displacement=equilibrium.displacement,
         von_mises=von_mises(model.bricks.nodal_stress(equilibrium.displacement, equilibrium.modes)),
         pressure=_pressure(model, equilibrium.contact_force),
@@ -104,9 +111,9 @@ def stress_of_state(
     sectors = refined_sectors(pair, settings.mesh, settings.teeth, state.pmc, half_width)
     model = gear_model(pair, torque, sectors, finite_deformation=False)
     rotation = state.pmc * pair.pinion.angular_pitch
-    places, loads = _point_loads(pair, state.cells, state.solution.force, rotation, compliance)
+    load_points, loads = _point_loads(pair, state.cells, state.solution.force, rotation, compliance)
     forces = sum(
-        (_on_surface(model.bricks.points, surface, places, loads) for surface in (model.first, model.second)),
+        (_on_surface(model.bricks.points, surface, load_points, loads) for surface in (model.first, model.second)),
         np.zeros_like(model.bricks.points),
     )
     held = model.held.copy()
@@ -162,31 +169,36 @@ def _point_loads(
     turned = rotation + cells.tooth[loaded][:, None] * pinion.angular_pitch + twist * height
     polar = (math.tan(working) - working) - (roll - np.arctan(roll)) + turned
     radius = pinion.base_radius * np.sqrt(1.0 + roll**2)
-    places = np.stack([radius * np.cos(polar), radius * np.sin(polar), height], axis=-1)
-    return places.reshape(-1, 3), np.repeat(force[loaded] / _POINTS_ACROSS, _POINTS_ACROSS)
+    load_points = np.stack([radius * np.cos(polar), radius * np.sin(polar), height], axis=-1)
+    return load_points.reshape(-1, 3), np.repeat(force[loaded] / _POINTS_ACROSS, _POINTS_ACROSS)
 
 
-def _on_surface(points: Floats, surface: Surface, places: Floats, loads: Floats) -> Floats:
+def _on_surface(points: Floats, surface: Surface, load_points: Floats, loads: Floats) -> Floats:
     """Nodal forces (n, 3) of normal forces that push on a surface, shared by the nearest facet's corners."""
     corners = points[surface.facets]
     middle = corners.mean(axis=1)
     normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     # Facets are long and narrow: the nearest one is where the place lies within its two directions.
-    _, found = cKDTree(middle[:, :2]).query(places[:, :2], k=min(_CANDIDATES, len(middle)))
-    candidates = np.asarray(found, dtype=np.int64).reshape(len(places), -1)
+    _, neighbours = cKDTree(middle[:, :2]).query(load_points[:, :2], k=min(_CANDIDATES, len(middle)))
+    candidates = np.asarray(neighbours, dtype=np.int64).reshape(len(load_points), -1)
     along, across = corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0]
-    apart = places[:, None] - middle[candidates]
+    apart = load_points[:, None] - middle[candidates]
     # Coordinates along the two directions, which are not at right angles where the mesh follows a slanted line.
-    one, two = (np.einsum("pka,pka->pk", apart, way[candidates]) for way in (along, across))
-    square_one, square_two = (np.sum(way**2, axis=1)[candidates] for way in (along, across))
+    along_product, across_product = (np.einsum("pka,pka->pk", apart, way[candidates]) for way in (along, across))
+    along_square, across_square = (np.sum(way**2, axis=1)[candidates] for way in (along, across))
     mixed = np.sum(along * across, axis=1)[candidates]
-    determinant = square_one * square_two - mixed**2
-    s, t = (square_two * one - mixed * two) / determinant, (square_one * two - mixed * one) / determinant
+    determinant = along_square * across_square - mixed**2
+    s, t = (
+        (across_square * along_product - mixed * across_product) / determinant,
+        (along_square * across_product - mixed * along_product) / determinant,
+    )
     # Facets of other teeth can lie under a point too, but far below it.
-    below = np.abs(np.einsum("pka,pka->pk", apart, normals[candidates])) / np.sqrt(np.minimum(square_one, square_two))
+    below = np.abs(np.einsum("pka,pka->pk", apart, normals[candidates])) / np.sqrt(
+        np.minimum(along_square, across_square)
+    )
     best = np.argmin(np.maximum(np.maximum(np.abs(s), np.abs(t)), below), axis=1)
-    rows = np.arange(len(places))
+    rows = np.arange(len(load_points))
     facet = candidates[rows, best]
     u, v = (np.clip(value[rows, best] + 0.5, 0.0, 1.0) for value in (s, t))
     weights = np.stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v], axis=1)

@@ -23,7 +23,9 @@ from fe_ste.geometry.gears import GearPair
 from fe_ste.reference.finite_deformation import von_mises
 from fe_ste.reference.newton import EquilibriumError, Iteration, convergence_table
 from fe_ste.reference.position import NonlinearPosition, NonlinearSettings, nonlinear_position
-from fe_ste.tools.files import FileError, Layout, load_dataset, write_dataset
+from fe_ste.tools.files import FileError
+from fe_ste.tools.notebook import html_table, value_range
+from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
 from fe_ste.tools.versions import NONLINEAR_TABLE
 from fe_ste.transmission_error.table import TableError
 
@@ -95,6 +97,10 @@ class NonlinearInput:
     def hash(self) -> str:
         """SHA-256 of the resolved input."""
         return hashlib.sha256(json.dumps(self.resolved(), sort_keys=True).encode()).hexdigest()
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<NonlinearInput of {self.pair.name!r}: {self.positions} positions, torque {self.torque:g} N m>"
 
 
 @dataclass(frozen=True)
@@ -208,34 +214,53 @@ class NonlinearTable:
         pmc = number / wanted.positions
         others = [line for line in self.failures if not line.startswith(f"position {pmc:.4g} ")]
         try:
-            found = nonlinear_position(wanted.pair, wanted.torque, pmc, wanted.settings, report)
+            position = nonlinear_position(wanted.pair, wanted.torque, pmc, wanted.settings, report)
         except EquilibriumError as error:
             dataset.attrs["failures"] = "\n".join([*others, str(error)])
             return NonlinearTable(dataset)
         dataset.attrs["failures"] = "\n".join(others)
-        dataset.attrs["convergence"] += f"position {pmc:.4g}\n{convergence_table(found.equilibrium.iterations)}\n"
-        for name, value in _figures(found).items():
+        dataset.attrs["convergence"] += f"position {pmc:.4g}\n{convergence_table(position.equilibrium.iterations)}\n"
+        for name, value in _figures(position).items():
             dataset[name].values[number, 0] = value
-        for tooth, share in found.load_share.items():
+        for tooth, share in position.load_share.items():
             dataset["load_share"].loc[{"pmc": dataset["pmc"][number], "tooth": tooth}] = share
         return NonlinearTable(dataset)
 
+    def __repr__(self) -> str:
+        """Return one short line."""
+        solved, torque = int(self.dataset["converged"].sum()), value_range(self.dataset["torque"], "N m")
+        pair, positions = self.dataset.attrs["pair"], self.dataset.sizes["pmc"]
+        return f"<NonlinearTable of {pair!r}: {solved} of {positions} positions solved, torque {torque}>"
 
-def _figures(found: NonlinearPosition) -> dict[str, float]:
-    equilibrium, model = found.equilibrium, found.model
-    force = found.torque / found.pair.pinion.base_radius
+    def _repr_html_(self) -> str:
+        return html_table(
+            f"gear pair {self.dataset.attrs['pair']} by the reference analysis",
+            {
+                "positions solved": f"{int(self.dataset['converged'].sum())} of {self.dataset.sizes['pmc']}",
+                "torque": value_range(self.dataset["torque"], "N m"),
+                "static transmission error": value_range(self.dataset["ste"], "um", 1e6),
+                "mesh stiffness": value_range(self.dataset["mesh_stiffness"], "N/um", 1e-6),
+                "positions that failed": str(len(self.failures)),
+                "input": self.input_hash[:12],
+            },
+        )
+
+
+def _figures(position: NonlinearPosition) -> dict[str, float]:
+    equilibrium, model = position.equilibrium, position.model
+    force = position.torque / position.pair.pinion.base_radius
     inside, edge = equilibrium.pressure[equilibrium.facing], equilibrium.mean_pressure[~equilibrium.facing]
     stress = model.bricks.nodal_stress(equilibrium.displacement, equilibrium.modes)
     return {
-        "ste": found.ste,
-        "mesh_stiffness": force / found.ste,
+        "ste": position.ste,
+        "mesh_stiffness": force / position.ste,
         "line_of_action_force": force,
         "max_pressure": inside.max(initial=0.0),
         "edge_pressure": edge.max(initial=0.0),
         "max_von_mises": von_mises(stress).max(),
-        "unknowns": found.unknowns,
+        "unknowns": position.unknowns,
         "iterations": len(equilibrium.iterations),
-        "wall_time": found.wall_time,
+        "wall_time": position.wall_time,
         "converged": True,
     }
 
@@ -243,11 +268,11 @@ def _figures(found: NonlinearPosition) -> dict[str, float]:
 def _without_results(wanted: NonlinearInput) -> xr.Dataset:
     """Table of the right shape with no position solved."""
     names, shape = ("pmc", "torque"), (wanted.positions, 1)
-    whole = ("unknowns", "iterations")
+    counts = ("unknowns", "iterations")
     teeth = np.arange(wanted.settings.teeth) - wanted.settings.teeth // 2
-    floats = [name for name in _UNITS if name not in {*names, *whole, "tooth", "converged", "load_share"}]
+    floats = [name for name in _UNITS if name not in {*names, *counts, "tooth", "converged", "load_share"}]
     variables: dict[str, Any] = {name: (names, np.full(shape, np.nan)) for name in floats}
-    variables |= {name: (names, np.zeros(shape, dtype=np.int64)) for name in whole}
+    variables |= {name: (names, np.zeros(shape, dtype=np.int64)) for name in counts}
     variables["converged"] = (names, np.zeros(shape, dtype=np.bool_))
     variables["load_share"] = ((*names, "tooth"), np.full((*shape, len(teeth)), np.nan))
     axes = {

@@ -130,14 +130,14 @@ class _KernelCache(FunctionCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
-            found = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+            kernel = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         except Exception:  # what reading a damaged pickle raises is not bounded
             with suppress(OSError):
                 self.flush()  # type: ignore[no-untyped-call]
-            found = None
-        if found is None:
+            kernel = None
+        if kernel is None:
             _tell_of_compiling()
-        return found
+        return kernel
 
     def save_overload(self, sig: Any, data: Any) -> None:
         try:
@@ -167,9 +167,9 @@ def _package_of(source: Path) -> Path:
 @cache
 def _folder_of(package: Path) -> Path | None:
     name = _FOLDER + _digest(package)
-    for place in _places(package):
+    for folder in _places(package):
         with suppress(OSError):
-            return _opened(place, name)
+            return _opened(folder, name)
     return None
 
 
@@ -212,32 +212,32 @@ def _is_own(folder: Path) -> bool:
     """Tell whether no other user but root can put files into a folder, or another folder into its place."""
     if sys.platform == "win32":
         return True  # profiles are closed to other users
-    for place in (folder, *folder.resolve().parents):
+    for level in (folder, *folder.resolve().parents):
         try:
-            found = place.stat()
+            status = level.stat()
         except FileNotFoundError:  # will be made by this process
             continue
         except OSError:
             return False
-        open_to_all = bool(found.st_mode & stat.S_IWOTH) and not found.st_mode & stat.S_ISVTX
-        if open_to_all or found.st_uid not in (0, os.getuid()):
+        open_to_all = bool(status.st_mode & stat.S_IWOTH) and not status.st_mode & stat.S_ISVTX
+        if open_to_all or status.st_uid not in (0, os.getuid()):
             return False
     return True
 
 
-def _opened(place: Path, name: str) -> Path:
+def _opened(parent: Path, name: str) -> Path:
     """Return a folder of kernels that can be written; a new one takes the place of those not used for long."""
-    folder = place / name
+    folder = parent / name
     is_new = not folder.is_dir()
     folder.mkdir(parents=True, exist_ok=True)
     tempfile.TemporaryFile(dir=folder).close()
     os.utime(folder)
     if is_new:
-        _prune(place)
+        _prune(parent)
     return folder
 
 
-def _prune(place: Path) -> None:
+def _prune(parent: Path) -> None:
     """Remove the folders of kernels used least lately; a process that still uses one makes it anew."""
 
     def last_used(folder: Path) -> float:
@@ -246,6 +246,6 @@ def _prune(place: Path) -> None:
         except FileNotFoundError:  # another process was faster
             return 0.0
 
-    by_use = sorted(place.glob(_FOLDER + "*"), key=last_used, reverse=True)
+    by_use = sorted(parent.glob(_FOLDER + "*"), key=last_used, reverse=True)
     for folder in by_use[1 + _FOLDERS_KEPT :]:
         shutil.rmtree(folder, ignore_errors=True)

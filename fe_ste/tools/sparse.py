@@ -276,9 +276,9 @@ def _check_recovers_known_solution(matrix: SparseMatrix, factorisation: Factoris
 
 def _point_out_mkl() -> None:
     """Tell pypardiso where the wheel puts MKL, or it walks all of the environment for each solver it makes."""
-    found = sorted(Path(sys.prefix).glob("lib/libmkl_rt.so*"))
-    if found:
-        os.environ.setdefault("PYPARDISO_MKL_RT", str(found[0]))
+    libraries = sorted(Path(sys.prefix).glob("lib/libmkl_rt.so*"))
+    if libraries:
+        os.environ.setdefault("PYPARDISO_MKL_RT", str(libraries[0]))
 
 
 def _not_positive_definite(unknowns: int, reason: str) -> FactorisationError:

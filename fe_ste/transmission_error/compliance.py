@@ -15,6 +15,7 @@ from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.notebook import html_table, value_range
 from fe_ste.tools.sparse import Backend
 
 
@@ -65,11 +66,11 @@ class PairCompliance:
         reach, outermost = _teeth_in_contact(pair, flanks)
         teeth = np.arange(-outermost, outermost + 1)
         senses = (1, 1 if pair.gear.internal else -1)
-        one, two = (
+        pinion, gear = (
             SlicedCompliance.from_flank(flank, axial, sense, teeth, reach)
             for flank, sense in zip(flanks, senses, strict=True)
         )
-        return cls(pair, flanks, contact, axial, teeth, reach, (one, two))
+        return cls(pair, flanks, contact, axial, teeth, reach, (pinion, gear))
 
     def at_centre_distance(self, centre_distance: float) -> PairCompliance:
         """Return the same gears at another operating centre distance."""
@@ -105,6 +106,25 @@ class PairCompliance:
     def slice_width(self) -> float:
         """Axial width of a contact slice, m."""
         return self.pair.face_width / len(self.axial)
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        lowest, highest = self.teeth[0], self.teeth[-1]
+        return f"<PairCompliance of {self.pair.name!r}: {len(self.axial)} slices, tooth pairs {lowest} to {highest}>"
+
+    def _repr_html_(self) -> str:
+        pinion, gear = self.modifications
+        return html_table(
+            f"compliance of gear pair {self.pair.name}",
+            {
+                "pinion": repr(self.flanks[0]),
+                "gear": repr(self.flanks[1]),
+                "modifications": f"{pinion} {gear}",
+                "contact": repr(self.contact),
+                "tooth pairs that may touch": f"{self.teeth[0]} to {self.teeth[-1]}",
+                "gaps of tooth pairs": "none" if self.tooth_gap is None else value_range(self.tooth_gap, "um", 1e6),
+            },
+        )
 
 
 def _teeth_in_contact(pair: GearPair, flanks: tuple[FlankCompliance, FlankCompliance]) -> tuple[int, int]:
@@ -145,10 +165,10 @@ def pair_compliance(
     -------
     PairCompliance
     """
-    one, two = (
+    pinion, gear = (
         flank_compliance(
-            gear, side, mesh, open_teeth=open_teeth, incompatible_modes=incompatible_modes, backend=backend
+            wheel, side, mesh, open_teeth=open_teeth, incompatible_modes=incompatible_modes, backend=backend
         )
-        for gear, side in ((pair.pinion, 1), (pair.gear, -1 if pair.gear.internal else 1))
+        for wheel, side in ((pair.pinion, 1), (pair.gear, -1 if pair.gear.internal else 1))
     )
-    return PairCompliance.from_flanks(pair, (one, two), contact)
+    return PairCompliance.from_flanks(pair, (pinion, gear), contact)

@@ -13,8 +13,8 @@ def load_along_face(states: xr.Dataset) -> xr.DataArray:
     states : xarray.Dataset
         Of `fe_ste.transmission_error.transmission_error.static_transmission_error`, or of a table.
     """
-    found: xr.DataArray = states["line_load"].sum("tooth").mean("pmc")
-    return found.assign_attrs(units="N/m", long_name="line load of all tooth pairs, mean of the mesh cycle")
+    line_load: xr.DataArray = states["line_load"].sum("tooth").mean("pmc")
+    return line_load.assign_attrs(units="N/m", long_name="line load of all tooth pairs, mean of the mesh cycle")
 
 
 def face_load_factor(states: xr.Dataset) -> xr.DataArray:

@@ -21,7 +21,8 @@ from typing import Protocol
 import numpy as np
 import xarray as xr
 
-from fe_ste.tools.files import FileError, Layout, load_dataset, write_dataset
+from fe_ste.tools.files import FileError
+from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
 from fe_ste.tools.versions import TABLE
 from fe_ste.tools.workers import Workers, stop_if_asked
 from fe_ste.transmission_error.compliance import PairCompliance

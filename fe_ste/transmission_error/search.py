@@ -127,8 +127,8 @@ def contact_states(
             search.solve(window, group)
     for index in search.pending():
         message = f"the contact is wider than the flanks, or found no approach, at torque {torque:g} N m"
-        search.found[index] = ContactError(message)
-    return [search.found[index] for index in range(len(starts))]
+        search.states[index] = ContactError(message)
+    return [search.states[index] for index in range(len(starts))]
 
 
 @dataclass(frozen=True)
@@ -175,38 +175,38 @@ class _Search:
     ) -> None:
         self.compliance, self.pmc, self.misalignments, self.starts = compliance, pmc, misalignments, starts
         pair, roll = compliance.pair, compliance.flanks[0].roll
-        self.load = _normal_load(pair, torque)
+        self.load = normal_load(pair, torque)
         self.kinematics = FlankPair.from_pair(pair, roll[0], roll[-1])
         self.rotation = pmc * pair.pinion.angular_pitch
         self.cell_width = _cell_width(compliance, self.load)
         self.too_deep = [math.inf] * len(starts)
-        self.found: dict[int, ContactState | ContactError] = {}
+        self.states: dict[int, ContactState | ContactError] = {}
 
     def pending(self) -> list[int]:
         """Misalignments whose state is not found yet."""
-        return [index for index in range(len(self.starts)) if index not in self.found]
+        return [index for index in range(len(self.starts)) if index not in self.states]
 
     def window(self, pending: list[int]) -> _Window:
         """Lay the cells that the states of `pending` need."""
         count = max(self.starts[index].cells for index in pending)
-        one, axial = self.compliance, self.compliance.axial
-        cells = lay_cells(self.kinematics, self.rotation, one.teeth, axial, count * self.cell_width / 2, count)
+        compliance, axial = self.compliance, self.compliance.axial
+        cells = lay_cells(self.kinematics, self.rotation, compliance.teeth, axial, count * self.cell_width / 2, count)
         if not cells.tooth.size:  # wider than the flanks
             return _Window(cells, cells.cut, cells.tooth, {}, {})
-        removed = cells.gap + _modification_gap(one, cells)
-        wedge = axial[cells.layer] * math.cos(one.pair.pinion.base_helix_angle)
-        gap = {index: removed + self.misalignments[index] * wedge for index in pending}
+        removed = cells.gap + _modification_gap(compliance, cells)
+        gap_per_misalignment = axial[cells.layer] * math.cos(compliance.pair.pinion.base_helix_angle)
+        gap = {index: removed + self.misalignments[index] * gap_per_misalignment for index in pending}
         near = {index: g - g.min() < _GAP_REACH * self.starts[index].depth for index, g in gap.items()}
         return _Window(cells, _window_ends(cells), self._addresses(cells), gap, near)
 
     def _addresses(self, cells: Cells) -> Integers:
         pair, radius = self.kinematics, self.kinematics.base_radius_1
         axial = self.compliance.axial[cells.layer]
-        line = pair.working_roll + self.rotation + cells.tooth * pair.pitch_1 + pair.twist_1 * axial
-        from_line = 0.5 * radius * (cells.roll**2 - line * np.abs(line)) / self.cell_width
-        place = np.clip(np.rint(from_line) + _PLACES // 2, 0, _PLACES - 1).astype(np.int64)
+        line_roll = pair.working_roll + self.rotation + cells.tooth * pair.pitch_1 + pair.twist_1 * axial
+        from_line = 0.5 * radius * (cells.roll**2 - line_roll * np.abs(line_roll)) / self.cell_width
+        from_middle = np.clip(np.rint(from_line) + _PLACES // 2, 0, _PLACES - 1).astype(np.int64)
         row = (cells.tooth - self.compliance.teeth[0]) * len(self.compliance.axial) + cells.layer
-        return np.asarray(row * _PLACES + place, dtype=np.int64)
+        return np.asarray(row * _PLACES + from_middle, dtype=np.int64)
 
     def solve(self, window: _Window, group: list[int]) -> None:
         """Solve the states of `group`; one that needs other cells stays pending, with a start that asks for them."""
@@ -215,18 +215,18 @@ class _Search:
             self._come_nearer(group[0])
             return
         cells, address, end = window.cells.select(near), window.address[near], window.end[near]
-        one = self.compliance
-        matrix = compliance_matrix(cells, self.kinematics, one.axial, one.flanks, one.sliced)
+        compliance = self.compliance
+        matrix = compliance_matrix(cells, self.kinematics, compliance.axial, compliance.flanks, compliance.sliced)
         for index in group:
             gap = window.gap[index][near]
             try:
                 solution = solve_complementarity(matrix, gap, self.load, self._guess(index, gap, address))
                 if self._settled(index, solution, gap, end):
-                    self.found[index] = self._state(cells, solution)
+                    self.states[index] = self._state(cells, solution)
                     carrying = address[solution.force > 0]
                     self.starts[index] = replace(self.starts[index], touching=carrying)
             except ContactError as error:
-                self.found[index] = error
+                self.states[index] = error
 
     def _guess(self, index: int, gap: Floats, address: Integers) -> Booleans:
         start = self.starts[index]
@@ -292,17 +292,17 @@ def unloaded_states(compliance: PairCompliance, axes: StateAxes) -> xr.Dataset:
     cosine = math.cos(pair.pinion.base_helix_angle)
     width = _UNLOADED_CELLS * _UNLOADED_WIDTH * pair.pinion.normal_module
     for c, distance in enumerate(axes.centre_distance):
-        placed = compliance.at_centre_distance(float(distance))
-        kinematics = FlankPair.from_pair(placed.pair, roll[0], roll[-1])
+        at_distance = compliance.at_centre_distance(float(distance))
+        kinematics = FlankPair.from_pair(at_distance.pair, roll[0], roll[-1])
         for p in range(axes.positions):
             rotation = p / axes.positions * pair.pinion.angular_pitch
-            cells = lay_cells(kinematics, rotation, placed.teeth, placed.axial, width / 2, _UNLOADED_CELLS)
-            removed = cells.gap + _modification_gap(placed, cells)
-            place = placed.axial[cells.layer]
+            cells = lay_cells(kinematics, rotation, at_distance.teeth, at_distance.axial, width / 2, _UNLOADED_CELLS)
+            removed = cells.gap + _modification_gap(at_distance, cells)
+            axial = at_distance.axial[cells.layer]
             for m, misalignment in enumerate(axes.misalignment):
-                gap = removed + misalignment * place * cosine
+                gap = removed + misalignment * axial * cosine
                 ste[p, c, m] = gap.min() / cosine
-                centre[p, c, m] = place[gap < gap.min() + _TOUCHING].mean()
+                centre[p, c, m] = axial[gap < gap.min() + _TOUCHING].mean()
     names = ("pmc", "centre_distance", "misalignment")
     meaning = {
         "unloaded_ste": "transmission error at which the flanks first touch, on the transverse line of action",
@@ -335,7 +335,7 @@ def _cell_width(compliance: PairCompliance, load: float) -> float:
 def new_start(compliance: PairCompliance, torque: float) -> SearchStart:
     """Start of a search that knows no other state."""
     stiffness = 10e9 * compliance.pair.face_width  # two thirds of a usual mesh stiffness: may be too deep
-    return SearchStart(compliance.contact.cells, _normal_load(compliance.pair, torque) / stiffness)
+    return SearchStart(compliance.contact.cells, normal_load(compliance.pair, torque) / stiffness)
 
 
 def _window_ends(cells: Cells) -> Booleans:
@@ -346,6 +346,6 @@ def _window_ends(cells: Cells) -> Booleans:
     return np.asarray((first | last) & ~cells.cut)
 
 
-def _normal_load(pair: GearPair, torque: float) -> float:
-    """Sum of the normal contact forces: every involute contact has the same lever arm r_b cos(beta_b)."""
+def normal_load(pair: GearPair, torque: float) -> float:
+    """Sum of the normal contact forces under a torque on gear 1, N: all contacts have the lever r_b cos(beta_b)."""
     return torque / (pair.pinion.base_radius * math.cos(pair.pinion.base_helix_angle))

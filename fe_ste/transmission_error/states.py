@@ -16,6 +16,7 @@ from fe_ste.contact.complementarity import ContactSolution
 from fe_ste.contact.kinematics import ContactError
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.notebook import html_table, value_range
 from fe_ste.transmission_error.compliance import PairCompliance
 
 
@@ -39,6 +40,11 @@ class ContactState:
     cells: Cells
     solution: ContactSolution
     pressure: Floats
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        cells = len(self.cells.tooth)
+        return f"<ContactState: pmc {self.pmc:.4g}, normal load {self.normal_load:.5g} N, {cells} cells>"
 
 
 @dataclass
@@ -104,8 +110,8 @@ class StateAxes:
         misalignments = np.atleast_1d(np.asarray(misalignment, dtype=float))
         if not np.isfinite(misalignments).all():
             raise ValueError(f"misalignment = {misalignment}: must be finite angles in rad")
-        own = pair.centre_distance if centre_distance is None else centre_distance
-        distances = np.atleast_1d(np.asarray(own, dtype=float))
+        distances_asked = pair.centre_distance if centre_distance is None else centre_distance
+        distances = np.atleast_1d(np.asarray(distances_asked, dtype=float))
         for distance in distances:
             pair.with_centre_distance(float(distance))  # refuses before the finite elements, not after
         return cls(positions, torques, distances, misalignments)
@@ -122,6 +128,22 @@ class StateAxes:
             "torque": self.torque,
             "centre_distance": self.centre_distance,
             "misalignment": self.misalignment,
+        }
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<StateAxes: {', '.join(self.ranges().values())}>"
+
+    def _repr_html_(self) -> str:
+        return html_table("axes of a grid of states", self.ranges())
+
+    def ranges(self) -> dict[str, str]:
+        """Return the values along each axis as text for people, with units."""
+        return {
+            "position in the mesh cycle": f"{self.positions} positions",
+            "torque": value_range(self.torque, "N m"),
+            "centre distance": value_range(self.centre_distance, "mm", 1e3),
+            "misalignment": value_range(self.misalignment, "urad", 1e6),
         }
 
 
@@ -282,3 +304,8 @@ class StateResults:
             dataset[name].attrs = {"units": unit, "long_name": meaning}
         dataset.attrs["failures"] = "\n".join(self.failures)
         return dataset
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        solved = int(np.isfinite(self.values["ste"]).sum())
+        return f"<StateResults: {solved} of {self.iterations.size} states solved, {len(self.failures)} failed>"

@@ -17,6 +17,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.notebook import html_table, value_range
 
 STENCIL = 4
 """Nodes of an axis that act between two of them."""
@@ -154,7 +155,7 @@ class SteSurface:
         if not bool(table["converged"].all()):
             unsolved = int((~table["converged"].astype(bool)).sum())
             raise InterpolationError(f"the table holds {unsolved} unsolved states")
-        places = axes[:3]
+        position_axes = axes[:3]
         return cls.from_nodes(
             table["centre_distance"].to_numpy(),
             table["misalignment"].to_numpy(),
@@ -162,8 +163,8 @@ class SteSurface:
             table["ste"].to_numpy(),
             table["tangent_stiffness"].to_numpy(),
             table["tangent_load_centre"].to_numpy(),
-            table["unloaded_ste"].transpose(*places).to_numpy(),
-            table["unloaded_centre"].transpose(*places).to_numpy(),
+            table["unloaded_ste"].transpose(*position_axes).to_numpy(),
+            table["unloaded_centre"].transpose(*position_axes).to_numpy(),
         )
 
     @classmethod
@@ -211,12 +212,12 @@ class SteSurface:
         nodes = _from_no_load(unloaded, values)
         slopes = _load_slopes(root, nodes, np.asarray(tangent_stiffness, dtype=np.float64))
         pieces = _load_pieces(root, nodes, slopes)
-        tilts = np.atleast_1d(np.asarray(misalignment, dtype=np.float64))
-        if tilts.size > 1:
+        misalignments = np.atleast_1d(np.asarray(misalignment, dtype=np.float64))
+        if misalignments.size > 1:
             centres = _from_no_load(unloaded_centre, np.broadcast_to(tangent_load_centre, values.shape))
-            turning = _load_pieces(root, centres, centres @ _slope_matrix(root).T)
-            pieces = np.stack([pieces, turning], axis=3).reshape(*values.shape[:2], -1, *pieces.shape[3:])
-        surface = cls(np.atleast_1d(np.asarray(centre_distance, dtype=np.float64)), tilts, root, pieces)
+            by_misalignment = _load_pieces(root, centres, centres @ _slope_matrix(root).T)
+            pieces = np.stack([pieces, by_misalignment], axis=3).reshape(*values.shape[:2], -1, *pieces.shape[3:])
+        surface = cls(np.atleast_1d(np.asarray(centre_distance, dtype=np.float64)), misalignments, root, pieces)
         surface._check_rising()
         return surface
 
@@ -237,8 +238,8 @@ class SteSurface:
 
         Outside the axes of position it continues along its slope.
         """
-        a = self.centre_distance[0] if centre_distance is None else centre_distance
-        cubic = self._cubics_at(pmc, float(a), misalignment)
+        distance = self.centre_distance[0] if centre_distance is None else centre_distance
+        cubic = self._cubics_at(pmc, float(distance), misalignment)
         root = np.sqrt(force)
         piece = int(np.clip(np.searchsorted(self.root_force, root, side="right") - 1, 0, len(cubic) - 1))
         start, end = self.root_force[piece : piece + 2]
@@ -265,12 +266,12 @@ class SteSurface:
         """Make sure that s rises with the load between the nodes too, where weights may be negative."""
         powers = np.arange(1, 4) * _CHECKS[:, None] ** np.arange(3)
         count = len(self.coefficients)
-        cycle = np.array([_periodic_weights(count, 0.5 * p / count) for p in range(2 * count)])
-        centre = np.array([_weights_at(self.centre_distance, x) for x in _halved(self.centre_distance)])
-        tilt = np.array([_slope_weights_at(self.misalignment, x) for x in _halved(self.misalignment)])
-        for rows in cycle:  # a position at a time: the whole would be large
+        pmc_weights = np.array([_periodic_weights(count, 0.5 * p / count) for p in range(2 * count)])
+        distance_weights = np.array([_weights_at(self.centre_distance, x) for x in _halved(self.centre_distance)])
+        misalignment_weights = np.array([_slope_weights_at(self.misalignment, x) for x in _halved(self.misalignment)])
+        for rows in pmc_weights:  # a position at a time: the whole would be large
             values = np.tensordot(rows, self.coefficients, 1)
-            values = np.tensordot(tilt, np.tensordot(centre, values, 1), (1, 1))
+            values = np.tensordot(misalignment_weights, np.tensordot(distance_weights, values, 1), (1, 1))
             rise = values[..., 1:4].sum(axis=-1)
             falling = np.argwhere((values[..., 1:4] @ powers.T).min(axis=-1) < -_ROUND_OFF * rise)
             if falling.size:
@@ -280,6 +281,24 @@ class SteSurface:
                     f"{_halved(self.centre_distance)[c]:.6g} m, misalignment {_halved(self.misalignment)[a]:.4g} rad, "
                     "between the nodes of the table: lay more of them"
                 )
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return (
+            f"<SteSurface: {len(self.coefficients)} positions, {value_range(self.centre_distance, 'mm', 1e3)}, "
+            f"{value_range(self.misalignment, 'urad', 1e6)}, force up to {self.root_force[-1] ** 2:.5g} N>"
+        )
+
+    def _repr_html_(self) -> str:
+        return html_table(
+            "surface of the static transmission error",
+            {
+                "position in the mesh cycle": f"{len(self.coefficients)} positions",
+                "centre distance": value_range(self.centre_distance, "mm", 1e3),
+                "misalignment": value_range(self.misalignment, "urad", 1e6),
+                "line-of-action force": value_range(self.root_force**2, "N"),
+            },
+        )
 
 
 def _load_slopes(root: Floats, nodes: Floats, tangent: Floats) -> Floats:

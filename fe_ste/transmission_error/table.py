@@ -25,7 +25,9 @@ from fe_ste.elasticity.flank import HANDOVER_DEPTH, FlankCompliance, flank_compl
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.gears import Gear, GearPair
-from fe_ste.tools.files import FileError, Layout, load_dataset, write_dataset
+from fe_ste.tools.files import FileError
+from fe_ste.tools.notebook import html_table, value_range
+from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
 from fe_ste.tools.versions import TABLE
 from fe_ste.tools.workers import Workers
 from fe_ste.transmission_error.compliance import PairCompliance
@@ -97,6 +99,31 @@ class TableInput:
     def hash(self) -> str:
         """SHA-256 of the resolved input."""
         return hashlib.sha256(json.dumps(self.resolved(), sort_keys=True).encode()).hexdigest()
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<TableInput of {self.pair.name!r}: {', '.join(self.axes().ranges().values())}>"
+
+    def _repr_html_(self) -> str:
+        return html_table(
+            f"input of a table of gear pair {self.pair.name}",
+            self.axes().ranges()
+            | {
+                "pinion modification": repr(self.pinion_modification),
+                "gear modification": repr(self.gear_modification),
+                "mesh": repr(self.mesh),
+                "contact": repr(self.contact),
+            },
+        )
+
+    def axes(self) -> StateAxes:
+        """Axes of the table, not checked."""
+        return StateAxes(
+            self.positions,
+            np.array(self.torque),
+            np.array(self.centre_distance or (self.pair.centre_distance,)),
+            np.array(self.misalignment),
+        )
 
 
 @dataclass(frozen=True)
@@ -218,6 +245,26 @@ class MeshTable:
     def failures(self) -> list[str]:
         """Positions that were not solved, with the reason."""
         return [line for line in str(self.dataset.attrs["failures"]).splitlines() if line]
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<MeshTable of {self.dataset.attrs['pair']!r}: {', '.join(self._ranges().values())}>"
+
+    def _repr_html_(self) -> str:
+        return html_table(
+            f"static transmission error of gear pair {self.dataset.attrs['pair']}",
+            self._ranges()
+            | {
+                "static transmission error": value_range(self.dataset["ste"], "um", 1e6),
+                "mesh stiffness": value_range(self.dataset["mesh_stiffness"], "N/um", 1e-6),
+                "states not solved": str(len(self.failures)),
+                "input": self.input_hash[:12],
+            },
+        )
+
+    def _ranges(self) -> dict[str, str]:
+        positions, values = self.dataset.sizes["pmc"], (self.dataset[axis].to_numpy() for axis in STATE_AXES)
+        return StateAxes(positions, *values).ranges()
 
 
 @lru_cache(maxsize=8)

@@ -119,20 +119,22 @@ def solve_positions(
     finished = 0
     with one_dense_thread():
         for c, distance in enumerate(axes.centre_distance):
-            placed = compliance.at_centre_distance(float(distance))
+            at_distance = compliance.at_centre_distance(float(distance))
             descending = np.argsort(-axes.torque, kind="stable")  # contact that shrinks is found in fewer steps
-            known = float(axes.torque[descending[0]])
-            first = [new_start(placed, known) for _ in axes.misalignment]
+            known_torque = float(axes.torque[descending[0]])
+            starts_of_first = [new_start(at_distance, known_torque) for _ in axes.misalignment]
             for t in descending:
                 torque = axes.torque[t]
-                starts = [start.scaled(float(torque) / known) for start in first]
-                known = float(torque)
+                starts = [start.scaled(float(torque) / known_torque) for start in starts_of_first]
+                known_torque = float(torque)
                 for p, position in enumerate(chosen):
                     pmc = position / axes.positions
-                    states = contact_states(placed, float(torque), pmc, axes.misalignment, starts)
-                    first = list(starts) if p == 0 else first
+                    states = contact_states(at_distance, float(torque), pmc, axes.misalignment, starts)
+                    starts_of_first = list(starts) if p == 0 else starts_of_first
                     for m, state in enumerate(states):
-                        results.put((p, int(t), c, m), placed, float(torque), pmc, float(axes.misalignment[m]), state)
+                        results.put(
+                            (p, int(t), c, m), at_distance, float(torque), pmc, float(axes.misalignment[m]), state
+                        )
                         finished += 1
                         if progress is not None:
                             progress(finished)

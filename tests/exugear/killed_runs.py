@@ -19,6 +19,7 @@ from pathlib import Path
 import xarray as xr
 
 import fe_ste.tools.files
+import fe_ste.tools.sealed
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.results.run_file import load_run
@@ -51,7 +52,7 @@ def kill_at(number: int) -> None:
 
     for name in CALLS:
         setattr(os, name, counted(getattr(os, name)))
-    plain = fe_ste.tools.files._write_all
+    plain = fe_ste.tools.files.write_all
 
     def write_all(file, content) -> None:
         if reached():
@@ -59,7 +60,8 @@ def kill_at(number: int) -> None:
             os.kill(os.getpid(), signal.SIGKILL)
         plain(file, content)
 
-    fe_ste.tools.files._write_all = write_all
+    for module in (fe_ste.tools.files, fe_ste.tools.sealed):
+        module.write_all = write_all
 
 
 def in_fork(work: Callable[[], None]) -> int:

@@ -19,7 +19,7 @@ from exugear.kernels.elastic import elastic_energies, scratch_for
 from exugear.kernels.inertia import kinetic_energies
 from exugear.kernels.meshes import STATE_SIZE, mesh_state
 from exugear.kernels.turning import turning_energies, turning_memory
-from exugear.model.sections import GROUND
+from exugear.model.sections.entries import GROUND
 
 
 def sampled(assembly: Assembly, q: np.ndarray, v: np.ndarray) -> np.ndarray:

@@ -14,7 +14,7 @@ STIFFNESS = {"sun_planet": 3.77e9, "ring_planet": 4.85e9, "intermediate": 3.07e9
 def surface_of(gearbox: Gearbox, name: str, positions: int = 50) -> SteSurface:
     """Table of a pair around its centre distance, up to twice its static load."""
     mesh = next(mesh for mesh in gearbox.meshes if mesh.pair.name == name)
-    static = abs(gearbox.static_mesh_forces()[mesh.name])
+    static = abs(gearbox.train.static_mesh_forces()[mesh.name])
     centre = mesh.centre_distance + np.linspace(-2e-4, 2e-4, 5)
     misalignment = np.linspace(-4e-4, 4e-4, 5)
     force = static * LOADS

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from fe_ste.geometry.gears import BasicRack, Gear, GearPair
+from fe_ste.tools.arrays import Floats, Integers
 
 DEEP_RACK = BasicRack(addendum=1.0, dedendum=1.46, tip_radius=0.36)
 DEEPEST_RACK = BasicRack(addendum=1.0, dedendum=1.50, tip_radius=0.34)
@@ -121,7 +121,7 @@ def high_speed() -> GearPair:
     return grc_pair("high_speed")
 
 
-Block = tuple[NDArray[np.float64], NDArray[np.int64]]
+Block = tuple[Floats, Integers]
 
 
 def _block(*axes: Sequence[float]) -> Block:

@@ -26,10 +26,10 @@ def check(case: CaseArgument, files_below: FilesBelowOption = None, as_json: Jso
         loads = _load_summaries(gearbox)
         variants = {variant: lacking(gearbox, variant) for variant in VARIANTS}
         if as_json:
-            summary = {"case": str(case), "name": gearbox.name, "ratio": gearbox.ratio, "pairs": pairs}
+            summary = {"case": str(case), "name": gearbox.name, "ratio": gearbox.train.ratio, "pairs": pairs}
             print_json({**summary, "load_cases": loads, "variants": variants, "warnings": remarks(gearbox)})
         else:
-            say(f"{gearbox.name}: no fault found, ratio {gearbox.ratio:.6f}")
+            say(f"{gearbox.name}: no fault found, ratio {gearbox.train.ratio:.6f}")
             print_table("Gear pairs", [_pair_row(pair) for pair in pairs])
             if loads:
                 title = f"Load cases, rolling at the overall input {gearbox.case.overall.input}"
@@ -84,7 +84,7 @@ def _pair_row(pair: dict[str, Any]) -> dict[str, str]:
 def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
     """Sum up what each load case does to the rolling train; one that no run could take is bad input."""
     from exugear.loads.summary import doubts_about, summarise_loads
-    from exugear.model.gearbox import RPM
+    from exugear.model.parts import RPM
     from exugear.runs.extent import check_duration
 
     found = []

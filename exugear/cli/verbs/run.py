@@ -47,6 +47,13 @@ class Solver(StrEnum):
     exudyn = "exudyn"
 
 
+class MeshRoute(StrEnum):
+    """How forces of meshes enter Exudyn: by one element for all, or by a load with a user function on each gear."""
+
+    element = "element"
+    loads = "loads"
+
+
 def run(
     case: CaseArgument,
     variant: VariantOption,
@@ -56,6 +63,13 @@ def run(
         str | None, typer.Option("--load-case", metavar="NAME", help="Load case. (default: the first of the file)")
     ] = None,
     solver: Annotated[Solver, typer.Option(help="What integrates.")] = Solver.compiled,
+    mesh_route: Annotated[
+        MeshRoute,
+        typer.Option(
+            "--mesh-route",
+            help="How mesh forces enter Exudyn; loads is its textbook way, slow, with the variant bushing.",
+        ),
+    ] = MeshRoute.element,
     duration: Annotated[
         float | None, typer.Option(metavar="S", help="Simulated time, s. (default: the load case's)")
     ] = None,
@@ -79,6 +93,7 @@ def run(
         _check_freedom(gearbox)
         _check_extent(gearbox, variant, mesh_law, loads, duration, out or Path("results"))
         _check_solver(gearbox, variant, solver)
+        _check_mesh_route(mesh_route, variant, solver)
         inertias = inertias or gearbox.case.default_inertias
         folder = results_folder(case, out, make=not resume)
         directory = run_directory(folder, Choice(variant.value, mesh_law.value, inertias, loads))
@@ -87,9 +102,19 @@ def run(
             raise BadInputError(f"--resume: {reason}; run without it")
         _tell_doubts(gearbox, loads)
         fill_missing_tables(gearbox, folder, mesh_law)
-        with time_noted(folder, f"run, {variant}, {loads}, {inertias}, {mesh_law}, solver {solver}"):
+        route = ", meshes as loads" if mesh_route is MeshRoute.loads else ""
+        with time_noted(folder, f"run, {variant}, {loads}, {inertias}, {mesh_law}, solver {solver}{route}"):
             finished = _simulate(
-                gearbox, folder, variant.value, mesh_law.value, inertias, loads, solver.value, duration, resume
+                gearbox,
+                folder,
+                variant.value,
+                mesh_law.value,
+                inertias,
+                loads,
+                solver.value,
+                mesh_route.value,
+                duration,
+                resume,
             )
         _tell_run(case, finished, as_json)
 
@@ -117,9 +142,26 @@ def _check_solver(gearbox: Gearbox, variant: Variant, solver: Solver) -> None:
         )
 
 
+def _check_mesh_route(route: MeshRoute, variant: Variant, solver: Solver) -> None:
+    """Refuse loads on bodies where there are no loads, or no rigid bodies, before anything is computed."""
+    if route is MeshRoute.element:
+        return
+    if variant is not Variant.bushing:
+        why = "has no bodies, only their spins" if variant is Variant.rigid else "has elastic bodies"
+        raise BadInputError(
+            f"--mesh-route loads: its loads act on rigid bodies, and the variant {variant} {why}; "
+            "take --variant bushing, or --mesh-route element"
+        )
+    if solver is not Solver.exudyn:
+        raise BadInputError(
+            f"--mesh-route loads: loads with user functions exist in Exudyn only, not in the solver {solver}; "
+            "add --solver exudyn"
+        )
+
+
 def _check_freedom(gearbox: Gearbox) -> None:
     """Refuse to run a train whose speeds do not follow from one of them."""
-    freedoms = gearbox.kinematic_modes.shape[1]
+    freedoms = gearbox.train.degrees_of_freedom
     if freedoms > 1:
         raise BadInputError(
             f"{gearbox.source}: the gear train has {freedoms} degrees of freedom, and its runs do not work yet; "
@@ -145,6 +187,7 @@ def _simulate(
     inertias: str,
     load_case: str,
     solver: Literal["compiled", "exudyn"],
+    mesh_route: Literal["element", "loads"],
     duration: float | None,
     resume: bool,
 ) -> Run:
@@ -178,6 +221,7 @@ def _simulate(
                     bodies=bodies,
                     duration=duration,
                     solver=solver,
+                    mesh_route=mesh_route,
                     resume=resume,
                     progress=show,
                 )
@@ -197,7 +241,7 @@ def _tell_run(case: Path, finished: Run, as_json: bool) -> None:
         so_far = "".join(f"\nNot to be trusted so far: {reason}" for reason in finished.reasons)
         raise StoppedError(f"at {finished.end:.3f} s; kept in {finished.path}, --resume goes on from there{so_far}")
     from exugear.dynamics.signals import BALANCE_TERMS, MESH_TIMES, energy_residual
-    from exugear.model.gearbox import RPM
+    from exugear.model.parts import RPM
     from exugear.results.run_file import load_run
 
     data = load_run(finished.path, ("input_speed", *MESH_TIMES, *BALANCE_TERMS))

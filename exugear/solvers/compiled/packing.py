@@ -10,7 +10,7 @@ from exugear.kernels.connectors import ConnectorArrays
 from exugear.kernels.elastic import elastic_motion, scratch_for
 from exugear.kernels.table_law import scratch_memory
 from exugear.kernels.turning import turning_memory
-from exugear.model.sections import GROUND
+from exugear.model.sections.entries import GROUND
 from exugear.solvers.compiled.arrays import Bodies, Connectors, Equations, Joints, Loads, Meshes, Springs, Work
 from exugear.solvers.loads import LoadTable
 from fe_ste.tools.arrays import Floats

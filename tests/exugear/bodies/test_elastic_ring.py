@@ -57,7 +57,7 @@ def turned(assembly: Assembly, angle: float) -> tuple[np.ndarray, np.ndarray]:
     start = accelerating_start(assembly, LOAD, 20.0)
     random = np.random.default_rng(7)
     q = start.q + 1e-6 * random.normal(size=assembly.size)
-    q += assembly.rolling_velocity(np.zeros(assembly.size), assembly.gearbox.rolling_speeds("carrier", angle))
+    q += assembly.rolling_velocity(np.zeros(assembly.size), assembly.gearbox.train.rolling_speeds("carrier", angle))
     for body in assembly.bodies:
         if body.carrier is not None:  # their orbit is an arc
             o = assembly.coordinates[body.name][0]

@@ -49,7 +49,7 @@ def spinning(assembly: Assembly, angle: float = 0.7) -> tuple[np.ndarray, np.nda
     random = np.random.default_rng(7)
     q = start.q + 1e-6 * random.normal(size=assembly.size)
     v = start.v + 1e-2 * random.normal(size=assembly.size)
-    turned = assembly.rolling_velocity(np.zeros(assembly.size), assembly.gearbox.rolling_speeds("carrier", angle))
+    turned = assembly.rolling_velocity(np.zeros(assembly.size), assembly.gearbox.train.rolling_speeds("carrier", angle))
     planets = [body for body in assembly.bodies if body.carrier is not None]
     for body in planets:  # their orbit is an arc
         o = assembly.coordinates[body.name][0]
@@ -89,7 +89,7 @@ def test_shapes_of_the_grc_weigh_about_what_is_printed(flexible: Assembly, grc: 
 
 
 def test_turning_the_whole_train_stores_nothing(flexible: Assembly) -> None:
-    turned = flexible.rolling_velocity(np.zeros(flexible.size), flexible.gearbox.rolling_speeds("carrier", 1e-8))
+    turned = flexible.rolling_velocity(np.zeros(flexible.size), flexible.gearbox.train.rolling_speeds("carrier", 1e-8))
     forces = flexible.forces(turned, np.zeros(flexible.size), flexible.mean_meshes)
     one = np.zeros(flexible.size)
     one[flexible.coordinates["hss.hs_pinion"][5]] = 1e-8  # small enough for the planets' arcs
@@ -100,7 +100,7 @@ def test_turning_the_whole_train_stores_nothing(flexible: Assembly) -> None:
 def test_a_locked_output_winds_the_shafts_up_as_their_torsion_says(flexible: Assembly, grc: Gearbox) -> None:
     # Between pinion and coupling the high-speed shaft carries the whole torque: seats at 266.5 and 864 mm.
     q = locked_equilibrium(flexible, grc.case.static_load.torques_N_m, ["hss"], flexible.mean_meshes)
-    torque = 240e3 / grc.ratio
+    torque = 240e3 / grc.train.ratio
     # 80 GPa; the pinion's seat feeds its torque in over its width, so its mean angle is that of its middle or less.
     shear = 206e9 / 2.6
     pieces = [(0.060, 0.100), (0.0655, 0.105), (0.112, 0.110), (0.360, 0.105)]

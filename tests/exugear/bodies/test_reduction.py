@@ -17,7 +17,7 @@ from exugear.bodies.store import kept_arrays
 from exugear.bodies.turned_section import MeshSize, SeatBand, Shaft, ShaftSection
 from exugear.bodies.turned_shaft import ShaftModel, load_or_reduce, reduce_shaft
 from fe_ste.geometry.gears import Material
-from fe_ste.tools.files import write_sealed
+from fe_ste.tools.sealed import write_sealed
 
 from ...fe_ste.damage import damages
 

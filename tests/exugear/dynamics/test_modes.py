@@ -176,7 +176,7 @@ def test_train_has_one_free_rotation(grc: Gearbox, stiffness: dict) -> None:
         assert modes.frequency[0] == 0.0
         assert modes.frequency[1] > 10.0
         spin = [modes.shapes[modes.assembly.spin[name], 0] for name in ("carrier", "hss")]
-        assert spin[1] / spin[0] == pytest.approx(grc.ratio, rel=1e-6)
+        assert spin[1] / spin[0] == pytest.approx(grc.train.ratio, rel=1e-6)
 
 
 def test_energy_shares_sum_to_one(grc: Gearbox, stiffness: dict) -> None:
@@ -233,7 +233,7 @@ def sun_force(gearbox: Gearbox, speed: float) -> tuple[np.ndarray, float]:
     for step in range(600):
         angle = speed * step * 2e-5
         at = q.copy()
-        modes = gearbox.kinematic_modes
+        modes = gearbox.train.kinematic_modes
         roll = np.linalg.lstsq(
             modes[[gearbox.spinning.index(name) for name in ("sun", "carrier")]],
             np.array([angle, 0.0]), rcond=None,
@@ -327,7 +327,7 @@ def test_linearisation_ignores_the_slope_of_the_stiffness(grc: Gearbox, stiffnes
     load = grc.case.static_load
     q = locked_equilibrium(assembly, load.torques_N_m, load.locked, assembly.mean_meshes)
     rolling = np.zeros(assembly.size)
-    for name, value in grc.rolling_speeds("carrier", 1.0).items():
+    for name, value in grc.train.rolling_speeds("carrier", 1.0).items():
         rolling[assembly.spin[name]] = value
     stiff = linearise(assembly, q).total_stiffness
     assert np.abs(stiff @ rolling).max() < 1e-9 * np.abs(stiff).max()

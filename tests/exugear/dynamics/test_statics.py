@@ -141,7 +141,7 @@ def test_speed_driven_start_solves_for_the_drive_torque(grc: Gearbox, stiffness:
 def test_train_near_balance_starts_with_what_its_loads_leave(grc: Gearbox, stiffness: dict, law: str) -> None:
     """Net torque over referred inertia, whatever share of the loads is left over."""
     assembly = assemble(grc, Choice("rigid", law), {} if law == "rigid" else stiffness)
-    ratios = grc.rolling_speeds("carrier", 1.0)
+    ratios = grc.train.rolling_speeds("carrier", 1.0)
     inertia = sum(assembly.mass_matrix[i, i] * ratios[name] ** 2 for name, i in assembly.spin.items())
     for share in np.geomspace(1.0, 1e-6, 25):
         loads = {"carrier": 240e3, "hss": -240e3 * (1.0 - share) / ratios["hss"]}

@@ -279,7 +279,7 @@ def test_teeth_apart_and_tables_left_are_counted(grc: Gearbox, tables: dict, tmp
     run = simulate(unloaded, Choice("rigid", "table"), tables, tmp_path, duration=0.01)
     data = xr.load_dataset(run.path, engine="h5netcdf")
     assert float(data["apart_time"].min()) == pytest.approx(0.01, rel=0.05)
-    heavy = grc.varied({"load_cases.reference.torques_N_m": {"carrier": 7.2e5, "hss": -7.2e5 / grc.ratio}})
+    heavy = grc.varied({"load_cases.reference.torques_N_m": {"carrier": 7.2e5, "hss": -7.2e5 / grc.train.ratio}})
     run = simulate(heavy, Choice("rigid", "table"), tables, tmp_path / "heavy", duration=0.01)
     data = xr.load_dataset(run.path, engine="h5netcdf")
     assert float(data["outside_time"].min()) == pytest.approx(0.01, rel=0.05)

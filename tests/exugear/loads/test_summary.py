@@ -16,7 +16,8 @@ from exugear.dynamics.assemble import assemble
 from exugear.dynamics.statics import accelerating_start
 from exugear.loads.summary import BURSTING_RIM_SPEED, LoadSummary, doubts_about, summarise_loads
 from exugear.model.choice import Choice
-from exugear.model.gearbox import RPM, Gearbox
+from exugear.model.gearbox import Gearbox
+from exugear.model.parts import RPM
 from exugear.model.reading import CaseError
 from exugear.runs.runup import simulate
 
@@ -72,7 +73,7 @@ def test_a_drive_holds_what_the_torques_do_not(grc: Gearbox, stiffness: dict) ->
     case = grc.load_cases["speed_driven"]
     loads = summarise_loads(grc, case)
     assert loads.net_torque == pytest.approx(240e3)
-    assert loads.end_speed == pytest.approx(1800.0 * RPM / grc.ratio, rel=1e-12)
+    assert loads.end_speed == pytest.approx(1800.0 * RPM / grc.train.ratio, rel=1e-12)
     half = summarise_loads(grc, case, duration=2.5)  # the ramp is the load case's; a shorter run ends on it
     assert half.end_speed == pytest.approx(0.5 * loads.end_speed, rel=1e-12)
     assembly = assemble(grc, Choice("rigid", "constant"), stiffness)
@@ -145,7 +146,7 @@ def test_check_reads_the_torque_series_too(tmp_path):
 
 
 def test_planets_count_with_their_orbits(grc: Gearbox) -> None:
-    unit = grc.rolling_speeds("carrier", 1.0)
+    unit = grc.train.rolling_speeds("carrier", 1.0)
     bodies = grc.bodies()
     spins = sum(body.axial * unit[body.name] ** 2 for body in bodies if not body.fixed)
     orbits = sum(body.mass * 0.308**2 for body in bodies if body.carrier)

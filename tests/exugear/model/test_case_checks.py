@@ -70,7 +70,7 @@ def equal_planets(count: int) -> dict[str, Any]:
 @pytest.mark.parametrize("count", [1, 3])
 def test_planets_share_the_load_of_the_carrier(case: Any, count: int) -> None:
     gearbox = case("planetary", **equal_planets(count), pins={})
-    forces = gearbox.static_mesh_forces()
+    forces = gearbox.train.static_mesh_forces()
     # The sun takes the carrier's torque over the ratio 1 + z_ring / z_sun, in equal parts.
     expected = 240e3 / (1.0 + 99.0 / 21.0) / gearbox.gears["sun"].base_radius / count
     assert len(forces) == 2 * count
@@ -86,15 +86,15 @@ def test_meshes_carry_what_statics_say_under_any_load(case: Any, variant: str, c
     assembly = assembled(gearbox, Choice(variant), ISO)
     q = locked_equilibrium(assembly, {"carrier": torque}, ["shaft"], assembly.mean_meshes)
     found = assembly.mesh_states(q, np.zeros_like(q), assembly.mean_meshes)[:, 4]
-    expected = sum(abs(force) for force in gearbox.static_mesh_forces().values())
+    expected = sum(abs(force) for force in gearbox.train.static_mesh_forces().values())
     assert np.abs(found).sum() == pytest.approx(expected, rel=1e-3 if variant == "bushing" else 1e-6)
 
 
 def test_a_brake_that_is_locked_holds_the_train_as_its_shaft_would(case: Any) -> None:
     gearbox = case("grc", static_load__locked=["brake"])
     plain = case("grc")
-    assert gearbox.ratio == pytest.approx(plain.ratio, rel=1e-12)
-    assert gearbox.static_mesh_forces() == pytest.approx(plain.static_mesh_forces(), rel=1e-9)
+    assert gearbox.train.ratio == pytest.approx(plain.train.ratio, rel=1e-12)
+    assert gearbox.train.static_mesh_forces() == pytest.approx(plain.train.static_mesh_forces(), rel=1e-9)
     stiffness = {name: np.array([3e9]) for name in gearbox.pairs}
     for variant in ("rigid", "bushing"):
         held, free = (modes_with_bodies(one, Choice(variant), stiffness).frequency for one in (gearbox, plain))
@@ -106,7 +106,7 @@ def test_balanced_torques_need_no_lock(case: Any) -> None:
     free = case("spur", static_load={"torques_N_m": balanced, "locked": []})
     held = case("spur")
     stiffness = {"spur": np.array([2e8])}
-    assert free.static_mesh_forces() == pytest.approx(held.static_mesh_forces())
+    assert free.train.static_mesh_forces() == pytest.approx(held.train.static_mesh_forces())
     assert eigenmodes(free, Choice("bushing"), stiffness).frequency == pytest.approx(
         eigenmodes(held, Choice("bushing"), stiffness).frequency, rel=1e-6, abs=1e-3
     )
@@ -152,7 +152,7 @@ def test_a_held_carrier_of_a_train_that_turns_has_modes(case: Any) -> None:
     static = {"torques_N_m": {"rim": -1e4}, "locked": ["shaft", "carrier"]}
     held = {"static_load": static, "overall__input": "rim"}
     gearbox = case("planetary", **DIFFERENTIAL, **held)
-    assert gearbox.ratio == pytest.approx(-99.0 / 21.0, rel=1e-12)  # Willis, the carrier at rest
+    assert gearbox.train.ratio == pytest.approx(-99.0 / 21.0, rel=1e-12)  # Willis, the carrier at rest
     for variant in ("rigid", "bushing"):
         assert (modes_with_bodies(gearbox, Choice(variant), ISO).frequency < 0.1).sum() == 2
 
@@ -265,10 +265,10 @@ def test_a_topography_deeper_than_half_a_module_is_refused(case: Any, cases: Any
 
 def test_what_carries_nothing_in_the_static_load_is_told(case: Any) -> None:
     gearbox = case("spur", static_load={"torques_N_m": {"shaft_1": 100.0}, "locked": ["shaft_1"]})
-    assert gearbox.static_mesh_forces() == {"spur": 0.0}  # not the rounding of zero
+    assert gearbox.train.static_mesh_forces() == {"spur": 0.0}  # not the rounding of zero
     assert "pairs.spur: carries no torque in [static_load], and so gets no table" in remarks(gearbox)
     still = case("grc", static_load__torques_N_m={"carrier": 0.0})
-    assert set(still.static_mesh_forces().values()) == {0.0}
+    assert set(still.train.static_mesh_forces().values()) == {0.0}
     (loads,) = {summarise_loads(still, still.load_cases["reference"]).reversed_flanks}
     assert loads == ()
 
@@ -415,7 +415,7 @@ def test_one_phase_for_each_mesh_of_a_set_is_taken(case: Any) -> None:
 
 
 def test_whole_numbers_serve_where_a_length_is_asked(case: Any) -> None:
-    assert case("spur", pairs__spur__centre_distance_mm=75).ratio == case("spur").ratio
+    assert case("spur", pairs__spur__centre_distance_mm=75).train.ratio == case("spur").train.ratio
 
 
 @pytest.mark.parametrize(

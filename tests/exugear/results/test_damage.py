@@ -17,7 +17,8 @@ from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
 from exugear.results.folder import kept_case, times_spent
 from exugear.results.run_file import load_run
-from fe_ste.tools.files import FileError, write_dataset
+from fe_ste.tools.files import FileError
+from fe_ste.tools.sealed import write_dataset
 
 from ...fe_ste.damage import damages
 from ..runs.test_kills import stopped_run

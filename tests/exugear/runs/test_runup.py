@@ -189,7 +189,7 @@ def test_sample_rate_must_fit_the_step(grc: Gearbox, stiffness: dict, tmp_path: 
 def test_speed_driven_run_keeps_its_speed(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
     run = simulate(grc, Choice("rigid", load_case="speed_driven"), stiffness, tmp_path, duration=0.2)
     speed = opened(run.path).input_speed
-    ramp = 1800 * np.pi / 30 / grc.ratio / 5.0
+    ramp = 1800 * np.pi / 30 / grc.train.ratio / 5.0
     # The drive's spring lets the train swing by a small part of the ramp.
     assert float(speed[-1]) == pytest.approx(ramp * float(speed.time[-1]), rel=2e-2)
 

@@ -42,7 +42,7 @@ def disturbed(assembly: Assembly, angle: float = 0.7) -> tuple[np.ndarray, np.nd
     q = start.q + 1e-5 * random.normal(size=assembly.size)
     v = start.v + 0.1 * random.normal(size=assembly.size)
     bodies = {body.name: body for body in assembly.bodies}
-    for name, unit in assembly.gearbox.rolling_speeds("carrier", 1.0).items():
+    for name, unit in assembly.gearbox.train.rolling_speeds("carrier", 1.0).items():
         q[assembly.spin[name]] += unit * angle
         carrier = bodies[name].carrier
         if carrier is not None and assembly.has_six(bodies[name]):
@@ -222,7 +222,7 @@ def test_rigid_variant_follows_the_jointed_model_of_exudyn(grc: Gearbox, stiffne
     minimal, jointed = assemble(grc, Choice("rigid"), stiffness), assemble(grc, Choice("jointed"), stiffness)
     speed, duration, interval = -4.8, 0.5, 5e-5
     start = accelerating_start(minimal, LOAD, speed)
-    speeds = {n: u * speed for n, u in grc.rolling_speeds("carrier", 1.0).items()}
+    speeds = {n: u * speed for n, u in grc.train.rolling_speeds("carrier", 1.0).items()}
     q = np.zeros(jointed.size)
     for name, index in jointed.spin.items():
         q[index] = start.q[minimal.spin[name]]
@@ -343,7 +343,7 @@ def test_both_solvers_write_the_same_run(grc: Gearbox, stiffness: dict, tmp_path
 
 def excitation_amplitudes(assembly: Assembly, rpm: float, step: float) -> np.ndarray:
     """Amplitudes of overall DTE and high-speed DTE at the high-speed mesh frequency, constant speed (rpm)."""
-    load = {"carrier": 240e3, "hss": -240e3 / assembly.gearbox.ratio}
+    load = {"carrier": 240e3, "hss": -240e3 / assembly.gearbox.train.ratio}
     start = accelerating_start(assembly, load, rpm * np.pi / 30.0)
     every, steps = round(2.5e-5 / step), round(0.4 / step)
     q, v = np.empty((2, steps, assembly.size))
@@ -366,7 +366,7 @@ def test_amplitude_error_of_the_chosen_step(
     grc: Gearbox, stiffness: dict, variant: str, frequency: float, limit: float
 ) -> None:
     assembly = assembled(grc, Choice(variant), stiffness)
-    rpm = frequency / grc.mesh_frequencies(np.pi / 30.0)["high_speed"]
+    rpm = frequency / grc.train.mesh_frequencies(np.pi / 30.0)["high_speed"]
     found = excitation_amplitudes(assembly, rpm, choose_step(assembly, 20e3, 6.4e3))
     expected = excitation_amplitudes(assembly, rpm, 2.5e-6)
     # Under 1 % is asked for at 6.4 kHz; the method's order leaves a twentieth of that at half the frequency.
@@ -390,7 +390,7 @@ def test_order_cuts_of_the_run_up_stay_at_half_the_step(
         )
         lines = [
             line
-            for name, order in grc.mesh_frequencies(2.0 * np.pi).items()
+            for name, order in grc.train.mesh_frequencies(2.0 * np.pi).items()
             for line in harmonics(name, order, 3)
             if line.frequency(22.5) < 8e3  # the flat part of the stored band
         ]

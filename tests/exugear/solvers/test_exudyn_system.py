@@ -155,7 +155,7 @@ def test_rigid_meshes_leave_the_train_and_its_couplings(grc: Gearbox) -> None:
     """Two bodies about one spring: everything geared together, and the brake behind its coupling."""
     assembly = assemble(grc, Choice("rigid", "rigid"), {})
     assert assembly.motions.shape[1] == 2
-    spins = grc.rolling_speeds("carrier", grc.rolling_speeds("hss", 1.0)["carrier"])
+    spins = grc.train.rolling_speeds("carrier", grc.train.rolling_speeds("hss", 1.0)["carrier"])
     referred = sum(assembly.mass_matrix[i, i] * spins[n] ** 2 for n, i in assembly.spin.items() if n != "brake")
     frequency = np.sqrt(1e6 * (1 / 0.39 + 1 / referred)) / (2 * np.pi)
     assert modes_of(assembly).frequency == pytest.approx([0.0, frequency], rel=1e-9)

@@ -12,7 +12,7 @@ from exugear.model.versions import RUN
 from exugear.results.run_file import load_run
 from exugear.spectra.comparison import VariantRun, compare, mobility_shares, nearest_mode, read_run, report_mode
 from exugear.spectra.waterfall import OrderLine
-from fe_ste.tools.files import write_dataset
+from fe_ste.tools.sealed import write_dataset
 
 RATE = 8000.0
 LINE = OrderLine("mesh", 100.0)

@@ -23,7 +23,7 @@ RATED = 22.1 * math.pi / 30
 
 def rolled(assembly: Assembly, angle: float) -> np.ndarray:
     """Coordinates after the carrier has rolled through an angle, nothing deflected."""
-    spins = assembly.gearbox.rolling_speeds("carrier", angle)
+    spins = assembly.gearbox.train.rolling_speeds("carrier", angle)
     q = np.zeros(assembly.size)
     c, s = math.cos(angle), math.sin(angle)
     for body in assembly.bodies:
@@ -58,7 +58,7 @@ def states(assembly: Assembly, q: np.ndarray, v: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
 def test_rolling_at_rated_speed_has_no_deflection_rate(grc: Gearbox, stiffness: dict, law: str, variant: str) -> None:
     assembly = assembled(grc, Choice(variant, law), stiffness)
-    speeds = grc.rolling_speeds("carrier", RATED)
+    speeds = grc.train.rolling_speeds("carrier", RATED)
     for angle in (0.0, 0.4, 100.0):
         q = rolled(assembly, angle)
         found = states(assembly, q, assembly.rolling_velocity(q, speeds))

@@ -50,7 +50,7 @@ def high_speed(assembly: Assembly) -> int:
 def deflection_at(assembly: Assembly, mesh: int, angle: float) -> float:
     """Deflection of a mesh when the train has rolled through an angle of the mesh's gear 1."""
     element = assembly.elements[mesh]
-    spins = assembly.gearbox.rolling_speeds(element.mesh.pinion, angle)
+    spins = assembly.gearbox.train.rolling_speeds(element.mesh.pinion, angle)
     q = np.zeros(assembly.size)
     for name, spin in spins.items():
         q[assembly.spin[name]] = spin
@@ -216,7 +216,7 @@ def test_a_displaced_planet_gives_the_sidebands_of_its_orbit(grc: Gearbox, stiff
         assembly = assemble(
             gearbox, Choice("bushing", "constant"), {n: np.array([v.mean()]) for n, v in stiffness.items()}
         )
-        balanced = {"carrier": 240e3, "hss": -240e3 / gearbox.ratio}
+        balanced = {"carrier": 240e3, "hss": -240e3 / gearbox.train.ratio}
         start = accelerating_start(assembly, balanced, speed)
         step = 2.0 * math.pi / speed / 16384
         q, v = np.empty((2, 16384, assembly.size))

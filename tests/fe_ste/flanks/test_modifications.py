@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from fe_ste.flanks.modifications import (
     FlankModification,
@@ -19,8 +18,7 @@ from fe_ste.flanks.modifications import (
 )
 from fe_ste.geometry.checks import GeometryError
 from fe_ste.geometry.gears import Gear, GearPair
-
-Floats = NDArray[np.float64]
+from fe_ste.tools.arrays import Floats
 
 MICRON = 1e-6
 

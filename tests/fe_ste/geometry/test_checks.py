@@ -8,14 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from fe_ste.geometry.checks import GeometryError
 from fe_ste.geometry.gears import BasicRack, Gear, GearPair, Material
 from fe_ste.geometry.involute import inverse_involute, involute
 from fe_ste.geometry.profile import tooth_profile
-
-Floats = NDArray[np.float64]
+from fe_ste.tools.arrays import Floats
 
 
 def spur(**changes: Any) -> Gear:

@@ -8,12 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from fe_ste.geometry.gears import BasicRack, Gear, GearPair
 from fe_ste.geometry.involute import inverse_involute, involute
-
-Floats = NDArray[np.float64]
+from fe_ste.tools.arrays import Floats
 
 
 def spur(**changes: Any) -> Gear:

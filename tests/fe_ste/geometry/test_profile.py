@@ -8,13 +8,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from fe_ste.geometry.checks import GeometryError
 from fe_ste.geometry.gears import BasicRack, Gear, GearPair
 from fe_ste.geometry.profile import ToothProfile, tooth_profile
-
-Floats = NDArray[np.float64]
+from fe_ste.tools.arrays import Floats
 
 NANO = 1e-12
 """1e-9 mm: rounding of coordinates of half a metre, with room for a few operations."""

@@ -11,7 +11,7 @@ import pytest
 from fe_ste.elasticity.sectors import ContactMesh
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.reference.newton import EquilibriumError, NewtonSettings
-from fe_ste.reference.position import NonlinearSettings, nonlinear_position, normal_force
+from fe_ste.reference.position import NonlinearSettings, nonlinear_position, normal_load
 
 SPUR = Gear(name="spur", teeth=50, normal_module=3e-3, face_width=20e-3, held_diameter=100e-3)
 PAIR = GearPair(name="spur", pinion=SPUR, gear=SPUR, centre_distance=150e-3)
@@ -46,7 +46,7 @@ def test_contact_forces_balance_the_torque_on_both_gears(solved):
 def test_pressures_push_and_sum_to_the_normal_force(solved):
     found = solved.equilibrium
     assert found.pressure.min() >= 0
-    assert found.pressure @ found.weight == pytest.approx(normal_force(PAIR, TORQUE), rel=2e-3)
+    assert found.pressure @ found.weight == pytest.approx(normal_load(PAIR, TORQUE), rel=2e-3)
     assert sum(solved.load_share.values()) == pytest.approx(1.0)
     assert solved.load_share[0] > 0.99  # single contact at the pitch point
 

@@ -13,7 +13,7 @@ from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.elasticity.sectors import ContactMesh
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.pictures.stress import draw_contact_stress
-from fe_ste.reference.position import NonlinearSettings, nonlinear_position, normal_force
+from fe_ste.reference.position import NonlinearSettings, nonlinear_position, normal_load
 from fe_ste.reference.stress import stress_of_position, stress_of_state
 from fe_ste.tools.rendering import RenderingError, require_rendering
 from fe_ste.transmission_error.compliance import pair_compliance
@@ -41,7 +41,7 @@ def fields():
 @pytest.mark.parametrize("method", ["non-linear", "superelement"])
 def test_pressure_and_equivalent_stress_are_those_of_hertz(fields, method):
     field = fields[method]
-    line_load = normal_force(PAIR, TORQUE) / PAIR.face_width
+    line_load = normal_load(PAIR, TORQUE) / PAIR.face_width
     peak = 2 * line_load / (np.pi * hertz_half_width(PAIR, line_load))
     middle = np.abs(field.sectors[0].points[:, 2]) < 5e-3
     own = field.nodes_of(0)
@@ -78,7 +78,7 @@ def test_pressures_of_both_gears_carry_the_same_load(fields):
         corners = sector.points[sector.facets]
         area = np.linalg.norm(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=1) / 2
         totals.append(float((field.pressure[field.nodes_of(number)][sector.facets].mean(axis=1) * area).sum()))
-    assert totals == pytest.approx([normal_force(PAIR, TORQUE)] * 2, rel=0.01)
+    assert totals == pytest.approx([normal_load(PAIR, TORQUE)] * 2, rel=0.01)
 
 
 def can_render() -> bool:

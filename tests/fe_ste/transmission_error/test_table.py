@@ -19,7 +19,7 @@ from fe_ste.contact.cells import ContactSettings
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.gears import Gear, GearPair
-from fe_ste.tools.files import write_dataset
+from fe_ste.tools.sealed import write_dataset
 from fe_ste.transmission_error.table import MeshTable, TableError, TableInput
 
 from ..damage import damages

@@ -1,0 +1,145 @@
+"""Bodies from their sections, position errors of planets' pins, and load cases."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+from exugear.model.named_files import LARGEST_TABLE
+from exugear.model.origin import Origin, part_of_each
+from exugear.model.parts import RPM, Body, LoadCase
+from exugear.model.sections.bodies import BodySection, InertiaSection
+from exugear.model.sections.case import LoadCaseSection
+from exugear.model.sections.gears import PinSection
+
+
+def inertia_sets(origin: Origin) -> tuple[str, ...]:
+    """Names of the inertia sets; every moving body has each of them."""
+    moving = [section for section in origin.enabled.values() if not section.fixed]
+    return tuple(moving[0].inertia) if moving else ()
+
+
+def bodies(origin: Origin, inertias: str) -> tuple[Body, ...]:
+    """All enabled bodies, planets one by one.
+
+    Parameters
+    ----------
+    origin : Origin
+    inertias : str
+        Inertia set.
+
+    Raises
+    ------
+    CaseError
+        A body lacks the inertia set, or has no place.
+    """
+    return tuple(
+        body for family, section in origin.enabled.items() for body in _family(origin, family, section, inertias)
+    )
+
+
+def _family(origin: Origin, family: str, section: BodySection, inertias: str) -> Iterator[Body]:
+    """One body, or the planets of a set."""
+    inertia = section.inertia.get(inertias)
+    if inertia is None and not section.fixed:
+        raise origin.fault(
+            f"bodies.{family}.inertia: no set {inertias!r}; every moving body "
+            f"needs the sets {', '.join(inertia_sets(origin))}"
+        )
+    angles = [math.radians(angle) for angle in section.planet_angles_deg] or [0.0]
+    for suffix, angle in zip(origin.suffixes(family), angles, strict=True):
+        yield _body(family, suffix, section, inertia, angle, _axis(origin, family, angle))
+
+
+def _body(
+    family: str,
+    suffix: str,
+    section: BodySection,
+    inertia: InertiaSection | None,
+    angle: float,
+    axis: tuple[float, float],
+) -> Body:
+    return Body(
+        name=family + suffix,
+        family=family,
+        axis=axis,
+        centre_of_mass_z=1e-3 * ((inertia and inertia.centre_of_mass_z_mm) or 0.0),
+        mass=(inertia and inertia.mass_kg) or 0.0,
+        axial=inertia.axial_kg_m2 if inertia else 0.0,
+        transverse=(inertia and inertia.transverse_kg_m2) or 0.0,
+        carrier=section.carrier,
+        orbit_angle=angle if section.carrier else 0.0,
+        spin_only=section.spin_only,
+        fixed=section.fixed,
+        wheels={gear: z * 1e-3 for gear, z in section.wheels_z_mm.items()},
+    )
+
+
+def _axis(origin: Origin, family: str, angle: float) -> tuple[float, float]:
+    """Position (x, y) of a body's axis, m; of a planet at its angle on the carrier, rad."""
+    section = origin.case.bodies[family]
+    if section.axis_position_mm is not None:
+        x, y = section.axis_position_mm
+        return x * 1e-3, y * 1e-3
+    carrier, radius = section.carrier, section.orbit_radius_mm
+    if carrier is None or radius is None:
+        raise origin.fault(f"bodies.{family}: give axis_position_mm or the keys of a planet")
+    if not origin.are_enabled(f"bodies.{family}.carrier", carrier):
+        raise origin.fault(f"bodies.{family}.carrier = {carrier!r}: that body is not enabled")
+    if origin.case.bodies[carrier].axis_position_mm is None:
+        raise origin.fault(f"bodies.{family}.carrier = {carrier!r}: a carrier cannot be a planet")
+    x, y = _axis(origin, carrier, 0.0)
+    return x + radius * 1e-3 * math.cos(angle), y + radius * 1e-3 * math.sin(angle)
+
+
+def pin_offsets(origin: Origin, bodies: Mapping[str, Body]) -> dict[str, tuple[float, float]]:
+    """Position error of planets in their carrier at zero angles, x and y, m.
+
+    Raises
+    ------
+    CaseError
+        Errors of what is no planet.
+    """
+
+    def offset(name: str, section: PinSection) -> tuple[str, tuple[float, float]]:
+        body = bodies.get(section.body)
+        if body is None or body.carrier is None:
+            planets = ", ".join(planet.name for planet in bodies.values() if planet.carrier) or "none"
+            raise origin.fault(f"pins.{name}.body = {section.body!r}: no planet; planets are {planets}")
+        error = 1e-6 * complex(section.radial_um, section.tangential_um)
+        error *= complex(math.cos(body.orbit_angle), math.sin(body.orbit_angle))
+        return section.body, (error.real, error.imag)
+
+    return dict(part_of_each(offset, origin.case.pins).values())
+
+
+def load_cases(origin: Origin, spinning: Sequence[str]) -> dict[str, LoadCase]:
+    """Load cases by name; `spinning` are the bodies that can turn.
+
+    Raises
+    ------
+    CaseError
+        Loads on a body that does not turn, a torque series that is not there or may not be read.
+    """
+
+    def load_case(name: str, section: LoadCaseSection) -> LoadCase:
+        key = f"load_cases.{name}"
+        for body in (*section.torques_N_m, *((section.driven_body,) if section.driven_body else ())):
+            if body not in spinning:
+                raise origin.fault(f"{key}: no turning body {body!r}; bodies are {', '.join(spinning)}")
+        series = None
+        if section.torque_series is not None:
+            series = origin.file(f"{key}.torque_series", section.torque_series, LARGEST_TABLE)
+        return LoadCase(
+            name=name,
+            torques=dict(section.torques_N_m),
+            torque_series=series,
+            duration=section.duration_s,
+            start_speed=section.start_speed_rpm * RPM,
+            driven_body=section.driven_body,
+            end_speed=None if section.end_speed_rpm is None else section.end_speed_rpm * RPM,
+            drive_stiffness=section.drive_stiffness_N_m_per_rad,
+            description=section.description,
+        )
+
+    return part_of_each(load_case, origin.case.load_cases)

@@ -1,0 +1,308 @@
+"""Gears, their modifications and errors, pairs and meshes, from their sections."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from exugear.model.named_files import LARGEST_TABLE
+from exugear.model.origin import Origin, part_of_each, parts_of_each
+from exugear.model.parts import Body, Mesh, PairSpec, WheelDeviation
+from exugear.model.sections.connections import MeshSection
+from exugear.model.sections.entries import GROUND
+from exugear.model.sections.gears import DeviationSection, GearSection, ModificationSection, PairSection
+from fe_ste.flanks.modifications import (
+    FlankModification,
+    Relief,
+    ReliefShape,
+    radius_at_roll_length_from_root,
+    radius_at_roll_length_from_tip,
+)
+from fe_ste.flanks.topography import FlankTopography
+from fe_ste.geometry.gears import BasicRack, Gear, GearPair, Material
+
+DEEPEST_REMOVAL = 0.5
+"""Most that a modification or an error may take off a flank, in normal modules: a tooth is 1.6 thick."""
+ANGLE_TOLERANCE = 1e-4
+"""Allowed difference between a stated angle of the line of centres and the positions of the bodies, rad."""
+
+
+def gears(origin: Origin) -> dict[str, Gear]:
+    """All gears by name.
+
+    Raises
+    ------
+    CaseError
+        A gear that cannot be made, with its key.
+    """
+    return part_of_each(lambda name, section: origin.guarded(f"gears.{name}", _gear, name, section), origin.case.gears)
+
+
+def _gear(name: str, section: GearSection) -> Gear:
+    """Gear from its section: millimetres to metres, degrees to radians."""
+    return Gear(
+        name=name,
+        teeth=section.teeth,
+        normal_module=section.normal_module_mm * 1e-3,
+        normal_pressure_angle=math.radians(section.normal_pressure_angle_deg),
+        helix_angle=math.radians(section.helix_angle_deg),
+        profile_shift=section.profile_shift,
+        face_width=section.face_width_mm * 1e-3,
+        held_diameter=section.held_diameter_mm * 1e-3,
+        internal=section.internal,
+        rack=BasicRack(section.rack.addendum, section.rack.dedendum, section.rack.tip_radius),
+        tip_diameter=None if section.tip_diameter_mm is None else section.tip_diameter_mm * 1e-3,
+        root_diameter=None if section.root_diameter_mm is None else section.root_diameter_mm * 1e-3,
+        tooth_thinning=section.tooth_thinning_mm * 1e-3,
+        material=Material(
+            youngs_modulus=section.material.youngs_modulus_GPa * 1e9,
+            poissons_ratio=section.material.poissons_ratio,
+            density=section.material.density_kg_per_m3,
+        ),
+    )
+
+
+def modifications(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, FlankModification]:
+    """Flank modifications of all gears by name.
+
+    Raises
+    ------
+    CaseError
+        A modification that does not fit its gear, or a topography that cannot be read.
+    """
+
+    def of_section(name: str, section: GearSection) -> FlankModification:
+        key = f"gears.{name}.modification"
+        amounts = {} if section.modification is None else dict(section.modification)
+        _check_depth(origin, key, amounts, section.normal_module_mm)
+        find = partial(origin.file, f"{key}.topography", largest=LARGEST_TABLE)
+        modification = origin.guarded(key, _modification, gears[name], section, find)
+        if modification.topography is not None:
+            removed = 1e6 * max(abs(value) for row in modification.topography.removed for value in row)
+            _check_depth(origin, key, {"topography, removed_um": removed}, section.normal_module_mm)
+        return modification
+
+    return part_of_each(of_section, origin.case.gears)
+
+
+def _modification(gear: Gear, section: GearSection, find: Callable[[str], Path]) -> FlankModification:
+    """Modification of a gear from its section, tried on the gear; `find` gives the path of the topography it names."""
+    given = section.modification
+    if given is None:
+        return FlankModification()
+    modification = FlankModification(
+        tip_relief=_relief(gear, given, "tip", radius_at_roll_length_from_tip),
+        root_relief=_relief(gear, given, "root", radius_at_roll_length_from_root),
+        profile_crowning=1e-6 * given.profile_crowning_um,
+        lead_crowning=1e-6 * given.lead_crowning_um,
+        profile_slope=1e-6 * given.profile_slope_um,
+        helix_slope=1e-6 * given.helix_slope_um,
+        twist=1e-6 * given.twist_um,
+        topography=None if given.topography is None else FlankTopography.from_csv(find(given.topography)),
+    )
+    modification.gap(gear, np.array(gear.tip_radius), np.array(0.0))  # refuses a relief that starts off the involute
+    return modification
+
+
+def _relief(
+    gear: Gear, given: ModificationSection, kind: str, from_end: Callable[[Gear, float], float]
+) -> Relief | None:
+    length_mm = getattr(given, f"{kind}_relief_length_mm")
+    start_roll_deg = getattr(given, f"{kind}_relief_start_roll_deg")
+    if length_mm is not None:
+        radius = from_end(gear, 1e-3 * length_mm)
+    elif start_roll_deg is not None:
+        radius = gear.base_radius * math.hypot(1.0, math.radians(start_roll_deg))
+    else:
+        return None
+    shape = ReliefShape(getattr(given, f"{kind}_relief_shape"))
+    return Relief(1e-6 * getattr(given, f"{kind}_relief_um"), radius, shape)
+
+
+def _check_depth(origin: Origin, key: str, amounts: Mapping[str, Any], module_mm: float) -> None:
+    """Refuse removal that leaves nothing of the teeth."""
+    deepest = 1e3 * DEEPEST_REMOVAL * module_mm
+    for name, amount in amounts.items():
+        if name.endswith("_um") and abs(amount) > deepest:
+            raise origin.fault(f"{key}.{name} = {amount:g}: must be at most {deepest:g}, half a normal module")
+
+
+def gear_pairs(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, GearPair]:
+    """All gear pairs by name.
+
+    Raises
+    ------
+    CaseError
+        A pair of unknown gears, or of such as cannot run together.
+    """
+
+    def of_section(name: str, section: PairSection) -> GearPair:
+        for key in ("pinion", "gear"):
+            if getattr(section, key) not in gears:
+                raise origin.fault(
+                    f"pairs.{name}.{key} = {getattr(section, key)!r}: no such gear; gears are {', '.join(gears)}"
+                )
+        return origin.guarded(
+            f"pairs.{name}",
+            GearPair,
+            name=name,
+            pinion=gears[section.pinion],
+            gear=gears[section.gear],
+            centre_distance=section.centre_distance_mm * 1e-3,
+        )
+
+    return part_of_each(of_section, origin.case.pairs)
+
+
+def pair_specs(
+    sections: Mapping[str, PairSection],
+    pairs: Mapping[str, GearPair],
+    modifications: Mapping[str, FlankModification],
+    mesh_forces: Mapping[str, list[float]],
+) -> dict[str, PairSpec]:
+    """Gather what the tables of pairs need.
+
+    Parameters
+    ----------
+    sections, pairs : mappings of pair name
+    modifications : mapping of gear name to FlankModification
+    mesh_forces : mapping of pair name to list of float
+        Static force F_bt of each of the pair's meshes at work, N; the pair's own is the mean of their amounts.
+    """
+    specs = {}
+    for name, pair in pairs.items():
+        section, forces = sections[name], mesh_forces.get(name, [])
+        force = sum(abs(force) for force in forces) / len(forces) if forces else 0.0
+        specs[name] = PairSpec(
+            name=name,
+            pair=pair,
+            static_torque=force * pair.pinion.base_radius,
+            table=section.table,
+            flank=-1 if sum(forces) < 0.0 else 1,
+            modifications=(modifications[section.pinion], modifications[section.gear]),
+        )
+    return specs
+
+
+def meshes(origin: Origin, pairs: Mapping[str, GearPair], bodies: Mapping[str, Body]) -> tuple[Mesh, ...]:
+    """All meshes at work, one per planet.
+
+    Raises
+    ------
+    CaseError
+        Unknown pairs or bodies, a body without the gear, faces that do not overlap, angles that contradict positions.
+    """
+
+    def of_section(name: str, section: MeshSection) -> tuple[Mesh, ...]:
+        key = f"meshes.{name}"
+        for end in ("pinion_body", "gear_body"):
+            if getattr(section, end) == GROUND:
+                raise origin.fault(f"{key}.{end} = {GROUND!r}: name a body; one with fixed = true does not turn")
+        if not origin.are_enabled(key, section.pinion_body, section.gear_body):
+            return ()
+        if section.pair not in pairs:
+            raise origin.fault(f"{key}.pair = {section.pair!r}: no such pair; pairs are {', '.join(pairs)}")
+        return tuple(_meshes_of_section(origin, name, section, pairs[section.pair], bodies))
+
+    return parts_of_each(of_section, origin.case.meshes)
+
+
+def _meshes_of_section(
+    origin: Origin, family: str, section: MeshSection, pair: GearPair, bodies: Mapping[str, Body]
+) -> Iterator[Mesh]:
+    key = f"meshes.{family}"
+    instances = origin.instances(key, section.pinion_body, section.gear_body)
+    phases = section.phase if isinstance(section.phase, tuple) else (section.phase,) * len(instances)
+    if len(phases) != len(instances):
+        raise origin.fault(f"{key}.phase = {list(phases)}: {len(instances)} meshes need {len(instances)} phases")
+    for (suffix, pinion_name, gear_name), phase in zip(instances, phases, strict=True):
+        pinion_body, gear_body = bodies[pinion_name], bodies[gear_name]
+        frame = section.frame or pinion_body.carrier or gear_body.carrier or GROUND
+        if frame != GROUND and frame not in bodies:
+            raise origin.fault(f"{key}.frame = {frame!r}: no such body; use a carrier's name or ground")
+        dx, dy = gear_body.axis[0] - pinion_body.axis[0], gear_body.axis[1] - pinion_body.axis[1]
+        angle = math.atan2(dy, dx)
+        _check_angle(origin, key, section.position_angle_deg, angle)
+        z = _middle_of_faces(origin, key, pair, pinion_body, gear_body)
+        yield Mesh(
+            name=family + suffix,
+            family=family,
+            pair=pair,
+            pinion=pinion_name,
+            gear=gear_name,
+            frame=frame,
+            z=z,
+            offsets=(z - pinion_body.wheels[pair.pinion.name], z - gear_body.wheels[pair.gear.name]),
+            position_angle=angle,
+            centre_distance=math.hypot(dx, dy),
+            phase=phase,
+        )
+
+
+def _check_angle(origin: Origin, key: str, stated_deg: float | None, angle: float) -> None:
+    """Refuse a stated angle of the line of centres that is not the one of the bodies' positions, rad."""
+    if stated_deg is not None and abs(math.remainder(angle - math.radians(stated_deg), 2 * math.pi)) > ANGLE_TOLERANCE:
+        raise origin.fault(
+            f"{key}.position_angle_deg = {stated_deg}: the bodies' positions give "
+            f"{math.degrees(angle):.4f} deg; leave the key out or correct the positions"
+        )
+
+
+def _middle_of_faces(origin: Origin, key: str, pair: GearPair, pinion_body: Body, gear_body: Body) -> float:
+    """Middle of the overlap of the two faces, m."""
+    low, high = -math.inf, math.inf
+    for body, gear in ((pinion_body, pair.pinion), (gear_body, pair.gear)):
+        if gear.name not in body.wheels:
+            raise origin.fault(
+                f"{key}: body {body.family!r} carries no gear {gear.name!r}; give its z in "
+                f"bodies.{body.family}.wheels_z_mm"
+            )
+        low = max(low, body.wheels[gear.name] - gear.face_width / 2)
+        high = min(high, body.wheels[gear.name] + gear.face_width / 2)
+    if high <= low:
+        raise origin.fault(f"{key}: the faces of {pair.pinion.name} and {pair.gear.name} do not overlap in z")
+    return (low + high) / 2
+
+
+def deviations(
+    origin: Origin, gears: Mapping[str, Gear], bodies: Mapping[str, Body]
+) -> dict[tuple[str, str], WheelDeviation]:
+    """Errors of wheels by body and gear; a pitch deviation is cumulative, positive into the tooth (ISO 1328-1).
+
+    Raises
+    ------
+    CaseError
+        Errors of an unknown body or gear, not one for each tooth, or deeper than teeth are.
+    """
+
+    def of_section(name: str, section: DeviationSection) -> tuple[tuple[str, str], WheelDeviation]:
+        key = f"deviations.{name}"
+        if section.body not in bodies:
+            raise origin.fault(f"{key}.body = {section.body!r}: no such body; bodies are {', '.join(bodies)}")
+        wheels = bodies[section.body].wheels
+        gear = section.gear or next(iter(wheels), "")
+        if gear not in wheels or (section.gear is None and len(wheels) > 1):
+            raise origin.fault(f"{key}.gear = {section.gear!r}: name one of {', '.join(wheels) or 'no gears'}")
+        return (section.body, gear), _deviation(origin, key, gears[gear], section)
+
+    return dict(part_of_each(of_section, origin.case.deviations).values())
+
+
+def _deviation(origin: Origin, key: str, gear: Gear, section: DeviationSection) -> WheelDeviation:
+    pitch = np.array(section.cumulative_pitch_um) * 1e-6
+    if len(pitch) not in (0, gear.teeth):
+        raise origin.fault(f"{key}.cumulative_pitch_um: {len(pitch)} values; {gear.name} has {gear.teeth} teeth")
+    amounts = {"cumulative_pitch_um": max(map(abs, section.cumulative_pitch_um), default=0.0)}
+    amounts["runout_um"] = section.runout_um
+    _check_depth(origin, key, amounts, 1e3 * gear.normal_module)
+    return WheelDeviation(
+        teeth=gear.teeth,
+        pitch=pitch * gear.base_radius / gear.reference_radius,
+        eccentricity=0.5e-6 * section.runout_um,
+        eccentricity_angle=math.radians(section.runout_angle_deg),
+    )

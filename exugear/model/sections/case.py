@@ -1,0 +1,160 @@
+"""The gearbox file as it is written: loads, settings, and the whole of its sections, unit in the key.
+
+The models of this room know no mechanics. They refuse unknown keys, values of the wrong type and values that no
+gearbox can have (:mod:`exugear.model.sections.quantities`). :mod:`exugear.model.gearbox` turns them into SI data and
+checks them against each other.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from exugear.model.sections import quantities as q
+from exugear.model.sections.bodies import BodySection
+from exugear.model.sections.connections import BearingSection, CouplingSection, JointSection, MeshSection, MountSection
+from exugear.model.sections.entries import MOST_ENTRIES, Entries, FileName, Name, Section, Text
+from exugear.model.sections.gears import DeviationSection, GearSection, PairSection, PinSection
+
+
+class LoadCaseSection(Section):
+    """Torques on the gearbox and, when speed-driven, the prescribed speed of one body."""
+
+    torques_N_m: dict[Name, q.TorqueNm] = {}
+    torque_series: FileName | None = None
+    duration_s: q.DurationS = 30.0
+    start_speed_rpm: q.SpeedRpm = 0.0
+    driven_body: Name | None = None
+    end_speed_rpm: q.SpeedRpm | None = None
+    drive_stiffness_N_m_per_rad: q.CouplingStiffness | None = None
+    description: Text = ""
+
+    @model_validator(mode="after")
+    def _drive(self) -> LoadCaseSection:
+        drive = (
+            self.driven_body is not None,
+            self.end_speed_rpm is not None,
+            self.drive_stiffness_N_m_per_rad is not None,
+        )
+        if any(drive) and not all(drive):
+            raise ValueError("a speed-driven case needs driven_body, end_speed_rpm and drive_stiffness_N_m_per_rad")
+        if not self.torques_N_m and self.torque_series is None and not any(drive):
+            raise ValueError("give torques_N_m, torque_series or a driven_body")
+        return self
+
+
+class OverallSection(Section):
+    """Which spins the overall transmission error compares, and where its length is taken."""
+
+    input: Name
+    output: Name
+    output_gear: Name
+
+
+class StaticLoadSection(Section):
+    """The static state that fixes loaded flanks and the load of the STE tables."""
+
+    torques_N_m: dict[Name, q.TorqueNm]
+    locked: Annotated[tuple[Name, ...], Field(strict=False, max_length=MOST_ENTRIES)]
+
+
+class DampingSection(Section):
+    """Stiffness-proportional damping times: c = time * k."""
+
+    bearing_time_s: q.DampingTimeS = 4e-6
+    mesh_time_s: q.DampingTimeS = 4e-6
+    coupling_time_s: q.DampingTimeS = 4e-6
+    body_time_s: q.DampingTimeS = 1e-6
+
+
+class ElasticitySection(Section):
+    """How finely elastic bodies are described (variant `flexible`).
+
+    Vibrations of each body up to `band_Hz` are kept exactly; what vibrates above `limit_Hz` is slowed down to it, so
+    that a solver's step is not ruled by it.
+    """
+
+    band_Hz: q.FrequencyHz = 4500.0
+    limit_Hz: q.FrequencyHz = 9000.0
+
+    @model_validator(mode="after")
+    def _order(self) -> ElasticitySection:
+        if self.limit_Hz <= self.band_Hz:
+            raise ValueError(f"limit_Hz must be above band_Hz = {self.band_Hz:g}")
+        return self
+
+
+class HousingSection(Section):
+    """Factor on bearing stiffness that stands for the housing seat in series; not where the housing is elastic."""
+
+    factor: q.SeatFactor = 1.0
+
+
+_Vector = Annotated[tuple[q.Acceleration, q.Acceleration, q.Acceleration], Field(strict=False)]
+
+
+class GravitySection(Section):
+    """Weight as an acceleration vector in the model's axes; off by default."""
+
+    acceleration_m_per_s2: _Vector = (0.0, 0.0, 0.0)
+
+
+class ReportSection(Section):
+    """What a report looks for: modes near a frequency that was measured or published."""
+
+    reference_frequency_Hz: q.FrequencyHz | None = None
+
+
+_Factors = Annotated[tuple[q.LoadFactor, ...], Field(strict=False, max_length=50)]
+_Offsets = Annotated[tuple[q.OffsetUm, ...], Field(strict=False, max_length=50)]
+
+
+class SteSection(Section):
+    """Settings of the finite-element tables; the axes are those of a table with ``grid``."""
+
+    positions: q.Positions = 50
+    method: Literal["superelement", "nonlinear"] = "superelement"
+    grid: bool = False
+    torque_factors: _Factors = (0.05, 0.2, 0.5, 1.0, 2.0, 3.0)
+    centre_distance_offsets_um: _Offsets = (-100.0, -50.0, 0.0, 50.0, 100.0)
+    misalignment_um: _Offsets = (-60.0, -30.0, 0.0, 30.0, 60.0)
+
+    @model_validator(mode="after")
+    def _axes(self) -> SteSection:
+        for key, values, static in (
+            ("torque_factors", self.torque_factors, 1.0),
+            ("centre_distance_offsets_um", self.centre_distance_offsets_um, 0.0),
+            ("misalignment_um", self.misalignment_um, 0.0),
+        ):
+            if list(values) != sorted(set(values)):
+                raise ValueError(f"{key} = {list(values)}: values must rise")
+            if static not in values:
+                raise ValueError(f"{key} = {list(values)}: {static} must be among them, the static state")
+        return self
+
+
+class CaseFile(Section):
+    """The whole gearbox file."""
+
+    name: Annotated[Text, Field(max_length=200)]
+    default_inertias: Name
+    overall: OverallSection
+    static_load: StaticLoadSection
+    gears: Entries[GearSection]
+    pairs: Entries[PairSection]
+    bodies: Entries[BodySection]
+    meshes: Entries[MeshSection]
+    load_cases: Entries[LoadCaseSection]
+    joints: Entries[JointSection] = {}
+    bearings: Entries[BearingSection] = {}
+    mounts: Entries[MountSection] = {}
+    couplings: Entries[CouplingSection] = {}
+    deviations: Entries[DeviationSection] = {}
+    pins: Entries[PinSection] = {}
+    damping: DampingSection = DampingSection()
+    elasticity: ElasticitySection = ElasticitySection()
+    housing: HousingSection = HousingSection()
+    gravity: GravitySection = GravitySection()
+    report: ReportSection = ReportSection()
+    ste: SteSection = SteSection()

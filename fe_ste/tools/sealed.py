@@ -1,0 +1,277 @@
+"""Files sealed with a checksum of their content, netCDF or npz, and read only if it fits.
+
+HDF5 hangs, crashes or misreads when it is given damaged bytes, and crashes when the disk is full. So it never meets
+either: content is made in memory or written through `ErrorKeeper`, and a file is opened only after its last line, the
+seal, was found to fit all bytes before it. HDF5 and zip ignore what follows their own end, so that a sealed file is
+plain netCDF or npz for any other program.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, TYPE_CHECKING
+
+from fe_ste.tools.files import FileError, open_regular, replacement, write_all
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from _typeshed import ReadableBuffer, WriteableBuffer
+
+
+_SEAL = b"\nexugear sha256 "
+_SEAL_LENGTH = len(_SEAL) + 65
+_CHUNK = 1 << 20
+
+
+def write_sealed(path: Path, content: ReadableBuffer) -> str:
+    """Write a file whole or not at all, with the checksum of its content behind it; return that."""
+    checksum = hashlib.sha256(content).hexdigest()
+    with replacement(path) as file:
+        write_all(file, content)
+        write_all(file, _seal(checksum))
+    return checksum
+
+
+def seal(file: IO[bytes]) -> None:
+    """Add the checksum of all that an open file holds."""
+    file.seek(0)
+    checksum = _checksum_of(file, file.seek(0, os.SEEK_END))
+    file.seek(0, os.SEEK_END)
+    write_all(file, _seal(checksum))
+
+
+def _seal(checksum: str) -> bytes:
+    return _SEAL + checksum.encode("ascii") + b"\n"
+
+
+def _checksum_of(file: IO[bytes], length: int) -> str:
+    """Checksum of the first bytes of a file."""
+    file.seek(0)
+    checksum = hashlib.sha256()
+    while length:
+        chunk = file.read(min(_CHUNK, length))
+        if not chunk:
+            break
+        checksum.update(chunk)
+        length -= len(chunk)
+    return checksum.hexdigest()
+
+
+def _check_seal(file: IO[bytes], path: Path) -> str:
+    """Return the checksum of a file if its content fits it."""
+    length = file.seek(0, os.SEEK_END) - _SEAL_LENGTH
+    written = b""
+    if length >= 0:
+        file.seek(length)
+        written = file.read(_SEAL_LENGTH)
+    if not (written.startswith(_SEAL) and written.endswith(b"\n")):
+        raise FileError(
+            f"{path}: has no checksum at its end: it was cut short, or written by an earlier version or another program"
+        )
+    checksum = _checksum_of(file, length)
+    if written != _seal(checksum):
+        raise FileError(f"{path}: is damaged, its content does not fit its checksum")
+    return checksum
+
+
+@contextmanager
+def open_sealed(path: Path) -> Iterator[tuple[IO[bytes], str]]:
+    """Open a sealed file whose content fits, and give its checksum.
+
+    What is read is what was checked: files are replaced as a whole, so an open one does not change.
+
+    Raises
+    ------
+    FileError
+        It is missing, cannot be read, or does not fit its checksum.
+    """
+    with open_regular(path) as file:
+        try:
+            checksum = _check_seal(file, path)
+        except FileError:
+            raise
+        except OSError as error:
+            raise FileError(f"{path}: cannot be read ({error.strerror})") from error
+        file.seek(0)
+        yield file, checksum
+
+
+def read_sealed(path: Path) -> bytes:
+    """Read the content of a sealed file, without the seal.
+
+    Raises
+    ------
+    FileError
+        As `open_sealed`.
+    """
+    with open_sealed(path) as (file, _):
+        return file.read()[:-_SEAL_LENGTH]
+
+
+class ErrorKeeper(io.RawIOBase):
+    """File for HDF5 to write into: the first error is kept, and raised by `check` instead of inside HDF5.
+
+    HDF5 cannot go on after a write that failed; told nothing, it ends in order, and the file is thrown away.
+
+    Parameters
+    ----------
+    file : binary file without a buffer
+    """
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self._file = file
+        self._error: OSError | None = None
+
+    def check(self) -> None:
+        """Raise the error that a writing met.
+
+        Raises
+        ------
+        OSError
+        """
+        if self._error is not None:
+            raise self._error
+
+    def readable(self) -> bool:
+        """Tell that it can be read."""
+        return True
+
+    def writable(self) -> bool:
+        """Tell that it can be written."""
+        return True
+
+    def seekable(self) -> bool:
+        """Tell that it has a position."""
+        return True
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        """Move the position."""
+        return self._file.seek(offset, whence)
+
+    def tell(self) -> int:
+        """Return the position."""
+        return self._file.tell()
+
+    def readinto(self, buffer: WriteableBuffer) -> int:
+        """Fill a buffer as far as the file reaches."""
+        content = self._file.read(len(memoryview(buffer)))
+        memoryview(buffer)[: len(content)] = content
+        return len(content)
+
+    def write(self, content: ReadableBuffer) -> int:
+        """Write, or keep the error."""
+        if self._error is None:
+            try:
+                write_all(self._file, content)
+            except OSError as error:
+                self._error = error
+        return len(memoryview(content))
+
+    def truncate(self, size: int | None = None) -> int:
+        """Set the length, or keep the error."""
+        size = self._file.tell() if size is None else size
+        if self._error is None:
+            try:
+                self._file.truncate(size)
+            except OSError as error:
+                self._error = error
+        return size
+
+
+def write_dataset(path: Path, dataset: xr.Dataset) -> None:
+    """Write a sealed netCDF file whole or not at all."""
+    content = io.BytesIO()
+    dataset.to_netcdf(content, engine="h5netcdf")
+    write_sealed(path, content.getvalue())
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What a netCDF file of one kind holds.
+
+    Attributes
+    ----------
+    kind : str
+        In words, for messages.
+    version : int
+        Version of the method whose numbers it holds, its attribute ``method_version``.
+    variables : mapping of str to tuple of str
+        Dimensions by variable; there may be more.
+    attributes : tuple of str
+        Attributes that are there; there may be more.
+    """
+
+    kind: str
+    version: int
+    variables: Mapping[str, tuple[str, ...]]
+    attributes: tuple[str, ...] = ()
+
+    def check(self, dataset: xr.Dataset, path: Path) -> None:
+        """Refuse a dataset of another kind or version.
+
+        Raises
+        ------
+        FileError
+        """
+        for name, dimensions in self.variables.items():
+            if name not in dataset.variables or dataset[name].dims != dimensions:
+                raise FileError(f"{path}: holds no {self.kind}: {name} over ({', '.join(dimensions)}) is missing")
+        for name in self.attributes:
+            if name not in dataset.attrs:
+                raise FileError(f"{path}: holds no {self.kind}: its attribute {name} is missing")
+        version = dataset.attrs.get("method_version")
+        if version != self.version:
+            raise FileError(
+                f"{path}: was computed by version {version} of its method, now at {self.version}; compute it again"
+            )
+
+
+@contextmanager
+def open_dataset(path: Path, layout: Layout) -> Iterator[xr.Dataset]:
+    """Open a sealed netCDF file; its arrays are read when they are used.
+
+    Raises
+    ------
+    FileError
+        It is missing, damaged, or not of this layout.
+    """
+    import xarray as xr
+
+    with open_sealed(path) as (file, _):
+        try:
+            dataset = xr.open_dataset(file, engine="h5netcdf")
+        # What the checksum fits was written whole: only a file of another make comes here, and there HDF5, h5netcdf
+        # and xarray raise what they like.
+        except Exception as error:
+            raise FileError(f"{path}: is no netCDF file ({error})") from error
+        with dataset:
+            layout.check(dataset, path)
+            yield dataset
+
+
+def load_dataset(path: Path, layout: Layout, names: Sequence[str] | None = None) -> xr.Dataset:
+    """Read a sealed netCDF file into memory.
+
+    Parameters
+    ----------
+    path : Path
+    layout : Layout
+    names : sequence of str, optional
+        Variables; all by default.
+
+    Raises
+    ------
+    FileError
+        As `open_dataset`, or a variable is not there.
+    """
+    with open_dataset(path, layout) as dataset:
+        for name in names or ():
+            if name not in dataset.variables:
+                raise FileError(f"{path}: holds no {name}")
+        return dataset.load() if names is None else dataset[list(names)].load()

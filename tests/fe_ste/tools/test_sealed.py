@@ -1,0 +1,163 @@
+"""A file whose content does not fit its checksum is never used, and a sealed one is plain for other programs."""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+from pathlib import Path
+
+import h5netcdf
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+
+from fe_ste.tools.files import FileError, replacement
+from fe_ste.tools.sealed import (
+    ErrorKeeper,
+    Layout,
+    load_dataset,
+    open_sealed,
+    read_sealed,
+    seal,
+    write_dataset,
+    write_sealed,
+)
+
+from ..damage import damages
+
+DATA = xr.Dataset(
+    {"a": (("x", "y"), np.random.default_rng(1).random((50, 40)), {"units": "m"})},
+    {"y": np.array([f"name {n}" for n in range(40)], dtype=object)},
+    {"method_version": 3, "title": "numbers"},
+)
+LAYOUT = Layout("numbers", 3, {"a": ("x", "y")}, ("title",))
+
+
+def test_a_sealed_file_is_plain_netcdf_for_others(tmp_path: Path) -> None:
+    path = tmp_path / "a.nc"
+    write_dataset(path, DATA)
+    assert load_dataset(path, LAYOUT).identical(DATA)
+    with xr.open_dataset(path, engine="h5netcdf") as plain:
+        assert plain.identical(DATA)
+    with h5py.File(path, "r") as plain:
+        assert np.array_equal(plain["a"], DATA["a"])
+    np.savez(content := io.BytesIO(), a=DATA["a"].to_numpy())
+    write_sealed(tmp_path / "a.npz", content.getbuffer())
+    with np.load(tmp_path / "a.npz") as arrays:
+        assert np.array_equal(arrays["a"], DATA["a"])
+    assert read_sealed(tmp_path / "a.npz") == content.getvalue()
+
+
+def test_no_damage_is_ever_read(tmp_path: Path) -> None:
+    path = tmp_path / "a.nc"
+    write_dataset(path, DATA)
+    tried = 0
+    for damaged in damages(path.read_bytes(), 280):
+        path.write_bytes(damaged)
+        with pytest.raises(FileError, match=r"a\.nc: (has no checksum at its end|is damaged)"):
+            load_dataset(path, LAYOUT)
+        tried += 1
+    assert tried > 250
+
+
+def test_other_kinds_and_versions_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "a.nc"
+    write_dataset(path, DATA.rename(a="b"))
+    with pytest.raises(FileError, match=r"a\.nc: holds no numbers: a over \(x, y\) is missing"):
+        load_dataset(path, LAYOUT)
+    write_dataset(path, DATA.drop_attrs())
+    with pytest.raises(FileError, match=r"a\.nc: holds no numbers: its attribute title is missing"):
+        load_dataset(path, LAYOUT)
+    write_dataset(path, DATA.assign_attrs(method_version=2))
+    with pytest.raises(FileError, match=r"computed by version 2 of its method, now at 3; compute it again"):
+        load_dataset(path, LAYOUT)
+    write_sealed(path, b"no netCDF")
+    with pytest.raises(FileError, match=r"a\.nc: is no netCDF file"):
+        load_dataset(path, LAYOUT)
+    DATA.to_netcdf(path, engine="h5netcdf")  # as earlier versions wrote it
+    with pytest.raises(FileError, match=r"written by an earlier version"):
+        load_dataset(path, LAYOUT)
+
+
+FAILING = """
+import errno, io, sys
+import h5netcdf
+import numpy as np
+from fe_ste.tools.sealed import ErrorKeeper
+
+
+class Full(io.BytesIO):
+    left = 0
+
+    def write(self, content):
+        self.left -= 1
+        if self.left < 0:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return super().write(content)
+
+
+for room in range(10**6):
+    full = Full()
+    full.left = room
+    target = ErrorKeeper(full)
+    with h5netcdf.File(target, "w") as file:
+        file.dimensions = {"time": 5000, "m": 4}
+        for n in range(5):
+            file.create_variable(f"v{n}", ("time", "m"), "f4")[:] = np.random.rand(5000, 4)
+    try:
+        target.check()
+    except OSError as error:
+        assert error.errno == errno.ENOSPC
+    else:
+        break
+print(room)
+"""
+
+
+def test_hdf5_survives_a_disk_that_is_full_at_any_write() -> None:
+    """Told of the error it would crash in closing the file."""
+    ended = subprocess.run([sys.executable, "-c", FAILING], capture_output=True, text=True, check=False, timeout=120)
+    assert ended.returncode == 0, ended.stderr
+    assert int(ended.stdout) > 10
+
+
+def test_a_streamed_file_is_sealed_like_others(tmp_path: Path) -> None:
+    path = tmp_path / "a.nc"
+    with replacement(path) as raw:
+        target = ErrorKeeper(raw)
+        with h5netcdf.File(target, "w") as file:
+            file.dimensions = {"x": 3}
+            file.create_variable("a", ("x",), "f8")[:] = [1.0, 2.0, 3.0]
+        target.check()
+        seal(raw)
+    with open_sealed(path) as (content, checksum):
+        assert len(checksum) == 64
+        assert xr.load_dataset(content, engine="h5netcdf")["a"].values.tolist() == [1.0, 2.0, 3.0]
+
+
+WRITING = """
+import sys
+from pathlib import Path
+import numpy as np
+import xarray as xr
+from fe_ste.tools.sealed import write_dataset
+
+attributes = {"title": "", "method_version": 3}
+for n in range(12):
+    data = xr.Dataset({"a": (("x", "y"), np.full((50, 40), float(sys.argv[2])))}, attrs=attributes)
+    write_dataset(Path(sys.argv[1]), data)
+"""
+
+
+def test_two_writers_of_one_file_and_a_reader_see_whole_files_only(tmp_path: Path) -> None:
+    path = tmp_path / "a.nc"
+    write_dataset(path, DATA)
+    writers = [subprocess.Popen([sys.executable, "-c", WRITING, str(path), number]) for number in ("1", "2")]
+    read = set()
+    while any(writer.poll() is None for writer in writers):
+        read.add(float(load_dataset(path, LAYOUT)["a"].std()))
+    assert [writer.returncode for writer in writers] == [0, 0]
+    assert read <= {0.0, float(DATA["a"].std())}
+    assert list(tmp_path.iterdir()) == [path]
