@@ -10,7 +10,8 @@ from timing import Cost, timed
 
 from exugear.dynamics.assembly import Assembly
 from exugear.kernels.meshes import stiffness_at
-from exugear.solvers.exudyn_model.system import ExudynSystem, MeshRoute, exudyn, items
+from exugear.solvers.exudyn_model.library import exudyn, items
+from exugear.solvers.exudyn_model.system import ExudynSystem, MeshRoute
 from exugear.solvers.loads import Loading
 from exugear.tooth_mesh.element import MeshElement
 
@@ -27,7 +28,7 @@ class PythonMesh:
         self.element, self.size = element, 6 * len(start)
         self.coefficients = system.assembly.meshes.stiffness[system.assembly.elements.index(element)]
         system.mbs.AddObject(
-            items.ObjectGenericODE2(nodeNumbers=[system._nodes[n] for n in names], forceUserFunction=self.force)
+            items.ObjectGenericODE2(nodeNumbers=[system.parts.nodes[n] for n in names], forceUserFunction=self.force)
         )
 
     def force(self, mbs: Any, t: float, item: int, q: Any, v: Any) -> list[float]:

@@ -68,7 +68,7 @@ def check_choices(
     load_case: str | None = None,
 ) -> None:
     """Refuse what the gearbox does not have, or may not do, before anything is written into the results folder."""
-    from exugear.bodies.of_gearbox import check_solids
+    from exugear.bodies.of_gearbox.solids import check_solids
     from exugear.dynamics.readiness import lacking
     from exugear.results.folder import bodies_folder
 

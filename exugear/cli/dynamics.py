@@ -10,7 +10,7 @@ from exugear.cli.errors import BadInputError, FailedError, model_errors
 from exugear.cli.options import Variant
 
 if TYPE_CHECKING:
-    from exugear.bodies.of_gearbox import ElasticBody
+    from exugear.bodies.of_gearbox.elastic_bodies import ElasticBody
     from exugear.dynamics.modes import Modes
     from exugear.model.gearbox import Gearbox
 
@@ -20,7 +20,7 @@ def reduce_elastic_bodies(gearbox: Gearbox, folder: Path, variant: str, inertias
     if variant != Variant.flexible:
         return {}
     from exugear.bearings.supports import elastic_names
-    from exugear.bodies.of_gearbox import reduced_bodies
+    from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies
     from exugear.results.folder import bodies_folder
 
     with progress_bar() as bar:
@@ -51,7 +51,7 @@ def compute_modes(gearbox: Gearbox, folder: Path, variant: str, law: str, inerti
     with model_errors():
         found = eigenmodes(gearbox, Choice(variant, law, inertias), mesh_stiffness(gearbox, law, folder), bodies)
     for name, body in found.assembly.elastic_bodies.items():
-        figures = body.reduced.figures
+        figures = body.reduced.summary
         unknowns, took = sum(figures.unknowns.values()), figures.seconds
         note(f"{name}: {unknowns} unknowns reduced to {body.reduced.size} coordinates in {took:.1f} s")
     return found, found.save(modes_path(folder, found.assembly.choice))

@@ -11,7 +11,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from exugear.bearings.supports import ON_BEARINGS, bearing_matrices, elastic_names, mounts_at_work, unsupported
-from exugear.bodies.of_gearbox import ElasticBody
+from exugear.bodies.of_gearbox.elastic_bodies import ElasticBody
 from exugear.dynamics.assembly import Assembly, VariantError
 from exugear.kernels.connectors import ConnectorArrays, no_connectors
 from exugear.kernels.elastic import ElasticArrays, no_elastic
@@ -129,11 +129,11 @@ def _take_seats(
         key = seat_key(name, seat.name)
         coordinates[key] = tuple(range(first + 6 * n, first + 6 * n + 6))
         nodes[key] = np.array(seat.place)
-    for item, seat_name in body.shared.items():
+    for item, seat_name in body.shared_seats.items():
         key = seat_key(name, seat_name)
         coordinates[seat_key(name, item)], nodes[seat_key(name, item)] = coordinates[key], nodes[key]
-    coordinates[name] = coordinates[seat_key(name, body.main)]
-    nodes[name] = nodes[seat_key(name, body.main)]
+    coordinates[name] = coordinates[seat_key(name, body.main_seat)]
+    nodes[name] = nodes[seat_key(name, body.main_seat)]
     return first + body.reduced.size
 
 
@@ -298,7 +298,7 @@ def _connectors(
         keys = [_attached(coordinates, body, bearing.name) for body in (bearing.on, bearing.body)]
         at = [np.zeros(3) if key is None else nodes[key] for key in keys]
         starts.append([-1 if key is None else coordinates[key][0] for key in keys])
-        local.append([np.array(bearing.place) - node for node in at])
+        local.append([np.array(bearing.position) - node for node in at])
         if bearing.body in gearbox.pin_offsets:
             local[-1][0] = local[-1][0] + [*gearbox.pin_offsets[bearing.body], 0.0]
         places.append(at)

@@ -5,8 +5,8 @@ from the same assembly, so they solve the same equations in the same coordinates
 
 Bodies with six coordinates come first, in the order of the file, then those with their spin alone. In the
 variant `rigid` every body has its spin alone: ideal joints leave nothing else, and a planet rides on its
-carrier's spin. In the variant `flexible` elastic bodies follow, with six coordinates at each seat and their inner
-amplitudes: a gear or a bearing sits on a seat as it would on a rigid body. A fixed body, such as the housing, is the
+carrier's spin. In the variant `flexible` elastic bodies follow, with six coordinates at each seat and their modal
+coordinates: a gear or a bearing sits on a seat as it would on a rigid body. A fixed body, such as the housing, is the
 ground itself unless it is elastic; then it moves on its mounts, and what sits in it sits on its seats.
 """
 
@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exugear.bodies.floating import FloatingBody
-from exugear.bodies.of_gearbox import ElasticBody
+from exugear.bodies.of_gearbox.elastic_bodies import ElasticBody
 from exugear.bodies.turning_frame import TurningBody, turning_arrays
 from exugear.kernels.connectors import ConnectorArrays, add_connector_forces, connector_load
 from exugear.kernels.elastic import ElasticArrays, add_elastic_forces, scratch_for, set_elastic_accelerations

@@ -29,12 +29,23 @@ class BalanceError(RuntimeError):
 
 @dataclass(frozen=True)
 class StartState:
-    """Coordinates and velocities at the start of a run, with the spin rates (rad/s2) it starts with."""
+    """Coordinates and velocities at the start of a run, with the spin rates (rad/s2) it starts with.
+
+    Attributes
+    ----------
+    q, v : (size,) coordinates and velocities
+    rates : spin rate by body, rad/s2
+    drive_torque : torque that the driven body takes, N m; 0 where none is driven
+    """
 
     q: Floats
     v: Floats
     rates: Mapping[str, float]
     drive_torque: float
+
+    def __repr__(self) -> str:
+        """Sizes and drive torque in one line."""
+        return f"<StartState: {len(self.q)} coordinates, drive torque {self.drive_torque:.4g} N m>"
 
 
 def _newton(residual: Callable[[Floats], Floats], start: Floats, steps: Floats, scale: Floats, what: str) -> Floats:

@@ -43,8 +43,8 @@ class RunPlan:
         Magnitude of the fastest eigenvalue, rad/s.
     solver : str
         ``compiled`` or ``exudyn``.
-    mesh_route : {"element", "loads"}
-        See `exugear.solvers.exudyn_model.system`.
+    mesh_route : str
+        How meshes act in Exudyn: ``element`` or ``loads``.
     """
 
     assembly: Assembly
@@ -56,7 +56,7 @@ class RunPlan:
     band: float
     fastest_rate: float
     solver: str
-    mesh_route: MeshRoute
+    mesh_route: MeshRoute = "element"
 
     @property
     def final_path(self) -> Path:
@@ -117,7 +117,7 @@ def plan_run(
     band: float,
     sample_rate: float,
     solver: str,
-    mesh_route: MeshRoute,
+    mesh_route: MeshRoute = "element",
 ) -> RunPlan:
     """Plan a run of so many seconds.
 

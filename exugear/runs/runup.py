@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
-from exugear.bodies.of_gearbox import ElasticBody
+from exugear.bodies.of_gearbox.elastic_bodies import ElasticBody
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.signals import signal_layout
@@ -82,7 +82,7 @@ def simulate(
     angles : {"reference", "operating"}
         Angles of the law `seed`.
     mesh_route : {"element", "loads"}
-        See `exugear.solvers.exudyn_model.system`; "loads" is Exudyn's alone, for the variants bushing and jointed.
+        See `exugear.solvers.exudyn_model.system`; "loads" is Exudyn's alone.
     resume : bool
         Go on with a run that was stopped.
     progress : callable, optional

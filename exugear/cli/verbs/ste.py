@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from exugear.model.gearbox import Gearbox
     from exugear.tooth_mesh.reference_tables import ReferenceOrder
     from exugear.tooth_mesh.tables import TableOrder
-    from fe_ste.reference.newton import Iteration
+    from fe_ste.reference.contact_model import Iteration
     from fe_ste.reference.table import NonlinearTable
     from fe_ste.transmission_error.table import MeshTable
 

@@ -41,8 +41,8 @@ def no_rendering(monkeypatch):
     def unable(*arguments, **options):
         raise RenderingError("3-D pictures need pyvista: pip install 'exugear[pictures]'")
 
-    monkeypatch.setattr("exugear.report.writer.draw_mode", unable)
-    monkeypatch.setattr("exugear.report.writer.draw_elastic_bodies", unable)
+    monkeypatch.setattr("exugear.report.mode_pictures.draw_mode", unable)
+    monkeypatch.setattr("exugear.report.mode_pictures.draw_elastic_bodies", unable)
 
 
 @pytest.fixture(scope="module")
@@ -111,7 +111,8 @@ sections = [{ length_mm = 80.0, outer_diameter_mm = 25.0 }]
     modes = modes_with_bodies(gearbox, Choice("flexible", LAW), stiffness, folder=kept)
     modes.save(modes_path(tmp_path, Choice("flexible", LAW, "disc")))
     simulated(gearbox, Choice("flexible", load_case="run_up"), stiffness, tmp_path, duration=0.2)
-    monkeypatch.setattr("exugear.bodies.of_gearbox.reduce_shaft", lambda model: pytest.fail("reduced again"))
+    reduction = "exugear.bodies.of_gearbox.elastic_bodies.reduce_shaft"
+    monkeypatch.setattr(reduction, lambda model: pytest.fail("reduced again"))
     before = set(kept.iterdir())
     report = write_report(tmp_path, target=1000.0)
     assert [line for line in report.left_out if "picture" not in line] == []

@@ -89,7 +89,7 @@ def test_a_train_that_runs_away_is_stopped_where_its_rims_would_burst(tmp_path):
 
 
 def test_teeth_that_pull_for_the_whole_run_end_with_code_1_and_a_red_box_in_the_report(tmp_path, monkeypatch):
-    monkeypatch.setattr("exugear.report.writer.draw_mode", lambda scene, path: path.write_bytes(b""))
+    monkeypatch.setattr("exugear.report.mode_pictures.draw_mode", lambda scene, path: path.write_bytes(b""))
     outcome = exugear("run", written(tmp_path, REVERSED), "--json")
     assert outcome.exit_code == 1
     summary = json.loads(outcome.stdout)

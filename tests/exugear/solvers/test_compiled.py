@@ -23,9 +23,11 @@ from exugear.runs.runup import simulate
 from exugear.solvers.compiled.observers import Observer
 from exugear.solvers.compiled.solver import CompiledSystem, refusal
 from exugear.solvers.compiled.step import choose_step, highest_rate
-from exugear.solvers.exudyn_model.system import ExudynSystem, exudyn
+from exugear.solvers.exudyn_model.library import exudyn
+from exugear.solvers.exudyn_model.system import ExudynSystem
 from exugear.solvers.loads import DriveLaw, Loading, LoadTable
-from exugear.spectra.waterfall import harmonics, order_cut
+from exugear.spectra.order_cut import order_cut
+from exugear.spectra.orders import harmonics
 
 from ..assembled import assembled, simulated
 from ..plain_signals import energies_of, sampled
