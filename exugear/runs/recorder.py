@@ -14,7 +14,7 @@ from exugear.runs.plan import RunPlan
 from exugear.runs.start import RunStart
 from exugear.runs.trust import PULLING
 from exugear.solvers.compiled.observers import Observer
-from fe_ste.tools.arrays import Floats
+from fe_ste.tools.arrays import Floats, Integers
 
 FLUSH_INTERVAL = 0.25
 """Simulated time between writes to disk, s."""
@@ -151,7 +151,7 @@ class Recorder:
         if self._progress is not None:
             self._progress(float(times[-1]))
 
-    def _lines_to_write(self, count: int) -> Floats:
+    def _lines_to_write(self, count: int) -> Integers:
         """Numbers of the lines of the account that are written, of so many: each interval's first, and the last."""
         stride = max(1, round(FLUSH_INTERVAL / self._plan.step))
         return np.unique(np.append(np.arange(0, count, stride), count - 1))
