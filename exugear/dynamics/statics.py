@@ -152,7 +152,7 @@ class StaticState:
     def mesh_force(self) -> Floats:
         """Transverse force F_bt of each mesh on the line of action, N; positive, the loaded flank pushes."""
         states = self.assembly.mesh_states(self.q, np.zeros_like(self.q), self.assembly.mean_meshes)
-        return np.asarray(states[:, 4])
+        return np.asarray(states[:, FORCE])
 
     def __repr__(self) -> str:
         """One line."""

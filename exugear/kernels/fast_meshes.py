@@ -21,7 +21,7 @@ ALONG_DEFLECTION, ALONG_FORCE, TABLE_FORCE = range(3)
 LAST_DEFLECTION, LAST_RATE, LAST_OUTSIDE, LAST_FORCE = range(4)
 """Columns of `MeshMemory.states`."""
 KINETIC, ELASTIC, OF_LOADS, DISSIPATED, OF_VARYING_STIFFNESS, NON_CONSERVATIVE, OF_BEARING_RATES = range(7)
-"""Columns of an account of energy.
+"""Columns of an account of energy, as runs take it (`exugear.solvers.compiled.observers`).
 
 Kinetic and elastic energy (J); powers (W): of the loads, damped, of the stiffness that changes with pmc, of mesh forces
 that are not conjugate to their deflection, of bearings whose rate is not the derivative of their displacement.

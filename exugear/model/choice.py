@@ -21,7 +21,7 @@ class Choice:
     variant : {"rigid", "bushing", "flexible", "jointed"}
         How bodies are held.
     mesh_law : str
-        How teeth in mesh push each other; `exugear.tooth_mesh.element` lists the laws.
+        How teeth in mesh push each other; `exugear.tooth_mesh.laws.registry` lists the laws.
     inertias : str, optional
         Inertia set.
     load_case : str, optional

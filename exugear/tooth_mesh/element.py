@@ -38,12 +38,7 @@ from exugear.model.parts import Body, Mesh
 from exugear.model.seats import node_position, seat_key
 from exugear.model.sections.entries import GROUND
 from exugear.tooth_mesh.law import Angles, Law, MeshData, TableFlanks
-from exugear.tooth_mesh.placement import (
-    MeshError,
-    loaded_flanks,
-    position_rows,
-    tooth_places,
-)
+from exugear.tooth_mesh.placement import MeshError, loaded_flanks, position_rows, tooth_places
 from exugear.tooth_mesh.wheel_errors import wheel_errors
 from fe_ste.geometry.gears import Gear
 from fe_ste.tools.arrays import Floats

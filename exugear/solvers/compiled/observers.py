@@ -14,6 +14,7 @@ import numpy as np
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.modes import overall_row
 from exugear.dynamics.signals import ENERGIES, POWERS, SignalLayout, signal_layout
+from exugear.kernels.coordinates import AXIAL, BODY_SIZE, SPIN, TILT
 from exugear.kernels.elastic import elastic_energies
 from exugear.kernels.fast_meshes import (
     ALONG_FORCE,
@@ -30,7 +31,7 @@ from exugear.kernels.fast_meshes import (
     Meshes,
     mesh_row,
 )
-from exugear.kernels.table_law import ENERGY_DERIVATIVES
+from exugear.kernels.table_law import ENERGY_DERIVATIVES, NOMINAL_MISALIGNMENT
 from exugear.kernels.travelling import place_travelling
 from exugear.kernels.turning import turning_energies
 from exugear.solvers.compiled.arrays import (
@@ -42,6 +43,9 @@ from exugear.solvers.compiled.arrays import (
     STRAIN,
     STRAIN_RATE,
     TRUE_RATE,
+    W_X,
+    W_Y,
+    W_Z,
     Bodies,
     Connectors,
     Equations,
@@ -84,7 +88,7 @@ def observe_gear_positions(
     centre, _ = mesh_row(q, v, index, axis, table.centre[m], c, s, work.mesh.gradient[ALONG_FORCE])
     tilted, _ = mesh_row(q, v, index, axis, table.misalignment[m], c, s, work.mesh.gradient[ALONG_FORCE])
     sample[columns.centre_distance_change + m] = centre
-    sample[columns.misalignment + m] = table.nominal[m, 2] + tilted
+    sample[columns.misalignment + m] = table.nominal[m, NOMINAL_MISALIGNMENT] + tilted
 
 
 @kernel
@@ -102,7 +106,7 @@ def observe_table(
         observe_gear_positions(q, v, m, meshes, work, columns, sample)
     else:  # gears that only turn stay where they are
         sample[columns.centre_distance_change + m] = 0.0
-        sample[columns.misalignment + m] = meshes.table.nominal[m, 2]
+        sample[columns.misalignment + m] = meshes.table.nominal[m, NOMINAL_MISALIGNMENT]
 
 
 @kernel
@@ -131,18 +135,19 @@ def observe_meshes(
 
 @kernel
 def true_rate(n: int, first_body: Floats, work: Work) -> None:
-    """Fill the derivative of the strain into `work.motion[2]`: see `exugear.kernels.connectors.connector_motion`."""
+    """Fill the derivative of the strain into `work.motion`: see `exugear.kernels.connectors.connector_motion`."""
     d, w, out = work.motion[STRAIN], work.motion[STRAIN_RATE], work.motion[TRUE_RATE]
-    x = first_body[0] * first_body[9] + first_body[3] * first_body[10] + first_body[6] * first_body[11]
-    y = first_body[1] * first_body[9] + first_body[4] * first_body[10] + first_body[7] * first_body[11]
-    z = first_body[2] * first_body[9] + first_body[5] * first_body[10] + first_body[8] * first_body[11]
+    x = first_body[0] * first_body[W_X] + first_body[3] * first_body[W_Y] + first_body[6] * first_body[W_Z]
+    y = first_body[1] * first_body[W_X] + first_body[4] * first_body[W_Y] + first_body[7] * first_body[W_Z]
+    z = first_body[2] * first_body[W_X] + first_body[5] * first_body[W_Y] + first_body[8] * first_body[W_Z]
     out[0] = w[0] - y * d[2] + z * d[1]
     out[1] = w[1] - z * d[0] + x * d[2]
     out[2] = w[2] - x * d[1] + y * d[0]
-    c, s = math.cos(d[3]), math.sin(d[3])
-    out[5] = (c * w[5] - s * w[4]) / math.cos(d[4])
-    out[4] = c * w[4] + s * w[5]
-    out[3] = w[3] - math.sin(d[4]) * out[5]
+    a, b = d[TILT], d[TILT + 1]
+    c, s = math.cos(a), math.sin(a)
+    out[SPIN] = (c * w[SPIN] - s * w[TILT + 1]) / math.cos(b)
+    out[TILT + 1] = c * w[TILT + 1] + s * w[SPIN]
+    out[TILT] = w[TILT] - math.sin(b) * out[SPIN]
 
 
 @kernel
@@ -190,9 +195,9 @@ def observe_joints(v: Floats, meshes: Meshes, joints: Joints, work: Work, column
             if j >= 0:
                 force = work.mesh.states[m, LAST_FORCE]
                 row = meshes.force[m]
-                if force < 0.0 and meshes.table.shape[m, 0] > 0:  # the other flank pushes
+                if force < 0.0 and meshes.form[m] == TABLE_FORM:  # the other flank pushes
                     force, row = -force, meshes.table.back[m]
-                x, y, z = row[6 * end], row[6 * end + 1], row[6 * end + 2]
+                x, y, z = row[BODY_SIZE * end], row[BODY_SIZE * end + 1], row[BODY_SIZE * end + AXIAL]
                 forces[3 * j] += force * (c * x - s * y)
                 forces[3 * j + 1] += force * (s * x + c * y)
                 forces[3 * j + 2] += force * z
@@ -213,8 +218,8 @@ def observe_bodies(q: Floats, v: Floats, bodies: Bodies, work: Work, energy: Flo
     for n in range(bodies.mass.size):
         o, sb, cb = bodies.start[n], work.frames[n, SIN_B], work.frames[n, COS_B]
         square = v[o] * v[o] + v[o + 1] * v[o + 1] + v[o + 2] * v[o + 2]
-        tilting = (v[o + 3] * cb) ** 2 + v[o + 4] * v[o + 4]
-        spin = v[o + 5] + v[o + 3] * sb
+        tilting = (v[o + TILT] * cb) ** 2 + v[o + TILT + 1] * v[o + TILT + 1]
+        spin = v[o + SPIN] + v[o + TILT] * sb
         twice = bodies.mass[n] * square + bodies.transverse[n] * tilting + bodies.axial[n] * spin * spin
         energy[KINETIC] += 0.5 * twice
     for n in range(bodies.spin.size):

@@ -12,6 +12,7 @@ from exugear.kernels.springs import SpringArrays
 from exugear.solvers.exudyn_model.library import items
 from exugear.solvers.exudyn_model.meshes import mesh_jacobian
 from exugear.solvers.loads import Loading
+from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
 
 
@@ -41,9 +42,9 @@ def add_minimal_system(
             f += assembly.mesh_forces(q, v, meshes)
         return f @ motions
 
-    # The drive's spring is in no jacobian, and the law `rigid` has coordinates of its own.
+    # The drive's spring is in no jacobian, and gears that only roll have coordinates of their own.
     jacobian: Any = 0
-    if loading.drive is None and meshes is not None and assembly.law != "rigid":
+    if loading.drive is None and meshes is not None and LAWS[assembly.law].has_force:
         jacobian = mesh_jacobian(assembly, meshes)
     mbs.AddObject(
         items.ObjectGenericODE2(
