@@ -27,7 +27,7 @@ def kinetic_shares(assembly: Assembly, shapes: Floats, q: Floats) -> Floats:
             body_shapes = shapes[of_body]
             if body.name in assembly.turning:  # its matrices are those of its own frame
                 turning = assembly.turning[body.name]
-                body_shapes = turning.turned(body_shapes, -turning.angle(q[of_body]))
+                body_shapes = turning.rotated(body_shapes, -turning.angle(q[of_body]))
             shares[:, n] = _elastic_energies(assembly.elastic_bodies[body.name].reduced, body_shapes)
             continue
         index = assembly.coordinates[body.name]
