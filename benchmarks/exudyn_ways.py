@@ -44,7 +44,7 @@ class PythonMesh:
                 gradient[self.frame + 5] -= row[5]
             if start is None:
                 continue
-            for pair, place in ((0, e.place[end]), (3, (0.0, 0.0))):
+            for pair, place in ((0, e.axis[end]), (3, (0.0, 0.0))):
                 x, y = place[0] + q[start + pair], place[1] + q[start + pair + 1]
                 lx, ly = c * x + s * y, c * y - s * x
                 delta += row[pair] * (lx - place[0]) + row[pair + 1] * (ly - place[1])

@@ -49,8 +49,10 @@ def described(name: str, body: ReducedBody) -> str:
     """Mass, unknowns, seconds and first normal modes in one line."""
     summary = body.summary
     first = ", ".join(f"{f:.0f}" for f in summary.free_interface_frequencies["whole"][:4])
-    sizes = f"{summary.unknowns['whole']:7d} unknowns {body.size:4d} coordinates"
-    return f"{name:9s} {body.rigid_inertia.mass:7.0f} kg {sizes} {summary.seconds:5.1f} s   {first} Hz"
+    return (
+        f"{name:9s} {body.rigid_inertia.mass:7.0f} kg {summary.unknowns['whole']:7d} unknowns "
+        f"{body.size:4d} coordinates {summary.seconds:5.1f} s   {first} Hz"
+    )
 
 
 def main(out: Path) -> None:

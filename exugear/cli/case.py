@@ -71,6 +71,7 @@ def check_choices(
     from exugear.bodies.of_gearbox.solids import check_solids
     from exugear.dynamics.readiness import lacking
     from exugear.results.folder import bodies_folder
+    from exugear.tooth_mesh.laws.registry import LAWS
 
     with model_errors():
         gearbox.bodies(inertias)
@@ -82,8 +83,8 @@ def check_choices(
             raise gearbox.fault(f"variant {variant}: {reason}")
         if variant is Variant.flexible:
             check_solids(gearbox, bodies_folder(folder))
-    if law is MeshLaw.rigid and variant is not Variant.rigid:
-        raise BadInputError(f"--mesh-law rigid: its gears only roll, which needs the variant rigid, not {variant}")
+    if not LAWS[law].has_force and variant is not Variant.rigid:
+        raise BadInputError(f"--mesh-law {law}: its gears only roll, which needs the variant rigid, not {variant}")
 
 
 @contextmanager

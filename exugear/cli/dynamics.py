@@ -45,7 +45,7 @@ def compute_modes(gearbox: Gearbox, folder: Path, variant: str, law: str, inerti
     from exugear.dynamics.modes import eigenmodes
     from exugear.model.choice import Choice
     from exugear.results.folder import modes_path
-    from exugear.tooth_mesh.stiffness import mesh_stiffness
+    from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 
     bodies = reduce_elastic_bodies(gearbox, folder, variant, inertias)
     with model_errors():

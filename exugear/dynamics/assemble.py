@@ -22,7 +22,10 @@ from exugear.model.choice import VARIANTS, Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Bearing, Body
 from exugear.model.seats import node_position, seat_key
-from exugear.tooth_mesh.element import Angles, MeshData, mesh_elements, pack
+from exugear.tooth_mesh.element import mesh_elements
+from exugear.tooth_mesh.law import Angles, MeshData
+from exugear.tooth_mesh.laws.packing import pack
+from exugear.tooth_mesh.laws.registry import LAWS, law_of
 from fe_ste.tools.arrays import Floats
 
 
@@ -71,8 +74,9 @@ def assemble(
     lacking = unsupported(gearbox, variant)
     if lacking:
         raise VariantError(f"variant {variant}: {lacking}")
-    if law == "rigid" and variant != "rigid":
-        raise VariantError(f"mesh law rigid: its gears only roll, which needs the variant rigid, not {variant}")
+    only_rolls = law in LAWS and not LAWS[law].has_force
+    if only_rolls and variant != "rigid":
+        raise VariantError(f"mesh law {law}: its gears only roll, which needs the variant rigid, not {variant}")
     flexible = _chosen_bodies(elastic, bodies or {})
     rigid = [body for body in moving if body.name not in flexible]
     six = [body for body in rigid if variant != "rigid" and not body.spin_only]
@@ -84,8 +88,8 @@ def assemble(
     travelling = _travelling(gearbox, flexible, size, coordinates, nodes)
     supports = _supports(gearbox, flexible) if variant in ON_BEARINGS else ()
     displaced = gearbox.pin_offsets if variant not in ON_BEARINGS else {}  # bearings carry the planets along
-    settings = (law, inertias, flanks, angles, displaced, nodes)
-    elements = () if law == "rigid" else mesh_elements(gearbox, stiffness, *settings)
+    settings = (inertias, flanks, angles, displaced, nodes)
+    elements = () if only_rolls else mesh_elements(gearbox, stiffness, law_of(law), *settings)
     return Assembly(
         gearbox=gearbox,
         choice=replace(choice, inertias=inertias),
@@ -102,7 +106,7 @@ def assemble(
         inertia=_inertia(variant, six, alone),
         elastic_bodies=flexible,
         elastic=elastic_arrays(flexible, size, gearbox.case.damping.body_time_s),
-        motions=_rolling_motions(gearbox, coordinates) if law == "rigid" else np.eye(size),
+        motions=_rolling_motions(gearbox, coordinates) if only_rolls else np.eye(size),
     )
 
 
@@ -298,7 +302,7 @@ def _connectors(
         keys = [_attached(coordinates, body, bearing.name) for body in (bearing.on, bearing.body)]
         at = [np.zeros(3) if key is None else nodes[key] for key in keys]
         starts.append([-1 if key is None else coordinates[key][0] for key in keys])
-        local.append([np.array(bearing.place) - node for node in at])
+        local.append([np.array(bearing.position) - node for node in at])
         if bearing.body in gearbox.pin_offsets:
             local[-1][0] = local[-1][0] + [*gearbox.pin_offsets[bearing.body], 0.0]
         places.append(at)
@@ -306,7 +310,7 @@ def _connectors(
     return ConnectorArrays(
         bodies=np.array(starts, dtype=np.int64),
         local=np.array(local),
-        place=np.array(places),
+        node=np.array(places),
         stiffness=np.array([stiffness for stiffness, _ in matrices]),
         damping=np.array([damping for _, damping in matrices]),
     )

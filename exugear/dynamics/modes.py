@@ -27,7 +27,8 @@ from exugear.dynamics.statics import static_state
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.versions import MODES
-from exugear.tooth_mesh.element import Angles, MeshData
+from exugear.tooth_mesh.law import Angles, MeshData
+from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.notebook import html_table
 from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
@@ -249,7 +250,7 @@ def modes_of(assembly: Assembly, preload: bool = True) -> Modes:
             mode_name(assembly, element_names, kinetic[m], strain[m]) if elastic[m] else FREE_ROTATION
             for m in range(frequency.size)
         ),
-        growth_rate=growth_rate(linear) if assembly.law != "rigid" else 0.0,
+        growth_rate=growth_rate(linear) if LAWS[assembly.law].has_force else 0.0,
     )
 
 

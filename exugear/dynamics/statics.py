@@ -14,7 +14,8 @@ import numpy as np
 import scipy.linalg
 
 from exugear.dynamics.assembly import Assembly
-from exugear.kernels.meshes import MeshArrays
+from exugear.kernels.meshes import FORCE, MeshArrays
+from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
 
 STEP = 1e-7
@@ -211,12 +212,12 @@ def _touching(
     place: Callable[[Floats], Floats],
     solve: Callable[[Floats, MeshArrays | None], Floats],
 ) -> Floats:
-    """Begin with tables where linear teeth would be, on the flanks that these press: flanks apart hold nothing."""
-    if assembly.law != "table":
+    """Begin where linear teeth would be, on the flanks that they press: table flanks that are apart hold nothing."""
+    if not LAWS[assembly.law].loses_contact:
         return start
     x = solve(start, assembly.linear_meshes())
     q = place(x)
-    reversed_flanks = assembly.mesh_states(q, np.zeros_like(q), assembly.linear_meshes())[:, 4] < 0.0
+    reversed_flanks = assembly.mesh_states(q, np.zeros_like(q), assembly.linear_meshes())[:, FORCE] < 0.0
     return solve(x, assembly.linear_meshes(reversed_flanks)) if reversed_flanks.any() else x
 
 

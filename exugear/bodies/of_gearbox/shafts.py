@@ -67,10 +67,10 @@ def _seats(gearbox: Gearbox, body: Body, shape: ShapeSection) -> Iterator[tuple[
         yield gear, z, gearbox.gears[gear].face_width
     for bearing in gearbox.bearings:
         if body.name in (bearing.body, bearing.on):
-            yield bearing.name, bearing.place[2], seat_width(bearing)
+            yield bearing.name, bearing.position[2], seat_width(bearing)
     for mount in mounts_at_work(gearbox):
         if mount.body == body.name:
-            yield mount.name, mount.place[2], 0.0
+            yield mount.name, mount.position[2], 0.0
     if shape.torque_z_mm is not None:
         yield TORQUE_SEAT, shape.torque_z_mm * 1e-3, 0.0
 

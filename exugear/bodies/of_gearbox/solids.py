@@ -119,11 +119,11 @@ def _items(gearbox: Gearbox, body: Body) -> dict[str, _Item]:
             inside = (bearing.body == body.name) != on_pin
             diameter = 1e-3 * (bearing.catalogue.bore_mm if inside else bearing.catalogue.outer_diameter_mm)
             width = seat_width(bearing)
-        items[bearing.name] = _Item(bearing.family, "bearing", bearing.place, diameter, width)
+        items[bearing.name] = _Item(bearing.family, "bearing", bearing.position, diameter, width)
     at_work = {mount.name for mount in mounts_at_work(gearbox)}
     for mount in gearbox.mounts:
         if mount.body == body.name:
-            items[mount.name] = _Item(mount.name, "mount", mount.place, None, None, mount.name in at_work)
+            items[mount.name] = _Item(mount.name, "mount", mount.position, None, None, mount.name in at_work)
     return items
 
 

@@ -10,17 +10,17 @@ from exugear.cli.console import note, print_json, print_table, say
 from exugear.cli.dynamics import compute_modes, label_of
 from exugear.cli.errors import exit_codes
 from exugear.cli.options import (
+    USUAL_LAW,
     CaseArgument,
     FilesBelowOption,
     InertiasOption,
     JsonOption,
     LawOption,
-    MeshLaw,
     OutOption,
     ScriptsOption,
     VariantOption,
 )
-from exugear.cli.tables import fill_missing_tables
+from exugear.cli.tables import compute_missing_tables
 
 if TYPE_CHECKING:
     from exugear.dynamics.modes import Modes
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 def modes(
     case: CaseArgument,
     variant: VariantOption,
-    mesh_law: LawOption = MeshLaw.line_of_action,
+    mesh_law: LawOption = USUAL_LAW,
     inertias: InertiasOption = None,
     out: OutOption = None,
     files_below: FilesBelowOption = None,
@@ -44,7 +44,7 @@ def modes(
         gearbox = read_gearbox(case, files_below, scripts)
         check_choices(gearbox, variant, mesh_law, inertias, results_folder(case, out, make=False))
         folder = results_folder(case, out)
-        fill_missing_tables(gearbox, folder, mesh_law)
+        compute_missing_tables(gearbox, folder, mesh_law)
         with time_noted(folder, f"modes, {variant}, {inertias or gearbox.case.default_inertias}, {mesh_law}"):
             found, path = compute_modes(gearbox, folder, variant.value, mesh_law.value, inertias)
             picture = _draw_campbell(found, path)
@@ -62,8 +62,8 @@ def modes(
 
 def _draw_campbell(found: Modes, path: Path) -> Path:
     """Draw the modes that the overall transmission error sees, over the speeds of the fastest load case."""
-    from exugear.pictures.diagrams import plot_campbell
-    from exugear.spectra.comparison import mobility_shares
+    from exugear.pictures.mode_diagrams import plot_campbell
+    from exugear.spectra.mode_report import mobility_shares
     from exugear.spectra.orders import order_lines
 
     gearbox, least = found.assembly.gearbox, 1e-3
@@ -85,13 +85,13 @@ def _draw_campbell(found: Modes, path: Path) -> Path:
 
 
 def _mode_summaries(found: Modes) -> list[dict[str, Any]]:
-    from exugear.spectra.comparison import report_mode
+    from exugear.spectra.mode_report import report_mode
 
     data = found.to_dataset()
-    reports = [report_mode(data, place) for place in range(len(found.names))]
+    reports = [report_mode(data, index) for index in range(len(found.names))]
     return [
         {
-            "mode": mode.place + 1,
+            "mode": mode.index + 1,
             "frequency_Hz": mode.frequency,
             "damping_ratio": mode.damping_ratio,
             "share_of_overall_dte": mode.share,

@@ -21,6 +21,7 @@ from exugear.cli.errors import (
     model_errors,
 )
 from exugear.cli.options import (
+    USUAL_LAW,
     CaseArgument,
     FilesBelowOption,
     InertiasOption,
@@ -32,7 +33,7 @@ from exugear.cli.options import (
     Variant,
     VariantOption,
 )
-from exugear.cli.tables import fill_missing_tables
+from exugear.cli.tables import compute_missing_tables
 
 if TYPE_CHECKING:
     from exugear.model.gearbox import Gearbox
@@ -57,7 +58,7 @@ class MeshRoute(StrEnum):
 def run(
     case: CaseArgument,
     variant: VariantOption,
-    mesh_law: LawOption = MeshLaw.line_of_action,
+    mesh_law: LawOption = USUAL_LAW,
     inertias: InertiasOption = None,
     load_case: Annotated[
         str | None, typer.Option("--load-case", metavar="NAME", help="Load case. (default: the first of the file)")
@@ -101,7 +102,7 @@ def run(
         if resume and (reason := refuse_to_resume(directory)):
             raise BadInputError(f"--resume: {reason}; run without it")
         _tell_doubts(gearbox, loads)
-        fill_missing_tables(gearbox, folder, mesh_law)
+        compute_missing_tables(gearbox, folder, mesh_law)
         route = ", meshes as loads" if mesh_route is MeshRoute.loads else ""
         with time_noted(folder, f"run, {variant}, {loads}, {inertias}, {mesh_law}, solver {solver}{route}"):
             finished = _simulate(
@@ -124,9 +125,10 @@ def _check_extent(
 ) -> None:
     """Refuse a simulated time that is too short, or whose results do not fit on the disk."""
     from exugear.runs.extent import check_disk, check_duration, sample_bytes
+    from exugear.tooth_mesh.laws.registry import LAWS
 
     supports = gearbox.joints if variant is Variant.rigid else gearbox.bearings
-    size = sample_bytes(len(gearbox.meshes), len(supports), law is MeshLaw.table)
+    size = sample_bytes(len(gearbox.meshes), len(supports), LAWS[law].signals_positions)
     with model_errors():
         check_duration(gearbox, gearbox.load_cases[load_case], duration)
         check_disk(gearbox, gearbox.load_cases[load_case], folder, duration, sample_bytes=size)
@@ -196,7 +198,7 @@ def _simulate(
     from exugear.runs.outcome import LimitError, RunError
     from exugear.runs.run_folder import refuse_to_resume, run_directory
     from exugear.runs.runup import simulate
-    from exugear.tooth_mesh.stiffness import mesh_stiffness
+    from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 
     choice = Choice(variant, law, inertias, load_case)
     directory = run_directory(folder, choice)
@@ -240,9 +242,9 @@ def _tell_run(case: Path, finished: Run, as_json: bool) -> None:
     if not finished.complete and not finished.halted:
         so_far = "".join(f"\nNot to be trusted so far: {reason}" for reason in finished.reasons)
         raise StoppedError(f"at {finished.end:.3f} s; kept in {finished.path}, --resume goes on from there{so_far}")
-    from exugear.dynamics.signals import BALANCE_TERMS, energy_residual
+    from exugear.dynamics.signals import BALANCE_TERMS, MESH_TIMES, energy_residual
     from exugear.model.parts import RPM
-    from exugear.results.run_file import MESH_TIMES, load_run
+    from exugear.results.run_file import load_run
 
     data = load_run(finished.path, ("input_speed", *MESH_TIMES, *BALANCE_TERMS))
     outside = float(data["outside_time"].max())

@@ -12,15 +12,15 @@ from exugear.cli.case import make_results_folder, read_gearbox, time_noted
 from exugear.cli.console import note, print_json, print_table, progress_bar, say
 from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption
 from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption, OutOption
-from exugear.cli.tables import fill_tables
+from exugear.cli.tables import compute_tables
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
     from exugear.model.gearbox import Gearbox
-    from exugear.tooth_mesh.reference_tables import ReferenceOrder
-    from exugear.tooth_mesh.tables import TableOrder
-    from fe_ste.reference.newton import Iteration
+    from exugear.tooth_mesh.reference_tables import ReferenceRequest
+    from exugear.tooth_mesh.tables import TableRequest
+    from fe_ste.reference.contact_model import Iteration
     from fe_ste.reference.table import NonlinearTable
     from fe_ste.transmission_error.table import MeshTable
 
@@ -78,35 +78,35 @@ def ste(
             return
         if positions is not None and positions < LEAST_TABLE_POSITIONS:
             raise BadInputError(f"--positions {positions}: a table for dynamics needs at least {LEAST_TABLE_POSITIONS}")
-        orders, folder = _order_tables(gearbox, case, out, mesh or [], positions, grid)
+        requests, folder = _requested_tables(gearbox, case, out, mesh or [], positions, grid)
         with time_noted(folder, "tables of transmission error"):
-            tables = fill_tables(orders)
+            tables = compute_tables(requests)
         with time_noted(folder, "pictures of the tables"):
             beside = stored_tables(gearbox, folder, positions)
-            pictures = draw_curves({**beside, **tables}, folder) + _draw_contacts(orders, tables, folder)
-        _tell_tables(case, folder, orders, tables, pictures, as_json)
+            pictures = draw_curves({**beside, **tables}, folder) + _draw_contacts(requests, tables, folder)
+        _tell_tables(case, folder, requests, tables, pictures, as_json)
 
 
-def _order_tables(
+def _requested_tables(
     gearbox: Gearbox, case: Path, out: Path | None, names: list[str], positions: int | None, grid: bool
-) -> tuple[list[TableOrder], Path]:
+) -> tuple[list[TableRequest], Path]:
     from exugear.model.reading import CaseError
     from exugear.results.folder import keep_case
-    from exugear.tooth_mesh.tables import order_tables
+    from exugear.tooth_mesh.tables import requested_tables
 
     folder = out or Path("results") / case.resolve().parent.name
     try:
-        orders = order_tables(gearbox, folder, names, positions, grid)
+        requests = requested_tables(gearbox, folder, names, positions, grid)
     except CaseError as error:
         raise BadInputError(error) from error
     make_results_folder(folder)
     keep_case(gearbox, folder)
-    for order in orders:
-        if order.stored:
-            note(f"{order.name}: kept {order.path}, computed from the same input")
-        elif order.replaces:
-            note(order.replaces)
-    return orders, folder
+    for request in requests:
+        if request.stored:
+            note(f"{request.name}: kept {request.path}, computed from the same input")
+        elif request.replaces:
+            note(request.replaces)
+    return requests, folder
 
 
 def _compute_references(
@@ -115,21 +115,21 @@ def _compute_references(
     """Run the reference analysis of the pairs and report; each position is kept as soon as it is solved."""
     from exugear.model.reading import CaseError
     from exugear.results.folder import keep_case
-    from exugear.tooth_mesh.reference_tables import order_references, summarise_reference
+    from exugear.tooth_mesh.reference_tables import requested_references, summarise_reference
 
     folder = out or Path("results") / case.resolve().parent.name
     try:
-        orders = order_references(gearbox, folder, names, positions)
+        requests = requested_references(gearbox, folder, names, positions)
     except CaseError as error:
         raise BadInputError(error) from error
     make_results_folder(folder)
     keep_case(gearbox, folder)
     tables = {}
     with time_noted(folder, "reference analysis"), progress_bar() as bar:
-        task = bar.add_task("", total=sum(order.wanted.positions for order in orders))
-        for order in orders:
-            tables[order.name] = _fill_reference(order, bar, task)
-    summaries = [summarise_reference(order, tables[order.name]) for order in orders]
+        task = bar.add_task("", total=sum(request.wanted.positions for request in requests))
+        for request in requests:
+            tables[request.name] = _compute_reference(request, bar, task)
+    summaries = [summarise_reference(request, tables[request.name]) for request in requests]
     if as_json:
         print_json({"case": str(case), "tables": summaries})
     else:
@@ -140,25 +140,25 @@ def _compute_references(
         raise FailedError("\n".join(["positions that are not solved:", *failures]))
 
 
-def _fill_reference(order: ReferenceOrder, bar: Progress, task: TaskID) -> NonlinearTable:
+def _compute_reference(request: ReferenceRequest, bar: Progress, task: TaskID) -> NonlinearTable:
     from fe_ste.geometry.checks import GeometryError
 
     before = bar.tasks[task].completed
 
     def at_iteration(done: int, of: int, iteration: Iteration | None) -> None:
         interruption.check()
-        text = f"{order.name}: {done} of {of} positions"
+        text = f"{request.name}: {done} of {of} positions"
         if iteration is not None:
             text += f", {100 * iteration.load:.3g} % of the load, iteration {iteration.number}"
         bar.update(task, completed=before + done, description=text)
 
     try:
-        return order.fill(at_iteration)
+        return request.compute(at_iteration)
     except GeometryError as error:
-        raise BadInputError(f"pairs.{order.name}: {error}") from error
+        raise BadInputError(f"pairs.{request.name}: {error}") from error
 
 
-def _draw_contacts(orders: list[TableOrder], tables: dict[str, MeshTable], folder: Path) -> list[Path]:
+def _draw_contacts(requests: list[TableRequest], tables: dict[str, MeshTable], folder: Path) -> list[Path]:
     """Draw the teeth in contact where the picture is missing or the table is new; return all such pictures."""
     from exugear.pictures.tables import contact_picture, draw_contact
     from fe_ste.contact.kinematics import ContactError
@@ -166,13 +166,13 @@ def _draw_contacts(orders: list[TableOrder], tables: dict[str, MeshTable], folde
 
     pictures: list[Path] = []
     with progress_bar() as bar:
-        for order in bar.track(orders, description="pictures of the teeth"):
-            path = contact_picture(order.name, folder)
+        for request in bar.track(requests, description="pictures of the teeth"):
+            path = contact_picture(request.name, folder)
             try:
-                if not (order.stored and path.exists()):
-                    draw_contact(order, tables[order.name], folder)
+                if not (request.stored and path.exists()):
+                    draw_contact(request, tables[request.name], folder)
             except ContactError as error:
-                note(f"No picture of the teeth of {order.name}: {error}", style="yellow")
+                note(f"No picture of the teeth of {request.name}: {error}", style="yellow")
                 continue
             except RenderingError as error:
                 note(f"No pictures of the teeth: {error}", style="yellow")
@@ -184,14 +184,14 @@ def _draw_contacts(orders: list[TableOrder], tables: dict[str, MeshTable], folde
 def _tell_tables(
     case: Path,
     folder: Path,
-    orders: list[TableOrder],
+    requests: list[TableRequest],
     tables: dict[str, MeshTable],
     pictures: list[Path],
     as_json: bool,
 ) -> None:
     from exugear.tooth_mesh.tables import summarise
 
-    summaries = [summarise(order, tables[order.name]) for order in orders]
+    summaries = [summarise(request, tables[request.name]) for request in requests]
     if as_json:
         print_json({"case": str(case), "tables": summaries, "pictures": [str(path) for path in pictures]})
     else:

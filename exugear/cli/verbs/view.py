@@ -12,17 +12,17 @@ from exugear.cli.console import note, print_json, say
 from exugear.cli.dynamics import compute_modes, label_of
 from exugear.cli.errors import BadInputError, exit_codes
 from exugear.cli.options import (
+    USUAL_LAW,
     CaseArgument,
     FilesBelowOption,
     InertiasOption,
     JsonOption,
     LawOption,
-    MeshLaw,
     OutOption,
     ScriptsOption,
     Variant,
 )
-from exugear.cli.tables import fill_missing_tables
+from exugear.cli.tables import compute_missing_tables
 
 if TYPE_CHECKING:
     from exugear.dynamics.modes import Modes
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 def view(
     case: CaseArgument,
     variant: Annotated[Variant, typer.Option(help="How the shafts are held.")] = Variant.bushing,
-    mesh_law: LawOption = MeshLaw.line_of_action,
+    mesh_law: LawOption = USUAL_LAW,
     inertias: InertiasOption = None,
     near: Annotated[
         float | None,
@@ -50,7 +50,7 @@ def view(
         gearbox = read_gearbox(case, files_below, scripts)
         check_choices(gearbox, variant, mesh_law, inertias, results_folder(case, out, make=False))
         folder = results_folder(case, out)
-        fill_missing_tables(gearbox, folder, mesh_law)
+        compute_missing_tables(gearbox, folder, mesh_law)
         found, path = compute_modes(gearbox, folder, variant.value, mesh_law.value, inertias)
         wanted = gearbox.case.report.reference_frequency_Hz if near is None else near
         first = int(found.overall.argmax()) if wanted is None else found.nearest(wanted)
@@ -65,8 +65,9 @@ def view(
 def _draw_modes(found: Modes, folder: Path, first: int, animation: bool) -> list[Path]:
     """Write the page of all elastic modes, and pictures of the gearbox and one mode if this machine can render."""
     from exugear.pictures.elastic_scene import animate_elastic_bodies, draw_elastic_bodies, elastic_scene
+    from exugear.pictures.motions import mode_scene, motions_of
     from exugear.pictures.scene import animate_mode, draw_gearbox, draw_mode
-    from exugear.pictures.shapes import bodies_of, mode_scene, motions_of
+    from exugear.pictures.shapes import bodies_of
     from exugear.pictures.viewer import write_mode_page
     from fe_ste.tools.rendering import RenderingError
 

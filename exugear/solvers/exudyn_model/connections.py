@@ -23,7 +23,7 @@ def add_supports(parts: Parts) -> None:
     for n, bearing in enumerate(assembly.supports):
         if n in elsewhere:
             continue
-        place = np.array(bearing.place)
+        place = np.array(bearing.position)
         pin = np.array([*assembly.gearbox.pin_offsets.get(bearing.body, (0.0, 0.0)), 0.0])
         ends = ((bearing.on, place + pin), (bearing.body, place))
         parts.mbs.AddObject(
@@ -52,7 +52,7 @@ def add_couplings(parts: Parts) -> None:
 
 def add_joint(parts: Parts, joint: Joint) -> None:
     """Add an ideal joint, which leaves a body its spin."""
-    place = np.array(joint.place)
+    place = np.array(joint.position)
     parts.mbs.AddObject(
         items.GenericJoint(
             markerNumbers=[parts.support_marker(body, joint.name, place) for body in (joint.on, joint.body)],

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from exugear.dynamics.assembly import Assembly
-from exugear.kernels.meshes import ROW_SIZE, MeshArrays, add_mesh_forces
+from exugear.kernels.meshes import ROW_SIZE, MeshArrays
 from exugear.solvers.exudyn_model.library import exudyn, items
 from exugear.solvers.exudyn_model.parts import Parts
+from exugear.tooth_mesh.laws.forms import add_mesh_forces
 from fe_ste.tools.arrays import Floats
 
 

@@ -25,7 +25,7 @@ from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
 from exugear.runs.outcome import RunError
-from exugear.solvers.compiled.solver import refusal
+from exugear.solvers.compiled.solver import unsupported_reason
 from exugear.solvers.exudyn_model.floating_object import frame_integrals
 from exugear.solvers.exudyn_model.library import elements, exudyn
 from exugear.solvers.exudyn_model.system import ExudynSystem
@@ -264,8 +264,9 @@ def test_a_run_goes_on_from_its_own_state(floating: Assembly) -> None:
 def test_the_compiled_solver_leaves_floating_frames_to_exudyn(
     floating: Assembly, gearbox: Gearbox, stiffness: dict, tmp_path: Path
 ) -> None:
-    assert refusal(floating) == "bodies.shaft.flexibility = 'ffrf' runs in Exudyn only, 'nonrotating' in both"
-    assert refusal(in_the_frame_that_does_not_turn(floating)) == ""
+    told = "bodies.shaft.flexibility = 'ffrf' runs in Exudyn only, 'nonrotating' in both"
+    assert unsupported_reason(floating) == told
+    assert unsupported_reason(in_the_frame_that_does_not_turn(floating)) == ""
     with pytest.raises(RunError, match="flexibility = 'ffrf' runs in Exudyn only.*use --solver exudyn"):
         simulated(gearbox, Choice("flexible", load_case="steady"), stiffness, tmp_path, solver="compiled")
 

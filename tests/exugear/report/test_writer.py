@@ -19,8 +19,8 @@ from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
 from exugear.report.writer import ReportError, write_report
 from exugear.results.folder import bodies_folder, keep_case, kept_case, modes_path, note_time, times_spent
-from exugear.tooth_mesh.stiffness import mesh_stiffness
-from exugear.tooth_mesh.tables import order_tables
+from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear.tooth_mesh.tables import requested_tables
 from fe_ste.tools.rendering import RenderingError
 
 from ..assembled import assembled, modes_with_bodies, simulated
@@ -41,8 +41,8 @@ def no_rendering(monkeypatch):
     def unable(*arguments, **options):
         raise RenderingError("3-D pictures need pyvista: pip install 'exugear[pictures]'")
 
-    monkeypatch.setattr("exugear.report.writer.draw_mode", unable)
-    monkeypatch.setattr("exugear.report.writer.draw_elastic_bodies", unable)
+    monkeypatch.setattr("exugear.report.mode_pictures.draw_mode", unable)
+    monkeypatch.setattr("exugear.report.mode_pictures.draw_elastic_bodies", unable)
 
 
 @pytest.fixture(scope="module")
@@ -53,8 +53,8 @@ def results(tmp_path_factory):
     case.write_text(SPUR_CASE, encoding="utf-8")
     gearbox = Gearbox.from_toml(case)
     keep_case(gearbox, folder)
-    for order in order_tables(gearbox, folder):
-        order.fill()
+    for request in requested_tables(gearbox, folder):
+        request.compute()
     stiffness = mesh_stiffness(gearbox, LAW, folder)
     for variant in ("rigid", "bushing"):
         simulated(gearbox, Choice(variant, load_case="run_up"), stiffness, folder)
