@@ -23,10 +23,11 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from exugear.bodies.finite_elements.solid_matrices import in_each_direction
-from exugear.bodies.reduced_body import ELASTIC, SEAT_COORDINATES, ReducedBody, RigidInertia
+from exugear.bodies.reduced_body import ELASTIC, ReducedBody, RigidInertia
 from exugear.bodies.rotations import skew
 from exugear.bodies.solids import ReducedSolid, SolidModel, reduce_matrices, reduced_body
 from exugear.bodies.store import load_or_reduce, store_arrays, stored_arrays
+from exugear.kernels.coordinates import BODY_SIZE
 from fe_ste.tools.arrays import Floats
 
 
@@ -91,7 +92,7 @@ class FloatingBody:
     @property
     def at_seats(self) -> Floats:
         """Displacement and turns of the seats by mode, (6 s, k)."""
-        return self.mode_coordinates[: SEAT_COORDINATES * len(self.seats)]
+        return self.mode_coordinates[: BODY_SIZE * len(self.seats)]
 
 
 def floating_body(model: SolidModel, matrices: ReducedSolid | None = None) -> FloatingBody:

@@ -73,7 +73,7 @@ _SUMMARY = {
 def _arrays_of(body: ReducedBody) -> dict[str, NDArray[Any]]:
     words = {
         "name": body.name,
-        "seats": [[seat.name, seat.place] for seat in body.seats],
+        "seats": [[seat.name, seat.position] for seat in body.seats],
         "frame": body.frame,
         "groups": body.modal_groups,
         "figures": {stored: getattr(body.summary, name) for stored, name in _SUMMARY.items()},

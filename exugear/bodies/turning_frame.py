@@ -9,7 +9,8 @@ from functools import cached_property
 
 import numpy as np
 
-from exugear.bodies.reduced_body import SPIN, TILT_X, TILT_Y, UX, UY, UZ, ReducedBody
+from exugear.bodies.reduced_body import TILT_X, TILT_Y, UX, UY, UZ, ReducedBody
+from exugear.kernels.coordinates import SPIN
 from exugear.kernels.elastic import LANES
 from exugear.kernels.turning import TurningArrays
 from fe_ste.tools.arrays import Floats

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from exugear.bodies.reduced_body import SPIN, TILT_X, TILT_Y, UX, UY, UZ, ReducedBody
+from exugear.bodies.reduced_body import TILT_X, TILT_Y, UX, UY, UZ, ReducedBody
 from exugear.dynamics.assembly import Assembly
+from exugear.kernels.coordinates import SPIN
 from fe_ste.tools.arrays import Floats
 
 BODY_MOTIONS = ("spin", "radial", "axial", "tilt", "bending", "twist", "stretch", "deformation")

@@ -46,7 +46,7 @@ def turned_by(body: TurningBody, q: np.ndarray, angle: float) -> np.ndarray:
     """Coordinates of the body with displacements q in its frame, turned by an angle."""
     places = np.zeros_like(q)
     for n, seat in enumerate(body.reduced.seats):
-        places[6 * n : 6 * n + 2] = np.array(seat.place[:2]) - AXIS
+        places[6 * n : 6 * n + 2] = np.array(seat.position[:2]) - AXIS
     moved = body.rotated(q + places, angle) - places
     moved[5 : 6 * body.seat_count : 6] += angle
     return moved
@@ -157,7 +157,7 @@ def carried(body: ReducedBody, motion: np.ndarray) -> np.ndarray:
     centre = np.array(body.rigid_inertia.centre)
     q = np.zeros(body.size)
     for n, seat in enumerate(body.seats):
-        arm = np.array(seat.place) - centre
+        arm = np.array(seat.position) - centre
         q[6 * n : 6 * n + 6] = [*(motion[:3] + rigid(motion[3:]) @ arm - arm), *motion[3:]]
     return q
 
