@@ -90,7 +90,7 @@ def _from_arrays(arrays: Mapping[str, NDArray[Any]]) -> ReducedBody:
         summary[name] = {harmonic: tuple(values) for harmonic, values in summary[name].items()}
     return ReducedBody(
         name=words["name"],
-        seats=tuple(Seat(name, (place[0], place[1], place[2])) for name, place in words["seats"]),
+        seats=tuple(Seat(name, (x, y, z)) for name, (x, y, z) in words["seats"]),
         **{name: arrays[name] for name in _MATRICES},
         frame=words["frame"],
         modal_groups=tuple(words["groups"]),

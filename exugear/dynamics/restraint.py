@@ -101,9 +101,9 @@ def _node(body: Body) -> Floats:
     return np.array([*body.axis, body.centre_of_mass_z])
 
 
-def _motion_at(body: Body, place: Floats) -> Floats:
-    """Motion (6, 6) of a place for unit coordinates of a body."""
-    x, y, z = place - _node(body)
+def _motion_at(body: Body, position: Floats) -> Floats:
+    """Motion (6, 6) at a position for unit coordinates of a body."""
+    x, y, z = position - _node(body)
     motion = np.eye(6)
     motion[:3, 3:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
     return motion
