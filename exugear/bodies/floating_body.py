@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exugear.bodies.reduced_body import SEAT_COORDINATES
+from exugear.kernels.coordinates import BODY_SIZE
 from fe_ste.tools.arrays import Floats
 
 
@@ -71,4 +71,4 @@ class FloatingBody:
     @property
     def at_seats(self) -> Floats:
         """Displacement and turns of the seats by mode, (6 s, k)."""
-        return self.mode_coordinates[: SEAT_COORDINATES * len(self.seats)]
+        return self.mode_coordinates[: BODY_SIZE * len(self.seats)]

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.bodies.floating_body import FloatingBody
-from exugear.bodies.reduced_body import SEAT_COORDINATES, SPIN, ReductionError
+from exugear.bodies.reduced_body import ReductionError
 from exugear.bodies.rotations import IDENTITY, euler_rotation, skew, tilts_and_spin
+from exugear.kernels.coordinates import BODY_SIZE, SPIN
 from fe_ste.tools.arrays import Complexes, Floats
 
 ORDER_TOLERANCE = 0.02
@@ -73,7 +74,7 @@ class FloatingCoordinates:
         self._arms = body.places - body.centre
         self._orders: Floats = whole_orders
         self._shapes: Complexes = np.ascontiguousarray(shapes.conj().T)
-        self._inner: Complexes = body.mode_coordinates[SEAT_COORDINATES * seats :] @ shapes
+        self._inner: Complexes = body.mode_coordinates[BODY_SIZE * seats :] @ shapes
 
     def motion(self, q: Floats, v: Floats, near: float) -> FloatingMotion:
         """State of the reduced body at coordinates and rates (7 + k,); spins are those nearest to an angle (rad)."""

@@ -12,14 +12,13 @@ import scipy.linalg
 import scipy.sparse.csgraph
 from numpy.typing import NDArray
 
+from exugear.kernels.coordinates import AXIAL, BODY_SIZE, TILT
 from fe_ste.tools.arrays import Floats, Integers
 
 Frame = Literal["nonrotating", "carrier", "ground"]
 """Where coordinates are seen from: a frame that does not turn, the carrier's own, or the ground."""
-UX, UY, UZ, TILT_X, TILT_Y, SPIN = range(6)
-"""Coordinates of a seat: displacement, tilts about x and y, and the unwrapped spin about z."""
-SEAT_COORDINATES = 6
-"""Their number."""
+UX, UY, UZ, TILT_X, TILT_Y = 0, 1, AXIAL, TILT, TILT + 1
+"""Coordinates of a seat before its spin: displacement, and tilts about x and y."""
 ELASTIC = slice(6, None)
 """Normal modes of a free body in order of frequency that are elastic: the first six are its rigid motions."""
 
@@ -30,16 +29,16 @@ class ReductionError(ValueError):
 
 @dataclass(frozen=True)
 class Seat:
-    """A place on a body that other things are fixed to.
+    """Where other things are fixed to a body.
 
     Attributes
     ----------
     name : str
-    place : (3,) centre in the gearbox's coordinates at zero angles, m
+    position : (3,) centre in the gearbox's coordinates at zero angles, m
     """
 
     name: str
-    place: tuple[float, float, float]
+    position: tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -149,7 +148,7 @@ class ReducedBody:
         """
         for n, seat in enumerate(self.seats):
             if seat.name == seat_name:
-                return SEAT_COORDINATES * n
+                return BODY_SIZE * n
         names = ", ".join(seat.name for seat in self.seats)
         raise ReductionError(f"body {self.name}: no seat {seat_name!r}; seats are {names}")
 
@@ -164,7 +163,7 @@ class ReducedBody:
         """Rigid motions (n, 6): translations, and turns about a centre (3,) in the gearbox's coordinates."""
         motions = np.zeros((self.size, 6))
         for n, seat in enumerate(self.seats):
-            x, y, z = np.asarray(seat.place) - np.asarray(centre)
+            x, y, z = np.asarray(seat.position) - np.asarray(centre)
             motions[6 * n : 6 * n + 6] = np.eye(6)
             motions[6 * n : 6 * n + 3, 3:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
         return motions
@@ -172,7 +171,7 @@ class ReducedBody:
     @cached_property
     def rigid_inertia(self) -> RigidInertia:
         """Mass, centre of mass and inertias of the rigid body that this is."""
-        origin = np.array(self.seats[0].place)
+        origin = np.array(self.seats[0].position)
         about_seat = self.rigid_motions(origin)
         moments = about_seat.T @ self.mass @ about_seat
         mass = float(moments[0, 0])

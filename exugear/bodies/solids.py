@@ -31,7 +31,6 @@ from exugear.bodies.finite_elements.solid_files import SolidFile
 from exugear.bodies.finite_elements.solid_matrices import Solid, assemble, in_each_direction, shape_gradients
 from exugear.bodies.finite_elements.solid_seats import SolidSeat, seat_rows
 from exugear.bodies.reduced_body import (
-    SPIN,
     Blank,
     Frame,
     ReducedBody,
@@ -43,6 +42,7 @@ from exugear.bodies.reduced_body import (
 )
 from exugear.bodies.reduction import ReducedComponent, reduce_component, rigid_gyroscopic_matrix, selective_mass_scaling
 from exugear.bodies.store import load_or_reduce
+from exugear.kernels.coordinates import SPIN
 from exugear.model.versions import REDUCTION
 from fe_ste.geometry.gears import Material
 from fe_ste.tools.arrays import Floats

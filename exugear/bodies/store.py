@@ -73,7 +73,7 @@ _SUMMARY = {
 def _arrays_of(body: ReducedBody) -> dict[str, NDArray[Any]]:
     words = {
         "name": body.name,
-        "seats": [[seat.name, seat.place] for seat in body.seats],
+        "seats": [[seat.name, seat.position] for seat in body.seats],
         "frame": body.frame,
         "groups": body.modal_groups,
         "figures": {stored: getattr(body.summary, name) for stored, name in _SUMMARY.items()},
@@ -90,7 +90,7 @@ def _from_arrays(arrays: Mapping[str, NDArray[Any]]) -> ReducedBody:
         summary[name] = {harmonic: tuple(values) for harmonic, values in summary[name].items()}
     return ReducedBody(
         name=words["name"],
-        seats=tuple(Seat(name, (place[0], place[1], place[2])) for name, place in words["seats"]),
+        seats=tuple(Seat(name, (x, y, z)) for name, (x, y, z) in words["seats"]),
         **{name: arrays[name] for name in _MATRICES},
         frame=words["frame"],
         modal_groups=tuple(words["groups"]),

@@ -14,7 +14,6 @@ import numpy as np
 from exugear.bodies.finite_elements.shaft_sections import STANDARD_SIZE, MeshSize, SeatBand, ShaftSection
 from exugear.bodies.finite_elements.turned_section import Harmonic, HarmonicName, Shaft
 from exugear.bodies.reduced_body import (
-    SPIN,
     TILT_X,
     TILT_Y,
     UX,
@@ -29,6 +28,7 @@ from exugear.bodies.reduced_body import (
 )
 from exugear.bodies.reduction import ReducedComponent, reduce_component, selective_mass_scaling, symmetric
 from exugear.bodies.store import load_or_reduce
+from exugear.kernels.coordinates import SPIN
 from exugear.model.versions import REDUCTION
 from fe_ste.geometry.gears import Material
 from fe_ste.tools.arrays import Floats, Integers, SparseMatrix

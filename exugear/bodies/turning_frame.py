@@ -9,7 +9,8 @@ from functools import cached_property
 
 import numpy as np
 
-from exugear.bodies.reduced_body import ReducedBody
+from exugear.bodies.reduced_body import TILT_X, TILT_Y, UX, UY, UZ, ReducedBody
+from exugear.kernels.coordinates import SPIN
 from exugear.kernels.elastic import LANES
 from exugear.kernels.turning import TurningArrays
 from fe_ste.tools.arrays import Floats
@@ -34,108 +35,116 @@ class TurningBody:
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @cached_property
-    def seats(self) -> int:
+    def seat_count(self) -> int:
         """Number of seats."""
         return len(self.reduced.seats)
 
     @cached_property
-    def places(self) -> Floats:
+    def seat_offsets(self) -> Floats:
         """Places of the seats from the axis, (seats, 2), m: where the rigid spin moves them tells."""
-        moved = self.reduced.spin[: 6 * self.seats].reshape(-1, 6)
-        return np.stack([moved[:, 1], -moved[:, 0]], axis=1)
+        moved = self.reduced.spin[: 6 * self.seat_count].reshape(-1, 6)
+        return np.stack([moved[:, UY], -moved[:, UX]], axis=1)
 
     @cached_property
-    def weights(self) -> Floats:
+    def angle_weights(self) -> Floats:
         """Weights s (n,) of the frame's angle psi = s . coordinates."""
-        away = np.hypot(*self.places.T) > 0.0
-        chosen = away if away.any() else np.ones(self.seats, dtype=np.bool_)
+        # The mean spin of the seats off the axis: turning them by it displaces none of them.
+        off_axis = np.hypot(*self.seat_offsets.T) > 0.0
+        chosen = off_axis if off_axis.any() else np.ones(self.seat_count, dtype=np.bool_)
         weights = np.zeros(self.reduced.size)
-        weights[5 : 6 * self.seats : 6] = chosen / np.count_nonzero(chosen)
+        weights[SPIN : 6 * self.seat_count : 6] = chosen / np.count_nonzero(chosen)
         return weights
 
     @cached_property
     def coriolis(self) -> Floats:
         """Matrix 2 C - M S, (n, n)."""
-        return self.reduced.gyroscopic + self.across(self.reduced.mass).T  # S' = -S
+        return self.reduced.gyroscopic + self.quarter_turned(self.reduced.mass).T  # S' = -S
 
     @cached_property
-    def pull(self) -> Floats:
+    def centrifugal(self) -> Floats:
         """Centrifugal force over the square of the speed, -C r, (n,)."""
         return np.asarray(-0.5 * self.reduced.gyroscopic @ self.reduced.spin)
 
-    def turned(self, vector: Floats, angle: float) -> Floats:
+    @property
+    def _planar_coordinates(self) -> tuple[tuple[slice, slice], ...]:
+        """X and y of all seats, of their displacements and of their tilts."""
+        end = 6 * self.seat_count
+        return (slice(UX, end, 6), slice(UY, end, 6)), (slice(TILT_X, end, 6), slice(TILT_Y, end, 6))
+
+    def rotated(self, vector: Floats, angle: float) -> Floats:
         """Turn the vectors of the seats in (n, ...) by an angle (rad) about z."""
         out = np.array(vector, dtype=np.float64)
         c, s = math.cos(angle), math.sin(angle)
-        for first in (0, 3):
-            x, y = slice(first, 6 * self.seats, 6), slice(first + 1, 6 * self.seats, 6)
+        for x, y in self._planar_coordinates:
             out[x], out[y] = c * vector[x] - s * vector[y], s * vector[x] + c * vector[y]
         return out
 
-    def across(self, vector: Floats) -> Floats:
+    def quarter_turned(self, vector: Floats) -> Floats:
         """Turn the vectors of the seats in (n, ...) by a right angle and drop all else: S times the vector."""
         out = np.zeros_like(vector)
-        for first in (0, 3):
-            x, y = slice(first, 6 * self.seats, 6), slice(first + 1, 6 * self.seats, 6)
+        for x, y in self._planar_coordinates:
             out[x], out[y] = -vector[y], vector[x]
         return out
 
     def angle(self, q: Floats) -> float:
         """Angle psi of the frame at coordinates q, or its speed at velocities."""
-        return float(self.weights @ q)
+        return float(self.angle_weights @ q)
 
-    def seen(self, q: Floats) -> Floats:
+    def to_body_frame(self, q: Floats) -> Floats:
         """Displacements in the frame at coordinates q, both (n,)."""
-        places = -self.across(self.reduced.spin)
+        places = -self.quarter_turned(self.reduced.spin)  # the rigid spin moves a place by itself, a quarter turn on
         angle = self.angle(q)
-        out: Floats = self.turned(np.asarray(q + places), -angle) - places
-        out[5 : 6 * self.seats : 6] -= angle
+        out: Floats = self.rotated(np.asarray(q + places), -angle) - places
+        out[SPIN : 6 * self.seat_count : 6] -= angle
         return out
 
     def forces(self, q: Floats, v: Floats) -> Floats:
         """Generalized forces of elasticity, damping and weight, (n,)."""
         angle, speed = self.angle(q), self.angle(v)
-        moved = self.seen(q)
-        rates = self.turned(v, -angle) - speed * (self.reduced.spin + self.across(moved))
-        elastic = -self.reduced.stiffness @ (moved + self.damping_time * rates)
+        displacements = self.to_body_frame(q)
+        around = self.quarter_turned(displacements)
+        rates = self.rotated(v, -angle) - speed * (self.reduced.spin + around)
+        elastic = -self.reduced.stiffness @ (displacements + self.damping_time * rates)
         falling = np.zeros_like(q)
-        for axis in range(3):
-            falling[axis : 6 * self.seats : 6] = self.gravity[axis]
-        weight = self.reduced.mass @ self.turned(falling, -angle)
-        return np.asarray(self.turned(elastic + weight, angle) - (self.across(moved) @ elastic) * self.weights)
+        for axis in (UX, UY, UZ):
+            falling[axis : 6 * self.seat_count : 6] = self.gravity[axis]
+        weight = self.reduced.mass @ self.rotated(falling, -angle)
+        # Turning the frame alone changes the displacements in it: elastic forces act on its angle.
+        return np.asarray(self.rotated(elastic + weight, angle) - (around @ elastic) * self.angle_weights)
 
     def apparent_forces(self, v: Floats, angle: float) -> Floats:
         """Coriolis and centrifugal forces in the frame, Omega h - (w . h) s, (n,)."""
-        speed, w = self.angle(v), self.turned(v, -angle)
-        apparent = speed * self.pull - self.coriolis @ (w - speed * self.reduced.spin)
-        return np.asarray(speed * apparent - (w @ apparent) * self.weights)
+        speed, w = self.angle(v), self.rotated(v, -angle)
+        apparent = speed * self.centrifugal - self.coriolis @ (w - speed * self.reduced.spin)
+        # What is taken from the frame's angle leaves no power to them.
+        return np.asarray(speed * apparent - (w @ apparent) * self.angle_weights)
 
     def inertia_forces(self, q: Floats, v: Floats, a: Floats) -> Floats:
         """Generalized forces that accelerations a need, all (n,)."""
         angle = self.angle(q)
-        rates = self.turned(a - self.angle(v) * self.across(v), -angle)
-        return self.turned(self.reduced.mass @ rates - self.apparent_forces(v, angle), angle)
+        rates = self.rotated(a - self.angle(v) * self.quarter_turned(v), -angle)
+        return self.rotated(self.reduced.mass @ rates - self.apparent_forces(v, angle), angle)
 
     def accelerations(self, q: Floats, v: Floats, f: Floats) -> Floats:
         """Accelerations under generalized forces f, all (n,): the inverse of `inertia_forces`."""
         angle = self.angle(q)
-        given = self.turned(f, -angle) + self.apparent_forces(v, angle)
+        given = self.rotated(f, -angle) + self.apparent_forces(v, angle)
         rates: Floats = np.asarray(np.linalg.solve(self.reduced.mass, given), dtype=np.float64)
-        return self.turned(rates, angle) + self.angle(v) * self.across(v)
+        return self.rotated(rates, angle) + self.angle(v) * self.quarter_turned(v)
 
     def mass_matrix(self, q: Floats) -> Floats:
         """Mass matrix at coordinates q, (n, n)."""
         angle = self.angle(q)
-        return self.turned(self.turned(self.reduced.mass, angle).T, angle)
+        return self.rotated(self.rotated(self.reduced.mass, angle).T, angle)
 
     def rolling_velocity(self, q: Floats, speed: float) -> Floats:
         """Velocities (n,) at which the body turns with its deformation at a speed (rad/s)."""
-        return np.asarray(speed * (self.reduced.spin + self.across(q)))
+        return np.asarray(speed * (self.reduced.spin + self.quarter_turned(q)))
 
     def rolling_acceleration(self, q: Floats, speed: float, rate: float) -> Floats:
         """Accelerations (n,) of the same motion at a spin rate (rad/s2)."""
-        around = self.reduced.spin + self.across(q)
-        return np.asarray(rate * around + speed**2 * self.across(around))
+        around = self.reduced.spin + self.quarter_turned(q)
+        return np.asarray(rate * around + speed**2 * self.quarter_turned(around))
 
 
 def turning_arrays(bodies: Iterable[tuple[int, TurningBody]]) -> TurningArrays:
@@ -154,12 +163,12 @@ def turning_arrays(bodies: Iterable[tuple[int, TurningBody]]) -> TurningArrays:
     return TurningArrays(
         begin=np.array([begin for begin, _ in given], dtype=np.int64),
         size=sizes,
-        seats=np.array([body.seats for _, body in given], dtype=np.int64),
+        seats=np.array([body.seat_count for _, body in given], dtype=np.int64),
         columns=columns,
         first=np.cumsum(sizes) - sizes,
         spin=joined(body.reduced.spin for _, body in given),
-        weight=joined(body.weights for _, body in given),
-        pull=joined(body.pull for _, body in given),
+        weight=joined(body.angle_weights for _, body in given),
+        pull=joined(body.centrifugal for _, body in given),
         square=np.cumsum(sizes * columns) - sizes * columns,
         stiffness=row_by_row(body.reduced.stiffness for _, body in given),
         coriolis=row_by_row(body.coriolis for _, body in given),

@@ -132,7 +132,7 @@ def _take_seats(
     for n, seat in enumerate(body.reduced.seats):
         key = seat_key(name, seat.name)
         coordinates[key] = tuple(range(first + 6 * n, first + 6 * n + 6))
-        nodes[key] = np.array(seat.place)
+        nodes[key] = np.array(seat.position)
     for item, seat_name in body.shared_seats.items():
         key = seat_key(name, seat_name)
         coordinates[seat_key(name, item)], nodes[seat_key(name, item)] = coordinates[key], nodes[key]

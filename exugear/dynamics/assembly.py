@@ -206,7 +206,7 @@ class Assembly:
             if name in self.turning:
                 continue
             reduced = self.elastic_bodies[name].reduced
-            f[place] = reduced.mass @ reduced.rigid_motions(reduced.seats[0].place)[:, :3] @ acceleration
+            f[place] = reduced.mass @ reduced.rigid_motions(reduced.seats[0].position)[:, :3] @ acceleration
         return f
 
     def torque_vector(self, torques: Mapping[str, float]) -> Floats:

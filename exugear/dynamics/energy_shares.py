@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from exugear.bodies.reduced_body import SPIN, TILT_X, TILT_Y, UX, UY, UZ, ReducedBody
+from exugear.bodies.reduced_body import TILT_X, TILT_Y, UX, UY, UZ, ReducedBody
 from exugear.dynamics.assembly import Assembly
+from exugear.kernels.coordinates import SPIN
 from fe_ste.tools.arrays import Floats
 
 BODY_MOTIONS = ("spin", "radial", "axial", "tilt", "bending", "twist", "stretch", "deformation")
@@ -27,7 +28,7 @@ def kinetic_shares(assembly: Assembly, shapes: Floats, q: Floats) -> Floats:
             body_shapes = shapes[of_body]
             if body.name in assembly.turning:  # its matrices are those of its own frame
                 turning = assembly.turning[body.name]
-                body_shapes = turning.turned(body_shapes, -turning.angle(q[of_body]))
+                body_shapes = turning.rotated(body_shapes, -turning.angle(q[of_body]))
             shares[:, n] = _elastic_energies(assembly.elastic_bodies[body.name].reduced, body_shapes)
             continue
         index = assembly.coordinates[body.name]

@@ -59,14 +59,14 @@ def lacking(gearbox: Gearbox, variant: str) -> str:
 
 def remarks(gearbox: Gearbox) -> tuple[str, ...]:
     """Tell what is possible and unusual, and what some verbs will refuse; a line each."""
-    found = list(gearbox.warnings)
+    lines = list(gearbox.warnings)
     for name, spec in gearbox.pairs.items():
         if not spec.static_torque > 0.0 and any(mesh.pair.name == name for mesh in gearbox.meshes):
-            found.append(f"pairs.{name}: carries no torque in [static_load], and so gets no table")
+            lines.append(f"pairs.{name}: carries no torque in [static_load], and so gets no table")
     freedoms = gearbox.train.degrees_of_freedom
     if freedoms > 1:
-        found.append(f"meshes: the train has {freedoms} degrees of freedom; modes are possible, runs are not yet")
-    return tuple(found)
+        lines.append(f"meshes: the train has {freedoms} degrees of freedom; modes are possible, runs are not yet")
+    return tuple(lines)
 
 
 def _build_bearing(gearbox: Gearbox, bearing: Bearing) -> None:

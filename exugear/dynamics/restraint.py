@@ -11,19 +11,22 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from exugear.bearings.supports import bearing_matrices, elastic_names, mounts_at_work
+from exugear.kernels.coordinates import BODY_SIZE, SPIN
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Body
 from exugear.tooth_mesh.placement import line_of_action_row, loaded_flanks
 from fe_ste.tools.arrays import Floats
 
-LENGTH = 0.1
+TILT_LENGTH = 0.1
 """Length (m) that turns a tilt into a displacement, so that both are compared."""
-HELD = 1e-10
+HOLDING_SHARE = 1e-10
 """Least stiffness of a support in a direction over its largest that counts as holding."""
-FREE = 1e-8
+FREE_STRETCH = 1e-8
 """Largest stretch of all springs, per unit of motion, that counts as none."""
-_SCALE = np.array([1.0, 1.0, 1.0, 1.0 / LENGTH, 1.0 / LENGTH, 1.0 / LENGTH])
-"""Rows are over displacements and over rotations times `LENGTH`."""
+ROLLING_TOLERANCE = 1e-3
+"""Share of a free motion beside rolling up to which it counts as rolling."""
+_SCALE = np.array([1.0, 1.0, 1.0, 1.0 / TILT_LENGTH, 1.0 / TILT_LENGTH, 1.0 / TILT_LENGTH])
+"""Rows are over displacements and over rotations times `TILT_LENGTH`."""
 DIRECTIONS = ("move along x", "move along y", "move along z", "tilt about x", "tilt about y", "turn about z")
 
 
@@ -42,74 +45,77 @@ def free_motion(gearbox: Gearbox, variant: str) -> str:
     'body lss can move along z without resistance; add or stiffen a bearing'
     """
     moving = [body for body in gearbox.bodies() if not body.fixed or _is_elastic(gearbox, variant, body)]
-    first = {body.name: 6 * number for number, body in enumerate(moving)}
-    rows = np.array([row for row in _held_directions(gearbox, variant, first) if row.any()])
+    starts = {body.name: 6 * number for number, body in enumerate(moving)}
+    rows = np.array([row for row in _held_directions(gearbox, variant, starts) if row.any()])
     if not rows.size:
         return "no bearing holds anything"
+    # Each row of one length: how stiff a support is does not matter, only that it holds.
     _, singular, basis = np.linalg.svd(rows / np.linalg.norm(rows, axis=1, keepdims=True))
-    free = basis[int(np.sum(singular > FREE * singular[0])) :]
-    rolling = _rolling_motions(gearbox, moving, first)
+    free = basis[int(np.sum(singular > FREE_STRETCH * singular[0])) :]
+    rolling = _rolling_motions(gearbox, moving, starts)
     beyond = free - free @ rolling.T @ rolling
     amount = np.linalg.norm(beyond, axis=1)
-    if not amount.size or amount.max() < 1e-3:
+    if not amount.size or amount.max() < ROLLING_TOLERANCE:
         return ""
-    place = int(np.argmax(np.abs(beyond[np.argmax(amount)])))
-    return f"body {moving[place // 6].name} can {DIRECTIONS[place % 6]} without resistance; add or stiffen a bearing"
+    body, direction = divmod(int(np.argmax(np.abs(beyond[np.argmax(amount)]))), BODY_SIZE)
+    return f"body {moving[body].name} can {DIRECTIONS[direction]} without resistance; add or stiffen a bearing"
 
 
 def _is_elastic(gearbox: Gearbox, variant: str, body: Body) -> bool:
     return variant == "flexible" and body.name in elastic_names(gearbox)
 
 
-def _held_directions(gearbox: Gearbox, variant: str, first: Mapping[str, int]) -> Iterator[Floats]:
-    """Rows over all coordinates, rotations times `LENGTH`, of what supports, meshes and couplings hold."""
+def _held_directions(gearbox: Gearbox, variant: str, starts: Mapping[str, int]) -> Iterator[Floats]:
+    """Rows over all coordinates, rotations times `TILT_LENGTH`, of what supports, meshes and couplings hold."""
     bodies = {body.name: body for body in gearbox.bodies()}
-    size = 6 * len(first)
+    size = 6 * len(starts)
     for support in (*gearbox.bearings, *(mounts_at_work(gearbox) if variant == "flexible" else ())):
         motion = np.zeros((6, size))
         for name, sense in ((support.body, 1.0), (support.on, -1.0)):
-            if name in first:
-                motion[:, first[name] : first[name] + 6] += sense * _motion_at(bodies[name], np.array(support.position))
+            if name in starts:
+                motion[:, starts[name] : starts[name] + 6] += sense * _motion_at(
+                    bodies[name], np.array(support.position)
+                )
         stiffness, _ = bearing_matrices(support, 0.0)
         values, vectors = np.linalg.eigh(_SCALE * stiffness * _SCALE[:, None])
-        yield from (vectors[:, values > HELD * values[-1]].T / _SCALE) @ motion * np.tile(_SCALE, len(first))
+        yield from (vectors[:, values > HOLDING_SHARE * values[-1]].T / _SCALE) @ motion * np.tile(_SCALE, len(starts))
     flanks = loaded_flanks(gearbox)
     for mesh in gearbox.meshes:
         nodes = (_node(bodies[mesh.pinion]), _node(bodies[mesh.gear]))
         row = np.zeros(size)
         ends = np.split(line_of_action_row(mesh, flanks[mesh.name], nodes), 2)
         for name, part in zip((mesh.pinion, mesh.gear), ends, strict=True):
-            if name in first:
-                row[first[name] : first[name] + 6] += part * _SCALE
+            if name in starts:
+                row[starts[name] : starts[name] + 6] += part * _SCALE
         yield row
     for coupling in gearbox.couplings:
         row = np.zeros(size)
-        row[first[coupling.first] + 5], row[first[coupling.second] + 5] = 1.0, -1.0
+        row[starts[coupling.first] + SPIN], row[starts[coupling.second] + SPIN] = 1.0, -1.0
         yield row
     for body in bodies.values():
         if body.spin_only:  # it has no other coordinate
-            yield from np.eye(size)[first[body.name] : first[body.name] + 5]
+            yield from np.eye(size)[starts[body.name] : starts[body.name] + SPIN]
 
 
 def _node(body: Body) -> Floats:
     return np.array([*body.axis, body.centre_of_mass_z])
 
 
-def _motion_at(body: Body, place: Floats) -> Floats:
-    """Motion (6, 6) of a place for unit coordinates of a body."""
-    x, y, z = place - _node(body)
+def _motion_at(body: Body, position: Floats) -> Floats:
+    """Motion (6, 6) at a position for unit coordinates of a body."""
+    x, y, z = position - _node(body)
     motion = np.eye(6)
     motion[:3, 3:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
     return motion
 
 
-def _rolling_motions(gearbox: Gearbox, moving: list[Body], first: Mapping[str, int]) -> Floats:
+def _rolling_motions(gearbox: Gearbox, moving: list[Body], starts: Mapping[str, int]) -> Floats:
     """Orthonormal rolling motions (n, size): spins, and the orbit of planets with their carrier."""
     motions = np.zeros((gearbox.train.degrees_of_freedom, 6 * len(moving)))
     spins = dict(zip(gearbox.spinning, gearbox.train.kinematic_modes, strict=True))
     for body in moving:
-        begin = first[body.name]
-        motions[:, begin + 5] = LENGTH * spins.get(body.name, 0.0)
+        begin = starts[body.name]
+        motions[:, begin + SPIN] = TILT_LENGTH * spins.get(body.name, 0.0)
         if body.carrier is not None:
             x, y = np.array(body.axis) - gearbox.body(body.carrier).axis
             motions[:, begin : begin + 2] = np.outer(spins[body.carrier], [-y, x])

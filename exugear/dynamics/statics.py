@@ -18,8 +18,10 @@ from exugear.kernels.meshes import FORCE, MeshArrays
 from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
 
-STEP = 1e-7
+DIFFERENCE_STEP = 1e-7
 """Difference step of the Newton matrices, m and rad: far above round-off, far below any radius."""
+MOST_NEWTON_STEPS = 30
+"""Steps after which the search for a balance is given up."""
 LARGEST_RESIDUAL = 1e-9
 """Share of the load at which a residual that stops falling is round-off."""
 
@@ -61,7 +63,7 @@ def _newton(residual: Callable[[Floats], Floats], start: Floats, steps: Floats, 
     if not x.size:
         return x
     rounding = np.zeros_like(x)
-    for _ in range(30):
+    for _ in range(MOST_NEWTON_STEPS):
         r = residual(x)
         error = float(np.max(np.abs(r) / scale))
         if not np.isfinite(error):
@@ -117,7 +119,7 @@ def locked_equilibrium(
         def residual(x: Floats) -> Floats:
             return free.T @ (assembly.forces(free @ x, rest, meshes) + applied)
 
-        steps, scale = np.full(start.size, STEP), np.full(start.size, _load_scale(applied))
+        steps, scale = np.full(start.size, DIFFERENCE_STEP), np.full(start.size, _load_scale(applied))
         return _newton(residual, start, steps, scale, "static state")
 
     start = _touching(assembly, np.zeros(free.shape[1]), lambda x: np.asarray(free @ x), solve)
@@ -209,14 +211,14 @@ def _held(assembly: Assembly, torques: Mapping[str, float], locked: Sequence[str
 def _touching(
     assembly: Assembly,
     start: Floats,
-    place: Callable[[Floats], Floats],
+    to_coordinates: Callable[[Floats], Floats],
     solve: Callable[[Floats, MeshArrays | None], Floats],
 ) -> Floats:
     """Begin where linear teeth would be, on the flanks that they press: table flanks that are apart hold nothing."""
     if not LAWS[assembly.law].loses_contact:
         return start
     x = solve(start, assembly.linear_meshes())
-    q = place(x)
+    q = to_coordinates(x)
     reversed_flanks = assembly.mesh_states(q, np.zeros_like(q), assembly.linear_meshes())[:, FORCE] < 0.0
     return solve(x, assembly.linear_meshes(reversed_flanks)) if reversed_flanks.any() else x
 
@@ -276,7 +278,7 @@ def accelerating_start(
             return np.append(motions.T @ unbalanced, size * q[pinned])
 
         # The residual is linear in the last unknown, an acceleration or a torque: no step is too long for it.
-        steps = np.append(np.full(start.size - 1, STEP), 1.0)
+        steps = np.append(np.full(start.size - 1, DIFFERENCE_STEP), 1.0)
         return _newton(residual, start, steps, np.full(start.size, size), "start of the run")
 
     x = _touching(assembly, np.zeros(motions.shape[1] + 1), lambda x: split(x)[0], solve)

@@ -42,26 +42,26 @@ def second_order(points: Floats, cells: Integers, kind: str) -> Any:
     straight = _linear_tetrahedra(points[used], numbers) if tetrahedral else skfem_mesh(points[used], numbers)
     mesh = (skfem.MeshTet2 if tetrahedral else skfem.MeshHex2).from_mesh(straight)
     places = np.array(mesh.doflocs)
-    first = len(used)
+    node = len(used)  # the first beyond the corners
     edges = points[cells[:, CORNERS[kind] :]]
     if kind == "tetra10":
-        _place(places[:, first:], mesh.edges, numbers[:, TET_EDGES], edges)
+        _place(places[:, node:], mesh.edges, numbers[:, TET_EDGES], edges)
     elif kind in ("hexahedron20", "hexahedron27"):
-        _place(places[:, first:], mesh.edges, numbers[:, HEX_EDGES], edges[:, :12])
-        first += mesh.edges.shape[1]
+        _place(places[:, node:], mesh.edges, numbers[:, HEX_EDGES], edges[:, :12])
+        node += mesh.edges.shape[1]
         faces, bodies = edges[:, 12:18], edges[:, 18:19]
         if kind == "hexahedron20":  # the serendipity element's own place of these, or linear fields are lost
             ends = points[corners]
             faces = 0.5 * edges[:, HEX_FACE_EDGES].sum(axis=2) - 0.25 * ends[:, HEX_FACES].sum(axis=2)
             bodies = 0.25 * edges.sum(axis=1, keepdims=True) - 0.25 * ends.sum(axis=1, keepdims=True)
-        _place(places[:, first:], mesh.facets, numbers[:, HEX_FACES], faces)
-        places[:, first + mesh.facets.shape[1] :] = bodies[:, 0].T
-    found = type(mesh)(places, mesh.t)
-    determinant = found.mapping().detDF(skfem.quadrature.get_quadrature(found.elem(), 4)[0])
+        _place(places[:, node:], mesh.facets, numbers[:, HEX_FACES], faces)
+        places[:, node + mesh.facets.shape[1] :] = bodies[:, 0].T
+    bent = type(mesh)(places, mesh.t)
+    determinant = bent.mapping().detDF(skfem.quadrature.get_quadrature(bent.elem(), 4)[0])
     turned = np.flatnonzero((determinant.min(axis=1) < 0.0) == (determinant.max(axis=1) > 0.0))
     if turned.size:
         raise SolidError(f"element {turned[0]} of {len(cells)} is turned inside out; mesh finer where it is curved")
-    return found
+    return bent
 
 
 def _linear_tetrahedra(points: Floats, cells: Integers) -> Any:
@@ -78,6 +78,6 @@ def entity_numbers(entities: Integers, corners: Integers) -> Integers:
     return number[label[len(known) :]]
 
 
-def _place(places: Floats, entities: Integers, own: Integers, wanted: Floats) -> None:
-    """Put the nodes (3, ...) of edges or faces, (corners, n), where elements (m, e, corners) want them (m, e, 3)."""
-    places[:, entity_numbers(entities, own.reshape(-1, own.shape[2]))] = wanted.reshape(-1, 3).T
+def _place(places: Floats, entities: Integers, corners: Integers, wanted: Floats) -> None:
+    """Put the nodes (3, ...) of edges or faces, (c, n), where elements of corners (m, e, c) want them (m, e, 3)."""
+    places[:, entity_numbers(entities, corners.reshape(-1, corners.shape[2]))] = wanted.reshape(-1, 3).T

@@ -27,11 +27,11 @@ def _around(corners: Integers, places: Floats) -> Integers:
     """Corners (f, 4) of quadrilaterals, put in the order around each."""
     points = places[corners]
     away = points - points.mean(axis=1, keepdims=True)
-    first = away[:, 0]
-    normal = np.cross(first, away[:, 1]) + np.cross(first, away[:, 2])
-    other = np.cross(normal, first)
+    start = away[:, 0]
+    normal = np.cross(start, away[:, 1]) + np.cross(start, away[:, 2])
+    sideways = np.cross(normal, start)
     angle = np.arctan2(
-        np.einsum("fcd,fd->fc", away, other) * np.linalg.norm(first, axis=1)[:, None],
-        np.einsum("fcd,fd->fc", away, first) * np.linalg.norm(other, axis=1)[:, None],
+        np.einsum("fcd,fd->fc", away, sideways) * np.linalg.norm(start, axis=1)[:, None],
+        np.einsum("fcd,fd->fc", away, start) * np.linalg.norm(sideways, axis=1)[:, None],
     )
     return np.asarray(np.take_along_axis(corners, np.argsort(angle, axis=1), axis=1))

@@ -102,9 +102,10 @@ def _rows(mesh: Any, facets: Integers, centre: Floats) -> Floats:
     motions[:3] = np.eye(3)[:, :, None, None]
     loads = np.zeros((6, 3, share.shape[1]))
     loads[:3] = np.eye(3)[:, :, None] * share[0]
-    for turn, (one, other) in enumerate(((1, 2), (2, 0), (0, 1))):
-        motions[3 + turn, one], motions[3 + turn, other] = -arm[other], arm[one]
-        loads[3 + turn, one], loads[3 + turn, other] = -share[1 + other], share[1 + one]
+    # A turn about an axis moves the arm along the two axes after it in cyclic order.
+    for turn, (after, before) in enumerate(((1, 2), (2, 0), (0, 1))):
+        motions[3 + turn, after], motions[3 + turn, before] = -arm[before], arm[after]
+        loads[3 + turn, after], loads[3 + turn, before] = -share[1 + before], share[1 + after]
     inertia = np.einsum("idfq,jdfq,fq->ij", motions, motions, weight)
     rows: Floats = np.linalg.solve(inertia, loads.transpose(0, 2, 1).reshape(6, -1))
     return rows

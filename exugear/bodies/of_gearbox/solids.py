@@ -90,14 +90,14 @@ def solid_body(gearbox: Gearbox, name: str) -> SolidBody:
 
 @dataclass(frozen=True)
 class _Item:
-    """What sits on a solid: its place (m), and diameter and width (m) of its seat where they are known.
+    """What sits on a solid: its position (m), and diameter and width (m) of its seat where they are known.
 
     `family` is its name in the file, `noun` what it is, `needed` whether there must be a seat for it.
     """
 
     family: str
     noun: str
-    place: tuple[float, float, float]
+    position: tuple[float, float, float]
     diameter: float | None
     width: float | None
     needed: bool = True
@@ -173,16 +173,16 @@ def _solid_seat(gearbox: Gearbox, key: str, name: str, item: _Item | None, secti
         width = 1e-3 * section.width_mm
     if section.inner_diameter_mm is not None:
         width = 0.0
-    place = None if item is None else item.place
+    position = None if item is None else item.position
     if section.position_mm is not None:
         x, y, z = section.position_mm
-        place = (1e-3 * x, 1e-3 * y, 1e-3 * z)
-    given = (("diameter_mm", diameter), ("width_mm", width), ("position_mm", place))
+        position = (1e-3 * x, 1e-3 * y, 1e-3 * z)
+    given = (("diameter_mm", diameter), ("width_mm", width), ("position_mm", position))
     missing = [word for word, value in given if value is None]
-    if missing or diameter is None or width is None or place is None:
+    if missing or diameter is None or width is None or position is None:
         what = "a seat that no gear, bearing or mount of the body has the name of" if item is None else item.noun
         raise gearbox.fault(f"{key}: {what} {name!r} needs its seat; give {' and '.join(missing)} in [{key}]")
-    return SolidSeat(name, place, diameter / 2.0, width, 0.5e-3 * (section.inner_diameter_mm or 0.0))
+    return SolidSeat(name, position, diameter / 2.0, width, 0.5e-3 * (section.inner_diameter_mm or 0.0))
 
 
 def _parts(seat: SolidSeat, count: int) -> list[SolidSeat]:

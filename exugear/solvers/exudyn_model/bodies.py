@@ -63,11 +63,11 @@ def _add_rigid_body(parts: Parts, body: Body, q: Floats, v: Floats) -> None:
         parts.mbs.AddLoad(items.LoadMassProportional(markerNumber=marker, loadVector=list(acceleration)))
 
 
-def _add_rigid_node(parts: Parts, place: Floats, first: int, q: Floats, v: Floats) -> Any:
+def _add_rigid_node(parts: Parts, position: Floats, first: int, q: Floats, v: Floats) -> Any:
     """Add a node with six coordinates, which begin at `first` in the assembly's."""
     return parts.mbs.AddNode(
         items.NodeRigidBodyRxyz(
-            referenceCoordinates=[*place.tolist(), 0.0, 0.0, 0.0],
+            referenceCoordinates=[*position.tolist(), 0.0, 0.0, 0.0],
             initialCoordinates=q[first : first + 6].tolist(),
             initialVelocities=v[first : first + 6].tolist(),
         )
@@ -80,9 +80,9 @@ def _add_elastic_body(parts: Parts, name: str, q: Floats, v: Floats) -> None:
     elastic, coordinates = assembly.elastic_bodies[name], assembly.elastic_slices[name]
     reduced = elastic.reduced
     for n, seat in enumerate(reduced.seats):
-        key, place = seat_key(name, seat.name), np.array(seat.place)
-        parts.nodes[key] = _add_rigid_node(parts, place, coordinates.start + 6 * n, q, v)
-        parts.seat_places[key] = place
+        key, position = seat_key(name, seat.name), np.array(seat.position)
+        parts.nodes[key] = _add_rigid_node(parts, position, coordinates.start + 6 * n, q, v)
+        parts.seat_positions[key] = position
     nodes = [parts.nodes[seat_key(name, seat.name)] for seat in reduced.seats]
     modal = slice(coordinates.start + 6 * len(reduced.seats), coordinates.stop)
     nodes.append(
@@ -99,7 +99,7 @@ def _add_elastic_body(parts: Parts, name: str, q: Floats, v: Floats) -> None:
     parts.nodes[name] = parts.nodes[seat_key(name, elastic.main_seat)]
     for item, seat_name in elastic.shared_seats.items():
         key, shared = seat_key(name, item), seat_key(name, seat_name)
-        parts.nodes[key], parts.seat_places[key] = parts.nodes[shared], parts.seat_places[shared]
+        parts.nodes[key], parts.seat_positions[key] = parts.nodes[shared], parts.seat_positions[shared]
     if name in assembly.turning:
         _add_turning_laws(parts, assembly.turning[name], nodes)
         return

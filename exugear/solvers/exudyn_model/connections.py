@@ -23,9 +23,9 @@ def add_supports(parts: Parts) -> None:
     for n, bearing in enumerate(assembly.supports):
         if n in elsewhere:
             continue
-        place = np.array(bearing.position)
+        position = np.array(bearing.position)
         pin = np.array([*assembly.gearbox.pin_offsets.get(bearing.body, (0.0, 0.0)), 0.0])
-        ends = ((bearing.on, place + pin), (bearing.body, place))
+        ends = ((bearing.on, position + pin), (bearing.body, position))
         parts.mbs.AddObject(
             items.RigidBodySpringDamper(
                 markerNumbers=[parts.support_marker(body, bearing.name, at) for body, at in ends],
@@ -52,10 +52,10 @@ def add_couplings(parts: Parts) -> None:
 
 def add_joint(parts: Parts, joint: Joint) -> None:
     """Add an ideal joint, which leaves a body its spin."""
-    place = np.array(joint.position)
+    position = np.array(joint.position)
     parts.mbs.AddObject(
         items.GenericJoint(
-            markerNumbers=[parts.support_marker(body, joint.name, place) for body in (joint.on, joint.body)],
+            markerNumbers=[parts.support_marker(body, joint.name, position) for body in (joint.on, joint.body)],
             constrainedAxes=FREE_SPIN,
         )
     )

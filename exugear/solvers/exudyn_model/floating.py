@@ -26,8 +26,9 @@ import numpy as np
 
 from exugear.bodies.floating_body import FloatingBody
 from exugear.bodies.floating_coordinates import NO_TURN
-from exugear.bodies.reduced_body import SPIN, TILT_X, TILT_Y
+from exugear.bodies.reduced_body import TILT_X, TILT_Y
 from exugear.bodies.rotations import euler_rotation
+from exugear.kernels.coordinates import SPIN
 from exugear.solvers.exudyn_model.floating_object import Rotation, add_floating_body
 from exugear.solvers.exudyn_model.library import SolverFailure, exudyn, items, kinematics
 from fe_ste.tools.arrays import Floats

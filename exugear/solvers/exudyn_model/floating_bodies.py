@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from exugear.bodies.floating_coordinates import FRAME_COORDINATES, MODAL, FloatingCoordinates, FloatingMotion
-from exugear.bodies.reduced_body import SPIN
 from exugear.dynamics.assembly import Assembly
 from exugear.kernels.connectors import ConnectorArrays, add_connector_forces
+from exugear.kernels.coordinates import SPIN
 from exugear.kernels.meshes import MeshArrays
 from exugear.kernels.springs import SpringArrays, add_spring_forces
 from exugear.solvers.exudyn_model.floating_object import add_floating_body

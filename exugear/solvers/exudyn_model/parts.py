@@ -29,7 +29,7 @@ class Parts:
         `exugear.model.seats.seat_key`
     bodies : object of each rigid body
     elastic_nodes : all nodes of each elastic body: those of its seats, then one for its modal coordinates
-    seat_places : (3,) of each seat by its key, m
+    seat_positions : (3,) of each seat by its key, m
     floating : bodies in floating frames, if there are any
     """
 
@@ -38,7 +38,7 @@ class Parts:
     nodes: dict[str, Any] = field(default_factory=dict)
     bodies: dict[str, Any] = field(default_factory=dict)
     elastic_nodes: dict[str, list[Any]] = field(default_factory=dict)
-    seat_places: dict[str, Floats] = field(default_factory=dict)
+    seat_positions: dict[str, Floats] = field(default_factory=dict)
     floating: FloatingBodies | None = None
     _ground: Any = None
 
@@ -49,19 +49,19 @@ class Parts:
         elastic = [node for nodes in self.elastic_nodes.values() for node in nodes]
         return [self.nodes[name] for name in rigid] + elastic
 
-    def support_marker(self, body: str, item: str, place: Floats) -> Any:
-        """Marker of a support at a place (m, at zero angles) on a body, its seat on an elastic one, or the ground."""
+    def support_marker(self, body: str, item: str, position: Floats) -> Any:
+        """Marker of a support at a position (m, at zero angles) on a body, on an elastic one's seat, or the ground."""
         key = seat_key(body, item)
-        if key in self.nodes and not (place - self.seat_places[key]).any():
+        if key in self.nodes and not (position - self.seat_positions[key]).any():
             return self.mbs.AddMarker(items.MarkerNodeRigid(nodeNumber=self.nodes[key]))
         if key in self.nodes:  # beside the seat's centre: a body without mass is the arm
             arm = items.ObjectRigidBody(physicsMass=0.0, physicsInertia=[0.0] * 6, nodeNumber=self.nodes[key])
-            number, local = self.mbs.AddObject(arm), place - self.seat_places[key]
+            number, local = self.mbs.AddObject(arm), position - self.seat_positions[key]
         elif body in self.bodies:
             carrying = next(b for b in self.assembly.bodies if b.name == body)
-            number, local = self.bodies[body], place - node_position(carrying)
+            number, local = self.bodies[body], position - node_position(carrying)
         else:
-            number, local = self._ground_object(), place
+            number, local = self._ground_object(), position
         return self.mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=number, localPosition=np.asarray(local).tolist()))
 
     def _ground_object(self) -> Any:

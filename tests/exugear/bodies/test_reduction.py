@@ -218,7 +218,7 @@ def test_stiffer_shafts_tend_to_the_rigid_body(stepped):
     # Two bearings hold it: the first frequency nears that of the rigid body, the gap as one over the stiffness.
     inertia = stepped.rigid_inertia
     seats = [0, 12]
-    z = np.array([stepped.seats[n // 6].place[2] for n in seats]) - inertia.centre[2]
+    z = np.array([stepped.seats[n // 6].position[2] for n in seats]) - inertia.centre[2]
     bearing = 1e6
     rigid_k = bearing * np.array([[2.0, z.sum()], [z.sum(), z @ z]])
     rigid = np.sqrt(scipy.linalg.eigh(rigid_k, np.diag([inertia.mass, inertia.transverse]), eigvals_only=True)[0])

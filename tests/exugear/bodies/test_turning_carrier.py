@@ -82,10 +82,10 @@ def turned_state(assembly: Assembly, angle: float, speed: float = 22.5) -> tuple
             q[place] += speeds[name] * assembly.elastic_bodies[name].reduced.spin
             continue
         body = assembly.turning[name]
-        places = -body.across(body.reduced.spin)
-        q[place] = body.turned(q[place] + places, angle) - places
-        q[place.start + 5 : place.start + 6 * body.seats : 6] += angle
-        v[place] = body.turned(v[place], angle)
+        places = -body.quarter_turned(body.reduced.spin)
+        q[place] = body.rotated(q[place] + places, angle) - places
+        q[place.start + 5 : place.start + 6 * body.seat_count : 6] += angle
+        v[place] = body.rotated(v[place], angle)
     return q, v
 
 

@@ -46,9 +46,9 @@ def turned_by(body: TurningBody, q: np.ndarray, angle: float) -> np.ndarray:
     """Coordinates of the body with displacements q in its frame, turned by an angle."""
     places = np.zeros_like(q)
     for n, seat in enumerate(body.reduced.seats):
-        places[6 * n : 6 * n + 2] = np.array(seat.place[:2]) - AXIS
-    moved = body.turned(q + places, angle) - places
-    moved[5 : 6 * body.seats : 6] += angle
+        places[6 * n : 6 * n + 2] = np.array(seat.position[:2]) - AXIS
+    moved = body.rotated(q + places, angle) - places
+    moved[5 : 6 * body.seat_count : 6] += angle
     return moved
 
 
@@ -120,11 +120,11 @@ def test_power_is_balanced_at_every_state(body: TurningBody, angle: float, speed
     a = motion.accelerations(q, v, f)
     mass, stiffness = body.reduced.mass, body.reduced.stiffness
     psi, omega = body.angle(q), body.angle(v)
-    w, moved = body.turned(v, -psi), body.seen(q)
-    rates = w - omega * (body.reduced.spin + body.across(moved))
+    w, moved = body.rotated(v, -psi), body.to_body_frame(q)
+    rates = w - omega * (body.reduced.spin + body.quarter_turned(moved))
     h = 1e-5  # the displacements are nearly linear in time over this
-    assert (body.seen(q + h * v) - body.seen(q - h * v)) / (2 * h) == pytest.approx(rates, abs=1e-5)
-    slower = body.turned(a, -psi) - omega * body.across(w)
+    assert (body.to_body_frame(q + h * v) - body.to_body_frame(q - h * v)) / (2 * h) == pytest.approx(rates, abs=1e-5)
+    slower = body.rotated(a, -psi) - omega * body.quarter_turned(w)
     change = w @ mass @ slower + rates @ stiffness @ moved
     kinetic, stored, damped, weight = motion.energies(q, v)
     assert (kinetic, stored) == pytest.approx((0.5 * w @ mass @ w, 0.5 * moved @ stiffness @ moved), rel=1e-10)
@@ -138,9 +138,9 @@ def test_nothing_changes_when_everything_is_turned(body: TurningBody) -> None:
     q, v, f = at_random(body, 0.0, 5.0)
     found = motion.accelerations(q, v, f)
     angle = 2.1 + 40 * np.pi
-    again = motion.accelerations(turned_by(body, q, angle), body.turned(v, angle), body.turned(f, angle))
+    again = motion.accelerations(turned_by(body, q, angle), body.rotated(v, angle), body.rotated(f, angle))
     # Round-off of the turning, 1e-14 m times the stiffness over the mass.
-    assert body.turned(again, -angle) == pytest.approx(found, abs=1e-8 * np.abs(found).max())
+    assert body.rotated(again, -angle) == pytest.approx(found, abs=1e-8 * np.abs(found).max())
 
 
 def rigid(angles: np.ndarray) -> np.ndarray:
@@ -157,7 +157,7 @@ def carried(body: ReducedBody, motion: np.ndarray) -> np.ndarray:
     centre = np.array(body.rigid_inertia.centre)
     q = np.zeros(body.size)
     for n, seat in enumerate(body.seats):
-        arm = np.array(seat.place) - centre
+        arm = np.array(seat.position) - centre
         q[6 * n : 6 * n + 6] = [*(motion[:3] + rigid(motion[3:]) @ arm - arm), *motion[3:]]
     return q
 
@@ -199,7 +199,7 @@ def rigid_residual(reduced: ReducedBody, speed: float, frequency: float, size: f
     v, a = rates_of(lambda t: carried(reduced, motion(t)), h)
     along = np.array([rates_of(lambda t, e=e: carried(reduced, now + t * e), 1e-4)[0] for e in np.eye(6)])
     q = carried(reduced, now)
-    stretching = free.turned(speed**2 * free.pull, free.angle(q))
+    stretching = free.rotated(speed**2 * free.centrifugal, free.angle(q))
     found = along @ (free.inertia_forces(q, v, a) + stretching - free.forces(q, v))
     return found, rigid_forces(reduced.rigid_inertia, now, *rates_of(motion, h))
 
@@ -242,8 +242,8 @@ def test_displacements_vibrate_as_mass_coriolis_and_stiffness_say(plate: Reduced
     # displacement; terms in the square of the speed, (20 / omega)^2 = 1e-5 at the lowest 975 Hz, few times that.
     body, speed, time = TurningBody(plate, 0.0), 20.0, 5e-4
     motion, size, spin = Motion(body), plate.size, plate.spin
-    expanded = np.linalg.lstsq(plate.stiffness, speed**2 * body.pull)[0]
-    expanded -= spin * (body.weights @ expanded)
+    expanded = np.linalg.lstsq(plate.stiffness, speed**2 * body.centrifugal)[0]
+    expanded -= spin * (body.angle_weights @ expanded)
     inverse, lowest = np.linalg.inv(plate.mass), scipy.linalg.eigh(plate.stiffness, plate.mass)[1][:, :9]
     errors = []
     for coriolis in (plate.gyroscopic, np.zeros((size, size))):
@@ -251,14 +251,14 @@ def test_displacements_vibrate_as_mass_coriolis_and_stiffness_say(plate: Reduced
         exponential = scipy.linalg.expm(time * np.vstack([np.eye(size, 2 * size, size), lower]))
         # From velocities of seats: signs of modes, and directions among equal frequencies, are each machine's own.
         rates = np.zeros(size)
-        rates[: 6 * body.seats] = 1e-3 * np.random.default_rng(2).normal(size=6 * body.seats)
+        rates[: 6 * body.seat_count] = 1e-3 * np.random.default_rng(2).normal(size=6 * body.seat_count)
         rates = lowest @ (lowest.T @ plate.mass @ rates)
-        rates -= spin * (body.weights @ rates)
-        start = rates + speed * (spin + body.across(expanded))
+        rates -= spin * (body.angle_weights @ rates)
+        start = rates + speed * (spin + body.quarter_turned(expanded))
         q, _ = integrated(expanded, start, time / 250, 250, lambda q, v: motion.accelerations(q, v, np.zeros(size)))
         expected = (exponential @ np.concatenate([np.zeros(size), rates]))[:size]
-        expected -= spin * (body.weights @ expected)
-        errors.append(np.abs(body.seen(q) - expanded - expected).max() / np.abs(expected).max())
+        expected -= spin * (body.angle_weights @ expected)
+        errors.append(np.abs(body.to_body_frame(q) - expanded - expected).max() / np.abs(expected).max())
     assert errors[0] < 1e-4 < 3e-4 < errors[1]
 
 
