@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from exugear.cli.case import make_results_folder, read_gearbox, time_noted
+from exugear.cli.case import make_results_folder, read_gearbox
 from exugear.cli.console import note, print_json, print_table, progress_bar, say
 from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption
 from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption, OutOption
-from exugear.cli.tables import fill_tables
+from exugear.cli.tables import compute_tables
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
@@ -68,6 +68,7 @@ def ste(
     """
     with exit_codes():
         from exugear.pictures.tables import draw_curves
+        from exugear.results.folder import time_noted
         from exugear.tooth_mesh.tables import stored_tables
 
         gearbox = read_gearbox(case, files_below)
@@ -78,35 +79,36 @@ def ste(
             return
         if positions is not None and positions < LEAST_TABLE_POSITIONS:
             raise BadInputError(f"--positions {positions}: a table for dynamics needs at least {LEAST_TABLE_POSITIONS}")
-        orders, folder = _order_tables(gearbox, case, out, mesh or [], positions, grid)
+        requests, folder = _requested_tables(gearbox, case, out, mesh or [], positions, grid)
         with time_noted(folder, "tables of transmission error"):
-            tables = fill_tables(orders)
+            tables = compute_tables(requests)
         with time_noted(folder, "pictures of the tables"):
             beside = stored_tables(gearbox, folder, positions)
-            pictures = draw_curves({**beside, **tables}, folder) + _draw_contacts(orders, tables, folder)
-        _tell_tables(case, folder, orders, tables, pictures, as_json)
+            pictures = draw_curves({**beside, **tables}, folder) + _draw_contacts(requests, tables, folder)
+        _tell_tables(case, folder, requests, tables, pictures, as_json)
 
 
-def _order_tables(
+def _requested_tables(
     gearbox: Gearbox, case: Path, out: Path | None, names: list[str], positions: int | None, grid: bool
 ) -> tuple[list[TableOrder], Path]:
     from exugear.model.reading import CaseError
+    from exugear.project import default_folder
     from exugear.results.folder import keep_case
     from exugear.tooth_mesh.tables import order_tables
 
-    folder = out or Path("results") / case.resolve().parent.name
+    folder = out or default_folder(case)
     try:
-        orders = order_tables(gearbox, folder, names, positions, grid)
+        requests = order_tables(gearbox, folder, names, positions, grid)
     except CaseError as error:
         raise BadInputError(error) from error
     make_results_folder(folder)
     keep_case(gearbox, folder)
-    for order in orders:
-        if order.stored:
-            note(f"{order.name}: kept {order.path}, computed from the same input")
-        elif order.replaces:
-            note(order.replaces)
-    return orders, folder
+    for request in requests:
+        if request.stored:
+            note(f"{request.name}: kept {request.path}, computed from the same input")
+        elif request.replaces:
+            note(request.replaces)
+    return requests, folder
 
 
 def _compute_references(
@@ -114,22 +116,23 @@ def _compute_references(
 ) -> None:
     """Run the reference analysis of the pairs and report; each position is kept as soon as it is solved."""
     from exugear.model.reading import CaseError
-    from exugear.results.folder import keep_case
+    from exugear.project import default_folder
+    from exugear.results.folder import keep_case, time_noted
     from exugear.tooth_mesh.reference_tables import order_references, summarise_reference
 
-    folder = out or Path("results") / case.resolve().parent.name
+    folder = out or default_folder(case)
     try:
-        orders = order_references(gearbox, folder, names, positions)
+        requests = order_references(gearbox, folder, names, positions)
     except CaseError as error:
         raise BadInputError(error) from error
     make_results_folder(folder)
     keep_case(gearbox, folder)
     tables = {}
     with time_noted(folder, "reference analysis"), progress_bar() as bar:
-        task = bar.add_task("", total=sum(order.wanted.positions for order in orders))
-        for order in orders:
-            tables[order.name] = _fill_reference(order, bar, task)
-    summaries = [summarise_reference(order, tables[order.name]) for order in orders]
+        task = bar.add_task("", total=sum(request.wanted.positions for request in requests))
+        for request in requests:
+            tables[request.name] = _compute_reference(request, bar, task)
+    summaries = [summarise_reference(request, tables[request.name]) for request in requests]
     if as_json:
         print_json({"case": str(case), "tables": summaries})
     else:
@@ -140,25 +143,25 @@ def _compute_references(
         raise FailedError("\n".join(["positions that are not solved:", *failures]))
 
 
-def _fill_reference(order: ReferenceOrder, bar: Progress, task: TaskID) -> NonlinearTable:
+def _compute_reference(request: ReferenceOrder, bar: Progress, task: TaskID) -> NonlinearTable:
     from fe_ste.geometry.checks import GeometryError
 
     before = bar.tasks[task].completed
 
     def at_iteration(done: int, of: int, iteration: Iteration | None) -> None:
         interruption.check()
-        text = f"{order.name}: {done} of {of} positions"
+        text = f"{request.name}: {done} of {of} positions"
         if iteration is not None:
             text += f", {100 * iteration.load:.3g} % of the load, iteration {iteration.number}"
         bar.update(task, completed=before + done, description=text)
 
     try:
-        return order.fill(at_iteration)
+        return request.fill(at_iteration)
     except GeometryError as error:
-        raise BadInputError(f"pairs.{order.name}: {error}") from error
+        raise BadInputError(f"pairs.{request.name}: {error}") from error
 
 
-def _draw_contacts(orders: list[TableOrder], tables: dict[str, MeshTable], folder: Path) -> list[Path]:
+def _draw_contacts(requests: list[TableOrder], tables: dict[str, MeshTable], folder: Path) -> list[Path]:
     """Draw the teeth in contact where the picture is missing or the table is new; return all such pictures."""
     from exugear.pictures.tables import contact_picture, draw_contact
     from fe_ste.contact.kinematics import ContactError
@@ -166,13 +169,13 @@ def _draw_contacts(orders: list[TableOrder], tables: dict[str, MeshTable], folde
 
     pictures: list[Path] = []
     with progress_bar() as bar:
-        for order in bar.track(orders, description="pictures of the teeth"):
-            path = contact_picture(order.name, folder)
+        for request in bar.track(requests, description="pictures of the teeth"):
+            path = contact_picture(request.name, folder)
             try:
-                if not (order.stored and path.exists()):
-                    draw_contact(order, tables[order.name], folder)
+                if not (request.stored and path.exists()):
+                    draw_contact(request, tables[request.name], folder)
             except ContactError as error:
-                note(f"No picture of the teeth of {order.name}: {error}", style="yellow")
+                note(f"No picture of the teeth of {request.name}: {error}", style="yellow")
                 continue
             except RenderingError as error:
                 note(f"No pictures of the teeth: {error}", style="yellow")
@@ -184,14 +187,14 @@ def _draw_contacts(orders: list[TableOrder], tables: dict[str, MeshTable], folde
 def _tell_tables(
     case: Path,
     folder: Path,
-    orders: list[TableOrder],
+    requests: list[TableOrder],
     tables: dict[str, MeshTable],
     pictures: list[Path],
     as_json: bool,
 ) -> None:
     from exugear.tooth_mesh.tables import summarise
 
-    summaries = [summarise(order, tables[order.name]) for order in orders]
+    summaries = [summarise(request, tables[request.name]) for request in requests]
     if as_json:
         print_json({"case": str(case), "tables": summaries, "pictures": [str(path) for path in pictures]})
     else:
