@@ -20,13 +20,13 @@ from timing import CASE, Cost, median, median_row, peak_memory, result, say, sta
 
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.signals import Channels
 from exugear.dynamics.statics import accelerating_start
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.runs.extent import SAMPLE_RATE
 from exugear.runs.runup import BAND, simulate
-from exugear.solvers.compiled.solver import CompiledSystem, Observer
+from exugear.solvers.compiled.observers import Observer
+from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.compiled.step import choose_step
 from exugear.solvers.loads import LoadTable
 
@@ -193,8 +193,10 @@ def excitation_amplitudes(assembly: Assembly, rpm: float, step: float, method: s
     element = assembly.elements[assembly.mesh_names.index("high_speed")]
     cycle = element.cycles * q[:, assembly.spin[element.mesh.pinion]]
     window = np.hanning(len(q))
-    values = Observer(Channels(assembly), LoadTable(RATED)).observe(np.zeros(len(q)), q, v)[0]
-    values = values[:, [1, 2 + assembly.mesh_names.index("high_speed")]]
+    observer = Observer(assembly, LoadTable(RATED))
+    signals, _, _ = observer.observe(np.zeros(len(q)), q, v)
+    high_speed = observer.layout["mesh_dte"].start + assembly.mesh_names.index("high_speed")
+    values = signals[:, [observer.layout["overall_dte_angle"].start, high_speed]]
     values = values - window @ values / window.sum()
     return np.abs(2.0 * (window * np.exp(-2j * np.pi * cycle)) @ values) / window.sum()
 

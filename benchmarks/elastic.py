@@ -19,13 +19,13 @@ from timing import CASE, median, say, timed
 from exugear.bodies.of_gearbox import reduced_bodies
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.signals import Channels
 from exugear.dynamics.statics import accelerating_start
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.runs.extent import SAMPLE_RATE
 from exugear.runs.runup import BAND
-from exugear.solvers.compiled.solver import CompiledSystem, Observer
+from exugear.solvers.compiled.observers import Observer
+from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.compiled.step import choose_step
 from exugear.solvers.loads import LoadTable
 
@@ -81,7 +81,7 @@ class _Steps:
         self.q, self.v = np.zeros((2, self.number, assembly.size))
         self.times = step * np.arange(self.number)
         self._system = CompiledSystem(assembly, start.q, start.v, loads, step)
-        self._observer = Observer(Channels(assembly), loads)
+        self._observer = Observer(assembly, loads)
 
     def costs(self) -> tuple[float, float]:
         """Microseconds of processor time for a step, and for a step with its signals and energies."""

@@ -20,10 +20,11 @@ from one_variant import grc_project, show
 
 from exugear import Choice, Modes, Project, static_state
 from exugear.dynamics.modes import MOTIONS, counterparts, modes_of
-from exugear.pictures.diagrams import plot_waterfalls
 from exugear.pictures.elastic_scene import animate_elastic_bodies, draw_elastic_bodies, elastic_scene
-from exugear.spectra.orders import order_lines, run_waterfall
+from exugear.pictures.run_diagrams import plot_waterfalls
+from exugear.spectra.orders import order_lines
 from exugear.spectra.resonances import Pick, group_by_frequency, match_eigenfrequencies, pick_resonances
+from exugear.spectra.run_spectra import run_waterfall
 
 VARIANTS = ("rigid", "bushing", "flexible")
 MAIN_SHAFT_MODES = 500.0

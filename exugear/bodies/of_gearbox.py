@@ -101,10 +101,10 @@ def _seats(gearbox: Gearbox, body: Body, shape: ShapeSection) -> Iterator[tuple[
         yield gear, z, gearbox.gears[gear].face_width
     for bearing in gearbox.bearings:
         if body.name in (bearing.body, bearing.on):
-            yield bearing.name, bearing.place[2], _width(bearing)
+            yield bearing.name, bearing.position[2], _width(bearing)
     for mount in mounts_at_work(gearbox):
         if mount.body == body.name:
-            yield mount.name, mount.place[2], 0.0
+            yield mount.name, mount.position[2], 0.0
     if shape.torque_z_mm is not None:
         yield TORQUE_SEAT, shape.torque_z_mm * 1e-3, 0.0
 
@@ -232,11 +232,11 @@ def _items(gearbox: Gearbox, body: Body) -> dict[str, _Item]:
             inside = (bearing.body == body.name) != on_pin
             diameter = 1e-3 * (bearing.catalogue.bore_mm if inside else bearing.catalogue.outer_diameter_mm)
             width = _width(bearing)
-        found[bearing.name] = _Item(bearing.family, "bearing", bearing.place, diameter, width)
+        found[bearing.name] = _Item(bearing.family, "bearing", bearing.position, diameter, width)
     at_work = {mount.name for mount in mounts_at_work(gearbox)}
     for mount in gearbox.mounts:
         if mount.body == body.name:
-            found[mount.name] = _Item(mount.name, "mount", mount.place, None, None, mount.name in at_work)
+            found[mount.name] = _Item(mount.name, "mount", mount.position, None, None, mount.name in at_work)
     return found
 
 

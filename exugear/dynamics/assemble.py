@@ -298,7 +298,7 @@ def _connectors(
         keys = [_attached(coordinates, body, bearing.name) for body in (bearing.on, bearing.body)]
         at = [np.zeros(3) if key is None else nodes[key] for key in keys]
         starts.append([-1 if key is None else coordinates[key][0] for key in keys])
-        local.append([np.array(bearing.place) - node for node in at])
+        local.append([np.array(bearing.position) - node for node in at])
         if bearing.body in gearbox.pin_offsets:
             local[-1][0] = local[-1][0] + [*gearbox.pin_offsets[bearing.body], 0.0]
         places.append(at)

@@ -29,6 +29,7 @@ from exugear.model.gearbox import Gearbox
 from exugear.model.versions import MODES
 from exugear.tooth_mesh.element import Angles, MeshData
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.notebook import html_table, value_range
 from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
 
 RIGID_COORDINATES = ("x", "y", "z", "tilt_x", "tilt_y", "spin")
@@ -66,6 +67,24 @@ class Modes:
     amplification: Floats
     names: tuple[str, ...]
     growth_rate: float
+
+    def __repr__(self) -> str:
+        """One line."""
+        assembly = self.assembly
+        chosen = f"{assembly.variant}, {assembly.law}, {assembly.inertias}"
+        return f"Modes({chosen}: {self.frequency.size}, {value_range(self.frequency, 'Hz')})"
+
+    def _repr_html_(self) -> str:
+        assembly = self.assembly
+        rows = {
+            "variant": assembly.variant,
+            "mesh law": assembly.law,
+            "inertia set": assembly.inertias,
+            "modes": str(self.frequency.size),
+            "frequency": value_range(self.frequency, "Hz"),
+            "fastest growth": f"{self.growth_rate:.3g} 1/s",
+        }
+        return html_table(f"Modes of {assembly.gearbox.name}", rows)
 
     def nearest(self, frequency: float) -> int:
         """Find the number of the mode nearest to a frequency (Hz)."""

@@ -69,7 +69,7 @@ def _held_directions(gearbox: Gearbox, variant: str, first: Mapping[str, int]) -
         motion = np.zeros((6, size))
         for name, sense in ((support.body, 1.0), (support.on, -1.0)):
             if name in first:
-                motion[:, first[name] : first[name] + 6] += sense * _motion_at(bodies[name], np.array(support.place))
+                motion[:, first[name] : first[name] + 6] += sense * _motion_at(bodies[name], np.array(support.position))
         stiffness, _ = bearing_matrices(support, 0.0)
         values, vectors = np.linalg.eigh(_SCALE * stiffness * _SCALE[:, None])
         yield from (vectors[:, values > HELD * values[-1]].T / _SCALE) @ motion * np.tile(_SCALE, len(first))

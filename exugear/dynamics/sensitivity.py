@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.optimize
-from numpy.typing import NDArray
 
 from exugear.bodies.of_gearbox import ElasticBody
 from exugear.dynamics.assemble import assemble
@@ -17,13 +16,14 @@ from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Body
 from exugear.tooth_mesh.element import MeshData
-from fe_ste.tools.arrays import Floats
+from fe_ste.tools.arrays import Floats, Integers
 
 FRACTIONS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
 """Parts of the default value that a parameter without a natural range takes."""
-FOUND = 0.01
+MATCH_TOLERANCE = 0.01
 """Largest relative distance of a mode from the frequency that an assumption is said to bring it to."""
-HOUSING = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+HOUSING_FACTORS = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+"""Values of the housing factor, to which that of the case is added."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class Sweep:
+class ParameterVariation:
     """Modes over a parameter; n values, m modes, each followed by its shape.
 
     Attributes
@@ -73,7 +73,7 @@ class Sweep:
     amplification: Floats
     damping_ratio: Floats
 
-    def near(self, window: tuple[float, float], least_share: float) -> Sweep:
+    def near(self, window: tuple[float, float], least_share: float) -> ParameterVariation:
         """Keep modes that somewhere lie in a window (Hz) while they have a least share."""
         inside = (self.frequency >= window[0]) & (self.frequency <= window[1]) & (self.share >= least_share)
         kept = inside.any(axis=0)
@@ -86,20 +86,20 @@ class Sweep:
         )
 
     def crossings(self, frequency: float, least_share: float) -> tuple[float, ...]:
-        """Parameter values at which a mode that is seen passes a frequency (Hz), interpolated."""
+        """Parameter values at which a mode of a least share passes a frequency (Hz), interpolated between values."""
         scale = np.log(self.parameter.values) if self.parameter.logarithmic else np.array(self.parameter.values)
-        found = []
+        crossings = []
         for mode in range(self.frequency.shape[1]):
-            off, share = self.frequency[:, mode] - frequency, self.share[:, mode]
-            for n in np.flatnonzero(off[1:] * off[:-1] < 0.0):
+            distance, share = self.frequency[:, mode] - frequency, self.share[:, mode]
+            for n in np.flatnonzero(distance[1:] * distance[:-1] < 0.0):
                 if max(share[n], share[n + 1]) >= least_share:
-                    part = off[n] / (off[n] - off[n + 1])
-                    place = float(scale[n] + part * (scale[n + 1] - scale[n]))
-                    found.append(float(np.exp(place)) if self.parameter.logarithmic else place)
-        return tuple(sorted(found))
+                    part = distance[n] / (distance[n] - distance[n + 1])
+                    crossing = float(scale[n] + part * (scale[n + 1] - scale[n]))
+                    crossings.append(float(np.exp(crossing)) if self.parameter.logarithmic else crossing)
+        return tuple(sorted(crossings))
 
 
-def sweep_modes(parameter: Parameter, progress: Callable[[], None] | None = None) -> Sweep:
+def vary_parameter(parameter: Parameter, progress: Callable[[], None] | None = None) -> ParameterVariation:
     """Compute the modes at each value of a parameter and follow them by their shapes.
 
     Parameters
@@ -108,42 +108,52 @@ def sweep_modes(parameter: Parameter, progress: Callable[[], None] | None = None
     progress : callable, optional
         Called after each value.
     """
-    found = []
+    modes_of_values = []
     for value in parameter.values:
-        found.append(modes_of(parameter.build(value)))
+        modes_of_values.append(modes_of(parameter.build(value)))
         if progress is not None:
             progress()
-    followed: list[Floats] = []
+    figures: list[Floats] = []
     # Elastic bodies have modes up to a frequency, which may pass it on the way: the least number can be followed.
-    order = np.arange(min(len(modes.names) for modes in found))
-    for n, modes in enumerate(found):
-        order = followers(found[n - 1], modes, order) if n else order
-        total = max(float(np.sum(modes.overall**2)), 1e-300)
-        loudest = modes.amplification.max(axis=1, initial=0.0)
-        figures = np.array([modes.frequency, modes.overall**2 / total, loudest, modes.damping_ratio])
-        followed.append(figures[:, order])
-    frequency, share, amplification, damping = np.stack(followed, axis=1)
-    return Sweep(parameter, frequency, share, amplification, damping)
+    followed = np.arange(min(len(modes.names) for modes in modes_of_values))
+    for n, modes in enumerate(modes_of_values):
+        followed = follow_modes(modes_of_values[n - 1], modes, followed) if n else followed
+        highest = modes.amplification.max(axis=1, initial=0.0)
+        values = np.array([modes.frequency, _mobility_shares(modes), highest, modes.damping_ratio])
+        figures.append(values[:, followed])
+    frequency, share, amplification, damping = np.stack(figures, axis=1)
+    return ParameterVariation(parameter, frequency, share, amplification, damping)
 
 
-def followers(before: Modes, after: Modes, order: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Find for each mode followed so far its place among the modes of the next value.
+def _mobility_shares(modes: Modes) -> Floats:
+    """Share of each mode in the mobility of the overall transmission error, shape (n,)."""
+    squares: Floats = modes.overall**2
+    return squares / max(float(np.sum(squares)), 1e-300)
+
+
+def follow_modes(before: Modes, after: Modes, followed: Integers) -> Integers:
+    """Find each mode followed so far among the modes of the next value.
 
     Modes are paired so that the sum of their squared overlaps is largest; both have unit modal mass.
 
     Parameters
     ----------
     before, after : Modes
-    order : (m,) array of int
-        Places of the followed modes in `before`.
+    followed : (m,) array of int
+        Numbers of the followed modes in `before`.
+
+    Returns
+    -------
+    (m,) array of int
+        Their numbers in `after`.
     """
     roots = [np.linalg.cholesky(modes.assembly.mass_matrix) for modes in (before, after)]
-    overlap = ((roots[0].T @ before.shapes[:, order]).T @ (roots[1].T @ after.shapes)) ** 2
-    _, place = scipy.optimize.linear_sum_assignment(overlap, maximize=True)
-    return np.asarray(place, dtype=np.int64)
+    overlap = ((roots[0].T @ before.shapes[:, followed]).T @ (roots[1].T @ after.shapes)) ** 2
+    _, matched = scipy.optimize.linear_sum_assignment(overlap, maximize=True)
+    return np.asarray(matched, dtype=np.int64)
 
 
-def parameters_of(
+def assumed_parameters(
     gearbox: Gearbox,
     choice: Choice,
     stiffness: Mapping[str, MeshData],
@@ -171,7 +181,7 @@ def parameters_of(
     --------
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
     >>> stiffness = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
-    >>> [parameter.label for parameter in parameters_of(gearbox, Choice("rigid"), stiffness)]
+    >>> [parameter.label for parameter in assumed_parameters(gearbox, Choice("rigid"), stiffness)]
     ['axial inertia of hss / kg m²', 'mesh damping time / µs']
     """
 
@@ -180,29 +190,29 @@ def parameters_of(
         return assemble(varied, choice, stiffness, bodies_of(varied) if bodies_of else None)
 
     inertias = choice.inertia_set(gearbox)
-    found = []
+    parameters = []
     base = built({})
     if any(support.factor != 1.0 for support in base.supports):
         default = gearbox.case.housing.factor
-        values = tuple(sorted({*HOUSING, default}))
-        found.append(Parameter("housing factor", values, default, lambda x: built({"housing.factor": x}), False))
+        values = tuple(sorted({*HOUSING_FACTORS, default}))
+        parameters.append(Parameter("housing factor", values, default, lambda x: built({"housing.factor": x}), False))
     planets = planet_bearings(gearbox, base)
     if planets:
-        found.append(
+        parameters.append(
             Parameter("planet bearings / default", FRACTIONS, 1.0, lambda x: scaled_bearings(base, planets, x))
         )
     body = gearbox.body(gearbox.case.overall.output, inertias)
     sets = [gearbox.body(body.name, name).axial for name in gearbox.inertia_sets]
     values = _spanning(min(sets), max(sets), body.axial)
     label = f"axial inertia of {body.name} / kg m²"
-    found.append(Parameter(label, values, body.axial, lambda x: built(_inertia_changes(body, inertias, x))))
+    parameters.append(Parameter(label, values, body.axial, lambda x: built(_inertia_changes(body, inertias, x))))
     time = 1e6 * gearbox.case.damping.mesh_time_s
     if time > 0.0:
         values = tuple(time * part for part in FRACTIONS)
-        found.append(
+        parameters.append(
             Parameter("mesh damping time / µs", values, time, lambda x: built({"damping.mesh_time_s": 1e-6 * x}))
         )
-    return tuple(found)
+    return tuple(parameters)
 
 
 def _inertia_changes(body: Body, inertias: str, axial: float) -> dict[str, float]:
@@ -222,16 +232,16 @@ def _spanning(low: float, high: float, default: float) -> tuple[float, ...]:
 
 
 def planet_bearings(gearbox: Gearbox, assembly: Assembly) -> tuple[int, ...]:
-    """Places of the bearings between planets and their carrier among an assembly's connectors."""
+    """Numbers of the bearings between planets and their carrier among an assembly's connectors."""
     carriers = {body.name: body.carrier for body in assembly.bodies}
     names = {bearing.name for bearing in gearbox.bearings if carriers.get(bearing.body) == bearing.on}
-    return tuple(place for place, name in enumerate(assembly.connector_names) if name in names)
+    return tuple(number for number, name in enumerate(assembly.connector_names) if name in names)
 
 
-def scaled_bearings(assembly: Assembly, places: Sequence[int], factor: float) -> Assembly:
+def scaled_bearings(assembly: Assembly, numbers: Sequence[int], factor: float) -> Assembly:
     """Multiply stiffness and damping of some bearings by a factor."""
     scale = np.ones(len(assembly.connector_names))
-    scale[list(places)] = factor
+    scale[list(numbers)] = factor
     connectors = assembly.connectors._replace(
         stiffness=assembly.connectors.stiffness * scale[:, None, None],
         damping=assembly.connectors.damping * scale[:, None, None],
@@ -240,7 +250,7 @@ def scaled_bearings(assembly: Assembly, places: Sequence[int], factor: float) ->
 
 
 @dataclass(frozen=True)
-class Remedy:
+class FrequencyMatch:
     """An assumption that brings a mode to a frequency.
 
     Attributes
@@ -250,24 +260,47 @@ class Remedy:
         Of the parameter.
     modes : Modes
         Of the model with that value.
-    place : int
-        The mode among them.
+    index : int
+        The mode among them, from 0.
     """
 
     parameter: Parameter
     value: float
     modes: Modes
-    place: int
+    index: int
+
+    @property
+    def frequency(self) -> float:
+        """Frequency of the mode, Hz."""
+        return float(self.modes.frequency[self.index])
+
+    @property
+    def share(self) -> float:
+        """Share of the mode in the mobility of the overall transmission error, 0 to 1."""
+        return float(_mobility_shares(self.modes)[self.index])
 
 
-def remedies(sweeps: Sequence[Sweep], frequency: float, least_share: float) -> Iterator[Remedy]:
-    """Yield the assumptions under which a mode that is seen lies at a frequency (Hz), from crossings of the sweeps."""
-    for sweep in sweeps:
-        for value in sweep.crossings(frequency, least_share):
-            modes = modes_of(sweep.parameter.build(value))
-            total = max(float(np.sum(modes.overall**2)), 1e-300)
-            seen = np.flatnonzero(modes.overall**2 >= least_share * total)
-            place = int(seen[np.argmin(np.abs(modes.frequency[seen] - frequency))]) if seen.size else 0
+def frequency_matches(
+    variations: Iterable[ParameterVariation], frequency: float, least_share: float
+) -> Iterator[FrequencyMatch]:
+    """Yield the assumptions under which a mode of a least share lies at a frequency.
+
+    Parameters
+    ----------
+    variations : iterable of ParameterVariation
+        Where they cross the frequency, the modes are computed anew.
+    frequency : float
+        Hz.
+    least_share : float
+        Of the overall transmission error's mobility, 0 to 1.
+    """
+    for variation in variations:
+        for value in variation.crossings(frequency, least_share):
+            modes = modes_of(variation.parameter.build(value))
+            visible = np.flatnonzero(_mobility_shares(modes) >= least_share)
             # Between two values modes may exchange their shapes: then none is there that was looked for.
-            if seen.size and abs(modes.frequency[place] - frequency) <= FOUND * frequency:
-                yield Remedy(sweep.parameter, value, modes, place)
+            if not visible.size:
+                continue
+            index = int(visible[np.argmin(np.abs(modes.frequency[visible] - frequency))])
+            if abs(modes.frequency[index] - frequency) <= MATCH_TOLERANCE * frequency:
+                yield FrequencyMatch(variation.parameter, value, modes, index)

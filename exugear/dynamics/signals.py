@@ -1,38 +1,394 @@
-"""What a run records: signals per sample and the account of energy, by compiled loops over coordinates."""
+"""What a run records: one table of signals, and where each stands among the columns of a sample.
+
+`SIGNALS` has a row for each signal, under the name that it has in the file of a run. Whoever fills, judges, writes or
+reads signals goes by these names: `SignalLayout` says which columns of a sample belong to one.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
 
 import numpy as np
 import xarray as xr
 
 from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.modes import overall_row
-from exugear.kernels.connectors import ConnectorArrays, connector_load, connector_motion
-from exugear.kernels.elastic import ElasticArrays, elastic_energies, scratch_for
-from exugear.kernels.inertia import InertiaArrays, kinetic_energies
-from exugear.kernels.meshes import STATE_SIZE, MeshArrays, mesh_state
-from exugear.kernels.springs import SpringArrays
-from exugear.kernels.turning import TurningArrays, turning_energies, turning_memory
-from exugear.model.sections.entries import GROUND
-from fe_ste.tools.arrays import Floats, Integers
-from fe_ste.tools.compilation import compiled
+from fe_ste.tools.arrays import Booleans, Floats
 
-BALANCE_TERMS = (
-    "work_of_loads",
-    "kinetic_energy",
-    "elastic_energy",
-    "dissipated_energy",
-    "work_of_varying_stiffness",
-    "non_conservative_work",
-    "bearing_rate_work",
+COMPONENTS = {"axis": 3}
+"""Entries along a dimension that needs no names: x, y, z in global axes."""
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A variable in the file of a run.
+
+    Attributes
+    ----------
+    name : str
+    dimensions : tuple of str
+    units : str
+    long_name : str
+        What it is, where the name does not say it.
+    sign_convention : str
+        What a positive value means, where it can have either sign.
+    kind : str
+        Type in the file, as NumPy writes it.
+    """
+
+    name: str
+    dimensions: tuple[str, ...]
+    units: str
+    long_name: str = ""
+    sign_convention: str = ""
+    kind: str = "f8"
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """Attributes of the variable in the file."""
+        words = {"units": self.units, "long_name": self.long_name, "sign_convention": self.sign_convention}
+        return {key: value for key, value in words.items() if value}
+
+
+@dataclass(frozen=True)
+class Signal(Variable):
+    """A row of `SIGNALS`.
+
+    The first dimension says what kind of signal it is: ``time``, a value of each stored sample; ``mesh``, a time that
+    is added up for each mesh; ``balance_time``, a term of the account of energy.
+
+    Attributes
+    ----------
+    filled_by : tuple of str
+        Functions and methods of `exugear.solvers.compiled.observers` that fill its columns, or its part of the
+        account. Empty where `formula` gives it, or where it is a time itself.
+    formula : callable, optional
+        Makes it of the columns of samples: (layout, rows) to an array of rows and its further dimensions. Of a time
+        that is added up: in which samples it passes.
+    laws : {"all", "table", "bilateral"}
+        Mesh laws that have it: all, the law `table`, or all others. A time that a law has not got is zero.
+    stored : bool
+        Whether it stands in the file; other signals are for the formulas alone.
+    is_power : bool
+        Of the account of energy: whether the observer gives its power (W), which the run integrates.
+    """
+
+    filled_by: tuple[str, ...] = ()
+    formula: Callable[[SignalLayout, Floats], Floats | Booleans] | None = None
+    laws: Literal["all", "table", "bilateral"] = "all"
+    stored: bool = True
+    is_power: bool = False
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether it has a value in each sample."""
+        return self.dimensions[0] == "time"
+
+    @property
+    def is_mesh_time(self) -> bool:
+        """Whether it is a time that is added up for each mesh."""
+        return self.dimensions == ("mesh",)
+
+    @property
+    def is_balance_term(self) -> bool:
+        """Whether it is a term of the account of energy."""
+        return self.dimensions == ("balance_time",) and bool(self.filled_by)
+
+
+SIGNALS = (
+    Signal("time", ("time",), "s"),
+    Signal(
+        "input_speed",
+        ("time",),
+        "rad/s",
+        sign_convention="rotation about +z",
+        filled_by=("Observer.observe",),
+    ),
+    Signal(
+        "overall_dte_angle",
+        ("time",),
+        "rad",
+        sign_convention="output ahead, about +z, of where the ratio puts it",
+        filled_by=("Observer.observe",),
+    ),
+    Signal(
+        "overall_dte",
+        ("time",),
+        "m",
+        sign_convention="as overall_dte_angle, at the base radius of the output gear",
+        formula=lambda layout, rows: layout.values("overall_dte_angle", rows) * layout.radius,
+    ),
+    Signal(
+        "mesh_dte",
+        ("time", "mesh"),
+        "m",
+        sign_convention="the loaded flanks approach",
+        kind="f4",
+        filled_by=("observe_meshes", "observe_table"),
+    ),
+    Signal(
+        "mesh_force",
+        ("time", "mesh"),
+        "N",
+        sign_convention="the loaded flank pushes",
+        kind="f4",
+        filled_by=("observe_meshes", "observe_table"),
+    ),
+    Signal(
+        "support_force",
+        ("time", "support", "axis"),
+        "N",
+        sign_convention="on the body, along the global axis",
+        kind="f4",
+        filled_by=("observe_connectors", "observe_joints"),
+    ),
+    Signal(
+        "pulling_time",
+        ("mesh",),
+        "s",
+        "time in which the deflection had the sign that teeth cannot carry (where the law is bilateral)",
+        formula=lambda layout, rows: layout.values("mesh_dte", rows) < 0.0,
+        laws="bilateral",
+    ),
+    Signal(
+        "apart_time",
+        ("mesh",),
+        "s",
+        "time in which the teeth were apart (law table)",
+        formula=lambda layout, rows: layout.values("mesh_force", rows) == 0.0,
+        laws="table",
+    ),
+    Signal(
+        "outside_time",
+        ("mesh",),
+        "s",
+        "time in which load, centre distance or misalignment lay outside the table, which then goes on in a straight "
+        "line",
+        formula=lambda layout, rows: layout.values("outside_table", rows) > 0.0,
+        laws="table",
+    ),
+    Signal(
+        "centre_distance_change",
+        ("time", "mesh"),
+        "m",
+        sign_convention="axes further apart than nominal",
+        kind="f4",
+        filled_by=("observe_gear_positions", "observe_table"),
+        laws="table",
+    ),
+    Signal(
+        "misalignment",
+        ("time", "mesh"),
+        "rad",
+        sign_convention="the gap opens at the +z end",
+        kind="f4",
+        filled_by=("observe_gear_positions", "observe_table"),
+        laws="table",
+    ),
+    Signal(
+        "outside_table",
+        ("time", "mesh"),
+        "1",
+        "1 where load, centre distance or misalignment lies outside the table, else 0",
+        filled_by=("observe_table",),
+        laws="table",
+        stored=False,
+    ),
+    Signal("balance_time", ("balance_time",), "s"),
+    Signal(
+        "work_of_loads",
+        ("balance_time",),
+        "J",
+        sign_convention="put into the motion",
+        filled_by=("observe_loads", "observe_elastic_bodies"),
+        is_power=True,
+    ),
+    Signal("kinetic_energy", ("balance_time",), "J", filled_by=("observe_bodies", "observe_elastic_bodies")),
+    Signal(
+        "elastic_energy",
+        ("balance_time",),
+        "J",
+        filled_by=(
+            "observe_meshes",
+            "observe_table",
+            "observe_connectors",
+            "observe_springs",
+            "observe_elastic_bodies",
+        ),
+    ),
+    Signal(
+        "dissipated_energy",
+        ("balance_time",),
+        "J",
+        sign_convention="taken from the motion",
+        filled_by=(
+            "observe_meshes",
+            "observe_table",
+            "observe_connectors",
+            "observe_springs",
+            "observe_elastic_bodies",
+        ),
+        is_power=True,
+    ),
+    Signal(
+        "work_of_varying_stiffness",
+        ("balance_time",),
+        "J",
+        sign_convention="taken from the motion",
+        filled_by=("observe_meshes", "observe_table"),
+        is_power=True,
+    ),
+    Signal(
+        "non_conservative_work",
+        ("balance_time",),
+        "J",
+        sign_convention="taken from the motion",
+        filled_by=("observe_meshes",),
+        is_power=True,
+    ),
+    Signal(
+        "bearing_rate_work",
+        ("balance_time",),
+        "J",
+        sign_convention="taken from the motion",
+        filled_by=("observe_connectors",),
+        is_power=True,
+    ),
 )
-"""Loads' work = change of kinetic and elastic energy + the other four.
+"""All signals, in the order of the file.
 
-The last two: what the law `seed` does because its force has parts that its deflection does not see, and what the
-bearings do because their rate is not the derivative of their displacement (see `bearing_energies`).
+The account of energy: the loads' work = change of kinetic and elastic energy + the other four. The last two of these
+are what the law `seed` does because its force has parts that its deflection does not see, and what the bearings do
+because their rate is not the derivative of their displacement (see `exugear.kernels.connectors.connector_motion`).
 """
+MESH_TIMES = tuple(signal.name for signal in SIGNALS if signal.is_mesh_time)
+"""Times (s) that a run adds up for each mesh."""
+BALANCE_TERMS = tuple(signal.name for signal in SIGNALS if signal.is_balance_term)
+"""Terms of the account of energy."""
+POWERS = tuple(signal.name for signal in SIGNALS if signal.is_power)
+"""Terms of the account whose power is observed."""
+ENERGIES = tuple(name for name in BALANCE_TERMS if name not in POWERS)
+"""Terms of the account that are observed as they are."""
+
+
+def signals_of(tabled: bool) -> tuple[Signal, ...]:
+    """Rows of `SIGNALS` that a run with the law `table`, or with another, has.
+
+    Examples
+    --------
+    >>> {signal.name for signal in signals_of(True)} - {signal.name for signal in signals_of(False)} >= {"misalignment"}
+    True
+    """
+    return tuple(signal for signal in SIGNALS if signal.laws in ("all", "table" if tabled else "bilateral"))
+
+
+@dataclass(frozen=True, eq=False)
+class SignalLayout:
+    """Which columns of a sample belong to which signal; ``layout[name]`` is their slice.
+
+    Attributes
+    ----------
+    signals : tuple of Signal
+        What a run holds of `SIGNALS`.
+    names : mapping of str to tuple of str
+        Names along the dimensions ``mesh`` and ``support``.
+    radius : float
+        Base radius of the overall output gear, m.
+
+    Examples
+    --------
+    >>> layout = SignalLayout(SIGNALS, {"mesh": ("first", "second"), "support": ("pin",)}, radius=0.1)
+    >>> layout["mesh_force"], layout["support_force"]
+    (slice(4, 6, None), slice(6, 9, None))
+    >>> samples = np.arange(2.0 * layout.count).reshape(2, layout.count)
+    >>> layout.values("support_force", samples)
+    array([[[ 6.,  7.,  8.]],
+    <BLANKLINE>
+           [[21., 22., 23.]]])
+    """
+
+    signals: tuple[Signal, ...]
+    names: Mapping[str, tuple[str, ...]]
+    radius: float
+
+    @cached_property
+    def _slices(self) -> dict[str, slice]:
+        slices, end = {}, 0
+        for signal in self.signals:
+            if signal.is_sampled and signal.filled_by:
+                start, end = end, end + math.prod(self.shape(signal))
+                slices[signal.name] = slice(start, end)
+        return slices
+
+    @cached_property
+    def count(self) -> int:
+        """Columns of a sample."""
+        return int(max(columns.stop for columns in self._slices.values()))
+
+    def __contains__(self, name: str) -> bool:
+        """Tell whether a signal has columns."""
+        return name in self._slices
+
+    def __getitem__(self, name: str) -> slice:
+        """Columns of a signal."""
+        return self._slices[name]
+
+    def shape(self, signal: Variable) -> tuple[int, ...]:
+        """Sizes of a signal's dimensions after the first."""
+        sizes = {**COMPONENTS, **{dimension: len(names) for dimension, names in self.names.items()}}
+        return tuple(sizes[dimension] for dimension in signal.dimensions[1:])
+
+    @property
+    def sample_bytes(self) -> int:
+        """Size of a stored sample in the file.
+
+        Examples
+        --------
+        >>> names = {"mesh": tuple("abcdefgh"), "support": tuple("abcdefghijkl")}
+        >>> SignalLayout(signals_of(False), names, radius=0.1).sample_bytes
+        240
+        """
+        stored = (signal for signal in self.signals if signal.is_sampled and signal.stored)
+        return sum(np.dtype(signal.kind).itemsize * math.prod(self.shape(signal)) for signal in stored)
+
+    def values(self, name: str, rows: Floats) -> Floats:
+        """Values (samples, ...) of a signal in samples (samples, columns), with its dimensions after time."""
+        signal = next(signal for signal in self.signals if signal.name == name)
+        return rows[:, self[name]].reshape(len(rows), *self.shape(signal))
+
+    def stored_values(self, times: Floats, rows: Floats) -> dict[str, Floats]:
+        """Variables of the file by name, of samples (samples, columns) at times (s)."""
+        values: dict[str, Floats] = {"time": times}
+        for signal in self.signals:
+            if signal.is_sampled and signal.stored and signal.name not in values:
+                made = self.values(signal.name, rows) if signal.formula is None else signal.formula(self, rows)
+                values[signal.name] = np.asarray(made, dtype=np.float64)
+        return values
+
+    def mesh_times(self, rows: Floats) -> Floats:
+        """Count the samples (samples, columns) in which each of `MESH_TIMES` passes, (times, meshes)."""
+        counts = np.zeros((len(MESH_TIMES), len(self.names["mesh"])))
+        for signal in self.signals:
+            if signal.is_mesh_time and signal.formula is not None:
+                counts[MESH_TIMES.index(signal.name)] = np.sum(signal.formula(self, rows), axis=0)
+        return counts
+
+
+def signal_layout(assembly: Assembly) -> SignalLayout:
+    """Lay out the signals of an assembly.
+
+    Supports are bearings, or the ideal joints of the variant `rigid`.
+    """
+    gearbox = assembly.gearbox
+    joints = tuple(joint.name for joint in gearbox.joints) if assembly.variant == "rigid" else ()
+    return SignalLayout(
+        signals_of(assembly.law == "table"),
+        {"mesh": assembly.mesh_names, "support": assembly.connector_names or joints},
+        gearbox.gears[gearbox.case.overall.output_gear].base_radius,
+    )
 
 
 def energy_residual(data: xr.Dataset) -> float:
@@ -41,232 +397,3 @@ def energy_residual(data: xr.Dataset) -> float:
     explained = sum(value for term, value in change.items() if term != "work_of_loads")
     kinetic = change["kinetic_energy"]
     return (change["work_of_loads"] - explained) / kinetic if kinetic else math.nan
-
-
-@compiled
-def mesh_signals(q: Floats, v: Floats, meshes: MeshArrays, out: Floats) -> None:
-    """Fill (samples, 2 m): deflection (m), then F_bt (N) of each mesh; q and v (samples, size)."""
-    count = meshes.cycles.size
-    state = np.empty((count, STATE_SIZE))
-    for n in range(q.shape[0]):
-        mesh_state(q[n], v[n], meshes, state)
-        for m in range(count):
-            out[n, m] = state[m, 0]
-            out[n, count + m] = state[m, 4]
-
-
-@compiled
-def bearing_signals(q: Floats, v: Floats, connectors: ConnectorArrays, out: Floats) -> None:
-    """Fill (samples, 3 c): force of each bearing on its body (N), global axes."""
-    load, arms = np.empty(6), np.empty((2, 3))
-    for n in range(q.shape[0]):
-        for c in range(connectors.bodies.shape[0]):
-            connector_load(q[n], v[n], c, connectors, arms, load)
-            for i in range(3):
-                out[n, 3 * c + i] = -load[i]
-
-
-@compiled
-def joint_signals(
-    q: Floats, v: Floats, meshes: MeshArrays, ends: Integers, hosts: Integers, planets: Floats, out: Floats
-) -> None:
-    """Fill (samples, 3 j): force of each ideal joint on its body (N), global axes, in minimal coordinates.
-
-    Parameters
-    ----------
-    ends : (m, 2) joint that carries gear 1 and gear 2, -1 for none
-    hosts : (j,) joint of the body that a joint sits on (the carrier's for a planet), -1 for ground
-    planets : (j, 4) mass, x and y from the carrier's axis, coordinate of the carrier's spin; mass 0 else
-    """
-    state = np.empty((meshes.cycles.size, STATE_SIZE))
-    for n in range(q.shape[0]):
-        mesh_state(q[n], v[n], meshes, state)
-        out[n, :] = 0.0
-        for m in range(meshes.cycles.size):
-            psi = q[n, meshes.coordinates[m, 12]] if meshes.coordinates[m, 12] >= 0 else 0.0
-            cosine, sine = math.cos(psi), math.sin(psi)
-            scalar, row = state[m, 4] / meshes.line_of_action[m], meshes.force[m]
-            if scalar < 0.0 and meshes.table.shape[m, 0] > 0:  # the other flank pushes
-                scalar, row = -scalar, meshes.table.back[m]
-            for end in range(2):
-                j = ends[m, end]
-                if j >= 0:
-                    x, y, z = row[6 * end : 6 * end + 3]
-                    out[n, 3 * j] += scalar * (cosine * x - sine * y)
-                    out[n, 3 * j + 1] += scalar * (sine * x + cosine * y)
-                    out[n, 3 * j + 2] += scalar * z
-        for j in range(hosts.size):
-            if planets[j, 0] > 0.0:
-                c = int(planets[j, 3])
-                cosine, sine = math.cos(q[n, c]), math.sin(q[n, c])
-                square = v[n, c] ** 2
-                out[n, 3 * j] -= planets[j, 0] * square * (cosine * planets[j, 1] - sine * planets[j, 2])
-                out[n, 3 * j + 1] -= planets[j, 0] * square * (sine * planets[j, 1] + cosine * planets[j, 2])
-            if hosts[j] >= 0:
-                for i in range(3):
-                    out[n, 3 * hosts[j] + i] += out[n, 3 * j + i]
-
-
-@compiled
-def mesh_energies(q: Floats, v: Floats, meshes: MeshArrays, state: Floats, out: Floats) -> None:
-    """Add elastic energy (J) and the powers (W) damped, of k(PMC), non-conservative to out (5,)."""
-    mesh_state(q, v, meshes, state)
-    for m in range(meshes.cycles.size):
-        for i in range(4):
-            out[i] += state[m, 5 + i]
-
-
-@compiled
-def bearing_energies(q: Floats, v: Floats, connectors: ConnectorArrays, out: Floats) -> None:
-    """Add elastic energy (J), damping power and power of the rate's own (W) of all bearings to out (5,).
-
-    The connector's rate is not the derivative of its displacement (see `connector_motion`): with stiffness that
-    couples tilt and translation the elastic force then does a little work of its own, of second order.
-    """
-    turn, arms, motion = np.empty((3, 3)), np.empty((2, 3)), np.empty((3, 6))
-    for n in range(connectors.bodies.shape[0]):
-        connector_motion(q, v, n, connectors, turn, arms, motion)
-        elastic = connectors.stiffness[n] @ motion[0]
-        out[0] += 0.5 * np.dot(motion[0], elastic)
-        out[4] += np.dot(elastic, motion[1] - motion[2])
-        out[1] += np.dot(motion[1], connectors.damping[n] @ motion[1])
-
-
-@compiled
-def spring_energies(q: Floats, v: Floats, springs: SpringArrays, out: Floats) -> None:
-    """Add elastic energy (J) and damping power (W) of all couplings to out (5,)."""
-    for n in range(springs.coordinates.shape[0]):
-        i, j = springs.coordinates[n]
-        out[0] += 0.5 * springs.stiffness[n] * (q[j] - q[i]) ** 2
-        out[1] += springs.damping[n] * (v[j] - v[i]) ** 2
-
-
-@compiled
-def energy_signals(
-    q: Floats,
-    v: Floats,
-    meshes: MeshArrays,
-    connectors: ConnectorArrays,
-    springs: SpringArrays,
-    inertia: InertiaArrays,
-    out: Floats,
-) -> None:
-    """Fill (samples, 6): kinetic and elastic energy (J); powers (W) as the last four of `BALANCE_TERMS`."""
-    state = np.empty((meshes.cycles.size, STATE_SIZE))
-    kinetic = np.empty(inertia.body.size + inertia.spin.size)
-    for n in range(q.shape[0]):
-        kinetic_energies(q[n], v[n], inertia, kinetic)
-        out[n, :] = 0.0
-        out[n, 0] = kinetic.sum()
-        mesh_energies(q[n], v[n], meshes, state, out[n, 1:])
-        bearing_energies(q[n], v[n], connectors, out[n, 1:])
-        spring_energies(q[n], v[n], springs, out[n, 1:])
-
-
-@compiled
-def add_elastic_signals(q: Floats, v: Floats, elastic: ElasticArrays, scratch: Floats, out: Floats) -> None:
-    """Add kinetic and elastic energy (J) and the damped power (W) of elastic bodies to out (samples, 6)."""
-    for n in range(q.shape[0]):
-        kinetic, stored, damped = elastic_energies(q[n], v[n], elastic, scratch)
-        out[n, 0] += kinetic
-        out[n, 1] += stored
-        out[n, 2] += damped
-
-
-@compiled
-def add_turning_signals(q: Floats, v: Floats, turning: TurningArrays, memory: Floats, out: Floats) -> None:
-    """Add the same of elastic bodies in turning frames."""
-    for n in range(q.shape[0]):
-        kinetic, stored, damped, _ = turning_energies(q[n], v[n], turning, memory)
-        out[n, 0] += kinetic
-        out[n, 1] += stored
-        out[n, 2] += damped
-
-
-class Channels:
-    """The signals of an assembly, in the order of the columns of :meth:`sample`.
-
-    Columns: spin of the overall input (rad/s), overall DTE (rad), DTE and F_bt of each mesh, force (x, y, z) of
-    each support: bearings, or the ideal joints of the variant `rigid`. With the law `table` each mesh has three more:
-    change of the centre distance (m), misalignment (rad), and 1 where it is outside its table.
-    """
-
-    def __init__(self, assembly: Assembly) -> None:
-        self.assembly = assembly
-        overall = assembly.gearbox.case.overall
-        self.radius = assembly.gearbox.gears[overall.output_gear].base_radius
-        self._overall = overall_row(assembly) / self.radius
-        self._input = assembly.spin[overall.input]
-        self.mesh_names = assembly.mesh_names
-        joints = assembly.gearbox.joints if assembly.variant == "rigid" else ()
-        self.support_names = assembly.connector_names or tuple(joint.name for joint in joints)
-        self._joints = _joint_arrays(assembly) if joints else None
-        self.has_places = assembly.law == "table"
-        first = 2 + 2 * len(self.mesh_names) + 3 * len(self.support_names)
-        places = 3 * len(self.mesh_names) if self.has_places else 0
-        self.count = first + places
-        self.supports = slice(2 + 2 * len(self.mesh_names), first)
-        self.places = slice(first, first + places)
-
-    def sample(self, q: Floats, v: Floats) -> Floats:
-        """Signals of states q, v (samples, size), shape (samples, count)."""
-        meshes = len(self.mesh_names)
-        out = np.empty((q.shape[0], self.count))
-        out[:, 0] = v[:, self._input]
-        out[:, 1] = q @ self._overall
-        mesh_signals(*self.assembly.with_travelling(q, v), self.assembly.meshes, out[:, 2 : 2 + 2 * meshes])
-        supports = out[:, self.supports]
-        if self._joints is not None:
-            joint_signals(q, v, self.assembly.meshes, *self._joints, supports)
-        else:
-            bearing_signals(q, v, self.assembly.connectors, supports)
-        if self.has_places:
-            for row, x, u in zip(out, q, v, strict=True):
-                row[self.places] = self._places(x, u).ravel()
-        return out
-
-    def _places(self, q: Floats, v: Floats) -> Floats:
-        """Change of centre distance, misalignment, and whether outside the table, (3, meshes)."""
-        centre, misalignment = self.assembly.gear_positions(q).T
-        nominal = [element.mesh.centre_distance for element in self.assembly.elements]
-        return np.array([centre - nominal, misalignment, self.assembly.mesh_states(q, v)[:, 9]])
-
-    def mesh_deflections(self, signals: Floats) -> Floats:
-        """DTE of each mesh among the columns of `sample`, (samples, meshes), m."""
-        return signals[:, 2 : 2 + len(self.mesh_names)]
-
-    def mesh_times(self, signals: Floats) -> Floats:
-        """Count the samples, (3, meshes), in which the deflection pulls, teeth are apart, and a table is left."""
-        meshes = len(self.mesh_names)
-        times = np.zeros((3, meshes))
-        if self.has_places:
-            times[1] = np.sum(signals[:, 2 + meshes : 2 + 2 * meshes] == 0.0, axis=0)
-            times[2] = np.sum(signals[:, self.places][:, 2 * meshes :] > 0.0, axis=0)
-        else:
-            times[0] = np.sum(self.mesh_deflections(signals) < 0.0, axis=0)
-        return times
-
-    def energies(self, q: Floats, v: Floats) -> Floats:
-        """Energies and powers of states q, v (samples, size), shape (samples, 6): see `energy_signals`."""
-        out = np.empty((q.shape[0], 6))
-        a = self.assembly
-        energy_signals(*a.with_travelling(q, v), a.meshes, a.connectors, a.springs, a.inertia, out)
-        add_elastic_signals(q, v, a.elastic, scratch_for(a.elastic), out)
-        add_turning_signals(q, v, a.turning_arrays, turning_memory(a.turning_arrays), out)
-        return out
-
-
-def _joint_arrays(assembly: Assembly) -> tuple[Integers, Integers, Floats]:
-    """Build the arrays of `joint_signals`; a planet hands its force on to its carrier's joint."""
-    joints = assembly.gearbox.joints
-    bodies = {body.name: body for body in assembly.gearbox.bodies(assembly.inertias)}
-    number = {joint.body: n for n, joint in enumerate(joints)}
-    ends = [[number.get(e.mesh.pinion, -1), number.get(e.mesh.gear, -1)] for e in assembly.elements]
-    hosts = [-1 if joint.on == GROUND else number.get(joint.on, -1) for joint in joints]
-    planets = np.zeros((len(joints), 4))
-    for n, joint in enumerate(joints):
-        body = bodies[joint.body]
-        if body.carrier is not None:
-            axis = np.array(body.axis) - np.array(bodies[body.carrier].axis)
-            planets[n] = body.mass, axis[0], axis[1], assembly.spin[body.carrier]
-    return np.array(ends, dtype=np.int64).reshape(-1, 2), np.array(hosts, dtype=np.int64), planets

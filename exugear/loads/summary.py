@@ -18,6 +18,7 @@ from exugear.model.gearbox import Gearbox
 from exugear.model.parts import LoadCase
 from exugear.train.statics import UNLOADED
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.notebook import html_table, value_range
 
 Series = Mapping[str, tuple[Floats, Floats]]
 BURSTING_RIM_SPEED = 300.0
@@ -65,6 +66,27 @@ class LoadSummary:
     mesh_forces: Mapping[str, float]
     flanks: Mapping[str, str]
     reversed_flanks: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return (
+            f"<LoadSummary {self.name!r}: net torque {self.net_torque:g} N m, "
+            f"{self.start_speed:g} to {self.end_speed:g} rad/s>"
+        )
+
+    def _repr_html_(self) -> str:
+        speeds = (self.start_speed, self.end_speed, self.fastest_speed)
+        return html_table(
+            f"load case {self.name} of the rolling train",
+            {
+                "inertia at the input": value_range(self.inertia, "kg m2"),
+                "net torque at the input": value_range(self.net_torque, "N m"),
+                "driven": "yes" if self.driven else "no",
+                "start, end and fastest speed of the input": ", ".join(value_range(speed, "rad/s") for speed in speeds),
+                "flanks": ", ".join(f"{family} {flank}" for family, flank in self.flanks.items()),
+                "on another flank than by the static load": ", ".join(self.reversed_flanks) or "none",
+            },
+        )
 
     @property
     def fastest_rim(self) -> tuple[str, float]:
@@ -118,8 +140,8 @@ def summarise_loads(
     rates, speeds = _motion(gearbox, case, times, torques @ unit / inertia)
     needed = torques - rates[:, None] * axial * unit
     if case.driven_body is not None:
-        place = names.index(case.driven_body)
-        needed[:, place] -= needed @ unit / unit[place]  # what the machine adds
+        driven = names.index(case.driven_body)
+        needed[:, driven] -= needed @ unit / unit[driven]  # what the machine adds
     forces = _mesh_forces(gearbox, needed)
     fastest = float(np.abs(speeds).max())
     flanks, reversed_flanks = _flanks(gearbox, forces)
@@ -140,19 +162,19 @@ def summarise_loads(
 
 def doubts_about(loads: LoadSummary) -> tuple[str, ...]:
     """Say in words what looks like the wrong sign of a torque, nothing if all is well."""
-    found = []
+    doubts = []
     if loads.reversed_flanks:
-        found.append(
+        doubts.append(
             f"torque sign? {', '.join(loads.reversed_flanks)} loaded on another flank than by the static load, which "
             "tables, stiffness and phases are of"
         )
     body, rim = loads.fastest_rim
     if rim > BURSTING_RIM_SPEED:
-        found.append(
+        doubts.append(
             f"torque sign, or too long? the torques bring a rim on {body} to {rim:.4g} m/s, and wheels of steel burst "
             f"at some {BURSTING_RIM_SPEED:g} m/s; a run stops there"
         )
-    return tuple(found)
+    return tuple(doubts)
 
 
 def rim_radii(gearbox: Gearbox) -> dict[str, float]:
@@ -233,9 +255,9 @@ def _flanks(gearbox: Gearbox, forces: Floats) -> tuple[dict[str, str], tuple[str
     flanks: dict[str, str] = {}
     turned = []
     for m, mesh in enumerate(gearbox.meshes):
-        own = forces[:, m]
-        loaded = ("+" if np.any(own > least) else "") + ("-" if np.any(own < -least) else "")
+        mesh_forces = forces[:, m]
+        loaded = ("+" if np.any(mesh_forces > least) else "") + ("-" if np.any(mesh_forces < -least) else "")
         flanks[mesh.family] = "".join(sign for sign in "+-" if sign in flanks.get(mesh.family, "") + loaded)
-        if np.any(own * np.sign(static[mesh.name]) < -least):
+        if np.any(mesh_forces * np.sign(static[mesh.name]) < -least):
             turned.append(mesh.family)
-    return {family: found or "0" for family, found in flanks.items()}, tuple(dict.fromkeys(turned))
+    return {family: signs or "0" for family, signs in flanks.items()}, tuple(dict.fromkeys(turned))

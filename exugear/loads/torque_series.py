@@ -17,6 +17,10 @@ def torque_series(gearbox: Gearbox, case: LoadCase) -> dict[str, tuple[Floats, F
 
     The header is ``time_s`` and one ``<body>_N_m`` per loaded body; between lines torques are linear.
 
+    Returns
+    -------
+    mapping of body name to (times, torques), each (lines,); empty without a file.
+
     Raises
     ------
     CaseError

@@ -8,7 +8,7 @@ numbered from 1 (`planet_1`, `sun_planet_1`).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -27,12 +27,13 @@ from exugear.model.parts import (
     WheelDeviation,
     stiffness_matrix,
 )
-from exugear.model.reading import CaseError, parse_case, read_toml
+from exugear.model.reading import CaseError, parse_case, read_toml, shortened
 from exugear.model.sections.case import CaseFile, SteSection
 from exugear.model.sections.quantities import unusual_values
 from exugear.train.train import Train
 from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.gears import Gear, GearPair
+from fe_ste.tools.notebook import html_table
 
 
 @dataclass(frozen=True)
@@ -61,8 +62,8 @@ class Gearbox:
 
     case: CaseFile
     source: str
-    content: Mapping[str, Any] = field(repr=False)
-    permissions: Permissions = field(default=NOTHING_MORE, repr=False)
+    content: Mapping[str, Any]
+    permissions: Permissions = NOTHING_MORE
 
     @classmethod
     def from_toml(cls, path: str | Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:
@@ -159,6 +160,28 @@ class Gearbox:
                 key = f"bearings.{bearing.family}.stiffness"
                 lines.append(f"{key}: torsion {torsion:g} N m/rad holds {bearing.body} back, which turns")
         return tuple(dict.fromkeys(lines))
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return (
+            f"<Gearbox {shortened(self.name)}: ratio {self.train.ratio:.6g}, {len(self.named_bodies)} bodies, "
+            f"{len(self.meshes)} meshes>"
+        )
+
+    def _repr_html_(self) -> str:
+        return html_table(
+            self.name,
+            {
+                "file": self.source,
+                "ratio": f"{self.train.ratio:.6g}",
+                "bodies": ", ".join(self.named_bodies),
+                "meshes": ", ".join(mesh.name for mesh in self.meshes),
+                "bearings": str(len(self.bearings)),
+                "inertia sets": ", ".join(self.inertia_sets),
+                "load cases": ", ".join(self.load_cases),
+                "warnings": str(len(self.warnings)),
+            },
+        )
 
     # -- bodies ------------------------------------------------------------------------------------------
 

@@ -27,8 +27,10 @@ class Permissions:
 
     Attributes
     ----------
-    scripts : whether gmsh scripts that it names may run; they can do all that the user can
-    below : a further folder whose files it may name
+    scripts : bool
+        Whether gmsh scripts that it names may run; they can do all that the user can.
+    below : Path, optional
+        A further folder whose files it may name.
     """
 
     scripts: bool = False
@@ -40,7 +42,7 @@ NOTHING_MORE = Permissions()
 
 
 def check_regular(path: Path, largest: int) -> None:
-    """Refuse what is no regular file or too large; nothing is read.
+    """Refuse what is no regular file or has more than `largest` bytes; nothing is read.
 
     Raises
     ------
@@ -71,6 +73,16 @@ def named_file(name: str, folder: Path, permissions: Permissions, largest: int) 
 
     Symbolic links count as what they lead to.
 
+    Parameters
+    ----------
+    name : str
+        As the gearbox file gives it.
+    folder : Path
+        Folder of the gearbox file.
+    permissions : Permissions
+    largest : int
+        Bytes of the largest file that is read.
+
     Raises
     ------
     NamedFileError
@@ -87,11 +99,11 @@ by --files-below DIR or EXUGEAR_FILES_BELOW
     """
     path = folder / name
     try:
-        places = [place.resolve() for place in (folder, permissions.below) if place is not None]
-        real = path.resolve()
+        permitted = [parent.resolve() for parent in (folder, permissions.below) if parent is not None]
+        real_path = path.resolve()
     except (OSError, RuntimeError, ValueError):  # a name too long, links that go in circles, a name with a zero byte
         raise NamedFileError("no such file") from None
-    if not any(real.is_relative_to(place) for place in places):
+    if not any(real_path.is_relative_to(parent) for parent in permitted):
         raise NamedFileError(
             "lies outside the gearbox file's folder; put it there, or permit its folder by --files-below DIR or "
             "EXUGEAR_FILES_BELOW"

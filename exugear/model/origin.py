@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from exugear.model.named_files import NamedFileError, Permissions, named_file
-from exugear.model.reading import CaseError, fault_line
+from exugear.model.reading import CaseError, fault_line, shortened
 from exugear.model.sections.bodies import BodySection
 from exugear.model.sections.case import CaseFile
 from exugear.model.sections.entries import GROUND
@@ -34,6 +34,10 @@ class Origin:
     case: CaseFile
     source: str
     permissions: Permissions
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<Origin {shortened(self.source)}>"
 
     def fault(self, text: str) -> CaseError:
         """Error that names the file before `text` (key, value and what would be right)."""

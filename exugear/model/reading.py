@@ -15,6 +15,7 @@ from exugear.model.named_files import LARGEST_CASE, NamedFileError, check_regula
 from exugear.model.sections.case import CaseFile
 
 SHOWN_FAULTS = 20
+"""Most faults that one message shows."""
 LONGEST_FAULT = 280
 """Characters of a fault after the name of the file."""
 
@@ -24,7 +25,8 @@ class CaseError(ValueError):
 
     Attributes
     ----------
-    faults : all of them; the message shows the first `SHOWN_FAULTS`
+    faults : tuple of str
+        All of them; the message shows the first `SHOWN_FAULTS`.
     """
 
     def __init__(self, *faults: str) -> None:
@@ -70,6 +72,13 @@ def parsed(parse: Callable[[], dict[str, Any]], source: str, form: str) -> dict[
 
     Python's parsers raise ValueError for numbers of thousands of digits, and run out of stack in deep nesting.
 
+    Parameters
+    ----------
+    parse : callable
+        Gives the content.
+    source, form : str
+        Name of the file and "TOML" or "JSON", for the message.
+
     Raises
     ------
     CaseError
@@ -106,17 +115,17 @@ def parse_case(content: dict[str, Any], source: str) -> CaseFile:
 def _described(faults: list[Any], content: dict[str, Any]) -> Iterator[str]:
     """Key, value and what would be right of each fault; a misspelt key is not told as missing besides."""
     meant = set()
-    places = {fault["loc"] for fault in faults}
+    locations = {fault["loc"] for fault in faults}
     for fault in faults:
         if fault["type"] == "extra_forbidden":
             meant.add((*fault["loc"][:-1], _nearest(fault["loc"])))
     for fault in faults:
-        place = _place(fault["loc"], content)
-        key = ".".join(_key(part) for part in place)
-        if fault["type"] == "too_short" and any(loc[:-1][: len(fault["loc"])] == fault["loc"] for loc in places):
+        path = _path(fault["loc"], content)
+        key = ".".join(_key(part) for part in path)
+        if fault["type"] == "too_short" and any(loc[:-1][: len(fault["loc"])] == fault["loc"] for loc in locations):
             continue  # only because entries of it are wrong
         if fault["type"] == "missing":
-            if place not in meant:
+            if path not in meant:
                 yield f"{key}: this key is missing"
             continue
         shown = "" if isinstance(fault["input"], Mapping) else f" = {shortened(fault['input'])}"
@@ -158,9 +167,9 @@ def _remedy(fault: Any) -> str:
     return text[:1].lower() + text[1:]
 
 
-def _place(location: tuple[int | str, ...], content: Any) -> tuple[int | str, ...]:
+def _path(location: tuple[int | str, ...], content: Any) -> tuple[int | str, ...]:
     """Path of a fault in the content: without the words that pydantic adds for the branches of a type."""
-    place: list[int | str] = []
+    path: list[int | str] = []
     for number, part in enumerate(location):
         inside = (isinstance(content, Mapping) and part in content) or (
             isinstance(content, list | tuple) and isinstance(part, int) and part < len(content)
@@ -168,8 +177,8 @@ def _place(location: tuple[int | str, ...], content: Any) -> tuple[int | str, ..
         if inside:
             content = content[part]
         if inside or (number == len(location) - 1 and isinstance(content, Mapping) and part != "[key]"):
-            place.append(part)
-    return tuple(place)
+            path.append(part)
+    return tuple(path)
 
 
 def _key(part: int | str) -> str:
@@ -219,4 +228,4 @@ def _inner(section: Any, part: int | str) -> Any:
         models = [c for c in candidates if isinstance(c, type) and issubclass(c, BaseModel)]
         return models[0] if models and getattr(section, "__origin__", None) not in (dict, tuple) else section
     arguments = getattr(section, "__args__", ())
-    return next((one for one in reversed(arguments) if one is not Ellipsis), None)
+    return next((kind for kind in reversed(arguments) if kind is not Ellipsis), None)

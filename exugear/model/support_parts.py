@@ -26,7 +26,7 @@ def joints(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Joint, ...]:
         if not origin.are_enabled(key, section.body, section.on):
             return ()
         return tuple(
-            Joint(name + suffix, body, on, _place(bodies[body], section.z_mm))
+            Joint(name + suffix, body, on, _position(bodies[body], section.z_mm))
             for suffix, body, on in origin.instances(key, section.body, section.on)
         )
 
@@ -54,7 +54,7 @@ def bearings(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Bearing, ...]:
                 family=name,
                 body=body,
                 on=on,
-                place=_place(bodies[body], section.z_mm),
+                position=_position(bodies[body], section.z_mm),
                 stiffness=section.stiffness,
                 catalogue=section.catalogue,
                 damping=section.damping,
@@ -90,7 +90,7 @@ def mounts(origin: Origin) -> tuple[Bearing, ...]:
             family=name,
             body=section.body,
             on=GROUND,
-            place=(x, y, z),
+            position=(x, y, z),
             stiffness=section.stiffness,
             catalogue=None,
             damping=section.damping,
@@ -134,5 +134,5 @@ def _stands_aside(origin: Origin, key: str, section: MountSection | CouplingSect
     return section.instead_of is not None and origin.are_enabled(f"{key}.instead_of", section.instead_of)
 
 
-def _place(body: Body, z_mm: float) -> tuple[float, float, float]:
+def _position(body: Body, z_mm: float) -> tuple[float, float, float]:
     return (*body.axis, z_mm * 1e-3)

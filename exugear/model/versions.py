@@ -2,14 +2,14 @@
 
 Raise a number when a change of the method, or of what it rests on, changes what is stored: results of the old
 version are then computed again or refused. A change that leaves all numbers as they are leaves the version, too.
-Tables have theirs in `fe_ste.versions`.
+Tables have theirs in `fe_ste.tools.versions`.
 """
 
 from __future__ import annotations
 
-#: Reduced elastic bodies (`meridian`, `reduction`, `solid_mesh`, `solids`, `floating`). Runs and modes rest on it.
+#: Reduced elastic bodies (`exugear.bodies`). Runs and modes rest on it.
 REDUCTION = 1
-#: Eigenmodes (`modes`, and the laws and matrices of `assembly`).
+#: Eigenmodes (`exugear.dynamics.modes`, and the laws and matrices of `exugear.dynamics.assembly`).
 MODES = 1
-#: Runs in time (`runup`, both solvers, the laws, signals and filters).
+#: Runs in time (`exugear.runs`, both solvers, the laws, signals and filters).
 RUN = 1

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exugear.bodies.reduced_body import Surface
 from exugear.dynamics.assembly import Assembly
 from exugear.model.seats import seat_key
-from exugear.pictures.scene import displacement_map, look, quad_mesh, write_animation
-from exugear.pictures.shapes import BodyShape, gear_surface, placed
-from fe_ste.tools.arrays import Floats, Pixels
-from fe_ste.tools.drawing import drawing_style, finish_figure, new_figure
-from fe_ste.tools.rendering import drawn_part, offscreen_plotter, place_picture, rendered_image, without_margins
+from exugear.pictures.animation import gif_path, half_period_images, write_animation
+from exugear.pictures.motions import placed
+from exugear.pictures.scene import displacement_map, look, mode_figure, quad_mesh, triangle_mesh
+from exugear.pictures.shapes import BodyShape
+from exugear.pictures.surfaces import gear_surface
+from fe_ste.tools.arrays import Floats, Integers, Pixels
+from fe_ste.tools.drawing import finish_figure
+from fe_ste.tools.rendering import offscreen_plotter, rendered_image, without_margins
 
 if TYPE_CHECKING:
     import pyvista
@@ -41,7 +42,7 @@ class DeformedBody:
     """
 
     points: Floats
-    quads: NDArray[np.int64]
+    quads: Integers
     displacement: Floats
     energy: Floats
 
@@ -85,26 +86,27 @@ def elastic_scene(assembly: Assembly, shape: Floats, *, title: str = "", amplitu
     """
     if not assembly.elastic_bodies:
         raise ValueError(f"variant {assembly.variant} has no elastic bodies to draw; use the variant flexible")
-    found = []
+    deformed = []
     fixed = {body.name: body.axis for body in assembly.bodies if body.fixed}
-    for name, place in assembly.elastic_slices.items():
+    for name, coordinates in assembly.elastic_slices.items():
         surface = assembly.elastic_bodies[name].reduced.surface
         if name in fixed:
             surface = _half_behind(surface, fixed[name])
-        found.append((surface, surface.displacement @ shape[place], surface.energy_density(shape[place])))
-    largest = max(float(np.linalg.norm(moved, axis=1).max()) for _, moved, _ in found)
+        motion = shape[coordinates]
+        deformed.append((surface, surface.displacement @ motion, surface.energy_density(motion)))
+    largest = max(float(np.linalg.norm(moved, axis=1).max()) for _, moved, _ in deformed)
     if not largest > 0.0:
         raise ValueError("the mode does not move the elastic bodies")
-    factor = amplitude * max(float(np.ptp(surface.points[:, 2])) for surface, _, _ in found) / largest
+    factor = amplitude * max(float(np.ptp(surface.points[:, 2])) for surface, _, _ in deformed) / largest
     brightest = _density_below(
-        np.concatenate([density for _, _, density in found]),
-        np.concatenate([_areas(surface.points, surface.quads) for surface, _, _ in found]),
+        np.concatenate([density for _, _, density in deformed]),
+        np.concatenate([_areas(surface.points, surface.quads) for surface, _, _ in deformed]),
     )
     gears, motions = _gears(assembly, factor * shape)
     return ElasticScene(
         bodies=tuple(
             DeformedBody(surface.points, surface.quads, factor * moved, np.minimum(density / brightest, 1.0))
-            for surface, moved, density in found
+            for surface, moved, density in deformed
         ),
         gears=gears,
         motions=motions,
@@ -118,10 +120,10 @@ def _half_behind(surface: Surface, axis: tuple[float, float]) -> Surface:
     return replace(surface, quads=surface.quads[behind], strain=surface.strain[behind])
 
 
-def _areas(points: Floats, quads: NDArray[np.int64]) -> Floats:
+def _areas(points: Floats, quads: Integers) -> Floats:
     """Area of each quad, m2."""
-    one, two = points[quads[:, 2]] - points[quads[:, 0]], points[quads[:, 3]] - points[quads[:, 1]]
-    areas: Floats = 0.5 * np.linalg.norm(np.cross(one, two), axis=1)
+    diagonals = points[quads[:, 2]] - points[quads[:, 0]], points[quads[:, 3]] - points[quads[:, 1]]
+    areas: Floats = 0.5 * np.linalg.norm(np.cross(*diagonals), axis=1)
     return areas
 
 
@@ -138,8 +140,8 @@ def _gears(assembly: Assembly, shape: Floats) -> tuple[tuple[BodyShape, ...], tu
         if body.name not in assembly.elastic_bodies or body.fixed:  # a housing has its ring in its own surface
             continue
         for gear, z in body.wheels.items():
-            place = np.array([*body.axis, z])
-            gears.append(BodyShape(gear, gear, gear_surface(assembly.gearbox.gears[gear]).moved(place), place))
+            centre = np.array([*body.axis, z])
+            gears.append(BodyShape(gear, gear, gear_surface(assembly.gearbox.gears[gear]).moved(centre), centre))
             motions.append(shape[list(assembly.coordinates[seat_key(body.name, gear)])])
     return tuple(gears), tuple(motions)
 
@@ -198,29 +200,23 @@ def animate_elastic_bodies(
     fe_ste.tools.rendering.RenderingError
         If this machine cannot render off-screen.
     """
-    images = []
+    target = gif_path(path)
     with offscreen_plotter(*size) as plotter:
         bodies, gears = _add(plotter, scene)
         look(plotter, SIDE)
-        count = frames // 2 + 1
-        for number in range(count):
-            part = math.cos(math.pi * number / (count - 1))
+
+        def move(part: float) -> None:
             for mesh, body in zip(bodies, scene.bodies, strict=True):
                 mesh.points = body.points + part * body.displacement
                 mesh.cell_data["energy"] = part**2 * body.energy
             for mesh, gear, motion in zip(gears, scene.gears, scene.motions, strict=True):
                 mesh.points = placed(gear, part * motion)
-            images.append(rendered_image(plotter))
-    together = np.min([image for image, _ in images], axis=0)
-    rows, columns = drawn_part(together)
-    return write_animation(
-        [_figure(image[rows, columns], pixel, scene.title) for image, pixel in images], Path(path), duration
-    )
+
+        images = half_period_images(plotter, frames, move)
+    return write_animation([_figure(image, pixel, scene.title) for image, pixel in images], target, duration)
 
 
 def _add(plotter: pyvista.Plotter, scene: ElasticScene) -> tuple[list[pyvista.PolyData], list[pyvista.PolyData]]:
-    import pyvista
-
     bodies, gears = [], []
     for body in scene.bodies:
         mesh = quad_mesh(body.points + body.displacement, body.quads)
@@ -236,23 +232,12 @@ def _add(plotter: pyvista.Plotter, scene: ElasticScene) -> tuple[list[pyvista.Po
         )
         bodies.append(mesh)
     for gear, motion in zip(scene.gears, scene.motions, strict=True):
-        triangles = gear.surface.triangles
-        faces = np.column_stack([np.full(len(triangles), 3), triangles])
-        mesh = pyvista.PolyData(placed(gear, motion), faces=faces.ravel())
+        mesh = triangle_mesh(placed(gear, motion), gear.surface.triangles)
         plotter.add_mesh(mesh, color="#8A97A8", opacity=0.25)
         gears.append(mesh)
     return bodies, gears
 
 
 def _figure(image: Pixels, pixel: float, title: str) -> Figure:
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-
-    with drawing_style():
-        figure = new_figure(7.6, 6.6 * image.shape[0] / image.shape[1] + 0.7)
-        panel = figure.add_subplot()
-        place_picture(panel, image, pixel, fill(title, LINE))
-        scale = ScalarMappable(Normalize(0.0, 1.0), displacement_map())
-        label = f"Strain energy density / that of {BRIGHTEST:g} % of the surface"
-        figure.colorbar(scale, ax=panel, label=label, shrink=0.7, aspect=26)
-        return figure
+    label = f"Strain energy density / that of {BRIGHTEST:g} % of the surface"
+    return mode_figure(image, pixel, fill(title, LINE), label)

@@ -2,33 +2,31 @@
 
 from __future__ import annotations
 
-import io
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from exugear.pictures.shapes import BodyShape, ModeScene, placed
+from exugear.pictures.animation import gif_path, half_period_images, write_animation
+from exugear.pictures.motions import ModeScene, placed
+from exugear.pictures.shapes import BodyShape
 from fe_ste.tools.arrays import Floats, Integers, Pixels
 from fe_ste.tools.drawing import COLOURS, drawing_style, finish_figure, new_figure
-from fe_ste.tools.files import write_file
-from fe_ste.tools.rendering import drawn_part, offscreen_plotter, place_picture, rendered_image, without_margins
+from fe_ste.tools.rendering import offscreen_plotter, place_picture, rendered_image, without_margins
 
 if TYPE_CHECKING:
-    import PIL.Image
     import pyvista
     from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
 
 
-#: Colours of displacement from rest, a light grey that leaves resting bodies in the background, to the largest.
 DISPLACEMENT_COLOURS: Final = ("#E4E7EB", "#F5D67B", "#EE8A33", "#C2242E", "#5A0F3E")
-_BODY_COLOURS = (*COLOURS[:6], "#F0E442", "#999933")
-
-#: From the bodies to the eye: from the input side, from above and the side.
-_VIEW = (0.75, 0.45, -1.0)
+"""Colours of displacement from rest, a light grey that leaves resting bodies in the background, to the largest."""
+BODY_COLOURS: Final = (*COLOURS[:6], "#F0E442", "#999933")
+"""Colours of families of bodies that turn."""
+VIEW = (0.75, 0.45, -1.0)
+"""From the bodies to the eye: from the input side, from above and the side."""
 
 
 def draw_gearbox(
@@ -65,7 +63,7 @@ def draw_gearbox(
     colours = body_colours(bodies)
     with offscreen_plotter(*size) as plotter:
         for body in bodies:
-            mesh = _polydata(body.surface.points, body.surface.triangles)
+            mesh = triangle_mesh(body.surface.points, body.surface.triangles)
             plotter.add_mesh(mesh, color=colours[body.family], opacity=_opacity(body), ambient=0.3, diffuse=0.7)
         look(plotter)
         image, pixel = rendered_image(plotter)
@@ -137,77 +135,23 @@ def animate_mode(
     fe_ste.tools.rendering.RenderingError
         If this machine cannot render off-screen.
     """
-    target = Path(path)
-    if target.suffix.lower() != ".gif":
-        raise ValueError(f"animation {target}: the suffix must be .gif")
-    images = _mode_images(scene, frames // 2 + 1, size)
-    return write_animation([mode_figure(image, pixel, scene.title) for image, pixel in images], target, duration)
-
-
-def write_animation(way_out: Sequence[Figure], target: Path, duration: float) -> Path:
-    """Write a standing wave as an animated picture (``.gif``) from figures of half a period; `duration` in s.
-
-    Raises
-    ------
-    ValueError
-        If the suffix is another.
-    """
-    from PIL import Image
-
-    if target.suffix.lower() != ".gif":
-        raise ValueError(f"animation {target}: the suffix must be .gif")
-    # A standing wave: the way back shows the pictures of the way out.
-    finished = [_set_picture(figure) for figure in way_out]
-    pictures = finished + finished[-2:0:-1]
-    # One palette for all frames, else colours flicker.
-    palette = _with_white(pictures[0].quantize(colors=255, method=Image.Quantize.MEDIANCUT))
-    indexed = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
-    pause = round(1e3 * duration / len(indexed))
-    content = io.BytesIO()
-    rest = indexed[1:]
-    indexed[0].save(content, "GIF", save_all=True, append_images=rest, duration=pause, loop=0, optimize=True)
-    write_file(target, content.getvalue())
-    return target
-
-
-def _mode_images(scene: ModeScene, count: int, size: tuple[int, int]) -> list[tuple[Pixels, float]]:
-    """Render half a period, from one largest deflection to the other, with one margin around all images."""
-    images = []
+    target = gif_path(path)
     with offscreen_plotter(*size) as plotter:
         meshes = _add_mode(plotter, scene)
         look(plotter)
-        for number in range(count):
-            part = math.cos(math.pi * number / (count - 1))
+
+        def move(part: float) -> None:
             for mesh, body, motion in zip(meshes, scene.bodies, scene.motions, strict=True):
                 mesh.points = placed(body, part * motion)
-            images.append(rendered_image(plotter))
-    # The darkest of all frames at each pixel shows what any of them needs.
-    together = np.min([image for image, _ in images], axis=0)
-    rows, columns = drawn_part(together)
-    return [(image[rows, columns], pixel) for image, pixel in images]
 
-
-def _set_picture(figure: Figure) -> PIL.Image.Image:
-    """Turn a figure into a frame."""
-    from PIL import Image
-
-    finished = io.BytesIO()
-    figure.savefig(finished, format="png", dpi=100)
-    return Image.open(finished).convert("RGB")
-
-
-def _with_white(indexed: PIL.Image.Image) -> PIL.Image.Image:
-    """Make the lightest colours of a palette white, which averaging has made light greys."""
-    colours = np.array(indexed.getpalette()).reshape(-1, 3)
-    colours[colours.min(axis=1) >= 250] = 255
-    indexed.putpalette(colours.ravel().tolist())
-    return indexed
+        images = half_period_images(plotter, frames, move)
+    return write_animation([mode_figure(image, pixel, scene.title) for image, pixel in images], target, duration)
 
 
 def _add_mode(plotter: pyvista.Plotter, scene: ModeScene) -> list[pyvista.PolyData]:
     meshes = []
     for body, motion, displacement in zip(scene.bodies, scene.motions, scene.displacement, strict=True):
-        mesh = _polydata(placed(body, motion), body.surface.triangles)
+        mesh = triangle_mesh(placed(body, motion), body.surface.triangles)
         mesh.point_data["displacement"] = displacement
         plotter.add_mesh(
             mesh,
@@ -223,7 +167,8 @@ def _add_mode(plotter: pyvista.Plotter, scene: ModeScene) -> list[pyvista.PolyDa
     return meshes
 
 
-def _polydata(points: Floats, triangles: Integers) -> pyvista.PolyData:
+def triangle_mesh(points: Floats, triangles: Integers) -> pyvista.PolyData:
+    """Surface from triangles."""
     import pyvista
 
     faces = np.column_stack([np.full(len(triangles), 3), triangles])
@@ -242,15 +187,15 @@ def quad_mesh(points: Floats, quads: Integers) -> pyvista.PolyData:
     return pyvista.PolyData(points, faces=np.concatenate(cells))
 
 
-def look(plotter: pyvista.Plotter, direction: tuple[float, float, float] = _VIEW) -> None:
+def look(plotter: pyvista.Plotter, direction: tuple[float, float, float] = VIEW) -> None:
     """Look at everything, y up, with a direction from the bodies to the eye; the input side, above and the side."""
     centre = np.asarray(plotter.center)
     plotter.camera_position = [centre + np.asarray(direction), centre, (0.0, 1.0, 0.0)]
     plotter.renderer.ResetCamera()
 
 
-def mode_figure(image: Pixels, pixel: float, title: str) -> Figure:
-    """Set the rendered image of a mode, with its scale of colours and of length (m per pixel)."""
+def mode_figure(image: Pixels, pixel: float, title: str, label: str = "Displacement / largest displacement") -> Figure:
+    """Set the rendered image of a mode with its scale of length (m per pixel), and of colours from 0 to 1."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
@@ -259,14 +204,14 @@ def mode_figure(image: Pixels, pixel: float, title: str) -> Figure:
         panel = figure.add_subplot()
         place_picture(panel, image, pixel, title)
         scale = ScalarMappable(Normalize(0.0, 1.0), displacement_map())
-        figure.colorbar(scale, ax=panel, label="Displacement / largest displacement", shrink=0.7, aspect=26)
+        figure.colorbar(scale, ax=panel, label=label, shrink=0.7, aspect=26)
         return figure
 
 
 def body_colours(bodies: Sequence[BodyShape]) -> dict[str, tuple[float, float, float]]:
     """Colour of each family of bodies as red, green, blue from 0 to 1; fixed ones are grey."""
     families = list(dict.fromkeys(body.family for body in bodies if not body.fixed))
-    colours = {family: _lightened(_BODY_COLOURS[n % len(_BODY_COLOURS)]) for n, family in enumerate(families)}
+    colours = {family: _lightened(BODY_COLOURS[n % len(BODY_COLOURS)]) for n, family in enumerate(families)}
     return colours | {body.family: _lightened("#8A8F96") for body in bodies if body.fixed}
 
 
@@ -281,6 +226,12 @@ def _opacity(body: BodyShape) -> float:
     return 0.22 if body.fixed else 1.0
 
 
+def channels(colour: str) -> tuple[float, float, float]:
+    """Red, green and blue from 0 to 1 of a colour like ``#E4E7EB``."""
+    red, green, blue = (int(colour[start : start + 2], 16) / 255.0 for start in (1, 3, 5))
+    return red, green, blue
+
+
 def _lightened(colour: str) -> tuple[float, float, float]:
-    red, green, blue = (int(colour[place : place + 2], 16) / 255.0 for place in (1, 3, 5))
+    red, green, blue = channels(colour)
     return 0.35 + 0.65 * red, 0.35 + 0.65 * green, 0.35 + 0.65 * blue

@@ -1,140 +1,20 @@
-"""What the bodies of a gearbox look like and how they move: surfaces with teeth, rigid motions, mode shapes.
+"""What the bodies of a gearbox look like: gears whose teeth mesh, plain shafts and carriers.
 
-NumPy alone: `exugear.pictures.scene` draws these shapes, `exugear.pictures.viewer` writes them into a web page.
-Frame of the gearbox: z along the shafts, lengths in m.
+NumPy alone. Frame of the gearbox: z along the shafts, lengths in m.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Body, Mesh
-from fe_ste.geometry.gears import Gear
-from fe_ste.geometry.profile import tooth_profile
-from fe_ste.tools.arrays import Floats, Integers
-
-#: Rotation of the section from one ring of points to the next along a helical gear, rad.
-_TWIST_PER_LAYER = 0.06
-
-
-@dataclass(frozen=True)
-class Surface:
-    """Triangulated surface.
-
-    Attributes
-    ----------
-    points : (n, 3) array
-        m.
-    triangles : (m, 3) array of int
-    """
-
-    points: Floats
-    triangles: Integers
-
-    def moved(self, shift: ArrayLike) -> Surface:
-        """Copy at another place."""
-        return Surface(self.points + np.asarray(shift, dtype=np.float64), self.triangles)
-
-    @classmethod
-    def joined(cls, surfaces: Sequence[Surface]) -> Surface:
-        """All surfaces as one."""
-        offsets = np.cumsum([0, *(len(surface.points) for surface in surfaces)])
-        return cls(
-            np.concatenate([surface.points for surface in surfaces]),
-            np.concatenate([s.triangles + offset for s, offset in zip(surfaces, offsets, strict=False)]),
-        )
-
-
-def gear_surface(gear: Gear, angle: float = 0.0, rim_diameter: float | None = None) -> Surface:
-    """Surface of a whole gear with its teeth, about the z axis, z = 0 in the middle of the face width.
-
-    Parameters
-    ----------
-    gear : Gear
-        The gear.
-    angle : float
-        Polar angle of the middle of a tooth at z = 0, rad.
-    rim_diameter : float, optional
-        Bore of an external, outside diameter of an internal gear, m; by default where it is held.
-
-    Returns
-    -------
-    Surface
-
-    Examples
-    --------
-    >>> gear = Gear(name="gear", teeth=30, normal_module=3e-3, face_width=20e-3, held_diameter=50e-3)
-    >>> surface = gear_surface(gear)
-    >>> bool(abs(np.hypot(*surface.points[:, :2].T).max() - gear.tip_radius) < 1e-12)
-    True
-    """
-    outline = _gear_outline(gear)
-    rim = 0.5 * (rim_diameter or gear.held_diameter)
-    twist = math.tan(gear.base_helix_angle) / gear.base_radius * gear.face_width
-    layers = max(2, 1 + math.ceil(abs(twist) / _TWIST_PER_LAYER))
-    heights = np.linspace(-0.5, 0.5, layers)
-    polar = outline[:, 1] + angle
-    toothed = np.stack([_circle(outline[:, 0], polar + twist * part, gear.face_width * part) for part in heights])
-    plain = np.stack([_circle(rim, polar + twist * part, gear.face_width * part) for part in heights[[0, -1]]])
-    # Walls run round the axis; the caps join the teeth with the rim at the same polar angles.
-    bands = [toothed, plain[::-1], np.stack([plain[0], toothed[0]]), np.stack([toothed[-1], plain[1]])]
-    return Surface.joined([_band(band) for band in bands])
-
-
-def _gear_outline(gear: Gear) -> Floats:
-    """Radius and polar angle along the toothed circumference, shape (n, 2), counter-clockwise."""
-    profile = tooth_profile(gear)
-    fillet = profile.fillet[np.linspace(len(profile.fillet) - 1, 0, 6).astype(np.int64)[:-1]]
-    from_root = np.column_stack([np.hypot(*fillet.T), np.arctan2(fillet[:, 1], fillet[:, 0])])
-    radii = np.linspace(profile.form_radius, profile.tip_radius, 6)
-    to_tip = np.column_stack([radii, gear.half_angle(radii)])
-    side = np.concatenate([from_root, to_tip])
-    tooth = np.concatenate([side * np.array([1.0, -1.0]), side[::-1]])
-    starts = gear.angular_pitch * np.arange(gear.teeth)
-    return np.concatenate([tooth + np.array([0.0, start]) for start in starts])
-
-
-def _circle(radius: Floats | float, polar: Floats, height: float) -> Floats:
-    return np.column_stack([radius * np.cos(polar), radius * np.sin(polar), np.full(polar.shape, height)])
-
-
-def _band(rings: Floats) -> Surface:
-    """Close bands between rings of equal numbers of points, shape (rings, points, 3)."""
-    count, size = rings.shape[:2]
-    here = np.arange(count * size).reshape(count, size)
-    after = np.roll(here, -1, axis=1)
-    corners = np.stack([here[:-1], after[:-1], after[1:], here[1:]], axis=-1).reshape(-1, 4)
-    return Surface(rings.reshape(-1, 3), np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]]))
-
-
-def tube_surface(
-    diameter: float, start: float, end: float, bore: float = 0.0, centre: ArrayLike = (0.0, 0.0)
-) -> Surface:
-    """Surface of a shaft, disc or pin along z.
-
-    Parameters
-    ----------
-    diameter, bore : float
-        m.
-    start, end : float
-        z of both ends, m.
-    centre : array_like, shape (2,)
-        x and y of its axis, m.
-
-    Returns
-    -------
-    Surface
-    """
-    polar = np.linspace(0.0, 2.0 * math.pi, 49)[:-1]
-    corners = [(bore, start), (diameter, start), (diameter, end), (bore, end), (bore, start)]
-    rings = np.stack([_circle(0.5 * size, polar, height) for size, height in corners])
-    return _band(rings).moved([*np.asarray(centre, dtype=np.float64), 0.0])
+from exugear.pictures.surfaces import Surface, gear_surface, tube_surface
+from fe_ste.tools.arrays import Floats
 
 
 @dataclass(frozen=True)
@@ -159,160 +39,6 @@ class BodyShape:
     surface: Surface
     reference: Floats
     fixed: bool = False
-
-
-def displacement_of(body: BodyShape, motion: ArrayLike) -> Floats:
-    """Displacement of each point of a body for a small motion of it.
-
-    Parameters
-    ----------
-    body : BodyShape
-        The body, n points.
-    motion : array_like, shape (6,)
-        Displacement (m) of the reference point and rotations (rad) about x, y, z.
-
-    Returns
-    -------
-    (n, 3) array
-        m.
-    """
-    small = np.asarray(motion, dtype=np.float64)
-    return small[:3] + np.cross(small[3:], body.surface.points - body.reference)
-
-
-def placed(body: BodyShape, motion: ArrayLike) -> Floats:
-    """Points of a body after a motion that may be large: turned about the axis of its rotation, then shifted.
-
-    Linear displacements would blow a gear up when it turns by a drawn amplitude; this keeps it a gear.
-
-    Parameters
-    ----------
-    body : BodyShape
-        The body, n points.
-    motion : array_like, shape (6,)
-        As in `displacement_of`, the rotations as a rotation vector.
-
-    Returns
-    -------
-    (n, 3) array
-        m.
-    """
-    matrix = motion_matrix(body.reference, motion)
-    points: Floats = body.surface.points @ matrix[:3, :3].T + matrix[:3, 3]
-    return points
-
-
-def motion_matrix(reference: ArrayLike, motion: ArrayLike) -> Floats:
-    """Homogeneous matrix (4, 4) of a rotation about a reference point and a shift.
-
-    Examples
-    --------
-    >>> quarter = motion_matrix((1.0, 0.0, 0.0), (0.0, 0.0, 0.5, 0.0, 0.0, math.pi / 2))
-    >>> [round(float(entry), 12) for entry in (quarter @ [2.0, 0.0, 0.0, 1.0])[:3]]
-    [1.0, 1.0, 0.5]
-    """
-    centre, vector = np.asarray(reference, dtype=np.float64), np.asarray(motion, dtype=np.float64)
-    angle = float(np.linalg.norm(vector[3:]))
-    rotation = np.eye(3)
-    if angle > 0.0:
-        x, y, z = vector[3:] / angle
-        skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-        rotation += math.sin(angle) * skew + (1.0 - math.cos(angle)) * (skew @ skew)  # Rodrigues' formula
-    matrix = np.eye(4)
-    matrix[:3, :3] = rotation
-    matrix[:3, 3] = centre - rotation @ centre + vector[:3]
-    return matrix
-
-
-@dataclass(frozen=True)
-class ModeScene:
-    """A mode shape on the bodies of a gearbox, ready to draw.
-
-    Attributes
-    ----------
-    bodies : tuple of BodyShape
-    motions : tuple of (6,) arrays
-        Motion of each body at the drawn amplitude.
-    displacement : tuple of (n,) arrays
-        Displacement of each point over the largest of all, 0 to 1.
-    title : str
-    """
-
-    bodies: tuple[BodyShape, ...]
-    motions: tuple[Floats, ...]
-    displacement: tuple[Floats, ...]
-    title: str
-
-
-def mode_scene(
-    bodies: Sequence[BodyShape], motions: Mapping[str, ArrayLike], *, title: str = "", amplitude: float = 0.035
-) -> ModeScene:
-    """Scale a mode shape for drawing.
-
-    Parameters
-    ----------
-    bodies : sequence of BodyShape
-        Shapes.
-    motions : mapping of body name to (6,) array
-        Mode shape in any normalisation, as in `displacement_of`; bodies that are not named rest.
-    title : str
-        Frequency, damping and name of the mode.
-    amplitude : float
-        Largest displacement drawn, over the diagonal of the scene.
-
-    Returns
-    -------
-    ModeScene
-
-    Raises
-    ------
-    ValueError
-        If a motion belongs to no body, or nothing moves.
-    """
-    unknown = sorted(set(motions) - {body.name for body in bodies})
-    if unknown:
-        raise ValueError(f"mode shape: no body {unknown[0]!r} among {[body.name for body in bodies]}")
-    moving = [np.asarray(motions.get(body.name, np.zeros(6)), dtype=np.float64) for body in bodies]
-    sizes = [np.linalg.norm(displacement_of(body, motion), axis=1) for body, motion in zip(bodies, moving, strict=True)]
-    largest = max(float(size.max()) for size in sizes)
-    if not largest > 0.0:
-        raise ValueError("mode shape: no body moves")
-    points = np.concatenate([body.surface.points for body in bodies])
-    factor = amplitude * float(np.linalg.norm(np.ptp(points, axis=0))) / largest
-    return ModeScene(
-        bodies=tuple(bodies),
-        motions=tuple(factor * motion for motion in moving),
-        displacement=tuple(size / largest for size in sizes),
-        title=title,
-    )
-
-
-def motions_of(bodies: Iterable[Body], coordinates: Mapping[str, Sequence[int]], shape: ArrayLike) -> dict[str, Floats]:
-    """Read the motions of all bodies out of a vector of coordinates.
-
-    Parameters
-    ----------
-    bodies : iterable of Body
-        Bodies of the model.
-    coordinates : mapping of body name to six int
-        Places of x, y, z and the rotations about them in the vector; -1 where there is none.
-    shape : array_like, shape (size,)
-        Mode shape or displacement.
-
-    Returns
-    -------
-    dict of body name to (6,) array
-        As in `displacement_of`. A planet that turns on an ideal pin goes where its carrier takes it.
-    """
-    vector = np.append(np.asarray(shape, dtype=np.float64), 0.0)  # -1 reads the zero
-    every = {body.name: body for body in bodies}
-    motions = {name: vector[list(coordinates[name])] for name in every if name in coordinates}
-    for name, motion in motions.items():
-        carrier = every[name].carrier
-        if carrier in motions and max(coordinates[name][:5]) < 0:
-            away = np.subtract(every[name].axis, every[carrier].axis)
-            motion[:2] = motions[carrier][5] * np.array([-away[1], away[0]])
-    return motions
 
 
 def bodies_of(gearbox: Gearbox) -> tuple[BodyShape, ...]:
@@ -370,15 +96,16 @@ def tooth_angles(meshes: Sequence[Mesh]) -> dict[tuple[str, str], float]:
     while waiting:
         mesh = next((m for m in waiting if _ends(m)[0] in angles or _ends(m)[1] in angles), waiting[0])
         waiting.remove(mesh)
-        one, two = _ends(mesh)
-        if two in angles and one not in angles:
-            angles[one] = _mating_angle(mesh, angles[two], backwards=True)
+        pinion, gear = _ends(mesh)
+        if gear in angles and pinion not in angles:
+            angles[pinion] = _mating_angle(mesh, angles[gear], backwards=True)
         else:
-            angles.setdefault(two, _mating_angle(mesh, angles.setdefault(one, 0.0), backwards=False))
+            angles.setdefault(gear, _mating_angle(mesh, angles.setdefault(pinion, 0.0), backwards=False))
     return angles
 
 
 def _ends(mesh: Mesh) -> tuple[tuple[str, str], tuple[str, str]]:
+    """Names of body and gear at both ends of a mesh."""
     return (mesh.pinion, mesh.pair.pinion.name), (mesh.gear, mesh.pair.gear.name)
 
 
@@ -389,11 +116,12 @@ def _mating_angle(mesh: Mesh, angle: float, *, backwards: bool) -> float:
     facing = math.pi if gears[1].internal else 0.0
     towards = (mesh.position_angle + facing, mesh.position_angle + math.pi)
     sense = 1.0 if gears[1].internal else -1.0
-    here, there = (1, 0) if backwards else (0, 1)
+    known, mate = (1, 0) if backwards else (0, 1)
     twists = [math.tan(gear.base_helix_angle) / gear.base_radius for gear in gears]
-    at_mesh = angle + twists[here] * mesh.offsets[here]
-    part = (towards[here] - at_mesh) / gears[here].angular_pitch
-    return towards[there] - (sense * part + 0.5) * gears[there].angular_pitch - twists[there] * mesh.offsets[there]
+    at_mesh = angle + twists[known] * mesh.offsets[known]
+    # In pitches, from the tooth to the pitch point; there the mate has a space, half a pitch beside its tooth.
+    pitches = (towards[known] - at_mesh) / gears[known].angular_pitch
+    return towards[mate] - (sense * pitches + 0.5) * gears[mate].angular_pitch - twists[mate] * mesh.offsets[mate]
 
 
 def _shaft_diameter(gearbox: Gearbox, body: Body) -> float:
@@ -413,7 +141,7 @@ def _shaft(gearbox: Gearbox, body: Body) -> list[Surface]:
     if not _has_shaft(body):
         return []
     ends = [z + side * 0.5 * gearbox.gears[name].face_width for name, z in body.wheels.items() for side in (-1.0, 1.0)]
-    ends += [bearing.place[2] for bearing in gearbox.bearings if bearing.body == body.name]
+    ends += [bearing.position[2] for bearing in gearbox.bearings if bearing.body == body.name]
     margin = 0.02
     shaft = tube_surface(_shaft_diameter(gearbox, body), min(ends) - margin, max(ends) + margin, centre=body.axis)
     return [shaft]

@@ -5,21 +5,10 @@ from __future__ import annotations
 import base64
 import html
 from collections.abc import Iterable, Mapping, Sequence
+from importlib.resources import files
 from pathlib import Path
 
-_STYLE = """
-body { font: 15px/1.5 system-ui, sans-serif; color: #222; max-width: 62rem; margin: 2rem auto; padding: 0 1.2rem; }
-h1 { font-size: 1.6rem; margin-bottom: .2rem; } h2 { font-size: 1.25rem; margin-top: 2.4rem; }
-h2 { border-bottom: 1px solid #ddd; } h3 { font-size: 1.05rem; margin-top: 1.6rem; }
-table { border-collapse: collapse; font-size: .86rem; margin: .6rem 0 1rem; }
-th, td { padding: .18rem .6rem; border-bottom: 1px solid #e5e5e5; text-align: right; vertical-align: top; }
-th { border-bottom: 1px solid #999; font-weight: 600; vertical-align: bottom; }
-th.text, td.text { text-align: left; }
-figure { margin: 1rem 0; } figure img { max-width: 100%; } figcaption { font-size: .86rem; color: #555; }
-.scroll { overflow-x: auto; } .warning { background: #fff4e0; padding: .4rem .8rem; border-left: 3px solid #e69f00; }
-.alert { background: #fdecea; border: 2px solid #b3261e; color: #5c0f0a; padding: .4rem 1rem; margin: 1rem 0; }
-code { font-size: .82rem; overflow-wrap: anywhere; } summary { cursor: pointer; margin: .6rem 0; }
-"""
+_STYLE = files("exugear.report").joinpath("page.css").read_text(encoding="utf-8")
 
 
 def text(value: object) -> str:
@@ -102,6 +91,6 @@ def whole(title: str, *sections: str) -> str:
     """Make the page."""
     return (
         f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{text(title)}</title>'
-        f'<meta name="viewport" content="width=device-width, initial-scale=1"><style>{_STYLE}</style></head>'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1"><style>\n{_STYLE}</style></head>'
         f"<body><h1>{text(title)}</h1>{''.join(sections)}</body></html>"
     )

@@ -68,23 +68,23 @@ class Decimator:
         self.half = (TAPS_PER_FACTOR * factor) // 2 if factor > 1 else 0
         self.taps = low_pass(factor, self.half)
         self.pending = np.zeros((0, count))
-        self.first = 0  # number of the raw row that `pending` starts with
+        self.pending_first = 0  # number of the raw row that `pending` starts with
 
     def push(self, rows: Floats) -> tuple[int, Floats]:
         """Filter as far as the rows reach: number of the raw row of the first result, and the results."""
         self.pending = np.vstack([self.pending, rows])
-        centre = self.first + self.half
+        centre = self.pending_first + self.half
         centre += -centre % self.factor
-        last = self.first + len(self.pending) - 1 - self.half
+        last = self.pending_first + len(self.pending) - 1 - self.half
         count = max(0, (last - centre) // self.factor + 1)
         if count == 0:
             return centre, np.zeros((0, self.pending.shape[1]))
-        begin = centre - self.half - self.first
+        begin = centre - self.half - self.pending_first
         window = self.pending[begin : begin + (count - 1) * self.factor + len(self.taps)]
         # Angles far from zero lose no digits: what is filtered is the difference from the middle row.
         results = np.empty((count, window.shape[1]))
         filter_rows(window, self.taps[self.half :], self.factor, results)
         following = centre + count * self.factor - self.half
-        self.pending = self.pending[following - self.first :]
-        self.first = following
+        self.pending = self.pending[following - self.pending_first :]
+        self.pending_first = following
         return centre, results

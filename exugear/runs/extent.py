@@ -6,6 +6,7 @@ import math
 import shutil
 from pathlib import Path
 
+from exugear.dynamics.signals import SignalLayout, signals_of
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import LoadCase
 from exugear.model.reading import CaseError
@@ -71,22 +72,22 @@ def check_disk(
         )
 
 
-def sample_bytes(meshes: int, supports: int, has_places: bool) -> int:
-    """Size of one sample on disk: time, speed and overall transmission error in 8 bytes each, all else in 4.
+def sample_bytes(meshes: int, supports: int, tabled: bool) -> int:
+    """Size of one sample on disk, of a run with so many meshes and supports.
 
     Parameters
     ----------
     meshes, supports : int
-        Of each mesh deflection and force, of each support three forces.
-    has_places : bool
-        Whether two more numbers say where the gears of each mesh stand (law `table`).
+    tabled : bool
+        Whether its mesh law is `table`, which has further signals.
 
     Examples
     --------
-    >>> sample_bytes(meshes=8, supports=12, has_places=False)
+    >>> sample_bytes(meshes=8, supports=12, tabled=False)
     240
     """
-    return 4 * 8 + 4 * ((4 if has_places else 2) * meshes + 3 * supports)
+    names = {"mesh": ("",) * meshes, "support": ("",) * supports}
+    return SignalLayout(signals_of(tabled), names, radius=1.0).sample_bytes
 
 
 def too_fine(step: float, total: float, sample_rate: float) -> str:

@@ -7,7 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from exugear.model.choice import Choice
-from exugear.results.run_file import EARLIER_PARTIAL_NAME, FINAL_NAME, PARTIAL_NAME, has_pieces, load_run
+from exugear.results.pieces import has_pieces
+from exugear.results.run_file import EARLIER_PARTIAL_NAME, FINAL_NAME, PARTIAL_NAME, load_run
 from fe_ste.tools.files import FileError, exclusive
 
 LOCK_NAME = "run.partial.lock"

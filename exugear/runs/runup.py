@@ -1,10 +1,9 @@
 """Load cases in time: start in balance, integrate, stream the results.
 
 Two solvers take the same assembly: `exugear.solvers.compiled.solver`, and Exudyn as the model of record. Both hand
-their states to one `Recorder`, which filters, accounts for energy and writes. Without a step asked for,
-`exugear.solvers.compiled.step.choose_step`
-finds the longest that is stable and keeps the excitation in the band: 6.4 kHz is the high-speed mesh of the GRC at
-215 rpm. Exudyn is loaded only where it integrates.
+their states to one `exugear.runs.recorder.Recorder`, which filters, accounts for energy and writes. Without a step
+asked for, `exugear.solvers.compiled.step.choose_step` finds the longest that is stable and keeps the excitation in
+the band: 6.4 kHz is the high-speed mesh of the GRC at 215 rpm. Exudyn is loaded only where it integrates.
 """
 
 from __future__ import annotations
@@ -16,12 +15,18 @@ from typing import TYPE_CHECKING, Literal, get_args
 from exugear.bodies.of_gearbox import ElasticBody
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.signals import signal_layout
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
-from exugear.runs.extent import SAMPLE_RATE, check_duration, too_fine
-from exugear.runs.outcome import Progress, Run, RunError
+from exugear.results.run_file import join_pieces
+from exugear.runs.extent import SAMPLE_RATE, check_disk, check_duration, too_fine
+from exugear.runs.integration import integrate
+from exugear.runs.interruption import interruptible
+from exugear.runs.outcome import LimitError, Progress, ProgressMeter, Run, RunError
+from exugear.runs.plan import RunPlan, plan_run
 from exugear.runs.recorder import Recorder
 from exugear.runs.run_folder import held, run_directory
+from exugear.runs.start import RunStart, prepare_start
 from exugear.solvers.compiled.solver import refusal
 from exugear.solvers.compiled.step import choose_step, fastest_motion
 from exugear.tooth_mesh.element import Angles, MeshData
@@ -77,7 +82,7 @@ def simulate(
     angles : {"reference", "operating"}
         Angles of the law `seed`.
     mesh_route : {"element", "loads"}
-        See `exugear.solvers.exudyn_model.system`; "loads" is Exudyn's alone, for the variants bushing and jointed.
+        See `exugear.solvers.exudyn_model.system`; "loads" is Exudyn's alone.
     resume : bool
         Go on with a run that was stopped.
     progress : callable, optional
@@ -118,9 +123,35 @@ def simulate(
         if too_fine(step, total, sample_rate):
             raise gearbox.fault(f"{fastest_motion(assembly)}; {too_fine(step, total, sample_rate)}")
     with held(directory):
-        return Recorder(
-            assembly, case, directory, total, step, band, sample_rate, chosen, resume, progress, mesh_route
-        ).run()
+        plan = plan_run(assembly, case, directory, total, step, band, sample_rate, chosen, mesh_route)
+        if not resume:
+            size = signal_layout(assembly).sample_bytes
+            check_disk(gearbox, case, directory, total, sample_rate, sample_bytes=size)
+        return _carry_out(plan, prepare_start(plan, resume), progress)
+
+
+def _carry_out(plan: RunPlan, start: RunStart, progress: Callable[[Progress], None] | None) -> Run:
+    """Integrate to the end, or to the first fault or interruption, and join the pieces of a complete run."""
+    meter = ProgressMeter(start.state.step * plan.step, plan.duration, progress)
+    recorder = Recorder(plan, start, meter.reach)
+    with interruptible() as interruption:
+        integrate(plan, start, recorder, interruption)
+        recorder.flush()
+        if recorder.fault:
+            recorder.note_verdict()
+            start.pieces.mark()
+    reasons = recorder.reasons()
+    if recorder.fault:
+        raise RunError(f"{'; '.join((recorder.fault, *reasons))}; what was reached is in {plan.partial_path}")
+    complete = not interruption.asked and not recorder.halted
+    path = plan.final_path if complete else plan.partial_path
+    run = Run(path, complete, recorder.last_time, meter.wall, reasons, recorder.halted)
+    if run.halted:
+        raise LimitError(f"{'; '.join(reasons)}; what was reached is in {plan.partial_path}", run)
+    if complete:
+        start.pieces.note("complete", 1)
+        join_pieces(start.pieces, plan.final_path)
+    return run
 
 
 def _solver(asked: str | None, assembly: Assembly, mesh_route: str) -> str:

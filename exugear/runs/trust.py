@@ -16,16 +16,24 @@ from typing import Any
 import numpy as np
 
 from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.signals import BALANCE_TERMS
+from exugear.dynamics.signals import BALANCE_TERMS, MESH_TIMES
 from exugear.loads.summary import BURSTING_RIM_SPEED, LoadSummary, rim_radii
 from fe_ste.tools.arrays import Floats
 
 ENERGY, RIM, SPEED, DEFLECTION, ACCOUNT = range(5)
 """Rows of the running figures of a `Judge`; the last holds what the account of energy began with, and its scale."""
+LARGEST, SINCE, WHERE = range(3)
+"""Columns of these: largest value so far; time (s) and number of the body or mesh first beyond a limit."""
+AT_START, SCALE = range(2)
+"""Columns of the row `ACCOUNT`: energy that the account began with, and the largest so far, J."""
 FIGURES = (5, 3)
-"""Shape of the running figures: largest value so far; time (s) and number of the body or mesh first beyond a limit."""
-ENERGIES = [BALANCE_TERMS.index(term) for term in ("work_of_loads", "kinetic_energy", "elastic_energy")]
+"""Shape of the running figures."""
+WORK_OF_LOADS, KINETIC, ELASTIC = map(BALANCE_TERMS.index, ("work_of_loads", "kinetic_energy", "elastic_energy"))
 """Terms of the account that say how much energy there is; what varying stiffness pumps in shows up in them."""
+EXPLAINING = [number for number, term in enumerate(BALANCE_TERMS) if term != "work_of_loads"]
+"""Terms of the account that explain where the work of the loads went."""
+PULLING = MESH_TIMES.index("pulling_time")
+"""Row of the times of meshes in which they pull."""
 WHOLLY = 0.9
 """Part of a run in which a mesh pulls that is not swaying about no load, but load on the other flank."""
 LEAST_ENERGY = 1e-9
@@ -96,10 +104,10 @@ def energy_left_over(lines: Floats, start: float, scale: float) -> tuple[Floats,
     >>> energy_left_over(lines, start=1.0, scale=0.0)[0]
     array([0. , 0. , 0.1])
     """
-    largest = np.abs(lines[:, ENERGIES]).max(axis=1)
+    largest = np.abs(lines[:, [WORK_OF_LOADS, KINETIC, ELASTIC]]).max(axis=1)
     scales = np.maximum.accumulate(np.maximum(largest, max(scale, LEAST_ENERGY)))
-    explained = lines[:, 1:].sum(axis=1) - start
-    return np.abs(lines[:, 0] - explained) / scales, scales
+    explained = lines[:, EXPLAINING].sum(axis=1) - start
+    return np.abs(lines[:, WORK_OF_LOADS] - explained) / scales, scales
 
 
 class Judge:
@@ -122,7 +130,7 @@ class Judge:
         radii = rim_radii(assembly.gearbox)
         self.limits = limits
         self.figures = np.full(FIGURES, np.nan)
-        self.figures[:ACCOUNT, 0] = 0.0
+        self.figures[:ACCOUNT, LARGEST] = 0.0
         self._law = assembly.law
         self._bodies = tuple(radii)
         self._spins = np.array([assembly.spin[name] for name in self._bodies], dtype=np.int64)
@@ -159,31 +167,31 @@ class Judge:
             self._keep(DEFLECTION, times, given_way / self._heights, self.limits.deflection_marked)
 
     def _see_energy(self, times: Floats, lines: Floats) -> None:
-        start, scale = self.figures[ACCOUNT, :2]
+        start, scale = self.figures[ACCOUNT, [AT_START, SCALE]]
         if np.isnan(start):
-            start, scale = lines[0, 1:3].sum(), 0.0
+            start, scale = lines[0, KINETIC] + lines[0, ELASTIC], 0.0
         left, scales = energy_left_over(lines, start, scale)
-        self.figures[ACCOUNT, :2] = start, scales[-1]
+        self.figures[ACCOUNT, [AT_START, SCALE]] = start, scales[-1]
         self._keep(ENERGY, times, left[:, None], self.limits.energy_marked)
 
     def _keep(self, row: int, times: Floats, values: Floats, limit: float) -> None:
-        """Remember the largest of values (n, places), and when and where one first lies beyond a limit."""
+        """Remember the largest of values (n, bodies or meshes), and when and where one first lies beyond a limit."""
         if not values.size:
             return
         known = np.where(np.isnan(values), np.inf, values)
-        largest, first, _ = self.figures[row]
-        self.figures[row, 0] = max(largest, known.max())
+        largest, since, _ = self.figures[row]
+        self.figures[row, LARGEST] = max(largest, known.max())
         beyond = known.max(axis=1) > limit
-        if beyond.any() and np.isnan(first):
+        if beyond.any() and np.isnan(since):
             instant = int(np.argmax(beyond))
-            self.figures[row, 1:] = times[instant], np.argmax(known[instant])
+            self.figures[row, [SINCE, WHERE]] = times[instant], np.argmax(known[instant])
 
     @property
     def stop(self) -> bool:
         """Whether the run must not go on."""
         limits = self.limits
         most = (limits.energy_stopped, limits.rim_speed_stopped, 1.0, limits.deflection_stopped)
-        return bool(np.any(self.figures[:ACCOUNT, 0] > most))
+        return bool(np.any(self.figures[:ACCOUNT, LARGEST] > most))
 
     def reasons(self, pulling: Floats, simulated: float) -> tuple[str, ...]:
         """Reasons why the run is not to be trusted, none if it is.
@@ -195,46 +203,52 @@ class Judge:
         simulated : float
             Time so far, s.
         """
-        found = [*self._energy_words(), *self._speed_words(), *self._deflection_words()]
-        return (*found, *self._pulling_words(pulling / max(simulated, 1e-300)))
+        return (
+            *self._energy_words(),
+            *self._speed_words(),
+            *self._deflection_words(),
+            *self._pulling_words(pulling / max(simulated, 1e-300)),
+        )
 
     def _energy_words(self) -> Iterator[str]:
-        largest, first, _ = self.figures[ENERGY]
+        largest, since, _ = self.figures[ENERGY]
         if largest > self.limits.energy_marked:
             yield (
-                f"energy: from t = {first:.4g} s on more than {_percent(self.limits.energy_marked)} of the largest "
+                f"energy: from t = {since:.4g} s on more than {_percent(self.limits.energy_marked)} of the largest "
                 f"energy in the run is not accounted for, up to {_percent(largest)}; the motion is unstable, or the "
                 "step does not solve the equations"
             )
 
     def _speed_words(self) -> Iterator[str]:
         """Say what is too fast: a motion that leaves the one which loads give it, or this motion itself."""
-        largest, first, place = self.figures[SPEED]
+        largest, since, number = self.figures[SPEED]
         if largest > 1.0:
-            name, intended, allowed = self._at(place)
+            name, intended, allowed = self._body(number)
             yield (
-                f"speed: at t = {first:.4g} s a rim on {name} passes {allowed:.4g} m/s, where the loads bring it to "
+                f"speed: at t = {since:.4g} s a rim on {name} passes {allowed:.4g} m/s, where the loads bring it to "
                 f"{intended:.4g} m/s at most; the motion is unstable"
             )
             return
-        largest, first, place = self.figures[RIM]
+        largest, since, number = self.figures[RIM]
         if largest > self.limits.rim_speed_stopped:
+            name, _, _ = self._body(number)
             yield (
-                f"speed: at t = {first:.4g} s a rim on {self._at(place)[0]} passes {self.limits.rim_speed_stopped:g} "
+                f"speed: at t = {since:.4g} s a rim on {name} passes {self.limits.rim_speed_stopped:g} "
                 "m/s, where wheels of steel burst; look for a torque of the wrong sign, or one that nothing takes up"
             )
 
-    def _at(self, place: float) -> tuple[str, float, float]:
-        number = int(place)
+    def _body(self, figure: float) -> tuple[str, float, float]:
+        """Name of a body by its number, its intended and its allowed speed of the rim, m/s."""
+        number = int(figure)
         return self._bodies[number], float(self._intended[number]), float(self._allowed[number])
 
     def _deflection_words(self) -> Iterator[str]:
-        largest, first, place = self.figures[DEFLECTION]
+        largest, since, number = self.figures[DEFLECTION]
         limit = self.limits.deflection_marked
         if largest > limit:
-            height = float(self._heights[int(place)])
+            height, mesh = float(self._heights[int(number)]), self._meshes[int(number)]
             yield (
-                f"deflection: at t = {first:.4g} s the teeth of mesh {self._meshes[int(place)]}, {1e3 * height:.3g} mm "
+                f"deflection: at t = {since:.4g} s the teeth of mesh {mesh}, {1e3 * height:.3g} mm "
                 f"high, give way by more than {_percent(limit)} of their height, where they would have broken; meshes "
                 f"reach {_percent(largest)}"
             )

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from exugear.dynamics.assembly import Assembly
 from fe_ste.tools.arrays import Floats
 
@@ -89,3 +91,23 @@ class LoadTable:
     constant: Mapping[str, float] = field(default_factory=dict)
     series: Mapping[str, tuple[Floats, Floats]] = field(default_factory=dict)
     drive: DriveLaw | None = None
+
+    def as_functions(self) -> Loading:
+        """Express the same as functions of time, for Exudyn."""
+        varying = {name: _interpolator(times, torques) for name, (times, torques) in self.series.items()}
+        return Loading(self.constant, varying, None if self.drive is None else _drive_of(self.drive))
+
+
+def _drive_of(law: DriveLaw) -> Drive:
+    angle, speed, half_rate = law.angle
+    return Drive(
+        body=law.body,
+        stiffness=law.stiffness,
+        damping=law.damping,
+        angle=lambda t: angle + speed * t + half_rate * t * t,
+        speed=lambda t: speed + 2.0 * half_rate * t,
+    )
+
+
+def _interpolator(times: Floats, torques: Floats) -> Callable[[float], float]:
+    return lambda t: float(np.interp(t, times, torques))

@@ -1,1 +1,1 @@
-"""Waterfalls, order cuts, resonances, and variants compared by them."""
+"""Spectra of run-ups: waterfalls, order cuts, resonances and their modes, and variants compared by them."""

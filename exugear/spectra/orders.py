@@ -1,16 +1,65 @@
-"""Order lines of a gearbox: what its meshes excite per turn of the overall input."""
+"""Order lines: what turns with a gearbox excites a fixed number of times per turn of the reference shaft.
+
+The reference shaft is that of the overall input. Its speeds are in rad/s and count by magnitude: the line of order
+``o`` lies at the frequency ``o |speed| / 2 pi``.
+"""
 
 from __future__ import annotations
 
 import math
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from exugear.model.gearbox import Gearbox
-from exugear.results.run_file import load_run
-from exugear.spectra.resampling import sweep_matched_window
-from exugear.spectra.waterfall import OrderLine, Waterfall, harmonics, waterfall
+from fe_ste.tools.arrays import Floats
+
+
+@dataclass(frozen=True)
+class OrderLine:
+    """A named line of constant order in a waterfall.
+
+    Attributes
+    ----------
+    name : str
+        For legends and tables, such as ``"HS mesh"``.
+    order : float
+        Periods per turn of the reference shaft.
+    """
+
+    name: str
+    order: float
+
+    def frequency(self, speed: ArrayLike) -> Floats:
+        """Frequency on the line, Hz, at speeds of the reference shaft in rad/s."""
+        return self.order * np.abs(np.asarray(speed, dtype=np.float64)) / (2.0 * math.pi)
+
+
+def harmonics(name: str, order: float, count: int) -> tuple[OrderLine, ...]:
+    """Lines of a mesh and its harmonics.
+
+    Parameters
+    ----------
+    name : str
+        Name of the first.
+    order : float
+        Order of the first.
+    count : int
+        How many, the first included.
+
+    Returns
+    -------
+    tuple of OrderLine
+
+    Examples
+    --------
+    >>> [(line.name, line.order) for line in harmonics("planetary", 99.0, 2)]
+    [('planetary', 99.0), ('2 × planetary', 198.0)]
+    """
+    return tuple(
+        OrderLine(name if number == 1 else f"{number} × {name}", number * order) for number in range(1, count + 1)
+    )
 
 
 def order_lines(gearbox: Gearbox, count: int = 3) -> tuple[OrderLine, ...]:
@@ -28,43 +77,12 @@ def order_lines(gearbox: Gearbox, count: int = 3) -> tuple[OrderLine, ...]:
     >>> [(line.name, round(line.order, 3)) for line in order_lines(gearbox, 1)]
     [('sun_planet', 99.0), ('intermediate', 468.571), ('high_speed', 1792.795)]
     """
-    once = gearbox.train.mesh_frequencies(2.0 * math.pi)  # one turn per second
+    mesh_orders = gearbox.train.mesh_frequencies(2.0 * math.pi)  # at one turn per second
     lines: list[OrderLine] = []
-    seen: list[float] = []
+    known_orders: list[float] = []
     for mesh in gearbox.meshes:
-        order = once[mesh.name]
-        if not any(abs(order - known) < 1e-6 * known for known in seen):
-            seen.append(order)
+        order = mesh_orders[mesh.name]
+        if not any(abs(order - known) < 1e-6 * known for known in known_orders):
+            known_orders.append(order)
             lines.extend(harmonics(mesh.family, order, count))
     return tuple(lines)
-
-
-def run_waterfall(path: str | Path, window_length: float | None = None) -> Waterfall:
-    """Waterfall of the overall DTE of a run-up.
-
-    Parameters
-    ----------
-    path : path
-        ``run.nc`` of a run-up, or ``run.partial``.
-    window_length : float, optional
-        s; what suits the fastest first-order sweep by default. Runs to be compared need the same.
-
-    Raises
-    ------
-    ValueError
-        The speed does not change, so that nothing says how long a window should be, or the run is too short.
-    FileError
-        The run is missing or damaged.
-    """
-    data = load_run(path, ("time", "input_speed", "overall_dte"))
-    time = data["time"].to_numpy()
-    speed = data["input_speed"].to_numpy()
-    values = data["overall_dte"].to_numpy()
-    highest_order = float(data.attrs["highest_order"])
-    if time.size < 2:
-        raise ValueError(f"{path}: holds {time.size} samples, too few for a spectrum; run for longer")
-    if window_length is None:
-        sweep = highest_order * abs(np.ptp(speed)) / (2.0 * math.pi * np.ptp(time))
-        window_length = sweep_matched_window(sweep)
-    rate = (time.size - 1) / float(np.ptp(time))
-    return waterfall(values, speed, rate, window_length=window_length)

@@ -1,41 +1,15 @@
-"""Signals of varying speed on equal steps, and amplitude spectra."""
+"""Signals with uneven steps, such as those of a solver that chooses its step, on equal steps."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
+import scipy.interpolate
 import scipy.signal
 from numpy.typing import ArrayLike
 
 from fe_ste.tools.arrays import Floats
-
-
-def sweep_limited_resolution(sweep_rate: ArrayLike) -> Floats:
-    """Finest frequency resolution of a tone that sweeps, Hz: the root of its rate (Hz/s).
-
-    During a window T the tone sweeps over rate x T, while the window resolves 1/T: best where both are equal.
-
-    Examples
-    --------
-    >>> float(np.round(sweep_limited_resolution(214.0), 1))
-    14.6
-    """
-    resolution: Floats = np.sqrt(np.abs(np.asarray(sweep_rate, dtype=np.float64)))
-    return resolution
-
-
-def sweep_matched_window(sweep_rate: float) -> float:
-    """Window length, s, that resolves a tone sweeping at a rate (Hz/s) best.
-
-    Examples
-    --------
-    >>> round(1e3 * sweep_matched_window(214.0))  # milliseconds
-    68
-    """
-    if not abs(sweep_rate) > 0.0:
-        raise ValueError("sweep rate = 0: a steady tone has no best window, choose its length")
-    return 1.0 / math.sqrt(abs(sweep_rate))
 
 
 def resample_uniform(time: ArrayLike, values: ArrayLike, rate: float) -> tuple[Floats, Floats]:
@@ -83,43 +57,3 @@ def resample_uniform(time: ArrayLike, values: ArrayLike, rate: float) -> tuple[F
         padded = np.pad(fine, 20 * factor, mode="reflect", reflect_type="odd")
         fine = scipy.signal.fftconvolve(padded, taps, mode="valid")[::factor]
     return instants[0] + np.arange(fine.size) / rate, fine
-
-
-def amplitude_spectrum(values: ArrayLike, rate: float, window: str = "hann", padding: int = 1) -> tuple[Floats, Floats]:
-    """One-sided amplitude spectrum.
-
-    Parameters
-    ----------
-    values : array_like, shape (..., n)
-        Signal, along the last axis.
-    rate : float
-        Sampling rate, Hz.
-    window : str
-        Name of a SciPy window. ``"flattop"`` reads amplitudes between bins to 0.1 %, ``"hann"`` to 15 %.
-    padding : int
-        Length after appending zeros over `n`: spectral lines in between, no finer resolution.
-
-    Returns
-    -------
-    frequency : (padding n // 2 + 1,) array
-        Hz.
-    amplitude : (..., padding n // 2 + 1) array
-        Peak amplitude of a sine at that frequency; at frequency zero the mean.
-
-    Examples
-    --------
-    >>> time = np.arange(1000) / 1000.0
-    >>> frequency, amplitude = amplitude_spectrum(3.0 * np.cos(2 * np.pi * 50.0 * time), 1000.0)
-    >>> float(frequency[50]), round(float(amplitude[50]), 12)
-    (50.0, 3.0)
-    """
-    signal = np.asarray(values, dtype=np.float64)
-    count = padding * signal.shape[-1]
-    weights = scipy.signal.get_window(window, signal.shape[-1])  # periodic: a tone on a bin comes out exactly
-    spectrum = np.fft.rfft(signal * weights, n=count, axis=-1)
-    amplitude: Floats = 2.0 * np.abs(spectrum) / weights.sum()
-    amplitude[..., 0] *= 0.5
-    if count % 2 == 0:
-        amplitude[..., -1] *= 0.5
-    frequency = np.arange(amplitude.shape[-1]) * (rate / count)
-    return frequency, amplitude

@@ -1,16 +1,20 @@
-"""Resonances that stand out of a waterfall along its order lines."""
+"""Resonances of a run-up: peaks that stand out along the order lines of its waterfall, gathered by frequency."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from textwrap import shorten
 
 import numpy as np
 import scipy.signal
 from numpy.typing import ArrayLike
 
-from exugear.spectra.waterfall import OrderLine, Waterfall
+from exugear.model.parts import RPM
+from exugear.spectra.orders import OrderLine
+from exugear.spectra.waterfall import Waterfall, line_level
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.notebook import html_table
 
 
 @dataclass(frozen=True)
@@ -38,37 +42,6 @@ class Pick:
     resolution: float
 
 
-def line_level(spectra: Waterfall, line: OrderLine) -> Floats:
-    """Level along an order line.
-
-    Parameters
-    ----------
-    spectra : Waterfall
-        The run.
-    line : OrderLine
-        The order.
-
-    Returns
-    -------
-    (n,) array
-        Highest level within half the resolution to both sides of the line, dB; NaN where the line lies above
-        the band or so low (four spectral widths) that the window cannot tell it from the mean.
-    """
-    frequency = line.frequency(spectra.speed)
-    resolution = spectra.resolution(line)
-    spacing = float(spectra.frequency[1])
-    reach = int(np.max(np.ceil(0.5 * resolution / spacing)))
-    nearest = np.rint(frequency / spacing).astype(np.int64)
-    index = nearest[:, None] + np.arange(-reach, reach + 1)
-    last = spectra.frequency.size - 1
-    # The nearest spectral line always counts; half a resolution is at least that.
-    near = np.abs(index * spacing - frequency[:, None]) <= np.maximum(0.5 * resolution, 0.5 * spacing)[:, None]
-    level = np.take_along_axis(spectra.level, np.clip(index, 0, last), axis=1)
-    highest: Floats = np.where(near, level, -np.inf).max(axis=1)
-    inside = (frequency > 4.0 / spectra.window_length) & (nearest <= last)
-    return np.where(inside, highest, np.nan)
-
-
 def pick_resonances(
     spectra: Waterfall, lines: Iterable[OrderLine], *, prominence: float = 6.0, depth: float = 60.0
 ) -> tuple[Pick, ...]:
@@ -93,6 +66,7 @@ def pick_resonances(
 
     Examples
     --------
+    >>> from exugear.spectra.waterfall import waterfall
     >>> time = np.arange(20000) / 2000.0
     >>> speed = 2 * np.pi * time / 4.0
     >>> tone = np.sin(2 * np.pi * 100 * time**2 / 8.0) / np.hypot(1 - (25 * time / 120.0) ** 2, 0.1)
@@ -102,7 +76,7 @@ def pick_resonances(
     """
     searched = tuple(lines)
     highest = max((_highest(line_level(spectra, line)) for line in searched), default=0.0)
-    picks = (pick for line in searched for pick in _peaks_on_line(spectra, line, prominence))
+    picks = (pick for line in searched for pick in peaks_on_line(spectra, line, prominence))
     return tuple(pick for pick in picks if pick.level > highest - depth)
 
 
@@ -110,7 +84,8 @@ def _highest(level: Floats) -> float:
     return float(np.max(level, initial=-np.inf, where=np.isfinite(level)))
 
 
-def _peaks_on_line(spectra: Waterfall, line: OrderLine, prominence: float) -> list[Pick]:
+def peaks_on_line(spectra: Waterfall, line: OrderLine, prominence: float) -> list[Pick]:
+    """Find the peaks of a least prominence (dB) along one order line, in order of time."""
     level = line_level(spectra, line)
     usable = np.flatnonzero(np.isfinite(level))
     if usable.size < 3:
@@ -162,6 +137,24 @@ class Resonance:
     resolution: float
     picks: tuple[Pick, ...]
 
+    def __repr__(self) -> str:
+        """Frequency with its resolution, and the orders that show it."""
+        return f"Resonance({self._frequency_text}, {self._highest_text}, {len(self.picks)} peaks)"
+
+    def _repr_html_(self) -> str:
+        """Show frequency and each order's level as a small table in a notebook."""
+        rows = {pick.line.name: f"{pick.level:.1f} dB at {pick.speed / RPM:.1f} rpm" for pick in self.picks}
+        return html_table(f"Resonance, {self._frequency_text}", rows)
+
+    @property
+    def _frequency_text(self) -> str:
+        return f"{self.frequency:.1f} ± {self.resolution:.1f} Hz"
+
+    @property
+    def _highest_text(self) -> str:
+        highest = self.picks[0]
+        return f"highest {highest.level:.1f} dB on {shorten(highest.line.name, 80)}"
+
 
 def group_by_frequency(picks: Iterable[Pick]) -> tuple[Resonance, ...]:
     """Gather the peaks that several orders show of one resonance.
@@ -179,9 +172,9 @@ def group_by_frequency(picks: Iterable[Pick]) -> tuple[Resonance, ...]:
     waiting = sorted(picks, key=lambda pick: -pick.level)
     groups: list[Resonance] = []
     while waiting:
-        first = waiting[0]
-        members = [pick for pick in waiting if _within_resolution(first, pick)]
-        waiting = [pick for pick in waiting if not _within_resolution(first, pick)]
+        highest = waiting[0]
+        members = [pick for pick in waiting if _within_resolution(highest, pick)]
+        waiting = [pick for pick in waiting if not _within_resolution(highest, pick)]
         weights = np.array([pick.resolution**-2 for pick in members])
         frequencies = np.array([pick.frequency for pick in members])
         groups.append(
@@ -198,20 +191,22 @@ def _within_resolution(first: Pick, second: Pick) -> bool:
     return abs(first.frequency - second.frequency) <= max(first.resolution, second.resolution)
 
 
-def match_eigenfrequencies(found: Sequence[Pick | Resonance], eigenfrequencies: ArrayLike) -> tuple[int | None, ...]:
-    """Name the eigenfrequency that each finding belongs to.
+def match_eigenfrequencies(
+    resonances: Sequence[Pick | Resonance], eigenfrequencies: ArrayLike
+) -> tuple[int | None, ...]:
+    """Name the eigenfrequency that each resonance belongs to.
 
     Parameters
     ----------
-    found : sequence of Pick or Resonance
-        Findings in a waterfall.
+    resonances : sequence of Pick or Resonance
+        As a waterfall shows them.
     eigenfrequencies : array_like, shape (n,)
         Hz.
 
     Returns
     -------
     tuple of int or None
-        Index of the nearest eigenfrequency, or None where none lies within the resolution of the finding.
+        Index of the nearest eigenfrequency, or None where none lies within the resolution of the resonance.
 
     Examples
     --------
@@ -224,65 +219,8 @@ def match_eigenfrequencies(found: Sequence[Pick | Resonance], eigenfrequencies: 
     """
     known = np.asarray(eigenfrequencies, dtype=np.float64)
     matches: list[int | None] = []
-    for finding in found:
-        distance = np.abs(known - finding.frequency)
+    for resonance in resonances:
+        distance = np.abs(known - resonance.frequency)
         nearest = int(np.argmin(distance)) if known.size else None
-        matches.append(nearest if nearest is not None and distance[nearest] <= finding.resolution else None)
+        matches.append(nearest if nearest is not None and distance[nearest] <= resonance.resolution else None)
     return tuple(matches)
-
-
-@dataclass(frozen=True)
-class AbsenceRule:
-    """When a peak of one run counts as absent from another.
-
-    Attributes
-    ----------
-    prominence : float
-        On the same order line the other run has no peak of this prominence, dB, within the resolution, and
-    margin : float
-        its level at that place lies at least so far below, dB.
-    """
-
-    prominence: float = 3.0
-    margin: float = 6.0
-
-    @property
-    def description(self) -> str:
-        """The rule in words, for captions."""
-        return (
-            f"no peak of {self.prominence:g} dB prominence on the same order within the resolution, "
-            f"and a level at least {self.margin:g} dB lower"
-        )
-
-
-def only_in_first(picks: Iterable[Pick], other: Waterfall, rule: AbsenceRule | None = None) -> tuple[Pick, ...]:
-    """Select the peaks of one run that another run does not show.
-
-    Parameters
-    ----------
-    picks : iterable of Pick
-        Peaks of the first run.
-    other : Waterfall
-        The second run, with the same unit.
-    rule : AbsenceRule, optional
-        Stated thresholds.
-
-    Returns
-    -------
-    tuple of Pick
-        Peaks that satisfy the rule; a peak where the second run has no data does not.
-    """
-    stated = rule or AbsenceRule()
-    return tuple(pick for pick in picks if _is_absent(pick, other, stated))
-
-
-def _is_absent(pick: Pick, other: Waterfall, rule: AbsenceRule) -> bool:
-    frequency, level = pick.line.frequency(other.speed), line_level(other, pick.line)
-    near = np.isfinite(level) & (np.abs(frequency - pick.frequency) <= pick.resolution)
-    if not np.any(near):
-        return False
-    same_place = any(
-        abs(peak.frequency - pick.frequency) <= max(pick.resolution, peak.resolution)
-        for peak in _peaks_on_line(other, pick.line, rule.prominence)
-    )
-    return not same_place and float(level[near].max()) <= pick.level - rule.margin

@@ -1,69 +1,22 @@
-"""Spectra of run-ups: waterfalls, order cuts, and the resonances that stand out in them.
+"""Waterfalls: amplitude spectra of a run-up over the speed of the reference shaft.
 
-Pure functions on arrays. Speeds are those of the reference shaft (the carrier) in rad/s and count by
-magnitude; an order is a number of periods per turn of that shaft, so that a line of order ``o`` lies at
-``o |speed| / 2 pi``. Amplitudes are peak amplitudes of a sine; levels are
-``20 log10(amplitude / reference)`` in dB.
+Amplitudes are peak amplitudes of a sine; levels are ``20 log10(amplitude / reference)`` in dB. Speeds are those of the
+reference shaft as in `exugear.spectra.orders`.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.signal
 from numpy.typing import ArrayLike
 
-from exugear.spectra.resampling import amplitude_spectrum, sweep_limited_resolution
-from fe_ste.tools.arrays import Complexes, Floats
-
-
-@dataclass(frozen=True)
-class OrderLine:
-    """A named line of constant order in a waterfall.
-
-    Attributes
-    ----------
-    name : str
-        For legends and tables, such as ``"HS mesh"``.
-    order : float
-        Periods per turn of the reference shaft.
-    """
-
-    name: str
-    order: float
-
-    def frequency(self, speed: ArrayLike) -> Floats:
-        """Frequency on the line, Hz, at speeds of the reference shaft in rad/s."""
-        return self.order * np.abs(np.asarray(speed, dtype=np.float64)) / (2.0 * math.pi)
-
-
-def harmonics(name: str, order: float, count: int) -> tuple[OrderLine, ...]:
-    """Lines of a mesh and its harmonics.
-
-    Parameters
-    ----------
-    name : str
-        Name of the first.
-    order : float
-        Order of the first.
-    count : int
-        How many, the first included.
-
-    Returns
-    -------
-    tuple of OrderLine
-
-    Examples
-    --------
-    >>> [(line.name, line.order) for line in harmonics("planetary", 99.0, 2)]
-    [('planetary', 99.0), ('2 × planetary', 198.0)]
-    """
-    return tuple(
-        OrderLine(name if number == 1 else f"{number} × {name}", number * order) for number in range(1, count + 1)
-    )
+from exugear.model.parts import RPM
+from exugear.spectra.orders import OrderLine
+from exugear.spectra.spectrum import amplitude_spectrum, sweep_limited_resolution
+from fe_ste.tools.arrays import Floats
+from fe_ste.tools.notebook import html_table, value_range
 
 
 @dataclass(frozen=True)
@@ -99,6 +52,28 @@ class Waterfall:
     overlap: float
     reference: float
     unit: str
+
+    def __repr__(self) -> str:
+        """Sizes, spans and window; no arrays."""
+        return f"Waterfall({self.time.size} spectra of {self.frequency.size} lines, {self._spans}, {self.description})"
+
+    def _repr_html_(self) -> str:
+        """Show the same as a small table in a notebook."""
+        rows = {
+            "spectra": str(self.time.size),
+            "spectral lines": str(self.frequency.size),
+            "time": value_range(self.time, "s"),
+            "speed of the reference shaft": value_range(self.speed, "rpm", 1.0 / RPM),
+            "frequency": value_range(self.frequency, "Hz"),
+            "level": value_range(self.level, f"dB re {self.reference_text}"),
+            "analysis": self.description,
+        }
+        return html_table("Waterfall", rows)
+
+    @property
+    def _spans(self) -> str:
+        speed = value_range(self.speed, "rpm", 1.0 / RPM)
+        return f"{speed}, {value_range(self.frequency, 'Hz')}"
 
     @cached_property
     def level(self) -> Floats:
@@ -186,14 +161,13 @@ def waterfall(
         raise ValueError(f"window_length = {window_length} s is {length} samples: it needs 8 to {signal.size}")
     if not 0.0 <= overlap < 1.0:
         raise ValueError(f"overlap = {overlap} must lie in [0, 1)")
-    frames = _frames(signal, length, overlap)
+    frames = overlapping_frames(signal, length, overlap)
     # Twice the spectral lines: a tone between two lines would lose up to 1.4 dB, so it loses 0.4 dB.
     centred = frames - frames.mean(axis=1, keepdims=True)
     frequency, amplitude = amplitude_spectrum(centred, rate, window, padding=2)
-    middle = _frames(np.arange(signal.size) / rate, length, overlap).mean(axis=1)
     return Waterfall(
-        time=middle,
-        speed=np.abs(_frames(shaft, length, overlap).mean(axis=1)),
+        time=overlapping_frames(np.arange(signal.size) / rate, length, overlap).mean(axis=1),
+        speed=np.abs(overlapping_frames(shaft, length, overlap).mean(axis=1)),
         frequency=frequency,
         amplitude=amplitude,
         window=window,
@@ -204,92 +178,38 @@ def waterfall(
     )
 
 
-def _frames(values: Floats, length: int, overlap: float) -> Floats:
-    """Overlapping stretches of a signal, shape (frames, length), without a copy."""
+def overlapping_frames(values: Floats, length: int, overlap: float) -> Floats:
+    """Cut a signal into overlapping frames, shape (frames, length), without a copy."""
     hop = max(1, round(length * (1.0 - overlap)))
     return np.lib.stride_tricks.sliding_window_view(values, length)[::hop]
 
 
-@dataclass(frozen=True)
-class OrderCut:
-    """Amplitude and phase along an order.
-
-    Attributes
-    ----------
-    line : OrderLine
-        The order.
-    time, speed, frequency : (n,) array
-        Middle of each window, s; speed there, rad/s; frequency of the order there, Hz.
-    amplitude : (n,) complex array
-        Peak amplitude; its phase is that relative to ``cos(order * angle)``.
-    """
-
-    line: OrderLine
-    time: Floats
-    speed: Floats
-    frequency: Floats
-    amplitude: Complexes
-
-
-def order_cut(
-    values: ArrayLike,
-    speed: ArrayLike,
-    rate: float,
-    line: OrderLine,
-    *,
-    window_length: float,
-    overlap: float = 0.75,
-    window: str = "hann",
-) -> OrderCut:
-    """Follow an order along the instantaneous speed.
-
-    The signal is multiplied by ``exp(-i order angle)``, the angle being the integral of the speed, and
-    averaged under a window. The order itself is at rest then: its amplitude comes out right however fast it
-    sweeps.
+def line_level(spectra: Waterfall, line: OrderLine) -> Floats:
+    """Level along an order line.
 
     Parameters
     ----------
-    values, speed : array_like, shape (n,)
-        Signal and speed of the reference shaft (rad/s), uniformly sampled.
-    rate : float
-        Sampling rate, Hz.
+    spectra : Waterfall
+        The run.
     line : OrderLine
-        The order to follow.
-    window_length : float
-        s; another order closer than about ``2 / window_length`` in Hz leaks in.
-    overlap : float
-        Share of each window that the next repeats, in [0, 1).
-    window : str
-        Name of a SciPy window.
+        The order.
 
     Returns
     -------
-    OrderCut
-
-    Examples
-    --------
-    >>> time = np.arange(4000) / 2000.0
-    >>> speed = 2 * np.pi * (2.0 + 3.0 * time)  # 2 to 8 turns per second
-    >>> angle = 2 * np.pi * (2.0 * time + 1.5 * time**2)
-    >>> cut = order_cut(0.5 * np.cos(30 * angle), speed, 2000.0, OrderLine("30", 30.0), window_length=0.1)
-    >>> bool(np.all(np.abs(np.abs(cut.amplitude) - 0.5) < 1e-3))
-    True
+    (n,) array
+        Highest level within half the resolution to both sides of the line, dB; NaN where the line lies above
+        the band or so low (four spectral widths) that the window cannot tell it from the mean.
     """
-    signal, shaft = np.asarray(values, dtype=np.float64), np.asarray(speed, dtype=np.float64)
-    length = round(window_length * rate)
-    step = 0.5 * (np.abs(shaft[1:]) + np.abs(shaft[:-1])) / rate
-    angle = np.concatenate([[0.0], np.cumsum(step)])
-    turning_back = np.exp(-1j * line.order * angle)
-    weights = scipy.signal.get_window(window, length)
-    weights *= 2.0 / weights.sum()
-    demodulated = signal * turning_back
-    middle = _frames(np.arange(signal.size) / rate, length, overlap).mean(axis=1)
-    mean_speed = np.abs(_frames(shaft, length, overlap).mean(axis=1))
-    return OrderCut(
-        line=line,
-        time=middle,
-        speed=mean_speed,
-        frequency=line.frequency(mean_speed),
-        amplitude=_frames(demodulated.real, length, overlap) @ weights
-        + 1j * (_frames(demodulated.imag, length, overlap) @ weights),
-    )
+    frequency = line.frequency(spectra.speed)
+    resolution = spectra.resolution(line)
+    spacing = float(spectra.frequency[1])
+    reach = int(np.max(np.ceil(0.5 * resolution / spacing)))
+    nearest = np.rint(frequency / spacing).astype(np.int64)
+    index = nearest[:, None] + np.arange(-reach, reach + 1)
+    last = spectra.frequency.size - 1
+    # The nearest spectral line always counts; half a resolution is at least that.
+    near = np.abs(index * spacing - frequency[:, None]) <= np.maximum(0.5 * resolution, 0.5 * spacing)[:, None]
+    level = np.take_along_axis(spectra.level, np.clip(index, 0, last), axis=1)
+    highest: Floats = np.where(near, level, -np.inf).max(axis=1)
+    inside = (frequency > 4.0 / spectra.window_length) & (nearest <= last)
+    return np.where(inside, highest, np.nan)

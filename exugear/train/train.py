@@ -12,6 +12,7 @@ import numpy as np
 from exugear.train.kinematics import CoupledBodies, MeshedBodies, coupling_row, kinematic_modes, mesh_row, turn_together
 from exugear.train.statics import holding_forces, without_round_off
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.notebook import html_table
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +57,25 @@ class Train:
     locked: tuple[str, ...]
     fault: Callable[[str], Exception]
 
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return (
+            f"<Train from {self.input!r} to {self.output!r}: {len(self.spins)} spins, {len(self.meshes)} meshes, "
+            f"{len(self.couplings)} couplings>"
+        )
+
+    def _repr_html_(self) -> str:
+        return html_table(
+            f"train from {self.input} to {self.output}",
+            {
+                "ratio": f"{self.ratio:.6g}",
+                "degrees of freedom": str(self.degrees_of_freedom),
+                "spins": ", ".join(self.spins),
+                "static load": ", ".join(f"{torque:g} N m on {body}" for body, torque in self.torques.items()),
+                "held by": ", ".join(self.locked) or "nothing",
+            },
+        )
+
     @cached_property
     def spin_rows(self) -> Floats:
         """How meshes close and couplings twist per unit spins, (meshes and couplings, spins); m/rad, and 1."""
@@ -94,9 +114,9 @@ class Train:
             raise self.fault("meshes: the gear train cannot turn, its meshes and couplings lock each other")
         prescribed = (body, *self._standing(body))
         rows = self._modes_of(prescribed)
-        wanted = np.array([speed, *(0.0 for _ in prescribed[1:])])
-        weights, _, rank, _ = np.linalg.lstsq(rows, wanted, rcond=1e-9)
-        if rank < self.degrees_of_freedom or np.abs(rows @ weights - wanted).max() > 1e-9 * abs(speed):
+        speeds = np.array([speed, *(0.0 for _ in prescribed[1:])])
+        weights, _, rank, _ = np.linalg.lstsq(rows, speeds, rcond=1e-9)
+        if rank < self.degrees_of_freedom or np.abs(rows @ weights - speeds).max() > 1e-9 * abs(speed):
             raise self.fault(
                 f"the gear train has {self.degrees_of_freedom} degrees of freedom; turning {', '.join(prescribed)} "
                 "does not fix it: name the bodies that are held in static_load.locked"

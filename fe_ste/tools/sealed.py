@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 import io
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -255,13 +255,23 @@ def open_dataset(path: Path, layout: Layout) -> Iterator[xr.Dataset]:
             yield dataset
 
 
-def load_dataset(path: Path, layout: Layout) -> xr.Dataset:
+def load_dataset(path: Path, layout: Layout, names: Sequence[str] | None = None) -> xr.Dataset:
     """Read a sealed netCDF file into memory.
+
+    Parameters
+    ----------
+    path : Path
+    layout : Layout
+    names : sequence of str, optional
+        Variables; all by default.
 
     Raises
     ------
     FileError
-        As `open_dataset`.
+        As `open_dataset`, or a variable is not there.
     """
     with open_dataset(path, layout) as dataset:
-        return dataset.load()
+        for name in names or ():
+            if name not in dataset.variables:
+                raise FileError(f"{path}: holds no {name}")
+        return dataset.load() if names is None else dataset[list(names)].load()

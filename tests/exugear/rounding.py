@@ -11,7 +11,7 @@ STIFFEST = 5e9
 
 
 def allowed_difference(signals: np.ndarray, meshes: int) -> np.ndarray:
-    """Bounds (channels,) of signals (samples, channels): deflections of the meshes, then forces of all sizes.
+    """Bounds (columns,) of signals (samples, columns): deflections of the meshes, then forces of all sizes.
 
     A tenth of a billionth of each, and of what cancels in them ten times the rounding: forces are differences of
     places times stiffness, so the small ones are known no better than the large ones.

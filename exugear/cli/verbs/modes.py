@@ -64,8 +64,8 @@ def modes(
 
 def _draw_campbell(found: Modes, path: Path) -> Path:
     """Draw the modes that the overall transmission error sees, over the speeds of the fastest load case."""
-    from exugear.pictures.diagrams import plot_campbell
-    from exugear.spectra.comparison import mobility_shares
+    from exugear.pictures.mode_diagrams import plot_campbell
+    from exugear.spectra.mode_report import mobility_shares
     from exugear.spectra.orders import order_lines
 
     gearbox, least = found.assembly.gearbox, 1e-3
@@ -87,13 +87,13 @@ def _draw_campbell(found: Modes, path: Path) -> Path:
 
 
 def _mode_summaries(found: Modes) -> list[dict[str, Any]]:
-    from exugear.spectra.comparison import report_mode
+    from exugear.spectra.mode_report import report_mode
 
     data = found.to_dataset()
-    reports = [report_mode(data, place) for place in range(len(found.names))]
+    reports = [report_mode(data, index) for index in range(len(found.names))]
     return [
         {
-            "mode": mode.place + 1,
+            "mode": mode.index + 1,
             "frequency_Hz": mode.frequency,
             "damping_ratio": mode.damping_ratio,
             "share_of_overall_dte": mode.share,

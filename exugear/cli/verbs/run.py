@@ -222,9 +222,9 @@ def _tell_run(case: Path, finished: Run, as_json: bool) -> None:
     if not finished.complete and not finished.halted:
         so_far = "".join(f"\nNot to be trusted so far: {reason}" for reason in finished.reasons)
         raise StoppedError(f"at {finished.end:.3f} s; kept in {finished.path}, --resume goes on from there{so_far}")
-    from exugear.dynamics.signals import BALANCE_TERMS, energy_residual
+    from exugear.dynamics.signals import BALANCE_TERMS, MESH_TIMES, energy_residual
     from exugear.model.parts import RPM
-    from exugear.results.run_file import MESH_TIMES, load_run
+    from exugear.results.run_file import load_run
 
     data = load_run(finished.path, ("input_speed", *MESH_TIMES, *BALANCE_TERMS))
     outside = float(data["outside_time"].max())

@@ -66,8 +66,9 @@ def view(
 def _draw_modes(found: Modes, folder: Path, first: int, animation: bool) -> list[Path]:
     """Write the page of all elastic modes, and pictures of the gearbox and one mode if this machine can render."""
     from exugear.pictures.elastic_scene import animate_elastic_bodies, draw_elastic_bodies, elastic_scene
+    from exugear.pictures.motions import mode_scene, motions_of
     from exugear.pictures.scene import animate_mode, draw_gearbox, draw_mode
-    from exugear.pictures.shapes import bodies_of, mode_scene, motions_of
+    from exugear.pictures.shapes import bodies_of
     from exugear.pictures.viewer import write_mode_page
     from fe_ste.tools.rendering import RenderingError
 

@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 from exugear.model.sections import quantities as q
 from exugear.model.sections.bodies import BodySection
 from exugear.model.sections.connections import BearingSection, CouplingSection, JointSection, MeshSection, MountSection
-from exugear.model.sections.entries import MOST_ENTRIES, Entries, FileName, Name, Section, Text
+from exugear.model.sections.entries import LONGEST_VALUE, MOST_ENTRIES, Entries, FileName, Name, Section, Text
 from exugear.model.sections.gears import DeviationSection, GearSection, PairSection, PinSection
 
 
@@ -158,3 +158,10 @@ class CaseFile(Section):
     gravity: GravitySection = GravitySection()
     report: ReportSection = ReportSection()
     ste: SteSection = SteSection()
+
+    def __repr__(self) -> str:
+        """Return one short line: the title, and how many entries the tables have."""
+        tables = ("gears", "pairs", "bodies", "meshes", "bearings", "load_cases")
+        counts = ", ".join(f"{len(getattr(self, table))} {table}" for table in tables)
+        title = self.name if len(self.name) <= LONGEST_VALUE else f"{self.name[: LONGEST_VALUE - 1]}…"
+        return f"<CaseFile {title!r}: {counts}>"

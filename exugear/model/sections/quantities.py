@@ -22,9 +22,12 @@ class Range:
 
     Attributes
     ----------
-    least, most : what can be
-    usual : what occurs; all that can be by default. Zero is usual wherever it can be: it switches something off.
-    why : what the limits come from
+    least, most : float
+        What can be.
+    usual : (float, float), optional
+        What occurs; all that can be by default. Zero is usual wherever it can be: it switches something off.
+    why : str
+        What the limits come from.
     """
 
     least: float
@@ -144,8 +147,8 @@ def _quantities(value: Any, kind: Any, metadata: tuple[Any, ...], key: str) -> I
             where = f"{key}.{name}" if key else name
             yield from _quantities(value.__dict__[name], field.annotation, tuple(field.metadata), where)
     elif get_origin(kind) in (Union, UnionType):
-        branches = [one for one in get_args(kind) if one is not type(None)]
-        fitting = [one for one in branches if isinstance(value, tuple) == (_plain(one) is tuple)]
+        branches = [branch for branch in get_args(kind) if branch is not type(None)]
+        fitting = [branch for branch in branches if isinstance(value, tuple) == (_plain(branch) is tuple)]
         yield from _quantities(value, branches[0] if len(branches) == 1 else fitting[0], metadata, key)
     elif isinstance(value, Mapping):
         for name, entry in value.items():

@@ -1,4 +1,4 @@
-"""Equations of motion, signals and a Runge-Kutta loop as one compiled piece that allocates nothing per step.
+"""Equations of motion and a Runge-Kutta loop as one compiled piece that allocates nothing per step.
 
 The laws are those of `exugear.kernels.meshes`, which the tests hold them against; here they are arranged for speed:
 every
@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import math
 
-from exugear.kernels.elastic import elastic_energies, set_elastic_motion
+from exugear.kernels.elastic import set_elastic_motion
 from exugear.kernels.travelling import place_travelling, share_travelling_forces
-from exugear.kernels.turning import set_turning_motion, turning_energies
-from exugear.solvers.compiled.arrays import Bodies, Equations, Joints, Loads, Meshes, Springs, Work
-from exugear.solvers.compiled.connectors import add_connectors, observe_connectors, place_bodies
-from exugear.solvers.compiled.meshes import add_meshes, observe_meshes
+from exugear.kernels.turning import set_turning_motion
+from exugear.solvers.compiled.arrays import Bodies, Equations, Loads, Springs, Work
+from exugear.solvers.compiled.connectors import add_connectors, place_bodies
+from exugear.solvers.compiled.meshes import add_meshes
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import kernel
 
@@ -124,88 +124,3 @@ def advance(first: int, step: float, equations: Equations, work: Work, out_q: Fl
             return n
     steps: int = out_q.shape[0]
     return steps
-
-
-@kernel
-def observe_joints(v: Floats, meshes: Meshes, joints: Joints, work: Work, signals: Floats) -> None:
-    """Fill the force of each ideal joint on its body (3 j,), global axes; after `observe_meshes`."""
-    signals[:] = 0.0
-    for m in range(meshes.coordinates.shape[0]):
-        c, s = work.turns[meshes.slot[m], 0], work.turns[meshes.slot[m], 1]
-        for end in range(2):
-            j = joints.ends[m, end]
-            if j >= 0:
-                force = work.states[m, 3]
-                row = meshes.force[m]
-                if force < 0.0 and meshes.table.shape[m, 0] > 0:  # the other flank pushes
-                    force, row = -force, meshes.table.back[m]
-                x, y, z = row[6 * end], row[6 * end + 1], row[6 * end + 2]
-                signals[3 * j] += force * (c * x - s * y)
-                signals[3 * j + 1] += force * (s * x + c * y)
-                signals[3 * j + 2] += force * z
-    for j in range(joints.host.size):
-        if joints.planet[j, 0] > 0.0:
-            c, s = work.turns[joints.slot[j], 0], work.turns[joints.slot[j], 1]
-            pull = joints.planet[j, 0] * v[joints.carrier[j]] ** 2
-            signals[3 * j] -= pull * (c * joints.planet[j, 1] - s * joints.planet[j, 2])
-            signals[3 * j + 1] -= pull * (s * joints.planet[j, 1] + c * joints.planet[j, 2])
-        if joints.host[j] >= 0:
-            for i in range(3):
-                signals[3 * joints.host[j] + i] += signals[3 * j + i]
-
-
-@kernel
-def observe_bodies(q: Floats, v: Floats, bodies: Bodies, work: Work, energy: Floats) -> None:
-    """Add the kinetic energy of all bodies (see `observe`)."""
-    for n in range(bodies.mass.size):
-        o, sb, cb = bodies.start[n], work.frames[n, 14], work.frames[n, 15]
-        square = v[o] * v[o] + v[o + 1] * v[o + 1] + v[o + 2] * v[o + 2]
-        tilting = (v[o + 3] * cb) ** 2 + v[o + 4] * v[o + 4]
-        spin = v[o + 5] + v[o + 3] * sb
-        energy[0] += 0.5 * (bodies.mass[n] * square + bodies.transverse[n] * tilting + bodies.axial[n] * spin * spin)
-    for n in range(bodies.spin.size):
-        energy[0] += 0.5 * bodies.spin_inertia[n] * v[bodies.spin[n]] ** 2
-
-
-@kernel
-def observe(
-    time: Floats, q: Floats, v: Floats, equations: Equations, work: Work, signals: Floats, energies: Floats
-) -> None:
-    """Fill signals (samples, 2 m + 3 supports) and energies (samples, 7) of states q, v (samples, size).
-
-    Signals: deflection and F_bt of each mesh, force of each bearing or ideal joint, with tables where the gears stand
-    (`exugear.dynamics.signals`). Energies: kinetic and elastic (J); powers (W) of the loads, damped, of k(PMC),
-    non-conservative of meshes and of bearings.
-    """
-    size = q.shape[1]
-    meshes, springs = equations.meshes, equations.springs
-    two = 2 * meshes.coordinates.shape[0]
-    x, u, f = work.stage_q, work.stage_v, work.force
-    for n in range(q.shape[0]):
-        energy = energies[n]
-        energy[:] = 0.0
-        for i in range(size):
-            x[i], u[i] = q[n, i], v[n, i]
-        place_bodies(x, u, equations.bodies, work)
-        observe_bodies(x, u, equations.bodies, work, energy)
-        place_travelling(x, u, equations.travelling)
-        observe_meshes(x, u, meshes, work, signals[n], energy)
-        observe_connectors(x, u, equations.bodies, equations.connectors, work, signals[n, two:], energy)
-        if equations.joints.host.size > 0:
-            observe_joints(u, meshes, equations.joints, work, signals[n, two : two + 3 * equations.joints.host.size])
-        for s in range(springs.ends.shape[0]):
-            i, j = springs.ends[s, 0], springs.ends[s, 1]
-            energy[1] += 0.5 * springs.stiffness[s] * (x[j] - x[i]) ** 2
-            energy[3] += springs.damping[s] * (u[j] - u[i]) ** 2
-        kinetic, stored, damped = elastic_energies(x, u, equations.elastic, work.scratch)
-        energy[0] += kinetic
-        energy[1] += stored
-        energy[3] += damped
-        kinetic, stored, damped, weight = turning_energies(x, u, equations.turning, work.memory)
-        energy[0] += kinetic
-        energy[1] += stored
-        energy[2] += weight
-        energy[3] += damped
-        set_loads(time[n], x, u, equations.loads, work.series, f)
-        for i in range(size):
-            energy[2] += f[i] * u[i]

@@ -6,12 +6,8 @@ Same coordinates and same laws as the Exudyn system built from the same assembly
 
 from __future__ import annotations
 
-import numpy as np
-
 from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.modes import overall_row
-from exugear.dynamics.signals import Channels
-from exugear.solvers.compiled.equations import advance, evaluate, observe
+from exugear.solvers.compiled.equations import advance, evaluate
 from exugear.solvers.compiled.packing import equations_of, work_for
 from exugear.solvers.loads import LoadTable
 from fe_ste.tools.arrays import Floats
@@ -64,27 +60,3 @@ class CompiledSystem:
             Number of steps that stayed finite.
         """
         return advance(first, self.step, self.equations, self._work, q, v)
-
-
-class Observer:
-    """Signals and energies of states by one compiled loop; columns as those of `exugear.dynamics.signals.Channels`."""
-
-    def __init__(self, channels: Channels, loads: LoadTable) -> None:
-        assembly = channels.assembly
-        overall = assembly.gearbox.case.overall
-        self._count = channels.count
-        self._input = assembly.spin[overall.input]
-        self._overall = overall_row(assembly) / channels.radius
-        self._equations = equations_of(assembly, loads)
-        self._work = work_for(self._equations, np.zeros(assembly.size), np.zeros(assembly.size))
-
-    def observe(self, time: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:
-        """Signals (samples, count), energies (samples, 2) in J and powers (samples, 5) in W of states q, v.
-
-        The powers are those of the loads, damping, k(PMC), and non-conservative forces of meshes and bearings.
-        """
-        signals, energies = np.empty((len(time), self._count)), np.empty((len(time), 7))
-        signals[:, 0] = v[:, self._input]
-        signals[:, 1] = q @ self._overall
-        observe(time, q, v, self._equations, self._work, signals[:, 2:], energies)
-        return signals, energies[:, :2], energies[:, 2:]

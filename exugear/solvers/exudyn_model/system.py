@@ -292,7 +292,7 @@ class ExudynSystem:
         for n, bearing in enumerate(self.assembly.supports):
             if n in elsewhere:
                 continue
-            place = np.array(bearing.place)
+            place = np.array(bearing.position)
             pin = np.array([*self.assembly.gearbox.pin_offsets.get(bearing.body, (0.0, 0.0)), 0.0])
             ends = ((bearing.on, place + pin), (bearing.body, place))
             self.mbs.AddObject(
@@ -304,7 +304,7 @@ class ExudynSystem:
             )
 
     def _add_joint(self, joint: Joint) -> None:
-        place = np.array(joint.place)
+        place = np.array(joint.position)
         self.mbs.AddObject(
             items.GenericJoint(
                 markerNumbers=[self._point(body, joint.name, place) for body in (joint.on, joint.body)],

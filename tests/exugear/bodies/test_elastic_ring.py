@@ -11,15 +11,17 @@ import pytest
 import xarray as xr
 
 from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.signals import Channels, energy_residual
+from exugear.dynamics.signals import energy_residual
 from exugear.dynamics.statics import accelerating_start, locked_equilibrium
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
-from exugear.solvers.compiled.solver import CompiledSystem, Observer
+from exugear.solvers.compiled.observers import Observer
+from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.exudyn_model.system import ExudynSystem
 from exugear.solvers.loads import Loading, LoadTable
 
 from ..assembled import assembled, simulated
+from ..plain_signals import energies_of, sampled
 from ..ring_case import ring_content
 from ..rounding import allowed_difference
 
@@ -119,10 +121,10 @@ def test_compiled_right_hand_side_is_that_of_the_plain_kernels(ringed: Assembly)
     expected = ringed.accelerations(q, v, ringed.torque_vector(LOAD))
     # Rounding of places of 1 m, 1e-16 m each, of displacements of 1e-6 m.
     assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
-    signals, energies, _ = Observer(Channels(ringed), loads).observe(np.zeros(1), q[None], v[None])
-    plain = Channels(ringed).sample(q[None], v[None])
+    signals, energies, _ = Observer(ringed, loads).observe(np.zeros(1), q[None], v[None])
+    plain = sampled(ringed, q[None], v[None])
     assert np.all(np.abs(signals - plain) < allowed_difference(plain, len(ringed.mesh_names)))
-    assert energies[0] == pytest.approx(Channels(ringed).energies(q[None], v[None])[0, :2], rel=1e-9)
+    assert energies[0] == pytest.approx(energies_of(ringed, q[None], v[None])[0, :2], rel=1e-9)
 
 
 def test_compiled_solver_and_exudyn_run_alike(ringed: Assembly) -> None:

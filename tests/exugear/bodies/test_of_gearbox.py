@@ -12,18 +12,20 @@ from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly, VariantError
 from exugear.dynamics.linearised import linearise
 from exugear.dynamics.modes import counterparts, eigenmodes, modes_of
-from exugear.dynamics.signals import Channels
+from exugear.dynamics.signals import signal_layout
 from exugear.dynamics.statics import accelerating_start, locked_equilibrium
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
 from exugear.pictures.elastic_scene import animate_elastic_bodies, draw_elastic_bodies, elastic_scene
-from exugear.solvers.compiled.solver import CompiledSystem, Observer
+from exugear.solvers.compiled.observers import Observer
+from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.exudyn_model.system import ExudynSystem
 from exugear.solvers.loads import Loading, LoadTable
 
 from ..assembled import assembled, modes_with_bodies
 from ..limit_case import unchecked
+from ..plain_signals import energies_of, sampled
 from ..rounding import allowed_difference
 
 LOAD = {"carrier": 240e3, "hss": -3000.0}
@@ -158,27 +160,25 @@ def test_gyroscopic_forces_follow_the_actual_speed(flexible: Assembly) -> None:
 
 
 def test_signals_and_energies_are_those_of_the_plain_kernels(flexible: Assembly) -> None:
-    channels = Channels(flexible)
     states = [spinning(flexible, angle) for angle in (0.0, 0.7)]
     q, v = (np.array(values) for values in zip(*states, strict=True))
-    signals, energies, powers = Observer(channels, LoadTable(LOAD)).observe(np.zeros(2), q, v)
-    expected = channels.sample(q, v)
+    signals, energies, powers = Observer(flexible, LoadTable(LOAD)).observe(np.zeros(2), q, v)
+    expected = sampled(flexible, q, v)
     assert np.all(np.abs(signals - expected) < allowed_difference(expected, len(flexible.mesh_names)))
-    plain = channels.energies(q, v)
+    plain = energies_of(flexible, q, v)
     scale = np.abs(plain).max(axis=0) + np.abs(plain[:, 2]).max()
     assert (np.abs(np.column_stack([energies, powers[:, 1:]]) - plain) / scale).max() < 1e-9
 
 
 def test_power_is_balanced_at_every_state(flexible: Assembly) -> None:
     # d/dt of kinetic and elastic energy = loads - damping - work of k(PMC) - other; central difference in time.
-    channels = Channels(flexible)
     q, v = spinning(flexible)
     applied = flexible.torque_vector(LOAD)
     a = flexible.accelerations(q, v, applied)
     h = 1e-8
-    early, late = (channels.energies((q + s * h * v)[None], (v + s * h * a)[None])[0] for s in (-1.0, 1.0))
+    early, late = (energies_of(flexible, (q + s * h * v)[None], (v + s * h * a)[None])[0] for s in (-1.0, 1.0))
     change = (late[:2].sum() - early[:2].sum()) / (2.0 * h)
-    powers = channels.energies(q[None], v[None])[0, 2:]
+    powers = energies_of(flexible, q[None], v[None])[0, 2:]
     assert change == pytest.approx(v @ applied - powers.sum(), rel=1e-4)
 
 
@@ -196,13 +196,13 @@ def trajectories(assembly: Assembly, steps: int) -> tuple[np.ndarray, np.ndarray
 
     ExudynSystem(assembly, start.q, start.v, Loading(LOAD)).run(0.0, steps, STEP, keep)
     states = np.array(rows)
-    channels = Channels(assembly)
-    return channels.sample(q, v), channels.sample(states[:, 0], states[:, 1])
+    return sampled(assembly, q, v), sampled(assembly, states[:, 0], states[:, 1])
 
 
 def test_the_compiled_solver_follows_exudyn(flexible: Assembly) -> None:
     found, expected = trajectories(flexible, 500)
-    columns = slice(1, 2 + 2 * len(flexible.mesh_names))
+    layout = signal_layout(flexible)
+    columns = slice(layout["overall_dte_angle"].start, layout["mesh_force"].stop)
     moving = expected[:, columns] - expected[:, columns].mean(axis=0)
     error = np.sqrt(np.mean((found - expected)[:, columns] ** 2, axis=0) / np.mean(moving**2, axis=0))
     assert error.max() < 1e-5

@@ -19,7 +19,7 @@ from exugear.dynamics.assembly import Assembly, VariantError
 from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.linearised import linearise
 from exugear.dynamics.modes import MOTIONS, counterparts, eigenmodes, modes_of
-from exugear.dynamics.signals import Channels, energy_residual
+from exugear.dynamics.signals import energy_residual
 from exugear.dynamics.statics import accelerating_start, locked_equilibrium
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
@@ -34,6 +34,7 @@ from fe_ste.tools.sparse import factorise
 from ..assembled import assembled, modes_with_bodies, simulated
 from ..box_case import box_content
 from ..limit_case import unchecked
+from ..plain_signals import sampled
 
 STIFFNESS = {"spur": 2e8 * (1.0 + 0.1 * np.cos(2.0 * np.pi * np.arange(16) / 16))}
 LOAD = {"shaft_1": 100.0, "shaft_2": 140.0}
@@ -197,8 +198,7 @@ def test_the_compiled_solver_follows_exudyn_and_the_plain_kernels(housed: Assemb
         return True
 
     ExudynSystem(housed, q, v, Loading(LOAD)).run(0.0, steps, STEP, keep)
-    channels = Channels(housed)
-    found, expected = channels.sample(*states), channels.sample(*np.swapaxes(np.array(rows), 0, 1))
+    found, expected = sampled(housed, *states), sampled(housed, *np.swapaxes(np.array(rows), 0, 1))
     swing = np.mean((expected - expected.mean(axis=0)) ** 2, axis=0)
     assert np.sqrt(np.mean((found - expected) ** 2, axis=0) / swing).max() < 1e-5
 

@@ -14,17 +14,19 @@ import skfem
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.linearised import linearise
 from exugear.dynamics.modes import modes_of
-from exugear.dynamics.signals import Channels
+from exugear.dynamics.signals import signal_layout
 from exugear.dynamics.statics import accelerating_start, locked_equilibrium
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.named_files import Permissions
-from exugear.solvers.compiled.solver import CompiledSystem, Observer
+from exugear.solvers.compiled.observers import Observer
+from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.exudyn_model.system import ExudynSystem
 from exugear.solvers.loads import Loading, LoadTable
 
 from ..assembled import assembled, modes_with_bodies
 from ..limit_case import unchecked
+from ..plain_signals import energies_of, sampled
 
 pytestmark = pytest.mark.skipif(importlib.util.find_spec("meshio") is None, reason="meshio (extra mesh) is missing")
 
@@ -114,10 +116,9 @@ def test_compiled_accelerations_are_those_of_the_plain_kernels(
 
 
 def test_signals_and_energies_are_those_of_the_plain_kernels(flexible: Assembly) -> None:
-    channels = Channels(flexible)
     q, v = turned_state(flexible, 0.7)
-    _, energies, powers = Observer(channels, LoadTable(LOAD)).observe(np.zeros(1), q[None], v[None])
-    plain = channels.energies(q[None], v[None])
+    _, energies, powers = Observer(flexible, LoadTable(LOAD)).observe(np.zeros(1), q[None], v[None])
+    plain = energies_of(flexible, q[None], v[None])
     scale = np.abs(plain) + np.abs(plain[:, 2]).max()
     assert (np.abs(np.column_stack([energies, powers[:, 1:]]) - plain) / scale).max() < 1e-9
 
@@ -130,7 +131,7 @@ def test_the_account_of_energy_of_a_run_closes(carrying: Gearbox, stiffness: dic
     q, v = np.empty((2, 2001, assembly.size))
     q[0], v[0] = start.q, start.v
     assert CompiledSystem(assembly, start.q, start.v, LoadTable(LOAD), STEP).advance(0, q[1:], v[1:]) == 2000
-    _, energies, powers = Observer(Channels(assembly), LoadTable(LOAD)).observe(STEP * np.arange(2001), q, v)
+    _, energies, powers = Observer(assembly, LoadTable(LOAD)).observe(STEP * np.arange(2001), q, v)
     weights = np.full(2001, 2.0)
     weights[1::2], weights[[0, -1]] = 4.0, 1.0
     work = STEP / 3.0 * weights @ powers
@@ -172,9 +173,9 @@ def test_the_compiled_solver_follows_exudyn(flexible: Assembly) -> None:
 
     ExudynSystem(flexible, start.q, start.v, Loading(LOAD)).run(0.0, 500, STEP, keep)
     states = np.array(rows)
-    channels = Channels(flexible)
-    columns = slice(1, 2 + 2 * len(flexible.mesh_names))
-    found, expected = (channels.sample(*both)[:, columns] for both in ((q, v), (states[:, 0], states[:, 1])))
+    layout = signal_layout(flexible)
+    columns = slice(layout["overall_dte_angle"].start, layout["mesh_force"].stop)
+    found, expected = (sampled(flexible, *both)[:, columns] for both in ((q, v), (states[:, 0], states[:, 1])))
     error = np.sqrt(np.mean((found - expected) ** 2, axis=0) / np.var(expected, axis=0))
     assert error.max() < 1e-5
     # The carrier's own coordinates, too: by their motion against a steady turning.

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from exugear.cli.app import app
 from exugear.cli.options import MeshLaw, Variant
 from exugear.cli.verbs.run import Solver
-from exugear.dynamics.assemble import VARIANTS
+from exugear.dynamics.readiness import VARIANTS
 from exugear.model.gearbox import Gearbox
 from exugear.runs.outcome import RunError
 from exugear.runs.runup import SOLVERS
@@ -226,7 +226,7 @@ def test_report_of_a_folder_without_results_is_bad_input(tmp_path, name):
 
 
 def test_report_says_where_it_is_and_where_the_time_went(case, monkeypatch):
-    monkeypatch.setattr("exugear.report.writer.draw_mode", lambda scene, path: path.write_bytes(b""))
+    monkeypatch.setattr("exugear.report.mode_pictures.draw_mode", lambda scene, path: path.write_bytes(b""))
     for variant in ("rigid", "bushing"):
         assert iso("modes", case, "--variant", variant).exit_code == 0
     outcome = exugear("report", case.parent / "out")

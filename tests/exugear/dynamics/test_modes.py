@@ -331,3 +331,9 @@ def test_linearisation_ignores_the_slope_of_the_stiffness(grc: Gearbox, stiffnes
         rolling[assembly.spin[name]] = value
     stiff = linearise(assembly, q).total_stiffness
     assert np.abs(stiff @ rolling).max() < 1e-9 * np.abs(stiff).max()
+
+
+def test_modes_show_themselves_in_a_line_and_a_small_table(grc: Gearbox, stiffness: dict) -> None:
+    modes = eigenmodes(grc, Choice("rigid"), stiffness)
+    assert repr(modes).startswith(f"Modes(rigid, line_of_action, assemblies: {modes.frequency.size}, 0 to ")
+    assert f"<th>modes</th><td>{modes.frequency.size}</td>" in modes._repr_html_()

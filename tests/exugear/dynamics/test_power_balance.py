@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.signals import Channels
+from exugear.dynamics.signals import signal_layout
 from exugear.dynamics.statics import accelerating_start
 from exugear.kernels.connectors import ConnectorArrays, add_connector_forces
 from exugear.kernels.meshes import STATE_SIZE, add_mesh_forces, mesh_state
@@ -26,6 +26,7 @@ from exugear.solvers.compiled.step import choose_step
 from exugear.solvers.loads import LoadTable
 
 from ..assembled import assembled
+from ..plain_signals import energies_of, sampled
 
 LOAD = {"carrier": 240e3, "hss": -3000.0}
 SHARE = 1e-5
@@ -94,7 +95,7 @@ def account_of(assembly: Assembly, start_speed: float, duration: float) -> Accou
     """Run by the compiled solver and integrate all powers over its raw steps, chunk by chunk."""
     start = accelerating_start(assembly, LOAD, start_speed)
     step = choose_step(assembly, 20e3, 6.4e3)
-    channels = Channels(assembly)
+    layout = signal_layout(assembly)
     meshes = [assembly.meshes.one(m) for m in range(len(assembly.elements))]
     bearings = [
         ConnectorArrays._make(a[n : n + 1] for a in assembly.connectors) for n in range(len(assembly.connector_names))
@@ -108,9 +109,9 @@ def account_of(assembly: Assembly, start_speed: float, duration: float) -> Accou
         q, v = np.empty((2, size + 1, assembly.size))
         q[0], v[0] = last
         assert system.advance(done, q[1:], v[1:]) == size
-        signals = channels.sample(q, v)
-        delta = signals[:, 2 : 2 + count]
-        force = signals[:, 2 + count : 2 + 2 * count] / assembly.meshes.line_of_action
+        signals = sampled(assembly, q, v)
+        delta = layout.values("mesh_dte", signals)
+        force = layout.values("mesh_force", signals) / assembly.meshes.line_of_action
         powers = np.empty((count, size + 1, 4))
         for mesh, out in zip(meshes, powers, strict=True):
             mesh_powers(q, v, mesh, mesh.damping[0], out)
@@ -118,7 +119,7 @@ def account_of(assembly: Assembly, start_speed: float, duration: float) -> Accou
         for bearing, out in zip(bearings, others[:-1], strict=True):
             bearing_powers(q, v, bearing, out)
         spring_powers(q, v, assembly.springs, others[-1])
-        kinetic = channels.energies(q[[0, -1]], v[[0, -1]])[:, 0]
+        kinetic = energies_of(assembly, q[[0, -1]], v[[0, -1]])[:, 0]
         energies += [np.append(powers[:, n, 3], kinetic[n]) for n in (0, -1)]
         total += np.concatenate(
             [

@@ -1,4 +1,4 @@
-"""Sweeps over assumptions: closed forms on one gear pair, modes followed through crossings."""
+"""Parameters varied over assumptions: closed forms on one gear pair, modes followed through crossings."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import pytest
 
 from exugear.dynamics.sensitivity import (
     Parameter,
-    parameters_of,
+    assumed_parameters,
+    frequency_matches,
     planet_bearings,
-    remedies,
     scaled_bearings,
-    sweep_modes,
+    vary_parameter,
 )
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
@@ -28,47 +28,47 @@ def spur() -> Gearbox:
 
 
 def parameter(gearbox: Gearbox, variant: str, start: str, stiffness: dict) -> Parameter:
-    found = parameters_of(gearbox, Choice(variant, "line_of_action", gearbox.case.default_inertias), stiffness)
-    return next(one for one in found if one.label.startswith(start))
+    parameters = assumed_parameters(gearbox, Choice(variant), stiffness)
+    return next(parameter for parameter in parameters if parameter.label.startswith(start))
 
 
 def test_output_inertia_moves_the_mesh_mode_as_the_closed_form_says(spur):
     stiffness = mesh_stiffness(spur, "iso6336")
-    sweep = sweep_modes(parameter(spur, "rigid", "axial inertia of shaft_2", stiffness))
+    variation = vary_parameter(parameter(spur, "rigid", "axial inertia of shaft_2", stiffness))
     pair = spur.pairs["spur"].pair
-    inertia = np.array(sweep.parameter.values)
+    inertia = np.array(variation.parameter.values)
     flexibility = pair.pinion.base_radius**2 / 1e-2 + pair.gear.base_radius**2 / inertia
     expected = np.sqrt(stiffness["spur"][0] * flexibility) / (2 * np.pi)
-    assert sweep.frequency[:, 1] == pytest.approx(expected, rel=1e-9)
-    assert sweep.share[:, 1] == pytest.approx(np.ones(inertia.size), abs=1e-12)
+    assert variation.frequency[:, 1] == pytest.approx(expected, rel=1e-9)
+    assert variation.share[:, 1] == pytest.approx(np.ones(inertia.size), abs=1e-12)
 
 
 def test_mesh_damping_moves_no_frequency_and_lowers_the_resonance(spur):
     stiffness = mesh_stiffness(spur, "iso6336")
-    sweep = sweep_modes(parameter(spur, "rigid", "mesh damping", stiffness))
-    assert np.ptp(sweep.frequency[:, 1]) < 1e-9 * sweep.frequency[0, 1]
-    times = np.array(sweep.parameter.values)
+    variation = vary_parameter(parameter(spur, "rigid", "mesh damping", stiffness))
+    assert np.ptp(variation.frequency[:, 1]) < 1e-9 * variation.frequency[0, 1]
+    times = np.array(variation.parameter.values)
     # One degree of freedom: damping ratio = pi f tau, amplification = 1 / (2 ratio) times the kinematic factor.
-    assert sweep.damping_ratio[:, 1] == pytest.approx(np.pi * sweep.frequency[:, 1] * 1e-6 * times, rel=1e-9)
-    product = sweep.amplification[:, 1] * sweep.damping_ratio[:, 1]
+    assert variation.damping_ratio[:, 1] == pytest.approx(np.pi * variation.frequency[:, 1] * 1e-6 * times, rel=1e-9)
+    product = variation.amplification[:, 1] * variation.damping_ratio[:, 1]
     assert product == pytest.approx(np.full(times.size, product[0]), rel=1e-9)
 
 
 def test_a_crossing_leads_to_the_assumption_that_brings_the_mode_there(spur):
     stiffness = mesh_stiffness(spur, "iso6336")
-    sweep = sweep_modes(parameter(spur, "rigid", "axial inertia of shaft_2", stiffness))
-    target = 0.5 * float(sweep.frequency[3, 1] + sweep.frequency[4, 1])
-    (remedy,) = remedies([sweep], target, 0.01)
+    variation = vary_parameter(parameter(spur, "rigid", "axial inertia of shaft_2", stiffness))
+    target = 0.5 * float(variation.frequency[3, 1] + variation.frequency[4, 1])
+    (match,) = frequency_matches([variation], target, 0.01)
     # Linear between values a factor 1.4 apart.
-    assert remedy.modes.frequency[remedy.place] == pytest.approx(target, rel=3e-3)
-    assert sweep.parameter.values[3] < remedy.value < sweep.parameter.values[4]
-    assert not list(remedies([sweep], 10.0 * target, 0.01))
+    assert match.frequency == pytest.approx(target, rel=3e-3)
+    assert variation.parameter.values[3] < match.value < variation.parameter.values[4]
+    assert not list(frequency_matches([variation], 10.0 * target, 0.01))
 
 
 def test_the_housing_factor_counts_only_where_there_are_bearings(spur):
     stiffness = mesh_stiffness(spur, "iso6336")
     labels = {
-        variant: [one.label for one in parameters_of(spur, Choice(variant, "line_of_action", "disc"), stiffness)]
+        variant: [parameter.label for parameter in assumed_parameters(spur, Choice(variant), stiffness)]
         for variant in ("rigid", "bushing")
     }
     assert "housing factor" not in labels["rigid"]
@@ -88,8 +88,8 @@ def test_planet_bearings_of_the_grc_are_those_between_planets_and_carrier(grc, s
 
 def test_modes_are_followed_through_a_crossing(grc, stiffness):
     # With less inertia the mode of the high-speed shaft rises through those of the planets, which stay.
-    sweep = sweep_modes(parameter(grc, "bushing", "axial inertia of hss", stiffness))
-    seen = sweep.near((1500.0, 5500.0), 0.01)
+    variation = vary_parameter(parameter(grc, "bushing", "axial inertia of hss", stiffness))
+    seen = variation.near((1500.0, 5500.0), 0.01)
     spread = np.ptp(seen.frequency, axis=0)
     assert np.sum(spread > 1000.0) == 1
     # The others lie in its way and move by less than a quarter of a percent.
@@ -98,8 +98,8 @@ def test_modes_are_followed_through_a_crossing(grc, stiffness):
 
 def test_inertias_no_rigid_body_has_are_not_built(grc, stiffness):
     # The set "gears" has a light pinion: a large axial inertia needs a larger transverse one with it.
-    found = parameters_of(grc, Choice("bushing", "line_of_action", "gears"), stiffness)
-    inertia = next(one for one in found if one.label.startswith("axial inertia"))
+    parameters = assumed_parameters(grc, Choice("bushing", inertias="gears"), stiffness)
+    inertia = next(parameter for parameter in parameters if parameter.label.startswith("axial inertia"))
     built = inertia.build(max(inertia.values)).gearbox.body("hss", "gears")
     assert built.axial == max(inertia.values)
     assert built.axial <= 2.0 * built.transverse

@@ -15,18 +15,19 @@ import xarray as xr
 
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.signals import Channels
 from exugear.dynamics.statics import locked_equilibrium
 from exugear.kernels.meshes import add_mesh_forces
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.runs.runup import simulate
-from exugear.solvers.compiled.solver import CompiledSystem, Observer
+from exugear.solvers.compiled.observers import Observer
+from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.loads import LoadTable
 from exugear.tooth_mesh.element import pack
 from fe_ste.transmission_error.surface import SteSurface
 
 from ..assembled import assembled, simulated
+from ..plain_signals import energies_of, sampled
 from ..spur_case import SPUR_CASE
 from ..table_case import surfaces
 
@@ -112,11 +113,10 @@ def test_compiled_solver_has_the_same_forces_signals_and_energies(grc: Gearbox, 
         found = CompiledSystem(assembly, q, v, LoadTable(load), 1e-5).accelerations()
         expected = assembly.accelerations(q, v, assembly.torque_vector(load))
         assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
-        channels = Channels(assembly)
-        signals, energies, powers = Observer(channels, LoadTable(load)).observe(np.zeros(1), q[None], v[None])
-        sample = channels.sample(q[None], v[None])
+        signals, energies, powers = Observer(assembly, LoadTable(load)).observe(np.zeros(1), q[None], v[None])
+        sample = sampled(assembly, q[None], v[None])
         assert np.abs(signals - sample).max() < 1e-9 * np.abs(sample).max()
-        plain = channels.energies(q[None], v[None])
+        plain = energies_of(assembly, q[None], v[None])
         scale = np.abs(plain).max()
         assert np.abs(np.column_stack([energies, powers[:, 1:]]) - plain).max() < 1e-9 * scale
 

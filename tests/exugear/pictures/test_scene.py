@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from exugear.pictures.motions import mode_scene
 from exugear.pictures.scene import (
     DISPLACEMENT_COLOURS,
     animate_mode,
@@ -12,7 +13,8 @@ from exugear.pictures.scene import (
     draw_gearbox,
     draw_mode,
 )
-from exugear.pictures.shapes import BodyShape, Surface, gear_surface, mode_scene, tube_surface
+from exugear.pictures.shapes import BodyShape
+from exugear.pictures.surfaces import Surface, gear_surface, tube_surface
 from fe_ste.geometry.gears import Gear
 from fe_ste.tools.rendering import RenderingError, require_rendering
 

@@ -8,7 +8,9 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from exugear.pictures.shapes import BodyShape, displacement_of, mode_scene, tube_surface
+from exugear.pictures.motions import displacement_of, mode_scene
+from exugear.pictures.shapes import BodyShape
+from exugear.pictures.surfaces import tube_surface
 from exugear.pictures.viewer import write_mode_page
 
 

@@ -22,9 +22,11 @@ from typer.testing import CliRunner
 
 from exugear.cli import console
 from exugear.cli.app import app
-from exugear.pictures.diagrams import plot_mode_energies
+from exugear.pictures.mode_diagrams import plot_mode_energies
+from exugear.pictures.motions import mode_scene
 from exugear.pictures.scene import mode_figure
-from exugear.pictures.shapes import BodyShape, mode_scene, tube_surface
+from exugear.pictures.shapes import BodyShape
+from exugear.pictures.surfaces import tube_surface
 from exugear.pictures.viewer import write_mode_page
 from exugear.report import page
 from fe_ste.tools.rendering import RenderingError
@@ -97,8 +99,8 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Any]]:
         def unable(*arguments: Any, **options: Any) -> None:
             raise RenderingError(f"no picture {MARKUP}")
 
-        for place in ("pictures.scene.draw_gearbox", "report.writer.draw_mode"):
-            patch.setattr(f"exugear.{place}", unable)
+        for drawing in ("pictures.scene.draw_gearbox", "report.mode_pictures.draw_mode"):
+            patch.setattr(f"exugear.{drawing}", unable)
         ended = [
             exugear("check", case),
             exugear("check", case, "--json"),

@@ -41,8 +41,8 @@ def no_rendering(monkeypatch):
     def unable(*arguments, **options):
         raise RenderingError("3-D pictures need pyvista: pip install 'exugear[pictures]'")
 
-    monkeypatch.setattr("exugear.report.writer.draw_mode", unable)
-    monkeypatch.setattr("exugear.report.writer.draw_elastic_bodies", unable)
+    monkeypatch.setattr("exugear.report.mode_pictures.draw_mode", unable)
+    monkeypatch.setattr("exugear.report.mode_pictures.draw_elastic_bodies", unable)
 
 
 @pytest.fixture(scope="module")

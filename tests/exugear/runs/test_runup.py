@@ -19,7 +19,6 @@ from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.named_files import Permissions
 from exugear.model.reading import CaseError
-from exugear.results.decimation import Decimator, low_pass
 from exugear.results.run_file import load_run
 from exugear.runs.outcome import Progress, RunError
 from exugear.runs.runup import simulate
@@ -76,7 +75,7 @@ def test_file_carries_what_was_run_and_units(grc: Gearbox, stiffness: dict, tmp_
     data = opened(run.path)
     assert data.attrs["inertias"] == "assemblies"
     assert data.attrs["complete"] == 1
-    assert data["mesh_force"].attrs["units"] == "N"
+    assert data["mesh_force"].attrs == {"units": "N", "sign_convention": "the loaded flank pushes"}
     assert list(data.mesh.values[:2]) == ["sun_planet_1", "sun_planet_2"]
     assert data.sizes["support"] == 14
     assert np.diff(data.time) == pytest.approx(5e-5, rel=1e-9)
@@ -241,24 +240,6 @@ def test_run_with_rigid_meshes(grc: Gearbox, tmp_path: Path) -> None:
 def test_unknown_load_case_is_named(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
     with pytest.raises(CaseError, match="no load case 'storm'"):
         simulate(grc, Choice("rigid", load_case="storm"), stiffness, tmp_path)
-
-
-def test_decimation_keeps_the_band_and_removes_what_would_fold() -> None:
-    time = np.arange(8000) / 40e3
-    rows = np.column_stack([np.sin(2 * np.pi * 7e3 * time), np.sin(2 * np.pi * 12.8e3 * time)])
-    decimator = Decimator(2, 2)
-    results = np.vstack([decimator.push(part)[1] for part in np.array_split(rows, 7)])
-    first = decimator.half + decimator.half % 2
-    expected = rows[first::2, 0][: len(results)]
-    assert np.abs(results[:, 0] - expected).max() < 2e-4  # passband ripple of an 80 dB design
-    assert np.abs(results[:, 1]).max() < 2e-4  # twice the 6.4 kHz mesh would fold to 7.2 kHz
-
-
-def test_low_pass_is_the_one_that_scipy_designs() -> None:
-    for factor in (2, 3, 5):
-        half = 31 * factor // 2
-        expected = scipy.signal.firwin(2 * half + 1, 1.0 / factor, window=("kaiser", 8.0))
-        assert np.abs(low_pass(factor, half) - expected).max() < 1e-15
 
 
 def test_equal_planets_in_phase_load_the_sun_evenly(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:

@@ -89,7 +89,7 @@ def test_a_train_that_runs_away_is_stopped_where_its_rims_would_burst(tmp_path):
 
 
 def test_teeth_that_pull_for_the_whole_run_end_with_code_1_and_a_red_box_in_the_report(tmp_path, monkeypatch):
-    monkeypatch.setattr("exugear.report.writer.draw_mode", lambda scene, path: path.write_bytes(b""))
+    monkeypatch.setattr("exugear.report.mode_pictures.draw_mode", lambda scene, path: path.write_bytes(b""))
     outcome = exugear("run", written(tmp_path, REVERSED), "--json")
     assert outcome.exit_code == 1
     summary = json.loads(outcome.stdout)
@@ -235,9 +235,9 @@ import sys
 import tomllib
 import numpy as np
 from exugear.dynamics.assemble import assemble
-from exugear.solvers.compiled.solver import CompiledSystem, Observer
+from exugear.solvers.compiled.observers import Observer
+from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.loads import LoadTable
-from exugear.dynamics.signals import Channels
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.kernels.meshes import add_mesh_forces
@@ -259,7 +259,7 @@ for gearbox, law, data in (
     assembly = assemble(gearbox, Choice("rigid", law), data)
     rest = np.zeros(assembly.size)
     system = CompiledSystem(assembly, rest, rest, LoadTable(), 1e-6)
-    observer = Observer(Channels(assembly), LoadTable())
+    observer = Observer(assembly, LoadTable())
     sign = np.where(np.arange(assembly.size) % 2, -1.0, 1.0)
     for value in values:
         q = (value * sign)[None]

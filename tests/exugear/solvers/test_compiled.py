@@ -13,21 +13,23 @@ import xarray as xr
 
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.signals import Channels
+from exugear.dynamics.signals import signal_layout
 from exugear.dynamics.statics import accelerating_start
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.results.run_file import load_run
 from exugear.runs.outcome import RunError
-from exugear.runs.recorder import _loading
 from exugear.runs.runup import simulate
-from exugear.solvers.compiled.solver import CompiledSystem, Observer, refusal
+from exugear.solvers.compiled.observers import Observer
+from exugear.solvers.compiled.solver import CompiledSystem, refusal
 from exugear.solvers.compiled.step import choose_step, highest_rate
 from exugear.solvers.exudyn_model.system import ExudynSystem, exudyn
 from exugear.solvers.loads import DriveLaw, Loading, LoadTable
-from exugear.spectra.waterfall import harmonics, order_cut
+from exugear.spectra.order_cut import order_cut
+from exugear.spectra.orders import harmonics
 
 from ..assembled import assembled, simulated
+from ..plain_signals import energies_of, sampled
 from ..rounding import allowed_difference
 
 LOAD = {"carrier": 240e3, "hss": -3000.0}
@@ -95,13 +97,12 @@ def test_gears_that_only_roll_accelerate_together(grc: Gearbox) -> None:
 
 def test_signals_and_energies_are_those_of_the_plain_kernels(grc: Gearbox, stiffness: dict) -> None:
     for assembly in assemblies(grc, stiffness):
-        channels = Channels(assembly)
         states = [disturbed(assembly, angle) for angle in (0.0, 0.7)]
         q, v = (np.array(values) for values in zip(*states, strict=True))
-        signals, energies, powers = Observer(channels, LoadTable(LOAD)).observe(np.zeros(2), q, v)
-        expected = channels.sample(q, v)
+        signals, energies, powers = Observer(assembly, LoadTable(LOAD)).observe(np.zeros(2), q, v)
+        expected = sampled(assembly, q, v)
         assert np.all(np.abs(signals - expected) < allowed_difference(expected, len(assembly.mesh_names)))
-        plain = channels.energies(q, v)
+        plain = energies_of(assembly, q, v)
         # The non-conservative power is a small difference of large ones: measured by what is dissipated, too.
         scale = np.abs(plain).max(axis=0) + np.abs(plain[:, 2]).max()
         assert (np.abs(np.column_stack([energies, powers[:, 1:]]) - plain) / scale).max() < 1e-9
@@ -119,7 +120,7 @@ def test_loads_over_time_are_those_that_exudyn_gets(grc: Gearbox, stiffness: dic
     )
     q, v = disturbed(assembly)
     system = CompiledSystem(assembly, q, v, loads, STEP)
-    plain = _loading(loads)
+    plain = loads.as_functions()
     for t in (0.0, 0.012, 0.3, 0.7, 0.005):  # forwards, beyond the end, and back again
         applied = plain.generalized(assembly, t, q, v)
         assert system.accelerations(t) == pytest.approx(assembly.accelerations(q, v, applied), rel=1e-12)
@@ -191,14 +192,19 @@ def dynamic_error(found: np.ndarray, expected: np.ndarray) -> float:
     return float(np.max(np.sqrt(np.mean((found - expected) ** 2, axis=0) / np.mean(dynamic**2, axis=0))))
 
 
+def errors_and_mesh_forces(assembly: Assembly) -> slice:
+    """Columns of the transmission errors, overall and of the meshes, and of the forces of the meshes."""
+    layout = signal_layout(assembly)
+    return slice(layout["overall_dte_angle"].start, layout["mesh_force"].stop)
+
+
 def assert_exudyn_agrees(grc: Gearbox, stiffness: dict, steps: int, limit: float) -> None:
     """Overall DTE, DTE and forces of the meshes from 46 rpm on: high-speed mesh at 1.4 kHz."""
     assembly = assemble(grc, Choice("bushing"), stiffness)
     start = accelerating_start(assembly, LOAD, -4.8)
-    channels = Channels(assembly)
-    found = channels.sample(*compiled_trajectory(assembly, start.q, start.v, steps))
-    expected = channels.sample(*exudyn_trajectory(assembly, start.q, start.v, steps))
-    columns = slice(1, 2 + 2 * len(channels.mesh_names))
+    found = sampled(assembly, *compiled_trajectory(assembly, start.q, start.v, steps))
+    expected = sampled(assembly, *exudyn_trajectory(assembly, start.q, start.v, steps))
+    columns = errors_and_mesh_forces(assembly)
     assert dynamic_error(found[:, columns], expected[:, columns]) < limit
 
 
@@ -215,24 +221,23 @@ def test_bushing_variant_follows_exudyn_over_half_a_second(grc: Gearbox, stiffne
 def test_rigid_variant_follows_the_jointed_model_of_exudyn(grc: Gearbox, stiffness: dict) -> None:
     """Over 0.5 s; generalized-alpha of second order, extrapolated from two steps to none."""
     minimal, jointed = assemble(grc, Choice("rigid"), stiffness), assemble(grc, Choice("jointed"), stiffness)
-    speed, duration, sampled = -4.8, 0.5, 5e-5
+    speed, duration, interval = -4.8, 0.5, 5e-5
     start = accelerating_start(minimal, LOAD, speed)
     speeds = {n: u * speed for n, u in grc.train.rolling_speeds("carrier", 1.0).items()}
     q = np.zeros(jointed.size)
     for name, index in jointed.spin.items():
         q[index] = start.q[minimal.spin[name]]
     v = jointed.rolling_velocity(q, speeds)
-    joint_channels, channels = Channels(jointed), Channels(minimal)
-    count = 2 + 2 * len(channels.mesh_names)
+    columns = errors_and_mesh_forces(minimal)
     coarse, fine = (
-        joint_channels.sample(*exudyn_trajectory(jointed, q, v, round(duration / step), step, round(sampled / step)))[
-            :, 1:count
+        sampled(jointed, *exudyn_trajectory(jointed, q, v, round(duration / step), step, round(interval / step)))[
+            :, columns
         ]
         for step in (1e-5, 5e-6)
     )
     expected = (4.0 * fine - coarse) / 3.0
     q, v = compiled_trajectory(minimal, start.q, start.v, round(duration / 5e-6), 5e-6)
-    found = channels.sample(q[::10], v[::10])[:, 1:count]
+    found = sampled(minimal, q[::10], v[::10])[:, columns]
     assert dynamic_error(found, expected) < 1e-3
 
 
@@ -348,8 +353,9 @@ def excitation_amplitudes(assembly: Assembly, rpm: float, step: float) -> np.nda
     element = assembly.elements[assembly.mesh_names.index("high_speed")]
     cycle = element.cycles * q[:, assembly.spin[element.mesh.pinion]]
     window = np.hanning(len(q))
-    channels = Channels(assembly)
-    values = channels.sample(q, v)[:, [1, 2 + channels.mesh_names.index("high_speed")]]
+    layout = signal_layout(assembly)
+    high_speed = layout["mesh_dte"].start + assembly.mesh_names.index("high_speed")
+    values = sampled(assembly, q, v)[:, [layout["overall_dte_angle"].start, high_speed]]
     values = values - window @ values / window.sum()
     return np.abs(2.0 * (window * np.exp(-2j * np.pi * cycle)) @ values) / window.sum()
 

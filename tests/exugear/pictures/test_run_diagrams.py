@@ -1,21 +1,14 @@
-"""Diagrams of runs and modes show what they are given where the axes say."""
+"""Diagrams of runs show what they are given where the axes say."""
 
 import math
 
 import numpy as np
 import pytest
 
-from exugear.pictures.diagrams import (
-    Sensitivity,
-    plot_campbell,
-    plot_mode_energies,
-    plot_order_levels,
-    plot_sensitivities,
-    plot_waterfalls,
-    pooled_levels,
-)
-from exugear.spectra.resonances import Pick, line_level
-from exugear.spectra.waterfall import OrderLine, Waterfall, waterfall
+from exugear.pictures.run_diagrams import plot_order_levels, plot_waterfalls, pooled_levels
+from exugear.spectra.orders import OrderLine
+from exugear.spectra.resonances import Pick
+from exugear.spectra.waterfall import Waterfall, line_level, waterfall
 
 RATE = 2048.0
 MESH, SECOND = OrderLine("mesh", 60.0), OrderLine("2 × mesh", 120.0)
@@ -121,46 +114,6 @@ def test_order_levels_draw_every_run_on_every_line():
     assert figure.axes[-1].get_xlabel().endswith("0 dB = 1 µm")
 
 
-def test_campbell_marks_crossings():
-    figure = plot_campbell([200.0, 450.0], [MESH, SECOND], FASTEST, names=["a", "b"], weights=[0.0, 1.0], title="rigid")
-    panel = figure.axes[0]
-    first, second = (np.asarray(points.get_offsets()) for points in panel.collections)
-    np.testing.assert_allclose(first, [(200.0, 0.2), (450.0, 0.45)])  # 60 per turn: 1 Hz per rpm
-    np.testing.assert_allclose(second, [(100.0, 0.2), (225.0, 0.45)])
-    assert [text.get_text() for text in panel.texts] == ["a", "b"]
-
-
-def test_sensitivities_share_the_frequency_axis():
-    values = np.array([0.2, 0.5, 1.0])
-    frequencies = np.column_stack([1000 * values, [np.nan, 3000.0, 3100.0]])
-    sweeps = [
-        Sensitivity("housing factor", values, frequencies, default=0.5),
-        Sensitivity("inertia / kg m²", values, frequencies, weights=np.ones((3, 2)), logarithmic=True),
-    ]
-    figure = plot_sensitivities(sweeps, target=3215.0, window=(500.0, 3500.0), title="bushing")
-    left, right = figure.axes
-    assert left.get_ylim() == right.get_ylim() == (0.5, 3.5)
-    assert right.get_xscale() == "log"
-    np.testing.assert_allclose(left.lines[0].get_ydata(), values)
-    assert "3215 Hz" in [text.get_text() for text in left.texts]
-
-
-def test_sensitivity_of_wrong_shape_is_named():
-    with pytest.raises(ValueError, match="'housing factor'"):
-        plot_sensitivities([Sensitivity("housing factor", np.zeros(3), np.zeros((2, 4)))])
-
-
-def test_energy_bars_are_per_cent_and_gather_the_small():
-    strain = {"mesh": 0.6, "bearing": 0.392, "small": 0.005, "tiny": 0.003}
-    figure = plot_mode_energies(strain, {"shaft": 1.0}, title="3208 Hz")
-    left, right = figure.axes
-    assert [label.get_text() for label in left.get_yticklabels()] == ["mesh", "bearing", "others"]
-    np.testing.assert_allclose([bar.get_width() for bar in left.patches], [60.0, 39.2, 0.8])
-    assert [label.get_text() for label in right.get_yticklabels()] == ["shaft"]
-
-
-def test_pictures_are_written(tmp_path):
+def test_run_diagrams_are_written(tmp_path):
     plot_waterfalls({"a": run(), "b": run()}, [MESH], tmp_path / "waterfall.png")
-    plot_mode_energies({"mesh": 1.0}, {"shaft": 1.0}, tmp_path / "energies.svg")
     assert (tmp_path / "waterfall.png").stat().st_size > 20_000
-    assert (tmp_path / "energies.svg").read_text().startswith("<?xml")

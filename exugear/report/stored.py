@@ -1,0 +1,133 @@
+"""Results in the folder that belong to its case: tables, modes and runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from exugear.dynamics.assembly import VariantError
+from exugear.dynamics.fingerprint import input_hash
+from exugear.dynamics.modes import load_modes
+from exugear.model.choice import Choice
+from exugear.model.reading import CaseError
+from exugear.report.context import Context, choice_of
+from exugear.results.run_file import FINAL_NAME, PARTIAL_NAME, load_run
+from exugear.runs.trust import verdict_of
+from exugear.spectra.orders import order_lines
+from exugear.spectra.run_spectra import VariantRun, read_run
+from exugear.tooth_mesh.placement import MeshError
+from exugear.tooth_mesh.tables import fitting_table
+from fe_ste.tools.files import FileError
+from fe_ste.transmission_error.table import MeshTable, TableError
+
+
+@dataclass(frozen=True)
+class StoredResults:
+    """What a report is made from.
+
+    Attributes
+    ----------
+    tables : mapping of pair name to MeshTable
+    modes : mapping of Choice to xarray.Dataset
+        As `exugear.dynamics.modes.Modes.to_dataset` makes them.
+    runs : sequence of VariantRun
+    """
+
+    tables: Mapping[str, MeshTable]
+    modes: Mapping[Choice, xr.Dataset]
+    runs: Sequence[VariantRun]
+
+    def __bool__(self) -> bool:
+        """Tell whether there is anything to report."""
+        return bool(self.tables or self.modes or self.runs)
+
+
+def stored_results(context: Context) -> StoredResults:
+    """Read all results that belong to the case of the folder; what does not is noted as left out."""
+    tables = _stored_tables(context)
+    modes = dict(_stored_modes(context))
+    return StoredResults(tables, modes, list(_stored_runs(context, modes)))
+
+
+def _stored_tables(context: Context) -> dict[str, MeshTable]:
+    tables = {}
+    for name in dict.fromkeys(mesh.pair.name for mesh in context.gearbox.meshes):
+        try:
+            tables[name] = fitting_table(context.gearbox, name, context.folder)
+        except TableError as error:
+            context.notes.left_out.append(f"table of {name}: {error}")
+    return tables
+
+
+def _stored_modes(context: Context) -> Iterator[tuple[Choice, xr.Dataset]]:
+    for path in sorted(context.folder.glob("*/*/modes.nc")):
+        try:
+            data = load_modes(path)
+        except FileError as error:
+            context.notes.left_out.append(str(error))
+            continue
+        if _fits(context, path, data.attrs):
+            yield choice_of(data.attrs), data
+
+
+def _stored_runs(context: Context, modes: Mapping[Choice, xr.Dataset]) -> Iterator[VariantRun]:
+    """Read the runs that fit; those to be compared share one window."""
+    lines = order_lines(context.gearbox)
+    windows: dict[tuple[str, ...], float] = {}
+    for path in _run_files(context.folder):
+        try:
+            attributes = load_run(path, ()).attrs
+            if not _fits(context, path, attributes):
+                continue
+            _note_distrust(context, path, attributes)
+            context.tell(f"spectra of {context.name_of(path)}")
+            key = run_key(attributes)
+            run = read_run(path, lines, modes.get(choice_of(attributes)), windows.get(key))
+        except FileError as error:
+            context.notes.left_out.append(str(error))
+            continue
+        except ValueError as error:
+            context.notes.left_out.append(f"{context.name_of(path)}: {error}")
+            continue
+        windows[key] = run.spectra.window_length
+        yield run
+
+
+def _run_files(folder: Path) -> list[Path]:
+    """List runs that ended, and those that were stopped and not taken up again."""
+    ended = set(folder.glob(f"*/*/{FINAL_NAME}"))
+    stopped = {path for path in folder.glob(f"*/*/{PARTIAL_NAME}") if path.with_name(FINAL_NAME) not in ended}
+    return sorted(ended | stopped)
+
+
+def _fits(context: Context, path: Path, attributes: Mapping[str, Any]) -> bool:
+    """Tell whether a file was computed from the case of the folder; if not, note why it is left out."""
+    load_case = attributes.get("load_case")
+    try:
+        if load_case is not None and load_case not in context.gearbox.load_cases:
+            raise CaseError(f"the case has no load case {load_case!r}")
+        if input_hash(context.assembled(choice_of(attributes)), load_case) == attributes.get("input_hash"):
+            return True
+        reason = "was computed from another input; compute it again"
+    except (CaseError, MeshError, VariantError, KeyError) as error:
+        reason = str(error)
+    context.notes.left_out.append(f"{context.name_of(path)}: {reason}")
+    return False
+
+
+def _note_distrust(context: Context, path: Path, attributes: Mapping[str, Any]) -> None:
+    """Name a run that is not to be trusted, with the reason that its file gives."""
+    verdict = verdict_of(attributes)
+    if verdict:
+        name = context.name_of(path)
+        context.notes.distrusted.append(f"{name}: {verdict}")
+        context.notes.statements.append(f"Not to be trusted: {name}: {verdict}")
+
+
+def run_key(attributes: Mapping[str, Any]) -> tuple[str, str, str]:
+    """Load case, law and inertia set: what runs to be compared have in common."""
+    return str(attributes["load_case"]), str(attributes["mesh_law"]), str(attributes["inertias"])

@@ -1,0 +1,141 @@
+"""What a run is to do: its steps, and what it was run with, as the file keeps it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.fingerprint import input_hash
+from exugear.model.parts import LoadCase
+from exugear.model.versions import RUN
+from exugear.results.run_file import FINAL_NAME, PARTIAL_NAME
+from exugear.runs.extent import too_fine
+from exugear.runs.outcome import RunError
+from exugear.solvers.compiled.step import highest_rate, unstable
+
+if TYPE_CHECKING:
+    from exugear.solvers.exudyn_model.system import MeshRoute
+
+
+@dataclass(frozen=True, eq=False)
+class RunPlan:
+    """A run before it begins.
+
+    Attributes
+    ----------
+    assembly : Assembly
+    case : LoadCase
+    directory : Path
+        Where its results go.
+    step : float
+        s.
+    steps : int
+        Number of steps to the end.
+    steps_per_sample : int
+        Number of steps between two stored samples.
+    band : float
+        Highest frequency whose amplitude is kept, Hz.
+    fastest_rate : float
+        Magnitude of the fastest eigenvalue, rad/s.
+    solver : str
+        ``compiled`` or ``exudyn``.
+    mesh_route : str
+        How meshes act in Exudyn: ``element`` or ``loads``.
+    """
+
+    assembly: Assembly
+    case: LoadCase
+    directory: Path
+    step: float
+    steps: int
+    steps_per_sample: int
+    band: float
+    fastest_rate: float
+    solver: str
+    mesh_route: MeshRoute = "element"
+
+    @property
+    def final_path(self) -> Path:
+        """File of the complete run."""
+        return self.directory / FINAL_NAME
+
+    @property
+    def partial_path(self) -> Path:
+        """Folder of the run while it is not complete."""
+        return self.directory / PARTIAL_NAME
+
+    @property
+    def duration(self) -> float:
+        """Simulated time, s."""
+        return self.steps * self.step
+
+    @property
+    def is_implicit(self) -> bool:
+        """Whether Exudyn solves constraints, which its explicit solvers cannot."""
+        return self.assembly.variant == "jointed" or bool(self.assembly.floating)
+
+    def attributes(self) -> dict[str, Any]:
+        """Attributes that the file of the run begins with."""
+        assembly, gearbox = self.assembly, self.assembly.gearbox
+        return {
+            "gearbox": gearbox.name,
+            "variant": assembly.variant,
+            "load_case": self.case.name,
+            "mesh_law": assembly.law,
+            "inertias": assembly.inertias,
+            "input_hash": input_hash(assembly, self.case.name),
+            "method_version": RUN,
+            "housing_factor": assembly.housing_factor,
+            "ratio": gearbox.train.ratio,
+            "output_base_radius": gearbox.gears[gearbox.case.overall.output_gear].base_radius,
+            "highest_order": max(gearbox.train.mesh_frequencies(2.0 * math.pi).values()),
+            "step": self.step,
+            "band": self.band,
+            "fastest_eigenvalue": self.fastest_rate,
+            "solver": self._solver_name(),
+            "mesh_route": self.mesh_route,
+            "complete": 0,
+        }
+
+    def _solver_name(self) -> str:
+        if self.solver == "compiled":
+            return "compiled, RK4"
+        meshes = ", meshes as loads" if self.mesh_route == "loads" else ""
+        return f"Exudyn {version('exudyn')}, {'generalized-alpha' if self.is_implicit else 'RK44'}{meshes}"
+
+
+def plan_run(
+    assembly: Assembly,
+    case: LoadCase,
+    directory: Path,
+    total: float,
+    step: float,
+    band: float,
+    sample_rate: float,
+    solver: str,
+    mesh_route: MeshRoute = "element",
+) -> RunPlan:
+    """Plan a run of so many seconds.
+
+    Raises
+    ------
+    RunError
+        The step is not stable, absurdly small, or no sample falls on it.
+    """
+    fastest_rate = highest_rate(assembly)
+    if solver == "compiled" and unstable(fastest_rate, step):
+        raise RunError(unstable(fastest_rate, step))
+    if too_fine(step, total, sample_rate):
+        raise RunError(too_fine(step, total, sample_rate))
+    steps_per_sample = max(1, round(1.0 / (step * sample_rate)))
+    if abs(steps_per_sample * step * sample_rate - 1.0) > 1e-9:
+        raise RunError(
+            f"sample_rate = {sample_rate:g} Hz does not fit the step of {step:g} s; "
+            f"use {1.0 / (steps_per_sample * step):g} Hz"
+        )
+    steps = round(total / step)
+    return RunPlan(assembly, case, directory, step, steps, steps_per_sample, band, fastest_rate, solver, mesh_route)

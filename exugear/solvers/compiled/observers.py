@@ -1,0 +1,309 @@
+"""Signals and energies of states, observed by one compiled loop over the arrays of the compiled solver.
+
+What there is to observe stands in `exugear.dynamics.signals.SIGNALS`, with the kernel here that fills it. Where a
+signal stands among the columns of a sample is handed over as `Columns`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.modes import overall_row
+from exugear.dynamics.signals import ENERGIES, POWERS, SignalLayout, signal_layout
+from exugear.kernels.elastic import elastic_energies
+from exugear.kernels.table_law import FIRST_TWO
+from exugear.kernels.travelling import place_travelling
+from exugear.kernels.turning import turning_energies
+from exugear.solvers.compiled.arrays import Bodies, Connectors, Equations, Joints, Loads, Meshes, Springs, Work
+from exugear.solvers.compiled.connectors import move_connector, place_bodies
+from exugear.solvers.compiled.equations import set_loads
+from exugear.solvers.compiled.meshes import mesh_motion, mesh_row, mesh_stiffness, table_mesh
+from exugear.solvers.compiled.packing import equations_of, work_for
+from exugear.solvers.loads import LoadTable
+from fe_ste.tools.arrays import Floats
+from fe_ste.tools.compilation import kernel
+
+KINETIC, ELASTIC, OF_LOADS, DISSIPATED, OF_VARYING_STIFFNESS, NON_CONSERVATIVE, OF_BEARING_RATES = range(7)
+"""Columns of what is observed of energy: `ENERGIES` (J), then `POWERS` (W) of `exugear.dynamics.signals`."""
+
+
+class Columns(NamedTuple):
+    """First column of each signal that a kernel here fills; -1 where a run does not hold it.
+
+    The fields have the names of the signals. Signals of each mesh take one column a mesh, forces of supports three.
+    """
+
+    mesh_dte: int
+    mesh_force: int
+    support_force: int
+    centre_distance_change: int
+    misalignment: int
+    outside_table: int
+
+
+@kernel
+def observe_gear_positions(
+    q: Floats, v: Floats, m: int, meshes: Meshes, work: Work, columns: Columns, sample: Floats
+) -> None:
+    """Fill change of centre distance (m) and misalignment (rad) of mesh m with a table; after `observe_meshes`."""
+    table, index, place = meshes.table, meshes.coordinates[m], meshes.place[m]
+    c, s = work.turns[meshes.slot[m], 0], work.turns[meshes.slot[m], 1]
+    centre, _ = mesh_row(q, v, index, place, table.centre[m], c, s, work.gradient[1])
+    tilted, _ = mesh_row(q, v, index, place, table.tilt[m], c, s, work.gradient[1])
+    sample[columns.centre_distance_change + m] = centre
+    sample[columns.misalignment + m] = table.nominal[m, 2] + tilted
+
+
+@kernel
+def observe_table(
+    q: Floats, v: Floats, m: int, meshes: Meshes, work: Work, columns: Columns, sample: Floats, energy: Floats
+) -> None:
+    """Fill the signals of mesh m with a table and add its energy and powers: see `observe_meshes`."""
+    force = table_mesh(q, v, m, FIRST_TWO + 1, meshes, work, energy)
+    work.states[m, 3] = force
+    sample[columns.mesh_dte + m] = work.states[m, 0]
+    sample[columns.mesh_force + m] = force
+    sample[columns.outside_table + m] = work.states[m, 2]
+    if meshes.spinning[m] == 0:
+        observe_gear_positions(q, v, m, meshes, work, columns, sample)
+    else:  # gears that only turn stay where they are
+        sample[columns.centre_distance_change + m] = 0.0
+        sample[columns.misalignment + m] = meshes.table.nominal[m, 2]
+
+
+@kernel
+def observe_meshes(
+    q: Floats, v: Floats, meshes: Meshes, work: Work, columns: Columns, sample: Floats, energy: Floats
+) -> None:
+    """Fill the signals of each mesh into a sample; add energy and powers (see `observe`).
+
+    The scalar force of each mesh, or that along its line of action, is left in `work.states[:, 3]`.
+    """
+    for m in range(meshes.coordinates.shape[0]):
+        if meshes.table.shape[m, 0] > 0:
+            observe_table(q, v, m, meshes, work, columns, sample, energy)
+            continue
+        delta, rate, acting = mesh_motion(q, v, m, meshes, work)
+        k, slope = mesh_stiffness(q, m, meshes)
+        force = k * delta + meshes.damping[m] * rate
+        work.states[m, 3] = force
+        sample[columns.mesh_dte + m] = delta
+        sample[columns.mesh_force + m] = force * meshes.line_of_action[m]
+        cycling = meshes.cycles[m] * (v[meshes.coordinates[m, 5]] - v[meshes.coordinates[m, 12]])
+        energy[ELASTIC] += 0.5 * k * delta * delta
+        energy[DISSIPATED] += meshes.damping[m] * rate * rate
+        energy[OF_VARYING_STIFFNESS] -= 0.5 * slope * cycling * delta * delta
+        energy[NON_CONSERVATIVE] += force * (acting - rate)
+
+
+@kernel
+def true_rate(n: int, first_body: Floats, work: Work) -> None:
+    """Fill the derivative of the strain into `work.motion[2]`: see `exugear.kernels.connectors.connector_motion`."""
+    d, w, out = work.motion[0], work.motion[1], work.motion[2]
+    x = first_body[0] * first_body[9] + first_body[3] * first_body[10] + first_body[6] * first_body[11]
+    y = first_body[1] * first_body[9] + first_body[4] * first_body[10] + first_body[7] * first_body[11]
+    z = first_body[2] * first_body[9] + first_body[5] * first_body[10] + first_body[8] * first_body[11]
+    out[0] = w[0] - y * d[2] + z * d[1]
+    out[1] = w[1] - z * d[0] + x * d[2]
+    out[2] = w[2] - x * d[1] + y * d[0]
+    c, s = math.cos(d[3]), math.sin(d[3])
+    out[5] = (c * w[5] - s * w[4]) / math.cos(d[4])
+    out[4] = c * w[4] + s * w[5]
+    out[3] = w[3] - math.sin(d[4]) * out[5]
+
+
+@kernel
+def observe_connectors(
+    q: Floats,
+    v: Floats,
+    bodies: Bodies,
+    connectors: Connectors,
+    work: Work,
+    columns: Columns,
+    sample: Floats,
+    energy: Floats,
+) -> None:
+    """Fill the force of each bearing on its body (N), global axes; add energy and powers (see `observe`)."""
+    for n in range(connectors.ends.shape[0]):
+        move_connector(q, v, n, bodies, connectors, work)
+        turn = work.frames[connectors.ends[n, 0]]
+        true_rate(n, turn, work)
+        strain, rate, derivative, force = work.motion[0], work.motion[1], work.motion[2], work.motion[3]
+        force[:] = 0.0
+        for entry in range(connectors.first[n], connectors.first[n + 1]):
+            row, column = connectors.row[entry], connectors.column[entry]
+            elastic = connectors.stiffness[entry] * strain[column]
+            damped = connectors.damping[entry] * rate[column]
+            force[row] += elastic + damped
+            energy[ELASTIC] += 0.5 * elastic * strain[row]
+            energy[DISSIPATED] += damped * rate[row]
+            energy[OF_BEARING_RATES] += elastic * (rate[row] - derivative[row])
+        first = columns.support_force + 3 * connectors.number[n]
+        for i in range(3):
+            o = 3 * i
+            sample[first + i] = -(turn[o] * force[0] + turn[o + 1] * force[1] + turn[o + 2] * force[2])
+
+
+@kernel
+def observe_joints(v: Floats, meshes: Meshes, joints: Joints, work: Work, columns: Columns, sample: Floats) -> None:
+    """Fill the force of each ideal joint on its body (N), global axes; after `observe_meshes`."""
+    forces = sample[columns.support_force : columns.support_force + 3 * joints.host.size]
+    forces[:] = 0.0
+    for m in range(meshes.coordinates.shape[0]):
+        c, s = work.turns[meshes.slot[m], 0], work.turns[meshes.slot[m], 1]
+        for end in range(2):
+            j = joints.ends[m, end]
+            if j >= 0:
+                force = work.states[m, 3]
+                row = meshes.force[m]
+                if force < 0.0 and meshes.table.shape[m, 0] > 0:  # the other flank pushes
+                    force, row = -force, meshes.table.back[m]
+                x, y, z = row[6 * end], row[6 * end + 1], row[6 * end + 2]
+                forces[3 * j] += force * (c * x - s * y)
+                forces[3 * j + 1] += force * (s * x + c * y)
+                forces[3 * j + 2] += force * z
+    for j in range(joints.host.size):
+        if joints.planet[j, 0] > 0.0:  # held on its orbit
+            c, s = work.turns[joints.slot[j], 0], work.turns[joints.slot[j], 1]
+            pull = joints.planet[j, 0] * v[joints.carrier[j]] ** 2
+            forces[3 * j] -= pull * (c * joints.planet[j, 1] - s * joints.planet[j, 2])
+            forces[3 * j + 1] -= pull * (s * joints.planet[j, 1] + c * joints.planet[j, 2])
+        if joints.host[j] >= 0:  # hands its force on to the joint of the body that it sits on
+            for i in range(3):
+                forces[3 * joints.host[j] + i] += forces[3 * j + i]
+
+
+@kernel
+def observe_bodies(q: Floats, v: Floats, bodies: Bodies, work: Work, energy: Floats) -> None:
+    """Add the kinetic energy of all bodies (see `observe`)."""
+    for n in range(bodies.mass.size):
+        o, sb, cb = bodies.start[n], work.frames[n, 14], work.frames[n, 15]
+        square = v[o] * v[o] + v[o + 1] * v[o + 1] + v[o + 2] * v[o + 2]
+        tilting = (v[o + 3] * cb) ** 2 + v[o + 4] * v[o + 4]
+        spin = v[o + 5] + v[o + 3] * sb
+        twice = bodies.mass[n] * square + bodies.transverse[n] * tilting + bodies.axial[n] * spin * spin
+        energy[KINETIC] += 0.5 * twice
+    for n in range(bodies.spin.size):
+        energy[KINETIC] += 0.5 * bodies.spin_inertia[n] * v[bodies.spin[n]] ** 2
+
+
+@kernel
+def observe_springs(q: Floats, v: Floats, springs: Springs, energy: Floats) -> None:
+    """Add elastic energy and damping power of the torsional springs (see `observe`)."""
+    for n in range(springs.ends.shape[0]):
+        i, j = springs.ends[n, 0], springs.ends[n, 1]
+        energy[ELASTIC] += 0.5 * springs.stiffness[n] * (q[j] - q[i]) ** 2
+        energy[DISSIPATED] += springs.damping[n] * (v[j] - v[i]) ** 2
+
+
+@kernel
+def observe_elastic_bodies(q: Floats, v: Floats, equations: Equations, work: Work, energy: Floats) -> None:
+    """Add energies and powers of elastic bodies, in fixed and in turning frames (see `observe`)."""
+    kinetic, stored, damped = elastic_energies(q, v, equations.elastic, work.scratch)
+    energy[KINETIC] += kinetic
+    energy[ELASTIC] += stored
+    energy[DISSIPATED] += damped
+    kinetic, stored, damped, weight = turning_energies(q, v, equations.turning, work.memory)
+    energy[KINETIC] += kinetic
+    energy[ELASTIC] += stored
+    energy[OF_LOADS] += weight
+    energy[DISSIPATED] += damped
+
+
+@kernel
+def observe_loads(t: float, q: Floats, v: Floats, loads: Loads, size: int, work: Work, energy: Floats) -> None:
+    """Add the power of what acts from outside on the first `size` coordinates at time t (s)."""
+    set_loads(t, q, v, loads, work.series, work.force)
+    for i in range(size):
+        energy[OF_LOADS] += work.force[i] * v[i]
+
+
+@kernel
+def observe(
+    time: Floats,
+    q: Floats,
+    v: Floats,
+    equations: Equations,
+    work: Work,
+    columns: Columns,
+    signals: Floats,
+    energies: Floats,
+) -> None:
+    """Fill signals (samples, columns) and energies (samples, 7) of states q, v (samples, size).
+
+    Signals but those that `Observer` takes from a state by itself; energies in the columns `KINETIC` and so on.
+    """
+    size = q.shape[1]
+    x, u = work.stage_q, work.stage_v
+    for n in range(q.shape[0]):
+        sample, energy = signals[n], energies[n]
+        energy[:] = 0.0
+        for i in range(size):
+            x[i], u[i] = q[n, i], v[n, i]
+        place_bodies(x, u, equations.bodies, work)
+        observe_bodies(x, u, equations.bodies, work, energy)
+        place_travelling(x, u, equations.travelling)
+        observe_meshes(x, u, equations.meshes, work, columns, sample, energy)
+        observe_connectors(x, u, equations.bodies, equations.connectors, work, columns, sample, energy)
+        if equations.joints.host.size > 0:
+            observe_joints(u, equations.meshes, equations.joints, work, columns, sample)
+        observe_springs(x, u, equations.springs, energy)
+        observe_elastic_bodies(x, u, equations, work, energy)
+        observe_loads(time[n], x, u, equations.loads, size, work, energy)
+
+
+class Observer:
+    """Signals and energies of an assembly's states by one compiled loop.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    loads : LoadTable
+        What acts from outside, for its power.
+
+    Attributes
+    ----------
+    layout : SignalLayout
+        Columns of the signals.
+    """
+
+    def __init__(self, assembly: Assembly, loads: LoadTable) -> None:
+        self.layout: SignalLayout = signal_layout(assembly)
+        overall = assembly.gearbox.case.overall
+        self._input = assembly.spin[overall.input]
+        self._overall = overall_row(assembly) / self.layout.radius
+        self._columns = Columns._make(
+            self.layout[name].start if name in self.layout else -1 for name in Columns._fields
+        )
+        self._equations = equations_of(assembly, loads)
+        self._work = work_for(self._equations, np.zeros(assembly.size), np.zeros(assembly.size))
+
+    def observe(self, time: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:
+        """Observe states.
+
+        Parameters
+        ----------
+        time : (samples,) array
+            s.
+        q, v : (samples, size) arrays
+            Coordinates and velocities.
+
+        Returns
+        -------
+        signals : (samples, columns) array
+            See `layout`.
+        energies : (samples, 2) array
+            `exugear.dynamics.signals.ENERGIES`, J.
+        powers : (samples, 5) array
+            `exugear.dynamics.signals.POWERS`, W.
+        """
+        signals = np.empty((len(time), self.layout.count))
+        energies = np.empty((len(time), len(ENERGIES) + len(POWERS)))
+        signals[:, self.layout["input_speed"]] = v[:, [self._input]]
+        signals[:, self.layout["overall_dte_angle"]] = (q @ self._overall)[:, None]
+        observe(time, q, v, self._equations, self._work, self._columns, signals, energies)
+        return signals, energies[:, : len(ENERGIES)], energies[:, len(ENERGIES) :]

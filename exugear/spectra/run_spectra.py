@@ -1,0 +1,181 @@
+"""Spectra of stored run-ups: their waterfall, and their resonances with the eigenmodes they belong to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from textwrap import shorten
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from exugear.model.parts import RPM
+from exugear.results.run_file import load_run
+from exugear.spectra.mode_report import mobility_shares
+from exugear.spectra.orders import OrderLine
+from exugear.spectra.resonances import (
+    Pick,
+    Resonance,
+    group_by_frequency,
+    match_eigenfrequencies,
+    pick_resonances,
+)
+from exugear.spectra.spectrum import sweep_matched_window
+from exugear.spectra.waterfall import Waterfall, waterfall
+from fe_ste.tools.notebook import html_table
+
+LEAST_SHARE = 1e-5
+"""Modes with a smaller share of the overall transmission error's mobility are no match for a resonance of it."""
+
+
+def run_waterfall(path: str | Path, window_length: float | None = None) -> Waterfall:
+    """Waterfall of the overall DTE of a run-up.
+
+    Parameters
+    ----------
+    path : path
+        ``run.nc`` of a run-up, or ``run.partial``.
+    window_length : float, optional
+        s; what suits the fastest first-order sweep by default. Runs to be compared need the same.
+
+    Raises
+    ------
+    ValueError
+        The speed does not change, so that nothing says how long a window should be, or the run is too short.
+    FileError
+        The run is missing or damaged.
+    """
+    data = load_run(path, ("time", "input_speed", "overall_dte"))
+    time = data["time"].to_numpy()
+    speed = data["input_speed"].to_numpy()
+    values = data["overall_dte"].to_numpy()
+    highest_order = float(data.attrs["highest_order"])
+    if time.size < 2:
+        raise ValueError(f"{path}: holds {time.size} samples, too few for a spectrum; run for longer")
+    if window_length is None:
+        sweep = highest_order * abs(np.ptp(speed)) / (2.0 * math.pi * np.ptp(time))
+        window_length = sweep_matched_window(sweep)
+    rate = (time.size - 1) / float(np.ptp(time))
+    return waterfall(values, speed, rate, window_length=window_length)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A resonance of a run-up and the eigenmode it belongs to.
+
+    Attributes
+    ----------
+    resonance : Resonance
+        Peaks of one or several orders at one frequency, the highest first.
+    mode : int or None
+        Number, from 0, of the nearest eigenfrequency that the overall transmission error sees, if one lies within the
+        resolution.
+    mode_frequency : float
+        Hz; NaN without a mode.
+    mode_name : str
+        What moves, in words; empty without a mode.
+    """
+
+    resonance: Resonance
+    mode: int | None
+    mode_frequency: float
+    mode_name: str
+
+    @property
+    def strongest(self) -> Pick:
+        """Highest of its peaks."""
+        return self.resonance.picks[0]
+
+    @property
+    def speed(self) -> float:
+        """Speed of the reference shaft at the highest peak, revolutions per minute."""
+        return self.strongest.speed / RPM
+
+
+@dataclass(frozen=True)
+class VariantRun:
+    """A run-up with its spectra, resonances and modes.
+
+    Attributes
+    ----------
+    path : Path
+    attributes : mapping
+        What was run.
+    spectra : Waterfall
+    picks : tuple of Pick
+    modes : xarray.Dataset or None
+        As `exugear.dynamics.modes.Modes.to_dataset` makes it.
+    """
+
+    path: Path
+    attributes: Mapping[str, Any]
+    spectra: Waterfall
+    picks: tuple[Pick, ...]
+    modes: xr.Dataset | None
+
+    def __repr__(self) -> str:
+        """Name the model and the load case, and count what stands out."""
+        return f"VariantRun({shorten(f'{self.variant}, {self.conditions}', 150)}, {len(self.picks)} peaks)"
+
+    def _repr_html_(self) -> str:
+        """Show each resonance as a row of a small table in a notebook."""
+        peaks = [(finding.resonance.frequency, finding.strongest) for finding in self.findings()]
+        rows = {f"{frequency:.0f} Hz": f"{peak.level:.1f} dB on {peak.line.name}" for frequency, peak in peaks}
+        return html_table(f"Run-up of variant {self.variant}, {self.conditions}", rows)
+
+    @property
+    def variant(self) -> str:
+        """Name of the variant."""
+        return str(self.attributes["variant"])
+
+    @property
+    def conditions(self) -> str:
+        """Load case, law and inertia set in words."""
+        load_case, law, inertias = (self.attributes[key] for key in ("load_case", "mesh_law", "inertias"))
+        return f"load case {load_case}, law {law}, inertias {inertias}"
+
+    def findings(self, picks: Sequence[Pick] | None = None) -> tuple[Finding, ...]:
+        """Resonances, by frequency, of all peaks or of some of them, each with its mode."""
+        resonances = group_by_frequency(self.picks if picks is None else picks)
+        if self.modes is None:
+            return tuple(Finding(resonance, None, math.nan, "") for resonance in resonances)
+        visible = np.flatnonzero(mobility_shares(self.modes) >= LEAST_SHARE)
+        frequency, name = (self.modes[key].to_numpy()[visible] for key in ("frequency", "name"))
+        matches = match_eigenfrequencies(resonances, frequency)
+        return tuple(
+            Finding(resonance, None, math.nan, "")
+            if match is None
+            else Finding(resonance, int(visible[match]), float(frequency[match]), str(name[match]))
+            for resonance, match in zip(resonances, matches, strict=True)
+        )
+
+
+def read_run(
+    path: str | Path, lines: Sequence[OrderLine], modes: xr.Dataset | None = None, window_length: float | None = None
+) -> VariantRun:
+    """Read a run-up, compute its waterfall and pick its resonances.
+
+    Parameters
+    ----------
+    path : path
+        ``run.nc``, or ``run.partial`` of a run that was stopped.
+    lines : sequence of OrderLine
+        Where to look for resonances.
+    modes : xarray.Dataset, optional
+        Modes of the same variant, law and inertia set.
+    window_length : float, optional
+        s; runs to be compared need the same.
+
+    Raises
+    ------
+    ValueError
+        The run is too short for a spectrum, or its speed does not change.
+    FileError
+        The run is missing or damaged.
+    """
+    attributes = load_run(path, ()).attrs
+    spectra = run_waterfall(path, window_length)
+    return VariantRun(Path(path), attributes, spectra, pick_resonances(spectra, lines), modes)
