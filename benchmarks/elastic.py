@@ -16,7 +16,7 @@ import numpy as np
 from dynamics import LOAD, stiffness_of
 from timing import CASE, median, say, timed
 
-from exugear.bodies.of_gearbox import reduced_bodies
+from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.statics import accelerating_start
@@ -61,9 +61,9 @@ def reductions(gearbox: Gearbox) -> list[dict[str, Any]]:
     rows = [
         {
             "body": name,
-            "unknowns": sum(body.reduced.figures.unknowns.values()),
+            "unknowns": sum(body.reduced.summary.unknowns.values()),
             "coordinates": body.reduced.size,
-            "seconds": body.reduced.figures.seconds,
+            "seconds": body.reduced.summary.seconds,
         }
         for name, body in bodies.items()
     ]

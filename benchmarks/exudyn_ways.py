@@ -10,7 +10,8 @@ from timing import Cost, timed
 
 from exugear.dynamics.assembly import Assembly
 from exugear.kernels.meshes import stiffness_at
-from exugear.solvers.exudyn_model.system import ExudynSystem, MeshRoute, exudyn, items
+from exugear.solvers.exudyn_model.library import exudyn, items
+from exugear.solvers.exudyn_model.system import ExudynSystem, MeshRoute
 from exugear.solvers.loads import Loading
 from exugear.tooth_mesh.element import MeshElement
 
@@ -27,7 +28,7 @@ class PythonMesh:
         self.element, self.size = element, 6 * len(start)
         self.coefficients = system.assembly.meshes.stiffness[system.assembly.elements.index(element)]
         system.mbs.AddObject(
-            items.ObjectGenericODE2(nodeNumbers=[system._nodes[n] for n in names], forceUserFunction=self.force)
+            items.ObjectGenericODE2(nodeNumbers=[system.parts.nodes[n] for n in names], forceUserFunction=self.force)
         )
 
     def force(self, mbs: Any, t: float, item: int, q: Any, v: Any) -> list[float]:
@@ -43,7 +44,7 @@ class PythonMesh:
                 gradient[self.frame + 5] -= row[5]
             if start is None:
                 continue
-            for pair, place in ((0, e.place[end]), (3, (0.0, 0.0))):
+            for pair, place in ((0, e.axis[end]), (3, (0.0, 0.0))):
                 x, y = place[0] + q[start + pair], place[1] + q[start + pair + 1]
                 lx, ly = c * x + s * y, c * y - s * x
                 delta += row[pair] * (lx - place[0]) + row[pair + 1] * (ly - place[1])

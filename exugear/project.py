@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from exugear.bodies.of_gearbox import ElasticBody, reduced_bodies
+from exugear.bodies.of_gearbox.elastic_bodies import ElasticBody, reduced_bodies
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.modes import Modes, eigenmodes
@@ -24,9 +24,10 @@ from exugear.results.run_file import FINAL_NAME
 from exugear.runs.outcome import Run
 from exugear.runs.run_folder import run_directory
 from exugear.runs.runup import simulate
-from exugear.tooth_mesh.element import MeshData
-from exugear.tooth_mesh.stiffness import mesh_stiffness
-from exugear.tooth_mesh.tables import TableOrder, missing_tables, order_tables
+from exugear.tooth_mesh.law import MeshData
+from exugear.tooth_mesh.laws.registry import LAWS
+from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear.tooth_mesh.tables import TableRequest, missing_tables, requested_tables
 from fe_ste.transmission_error.table import MeshTable
 
 if TYPE_CHECKING:
@@ -124,9 +125,9 @@ class Project:
 
     def requested_tables(
         self, names: Iterable[str] = (), positions: int | None = None, *, grid: bool = False
-    ) -> list[TableOrder]:
-        """List tables and find those that are there: see `exugear.tooth_mesh.tables.order_tables`."""
-        return order_tables(self.gearbox, self.folder, names, positions, grid)
+    ) -> list[TableRequest]:
+        """List tables and find those that are there: see `exugear.tooth_mesh.tables.requested_tables`."""
+        return requested_tables(self.gearbox, self.folder, names, positions, grid)
 
     def tables(
         self,
@@ -150,20 +151,21 @@ class Project:
             Called with the number of finished states of the table at work, and of all its states.
         """
         self.keep_case()
-        orders = self.requested_tables(names, positions, grid=grid)
-        return {order.name: order.stored or order.fill(progress) for order in orders}
+        requests = self.requested_tables(names, positions, grid=grid)
+        return {request.name: request.stored or request.compute(progress) for request in requests}
 
-    def missing_tables(self) -> list[TableOrder]:
+    def missing_tables(self) -> list[TableRequest]:
         """Tables that the mesh law needs, and that are not there or belong to another input."""
-        if self.choice.mesh_law in ("rigid", "iso6336"):
+        law = LAWS.get(self.choice.mesh_law)
+        if law is None or not law.needs_tables:
             return []
-        return missing_tables(self.gearbox, self.folder, grid=self.choice.mesh_law == "table")
+        return missing_tables(self.gearbox, self.folder, grid=law.needs_axes)
 
     def stiffness(self) -> dict[str, MeshData]:
         """Mesh stiffness by gear pair, as the mesh law needs it; tables that are missing are computed first."""
-        for order in self.missing_tables():
+        for request in self.missing_tables():
             self.keep_case()
-            order.fill()
+            request.compute()
         return dict(mesh_stiffness(self.gearbox, self.choice.mesh_law, self.folder))
 
     def bodies(self, begin: Callable[[str], None] | None = None) -> dict[str, ElasticBody]:

@@ -1,4 +1,4 @@
-"""What ``import fe_ste`` offers: these names and no others, each where it says, at no cost before it is used."""
+"""What the two packages offer: these names and no others, each where it says, at no cost before it is used."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from types import ModuleType
 
 import pytest
 
-PACKAGES = ("fe_ste",)
+PACKAGES = ("exugear", "fe_ste")
 NAMES = [(package, name) for package in PACKAGES for name in importlib.import_module(package).__all__]
 
 

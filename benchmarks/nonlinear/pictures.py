@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 from exugear.model.gearbox import Gearbox
-from exugear.tooth_mesh.tables import order_tables
+from exugear.tooth_mesh.tables import requested_tables
 from fe_ste.pictures.stress import draw_contact_stress
 from fe_ste.reference.position import nonlinear_position
 from fe_ste.reference.stress import StressField, stress_of_position, stress_of_state
@@ -24,11 +24,11 @@ PICTURES = {"ring_planet": ("ring", 2), "sun_planet": ("sun", 1), "high_speed": 
 
 def stress(gearbox: Gearbox, pair: str, method: str) -> StressField:
     """Stresses of a pair under its static load at position 0 of the mesh cycle."""
-    (order,) = order_tables(gearbox, Path("nowhere"), [pair])
-    torque = order.wanted.torque[0]
+    (request,) = requested_tables(gearbox, Path("nowhere"), [pair])
+    torque = request.wanted.torque[0]
     if method == "nonlinear":
-        return stress_of_position(nonlinear_position(order.wanted.pair, torque, 0.0))
-    compliance = prepared_compliance(order.wanted)
+        return stress_of_position(nonlinear_position(request.wanted.pair, torque, 0.0))
+    compliance = prepared_compliance(request.wanted)
     return stress_of_state(compliance, contact_state(compliance, torque, 0.0), torque)
 
 

@@ -19,7 +19,8 @@ import numpy as np
 from one_variant import grc_project, show
 
 from exugear import Choice, Modes, Project, static_state
-from exugear.dynamics.modes import MOTIONS, counterparts, modes_of
+from exugear.dynamics.energy_shares import BODY_MOTIONS
+from exugear.dynamics.modes import counterparts, modes_of
 from exugear.pictures.elastic_scene import animate_elastic_bodies, draw_elastic_bodies, elastic_scene
 from exugear.pictures.run_diagrams import plot_waterfalls
 from exugear.spectra.orders import order_lines
@@ -122,7 +123,7 @@ def print_misalignment(title: str, project: Project) -> None:
 
 def bending_and_teeth(modes: Modes) -> int:
     """Find the mode in which bending of shafts and deflection of teeth come together most."""
-    bending = modes.kinetic[:, :, MOTIONS.index("bending")].sum(axis=1)
+    bending = modes.kinetic[:, :, BODY_MOTIONS.index("bending")].sum(axis=1)
     meshes = modes.strain[:, [name in modes.assembly.mesh_names for name in modes.element_names]].sum(axis=1)
     return int(np.argmax(bending * meshes))
 

@@ -4,7 +4,7 @@
 
 Solids come from the STEP files beside this file as gearbox.toml names them; gmsh (extra `mesh`) meshes them. The rim
 is part of the housing there, and is taken here by itself as well. Reductions are kept in the results folder, where
-`exugear run` finds them; pictures of the first free vibrations go beside them. `write_step.py` makes the STEP files
+`exugear run` finds them; pictures of the first normal modes go beside them. `write_step.py` makes the STEP files
 from scripts.
 """
 
@@ -13,7 +13,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from exugear.bodies.of_gearbox import solid_body
+from exugear.bodies.of_gearbox.solids import solid_body
 from exugear.bodies.reduced_body import ReducedBody
 from exugear.bodies.solids import SolidModel, load_or_reduce_solid
 from exugear.model.gearbox import Gearbox
@@ -46,12 +46,12 @@ def solid_models() -> dict[str, SolidModel]:
 
 
 def described(name: str, body: ReducedBody) -> str:
-    """Mass, unknowns, seconds and first free vibrations in one line."""
-    found = body.figures
-    first = ", ".join(f"{f:.0f}" for f in found.free_frequencies["whole"][:4])
+    """Mass, unknowns, seconds and first normal modes in one line."""
+    summary = body.summary
+    first = ", ".join(f"{f:.0f}" for f in summary.free_interface_frequencies["whole"][:4])
     return (
-        f"{name:9s} {body.rigid_inertia.mass:7.0f} kg {found.unknowns['whole']:7d} unknowns {body.size:4d} coordinates "
-        f"{found.seconds:5.1f} s   {first} Hz"
+        f"{name:9s} {body.rigid_inertia.mass:7.0f} kg {summary.unknowns['whole']:7d} unknowns "
+        f"{body.size:4d} coordinates {summary.seconds:5.1f} s   {first} Hz"
     )
 
 

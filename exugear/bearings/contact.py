@@ -1,4 +1,14 @@
-"""Contact of rollers with their raceways: lamina loads, the inner ring in balance, its tangent stiffness."""
+"""Contact of rollers with their raceways by ISO/TS 16281: lamina loads, the inner ring in balance, its tangent.
+
+Rows of rollers between two rigid rings. Each roller is cut into laminae; a lamina between both raceways
+carries ``c_L / n * delta^(10/9)`` with ``c_L = 35948 L_we^(8/9)`` (N, mm), its approach ``delta`` following
+from the six displacements of the inner ring relative to the outer one. Because every lamina has a potential,
+the load of the bearing is the gradient of a convex function: the equilibrium under a given force is unique
+and the tangent symmetric.
+
+Rings are rigid, ribs, cage, friction, centrifugal forces and the housing are left out. The frame is that of
+`exugear.bearings.rows`.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +17,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from exugear.bearings.rollers import BearingError, RollerBearing, RollerRow
-from fe_ste.tools.arrays import Floats
+from exugear.bearings.rows import BearingError, RollerBearing, RollerRow
+from fe_ste.tools.arrays import Floats, Integers
 
 LINE_CONTACT_EXPONENT = 10.0 / 9.0
+"""Load of a line contact over its approach."""
+MOST_NEWTON_STEPS = 200
+"""Steps after which the search for an equilibrium is given up."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +47,7 @@ class LaminaArrays:
     direction: Floats
     gap: Floats
     constant: Floats
-    roller: NDArray[np.int64]
+    roller: Integers
 
 
 def lamina_arrays(rows: Sequence[RollerRow], first_roller_angle: float = 0.0) -> LaminaArrays:
@@ -151,6 +164,15 @@ class BearingState:
     energy: float
     laminae: LaminaArrays
 
+    def __repr__(self) -> str:
+        """Displacement and load in one line."""
+        displacement, load = (
+            ", ".join(f"{round(value, 3) + 0.0:.3g}" for value in values.tolist())
+            for values in (1e6 * self.displacement[:3], 1e-3 * self.load[:3])
+        )
+        rollers = f"{np.count_nonzero(self.roller_load)} of {len(self.roller_load)} rollers loaded"
+        return f"<BearingState ({displacement}) um under ({load}) kN, {rollers}>"
+
     @property
     def secant(self) -> Floats:
         """Secant stiffness, shape (6, 6): ``secant @ displacement = load``."""
@@ -199,6 +221,7 @@ def equilibrium(
 
     Examples
     --------
+    >>> from exugear.bearings.rollers import CylindricalRollerBearing
     >>> bearing = CylindricalRollerBearing(bore=0.160, outside_diameter=0.290, width=0.080)
     >>> state = equilibrium(bearing, (129.9e3, 0.0, 0.0))
     >>> round(1e6 * state.displacement[0])  # micrometres
@@ -235,7 +258,7 @@ def _balance(laminae: LaminaArrays, force: Floats, tilt: Floats) -> Floats:
     def surplus(candidate: Floats) -> float:
         return elastic_energy(laminae, candidate) - float(force @ candidate[:3])
 
-    for _ in range(200):
+    for _ in range(MOST_NEWTON_STEPS):
         residual = force - bearing_load(laminae, displacement)[:3]
         if np.linalg.norm(residual) <= tolerance:
             return displacement
@@ -309,6 +332,7 @@ def pitch_averaged_tangent(bearing: RollerBearing, force: ArrayLike, positions: 
 
     Examples
     --------
+    >>> from exugear.bearings.rollers import CylindricalRollerBearing
     >>> bearing = CylindricalRollerBearing(bore=0.100, outside_diameter=0.180, width=0.046)
     >>> stiffness = pitch_averaged_tangent(bearing, (33.5e3, 0.0, 0.0))
     >>> float(round(stiffness[0, 0] / 1e9, 1))

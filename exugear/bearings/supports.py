@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 
 import numpy as np
 
-from exugear.bearings import contact, matrices, rollers
+from exugear.bearings import matrices
+from exugear.bearings.rollers import cylindrical_roller_stiffness, tapered_roller_stiffness
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Bearing, stiffness_matrix
 from exugear.model.sections.connections import CatalogueSection
@@ -15,6 +16,12 @@ from fe_ste.tools.arrays import Floats
 
 ON_BEARINGS = ("bushing", "flexible")
 """Variants whose bodies sit on bearings."""
+CATALOGUE_LAWS: Mapping[str, Callable[[CatalogueSection], Floats]] = {
+    "cylindrical_roller": cylindrical_roller_stiffness,
+    "tapered_roller": tapered_roller_stiffness,
+}
+"""Laws by the `type` of a catalogue section: each gives the stiffness (6, 6) of its bearings at the stated load, with z
+along their axis. A new kind is one file beside `rollers`, its type in the section, and a line here."""
 
 
 def unsupported(gearbox: Gearbox, variant: str) -> str:
@@ -68,12 +75,12 @@ def bearing_matrices(bearing: Bearing, damping_time: float) -> tuple[Floats, Flo
 
     Raises
     ------
-    exugear.bearings.rollers.BearingError
+    exugear.bearings.rows.BearingError
         The catalogue dimensions or the load are impossible.
     """
     given = stiffness_matrix(bearing.stiffness)
     if bearing.catalogue is not None:
-        given = matrices.regularised(_catalogue_stiffness(bearing.catalogue), np.diag(given))
+        given = matrices.regularised(catalogue_stiffness(bearing.catalogue), np.diag(given))
     stiffness = bearing.factor * given
     if bearing.damping is not None:
         return stiffness, stiffness_matrix(bearing.damping)
@@ -81,27 +88,12 @@ def bearing_matrices(bearing: Bearing, damping_time: float) -> tuple[Floats, Flo
 
 
 @lru_cache(maxsize=64)
-def _catalogue_stiffness(section: CatalogueSection) -> Floats:
-    one: rollers.CylindricalRollerBearing | rollers.TaperedRollerBearing
-    if section.type == "cylindrical_roller":
-        one = rollers.CylindricalRollerBearing(
-            bore=section.bore_mm * 1e-3,
-            outside_diameter=section.outer_diameter_mm * 1e-3,
-            width=section.width_mm * 1e-3,
-            full_complement=section.full_complement,
-            radial_clearance=section.radial_clearance_mm * 1e-3,
-        )
-    else:
-        one = rollers.TaperedRollerBearing(
-            bore=section.bore_mm * 1e-3,
-            outside_diameter=section.outer_diameter_mm * 1e-3,
-            width=section.width_mm * 1e-3,
-            contact_angle=math.radians(section.contact_angle_deg),
-            radial_clearance=section.radial_clearance_mm * 1e-3,
-        )
-    whole: rollers.RollerBearing = one
-    if section.arrangement != "single":
-        distance = None if section.row_distance_mm is None else section.row_distance_mm * 1e-3
-        whole = rollers.BearingPair(bearing=one, arrangement=section.arrangement, row_distance=distance)
-    force = (section.radial_load_kN * 1e3, 0.0, section.axial_load_kN * 1e3)
-    return matrices.axially_symmetric(contact.pitch_averaged_tangent(whole, force))
+def catalogue_stiffness(section: CatalogueSection) -> Floats:
+    """Stiffness (6, 6) that a catalogue gives, the same in all directions across the axis.
+
+    Raises
+    ------
+    exugear.bearings.rows.BearingError
+        The catalogue dimensions or the load are impossible.
+    """
+    return matrices.axially_symmetric(CATALOGUE_LAWS[section.type](section))

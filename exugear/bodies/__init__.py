@@ -1,1 +1,1 @@
-"""Elastic bodies: finite elements, reduced to seats and modal coordinates."""
+"""Elastic bodies reduced to seats and modal coordinates."""

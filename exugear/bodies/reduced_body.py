@@ -8,12 +8,20 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
+import scipy.linalg
 import scipy.sparse.csgraph
 from numpy.typing import NDArray
 
-from fe_ste.tools.arrays import Floats
+from fe_ste.tools.arrays import Floats, Integers
 
 Frame = Literal["nonrotating", "carrier", "ground"]
+"""Where coordinates are seen from: a frame that does not turn, the carrier's own, or the ground."""
+UX, UY, UZ, TILT_X, TILT_Y, SPIN = range(6)
+"""Coordinates of a seat: displacement, tilts about x and y, and the unwrapped spin about z."""
+SEAT_COORDINATES = 6
+"""Their number."""
+ELASTIC = slice(6, None)
+"""Normal modes of a free body in order of frequency that are elastic: the first six are its rigid motions."""
 
 
 class ReductionError(ValueError):
@@ -57,7 +65,7 @@ class Surface:
     """
 
     points: Floats
-    quads: NDArray[np.int64]
+    quads: Integers
     displacement: NDArray[np.float32]
     strain: NDArray[np.float32]
     elasticity: Floats
@@ -70,28 +78,29 @@ class Surface:
 
 
 @dataclass(frozen=True)
-class Figures:
-    """What a reduction took and found.
+class ReductionSummary:
+    """What a reduction took and which modes it kept, by harmonic, or under "whole" for a solid mesh.
 
     Attributes
     ----------
-    unknowns : number of unknowns by harmonic, or "whole" for a solid mesh
+    unknowns : number of unknowns
     seconds : wall time
-    free_frequencies : by harmonic, elastic free vibrations of the whole model that are kept, and the next one, Hz
-    lowered : by harmonic, frequencies of the reduced body above the limit that were lowered to it, Hz
+    free_interface_frequencies : of the elastic normal modes that are kept, and the next one, Hz
+    mass_scaled_frequencies : of modes of the reduced body above the limit before mass scaling brought them to it, Hz
     """
 
     unknowns: Mapping[str, int]
     seconds: float
-    free_frequencies: Mapping[str, tuple[float, ...]]
-    lowered: Mapping[str, tuple[float, ...]]
+    free_interface_frequencies: Mapping[str, tuple[float, ...]]
+    mass_scaled_frequencies: Mapping[str, tuple[float, ...]]
 
 
 @dataclass(frozen=True)
 class ReducedBody:
     """A reduced elastic body; n coordinates.
 
-    Coordinates are six per seat (ux uy uz, tilts thx thy, and thz unwrapped; m and rad), then the inner amplitudes.
+    Coordinates are six per seat (ux uy uz, tilts thx thy, and thz unwrapped; m and rad), then the modal coordinates
+    of the modes inside (`exugear.bodies.reduction`).
 
     Attributes
     ----------
@@ -101,9 +110,10 @@ class ReducedBody:
     spin : (n,) rigid spin about the axis: 1 on every seat's thz, and how it displaces seats off the axis, m; 0 for a
         body on the ground, which does not turn
     frame : where the coordinates are seen from: a frame that does not turn, the carrier's, or the ground
-    groups : names of the inner amplitudes: bending x, bending y, torsion or stretching; of a solid mesh, inner
+    modal_groups : what each modal coordinate describes: bending x, bending y, torsion or stretching; of a solid mesh,
+        inner
     surface : for pictures
-    figures : what the reduction took and found
+    summary : what the reduction took and which modes it kept
     """
 
     name: str
@@ -113,17 +123,24 @@ class ReducedBody:
     gyroscopic: Floats
     spin: Floats
     frame: Frame
-    groups: tuple[str, ...]
+    modal_groups: tuple[str, ...]
     surface: Surface
-    figures: Figures
+    summary: ReductionSummary
+
+    def __repr__(self) -> str:
+        """Name, sizes and mass in one line."""
+        return (
+            f"<ReducedBody {self.name}: {len(self.seats)} seats, {len(self.modal_groups)} modal coordinates, "
+            f"{self.rigid_inertia.mass:.4g} kg, frame {self.frame}>"
+        )
 
     @property
     def size(self) -> int:
         """Number of coordinates."""
         return len(self.spin)
 
-    def seat(self, name: str) -> int:
-        """Find the first coordinate of a seat.
+    def first_coordinate(self, seat_name: str) -> int:
+        """Find the first of a seat's six coordinates.
 
         Raises
         ------
@@ -131,12 +148,13 @@ class ReducedBody:
             No seat of that name.
         """
         for n, seat in enumerate(self.seats):
-            if seat.name == name:
-                return 6 * n
-        raise ReductionError(f"body {self.name}: no seat {name!r}; seats are {', '.join(s.name for s in self.seats)}")
+            if seat.name == seat_name:
+                return SEAT_COORDINATES * n
+        names = ", ".join(seat.name for seat in self.seats)
+        raise ReductionError(f"body {self.name}: no seat {seat_name!r}; seats are {names}")
 
     @cached_property
-    def blocks(self) -> tuple[NDArray[np.int64], ...]:
+    def blocks(self) -> tuple[Integers, ...]:
         """Coordinates that neither mass nor stiffness couples to others: both bending planes, torsion, stretching."""
         joined = scipy.sparse.csr_array((self.mass != 0.0) | (self.stiffness != 0.0))
         count, label = scipy.sparse.csgraph.connected_components(joined, directed=False)
@@ -155,21 +173,22 @@ class ReducedBody:
     def rigid_inertia(self) -> RigidInertia:
         """Mass, centre of mass and inertias of the rigid body that this is."""
         origin = np.array(self.seats[0].place)
-        about = self.rigid_motions(origin)
-        moments = about.T @ self.mass @ about
+        about_seat = self.rigid_motions(origin)
+        moments = about_seat.T @ self.mass @ about_seat
         mass = float(moments[0, 0])
+        # A turn about one axis moves the centre of mass along another: the first moments couple both.
         x, y, z = (float(moments[i, j]) / mass for i, j in ((1, 5), (2, 3), (0, 4)))
-        about = self.rigid_motions(origin + (x, y, z))
-        inertia = np.diag(about.T @ self.mass @ about)
+        about_centre = self.rigid_motions(origin + (x, y, z))
+        inertia = np.diag(about_centre.T @ self.mass @ about_centre)
         transverse = float(inertia[3] + inertia[4]) / 2.0
-        place = tuple((origin + (x, y, z)).tolist())
-        return RigidInertia(mass, (place[0], place[1], place[2]), transverse, float(inertia[5]))
+        centre = tuple((origin + (x, y, z)).tolist())
+        return RigidInertia(mass, (centre[0], centre[1], centre[2]), transverse, float(inertia[5]))
 
     @cached_property
     def free_frequencies(self) -> Floats:
-        """Frequencies of the reduced body, free and at rest, elastic ones only, Hz."""
+        """Frequencies of the reduced body's elastic normal modes, free and at rest, Hz."""
         values = scipy.linalg.eigh(self.stiffness, self.mass, eigvals_only=True)
-        return np.sqrt(np.maximum(values[6:], 0.0)) / (2.0 * np.pi)
+        return np.sqrt(np.maximum(values[ELASTIC], 0.0)) / (2.0 * np.pi)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Reductions of elastic bodies, kept in files by the hash of their input."""
+"""Reductions of elastic bodies, stored in files by the hash of their input."""
 
 from __future__ import annotations
 
@@ -7,39 +7,47 @@ import json
 import logging
 import zipfile
 from collections.abc import Callable, Mapping
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from exugear.bodies.reduced_body import Figures, ReducedBody, Seat, Surface
+from exugear.bodies.reduced_body import ReducedBody, ReductionSummary, Seat, Surface
 from fe_ste.tools.files import FileError
 from fe_ste.tools.sealed import read_sealed, write_sealed
 
 _log = logging.getLogger(__name__)
 
 
-def kept(path: Path, key: str, reduce: Callable[[], ReducedBody]) -> ReducedBody:
-    """Body from a file, or reduced and kept there if the file is missing, damaged or of another key."""
-    arrays = kept_arrays(path, key)
+def load_or_reduce(path: Path, key: str, reduce: Callable[[], ReducedBody]) -> ReducedBody:
+    """Body from a file, or reduced and stored there if the file is missing, damaged or of another key.
+
+    Parameters
+    ----------
+    path : Path
+    key : str
+        Hash of all that the reduction depends on.
+    reduce : callable
+        Called only where the file does not serve.
+    """
+    arrays = stored_arrays(path, key)
     if arrays is not None:
         return _from_arrays(arrays)
     body = reduce()
-    keep_arrays(path, key, _arrays_of(body))
+    store_arrays(path, key, _arrays_of(body))
     return body
 
 
-def keep_arrays(path: Path, key: str, arrays: Mapping[str, Any]) -> None:
+def store_arrays(path: Path, key: str, arrays: Mapping[str, Any]) -> None:
     """Write arrays into a sealed file of a key."""
     content = io.BytesIO()
     np.savez_compressed(content, key=np.array(key), **arrays)
     write_sealed(path, content.getvalue())
 
 
-def kept_arrays(path: Path, key: str) -> dict[str, NDArray[Any]] | None:
-    """Read what `keep_arrays` wrote; nothing if the file is missing, damaged or of another key."""
+def stored_arrays(path: Path, key: str) -> dict[str, NDArray[Any]] | None:
+    """Read what `store_arrays` wrote; nothing if the file is missing, damaged or of another key."""
     if not path.exists():
         return None
     try:
@@ -53,6 +61,13 @@ def kept_arrays(path: Path, key: str) -> dict[str, NDArray[Any]] | None:
 
 _MATRICES = ("mass", "stiffness", "gyroscopic", "spin")
 _SURFACE = ("points", "quads", "displacement", "strain", "elasticity")
+_SUMMARY = {
+    "unknowns": "unknowns",
+    "seconds": "seconds",
+    "free_frequencies": "free_interface_frequencies",
+    "lowered": "mass_scaled_frequencies",
+}
+"""Names in files, which stay so that old files are found again, and in `ReductionSummary`."""
 
 
 def _arrays_of(body: ReducedBody) -> dict[str, NDArray[Any]]:
@@ -60,8 +75,8 @@ def _arrays_of(body: ReducedBody) -> dict[str, NDArray[Any]]:
         "name": body.name,
         "seats": [[seat.name, seat.place] for seat in body.seats],
         "frame": body.frame,
-        "groups": body.groups,
-        "figures": asdict(body.figures),
+        "groups": body.modal_groups,
+        "figures": {stored: getattr(body.summary, name) for stored, name in _SUMMARY.items()},
     }
     arrays = {name: getattr(body, name) for name in _MATRICES}
     arrays |= {name: getattr(body.surface, name) for name in _SURFACE}
@@ -70,15 +85,15 @@ def _arrays_of(body: ReducedBody) -> dict[str, NDArray[Any]]:
 
 def _from_arrays(arrays: Mapping[str, NDArray[Any]]) -> ReducedBody:
     words = json.loads(str(arrays["words"]))
-    figures = words["figures"]
-    for key in ("free_frequencies", "lowered"):
-        figures[key] = {motion: tuple(values) for motion, values in figures[key].items()}
+    summary = {name: words["figures"][stored] for stored, name in _SUMMARY.items()}
+    for name in ("free_interface_frequencies", "mass_scaled_frequencies"):
+        summary[name] = {harmonic: tuple(values) for harmonic, values in summary[name].items()}
     return ReducedBody(
         name=words["name"],
         seats=tuple(Seat(name, (place[0], place[1], place[2])) for name, place in words["seats"]),
         **{name: arrays[name] for name in _MATRICES},
         frame=words["frame"],
-        groups=tuple(words["groups"]),
+        modal_groups=tuple(words["groups"]),
         surface=Surface(**{name: arrays[name] for name in _SURFACE}),
-        figures=Figures(**figures),
+        summary=ReductionSummary(**summary),
     )

@@ -10,17 +10,32 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from exugear.bodies.reduced_body import Blank, Figures, ReducedBody, ReductionError, Seat, Surface
-from exugear.bodies.reduction import ReducedPart, lowered, reduce_part, symmetric
-from exugear.bodies.store import kept
-from exugear.bodies.turned_section import STANDARD_SIZE, Harmonic, MeshSize, Motion, SeatBand, Shaft, ShaftSection
+from exugear.bodies.finite_elements.shaft_sections import STANDARD_SIZE, MeshSize, SeatBand, ShaftSection
+from exugear.bodies.finite_elements.turned_section import Harmonic, HarmonicName, Shaft
+from exugear.bodies.reduced_body import (
+    SPIN,
+    TILT_X,
+    TILT_Y,
+    UX,
+    UY,
+    UZ,
+    Blank,
+    ReducedBody,
+    ReductionError,
+    ReductionSummary,
+    Seat,
+    Surface,
+)
+from exugear.bodies.reduction import ReducedComponent, reduce_component, selective_mass_scaling, symmetric
+from exugear.bodies.store import load_or_reduce
 from exugear.model.versions import REDUCTION
 from fe_ste.geometry.gears import Material
-from fe_ste.tools.arrays import Floats, SparseMatrix
+from fe_ste.tools.arrays import Floats, Integers, SparseMatrix
 
-MOTIONS: tuple[Motion, ...] = ("bending", "torsion", "stretching")
+HARMONICS: tuple[HarmonicName, ...] = ("bending", "torsion", "stretching")
+ANGLES = 24
+"""Faces around a shaft in pictures."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +50,8 @@ class ShaftModel:
     origin : (3,) beginning of the shaft in the gearbox's coordinates, m
     seats : bands, z from the beginning of the shaft
     blanks : seat name -> rigid ring on it
-    band : vibrations up to here are exact, Hz
-    limit : vibrations of the reduced shaft above this are slowed down to it, Hz
+    band : free-interface normal modes up to here are exact, Hz
+    limit : modes of the reduced shaft above this are brought down to it by mass scaling, Hz
     size : element sizes
     """
 
@@ -62,121 +77,126 @@ def reduce_shaft(model: ShaftModel) -> ReducedBody:
 
     Raises
     ------
-    exugear.bodies.turned_section.ShaftError
+    exugear.bodies.finite_elements.shaft_sections.ShaftError
         A shaft that cannot be, or a seat that does not lie on it.
     ReductionError
         A blank without its seat, or too few seats.
     """
     began = time.perf_counter()
-    names = [seat.name for seat in model.seats]
-    for name in model.blanks:
-        if name not in names:
-            raise ReductionError(f"shaft {model.name}: blank on {name!r}, but the seats are {', '.join(names)}")
+    seats = [seat.name for seat in model.seats]
+    for blank in model.blanks:
+        if blank not in seats:
+            raise ReductionError(f"shaft {model.name}: blank on {blank!r}, but the seats are {', '.join(seats)}")
     shaft = Shaft(model.sections, model.material, model.seats, model.size)
-    harmonics = {motion: shaft.harmonic(motion) for motion in MOTIONS}
-    parts: dict[Motion, ReducedPart] = {}
-    slowed: dict[str, tuple[float, ...]] = {}
-    for motion, h in harmonics.items():
-        part = reduce_part(h.mass, h.stiffness, h.seats, h.rigid, _blank_masses(model, motion), model.band)
-        mass, slowed[motion] = lowered(part.mass, part.stiffness, model.limit)
-        parts[motion] = replace(part, mass=mass)
-    layout = _Layout(len(names), {motion: part.shapes.shape[1] for motion, part in parts.items()})
-    gyroscopic = _gyroscopic(model, harmonics["bending"], parts["bending"])
+    harmonics = {name: shaft.harmonic(name) for name in HARMONICS}
+    components: dict[HarmonicName, ReducedComponent] = {}
+    mass_scaled: dict[str, tuple[float, ...]] = {}
+    for name, h in harmonics.items():
+        component = reduce_component(h.mass, h.stiffness, h.seats, h.rigid, _blank_masses(model, name), model.band)
+        mass, mass_scaled[name] = selective_mass_scaling(component.mass, component.stiffness, model.limit)
+        components[name] = replace(component, mass=mass)
+    layout = _Layout(len(seats), {name: c.component_modes.shape[1] for name, c in components.items()})
+    gyroscopic = _gyroscopic(model, harmonics["bending"], components["bending"])
     spin = np.zeros(layout.size)
-    spin[5 : 6 * len(names) : 6] = 1.0
+    spin[SPIN : 6 * len(seats) : 6] = 1.0
     x, y, z = model.origin
     return ReducedBody(
         name=model.name,
         seats=tuple(Seat(seat.name, (x, y, z + seat.z)) for seat in model.seats),
-        mass=layout.gather({motion: part.mass for motion, part in parts.items()}),
-        stiffness=layout.gather({motion: part.stiffness for motion, part in parts.items()}),
-        gyroscopic=layout.across(gyroscopic),
+        mass=layout.gather({name: component.mass for name, component in components.items()}),
+        stiffness=layout.gather({name: component.stiffness for name, component in components.items()}),
+        gyroscopic=layout.between_planes(gyroscopic),
         spin=spin,
         frame="nonrotating",
-        groups=layout.groups,
-        surface=_surface(shaft, model.origin, parts, layout),
-        figures=Figures(
-            unknowns={motion: h.mass.shape[0] for motion, h in harmonics.items()},
+        modal_groups=layout.modal_groups,
+        surface=_surface(shaft, model.origin, components, layout),
+        summary=ReductionSummary(
+            unknowns={name: h.mass.shape[0] for name, h in harmonics.items()},
             seconds=time.perf_counter() - began,
-            free_frequencies={motion: part.frequencies for motion, part in parts.items()},
-            lowered=slowed,
+            free_interface_frequencies={name: component.frequencies for name, component in components.items()},
+            mass_scaled_frequencies=mass_scaled,
         ),
     )
 
 
-def load_or_reduce(model: ShaftModel, folder: Path) -> ReducedBody:
-    """Reduced shaft from a folder if it is there for exactly these inputs, else reduced and kept there."""
-    return kept(folder / f"{model.name}-{model.key[:16]}.npz", model.key, lambda: reduce_shaft(model))
+def load_or_reduce_shaft(model: ShaftModel, folder: Path) -> ReducedBody:
+    """Reduced shaft from a folder if it is there for exactly these inputs, else reduced and stored there."""
+    return load_or_reduce(folder / f"{model.name}-{model.key[:16]}.npz", model.key, lambda: reduce_shaft(model))
 
 
-def _blank_masses(model: ShaftModel, motion: Motion) -> Floats:
+def _blank_masses(model: ShaftModel, harmonic: HarmonicName) -> Floats:
     """Rigid masses of the blanks on the seat coordinates of one harmonic."""
-    nothing = Blank(0.0, 0.0, 0.0)
+    no_blank = Blank(0.0, 0.0, 0.0)
     values: list[float] = []
     for seat in model.seats:
-        blank = model.blanks.get(seat.name, nothing)
+        blank = model.blanks.get(seat.name, no_blank)
         values += {
             "bending": [blank.mass, blank.transverse],
             "torsion": [blank.axial],
             "stretching": [blank.mass],
-        }[motion]
+        }[harmonic]
     return np.diag(values)
 
 
-def _gyroscopic(model: ShaftModel, bending: Harmonic, part: ReducedPart) -> Floats:
+def _gyroscopic(model: ShaftModel, bending: Harmonic, component: ReducedComponent) -> Floats:
     """Polar inertia 2 g of one bending plane, blanks included; half of it is what a rigid tilt has of 2 g."""
     gyroscopic: SparseMatrix = bending.gyroscopic
-    doubled: Floats = 2.0 * part.shapes.T @ (gyroscopic @ part.shapes)
+    modes = component.component_modes
+    doubled: Floats = 2.0 * modes.T @ (gyroscopic @ modes)
     for n, seat in enumerate(model.seats):
         if seat.name in model.blanks:
-            doubled[2 * n + 1, 2 * n + 1] += model.blanks[seat.name].axial
+            tilt = 2 * n + 1  # a seat has a displacement and a tilt in each plane
+            doubled[tilt, tilt] += model.blanks[seat.name].axial
     return symmetric(doubled)
 
 
 class _Layout:
     """Where the coordinates of each harmonic stand among those of the body."""
 
-    def __init__(self, seats: int, sizes: Mapping[Motion, int]) -> None:
-        first = 6 * np.arange(seats)
-        inner = 6 * seats
-        amplitudes = sizes["bending"] - 2 * seats
+    def __init__(self, seats: int, sizes: Mapping[HarmonicName, int]) -> None:
+        seat_starts = 6 * np.arange(seats)
+        used = 6 * seats
+        bending = sizes["bending"] - 2 * seats
+        torsion, stretching = sizes["torsion"] - seats, sizes["stretching"] - seats
 
-        def following(count: int) -> NDArray[np.int64]:
-            nonlocal inner
-            inner += count
-            return np.arange(inner - count, inner)
+        def following(count: int) -> Integers:
+            """Take the next modal coordinates."""
+            nonlocal used
+            used += count
+            return np.arange(used - count, used)
 
-        pairs = np.stack([first, first + 4], axis=1).ravel(), np.stack([first + 1, first + 3], axis=1).ravel()
-        self.x = np.concatenate([pairs[0], following(amplitudes)])
-        self.y = np.concatenate([pairs[1], following(amplitudes)])
-        self.torsion = np.concatenate([first + 5, following(sizes["torsion"] - seats)])
-        self.stretching = np.concatenate([first + 2, following(sizes["stretching"] - seats)])
-        self.size = inner
+        x_plane = np.stack([seat_starts + UX, seat_starts + TILT_Y], axis=1).ravel()
+        y_plane = np.stack([seat_starts + UY, seat_starts + TILT_X], axis=1).ravel()
+        self.x = np.concatenate([x_plane, following(bending)])
+        self.y = np.concatenate([y_plane, following(bending)])
+        self.torsion = np.concatenate([seat_starts + SPIN, following(torsion)])
+        self.stretching = np.concatenate([seat_starts + UZ, following(stretching)])
+        self.size = used
         # A tilt about +x moves what lies at +z towards -y: in the y plane the tilt counts negative.
-        self.sign_y = np.where(np.isin(self.y, first + 3), -1.0, 1.0)
-        self.groups = (
-            *["bending x"] * amplitudes,
-            *["bending y"] * amplitudes,
-            *["torsion"] * (sizes["torsion"] - seats),
-            *["stretching"] * (sizes["stretching"] - seats),
+        self.sign_y = np.where(np.isin(self.y, seat_starts + TILT_X), -1.0, 1.0)
+        self.modal_groups = (
+            *["bending x"] * bending,
+            *["bending y"] * bending,
+            *["torsion"] * torsion,
+            *["stretching"] * stretching,
         )
 
-    def planes(self, motion: Motion) -> list[tuple[NDArray[np.int64], Floats]]:
+    def planes(self, harmonic: HarmonicName) -> list[tuple[Integers, Floats]]:
         """Coordinates of a harmonic and their signs; two planes for bending."""
-        if motion == "bending":
+        if harmonic == "bending":
             return [(self.x, np.ones(len(self.x))), (self.y, self.sign_y)]
-        index = self.torsion if motion == "torsion" else self.stretching
+        index = self.torsion if harmonic == "torsion" else self.stretching
         return [(index, np.ones(len(index)))]
 
-    def gather(self, parts: Mapping[Motion, Floats]) -> Floats:
+    def gather(self, parts: Mapping[HarmonicName, Floats]) -> Floats:
         """Matrix of the body from those of the harmonics."""
         matrix = np.zeros((self.size, self.size))
-        for motion, part in parts.items():
-            for index, sign in self.planes(motion):
+        for harmonic, part in parts.items():
+            for index, sign in self.planes(harmonic):
                 matrix[np.ix_(index, index)] = part * np.outer(sign, sign)
         return matrix
 
-    def across(self, doubled: Floats) -> Floats:
+    def between_planes(self, doubled: Floats) -> Floats:
         """Gyroscopic matrix from 2 g of one plane: M qx'' + 2 Omega g qy' and M qy'' - 2 Omega g qx'."""
         matrix = np.zeros((self.size, self.size))
         matrix[np.ix_(self.x, self.y)] = doubled * self.sign_y
@@ -184,12 +204,11 @@ class _Layout:
         return matrix
 
 
-ANGLES = 24
-"""Faces around a shaft in pictures."""
-
-
 def _surface(
-    shaft: Shaft, origin: tuple[float, float, float], parts: Mapping[Motion, ReducedPart], layout: _Layout
+    shaft: Shaft,
+    origin: tuple[float, float, float],
+    components: Mapping[HarmonicName, ReducedComponent],
+    layout: _Layout,
 ) -> Surface:
     """Turn the outline of the half-section into a surface with displacement and strain per coordinate."""
     outline = shaft.outline()
@@ -203,19 +222,14 @@ def _surface(
     corners += [around[:, 1:] + outline.edges[:, 1], around[:, 1:] + outline.edges[:, 0]]
     displacement = np.zeros((ANGLES, count, 3, layout.size), dtype=np.float32)
     strain = np.zeros((ANGLES, edges, 6, layout.size), dtype=np.float32)
-    for motion, part in parts.items():
-        moved = shaft.displacement(motion, outline.nodes, part.shapes)
-        strained = shaft.strain_at_edges(motion, outline.elements, part.shapes)
-        for plane, (index, sign) in enumerate(layout.planes(motion)):
-            turned = angle - plane * np.pi / 2.0
-            face = turned + np.pi / ANGLES
-            if motion == "bending":
-                c, s, cf, sf = np.cos(turned), np.sin(turned), np.cos(face), np.sin(face)
-                weights, face_weights = np.stack([c, s, c], 1), np.stack([cf, cf, cf, cf, sf, sf], 1)
-            else:
-                weights, face_weights = np.ones((ANGLES, 3)), np.ones((ANGLES, 6))
+    c, s = np.cos(angle)[:, None, None], np.sin(angle)[:, None, None]
+    for harmonic, component in components.items():
+        moved = shaft.displacement(harmonic, outline.nodes, component.component_modes)
+        strained = shaft.strain_at_edges(harmonic, outline.elements, component.component_modes)
+        for plane, (index, sign) in enumerate(layout.planes(harmonic)):
+            # The y plane is the x plane a quarter turn on.
+            weights, face_weights = _around(harmonic, angle - plane * np.pi / 2.0)
             u_r, u_phi, u_z = np.moveaxis(weights[:, None, :, None] * moved * sign, 2, 0)
-            c, s = np.cos(angle)[:, None, None], np.sin(angle)[:, None, None]
             displacement[..., index] = np.stack([u_r * c - u_phi * s, u_r * s + u_phi * c, u_z], axis=2)
             strain[..., index] = face_weights[:, None, :, None] * strained * sign
     return Surface(
@@ -225,3 +239,12 @@ def _surface(
         strain=strain.reshape(-1, 6, layout.size),
         elasticity=shaft.elasticity,
     )
+
+
+def _around(harmonic: HarmonicName, angle: Floats) -> tuple[Floats, Floats]:
+    """How displacements (a, 3) at angles and strains (a, 6) between two angles vary around the axis."""
+    if harmonic != "bending":
+        return np.ones((len(angle), 3)), np.ones((len(angle), 6))
+    face = angle + np.pi / ANGLES
+    c, s, cf, sf = np.cos(angle), np.sin(angle), np.cos(face), np.sin(face)
+    return np.stack([c, s, c], 1), np.stack([cf, cf, cf, cf, sf, sf], 1)

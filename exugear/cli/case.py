@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from exugear.cli.console import note
 from exugear.cli.errors import BadInputError, model_errors
-from exugear.cli.options import MeshLaw, Variant
+from exugear.cli.options import Variant
 
 if TYPE_CHECKING:
     from exugear.model.choice import Choice
@@ -68,9 +68,10 @@ def make_results_folder(folder: Path) -> None:
 
 def check_choice(gearbox: Gearbox, choice: Choice, folder: Path) -> None:
     """Refuse what the gearbox does not have, or may not do, before anything is written into the results folder."""
-    from exugear.bodies.of_gearbox import check_solids
+    from exugear.bodies.of_gearbox.solids import check_solids
     from exugear.dynamics.readiness import lacking
     from exugear.results.folder import bodies_folder
+    from exugear.tooth_mesh.laws.registry import LAWS
 
     with model_errors():
         gearbox.bodies(choice.inertias)
@@ -82,7 +83,7 @@ def check_choice(gearbox: Gearbox, choice: Choice, folder: Path) -> None:
             raise gearbox.fault(f"variant {choice.variant}: {reason}")
         if choice.variant == Variant.flexible:
             check_solids(gearbox, bodies_folder(folder))
-    if choice.mesh_law == MeshLaw.rigid and choice.variant != Variant.rigid:
+    if not LAWS[choice.mesh_law].has_force and choice.variant != Variant.rigid:
         raise BadInputError(
-            f"--mesh-law rigid: its gears only roll, which needs the variant rigid, not {choice.variant}"
+            f"--mesh-law {choice.mesh_law}: its gears only roll, which needs the variant rigid, not {choice.variant}"
         )

@@ -9,7 +9,7 @@ from exugear.cli.errors import BadInputError, FailedError, model_errors
 from exugear.cli.options import Variant
 
 if TYPE_CHECKING:
-    from exugear.bodies.of_gearbox import ElasticBody
+    from exugear.bodies.of_gearbox.elastic_bodies import ElasticBody
     from exugear.dynamics.modes import Modes
     from exugear.project import Project
 
@@ -44,7 +44,7 @@ def compute_modes(project: Project) -> Modes:
     with model_errors():
         modes = eigenmodes(project.gearbox, project.choice, project.stiffness(), bodies)
     for name, body in modes.assembly.elastic_bodies.items():
-        figures = body.reduced.figures
+        figures = body.reduced.summary
         unknowns, took = sum(figures.unknowns.values()), figures.seconds
         note(f"{name}: {unknowns} unknowns reduced to {body.reduced.size} coordinates in {took:.1f} s")
     modes.save(project.modes_path)

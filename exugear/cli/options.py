@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from exugear.tooth_mesh.laws.registry import LAWS
+
 CaseArgument = Annotated[Path, typer.Argument(metavar="CASE.toml", help="The gearbox file.", show_default=False)]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print a summary as one JSON object.")]
 OutOption = Annotated[
@@ -25,18 +27,22 @@ class Variant(StrEnum):
 
 
 class MeshLaw(StrEnum):
-    """How teeth in mesh push each other."""
+    """How teeth in mesh push each other: the laws of `exugear.tooth_mesh.laws.registry`."""
 
-    rigid = "rigid"
-    constant = "constant"
-    iso6336 = "iso6336"
-    seed = "seed"
-    line_of_action = "line_of_action"
-    table = "table"
+    _ignore_ = ["members", "law"]
+    members = vars()
+    for law in LAWS:
+        members[law] = law
+
+
+USUAL_LAW = MeshLaw("line_of_action")
 
 
 VariantOption = Annotated[Variant, typer.Option(help="How the shafts are held.", show_default=False)]
-LawOption = Annotated[MeshLaw, typer.Option("--mesh-law", help="How teeth in mesh push each other.")]
+_LAWS_TOLD = "How teeth in mesh push each other. " + "; ".join(
+    f"{law.name}: {law.description.replace('; ', ', ')}" for law in LAWS.values()
+)
+LawOption = Annotated[MeshLaw, typer.Option("--mesh-law", help=_LAWS_TOLD)]
 FilesBelowOption = Annotated[
     Path | None,
     typer.Option(

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
     from exugear.project import Project
-    from exugear.tooth_mesh.tables import TableOrder
+    from exugear.tooth_mesh.tables import TableRequest
     from fe_ste.transmission_error.table import MeshTable
 
 
@@ -32,7 +32,7 @@ def compute_missing_tables(project: Project) -> None:
         raise FailedError("\n".join(["positions of the tables that are not solved:", *failures]))
 
 
-def compute_tables(requests: list[TableOrder]) -> dict[str, MeshTable]:
+def compute_tables(requests: list[TableRequest]) -> dict[str, MeshTable]:
     """Return the table of each request, computing those that are not stored."""
     tables = {request.name: request.stored for request in requests if request.stored}
     missing = [request for request in requests if not request.stored]
@@ -44,7 +44,7 @@ def compute_tables(requests: list[TableOrder]) -> dict[str, MeshTable]:
     return {request.name: tables[request.name] for request in requests}
 
 
-def _compute_table(request: TableOrder, bar: Progress, task: TaskID) -> MeshTable:
+def _compute_table(request: TableRequest, bar: Progress, task: TaskID) -> MeshTable:
     from fe_ste.geometry.checks import GeometryError
     from fe_ste.tools.sparse import FactorisationError
     from fe_ste.transmission_error.grid import GridError
@@ -60,19 +60,19 @@ def _compute_table(request: TableOrder, bar: Progress, task: TaskID) -> MeshTabl
         bar.update(task, completed=completed, description=f"{request.name}: {what} {done} of {of}")
 
     try:
-        return request.fill(at_state)
+        return request.compute(at_state)
     except GeometryError as error:
         raise BadInputError(f"pairs.{request.name}: {error}") from error
     except (FactorisationError, GridError) as error:
         raise FailedError(f"{request.name}: {error}") from error
 
 
-def _work(request: TableOrder) -> int:
+def _work(request: TableRequest) -> int:
     """Work of a table, in states: the time left counts the finite elements of both gears as well."""
     finite_elements = 500
     return finite_elements + _states(request)
 
 
-def _states(request: TableOrder) -> int:
+def _states(request: TableRequest) -> int:
     wanted = request.wanted
     return wanted.positions * len(wanted.torque) * max(len(wanted.centre_distance), 1) * len(wanted.misalignment)

@@ -11,7 +11,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from exugear.bearings.supports import ON_BEARINGS, bearing_matrices, elastic_names, mounts_at_work, unsupported
-from exugear.bodies.of_gearbox import ElasticBody
+from exugear.bodies.of_gearbox.elastic_bodies import ElasticBody
 from exugear.dynamics.assembly import Assembly, VariantError
 from exugear.kernels.connectors import ConnectorArrays, no_connectors
 from exugear.kernels.elastic import ElasticArrays, no_elastic
@@ -22,7 +22,10 @@ from exugear.model.choice import VARIANTS, Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Bearing, Body
 from exugear.model.seats import node_position, seat_key
-from exugear.tooth_mesh.element import Angles, MeshData, mesh_elements, pack
+from exugear.tooth_mesh.element import mesh_elements
+from exugear.tooth_mesh.law import Angles, MeshData
+from exugear.tooth_mesh.laws.packing import pack
+from exugear.tooth_mesh.laws.registry import LAWS, law_of
 from fe_ste.tools.arrays import Floats
 
 
@@ -71,8 +74,9 @@ def assemble(
     lacking = unsupported(gearbox, variant)
     if lacking:
         raise VariantError(f"variant {variant}: {lacking}")
-    if law == "rigid" and variant != "rigid":
-        raise VariantError(f"mesh law rigid: its gears only roll, which needs the variant rigid, not {variant}")
+    only_rolls = law in LAWS and not LAWS[law].has_force
+    if only_rolls and variant != "rigid":
+        raise VariantError(f"mesh law {law}: its gears only roll, which needs the variant rigid, not {variant}")
     flexible = _chosen_bodies(elastic, bodies or {})
     rigid = [body for body in moving if body.name not in flexible]
     six = [body for body in rigid if variant != "rigid" and not body.spin_only]
@@ -84,8 +88,8 @@ def assemble(
     travelling = _travelling(gearbox, flexible, size, coordinates, nodes)
     supports = _supports(gearbox, flexible) if variant in ON_BEARINGS else ()
     displaced = gearbox.pin_offsets if variant not in ON_BEARINGS else {}  # bearings carry the planets along
-    settings = (law, inertias, flanks, angles, displaced, nodes)
-    elements = () if law == "rigid" else mesh_elements(gearbox, stiffness, *settings)
+    settings = (inertias, flanks, angles, displaced, nodes)
+    elements = () if only_rolls else mesh_elements(gearbox, stiffness, law_of(law), *settings)
     return Assembly(
         gearbox=gearbox,
         choice=replace(choice, inertias=inertias),
@@ -102,7 +106,7 @@ def assemble(
         inertia=_inertia(variant, six, alone),
         elastic_bodies=flexible,
         elastic=elastic_arrays(flexible, size, gearbox.case.damping.body_time_s),
-        motions=_rolling_motions(gearbox, coordinates) if law == "rigid" else np.eye(size),
+        motions=_rolling_motions(gearbox, coordinates) if only_rolls else np.eye(size),
     )
 
 
@@ -129,11 +133,11 @@ def _take_seats(
         key = seat_key(name, seat.name)
         coordinates[key] = tuple(range(first + 6 * n, first + 6 * n + 6))
         nodes[key] = np.array(seat.place)
-    for item, seat_name in body.shared.items():
+    for item, seat_name in body.shared_seats.items():
         key = seat_key(name, seat_name)
         coordinates[seat_key(name, item)], nodes[seat_key(name, item)] = coordinates[key], nodes[key]
-    coordinates[name] = coordinates[seat_key(name, body.main)]
-    nodes[name] = nodes[seat_key(name, body.main)]
+    coordinates[name] = coordinates[seat_key(name, body.main_seat)]
+    nodes[name] = nodes[seat_key(name, body.main_seat)]
     return first + body.reduced.size
 
 
@@ -306,7 +310,7 @@ def _connectors(
     return ConnectorArrays(
         bodies=np.array(starts, dtype=np.int64),
         local=np.array(local),
-        place=np.array(places),
+        node=np.array(places),
         stiffness=np.array([stiffness for stiffness, _ in matrices]),
         damping=np.array([damping for _, damping in matrices]),
     )

@@ -5,8 +5,8 @@ from the same assembly, so they solve the same equations in the same coordinates
 
 Bodies with six coordinates come first, in the order of the file, then those with their spin alone. In the
 variant `rigid` every body has its spin alone: ideal joints leave nothing else, and a planet rides on its
-carrier's spin. In the variant `flexible` elastic bodies follow, with six coordinates at each seat and their inner
-amplitudes: a gear or a bearing sits on a seat as it would on a rigid body. A fixed body, such as the housing, is the
+carrier's spin. In the variant `flexible` elastic bodies follow, with six coordinates at each seat and their modal
+coordinates: a gear or a bearing sits on a seat as it would on a rigid body. A fixed body, such as the housing, is the
 ground itself unless it is elastic; then it moves on its mounts, and what sits in it sits on its seats.
 """
 
@@ -21,26 +21,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exugear.bodies.floating import FloatingBody
-from exugear.bodies.of_gearbox import ElasticBody
+from exugear.bodies.of_gearbox.elastic_bodies import ElasticBody
 from exugear.bodies.turning_frame import TurningBody, turning_arrays
 from exugear.kernels.connectors import ConnectorArrays, add_connector_forces, connector_load
 from exugear.kernels.elastic import ElasticArrays, add_elastic_forces, scratch_for, set_elastic_accelerations
 from exugear.kernels.inertia import InertiaArrays, accelerations
-from exugear.kernels.meshes import (
-    STATE_SIZE,
-    MeshArrays,
-    add_mesh_forces,
-    add_mesh_jacobian,
-    gear_positions,
-    mesh_state,
-)
+from exugear.kernels.meshes import STATE_SIZE, MeshArrays, gear_positions
 from exugear.kernels.springs import SpringArrays, add_spring_forces
+from exugear.kernels.table_law import NOMINAL_DEFLECTION
 from exugear.kernels.travelling import TravellingArrays, follow, share_travelling_forces, travelling_tangent
 from exugear.kernels.turning import TurningArrays
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Bearing, Body
-from exugear.tooth_mesh.element import MeshElement, pack
+from exugear.tooth_mesh.element import MeshElement
+from exugear.tooth_mesh.laws.forms import add_mesh_forces, add_mesh_jacobian, mesh_state
+from exugear.tooth_mesh.laws.packing import pack
 from fe_ste.tools.arrays import Floats
 
 
@@ -181,10 +177,10 @@ class Assembly:
         reversed_flanks : (meshes,) array of bool, optional
             Meshes that press the other flank: their deflection counts from there.
         """
-        meshes = pack(self.elements, self.coordinates, averaged=True, tables=False)
+        meshes = pack(self.elements, self.coordinates, averaged=True, linear=True)
         for m, element in enumerate(self.elements):
             if reversed_flanks is not None and reversed_flanks[m] and element.table is not None:
-                meshes.table.nominal[m, 0] += element.table.backlash
+                meshes.table.nominal[m, NOMINAL_DEFLECTION] += element.table.backlash
         return meshes
 
     def forces(self, q: Floats, v: Floats, meshes: MeshArrays | None = None) -> Floats:
@@ -328,7 +324,7 @@ class Assembly:
         return loads
 
     def mesh_states(self, q: Floats, v: Floats, meshes: MeshArrays | None = None) -> Floats:
-        """State of each mesh, (meshes, 10): see `exugear.kernels.meshes.mesh_state`."""
+        """State of each mesh, (meshes, 10): columns as named in `exugear.kernels.meshes`."""
         out = np.zeros((len(self.elements), STATE_SIZE))
         mesh_state(*self.with_travelling(q, v), self.meshes if meshes is None else meshes, out)
         return out

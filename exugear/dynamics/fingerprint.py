@@ -7,7 +7,7 @@ import json
 
 import numpy as np
 
-from exugear.bodies.of_gearbox import solid_body
+from exugear.bodies.of_gearbox.solids import solid_body
 from exugear.dynamics.assembly import Assembly
 from exugear.model.versions import MODES, REDUCTION, RUN
 from fe_ste.transmission_error.surface import SteSurface

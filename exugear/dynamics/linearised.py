@@ -17,6 +17,7 @@ from exugear.kernels.springs import SpringArrays, add_spring_forces
 from fe_ste.tools.arrays import Floats
 
 DIFFERENCE_STEP = 1e-6
+"""Step of central differences, m or rad, and per second."""
 RIGID_BODY_LIMIT = 0.1
 """Modes below this frequency (Hz) are motions of the whole train without deflection."""
 
@@ -34,6 +35,10 @@ class Linearised:
     mass: Floats
     stiffness: Mapping[str, Floats]
     damping: Mapping[str, Floats]
+
+    def __repr__(self) -> str:
+        """Sizes in one line."""
+        return f"<Linearised: {len(self.mass)} coordinates, {len(self.stiffness)} elements>"
 
     @property
     def total_stiffness(self) -> Floats:
@@ -61,23 +66,23 @@ def linearise(assembly: Assembly, q: Floats, meshes: MeshArrays | None = None) -
     for n, name in enumerate(assembly.spring_names):
         spring = SpringArrays._make(values[n : n + 1] for values in assembly.springs)
         stiffness[name], damping[name] = _tangents(assembly.size, q, spring, add_spring_forces)
-    for name, place in assembly.elastic_slices.items():
+    for name, of_body in assembly.elastic_slices.items():
         if name in assembly.turning:
-            turning = (place, assembly.turning[name])
+            turning = (of_body, assembly.turning[name])
             stiffness[f"{name}_body"], damping[f"{name}_body"] = _tangents(
                 assembly.size, q, turning, _add_turning_forces
             )
             continue
-        own = np.zeros((assembly.size,) * 2)
-        own[place, place] = assembly.elastic_bodies[name].reduced.stiffness
-        stiffness[f"{name}_body"] = own
-        damping[f"{name}_body"] = assembly.gearbox.case.damping.body_time_s * own
+        matrix = np.zeros((assembly.size,) * 2)
+        matrix[of_body, of_body] = assembly.elastic_bodies[name].reduced.stiffness
+        stiffness[f"{name}_body"] = matrix
+        damping[f"{name}_body"] = assembly.gearbox.case.damping.body_time_s * matrix
     return Linearised(assembly.mass_at(q), stiffness, damping)
 
 
 def _add_turning_forces(q: Floats, v: Floats, element: tuple[slice, TurningBody], f: Floats) -> None:
-    place, body = element
-    f[place] += body.forces(q[place], v[place])
+    of_body, body = element
+    f[of_body] += body.forces(q[of_body], v[of_body])
 
 
 def _tangents(
@@ -90,11 +95,12 @@ def _tangents(
         add(q + dq, v, element, f)
         return f
 
-    none = np.zeros(size)
+    zero = np.zeros(size)
     steps = DIFFERENCE_STEP * np.eye(size)
-    k = np.array([force(-e, none) - force(e, none) for e in steps]).T / (2.0 * DIFFERENCE_STEP)
-    d = np.array([force(none, -e) - force(none, e) for e in steps]).T / (2.0 * DIFFERENCE_STEP)
-    return k, d
+    # Columns; a force falls with stiffness times displacement: hence minus ahead of plus.
+    stiffness = np.array([force(-e, zero) - force(e, zero) for e in steps]).T / (2.0 * DIFFERENCE_STEP)
+    damping = np.array([force(zero, -e) - force(zero, e) for e in steps]).T / (2.0 * DIFFERENCE_STEP)
+    return stiffness, damping
 
 
 def undamped_modes(mass: Floats, stiffness: Floats, motions: Floats | None = None) -> tuple[Floats, Floats]:
@@ -104,6 +110,7 @@ def undamped_modes(mass: Floats, stiffness: Floats, motions: Floats | None = Non
     that differs from real by round-off; its real and imaginary parts span the same plane. `motions` (size, n) are
     those that are free, all by default.
     """
+    # In coordinates with unit mass the problem is an ordinary one; only in free motions, an orthonormal basis of them.
     root = np.linalg.cholesky(mass)
     basis = scipy.linalg.orth(root.T @ (np.eye(len(mass)) if motions is None else motions))
     free = np.linalg.solve(root.T, basis)

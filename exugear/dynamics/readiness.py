@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from exugear.bearings.rollers import BearingError
+from exugear.bearings.rows import BearingError
 from exugear.bearings.supports import ON_BEARINGS, bearing_matrices, elastic_names, unsupported
 from exugear.dynamics.restraint import free_motion
 from exugear.loads.torque_series import torque_series
@@ -102,6 +102,6 @@ def _pairs_with_axes(gearbox: Gearbox) -> list[str]:
 
 
 def _build_elastic_body(gearbox: Gearbox, name: str) -> None:
-    from exugear.bodies.of_gearbox import check_elastic_body
+    from exugear.bodies.of_gearbox.elastic_bodies import check_elastic_body
 
     check_elastic_body(gearbox, name)

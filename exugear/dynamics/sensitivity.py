@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.optimize
 
-from exugear.bodies.of_gearbox import ElasticBody
+from exugear.bodies.of_gearbox.elastic_bodies import ElasticBody
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.modes import Modes, modes_of
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Body
-from exugear.tooth_mesh.element import MeshData
+from exugear.tooth_mesh.law import MeshData
 from fe_ste.tools.arrays import Floats, Integers
 
 FRACTIONS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)

@@ -16,6 +16,7 @@ import numpy as np
 import xarray as xr
 
 from exugear.dynamics.assembly import Assembly
+from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Booleans, Floats
 
 COMPONENTS = {"axis": 3}
@@ -385,7 +386,7 @@ def signal_layout(assembly: Assembly) -> SignalLayout:
     gearbox = assembly.gearbox
     joints = tuple(joint.name for joint in gearbox.joints) if assembly.variant == "rigid" else ()
     return SignalLayout(
-        signals_of(assembly.law == "table"),
+        signals_of(LAWS[assembly.law].signals_positions),
         {"mesh": assembly.mesh_names, "support": assembly.connector_names or joints},
         gearbox.gears[gearbox.case.overall.output_gear].base_radius,
     )

@@ -14,7 +14,8 @@ import numpy as np
 import scipy.linalg
 
 from exugear.dynamics.assembly import Assembly
-from exugear.kernels.meshes import MeshArrays
+from exugear.kernels.meshes import FORCE, MeshArrays
+from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
 
 STEP = 1e-7
@@ -29,12 +30,23 @@ class BalanceError(RuntimeError):
 
 @dataclass(frozen=True)
 class StartState:
-    """Coordinates and velocities at the start of a run, with the spin rates (rad/s2) it starts with."""
+    """Coordinates and velocities at the start of a run, with the spin rates (rad/s2) it starts with.
+
+    Attributes
+    ----------
+    q, v : (size,) coordinates and velocities
+    rates : spin rate by body, rad/s2
+    drive_torque : torque that the driven body takes, N m; 0 where none is driven
+    """
 
     q: Floats
     v: Floats
     rates: Mapping[str, float]
     drive_torque: float
+
+    def __repr__(self) -> str:
+        """Sizes and drive torque in one line."""
+        return f"<StartState: {len(self.q)} coordinates, drive torque {self.drive_torque:.4g} N m>"
 
 
 def _newton(residual: Callable[[Floats], Floats], start: Floats, steps: Floats, scale: Floats, what: str) -> Floats:
@@ -200,12 +212,12 @@ def _touching(
     place: Callable[[Floats], Floats],
     solve: Callable[[Floats, MeshArrays | None], Floats],
 ) -> Floats:
-    """Begin with tables where linear teeth would be, on the flanks that these press: flanks apart hold nothing."""
-    if assembly.law != "table":
+    """Begin where linear teeth would be, on the flanks that they press: table flanks that are apart hold nothing."""
+    if not LAWS[assembly.law].loses_contact:
         return start
     x = solve(start, assembly.linear_meshes())
     q = place(x)
-    reversed_flanks = assembly.mesh_states(q, np.zeros_like(q), assembly.linear_meshes())[:, 4] < 0.0
+    reversed_flanks = assembly.mesh_states(q, np.zeros_like(q), assembly.linear_meshes())[:, FORCE] < 0.0
     return solve(x, assembly.linear_meshes(reversed_flanks)) if reversed_flanks.any() else x
 
 

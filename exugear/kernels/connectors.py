@@ -1,4 +1,8 @@
-"""Compiled law of 6x6 connectors (bearings) on arrays of coordinates."""
+"""Compiled law of 6x6 connectors (bearings) on arrays of coordinates.
+
+Displacement and rate are those of Exudyn's RigidBodySpringDamper. Coordinates are those of
+`exugear.kernels.coordinates`.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +11,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from exugear.kernels.coordinates import BODY_SIZE, SPIN, TILT
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import compiled
+
+ARM, POSITION, VELOCITY, ANGULAR_VELOCITY = range(4)
+"""Rows of `body_point`."""
+DISPLACEMENT, RATE, TRUE_RATE = range(3)
+"""Rows of `connector_motion`."""
 
 
 class ConnectorArrays(NamedTuple):
@@ -18,13 +28,13 @@ class ConnectorArrays(NamedTuple):
     ----------
     bodies : (c, 2) first coordinate of the two bodies, -1 for ground; stiffness is in the first body's axes
     local : (c, 2, 3) attachment in each body's axes, relative to its node, m
-    place : (c, 2, 3) node positions at zero angles, m (for ground: zero)
+    node : (c, 2, 3) node positions at zero angles, m (for ground: zero)
     stiffness, damping : (c, 6, 6) N/m .. N m/rad, and times s
     """
 
     bodies: Integers
     local: Floats
-    place: Floats
+    node: Floats
     stiffness: Floats
     damping: Floats
 
@@ -47,22 +57,24 @@ def body_point(q: Floats, v: Floats, start: int, node: Floats, local: Floats, tu
         out[:] = 0.0
         for i in range(3):
             turn[i, i] = 1.0
-            out[0, i] = local[i]
-            out[1, i] = node[i] + local[i]
+            out[ARM, i] = local[i]
+            out[POSITION, i] = node[i] + local[i]
         return
-    a, b = q[start + 3], q[start + 4]
-    rotation(a, b, q[start + 5], turn)
-    da, db, dg = v[start + 3], v[start + 4], v[start + 5]
+    a, b = q[start + TILT], q[start + TILT + 1]
+    rotation(a, b, q[start + SPIN], turn)
+    da, db, dg = v[start + TILT], v[start + TILT + 1], v[start + SPIN]
     ca, sa, cb, sb = math.cos(a), math.sin(a), math.cos(b), math.sin(b)
+    # Angular velocity in global axes: each angle's rate about the axis that it turns about.
     wx, wy, wz = da + sb * dg, ca * db - sa * cb * dg, sa * db + ca * cb * dg
     for i in range(3):
-        out[0, i] = turn[i, 0] * local[0] + turn[i, 1] * local[1] + turn[i, 2] * local[2]
-        out[1, i] = node[i] + q[start + i] + out[0, i]
-    r = out[0]
-    out[2, 0] = v[start] + wy * r[2] - wz * r[1]
-    out[2, 1] = v[start + 1] + wz * r[0] - wx * r[2]
-    out[2, 2] = v[start + 2] + wx * r[1] - wy * r[0]
-    out[3, 0], out[3, 1], out[3, 2] = wx, wy, wz
+        out[ARM, i] = turn[i, 0] * local[0] + turn[i, 1] * local[1] + turn[i, 2] * local[2]
+        out[POSITION, i] = node[i] + q[start + i] + out[ARM, i]
+    # Velocity of the point: that of the node and omega x r.
+    r = out[ARM]
+    out[VELOCITY, 0] = v[start] + wy * r[2] - wz * r[1]
+    out[VELOCITY, 1] = v[start + 1] + wz * r[0] - wx * r[2]
+    out[VELOCITY, 2] = v[start + 2] + wx * r[1] - wy * r[0]
+    out[ANGULAR_VELOCITY, 0], out[ANGULAR_VELOCITY, 1], out[ANGULAR_VELOCITY, 2] = wx, wy, wz
 
 
 @compiled
@@ -77,45 +89,51 @@ def connector_motion(
     """
     turn1 = np.empty((3, 3))
     point0, point1 = np.empty((4, 3)), np.empty((4, 3))
-    index, place, local = connectors.bodies[n], connectors.place[n], connectors.local[n]
-    body_point(q, v, index[0], place[0], local[0], turn, point0)
-    body_point(q, v, index[1], place[1], local[1], turn1, point1)
+    index, node, local = connectors.bodies[n], connectors.node[n], connectors.local[n]
+    body_point(q, v, index[0], node[0], local[0], turn, point0)
+    body_point(q, v, index[1], node[1], local[1], turn1, point1)
+    # Everything of the second body against the first, seen in the first body's axes.
     relative = np.zeros((3, 3))
     out[:] = 0.0
     for i in range(3):
-        arms[0, i], arms[1, i] = point0[0, i], point1[0, i]
+        arms[0, i], arms[1, i] = point0[ARM, i], point1[ARM, i]
         for j in range(3):
-            out[0, i] += turn[j, i] * (point1[1, j] - point0[1, j])
-            out[1, i] += turn[j, i] * (point1[2, j] - point0[2, j])
-            out[1, 3 + i] += turn[j, i] * (point1[3, j] - point0[3, j])
+            out[DISPLACEMENT, i] += turn[j, i] * (point1[POSITION, j] - point0[POSITION, j])
+            out[RATE, i] += turn[j, i] * (point1[VELOCITY, j] - point0[VELOCITY, j])
+            out[RATE, TILT + i] += turn[j, i] * (point1[ANGULAR_VELOCITY, j] - point0[ANGULAR_VELOCITY, j])
             for k in range(3):
                 relative[i, j] += turn[k, i] * turn1[k, j]
-    out[0, 3] = math.atan2(-relative[1, 2], relative[2, 2])
-    out[0, 4] = math.asin(min(1.0, max(-1.0, relative[0, 2])))
-    out[0, 5] = math.atan2(-relative[0, 1], relative[0, 0])
+    # Rxyz angles of the relative rotation; the sine is clipped, since round-off may carry it past 1.
+    out[DISPLACEMENT, TILT] = math.atan2(-relative[1, 2], relative[2, 2])
+    out[DISPLACEMENT, TILT + 1] = math.asin(min(1.0, max(-1.0, relative[0, 2])))
+    out[DISPLACEMENT, SPIN] = math.atan2(-relative[0, 1], relative[0, 0])
+    # True derivative of the displacement: less what the turning of the axes themselves does to it.
     spinning = np.zeros(3)
     for i in range(3):
         for j in range(3):
-            spinning[i] += turn[j, i] * point0[3, j]
-    d, w = out[0], out[1]
-    out[2, 0] = w[0] - spinning[1] * d[2] + spinning[2] * d[1]
-    out[2, 1] = w[1] - spinning[2] * d[0] + spinning[0] * d[2]
-    out[2, 2] = w[2] - spinning[0] * d[1] + spinning[1] * d[0]
-    across = math.cos(d[3]) * w[5] - math.sin(d[3]) * w[4]
-    out[2, 5] = across / math.cos(d[4])
-    out[2, 4] = math.cos(d[3]) * w[4] + math.sin(d[3]) * w[5]
-    out[2, 3] = w[3] - math.sin(d[4]) * out[2, 5]
+            spinning[i] += turn[j, i] * point0[ANGULAR_VELOCITY, j]
+    d, w = out[DISPLACEMENT], out[RATE]
+    out[TRUE_RATE, 0] = w[0] - spinning[1] * d[2] + spinning[2] * d[1]
+    out[TRUE_RATE, 1] = w[1] - spinning[2] * d[0] + spinning[0] * d[2]
+    out[TRUE_RATE, 2] = w[2] - spinning[0] * d[1] + spinning[1] * d[0]
+    # Rates of the three angles from the angular velocity, by inverting the relation in `body_point`.
+    a, b = d[TILT], d[TILT + 1]
+    across = math.cos(a) * w[SPIN] - math.sin(a) * w[TILT + 1]
+    out[TRUE_RATE, SPIN] = across / math.cos(b)
+    out[TRUE_RATE, TILT + 1] = math.cos(a) * w[TILT + 1] + math.sin(a) * w[SPIN]
+    out[TRUE_RATE, TILT] = w[TILT] - math.sin(b) * out[TRUE_RATE, SPIN]
 
 
 @compiled
 def connector_load(q: Floats, v: Floats, n: int, connectors: ConnectorArrays, arms: Floats, out: Floats) -> None:
     """Fill force and moment (6,) that connector n takes from its second body, global axes; arms (2, 3)."""
-    turn, motion = np.empty((3, 3)), np.empty((3, 6))
+    turn, motion = np.empty((3, 3)), np.empty((3, BODY_SIZE))
     connector_motion(q, v, n, connectors, turn, arms, motion)
-    own = connectors.stiffness[n] @ motion[0] + connectors.damping[n] @ motion[1]
+    # Force and moment in the first body's axes, then turned into global ones.
+    local = connectors.stiffness[n] @ motion[DISPLACEMENT] + connectors.damping[n] @ motion[RATE]
     for i in range(3):
-        out[i] = turn[i, 0] * own[0] + turn[i, 1] * own[1] + turn[i, 2] * own[2]
-        out[3 + i] = turn[i, 0] * own[3] + turn[i, 1] * own[4] + turn[i, 2] * own[5]
+        out[i] = turn[i, 0] * local[0] + turn[i, 1] * local[1] + turn[i, 2] * local[2]
+        out[3 + i] = turn[i, 0] * local[3] + turn[i, 1] * local[4] + turn[i, 2] * local[5]
 
 
 @compiled
@@ -123,22 +141,24 @@ def add_wrench(q: Floats, start: int, sign: float, load: Floats, arm: Floats, f:
     """Add a global force and moment (6,) acting at `arm` from the node to the Rxyz coordinates of a body."""
     if start < 0:
         return
-    a, b = q[start + 3], q[start + 4]
+    a, b = q[start + TILT], q[start + TILT + 1]
     ca, sa, cb, sb = math.cos(a), math.sin(a), math.cos(b), math.sin(b)
+    # Moment about the node: that of the wrench and r x F.
     mx = sign * (load[3] + arm[1] * load[2] - arm[2] * load[1])
     my = sign * (load[4] + arm[2] * load[0] - arm[0] * load[2])
     mz = sign * (load[5] + arm[0] * load[1] - arm[1] * load[0])
     for i in range(3):
         f[start + i] += sign * load[i]
-    f[start + 3] += mx
-    f[start + 4] += ca * my + sa * mz
-    f[start + 5] += sb * mx - sa * cb * my + ca * cb * mz
+    # Conjugate to the angles are the moments about x, the tilted y and the body's z.
+    f[start + TILT] += mx
+    f[start + TILT + 1] += ca * my + sa * mz
+    f[start + SPIN] += sb * mx - sa * cb * my + ca * cb * mz
 
 
 @compiled
 def add_connector_forces(q: Floats, v: Floats, connectors: ConnectorArrays, f: Floats) -> None:
     """Add the generalized forces of all connectors to f."""
-    load, arms = np.empty(6), np.empty((2, 3))
+    load, arms = np.empty(BODY_SIZE), np.empty((2, 3))
     for n in range(connectors.bodies.shape[0]):
         connector_load(q, v, n, connectors, arms, load)
         add_wrench(q, connectors.bodies[n, 0], 1.0, load, arms[0], f)
@@ -148,5 +168,5 @@ def add_connector_forces(q: Floats, v: Floats, connectors: ConnectorArrays, f: F
 def no_connectors() -> ConnectorArrays:
     """Arrays of a system without bearings."""
     empty = np.zeros((0, 2, 3))
-    matrices = np.zeros((0, 6, 6))
+    matrices = np.zeros((0, BODY_SIZE, BODY_SIZE))
     return ConnectorArrays(np.zeros((0, 2), dtype=np.int64), empty, empty, matrices, matrices)

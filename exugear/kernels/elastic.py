@@ -3,6 +3,8 @@
 A body's matrices fall into blocks: for a shaft two planes of bending, torsion and stretching. Each block works on its
 own coordinates, gathered from the state; gyroscopic forces come from the velocities of a partner block, times the
 spin speed Omega = s . v that the body's momentum about its axis defines. Nothing is allocated here.
+
+Seats have the coordinates of `exugear.kernels.coordinates`; what vibrates between them, modal ones.
 """
 
 from __future__ import annotations
@@ -11,9 +13,8 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.arrays import Booleans, Floats, Integers
 from fe_ste.tools.compilation import kernel, summing_kernel
 
 
@@ -94,7 +95,7 @@ LANES = 8
 """Products taken together: what two registers of a processor hold."""
 
 
-def elastic_motion(elastic: ElasticArrays, acted: NDArray[np.bool_]) -> ElasticMotion:
+def elastic_motion(elastic: ElasticArrays, acted: Booleans) -> ElasticMotion:
     """Solve all blocks for their accelerations.
 
     Parameters
@@ -105,8 +106,8 @@ def elastic_motion(elastic: ElasticArrays, acted: NDArray[np.bool_]) -> ElasticM
     """
     sizes = np.diff(elastic.first)
     across = np.where(elastic.partner >= 0, sizes[elastic.partner], 0)
-    places = [np.flatnonzero(acted[elastic.coordinate[begin:end]]) for begin, end in pairwise(elastic.first)]
-    forces = np.array([place.max(initial=-1) + 1 for place in places], dtype=np.int64)
+    seats = [np.flatnonzero(acted[elastic.coordinate[begin:end]]) for begin, end in pairwise(elastic.first)]
+    forces = np.array([seat.max(initial=-1) + 1 for seat in seats], dtype=np.int64)
     columns = -(-(forces + sizes + across) // LANES) * LANES
     blocks: list[Floats] = [np.zeros(0)]
     for b, size in enumerate(sizes):
@@ -143,9 +144,9 @@ def row_product(matrix: Floats, begin: int | np.uint64, given: Floats, count: in
     products at once.
     """
     total = 0.0
-    place = np.uint64(begin)
+    start = np.uint64(begin)
     for j in range(np.uint64(count)):
-        total += matrix[place + j] * given[j]
+        total += matrix[start + j] * given[j]
     return total
 
 
@@ -159,6 +160,7 @@ def set_elastic_motion(q: Floats, v: Floats, f: Floats, elastic: ElasticMotion, 
     at = np.uint64  # places without a sign spare the question whether they count from the end: a third of the time
     for b in range(at(elastic.turning.size)):
         first, size, acted = at(elastic.first[b]), at(elastic.first[b + 1] - elastic.first[b]), at(elastic.acted[b])
+        # What the matrix acts on: outer forces, q + time v without the common turning, Omega v of the partner, zeros.
         common = q[at(elastic.coordinate[first])] * elastic.spin[first]
         time = elastic.damping_time[b]
         for i in range(acted):
@@ -220,12 +222,14 @@ def add_elastic_forces(q: Floats, v: Floats, elastic: ElasticArrays, scratch: Fl
         deformation(b, q, v, elastic.damping_time[b], elastic, given)
         for i in range(size):
             sum_[i] = 0.0
+        # Column by column: the inner loop then runs over neighbouring entries and needs no sum across lanes.
         column = elastic.square[b]
         for j in range(size):
             value = given[j]
             for i in range(size):
                 sum_[i] += elastic.stiffness[column + i] * value
             column += size
+        # Gyroscopic forces come from the other plane's velocities.
         partner = elastic.partner[b]
         if partner >= 0:
             speed = spin_speed(b, v, elastic)
@@ -281,6 +285,7 @@ def elastic_energies(q: Floats, v: Floats, elastic: ElasticArrays, scratch: Floa
         kinetic += 0.5 * block_energy(b, given, elastic.mass, elastic)
         deformation(b, q, v, 0.0, elastic, given)
         stored += 0.5 * block_energy(b, given, elastic.stiffness, elastic)
+        # Damping is a time times the stiffness: its power is that of the rates, without the common turning.
         deformation(b, v, v, 0.0, elastic, given)
         damped += elastic.damping_time[b] * block_energy(b, given, elastic.stiffness, elastic)
     return kinetic, stored, damped

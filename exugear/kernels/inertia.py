@@ -1,10 +1,14 @@
-"""Compiled inertia of rigid bodies, symmetric about their axes, on arrays of coordinates."""
+"""Compiled inertia of rigid bodies, symmetric about their axes, on arrays of coordinates.
+
+Coordinates are those of `exugear.kernels.coordinates`.
+"""
 
 from __future__ import annotations
 
 import math
 from typing import NamedTuple
 
+from exugear.kernels.coordinates import SPIN, TILT
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import compiled
 
@@ -32,7 +36,8 @@ class InertiaArrays(NamedTuple):
 def accelerations(q: Floats, v: Floats, inertia: InertiaArrays, f: Floats, out: Floats) -> None:
     """Solve the equations of motion of the bodies for the accelerations under generalized forces f.
 
-    For an axially symmetric body in Rxyz coordinates with p = J_a (spin' + a' sin b):
+    Lagrange's equations of an axially symmetric body in Rxyz coordinates, with p = J_a (spin' + a' sin b), the angular
+    momentum about its axis (the kinetic energy is that of `kinetic_energies`):
 
         J_t cos^2 b a'' = Q_a - Q_spin sin b - p b' cos b + 2 J_t a' b' sin b cos b
         J_t b'' = Q_b - J_t a'^2 sin b cos b + p a' cos b,   spin'' = Q_spin / J_a - a'' sin b - a' b' cos b
@@ -41,12 +46,14 @@ def accelerations(q: Floats, v: Floats, inertia: InertiaArrays, f: Floats, out: 
         o, jt, ja = inertia.body[n], inertia.transverse[n], inertia.axial[n]
         for i in range(3):
             out[o + i] = f[o + i] / inertia.mass[n]
-        sb, cb = math.sin(q[o + 4]), math.cos(q[o + 4])
-        da, db = v[o + 3], v[o + 4]
-        p = ja * (v[o + 5] + da * sb)
-        out[o + 3] = (f[o + 3] - f[o + 5] * sb - p * db * cb + 2.0 * jt * da * db * sb * cb) / (jt * cb * cb)
-        out[o + 4] = (f[o + 4] - jt * da * da * sb * cb + p * da * cb) / jt
-        out[o + 5] = f[o + 5] / ja - out[o + 3] * sb - da * db * cb
+        a, b, spin = o + TILT, o + TILT + 1, o + SPIN
+        sb, cb = math.sin(q[b]), math.cos(q[b])
+        da, db = v[a], v[b]
+        p = ja * (v[spin] + da * sb)
+        # The first tilt's equation contains spin'': it is eliminated with the spin's own equation, solved last.
+        out[a] = (f[a] - f[spin] * sb - p * db * cb + 2.0 * jt * da * db * sb * cb) / (jt * cb * cb)
+        out[b] = (f[b] - jt * da * da * sb * cb + p * da * cb) / jt
+        out[spin] = f[spin] / ja - out[a] * sb - da * db * cb
     for n in range(inertia.spin.size):
         out[inertia.spin[n]] = f[inertia.spin[n]] / inertia.spin_inertia[n]
 
@@ -57,9 +64,10 @@ def kinetic_energies(q: Floats, v: Floats, inertia: InertiaArrays, out: Floats) 
     for n in range(inertia.body.size):
         o = inertia.body[n]
         square = v[o] ** 2 + v[o + 1] ** 2 + v[o + 2] ** 2
-        sb, cb = math.sin(q[o + 4]), math.cos(q[o + 4])
-        tilting = (v[o + 3] * cb) ** 2 + v[o + 4] ** 2
-        spin = v[o + 5] + v[o + 3] * sb
+        # Angular velocity across the axis, and about it: spin' + a' sin b.
+        sb, cb = math.sin(q[o + TILT + 1]), math.cos(q[o + TILT + 1])
+        tilting = (v[o + TILT] * cb) ** 2 + v[o + TILT + 1] ** 2
+        spin = v[o + SPIN] + v[o + TILT] * sb
         out[n] = 0.5 * (inertia.mass[n] * square + inertia.transverse[n] * tilting + inertia.axial[n] * spin**2)
     for n in range(inertia.spin.size):
         out[inertia.body.size + n] = 0.5 * inertia.spin_inertia[n] * v[inertia.spin[n]] ** 2

@@ -1,4 +1,4 @@
-"""Compiled law of torsional springs on arrays of coordinates."""
+"""Compiled law of torsional springs on arrays of coordinates, which are those of `exugear.kernels.coordinates`."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ def add_spring_forces(q: Floats, v: Floats, springs: SpringArrays, f: Floats) ->
     """Add the torques of the torsional springs to f."""
     for n in range(springs.coordinates.shape[0]):
         i, j = springs.coordinates[n]
+        # A shaft that the second body is ahead of pulls the first one along.
         torque = springs.stiffness[n] * (q[j] - q[i]) + springs.damping[n] * (v[j] - v[i])
         f[i] += torque
         f[j] -= torque

@@ -27,10 +27,25 @@ ORDERS = np.array(
     dtype=np.int64,
 )
 """Derivatives of the surface in this order: times by pmc, by centre distance, by misalignment."""
-FIRST_TWO = 3
-"""Number of them that a force needs; one more for the power of the turning cycle, all for a tangent."""
+FORCE_DERIVATIVES = 3
+"""Number of them that a force needs: value and both slopes."""
+ENERGY_DERIVATIVES = FORCE_DERIVATIVES + 1
+"""One more for the power of the turning cycle; a tangent needs all."""
 ROUNDS = 60
 """Newton and bisection steps at most: bisection alone would reach round-off."""
+
+POSITIONS, DISTANCES, MISALIGNMENTS, LOAD_PIECES = range(4)
+"""Columns of `TableArrays.shape`."""
+AXIS_PMC, AXIS_DISTANCE, AXIS_MISALIGNMENT = range(3)
+"""Axes of `Scratch.basis` and `Scratch.node`."""
+NOMINAL_DEFLECTION, NOMINAL_DISTANCE, NOMINAL_MISALIGNMENT = range(3)
+"""Columns of `TableArrays.nominal`."""
+CUBIC_SIZE = 5
+ENERGY_BELOW = 4
+"""Behind the four coefficients of s over a load piece: the integral of s over the force up to the piece's start."""
+LAW_FORCE, LAW_STIFFNESS, LAW_POTENTIAL, LAW_BY_DISTANCE, LAW_BY_MISALIGNMENT, LAW_BY_PMC, LAW_OUTSIDE = range(7)
+"""Entries of `Scratch.law`."""
+LAW_SIZE = 7
 
 
 class TableArrays(NamedTuple):
@@ -43,11 +58,11 @@ class TableArrays(NamedTuple):
     values : (m, n) `fe_ste.transmission_error.surface.SteSurface.coefficients`, flat
     root : (m, l + 1) knots of the root of F_bt, sqrt(N)
     knots : (m, 2, k) knots of centre distance (m) and misalignment (rad)
-    first : (m, 2, k) first node that acts in each interval
+    first_node : (m, 2, k) first node that acts in each interval
     weights : (m, 2, k, 4, 4) coefficients of the nodes' weights in each interval
     lowest : (m,) deflection below which the flanks are apart in every position, m
-    centre, tilt : (m, 12) rows of centre distance and misalignment, about the bodies' nodes
-    back, back_tilt : (m, 12) rows of the other flank's deflection and misalignment
+    centre, misalignment : (m, 12) rows of centre distance and misalignment, about the bodies' nodes
+    back, back_misalignment : (m, 12) rows of the other flank's deflection and misalignment
     nominal : (m, 3) deflection (m), centre distance (m), misalignment (rad) of gears in their nominal place
     backlash : (m,) approach from flank to flank along the transverse line of action, m
     back_phase : (m,) position of the other flank in its mesh cycle at zero angles
@@ -60,13 +75,13 @@ class TableArrays(NamedTuple):
     values: Floats
     root: Floats
     knots: Floats
-    first: Integers
+    first_node: Integers
     weights: Floats
     lowest: Floats
     centre: Floats
-    tilt: Floats
+    misalignment: Floats
     back: Floats
-    back_tilt: Floats
+    back_misalignment: Floats
     nominal: Floats
     backlash: Floats
     back_phase: Floats
@@ -97,12 +112,18 @@ class Scratch(NamedTuple):
 @compiled
 def scratch_memory() -> Scratch:
     """Memory for `surface_law`."""
-    return Scratch(np.zeros((3, 3, 4)), np.zeros(3, dtype=np.int64), np.zeros((2, 5)), np.zeros((9, 5)), np.zeros(7))
+    return Scratch(
+        np.zeros((3, 3, 4)),
+        np.zeros(3, dtype=np.int64),
+        np.zeros((2, CUBIC_SIZE)),
+        np.zeros((9, CUBIC_SIZE)),
+        np.zeros(LAW_SIZE),
+    )
 
 
 @kernel
 def piece_at(scaled: float, pieces: int) -> int:
-    """Find the piece that holds a place in [0, pieces]; one of them for any number, also one that is not finite.
+    """Find the piece that holds a number in [0, pieces]; one of them for any number, also one that is not finite.
 
     A state that diverges passes through angles that are no numbers, or that no integer can hold: what the processor
     makes of these would read outside the array. Clamping the integer costs nothing; clamping the number, 4 % of a step.
@@ -111,21 +132,23 @@ def piece_at(scaled: float, pieces: int) -> int:
 
 
 @kernel
-def place_in_cycle(pmc: float, positions: int, node: Integers, basis: Floats) -> None:
-    """Weights of the four positions around pmc, and their derivatives per cycle."""
+def weigh_positions(pmc: float, positions: int, node: Integers, basis: Floats) -> None:
+    """Weights of the four positions around pmc, and their derivatives per cycle: Catmull-Rom splines, periodic."""
     basis[:] = 0.0
     if positions == 1:
-        node[0] = 0
+        node[AXIS_PMC] = 0
         basis[0, 0] = 1.0
         return
     scaled = (pmc - math.floor(pmc)) * positions
     piece = piece_at(scaled, positions)
     t = scaled - piece
-    node[0] = piece - 1 if piece > 0 else positions - 1
+    # Two positions on either side act; the first of them may lie before the start of the cycle.
+    node[AXIS_PMC] = piece - 1 if piece > 0 else positions - 1
     basis[0, 0] = 0.5 * t * (2.0 * t - 1.0 - t * t)
     basis[0, 1] = 0.5 * (2.0 + t * t * (3.0 * t - 5.0))
     basis[0, 2] = 0.5 * t * (1.0 + t * (4.0 - 3.0 * t))
     basis[0, 3] = 0.5 * t * t * (t - 1.0)
+    # Derivatives of the same polynomials, from per piece to per cycle.
     basis[1, 0] = 0.5 * (t * (4.0 - 3.0 * t) - 1.0) * positions
     basis[1, 1] = 0.5 * t * (9.0 * t - 10.0) * positions
     basis[1, 2] = 0.5 * (1.0 + t * (8.0 - 9.0 * t)) * positions
@@ -133,17 +156,19 @@ def place_in_cycle(pmc: float, positions: int, node: Integers, basis: Floats) ->
 
 
 @kernel
-def place_on_axis(x: float, count: int, knots: Floats, first: Integers, weights: Floats, basis: Floats) -> int:
+def weigh_nodes(x: float, count: int, knots: Floats, weights: Floats, basis: Floats) -> int:
     """Weights of the nodes near x with two derivatives; the interval, or -1 - interval where x is outside the axis."""
     if count == 1:
         basis[:] = 0.0
         basis[0, 0] = 1.0
         return 0
+    # Axes have a handful of knots: a search from the left is faster than bisection.
     i = 0
     while i < count - 2 and x >= knots[i + 1]:
         i += 1
     step = knots[i + 1] - knots[i]
     whole = (x - knots[i]) / step
+    # Outside the axis the weights go on along their tangent, so that the force stays continuous there.
     t = min(1.0, max(0.0, whole))
     beyond = whole - t
     for a in range(4):
@@ -159,71 +184,87 @@ def place_on_axis(x: float, count: int, knots: Floats, first: Integers, weights:
 def contract_for_force(values: Floats, shape: Integers, piece: int, memory: Scratch) -> None:
     """Fill `cubic` with the surface and its slopes over centre distance and misalignment, one axis after the other."""
     basis, node, cubic, part = memory.basis, memory.node, memory.cubic, memory.part
-    stride = 5 * shape[3]
-    for d in range(3):
-        for j in range(5):
+    stride = CUBIC_SIZE * shape[LOAD_PIECES]
+    for d in range(FORCE_DERIVATIVES):
+        for j in range(CUBIC_SIZE):
             cubic[d, j] = 0.0
-    for p in range(4 if shape[0] > 1 else 1):
-        position = node[0] + p
-        while position >= shape[0]:
-            position -= shape[0]
-        place = basis[0, 0, p]
-        for c in range(min(4, shape[1])):
-            start = 5 * (((position * shape[1] + node[1] + c) * shape[2] + node[2]) * shape[3] + piece)
-            for j in range(5):
+    for p in range(4 if shape[POSITIONS] > 1 else 1):
+        # The mesh cycle closes: behind the last position comes the first.
+        position = node[AXIS_PMC] + p
+        while position >= shape[POSITIONS]:
+            position -= shape[POSITIONS]
+        position_weight = basis[AXIS_PMC, 0, p]
+        for c in range(min(4, shape[DISTANCES])):
+            row = (position * shape[DISTANCES] + node[AXIS_DISTANCE] + c) * shape[MISALIGNMENTS]
+            start = CUBIC_SIZE * ((row + node[AXIS_MISALIGNMENT]) * shape[LOAD_PIECES] + piece)
+            for j in range(CUBIC_SIZE):
                 part[0, j], part[1, j] = 0.0, 0.0
-            for a in range(min(4, shape[2])):
-                straight, sloping = basis[2, 0, a], basis[2, 1, a]
-                for j in range(5):
+            # The innermost axis is summed once for value and slope: half the products of a sum over all three axes.
+            for a in range(min(4, shape[MISALIGNMENTS])):
+                value_weight, slope_weight = basis[AXIS_MISALIGNMENT, 0, a], basis[AXIS_MISALIGNMENT, 1, a]
+                for j in range(CUBIC_SIZE):
                     value = values[start + j]
-                    part[0, j] += straight * value
-                    part[1, j] += sloping * value
+                    part[0, j] += value_weight * value
+                    part[1, j] += slope_weight * value
                 start += stride
-            straight, sloping = place * basis[1, 0, c], place * basis[1, 1, c]
-            for j in range(5):
-                cubic[0, j] += straight * part[0, j]
-                cubic[1, j] += sloping * part[0, j]
-                cubic[2, j] += straight * part[1, j]
+            value_weight = position_weight * basis[AXIS_DISTANCE, 0, c]
+            slope_weight = position_weight * basis[AXIS_DISTANCE, 1, c]
+            for j in range(CUBIC_SIZE):
+                cubic[0, j] += value_weight * part[0, j]
+                cubic[1, j] += slope_weight * part[0, j]
+                cubic[2, j] += value_weight * part[1, j]
 
 
 @kernel
 def contract(values: Floats, shape: Integers, piece: int, count: int, memory: Scratch) -> None:
     """Fill `cubic` with the first `count` derivatives of the surface over one load piece."""
-    if count == FIRST_TWO:
+    if count == FORCE_DERIVATIVES:
         contract_for_force(values, shape, piece, memory)
         return
     cubic, basis, node = memory.cubic, memory.basis, memory.node
     for d in range(count):
-        for j in range(5):
+        for j in range(CUBIC_SIZE):
             cubic[d, j] = 0.0
-    across, along = min(4, shape[1]), min(4, shape[2])
-    for p in range(4 if shape[0] > 1 else 1):
-        position = node[0] + p
-        while position >= shape[0]:
-            position -= shape[0]
-        for c in range(across):
-            start = ((position * shape[1] + node[1] + c) * shape[2] + node[2]) * shape[3] + piece
-            for a in range(along):
-                o = 5 * (start + a * shape[3])
+    distances, misalignments = min(4, shape[DISTANCES]), min(4, shape[MISALIGNMENTS])
+    for p in range(4 if shape[POSITIONS] > 1 else 1):
+        position = node[AXIS_PMC] + p
+        while position >= shape[POSITIONS]:
+            position -= shape[POSITIONS]
+        for c in range(distances):
+            row = (position * shape[DISTANCES] + node[AXIS_DISTANCE] + c) * shape[MISALIGNMENTS]
+            start = (row + node[AXIS_MISALIGNMENT]) * shape[LOAD_PIECES] + piece
+            for a in range(misalignments):
+                o = CUBIC_SIZE * (start + a * shape[LOAD_PIECES])
                 for d in range(count):
-                    weight = basis[0, ORDERS[d, 0], p] * basis[1, ORDERS[d, 1], c] * basis[2, ORDERS[d, 2], a]
-                    for j in range(5):
+                    # The surface is a product of one-dimensional weights; so is each of its derivatives.
+                    weight = (
+                        basis[AXIS_PMC, ORDERS[d, 0], p]
+                        * basis[AXIS_DISTANCE, ORDERS[d, 1], c]
+                        * basis[AXIS_MISALIGNMENT, ORDERS[d, 2], a]
+                    )
+                    for j in range(CUBIC_SIZE):
                         cubic[d, j] += weight * values[o + j]
 
 
 @kernel
 def energy(c: Floats, start: float, step: float, t: float) -> float:
-    """Integral of s over the force from zero to place t of a load piece, c (5,)."""
+    """Integral of s over the force from zero to the position t of a load piece, c (5,)."""
+    # s is a cubic in the root of the force, r = start + step t, so dF = 2 r dr: the integrals of s and of t s.
     level = t * (c[0] + t * (c[1] / 2.0 + t * (c[2] / 3.0 + t * c[3] / 4.0)))
     rising = t * t * (c[0] / 2.0 + t * (c[1] / 3.0 + t * (c[2] / 4.0 + t * c[3] / 5.0)))
-    value: float = c[4] + 2.0 * step * (start * level + step * rising)
+    value: float = c[ENERGY_BELOW] + 2.0 * step * (start * level + step * rising)
     return value
 
 
 @kernel
-def place_on_piece(delta: float, c: Floats, flat: bool) -> float:
-    """Place t in [0, 1] with s(t) = delta on a rising cubic; flat: its slope at 0 may vanish."""
+def position_on_piece(delta: float, c: Floats, flat: bool) -> float:
+    """Solve s(t) = delta on a rising cubic for t in [0, 1]; flat: its slope at 0 may vanish.
+
+    Newton's method, kept in a bracket that shrinks, and halving it where Newton leaves it (Press et al., Numerical
+    Recipes, rtsafe).
+    """
     low, high = 0.0, 1.0
+    # First guess: the chord; where the slope may vanish, the parabola through both ends.
     t = (delta - c[0]) / (c[1] + c[2] + c[3])
     if flat:
         t = math.sqrt(max(0.0, t))
@@ -241,8 +282,8 @@ def place_on_piece(delta: float, c: Floats, flat: bool) -> float:
         if abs(guess - t) <= 1e-14:
             break
         t = guess
-    place: float = t
-    return place
+    solution: float = t
+    return solution
 
 
 @kernel
@@ -262,59 +303,63 @@ def surface_law(
     Parameters
     ----------
     guess : load piece where the search begins; it does not change the result
-    count : derivatives wanted, at least `FIRST_TWO`
+    count : derivatives wanted, at least `FORCE_DERIVATIVES`
 
     Returns
     -------
     piece : int
         Load piece of the solution, whose cubics are left in `memory.cubic`.
     t : float
-        Place in it: below 0 where the flanks are apart, above 1 beyond the last load.
+        Position in it: below 0 where the flanks are apart, above 1 beyond the last load.
     """
     law, cubic, shape = memory.law, memory.cubic, tables.shape[m]
-    for i in range(7):
+    for i in range(LAW_SIZE):
         law[i] = 0.0
-    place_in_cycle(pmc, shape[0], memory.node, memory.basis[0])
+    # Weights on the three axes; with them the surface becomes a function of the load alone.
+    weigh_positions(pmc, shape[POSITIONS], memory.node, memory.basis[AXIS_PMC])
     for axis in range(2):
         x = centre if axis == 0 else misalignment
-        i = place_on_axis(
-            x, tables.axes[m, axis], tables.knots[m, axis], tables.first[m, axis], tables.weights[m, axis],
-            memory.basis[1 + axis],
-        )  # fmt: skip
+        i = weigh_nodes(
+            x, tables.axes[m, axis], tables.knots[m, axis], tables.weights[m, axis], memory.basis[AXIS_DISTANCE + axis]
+        )
         if i < 0:
-            law[6] = 1.0
+            law[LAW_OUTSIDE] = 1.0
             i = -1 - i
-        memory.node[1 + axis] = tables.first[m, axis, i]
-    last = shape[3] - 1
+        memory.node[AXIS_DISTANCE + axis] = tables.first_node[m, axis, i]
+    # Walk to the load piece whose ends enclose delta. In one direction only: where the surface is not monotonic by
+    # round-off, a walk that may turn round would not end.
+    last = shape[LOAD_PIECES] - 1
     piece = min(max(guess, 0), last)
     c = cubic[0]
-    moved = 0
+    direction = 0
     while True:
         contract(tables.values[m], shape, piece, count, memory)
-        if delta < c[0] and piece > 0 and moved <= 0:
-            moved = -1
-        elif delta > c[0] + c[1] + c[2] + c[3] and piece < last and moved >= 0:
-            moved = 1
+        if delta < c[0] and piece > 0 and direction <= 0:
+            direction = -1
+        elif delta > c[0] + c[1] + c[2] + c[3] and piece < last and direction >= 0:
+            direction = 1
         else:
             break
-        piece += moved
+        piece += direction
     start = tables.root[m, piece]
     step = tables.root[m, piece + 1] - start
+    # Below the surface at no load the flanks are apart.
     if delta <= c[0] and piece == 0:
         return 0, -1.0
     end = c[0] + c[1] + c[2] + c[3]
     if delta > end and piece == last:
-        law[6] = 1.0
+        law[LAW_OUTSIDE] = 1.0
         beyond_last(delta, start, step, count, memory)
         return piece, 2.0
-    t = place_on_piece(delta, c, piece == 0)
+    # On the piece: F = r^2, dF/d delta = 2 r (dr/dt) / (ds/dt), U = F delta - U*, dU/dx = -dU*/dx.
+    t = position_on_piece(delta, c, piece == 0)
     root = start + step * t
     slope = c[1] + t * (2.0 * c[2] + t * 3.0 * c[3])
-    law[0] = root * root
-    law[1] = 2.0 * root * step / slope if slope > 0.0 else 0.0
-    law[2] = law[0] * delta - energy(c, start, step, t)
-    for d in range(1, min(count, 4)):
-        law[2 + d] = -energy(cubic[d], start, step, t)
+    law[LAW_FORCE] = root * root
+    law[LAW_STIFFNESS] = 2.0 * root * step / slope if slope > 0.0 else 0.0
+    law[LAW_POTENTIAL] = law[LAW_FORCE] * delta - energy(c, start, step, t)
+    for d in range(1, min(count, ENERGY_DERIVATIVES)):
+        law[LAW_POTENTIAL + d] = -energy(cubic[d], start, step, t)
     return piece, t
 
 
@@ -323,16 +368,18 @@ def beyond_last(delta: float, start: float, step: float, count: int, memory: Scr
     """Fill `memory.law` beyond the last load: the deflection goes on in proportion to the force."""
     law, cubic = memory.law, memory.cubic
     c = cubic[0]
+    # Slope ds/dF at the end of the last piece: (ds/dt) / (dF/dt).
     per_force = 2.0 * (start + step) * step
     end, slope = c[0] + c[1] + c[2] + c[3], (c[1] + 2.0 * c[2] + 3.0 * c[3]) / per_force
     more = (delta - end) / slope
-    law[0] = (start + step) ** 2 + more
-    law[1] = 1.0 / slope
-    law[2] = law[0] * delta - energy(c, start, step, 1.0) - more * (end + 0.5 * slope * more)
-    for d in range(1, min(count, 4)):
+    law[LAW_FORCE] = (start + step) ** 2 + more
+    law[LAW_STIFFNESS] = 1.0 / slope
+    # Beyond the end s is a straight line: its integral is a trapezium.
+    law[LAW_POTENTIAL] = law[LAW_FORCE] * delta - energy(c, start, step, 1.0) - more * (end + 0.5 * slope * more)
+    for d in range(1, min(count, ENERGY_DERIVATIVES)):
         g = cubic[d]
         rate = (g[1] + 2.0 * g[2] + 3.0 * g[3]) / per_force
-        law[2 + d] = -energy(g, start, step, 1.0) - more * (g[0] + g[1] + g[2] + g[3] + 0.5 * rate * more)
+        law[LAW_POTENTIAL + d] = -energy(g, start, step, 1.0) - more * (g[0] + g[1] + g[2] + g[3] + 0.5 * rate * more)
 
 
 @kernel
@@ -352,24 +399,28 @@ def surface_tangent(t: float, piece: int, m: int, tables: TableArrays, memory: S
     inside = min(t, 1.0)
     root = start + step * inside
     law, cubic = memory.law, memory.cubic
-    more = law[0] - root * root if t > 1.0 else 0.0
-    k = law[1]
+    more = law[LAW_FORCE] - root * root if t > 1.0 else 0.0
+    k = law[LAW_STIFFNESS]
     for d in range(4):  # delta, then the first derivatives of the surface in its order
         c = cubic[d]
+        # Derivatives by the root r, then by F = r^2: ds/dF = s' / 2r, d2s/dF2 = (s'' - s'/r) / 4r^2.
         rising = (c[1] + inside * (2.0 * c[2] + inside * 3.0 * c[3])) / step
         bending = (2.0 * c[2] + 6.0 * inside * c[3]) / (step * step)
         per_force = rising / (2.0 * root)
         curvature = (bending - rising / root) / (4.0 * root * root)
         value = c[0] + inside * (c[1] + inside * (c[2] + inside * c[3])) + more * per_force
         if d == 0:
+            # From s(F) = delta: dF = k d delta, dk = -k^3 s'' d delta; beyond the last load s'' = 0.
             second = 0.0 if t > 1.0 else curvature
             out[0, 0], out[3, 0] = k, -(k**3) * second
         else:
+            # At fixed delta a change x of the surface is made up for by the force: dF/dx = -k ds/dx.
             out[0, d] = -k * value
             out[3, d] = -k * k * (per_force + second * out[0, d])
     for row in range(1, 3):
         out[row, 0] = out[0, row]
         for column in range(1, 4):
+            # Second derivative in `ORDERS`: behind the first ones, pairs of a and gamma, then those with pmc.
             twice = 3 + row + column - 1 if column < 3 else 6 + row
             g = cubic[twice]
             slope = (g[1] + 2.0 * g[2] + 3.0 * g[3]) / (2.0 * root * step)

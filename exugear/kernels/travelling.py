@@ -11,7 +11,8 @@ no noise of its own. Waves around the ring up to n = (s-1)/2 are seen, their rad
 sector: nine sectors see 94 % of an oval (n = 2) and 85 % of three waves. Forces go back to the sectors by the
 transposed law, and what the slope of x(theta) does goes to the angle of the frame: no energy is made or lost.
 
-Each travelling seat has six coordinates of its own behind those of the system, which follow from these.
+Each travelling seat has six coordinates of its own behind those of the system, which follow from these; they are those
+of `exugear.kernels.coordinates`.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from exugear.kernels.coordinates import BODY_SIZE, TILT
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import compiled, kernel
 
@@ -62,6 +64,7 @@ def sector_weight(cosine: float, sine: float, count: int) -> tuple[float, float]
     (1.0, 0.0)
     """
     weight, slope = 1.0, 0.0
+    # cos n d and sin n d by turning on from n - 1: one cosine and sine serve all waves.
     c, s = 1.0, 0.0
     for n in range(1, (count - 1) // 2 + 1):
         c, s = c * cosine - s * sine, s * cosine + c * sine
@@ -77,14 +80,17 @@ def place_travelling(q: Floats, v: Floats, seats: TravellingArrays) -> None:
         o, frame = seats.first[t], seats.frame[t]
         angle, speed = seats.angle[t] + q[frame], v[frame]
         c, s = math.cos(angle), math.sin(angle)
-        for i in range(6):
+        for i in range(BODY_SIZE):
             q[o + i], v[o + i] = 0.0, 0.0
         for k in range(seats.number[t]):
+            # Angle from the sector's middle to the seat, by the difference of the two directions.
             x, y = seats.axes[t, k, 0], seats.axes[t, k, 1]
             cosine, sine = c * x + s * y, s * x - c * y
             weight, slope = sector_weight(cosine, sine, seats.number[t])
             j = seats.sectors[t, k]
-            for i in (0, 3):
+            # Translations, then angles: the sector's motion turned on by that angle, its share, and what the share
+            # and the turning change as the seat travels.
+            for i in (0, TILT):
                 x, y = cosine * q[j + i] - sine * q[j + i + 1], sine * q[j + i] + cosine * q[j + i + 1]
                 ux, uy = cosine * v[j + i] - sine * v[j + i + 1], sine * v[j + i] + cosine * v[j + i + 1]
                 q[o + i] += weight * x
@@ -102,29 +108,30 @@ def share_travelling_forces(q: Floats, seats: TravellingArrays, f: Floats) -> No
         o, frame = seats.first[t], seats.frame[t]
         angle = seats.angle[t] + q[frame]
         c, s = math.cos(angle), math.sin(angle)
-        along = 0.0
+        travelling = 0.0  # power of the forces as the seat travels, per rad/s: the force on the frame's angle
         for k in range(seats.number[t]):
             x, y = seats.axes[t, k, 0], seats.axes[t, k, 1]
             cosine, sine = c * x + s * y, s * x - c * y
             weight, slope = sector_weight(cosine, sine, seats.number[t])
             j = seats.sectors[t, k]
-            for i in (0, 3):
+            for i in (0, TILT):
+                # The transposed map: turned back, times the share.
                 fx, fy = cosine * f[o + i] + sine * f[o + i + 1], cosine * f[o + i + 1] - sine * f[o + i]
                 fz = f[o + i + 2]
                 f[j + i] += weight * fx
                 f[j + i + 1] += weight * fy
                 f[j + i + 2] += weight * fz
-                along += slope * (fx * q[j + i] + fy * q[j + i + 1] + fz * q[j + i + 2])
-                along += weight * (fy * q[j + i] - fx * q[j + i + 1])
-        f[frame] += along
-        for i in range(6):
+                travelling += slope * (fx * q[j + i] + fy * q[j + i + 1] + fz * q[j + i + 2])
+                travelling += weight * (fy * q[j + i] - fx * q[j + i + 1])
+        f[frame] += travelling
+        for i in range(BODY_SIZE):
             f[o + i] = 0.0
 
 
 @compiled
 def follow(q: Floats, v: Floats, seats: TravellingArrays) -> tuple[Floats, Floats]:
     """States (n, size + 6 t + 1) with those of the travelling seats and one that stays zero behind (n, size)."""
-    size, extended = q.shape[1], q.shape[1] + 6 * seats.first.size + 1
+    size, extended = q.shape[1], q.shape[1] + BODY_SIZE * seats.first.size + 1
     x, u = np.zeros((len(q), extended)), np.zeros((len(q), extended))
     x[:, :size], u[:, :size] = q, v
     for n in range(len(q)):
@@ -150,19 +157,19 @@ class TravellingTangent(NamedTuple):
 def travelling_tangent(q: Floats, v: Floats, force: Floats, seats: TravellingArrays) -> TravellingTangent:
     """Differentiate at a state q, v of `follow` (e,) under generalized forces (e,) that are not shared yet."""
     extended = len(q)
-    size = extended - 6 * seats.first.size - 1
+    size = extended - BODY_SIZE * seats.first.size - 1
     place, rate, turning = np.eye(extended, size), np.zeros((extended, size)), np.zeros((size, size))
     for t, o in enumerate(seats.first):
-        frame, acting, own = seats.frame[t], force[o : o + 6], slice(o, o + 6)
+        frame, acting, seat = seats.frame[t], force[o : o + BODY_SIZE], slice(o, o + BODY_SIZE)
         for k in range(seats.number[t]):
             middle = math.atan2(seats.axes[t, k, 1], seats.axes[t, k, 0])
             maps = _sector_maps(seats.angle[t] + q[frame] - middle, int(seats.number[t]))
-            at = slice(seats.sectors[t, k], seats.sectors[t, k] + 6)
-            place[own, at] += maps[0]
-            rate[own, at] += v[frame] * maps[1]
+            at = slice(seats.sectors[t, k], seats.sectors[t, k] + BODY_SIZE)
+            place[seat, at] += maps[0]
+            rate[seat, at] += v[frame] * maps[1]
             if frame < size:
-                place[own, frame] += maps[1] @ q[at]
-                rate[own, frame] += maps[1] @ v[at] + v[frame] * maps[2] @ q[at]
+                place[seat, frame] += maps[1] @ q[at]
+                rate[seat, frame] += maps[1] @ v[at] + v[frame] * maps[2] @ q[at]
                 turning[at, frame] += maps[1].T @ acting
                 turning[frame, at] += maps[1].T @ acting
                 turning[frame, frame] += (maps[2] @ q[at]) @ acting

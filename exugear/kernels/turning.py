@@ -1,9 +1,10 @@
 """Elastic bodies described in their own turning frame, such as a planet carrier: laws on arrays of coordinates.
 
-Coordinates in the state are those of rigid bodies: at each seat the displacement of its centre from the place p that
-it has at zero angles, tilts about axes that do not turn, and the unwrapped spin; then the inner amplitudes. So a seat
-at p from the axis that turns by psi is displaced by x = R(psi) (p + u) - p. Stiffness and mass are constant in a frame
-that turns with the mean psi of the spins of the seats off the axis (of all seats if none is), Omega = d psi / dt:
+Coordinates in the state are those of `exugear.kernels.coordinates` at each seat: the displacement of its centre from
+the place p that it has at zero angles, tilts about axes that do not turn, and the unwrapped spin. Modal coordinates of
+the inside follow. So a seat at p from the axis that turns by psi is displaced by x = R(psi) (p + u) - p. Stiffness and
+mass are constant in a frame that turns with the mean psi of the spins of the seats off the axis (of all seats if none
+is), Omega = d psi / dt:
 
 - displacements in it, q: u = R' (p + x) - p, tilts R' (a, b), spins less psi, amplitudes as they are;
 - velocities along its axes, w: R' x', R' (a', b'), spins', amplitudes'. With S, which turns the vectors of the seats
@@ -30,6 +31,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from exugear.kernels.coordinates import AXIAL, BODY_SIZE, SPIN, TILT
 from exugear.kernels.elastic import LANES, row_product
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import kernel
@@ -73,29 +75,33 @@ def turning_memory(turning: TurningArrays) -> Floats:
 
 
 @kernel
-def see_body(
+def to_body_frame(
     b: int, q: Floats, v: Floats, turning: TurningArrays, moved: Floats, rates: Floats
 ) -> tuple[float, float, float]:
     """Fill displacements q and rates w - Omega r of body b in its frame; return cos psi, sin psi and Omega."""
     begin, first, size = turning.begin[b], turning.first[b], turning.size[b]
+    # The frame's angle and speed: the weighted mean of the spins.
     angle, speed = 0.0, 0.0
     for n in range(turning.seats[b]):
-        weight = turning.weight[first + 6 * n + 5]
-        angle += weight * q[begin + 6 * n + 5]
-        speed += weight * v[begin + 6 * n + 5]
+        weight = turning.weight[first + BODY_SIZE * n + SPIN]
+        angle += weight * q[begin + BODY_SIZE * n + SPIN]
+        speed += weight * v[begin + BODY_SIZE * n + SPIN]
     c, s = math.cos(angle), math.sin(angle)
     for n in range(turning.seats[b]):
-        i, j = 6 * n, begin + 6 * n
+        i, j = BODY_SIZE * n, begin + BODY_SIZE * n
+        # A rigid spin displaces a seat at p by S p per rad: its entries are -p_y and p_x.
         rx, ry = turning.spin[first + i], turning.spin[first + i + 1]
         x, y = ry + q[j], q[j + 1] - rx
         moved[i], moved[i + 1] = c * x + s * y - ry, c * y - s * x + rx
         rates[i] = c * v[j] + s * v[j + 1] - speed * rx
         rates[i + 1] = c * v[j + 1] - s * v[j] - speed * ry
-        moved[i + 3], moved[i + 4] = c * q[j + 3] + s * q[j + 4], c * q[j + 4] - s * q[j + 3]
-        rates[i + 3], rates[i + 4] = c * v[j + 3] + s * v[j + 4], c * v[j + 4] - s * v[j + 3]
-        moved[i + 2], rates[i + 2] = q[j + 2], v[j + 2]
-        moved[i + 5], rates[i + 5] = q[j + 5] - angle, v[j + 5] - speed
-    for i in range(6 * turning.seats[b], size):
+        k, m = i + TILT, j + TILT
+        moved[k], moved[k + 1] = c * q[m] + s * q[m + 1], c * q[m + 1] - s * q[m]
+        rates[k], rates[k + 1] = c * v[m] + s * v[m + 1], c * v[m + 1] - s * v[m]
+        moved[i + AXIAL], rates[i + AXIAL] = q[j + AXIAL], v[j + AXIAL]
+        moved[i + SPIN], rates[i + SPIN] = q[j + SPIN] - angle, v[j + SPIN] - speed
+    # Modal coordinates turn with the frame as they are; what fills up the rows for `LANES` is zero.
+    for i in range(BODY_SIZE * turning.seats[b], size):
         moved[i], rates[i] = q[begin + i], v[begin + i]
     for i in range(size, turning.columns[b]):
         moved[i], rates[i] = 0.0, 0.0
@@ -103,12 +109,12 @@ def see_body(
 
 
 @kernel
-def turn_on(b: int, moved: Floats, rates: Floats, speed: float, turning: TurningArrays, out: Floats) -> None:
+def deformation_rates(b: int, moved: Floats, rates: Floats, speed: float, turning: TurningArrays, out: Floats) -> None:
     """Fill the rates q' = w - Omega r - Omega S q of the displacements of body b."""
     for i in range(turning.columns[b]):
         out[i] = rates[i]
     for n in range(turning.seats[b]):
-        for i in (6 * n, 6 * n + 3):
+        for i in (BODY_SIZE * n, BODY_SIZE * n + TILT):
             out[i] += speed * moved[i + 1]
             out[i + 1] -= speed * moved[i]
 
@@ -119,10 +125,11 @@ def set_turning_motion(q: Floats, v: Floats, f: Floats, turning: TurningArrays, 
     moved, rates, given, elastic, total = memory[0], memory[1], memory[2], memory[3], memory[4]
     for b in range(turning.begin.size):
         begin, first, size, columns = turning.begin[b], turning.first[b], turning.size[b], turning.columns[b]
-        c, s, speed = see_body(b, q, v, turning, moved, rates)
-        turn_on(b, moved, rates, speed, turning, given)
+        c, s, speed = to_body_frame(b, q, v, turning, moved, rates)
+        deformation_rates(b, moved, rates, speed, turning, given)
         for i in range(size):
             given[i] = moved[i] + turning.damping_time[b] * given[i]
+        # Elastic and apparent forces by rows; the reaction on the frame's angle gathers what they take from its power.
         reaction = 0.0
         row = turning.square[b]
         for i in range(size):
@@ -132,13 +139,15 @@ def set_turning_motion(q: Floats, v: Floats, f: Floats, turning: TurningArrays, 
             reaction -= (rates[i] + speed * turning.spin[first + i]) * apparent
             row += columns
         for n in range(turning.seats[b]):
-            for i in (6 * n, 6 * n + 3):
+            for i in (BODY_SIZE * n, BODY_SIZE * n + TILT):
                 x, y = f[begin + i], f[begin + i + 1]
                 reaction += moved[i + 1] * elastic[i] - moved[i] * elastic[i + 1]
+                # Outer forces turned into the frame; `total` has them in global axes so far.
                 total[i] += c * x + s * y - x
                 total[i + 1] += c * y - s * x - y
         for n in range(turning.seats[b]):
-            total[6 * n + 5] += reaction * turning.weight[first + 6 * n + 5]
+            total[BODY_SIZE * n + SPIN] += reaction * turning.weight[first + BODY_SIZE * n + SPIN]
+        # Accelerations along the frame's axes, then in global ones: R (dw/dt + Omega S w).
         for i in range(size, columns):
             total[i] = 0.0
         row = turning.square[b]
@@ -146,13 +155,13 @@ def set_turning_motion(q: Floats, v: Floats, f: Floats, turning: TurningArrays, 
             out[begin + i] = row_product(turning.inverse, row, total, columns)
             row += columns
         for n in range(turning.seats[b]):
-            for i in (6 * n, 6 * n + 3):
+            for i in (BODY_SIZE * n, BODY_SIZE * n + TILT):
                 spin_x, spin_y = turning.spin[first + i], turning.spin[first + i + 1]
                 x = out[begin + i] - speed * (rates[i + 1] + speed * spin_y)
                 y = out[begin + i + 1] + speed * (rates[i] + speed * spin_x)
                 out[begin + i], out[begin + i + 1] = c * x - s * y, s * x + c * y
             for axis in range(3):
-                out[begin + 6 * n + axis] += turning.gravity[b, axis]
+                out[begin + BODY_SIZE * n + axis] += turning.gravity[b, axis]
 
 
 @kernel
@@ -173,15 +182,16 @@ def turning_energies(q: Floats, v: Floats, turning: TurningArrays, memory: Float
     for b in range(turning.begin.size):
         first, size, columns = turning.first[b], turning.size[b], turning.columns[b]
         row = turning.square[b]
-        c, s, speed = see_body(b, q, v, turning, moved, rates)
+        c, s, speed = to_body_frame(b, q, v, turning, moved, rates)
         stored += 0.5 * square_form(turning.stiffness, row, size, columns, moved)
-        turn_on(b, moved, rates, speed, turning, given)
+        deformation_rates(b, moved, rates, speed, turning, given)
         damped += turning.damping_time[b] * square_form(turning.stiffness, row, size, columns, given)
+        # Power of the weight: gravity as an acceleration of all seats, times the momentum.
         falling[:] = 0.0
         for n in range(turning.seats[b]):
             x, y = turning.gravity[b, 0], turning.gravity[b, 1]
-            falling[6 * n], falling[6 * n + 1] = c * x + s * y, c * y - s * x
-            falling[6 * n + 2] = turning.gravity[b, 2]
+            falling[BODY_SIZE * n], falling[BODY_SIZE * n + 1] = c * x + s * y, c * y - s * x
+            falling[BODY_SIZE * n + AXIAL] = turning.gravity[b, 2]
         for i in range(size):
             rates[i] += speed * turning.spin[first + i]
         kinetic += 0.5 * square_form(turning.mass, row, size, columns, rates)

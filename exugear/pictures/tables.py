@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from exugear.tooth_mesh.tables import TableOrder
+from exugear.tooth_mesh.tables import TableRequest
 from fe_ste.pictures.diagrams import plot_load_share, plot_ste_curves
 from fe_ste.pictures.teeth import contact_quads, draw_tooth_contact, meshed_teeth
 from fe_ste.transmission_error.search import contact_state
@@ -32,7 +32,7 @@ def contact_picture(name: str, out: Path) -> Path:
     return out / PICTURE_FOLDER / f"contact_{name}.png"
 
 
-def draw_contact(order: TableOrder, table: MeshTable, out: Path) -> Path:
+def draw_contact(request: TableRequest, table: MeshTable, out: Path) -> Path:
     """Draw the teeth that carry load at position 0 of the mesh cycle, with the pressure between them.
 
     Raises
@@ -42,15 +42,15 @@ def draw_contact(order: TableOrder, table: MeshTable, out: Path) -> Path:
     fe_ste.contact.kinematics.ContactError
         The contact at position 0 cannot be solved.
     """
-    pair = order.wanted.pair
-    compliance = prepared_compliance(order.wanted)
+    pair = request.wanted.pair
+    compliance = prepared_compliance(request.wanted)
     state = contact_state(compliance, float(table.static_state["torque"]), 0.0)
     quads = contact_quads(pair, state.cells, 0.0, compliance.axial, compliance.slice_width)
     teeth = sorted({int(tooth) for tooth in state.cells.tooth[state.pressure > 0.0]})
-    pinion, gear = meshed_teeth(pair, 0.0, teeth, order.wanted.mesh)
-    path = contact_picture(order.name, out)
+    pinion, gear = meshed_teeth(pair, 0.0, teeth, request.wanted.mesh)
+    path = contact_picture(request.name, out)
     highest = float(table.static_state["max_pressure"].isel(pmc=0))
-    title = _title(order.name, table)
+    title = _title(request.name, table)
     draw_tooth_contact(pinion, gear, quads, state.pressure, path, title=title, highest_pressure=highest)
     return path
 

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from exugear.bodies.of_gearbox import ElasticBody, reduced_bodies
+from exugear.bodies.of_gearbox.elastic_bodies import ElasticBody, reduced_bodies
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.pictures.tables import PICTURE_FOLDER
 from exugear.results.folder import bodies_folder
-from exugear.tooth_mesh.stiffness import mesh_stiffness
+from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 from fe_ste.tools.arrays import Floats
 from fe_ste.transmission_error.surface import SteSurface
 

@@ -49,7 +49,7 @@ def _elastic_words(context: Context) -> Iterator[str]:
     case = context.gearbox.case
     parts = []
     for name, body in assembly.elastic_bodies.items():
-        unknowns = sum(body.reduced.figures.unknowns.values())
+        unknowns = sum(body.reduced.summary.unknowns.values())
         parts.append(f"{name} ({unknowns} unknowns reduced to {body.reduced.size} coordinates)")
     yield (
         f"Elastic in the variant {assembly.variant}: {', '.join(parts)}; damping {1e6 * case.damping.body_time_s:g} µs "

@@ -6,7 +6,7 @@ from exugear.pictures.tables import PICTURE_FOLDER
 from exugear.report import page
 from exugear.report.context import Context
 from exugear.report.stored import StoredResults
-from exugear.tooth_mesh.stiffness import iso6336_stiffness
+from exugear.tooth_mesh.laws.iso6336 import iso6336_stiffness
 from fe_ste.transmission_error.table import MeshTable
 
 

@@ -44,7 +44,7 @@ def _integrate_compiled(plan: RunPlan, start: RunStart, recorder: Recorder, inte
 
 def _integrate_in_exudyn(plan: RunPlan, start: RunStart, recorder: Recorder, interruption: Interruption) -> None:
     """Let Exudyn hand over each state."""
-    from exugear.solvers.exudyn_model.floating import SolverFailure
+    from exugear.solvers.exudyn_model.library import SolverFailure
     from exugear.solvers.exudyn_model.system import ExudynSystem
 
     state, step = start.state, plan.step

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
-from exugear.bodies.of_gearbox import ElasticBody
+from exugear.bodies.of_gearbox.elastic_bodies import ElasticBody
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.signals import signal_layout
@@ -27,9 +27,9 @@ from exugear.runs.plan import RunPlan, plan_run
 from exugear.runs.recorder import Recorder
 from exugear.runs.run_folder import held, run_directory
 from exugear.runs.start import RunStart, prepare_start
-from exugear.solvers.compiled.solver import refusal
+from exugear.solvers.compiled.solver import unsupported_reason
 from exugear.solvers.compiled.step import choose_step, fastest_motion
-from exugear.tooth_mesh.element import Angles, MeshData
+from exugear.tooth_mesh.law import Angles, MeshData
 
 if TYPE_CHECKING:
     from exugear.solvers.exudyn_model.system import MeshRoute
@@ -66,7 +66,7 @@ def simulate(
     choice : Choice
         Variant, mesh law, inertia set and load case.
     stiffness : mapping of pair name to (n,) array
-        Mesh stiffness over the cycle, see `exugear.tooth_mesh.stiffness.mesh_stiffness`.
+        Mesh stiffness over the cycle, see `exugear.tooth_mesh.laws.stiffness.mesh_stiffness`.
     out : path
         Results directory.
     bodies : mapping of body name to ElasticBody, optional
@@ -158,7 +158,7 @@ def _solver(asked: str | None, assembly: Assembly, mesh_route: str) -> str:
     """Solver to take: the one asked for if it can, else the compiled one where it applies."""
     if asked is not None and asked not in SOLVERS:
         raise RunError(f"solver {asked!r} is unknown; solvers are {', '.join(SOLVERS)}")
-    reason = refusal(assembly) if mesh_route == "element" else "user-function loads exist in Exudyn only"
+    reason = unsupported_reason(assembly) if mesh_route == "element" else "user-function loads exist in Exudyn only"
     if asked == "compiled" and reason:
         raise RunError(f"the compiled solver cannot run this: {reason}; use --solver exudyn")
     return "exudyn" if reason else asked or "compiled"

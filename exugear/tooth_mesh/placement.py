@@ -9,6 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from exugear.kernels.coordinates import BODY_SIZE, TILT
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Mesh
 from fe_ste.tools.arrays import Floats
@@ -72,13 +73,13 @@ class ToothContact:
     flank: int
     number: int
 
-    def cycle(self, orientation: Angle) -> Angle:
+    def pmc(self, orientation: Angle) -> Angle:
         """PMC, unwrapped, where a tooth's middle is at this polar angle (rad), seen from the mesh's frame."""
         return (orientation + self._flank_offset - self._pitch_point) / self._pitch
 
-    def orientation(self, cycle: float) -> float:
+    def orientation(self, pmc: float) -> float:
         """Orientation of the wheel at a given PMC."""
-        return cycle * self._pitch - self._flank_offset + self._pitch_point
+        return pmc * self._pitch - self._flank_offset + self._pitch_point
 
     @property
     def _wheel_is_internal(self) -> bool:
@@ -135,6 +136,18 @@ def line_of_action_row(mesh: Mesh, flank: int, nodes: tuple[Floats, Floats]) -> 
     return wrench_row(geometry.plane_of_action(flank) - axial, pitch_point_of(mesh, geometry, nodes), nodes)
 
 
+def position_rows(mesh: Mesh, flank: int, nodes: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    """Rows (12,) of the centre distance and of the misalignment of a flank about the two bodies' nodes."""
+    geometry = MeshGeometry.of(mesh)
+    towards = np.array([math.cos(mesh.position_angle), math.sin(mesh.position_angle), 0.0])
+    centre = -wrench_row(towards, pitch_point_of(mesh, geometry, nodes), nodes)
+    x, y, _ = geometry.plane_of_action(flank)
+    # Gear 1's tilts against gear 2's, turned into the plane of action.
+    misalignment = np.zeros(2 * BODY_SIZE)
+    misalignment[[TILT, TILT + 1, BODY_SIZE + TILT, BODY_SIZE + TILT + 1]] = y, -x, -y, x
+    return centre, misalignment
+
+
 def mesh_phases(gearbox: Gearbox, flanks: Mapping[str, int]) -> dict[str, float]:
     """Compute the PMC of each mesh at zero angles: see `tooth_places`."""
     return tooth_places(gearbox, flanks)[0]
@@ -178,20 +191,18 @@ def _wheels(mesh: Mesh) -> tuple[tuple[str, str], tuple[str, str]]:
 
 def _place_wheels(mesh: Mesh, flank: int, orientation: dict[tuple[str, str], float]) -> float:
     """PMC of a mesh from the wheels already placed; places those that are not."""
-    first, second = _wheels(mesh)
-    found = [
-        ToothContact(mesh, flank, number).cycle(orientation[wheel])
-        for number, wheel in ((1, first), (2, second))
-        if wheel in orientation
+    wheels = tuple(enumerate(_wheels(mesh), start=1))
+    placed = [
+        ToothContact(mesh, flank, number).pmc(orientation[wheel]) for number, wheel in wheels if wheel in orientation
     ]
-    misfit = math.remainder(found[0] - found[1], 1.0) if len(found) == 2 else 0.0
+    misfit = math.remainder(placed[0] - placed[1], 1.0) if len(placed) == 2 else 0.0
     if abs(misfit) > PHASE_TOLERANCE:
         raise MeshError(
             f"mesh {mesh.name}: the gears do not fit, loaded flanks miss each other by {misfit:.4f} of a "
             "mesh cycle; check planet angles and tooth thicknesses"
         )
-    phase = found[0] % 1.0 if found else 0.0
-    for number, wheel in ((1, first), (2, second)):
+    phase = placed[0] % 1.0 if placed else 0.0
+    for number, wheel in wheels:
         if wheel not in orientation:
             orientation[wheel] = ToothContact(mesh, flank, number).orientation(phase)
     return phase

@@ -10,8 +10,8 @@ from typing import Any
 import xarray as xr
 
 from exugear.model.gearbox import Gearbox
-from exugear.tooth_mesh.tables import TABLE_FOLDER, order_tables
-from fe_ste.reference.newton import Iteration
+from exugear.tooth_mesh.tables import TABLE_FOLDER, requested_tables
+from fe_ste.reference.contact_model import Iteration
 from fe_ste.reference.table import NonlinearInput, NonlinearTable
 
 #: Positions of the mesh cycle unless asked for otherwise: one takes a minute or two.
@@ -19,7 +19,7 @@ DEFAULT_POSITIONS = 10
 
 
 @dataclass(frozen=True)
-class ReferenceOrder:
+class ReferenceRequest:
     """The reference analysis of one pair.
 
     Attributes
@@ -36,14 +36,14 @@ class ReferenceOrder:
     wanted: NonlinearInput
     path: Path
 
-    def fill(self, progress: Callable[[int, int, Iteration | None], None] | None = None) -> NonlinearTable:
+    def compute(self, progress: Callable[[int, int, Iteration | None], None] | None = None) -> NonlinearTable:
         """Compute what the file does not hold yet, writing after each position."""
         return NonlinearTable.compute(self.wanted, self.path, progress)
 
 
-def order_references(
+def requested_references(
     gearbox: Gearbox, out: Path, names: Iterable[str] = (), positions: int | None = None
-) -> list[ReferenceOrder]:
+) -> list[ReferenceRequest]:
     """List the reference analyses of a gearbox under its static load; computes and writes nothing.
 
     Parameters
@@ -64,25 +64,25 @@ def order_references(
     Examples
     --------
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
-    >>> [str(order.path) for order in order_references(gearbox, Path("nowhere"), ["high_speed"])]
+    >>> [str(request.path) for request in requested_references(gearbox, Path("nowhere"), ["high_speed"])]
     ['nowhere/tables/high_speed-nonlinear.nc']
     """
-    orders = order_tables(gearbox, out, names)
+    requests = requested_tables(gearbox, out, names)
     return [
-        ReferenceOrder(
-            order.name,
+        ReferenceRequest(
+            request.name,
             NonlinearInput(
-                pair=order.wanted.pair,
-                torque=order.wanted.static_torque or order.wanted.torque[0],
+                pair=request.wanted.pair,
+                torque=request.wanted.static_torque or request.wanted.torque[0],
                 positions=positions or DEFAULT_POSITIONS,
             ),
-            out / TABLE_FOLDER / f"{order.name}-nonlinear.nc",
+            out / TABLE_FOLDER / f"{request.name}-nonlinear.nc",
         )
-        for order in orders
+        for request in requests
     ]
 
 
-def summarise_reference(order: ReferenceOrder, table: NonlinearTable) -> dict[str, Any]:
+def summarise_reference(request: ReferenceRequest, table: NonlinearTable) -> dict[str, Any]:
     """Return the figures of a table that a person asks for first; the unit is part of the key.
 
     What no converged position gives is None.
@@ -94,12 +94,12 @@ def summarise_reference(order: ReferenceOrder, table: NonlinearTable) -> dict[st
         return value if value == value else None
 
     return {
-        "pair": order.name,
-        "table": str(order.path),
+        "pair": request.name,
+        "table": str(request.path),
         "method": "nonlinear",
-        "torque_gear_1_N_m": order.wanted.torque,
-        "positions": order.wanted.positions,
-        "states": order.wanted.positions,
+        "torque_gear_1_N_m": request.wanted.torque,
+        "positions": request.wanted.positions,
+        "states": request.wanted.positions,
         "not_converged": int((~data["converged"]).sum()),
         "ste_mean_um": figure(1e6 * data["ste"].mean()),
         "ste_peak_to_peak_um": figure(1e6 * (data["ste"].max() - data["ste"].min())),

@@ -1,4 +1,4 @@
-"""The transmission error tables of a gearbox: which are wanted, which are there, and their pictures."""
+"""The transmission error tables of a gearbox: which are wanted, which are there, and what they say in figures."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ TABLE_FOLDER = "tables"
 
 
 @dataclass(frozen=True)
-class TableOrder:
+class TableRequest:
     """The table of one pair: its input, its file and, where the file fits the input, its content.
 
     Attributes
@@ -40,7 +40,7 @@ class TableOrder:
     stored: MeshTable | None
     replaces: str = ""
 
-    def fill(self, progress: Callable[[int, int], None] | None = None) -> MeshTable:
+    def compute(self, progress: Callable[[int, int], None] | None = None) -> MeshTable:
         """Compute the table and write its file; what a stopped computation had finished is taken up.
 
         Parameters
@@ -55,13 +55,13 @@ class TableOrder:
         return table
 
 
-def order_tables(
+def requested_tables(
     gearbox: Gearbox,
     out: Path,
     names: Iterable[str] = (),
     positions: int | None = None,
     grid: bool = False,
-) -> list[TableOrder]:
+) -> list[TableRequest]:
     """List the tables of a gearbox and find those that are there; computes and writes nothing.
 
     Parameters
@@ -85,7 +85,7 @@ def order_tables(
     Examples
     --------
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
-    >>> [order.name for order in order_tables(gearbox, Path("nowhere"))]
+    >>> [request.name for request in requested_tables(gearbox, Path("nowhere"))]
     ['sun_planet', 'ring_planet', 'intermediate', 'high_speed']
     """
     chosen = list(names) or [name for name, spec in gearbox.pairs.items() if spec.table]
@@ -100,7 +100,7 @@ def order_tables(
             )
     grid = grid or gearbox.ste.grid
     wanted = {name: wanted_table(gearbox, name, positions or gearbox.ste.positions, grid) for name in chosen}
-    return [_order(gearbox, name, out, order, grid) for name, order in wanted.items()]
+    return [_request(gearbox, name, out, table, grid) for name, table in wanted.items()]
 
 
 def table_path(out: Path, name: str) -> Path:
@@ -128,7 +128,7 @@ def wanted_table(gearbox: Gearbox, name: str, positions: int, grid: bool = False
     spec = gearbox.pairs[name]
     # Statics leave rounding in the torque; another machine's must not make another hash of it.
     torque = _rounded(spec.static_torque)
-    pinion, gear = (one if spec.flank > 0 else one.mirrored() for one in spec.modifications)
+    pinion, gear = (given if spec.flank > 0 else given.mirrored() for given in spec.modifications)
     static = TableInput(
         pair=spec.pair,
         torque=(torque,),
@@ -191,7 +191,7 @@ def _holds(table: MeshTable, static: TableInput) -> bool:
     return torque == static.torque[0] and table.input_hash == wider.hash
 
 
-def missing_tables(gearbox: Gearbox, out: Path, grid: bool = False) -> list[TableOrder]:
+def missing_tables(gearbox: Gearbox, out: Path, grid: bool = False) -> list[TableRequest]:
     """List the tables that dynamics need and that are not there, or belong to another input.
 
     Parameters
@@ -202,29 +202,29 @@ def missing_tables(gearbox: Gearbox, out: Path, grid: bool = False) -> list[Tabl
     grid : bool
         Whether the mesh law interpolates over load, centre distance and misalignment.
     """
-    orders = []
+    requests = []
     for name in dict.fromkeys(mesh.pair.name for mesh in gearbox.meshes):
         try:
             fitting_table(gearbox, name, out, grid)
         except TableError:
-            orders += order_tables(gearbox, out, [name], grid=grid)
-    return orders
+            requests += requested_tables(gearbox, out, [name], grid=grid)
+    return requests
 
 
-def _order(gearbox: Gearbox, name: str, out: Path, wanted: TableInput, grid: bool) -> TableOrder:
+def _request(gearbox: Gearbox, name: str, out: Path, wanted: TableInput, grid: bool) -> TableRequest:
     path = table_path(out, name)
     if not path.exists():
-        return TableOrder(name, wanted, path, None)
+        return TableRequest(name, wanted, path, None)
     try:
         stored = fitting_table(gearbox, name, out, grid)
     except TableError as error:
-        return TableOrder(name, wanted, path, None, str(error))
+        return TableRequest(name, wanted, path, None, str(error))
     if stored.dataset.sizes["pmc"] != wanted.positions:
-        return TableOrder(name, wanted, path, None, f"{path}: was computed from another input, with other positions")
-    return TableOrder(name, wanted, path, stored)
+        return TableRequest(name, wanted, path, None, f"{path}: was computed from another input, with other positions")
+    return TableRequest(name, wanted, path, stored)
 
 
-def summarise(order: TableOrder, table: MeshTable) -> dict[str, Any]:
+def summarise(request: TableRequest, table: MeshTable) -> dict[str, Any]:
     """Return the figures of a table that a person asks for first; the unit is part of the key.
 
     Of the static state, but for the numbers of states. What no converged position gives is None.
@@ -236,10 +236,10 @@ def summarise(order: TableOrder, table: MeshTable) -> dict[str, Any]:
         return value if value == value else None
 
     return {
-        "pair": order.name,
-        "table": str(order.path),
+        "pair": request.name,
+        "table": str(request.path),
         "torque_gear_1_N_m": float(data["torque"]),
-        "positions": order.wanted.positions,
+        "positions": request.wanted.positions,
         "states": table.dataset["ste"].size,
         "not_converged": int((~table.dataset["converged"]).sum()),
         "ste_mean_um": figure(1e6 * data["ste"].mean()),
@@ -252,5 +252,5 @@ def summarise(order: TableOrder, table: MeshTable) -> dict[str, Any]:
 
 def stored_tables(gearbox: Gearbox, out: Path, positions: int | None = None) -> dict[str, MeshTable]:
     """Return the tables of a results folder that fit the gearbox, by the name of the pair."""
-    orders = order_tables(gearbox, out, positions=positions)
-    return {order.name: order.stored for order in orders if order.stored}
+    requests = requested_tables(gearbox, out, positions=positions)
+    return {request.name: request.stored for request in requests if request.stored}

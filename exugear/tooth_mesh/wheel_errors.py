@@ -12,13 +12,12 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Mesh, WheelDeviation
 from exugear.tooth_mesh.placement import MeshGeometry, ToothContact
 from fe_ste.geometry.gears import GearPair
-from fe_ste.tools.arrays import Floats
+from fe_ste.tools.arrays import Floats, Integers
 
 SAMPLES_PER_TOOTH = 32
 """Samples of an error over a pitch: ten harmonics of the mesh, to a per cent."""
@@ -26,7 +25,7 @@ _PLANES = 101
 """Planes across the face in which contact is looked for."""
 
 
-def contact_line_shares(pair: GearPair, pmc: Floats) -> tuple[NDArray[np.int64], Floats]:
+def contact_line_shares(pair: GearPair, pmc: Floats) -> tuple[Integers, Floats]:
     """Part of all contact lines that each tooth pair has.
 
     Parameters
@@ -74,18 +73,27 @@ def wheel_errors(
     phase : PMC at zero angles
     orientation : mapping of (body, gear) to the polar angle of a tooth's middle at zero body angle
     """
-    found = []
-    for number, wheel in ((1, (mesh.pinion, mesh.pair.pinion.name)), (2, (mesh.gear, mesh.pair.gear.name))):
-        deviation = gearbox.deviations.get(wheel)
-        if deviation is None:
-            found.append(np.zeros(0))
-        else:
-            contact = ToothContact(mesh, flank, number)
-            error = _run_out_error(deviation, contact)
-            if deviation.pitch.size:
-                error = error + _pitch_error(deviation, contact, orientation[wheel], phase)
-            found.append(error)
-    return found[0], found[1]
+    return (
+        _wheel_error(gearbox, (mesh.pinion, mesh.pair.pinion.name), ToothContact(mesh, flank, 1), orientation, phase),
+        _wheel_error(gearbox, (mesh.gear, mesh.pair.gear.name), ToothContact(mesh, flank, 2), orientation, phase),
+    )
+
+
+def _wheel_error(
+    gearbox: Gearbox,
+    wheel: tuple[str, str],
+    contact: ToothContact,
+    orientation: Mapping[tuple[str, str], float],
+    phase: float,
+) -> Floats:
+    """Error of one wheel over its revolution; empty for none."""
+    deviation = gearbox.deviations.get(wheel)
+    if deviation is None:
+        return np.zeros(0)
+    error = _run_out_error(deviation, contact)
+    if deviation.pitch.size:
+        error = error + _pitch_error(deviation, contact, orientation[wheel], phase)
+    return error
 
 
 def _angles(deviation: WheelDeviation) -> Floats:
@@ -96,16 +104,17 @@ def _angles(deviation: WheelDeviation) -> Floats:
 def _pitch_error(deviation: WheelDeviation, contact: ToothContact, orientation: float, phase: float) -> Floats:
     """Sum of the teeth's deviations, each by its part of the contact lines."""
     teeth = deviation.teeth
-    first = orientation % (2.0 * math.pi / teeth)  # tooth 0: the first at a positive polar angle
-    stated = math.remainder(phase - contact.cycle(orientation), 1.0)  # where the file gives the phase
+    tooth_0 = orientation % (2.0 * math.pi / teeth)  # the first at a positive polar angle
+    stated = math.remainder(phase - contact.pmc(orientation), 1.0)  # where the file gives the phase
     error = np.zeros(teeth * SAMPLES_PER_TOOTH)
     for tooth, gap in enumerate(deviation.pitch):
         if gap == 0.0:
             continue
-        cycle = contact.cycle(first + 2.0 * math.pi * tooth / teeth + _angles(deviation)) + stated
-        cycle = cycle - teeth * np.round(cycle / teeth)
-        pairs, shares = contact_line_shares(contact.mesh.pair, cycle % 1.0)
-        ahead = np.floor(cycle).astype(np.int64) - pairs[0]
+        # Unwrapped position in the mesh cycle of this tooth, zero where it stands at the pitch point.
+        pmc = contact.pmc(tooth_0 + 2.0 * math.pi * tooth / teeth + _angles(deviation)) + stated
+        pmc = pmc - teeth * np.round(pmc / teeth)
+        pairs, shares = contact_line_shares(contact.mesh.pair, pmc % 1.0)
+        ahead = np.floor(pmc).astype(np.int64) - pairs[0]
         inside = (ahead >= 0) & (ahead < len(pairs))
         error[inside] += gap * shares[inside, ahead[inside]]
     return error

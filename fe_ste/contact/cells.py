@@ -1,4 +1,8 @@
-"""Cells over the plane of action, in which pressures are looked for."""
+"""Cells over the plane of action, in which pressures are looked for; frame and signs as in `fe_ste.contact.kinematics`.
+
+Each slice of the face width has a window of cells about its contact line. Cells are equal in arc length along the
+involute, in which the contact of two flanks is nearly that of two parabolas.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +15,8 @@ from fe_ste.contact.kinematics import FlankPair, rigid_gap, tip_limit
 from fe_ste.tools.arrays import Booleans, Floats, Integers
 from fe_ste.tools.compilation import compiled
 
-#: A cell cut by a tip edge to less than this part of its width is joined to its neighbour.
+#: A cell cut by a tip edge to less than this part of its width is joined to its neighbour: so narrow a cell would
+#: have a pressure of its own that is all rounding.
 _LEAST_CELL = 0.2
 
 
@@ -58,11 +63,14 @@ def _lay_cells(
     used = 0
     for tooth in teeth:
         for layer in range(len(axial)):
+            # The contact line: roll grows with the rotation, by a pitch from tooth to tooth and along the helix.
             line = pair.working_roll + rotation + tooth * pair.pitch_1 + pair.twist_1 * axial[layer]
+            # Gear 1's own tip bounds the window above, the tip of gear 2 below.
             lowest_roll = tip_limit(pair, axial[layer], tooth, rotation)
             bottom = 0.5 * pair.base_radius_1 * lowest_roll**2
             if top - bottom < step:
                 continue
+            # Elastic teeth touch a little before and after the path of contact: the window then stays at the edge.
             line = min(max(line, lowest_roll), pair.tip_roll_1)
             centre = 0.5 * pair.base_radius_1 * line**2
             number = 0

@@ -1,4 +1,8 @@
-"""The complementarity problem of contact: pressures where the gap is closed, none elsewhere."""
+"""The complementarity problem of contact: pressures where the gap is closed, none elsewhere.
+
+Forces are positive where they press; gap and approach are lengths on the contact normal, see
+`fe_ste.contact.kinematics`.
+"""
 
 from __future__ import annotations
 
@@ -90,16 +94,18 @@ def solve_complementarity(
     active = guess & np.isfinite(gap)
     fewest, patience = len(gap) + 1, 5
     for iteration in range(1, max_iterations + 1):
-        if not active.any():
+        if not active.any():  # a load needs a cell: the nearest one
             active = gap == gap.min()
         numbers = np.flatnonzero(active)
         rows = compliance[numbers]
         closing, closing_per_load, approach, per_load = _solve_active(rows[:, numbers], gap[numbers], load)
         force = np.zeros(len(gap))
         force[numbers] = closing
+        # The matrix is symmetric, so its rows serve as columns: all cells move by the forces on the active ones.
         clearance = closing @ rows + gap - approach
         if np.isnan(clearance).any():  # every comparison below would pass
             raise ContactError("the contact problem holds values that are not numbers")
+        # Below rounding an open cell counts as closed, or it would change for ever.
         tolerance = 1e-12 * max(abs(approach), 1e-12)
         wrong = np.where(active, force < 0.0, clearance < -tolerance)
         if not wrong.any():
@@ -107,6 +113,8 @@ def solve_complementarity(
             force_per_load[numbers] = closing_per_load
             return ContactSolution(approach, per_load, force, force_per_load, iteration)
         count = int(wrong.sum())
+        # Block steps are fast but may cycle. After five without progress single steps go on, which cannot
+        # (Judice and Pires): each takes the wrong cell of the highest number.
         if count < fewest:
             fewest, patience = count, 5
         else:
@@ -129,6 +137,7 @@ def _solve_active(compliance: Floats, gap: Floats, load: float) -> tuple[Floats,
         factor = scipy.linalg.cho_factor(compliance.T, lower=True, overwrite_a=True, check_finite=False)
     except np.linalg.LinAlgError as error:
         raise ContactError("the compliance of the contact cells is not positive definite") from error
+    # C f = approach - gap on active cells, so f = approach C^-1 1 - C^-1 gap; sum(f) = load then gives the approach.
     right = np.stack([np.ones(len(gap)), gap])
     unit, closed = scipy.linalg.cho_solve(factor, right.T, overwrite_b=True, check_finite=False).T
     approach = (load + closed.sum()) / unit.sum()

@@ -1,9 +1,8 @@
-"""Tooth contact of a gear pair at one position: rigid gap, compliance of the contact cells, complementarity.
+"""Compliance of the contact cells of a gear pair: near field of half-spaces, and the regular part of both flanks.
 
-Frame. Gear 1 turns counter-clockwise and drives. The x axis runs from its centre to the pitch point, z along the
-axes, z = 0 in the middle of the common face width. The flanks in contact are the counter-clockwise flanks of gear 1
-and of an external gear 2, and the clockwise flanks of an internal gear 2's teeth. Tooth pair 0 touches at the pitch
-point for rotation 0; pair j is j base pitches ahead on the path of contact.
+The near field is the surface displacement of an elastic half-space under uniform cell pressures. The regular part is
+what finite elements give for the tooth, the rim and the neighbouring teeth, with their own near field taken out
+(`fe_ste.elasticity.flank`). Frame and signs as in `fe_ste.contact.kinematics`.
 """
 
 from __future__ import annotations
@@ -27,8 +26,10 @@ _FAR = 6.0
 
 @compiled
 def _mean_inverse_distance(across: float, along: float, half_across: float, half_along: float) -> float:
+    """Mean of 1 / distance over a rectangle: exact near it, else the first terms of its Taylor series."""
     square = across * across + along * along
     if square > (_FAR * max(half_across, half_along)) ** 2:
+        # 1/R averaged to second order: a^2 / 6 and b^2 / 6 times its second derivatives.
         moments = half_across**2 * (2 * across**2 - along**2) + half_along**2 * (2 * along**2 - across**2)
         return (1.0 + moments / (6.0 * square * square)) / math.sqrt(square)
     return rectangle_integral(across, along, half_across, half_along) / (4.0 * half_across * half_along)
@@ -41,8 +42,9 @@ def _add_far(
 ) -> None:  # fmt: skip
     """Add the resultants and second moments of the cells of one slice, seen from afar, to ``row``; no branches."""
     for j in range(len(rolls)):
+        # Distance across the generators, see `fe_ste.elasticity.halfspace`: r_b times mean roll times difference.
         across = across_scale * (roll + rolls[j]) * (roll - rolls[j] - shift)
-        half = 0.5 * (half_across + halves[j])
+        half = 0.5 * (half_across + halves[j])  # the mean of both cells: the matrix stays symmetric
         inverse = 1.0 / (across * across + along * along)
         moments = half * half * (2 * across * across - along * along)
         moments += half_along * half_along * (2 * along * along - across * across)
@@ -88,8 +90,10 @@ def _add_half_spaces(
         for h in range(g + 1):
             row_start, column_start = groups[g], groups[h]
             if tooth[row_start] != tooth[column_start]:
-                continue
+                continue  # a near field ends at its tooth; others feel it through the regular part
             apart, together = axial[row_start] - axial[column_start], axial[row_start] + axial[column_start]
+            # Load 0 is the cell's own, on both half-spaces. Loads 1 to 4 are its images behind the end faces of gear 1
+            # and gear 2: load and image together leave no shear stress on these free faces.
             along[0], strength[0] = apart / pair.base_helix_cosine, surface[0] + surface[1]
             for image in range(4):
                 body, sign = image // 2, 2.0 * (image % 2) - 1.0
@@ -135,6 +139,8 @@ def _add_regular(
             for j in range(column_start, column_end):
                 lowest, highest = min(lowest, first_spline[j]), max(highest, first_spline[j])
             for i in range(row_start, groups[g + 1]):
+                # First the splines of the row's cell, then those of each column's: two sums of four instead of one
+                # of sixteen, the first of which serves the whole run.
                 for b in range(lowest, highest + 4):
                     read[b] = (
                         weights[i, 0] * block[first_spline[i], b]
@@ -201,6 +207,7 @@ class SlicedCompliance:
         reach : int
             Largest difference of tooth pairs in contact at once.
         """
+        # Over the arc length of the involute the flank's nodes are evenly spaced, which suits the splines.
         arc = flank.gear.base_radius * flank.roll**2 / 2.0
         along_roll = make_interp_spline(arc, np.eye(len(arc)), k=3)
         at_slices = make_interp_spline(flank.axial, np.eye(len(flank.axial)), k=3)(axial)

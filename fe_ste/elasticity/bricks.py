@@ -1,4 +1,7 @@
-"""Trilinear bricks with incompatible modes: stiffness of single elements and of whole meshes."""
+"""Trilinear bricks with incompatible modes: gradients, stiffness of single elements and of whole meshes.
+
+Eight nodes, eight Gauss points. The three incompatible modes 1 - xi^2 of each element let it bend without shear.
+"""
 
 from __future__ import annotations
 
@@ -105,9 +108,12 @@ def brick_values() -> Floats:
 
 def _incompatible_gradients(basis: skfem.CellBasis, determinant: Floats) -> Floats:
     """Gradients (3, 3, elements, Gauss points) of 1 - xi^2 in each direction, with the Jacobian of the middle."""
+    # Taylor, Beresford and Wilson: Jacobian and determinant of the middle make the mean gradient vanish, so that the
+    # modes do no work on a constant stress and the patch test is passed.
     middle = np.full((3, 1), 0.5)
     inverse = basis.mapping.invDF(middle)[..., 0]
     ratio = basis.mapping.detDF(middle) / determinant
+    # Mode 1 - (2 X - 1)^2 over X from 0 to 1, whose derivative this is.
     slope = 4.0 * (1.0 - 2.0 * basis.X)
     return np.asarray(np.einsum("iae,iq,eq->iaeq", inverse, slope, ratio))
 
@@ -129,6 +135,7 @@ def gradient_products(gradients: Floats, volume: Floats, material: Material) -> 
     modulus, ratio = material.youngs_modulus, material.poissons_ratio
     lame = modulus * ratio / ((1 + ratio) * (1 - 2 * ratio))
     shear = modulus / (2 * (1 + ratio))
+    # B'DB of an isotropic solid: lambda div u div v + mu (grad u + grad u') : grad v.
     laplacian = np.einsum("eicjc->eij", products)
     stiffness = lame * products + shear * products.transpose(0, 1, 4, 3, 2)
     stiffness += shear * laplacian[:, :, None, :, None] * np.eye(3)[:, None, :]
@@ -136,6 +143,7 @@ def gradient_products(gradients: Floats, volume: Floats, material: Material) -> 
 
 
 def _condense_bubbles(stiffness: Floats) -> Floats:
+    """Eliminate the nine unknowns of the modes, which no load and no neighbour touches (static condensation)."""
     coupling = stiffness[:, 24:, :24]
     return np.asarray(
         stiffness[:, :24, :24] - coupling.transpose(0, 2, 1) @ np.linalg.solve(stiffness[:, 24:, 24:], coupling)

@@ -50,6 +50,7 @@ def interior_normal_displacement(across: float, along: float, depth: float, pois
 @compiled
 def _weighted_difference(x: float, high: float, low: float, to_high: float, to_low: float) -> float:
     """Evaluate x [asinh(high / |x|) - asinh(low / |x|)] with one logarithm; ``to_high`` is hypot(x, high)."""
+    # asinh(h / |x|) = log((h + hypot(x, h)) / |x|). For a negative h the sum would cancel, but asinh is odd.
     if x == 0.0:
         return 0.0
     above, below = abs(high) + to_high, abs(low) + to_low
@@ -80,6 +81,7 @@ def rectangle_integral(across: float, along: float, half_across: float, half_alo
     ----------
     A. E. H. Love, Phil. Trans. R. Soc. A 228 (1929) 377-420; Johnson, Contact Mechanics, eq. (3.25).
     """
+    # Johnson's four logarithms, joined in pairs: sides right and left by the height, top and bottom by the breadth.
     right, left = across + half_across, across - half_across
     top, bottom = along + half_along, along - half_along
     right_top, right_bottom = math.hypot(right, top), math.hypot(right, bottom)
@@ -132,11 +134,13 @@ def tent_displacements(
     n_roll, n_axial = len(roll), len(axial)
     result = np.zeros((n_roll * n_axial, n_roll * n_axial))
     weight_sum = np.zeros(n_roll * n_axial)
-    gauss = 0.5 / math.sqrt(3.0)
+    gauss = 0.5 / math.sqrt(3.0)  # two-point Gauss rule, from the middle of a part of length 1
+    # The image of a load at z behind the face at z_end is at 2 z_end - z.
     ends = (2.0 * axial[0], 2.0 * axial[-1])
     for quad_roll in range(n_roll - 1):
         roll_step = roll[quad_roll + 1] - roll[quad_roll]
         roll_length = base_radius * 0.5 * (roll[quad_roll] + roll[quad_roll + 1]) * roll_step
+        # 1/R changes over the depth: parts of half of it are fine enough for two points each way.
         cuts_roll = max(1, int(math.ceil(roll_length / (0.5 * depth))))
         for quad_axial in range(n_axial - 1):
             axial_step = axial[quad_axial + 1] - axial[quad_axial]
@@ -149,8 +153,10 @@ def tent_displacements(
                     sign_axial = 1.0 if part_axial % 2 else -1.0
                     t = (part_axial // 2 + 0.5 + sign_axial * gauss) / cuts_axial
                     load_axial = axial[quad_axial] + t * axial_step
+                    # dA = r_b phi dphi dz / cos(beta_b); constant factors cancel against the sum of the weights.
                     area = load_roll / (cuts_roll * cuts_axial) * roll_step * axial_step
                     corner = quad_roll * n_axial + quad_axial
+                    # A load on the quadrilateral belongs to its four corners by their bilinear shape functions.
                     columns = (corner, corner + 1, corner + n_axial, corner + n_axial + 1)
                     weights = (area * (1 - s) * (1 - t), area * (1 - s) * t, area * s * (1 - t), area * s * t)
                     for k in range(4):
@@ -191,6 +197,7 @@ def tent_weights(roll: Floats, axial: Floats) -> Floats:
     >>> np.allclose(weights.sum(axis=0), 1.0)
     True
     """
+    # The mass matrix of the tents is a product, since the area r_b phi dphi dz is: phi goes with the roll angle.
     along_roll = _line_mass(roll, weight=roll)
     along_axis = _line_mass(axial, weight=np.ones_like(axial))
     mass = np.kron(along_roll, along_axis)
@@ -202,6 +209,7 @@ def _line_mass(nodes: Floats, weight: Floats) -> Floats:
     mass = np.zeros((len(nodes), len(nodes)))
     for left in range(len(nodes) - 1):
         length, (a, b) = nodes[left + 1] - nodes[left], weight[left : left + 2]
+        # Integrals of two linear shape functions with a linear weight, exact.
         block = length / 12.0 * np.array([[3 * a + b, a + b], [a + b, a + 3 * b]])
         mass[left : left + 2, left : left + 2] += block
     return mass

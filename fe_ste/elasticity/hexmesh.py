@@ -320,6 +320,7 @@ def _half_boundary(
     roll_form, roll_tip = (
         np.sqrt((radius / gear.base_radius) ** 2 - 1.0) for radius in (profile.form_radius, profile.tip_radius)
     )
+    # Arc length of an involute is r_b roll^2 / 2: fractions of it are fractions of the squared roll angle.
     roll = np.sqrt(roll_form**2 + flank_fractions * (roll_tip**2 - roll_form**2))
     radius = gear.base_radius * np.sqrt(1.0 + roll**2)
     angle = gear.half_angle(radius)
@@ -332,11 +333,13 @@ def _half_boundary(
 
     step = np.diff(root_curve, axis=0)
     length = np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))])
+    # The blocks of tooth and rim part where the fillet runs half-way between flank and root land; element angles stay
+    # near 90 degrees on both sides.
     tangent_angle = np.arctan2(np.abs(step[:, 1]), np.abs(step[:, 0]))
     split = max(length[int(np.argmax(tangent_angle > _FILLET_SPLIT_ANGLE))], 0.1 * length[-1])
     upper_fillet = _along(root_curve, length, np.linspace(split, 0.0, settings.fillet + 1))
     lower = _along(root_curve, length, np.linspace(split, length[-1], settings.root + 1))
-    upper_fillet[-1] = involute[0]
+    upper_fillet[-1] = involute[0]  # the same point but for rounding: a crack otherwise
     return roll, np.concatenate([upper_fillet[:-1], involute]), lower
 
 
@@ -361,6 +364,7 @@ def _rim_blocks(gear: Gear, core: Floats, split: Floats, root: Floats, settings:
     held_radius = gear.held_diameter / 2
     split_angle = np.arctan2(split[1], split[0])
     held_angle = split_angle * np.linspace(-1.0, 1.0, core.shape[0])
+    # Elements of the rim grow from the size they have at the root.
     depth = abs(np.hypot(*split) - held_radius)
     upwards = 1.0 - _geometric(settings.rim, np.hypot(*(root[1] - root[0])) / depth)[::-1]
 
@@ -384,6 +388,7 @@ def _coons(
     along: Floats,
 ) -> Floats:
     """Transfinite interpolation between four edges; result (across, along, 2)."""
+    # Gordon and Hall, Int. J. Num. Meth. Eng. 7 (1973) 461-477: both pairs of edges less the corners, counted twice.
     s, t = across[:, None, None], along[None, :, None]
     edges = (1 - s) * left + s * right + (1 - t) * bottom[:, None] + t * top[:, None]
     corners = (1 - s) * ((1 - t) * left[0] + t * left[-1]) + s * ((1 - t) * right[0] + t * right[-1])

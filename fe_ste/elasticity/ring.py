@@ -42,6 +42,8 @@ def joined(first: Floats, second: Floats) -> Floats:
     """
     outer_minus, to_middle, _, middle_first = blocks(first)
     middle_second, _, from_middle, outer_plus = blocks(second)
+    # Schur complement of the joined face: outer blocks less (coupling) (middle)^-1 (coupling)'. By the Cholesky factor
+    # it is a product with its own transpose, and so stays symmetric to the last bit.
     coupling = np.concatenate([to_middle, from_middle])
     factor = scipy.linalg.cholesky(middle_first + middle_second, lower=True, overwrite_a=True, check_finite=False)
     reduced = scipy.linalg.solve_triangular(factor, coupling.T, lower=True, check_finite=False)
@@ -80,15 +82,19 @@ def ring_faces(sector: Floats, load: Floats, teeth: int, reach: int) -> dict[int
     """
     minus_minus, minus_plus, plus_minus, plus_plus = blocks(sector)
     half = len(minus_minus)
+    # The ring is sector 0 and a chain of all others, condensed to its two ends. The chains that lack the sectors near
+    # sector 0 are kept on the way: they give the faces in between back.
     rests = [chain(sector, teeth - 1 - reach)]
     for _ in range(reach):
         rests.append(joined(sector, rests[-1]))
     rest = rests.pop()
+    # The rest's minus face is the plus face of sector 0 and the other way round, hence the exchanged blocks.
     closed = sector + np.block([[blocks(rest)[3], blocks(rest)[2]], [blocks(rest)[1], blocks(rest)[0]]])
     solution = scipy.linalg.solve(closed, load, assume_a="pos", check_finite=False)
     faces = {0: solution[:half], 1: solution[half:]}
     for step in range(1, reach + 1):
         rest_mm, rest_mp, rest_pm, rest_pp = blocks(rests.pop())
+        # Equilibrium of the next face on either side, between the sector just solved and a chain one shorter.
         ahead = plus_minus @ faces[step] + rest_mp @ faces[0]
         faces[step + 1] = -scipy.linalg.solve(plus_plus + rest_mm, ahead, assume_a="pos", check_finite=False)
         behind = minus_plus @ faces[1 - step] + rest_pm @ faces[1]
@@ -128,6 +134,7 @@ def open_chain_faces(sector: Floats, load: Floats, teeth: int) -> list[list[Floa
 
 def uniform_faces(sector: Floats, load: Floats) -> Floats:
     """Sum over the ring's faces of their displacements under `load`: the harmonic of order zero, (m, k)."""
+    # In that harmonic both faces of a sector move alike, so all four blocks add up.
     half = len(sector) // 2
     matrix = sum(blocks(sector), np.zeros((half, half)))
     return np.asarray(scipy.linalg.solve(matrix, load[:half] + load[half:], assume_a="pos", check_finite=False))

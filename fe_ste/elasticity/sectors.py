@@ -1,9 +1,7 @@
-"""Open sectors of some neighbouring teeth of both gears, in their places in the pair, fine where flanks touch.
+"""Open sectors of some neighbouring teeth of both gears, as they stand in the pair, fine where flanks touch.
 
-The pose is that of `fe_ste.contact.compliance`: gear 1 at the origin, the pitch point on +x, an external gear 2 at
-+x, an
-internal one at -x. In each layer the flank nodes gather about the contact line of that layer; the cut faces between
-teeth do not move with them.
+Frame and tooth numbers are those of `fe_ste.contact.kinematics`. In each layer the flank nodes gather about the contact
+line of that layer; the cut faces between teeth do not move with them.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Diagrams of transmission error tables.
-
-matplotlib is imported when a diagram is drawn and needs no display: figures are made without pyplot.
-"""
+"""Diagrams of transmission error tables."""
 
 from __future__ import annotations
 
@@ -39,18 +36,18 @@ def single_load_case(dataset: xr.Dataset) -> xr.Dataset:
     Raises
     ------
     ValueError
-        If a dimension is swept: a curve belongs to one state.
+        If a dimension but ``pmc`` has several values: a curve belongs to one state.
     """
     if "pmc" not in dataset.dims:
         raise ValueError(f"dataset: no dimension 'pmc' among {sorted(map(str, dataset.dims))}")
-    swept = {"torque", "centre_distance", "misalignment"}.intersection(map(str, dataset.dims))
-    several = [name for name in sorted(swept) if dataset.sizes[name] > 1]
+    conditions = {"torque", "centre_distance", "misalignment"}.intersection(map(str, dataset.dims))
+    several = [name for name in sorted(conditions) if dataset.sizes[name] > 1]
     if several:
         name = several[0]
         raise ValueError(
             f"dataset: {name} has {dataset.sizes[name]} values; choose one, such as dataset.isel({name}=0)"
         )
-    return dataset.isel({name: 0 for name in swept}).sortby("pmc")
+    return dataset.isel({name: 0 for name in conditions}).sortby("pmc")
 
 
 def plot_ste_curves(datasets: Mapping[str, xr.Dataset], path: str | Path | None = None) -> Figure:
@@ -72,7 +69,7 @@ def plot_ste_curves(datasets: Mapping[str, xr.Dataset], path: str | Path | None 
     Raises
     ------
     ValueError
-        If there is nothing to draw or a table is swept over more than the mesh cycle.
+        If there is nothing to draw or a table has further dimensions than the mesh cycle.
     """
     if not datasets:
         raise ValueError("plot_ste_curves: no dataset given")
@@ -117,7 +114,7 @@ def plot_ripple(
     Raises
     ------
     ValueError
-        If there is nothing to draw, or a table is swept over more than position and load.
+        If there is nothing to draw, or a table has further dimensions than position and load.
     """
     if not datasets:
         raise ValueError("plot_ripple: no dataset given")
@@ -227,7 +224,7 @@ def plot_load_share(dataset: xr.Dataset, path: str | Path | None = None, title: 
     Raises
     ------
     ValueError
-        If the table has no load shares or is swept over more than the mesh cycle.
+        If the table has no load shares or further dimensions than the mesh cycle.
     """
     if "load_share" not in dataset:
         raise ValueError(f"dataset: no variable 'load_share' among {sorted(map(str, dataset.data_vars))}")

@@ -79,11 +79,11 @@ def draw_contact_stress(
     gear = field.sectors[flank.number]
     name = (field.pair.pinion, field.pair.gear)[flank.number].name.replace("_", " ")
     load = f"{field.torque:.0f} N m on gear 1, position {field.pmc:.2f} of the mesh cycle, {field.method}"
-    place = flank.points[flank.highest] + flank.displacement[flank.highest]
+    highest_point = flank.points[flank.highest] + flank.displacement[flank.highest]
     top = 1e-6 * _top_stress(field, flank.points[flank.highest])
     views = (
         (f"flank of the {name} from the front", _flank_view(field, gear, flank, magnification, top, size)),
-        (f"section at z = {1e3 * place[2]:.1f} mm", _section_view(field, flank, place, top, size)),
+        (f"section at z = {1e3 * highest_point[2]:.1f} mm", _section_view(field, flank, highest_point, top, size)),
     )
     with drawing_style():
         from matplotlib.cm import ScalarMappable
@@ -128,8 +128,8 @@ class _LoadedFlank:
 
     @classmethod
     def of(cls, field: StressField, number: int) -> _LoadedFlank:
-        sector, own = field.sectors[number], field.nodes_of(number)
-        pressure = field.pressure[own]
+        sector, nodes = field.sectors[number], field.nodes_of(number)
+        pressure = field.pressure[nodes]
         corners = sector.points[sector.facets]
         normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
         load = pressure[sector.facets].mean(axis=1) * np.linalg.norm(normals, axis=1)
@@ -142,8 +142,8 @@ class _LoadedFlank:
         middle = np.sum(load[:, None] * corners[on_tooth].mean(axis=1), axis=0) / load.sum()
         middle[2] = 0.0
         gear = (field.pair.pinion, field.pair.gear)[number]
-        kind = -1.0 if field.pair.gear.internal else 1.0
-        axis = np.array([kind * field.pair.centre_distance * number, 0.0, 0.0])
+        mate_sign = -1.0 if field.pair.gear.internal else 1.0
+        axis = np.array([mate_sign * field.pair.centre_distance * number, 0.0, 0.0])
         radial = (middle - axis) * (-1.0 if gear.internal else 1.0)
         upward = radial - (radial @ normal) * normal
         # Not at an end face, where there is no section to see, and not at an edge, where the mesh makes the pressure.
@@ -155,7 +155,7 @@ class _LoadedFlank:
             tooth=int(tooth),
             facets=facets,
             points=sector.points,
-            displacement=field.displacement[own],
+            displacement=field.displacement[nodes],
             pressure=pressure,
             highest=int(np.argmax(np.where(inner, pressure, 0.0))),
             top_pressure=float(np.where(inner, pressure, 0.0).max()),
@@ -178,10 +178,10 @@ def _grid(field: StressField, number: int, bricks: Integers, magnification: floa
     """Deformed bricks of one gear with their stress in MPa."""
     import pyvista
 
-    own = field.nodes_of(number)
-    points = field.sectors[number].points + magnification * field.displacement[own]
+    nodes = field.nodes_of(number)
+    points = field.sectors[number].points + magnification * field.displacement[nodes]
     grid = pyvista.UnstructuredGrid({pyvista.CellType.HEXAHEDRON: bricks}, points)
-    grid.point_data["stress"] = 1e-6 * field.von_mises[own]
+    grid.point_data["stress"] = 1e-6 * field.von_mises[nodes]
     return grid
 
 
@@ -231,15 +231,15 @@ def _flank_view(
 
 
 def _section_view(
-    field: StressField, flank: _LoadedFlank, place: Floats, top: float, size: tuple[int, int]
+    field: StressField, flank: _LoadedFlank, point: Floats, top: float, size: tuple[int, int]
 ) -> tuple[Pixels, float]:
-    """Both gears cut at the height of a place on the flank, close to it."""
+    """Both gears cut at the height of a point on the flank, close to it."""
     module = field.pair.pinion.transverse_module
     with offscreen_plotter(*size) as plotter:
         for number, sector in enumerate(field.sectors):
             grid = _grid(field, number, sector.hexahedra, 1.0)
             # A little beside the layer of nodes, where bricks are cut, not touched.
-            cut = grid.slice(normal=(0.0, 0.0, 1.0), origin=(0.0, 0.0, place[2] + 1e-4 * module))
+            cut = grid.slice(normal=(0.0, 0.0, 1.0), origin=(0.0, 0.0, point[2] + 1e-4 * module))
             plotter.add_mesh(
                 cut,
                 scalars="stress",
@@ -250,7 +250,7 @@ def _section_view(
             )
             outline = cut.extract_feature_edges(boundary_edges=True, feature_edges=False, manifold_edges=False)
             plotter.add_mesh(outline, color="#222222", line_width=2.0)
-        plotter.camera_position = [place + np.array([0.0, 0.0, module]), place, flank.upward]
+        plotter.camera_position = [point + np.array([0.0, 0.0, module]), point, flank.upward]
         plotter.camera.parallel_scale = 0.5 * _SECTION_HEIGHT * module
         plotter.renderer.ResetCameraClippingRange()
         return rendered_image(plotter)

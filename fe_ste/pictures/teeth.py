@@ -1,8 +1,4 @@
-"""Pictures of meshing teeth under load, rendered off-screen.
-
-pyvista is imported when a picture is drawn. VTK renders into memory without a display through EGL or OSMesa;
-where neither is there it crashes the process, so the first picture tries it in a process of its own.
-"""
+"""Pictures of meshing teeth under load, rendered off-screen (`fe_ste.tools.rendering`)."""
 
 from __future__ import annotations
 

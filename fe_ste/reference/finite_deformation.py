@@ -1,7 +1,7 @@
 """8-node bricks with incompatible modes under finite deformation, St. Venant-Kirchhoff steel.
 
 The displacement gradient of a brick is that of its nodes plus that of three incompatible modes, whose gradients are
-those of the linear element in `fe_ste.elasticity.flank`: at vanishing displacements the tangent is that element's
+those of the linear element in `fe_ste.elasticity.bricks`: at vanishing displacements the tangent is that element's
 stiffness matrix. The modes are unknowns of each element alone; they are condensed there and follow each Newton step.
 
 Green's strain is exact in the brick's mean deformation gradient and linear in what deviates from it, as in physically
@@ -56,10 +56,12 @@ def _gradient(motion: Floats, gradients: Floats) -> Floats:
 @compiled
 def _stress(whole: Floats, deviation: Floats, lame: float, shear: float, finite: bool) -> Floats:
     """Second Piola-Kirchhoff stress from the displacement gradient and its deviation from the mean."""
+    # Green's strain E = (H + H' + H'H) / 2 with H = mean + deviation, less the square of the deviation.
     strain = 0.5 * (whole + whole.T)
     if finite:
         mean = whole - deviation
         strain = strain + 0.5 * (mean.T @ mean + mean.T @ deviation + deviation.T @ mean)
+    # St. Venant and Kirchhoff: S = 2 mu E + lambda tr(E) I.
     stress = 2.0 * shear * strain
     trace = lame * (strain[0, 0] + strain[1, 1] + strain[2, 2])
     for a in range(3):
@@ -69,6 +71,7 @@ def _stress(whole: Floats, deviation: Floats, lame: float, shear: float, finite:
 
 @compiled
 def _determinant(f: Floats) -> float:
+    """Return the determinant of a deformation gradient (3, 3): its volume ratio."""
     return float(
         f[0, 0] * (f[1, 1] * f[2, 2] - f[1, 2] * f[2, 1])
         - f[0, 1] * (f[1, 0] * f[2, 2] - f[1, 2] * f[2, 0])
@@ -99,6 +102,7 @@ def _brick(
     for point in range(_POINTS):
         at_point = gradients[point * _FUNCTIONS : (point + 1) * _FUNCTIONS]
         whole, deviation = _gradient(motion, at_point), _gradient(motion, at_point - mean)
+        # Newton's method must not step through an element turned inside out: from there it does not come back.
         if finite and _determinant(whole + np.eye(3)) <= 0.0:
             return False
         stress = _stress(whole, deviation, lame, shear, finite)
@@ -106,6 +110,8 @@ def _brick(
         for i in range(_FUNCTIONS):
             for a in range(3):
                 row = 3 * i + a
+                # Row of B: derivative of the strain by displacement a of node i, F' grad N symmetrised, in Voigt's
+                # order with shears doubled. The internal force is the integral of B'S.
                 for k in range(6):
                     b, c = rows[k], columns[k]
                     strain = mean_deformation[a, b] * at_point[i, c]
@@ -121,6 +127,7 @@ def _brick(
                 for k in range(3):
                     stresses[row, k] = volume * (trace + 2.0 * shear * strains[row, k])
                     stresses[row, k + 3] = volume * shear * strains[row, k + 3]
+        # Material stiffness B'DB, one triangle of it.
         for row in range(33):
             for column in range(row, 33):
                 total = 0.0
@@ -138,6 +145,7 @@ def _brick(
 @compiled
 def _add_geometric_stiffness(at_point: Floats, mean: Floats, stress: Floats, matrix: Floats) -> None:
     """Add the stress times the second derivative of the strain, which has no square of the deviation."""
+    # S : d2E, d2E = sym(grad N_i (x) grad N_j) for each direction alike, less that of the deviations.
     deviation = at_point - mean
     whole = at_point @ stress @ at_point.T - deviation @ stress @ deviation.T
     for i in range(_FUNCTIONS):
@@ -203,6 +211,8 @@ def _all_bricks(
             matrix,
         ):
             return element
+        # Static condensation of the nine mode unknowns: with K_mm d_m = -(r_m + K_mu d_u) the step of the modes is
+        # known from that of the nodes, and forces and stiffness lose what the modes take up.
         solved = recovery[element]
         solved[:, 0] = element_force[24:]
         solved[:, 1:] = matrix[24:, :24]
@@ -244,7 +254,7 @@ def _cauchy_stress(
             at_point = gradients[element, point * _FUNCTIONS : (point + 1) * _FUNCTIONS]
             whole, deviation = _gradient(motion, at_point), _gradient(motion, at_point - mean)
             stress = _stress(whole, deviation, lame[element], shear[element], finite)
-            if finite:
+            if finite:  # Cauchy stress F S F' / det F
                 deformation = whole + np.eye(3)
                 stress = deformation @ stress @ deformation.T / _determinant(deformation)
             result[element, point] = stress

@@ -131,11 +131,13 @@ def _cut(polygon: Floats, count: int, window: Floats, result: Floats, spare: Flo
         kept = 0
         for corner in range(count):
             corner_point, next_point = result[corner], result[(corner + 1) % count]
+            # Cross product of the edge with the way to the point: positive on its left, inside.
             inside = along_x * (corner_point[1] - start[1]) - along_y * (corner_point[0] - start[0])
             inside_next = along_x * (next_point[1] - start[1]) - along_y * (next_point[0] - start[0])
             if inside >= 0.0:
                 spare[kept] = corner_point
                 kept += 1
+            # The edge crosses the polygon between two corners strictly on either side; one on it is kept above.
             if (inside > 0.0 and inside_next < 0.0) or (inside < 0.0 and inside_next > 0.0):
                 share = inside / (inside - inside_next)
                 spare[kept, 0] = corner_point[0] + share * (next_point[0] - corner_point[0])
@@ -166,6 +168,7 @@ def _shape_at(corners: Floats, x: float, y: float, values: Floats) -> None:
         for corner in range(4):
             at_x += values[corner] * corners[corner, 0]
             at_y += values[corner] * corners[corner, 1]
+        # Jacobian of the bilinear map, inverted by hand.
         a = 0.25 * ((1.0 - t) * (corners[1, 0] - corners[0, 0]) + (1.0 + t) * (corners[2, 0] - corners[3, 0]))
         b = 0.25 * ((1.0 - s) * (corners[3, 0] - corners[0, 0]) + (1.0 + s) * (corners[2, 0] - corners[1, 0]))
         c = 0.25 * ((1.0 - t) * (corners[1, 1] - corners[0, 1]) + (1.0 + t) * (corners[2, 1] - corners[3, 1]))
@@ -181,6 +184,7 @@ def _shape_at(corners: Floats, x: float, y: float, values: Floats) -> None:
 
 @compiled
 def _flatten(corners: Floats, origin: Floats, axes: Floats, reverse: bool, result: Floats) -> None:
+    """Coordinates (4, 2) of a facet's corners in a plane; in reverse order for one that is seen from behind."""
     for corner in range(4):
         at = 3 - corner if reverse else corner
         for axis in range(2):
@@ -195,6 +199,7 @@ def _plane(corners: Floats, origin: Floats, axes: Floats) -> float:
     """Middle, two axes and normal of a facet's plane; its area."""
     for k in range(3):
         origin[k] = 0.25 * (corners[0, k] + corners[1, k] + corners[2, k] + corners[3, k])
+    # The diagonals span the mean plane of a warped facet, and their cross product is twice its area.
     normal = np.cross(corners[2] - corners[0], corners[3] - corners[1])
     twice_area = np.sqrt(np.sum(normal**2))
     axes[2] = normal / twice_area
@@ -228,14 +233,15 @@ def _integrate_pairs(
     shape_one, shape_two, reversed_two = np.empty(4), np.empty(4), np.empty(4)
     normal, apart, triangle = np.empty(3), np.empty(3), np.empty((3, 2))
     for number in range(len(pairs)):
-        one, two = first[pairs[number, 0]], second[pairs[number, 1]]
-        corners_one, corners_two = points[one], points[two]
+        nodes_one, nodes_two = first[pairs[number, 0]], second[pairs[number, 1]]
+        corners_one, corners_two = points[nodes_one], points[nodes_two]
         area = _plane(corners_one, origin, axes)
         _flatten(corners_one, origin, axes, False, flat_one)
         _flatten(corners_two, origin, axes, True, flat_two)
         count = _cut(flat_two, 4, flat_one, polygon, spare)
         if count == 0:
             continue
+        # Triangles from the middle: the polygon is convex, so all have positive area.
         middle_x, middle_y = np.mean(polygon[:count, 0]), np.mean(polygon[:count, 1])
         for corner in range(count):
             triangle[0, 0], triangle[0, 1] = middle_x, middle_y
@@ -255,7 +261,8 @@ def _integrate_pairs(
                 _shape_at(flat_one, x, y, shape_one)
                 _shape_at(flat_two, x, y, reversed_two)
                 for k in range(4):
-                    shape_two[k] = reversed_two[3 - k]
+                    shape_two[k] = reversed_two[3 - k]  # back in the order of the second facet's nodes
+                # Gap along the interpolated normal, from the point of the first surface to that of the second.
                 length = 0.0
                 for axis in range(3):
                     normal[axis], apart[axis] = 0.0, 0.0
@@ -274,6 +281,8 @@ def _integrate_pairs(
                     weights[number, a] += weight
                     for b in range(4):
                         for axis in range(3):
+                            # Virtual gap: the second surface's point moves away, the first one's towards it. Its
+                            # transpose distributes pressures with equal and opposite sums.
                             gradients[number, a, b, axis] -= weight * shape_one[b] * normal[axis]
                             gradients[number, a, 4 + b, axis] += weight * shape_two[b] * normal[axis]
 
@@ -284,29 +293,33 @@ def _facing_pairs(points: Floats, first: Integers, second: Integers, reach: floa
     count_one, count_two = len(first), len(second)
     low, high = np.empty((count_two, 3)), np.empty((count_two, 3))
     normals = np.empty((count_two, 3))
-    for two in range(count_two):
-        corners = points[second[two]]
+    for facet_two in range(count_two):
+        corners = points[second[facet_two]]
         for axis in range(3):
-            low[two, axis], high[two, axis] = corners[:, axis].min(), corners[:, axis].max()
-        normals[two] = np.cross(corners[2] - corners[0], corners[3] - corners[1])
+            low[facet_two, axis], high[facet_two, axis] = corners[:, axis].min(), corners[:, axis].max()
+        normals[facet_two] = np.cross(corners[2] - corners[0], corners[3] - corners[1])
     pairs = np.empty((64, 2), dtype=np.int64)
     used = 0
-    for one in range(count_one):
-        corners = points[first[one]]
+    for facet_one in range(count_one):
+        corners = points[first[facet_one]]
         normal = np.cross(corners[2] - corners[0], corners[3] - corners[1])
-        for two in range(count_two):
+        for facet_two in range(count_two):
             near = True
             for axis in range(3):
-                if corners[:, axis].min() - reach > high[two, axis] or corners[:, axis].max() + reach < low[two, axis]:
+                if (
+                    corners[:, axis].min() - reach > high[facet_two, axis]
+                    or corners[:, axis].max() + reach < low[facet_two, axis]
+                ):
                     near = False
                     break
-            if not near or np.sum(normal * normals[two]) >= 0.0:
+            # Facets whose normals agree belong to the backs of teeth.
+            if not near or np.sum(normal * normals[facet_two]) >= 0.0:
                 continue
-            if used == len(pairs):
+            if used == len(pairs):  # compiled code has no growing list of rows
                 larger = np.empty((2 * used, 2), dtype=np.int64)
                 larger[:used] = pairs
                 pairs = larger
-            pairs[used, 0], pairs[used, 1] = one, two
+            pairs[used, 0], pairs[used, 1] = facet_one, facet_two
             used += 1
     return pairs[:used]
 

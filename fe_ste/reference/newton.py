@@ -9,14 +9,15 @@ active gaps only makes the matrix positive definite, and the multipliers are ite
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse
 
-from fe_ste.reference.finite_deformation import Bricks, BrickTangent, InvertedElementError
-from fe_ste.reference.mortar import Surface, WeightedGap, facing_pairs, summed, weighted_gap
+from fe_ste.reference.contact_model import ContactModel, Equilibrium, Iteration
+from fe_ste.reference.finite_deformation import BrickTangent, InvertedElementError
+from fe_ste.reference.mortar import WeightedGap, facing_pairs, summed, weighted_gap
 from fe_ste.tools.arrays import Booleans, Floats, Integers, SparseMatrix
 from fe_ste.tools.sparse import FactorisationError, factorise
 from fe_ste.tools.threads import one_dense_thread
@@ -36,69 +37,6 @@ _LEAST_LOAD_STEP = 1.0 / 64.0
 
 class EquilibriumError(RuntimeError):
     """No equilibrium was found; the message says at which load step and iteration."""
-
-
-@dataclass(frozen=True)
-class TurningHub:
-    """Nodes of a rigid hub that turns about an axis along z under a torque.
-
-    Attributes
-    ----------
-    nodes : ndarray
-    axis : ndarray (2,)
-        m.
-    lever : float
-        The unknown is the rotation (positive about +z) times this length, m; negative reverses its sense.
-    force : float
-        Torque over `lever`, N.
-    """
-
-    nodes: Integers
-    axis: Floats
-    lever: float
-    force: float
-
-
-@dataclass(frozen=True)
-class ContactModel:
-    """Elastic bodies, what holds and loads them, and where they may touch.
-
-    Attributes
-    ----------
-    bricks : Bricks
-    first, second : Surface
-        The nodes of the first one carry the contact pressures.
-    held : ndarray of bool (n, 3)
-        Displacements that are zero.
-    forces : ndarray (n, 3)
-        Nodal forces, N; they do not turn with the bodies.
-    hub : TurningHub, optional
-    modulus : float
-        A Young's modulus of the bodies, Pa, for scales.
-    search : float
-        Distance up to which facets count as neighbours, m.
-    reach : float
-        Gap at the edge of the contact expected, m: the first guess are the nodes whose gap is smaller. A guess too wide
-        would crush the smallest bricks.
-    allowed_overlap : float
-        Overlap of the undeformed surfaces that a mesh of chords may have, m.
-    """
-
-    bricks: Bricks
-    first: Surface
-    second: Surface
-    held: Booleans
-    forces: Floats
-    modulus: float
-    search: float
-    reach: float
-    allowed_overlap: float = 0.0
-    hub: TurningHub | None = None
-
-    def __repr__(self) -> str:
-        """Return one short line."""
-        facets = f"surfaces of {len(self.first.facets)} and {len(self.second.facets)} facets"
-        return f"<ContactModel: {len(self.bricks.nodes)} bricks, {len(self.bricks.points)} nodes, {facets}>"
 
 
 @dataclass(frozen=True)
@@ -128,82 +66,6 @@ class NewtonSettings:
             raise ValueError("load_steps must be at least 1 and most_iterations at least 2")
         if not (self.force_tolerance > 0 and self.gap_tolerance > 0):
             raise ValueError("the tolerances must be positive")
-
-
-@dataclass(frozen=True)
-class Iteration:
-    """One Newton iteration, a row of the convergence table.
-
-    Attributes
-    ----------
-    load : float
-        Part of the load.
-    number : int
-        Within the load step, from 1.
-    active : int
-        Nodes in contact.
-    changed : int
-        Nodes whose state changed after it.
-    step_length : float
-        Of the line search.
-    force_error : float
-        Largest force out of balance after it, as part of the largest load.
-    gap_error : float
-        Largest mean gap or overlap left where pressure is, as part of the largest displacement.
-    hub : float
-        Displacement of the hub, m.
-    """
-
-    load: float
-    number: int
-    active: int
-    changed: int
-    step_length: float
-    force_error: float
-    gap_error: float
-    hub: float
-
-
-@dataclass(frozen=True)
-class Equilibrium:
-    """Bodies in equilibrium.
-
-    Attributes
-    ----------
-    displacement : ndarray (n, 3)
-        m.
-    modes : ndarray (m, 3, 3)
-        Incompatible modes.
-    pressure : ndarray (s,)
-        Contact pressure at the nodes of the first surface, Pa.
-    contact_force : ndarray (n, 3)
-        Contact forces on the nodes of both surfaces, N.
-    mean_pressure : ndarray (s,)
-        Contact force on each of these nodes over its contact area, Pa: without the peaks that `pressure` has where an
-        edge of the other surface leaves a node little of its area.
-    weight : ndarray (s,)
-        Contact area of each node, m^2.
-    facing : ndarray of bool (s,)
-        Nodes whose whole area faces the other surface.
-    hub : float
-        Displacement of the hub, m.
-    iterations : tuple of Iteration
-    """
-
-    displacement: Floats
-    modes: Floats
-    pressure: Floats
-    contact_force: Floats
-    mean_pressure: Floats
-    weight: Floats
-    facing: Booleans
-    hub: float
-    iterations: tuple[Iteration, ...]
-
-    def __repr__(self) -> str:
-        """Return one short line."""
-        touching = np.count_nonzero(self.pressure)
-        return f"<Equilibrium: {touching} of {len(self.pressure)} nodes in contact, {len(self.iterations)} iterations>"
 
 
 @dataclass(frozen=True)
@@ -247,6 +109,8 @@ class _Numbering:
         self.free = np.flatnonzero(~bound.ravel())
         self.count = len(self.free)
         self._hub_elements = np.flatnonzero(on_hub[nodes].any(axis=1))
+        # One number per pair of nodes that share a brick: the entries of all bricks are then summed without a sort at
+        # each iteration, since the pattern of the matrix stays.
         pairs, self._pair_of_block = np.unique(nodes[:, :, None] * size + nodes[:, None, :], return_inverse=True)
         self._columns = pairs % size
         self._starts = np.searchsorted(pairs // size, np.arange(size + 1))
@@ -266,6 +130,8 @@ class _Numbering:
         stiffness: SparseMatrix = whole[self.free][:, self.free]
         if self.model.hub is None:
             return stiffness
+        # The hub's nodes move by motion times one unknown: its column is K motion, its diagonal motion' K motion and
+        # the geometric stiffness of forces whose arms turn.
         unknowns = self.model.bricks.unknowns[self._hub_elements]
         forces = np.einsum("eij,ej->ei", tangent.stiffness[self._hub_elements], motion.ravel()[unknowns])
         coupling = summed(unknowns, forces, size)
@@ -328,6 +194,7 @@ class _Search:
         if not self.model.bricks.finite:
             slope[hub.nodes, :2] = np.stack([-y, x], axis=1) / hub.lever
             return slope * hub_displacement, slope, curvature
+        # A finite rotation: nodes move on circles, and the second derivative points to the axis.
         cosine, sine = math.cos(angle), math.sin(angle)
         turned = np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1)
         displacement[hub.nodes, :2] = turned - np.stack([x, y], axis=1)
@@ -358,11 +225,13 @@ class _Search:
         """Compute forces, tangents and gaps of a state under a part of the load."""
         model = self.model
         tangent = model.bricks.evaluate(state.displacement, state.modes)
+        # In small displacements the contact geometry is that of the undeformed surfaces, and the gap linear.
         if model.bricks.finite:
             contact = weighted_gap(model.bricks.points + state.displacement, model.first, model.second, self.pairs)
         else:
             opened = self.at_rest.gap + self.at_rest.gradient @ state.displacement.ravel()
             contact = replace(self.at_rest, gap=opened)
+        # External and contact forces less the internal ones: zero in equilibrium.
         imbalance = load * model.forces - tangent.force + self.contact_force(contact, state.pressure)
         _, motion, _ = self.hub_motion(state.hub)
         reduced = self.numbering.reduced(imbalance, motion)
@@ -385,6 +254,7 @@ class _Search:
             try:
                 state, active = self._solve_step(state, active, load, number)
             except EquilibriumError as error:
+                # A smaller part of the load from the last equilibrium on, with the contact found there.
                 step /= 2.0
                 if step < _LEAST_LOAD_STEP:
                     raise EquilibriumError(f"{error}; {100 * reached:.3g} % of the load was reached") from error
@@ -445,6 +315,8 @@ class _Search:
 
     def _tested_active(self, now: _Evaluation, active: Booleans) -> Booleans:
         """Nodes that pressure and gap ask to be in contact."""
+        # Complementarity function of Hintermueller, Ito and Kunisch: p - c g > 0, c a modulus over the node's width so
+        # that both terms are pressures of like size.
         width = np.sqrt(self.area)
         test = now.state.pressure - self.model.modulus * now.mean_gap / width
         tolerance = 1e-9 * float(np.abs(now.state.pressure).max())
@@ -465,6 +337,7 @@ class _Search:
     def _newton_step(self, now: _Evaluation, active: Booleans) -> tuple[Floats, Floats]:
         """Step of the unknowns and the pressures after it, from the linearised equilibrium with the gaps closed."""
         _, motion, curvature = self.hub_motion(now.state.hub)
+        # What the hub's nodes are held by does work on the curvature of their paths.
         held_force = self.contact_force(now.contact, now.state.pressure) - now.tangent.force
         stiffness = self.numbering.matrix(now.tangent, motion, -float(np.sum(curvature * held_force)))
         numbers = np.flatnonzero(active)
@@ -473,6 +346,8 @@ class _Search:
         rows = gradient[:, self.numbering.free]
         if self.model.hub is not None:
             rows = scipy.sparse.hstack([rows, scipy.sparse.csr_matrix((gradient @ motion.ravel())[:, None])], "csr")
+        # Augmented Lagrangian on the linearised problem: penalties make the indefinite saddle point system positive
+        # definite; the multipliers are then iterated with the same factor (Uzawa) until the gaps are closed exactly.
         added = _AUGMENTATION * self.model.modulus * np.sqrt(self.area[numbers]) / weight**2
         augmented = stiffness + rows.T @ scipy.sparse.diags_array(added) @ rows
         balance = now.imbalance - self.numbering.reduced(self.contact_force(now.contact, now.state.pressure), motion)
@@ -493,6 +368,7 @@ class _Search:
         self, now: _Evaluation, active: Booleans, step: Floats, pressure: Floats, load: float, at: str
     ) -> tuple[_Evaluation, float]:
         """Shorten the step until it lessens what is out of balance, on the gaps taken as closed."""
+        # Newton's step descends on the norm of what it linearises: halving finds a length that does, if there is one.
         before, length, reason = self._merit(now, active), 1.0, ""
         rounding = 0.1 * self.settings.force_tolerance * load * self.largest_load
         while length >= _LEAST_STEP_LENGTH:
@@ -510,6 +386,7 @@ class _Search:
 
     def _merit(self, now: _Evaluation, active: Booleans) -> float:
         """Norm of what the linearised equations on the nodes taken as `active` are to remove, N."""
+        # Gaps and stray pressures as forces, so that one number compares them.
         gaps = self.model.modulus * np.sqrt(self.area[active]) * now.mean_gap[active]
         pulls = (now.contact.weight * now.state.pressure)[~active]
         return float(np.sqrt(np.sum(now.imbalance**2) + np.sum(gaps**2) + np.sum(pulls**2)))
@@ -555,14 +432,3 @@ def fixed_body_displacement(model: ContactModel) -> tuple[Floats, Floats]:
     with factorise(numbering.matrix(tangent, displacement, 0.0)) as factor:
         displacement.ravel()[numbering.free] = factor.solve(numbering.reduced(model.forces, displacement))
     return displacement, bricks.stepped_modes(modes, tangent, displacement, 1.0)
-
-
-def convergence_table(iterations: Sequence[Iteration]) -> str:
-    """Lay out the iterations of an analysis as text, one a line."""
-    head = "load %  iteration  in contact  changed  step  force error  gap error     hub um"
-    rows = [
-        f"{100 * row.load:6.4g}  {row.number:9d}  {row.active:10d}  {row.changed:7d}  {row.step_length:4.2f}"
-        f"  {row.force_error:11.1e}  {row.gap_error:9.1e}  {1e6 * row.hub:9.4f}"
-        for row in iterations
-    ]
-    return "\n".join([head, *rows])

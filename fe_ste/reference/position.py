@@ -16,17 +16,10 @@ import numpy as np
 
 from fe_ste.elasticity.sectors import ContactMesh, OpenSector, refined_sectors
 from fe_ste.geometry.gears import GearPair
+from fe_ste.reference.contact_model import ContactModel, Equilibrium, Iteration, TurningHub
 from fe_ste.reference.finite_deformation import Bricks
 from fe_ste.reference.mortar import Surface
-from fe_ste.reference.newton import (
-    ContactModel,
-    Equilibrium,
-    EquilibriumError,
-    Iteration,
-    NewtonSettings,
-    TurningHub,
-    solve_contact,
-)
+from fe_ste.reference.newton import EquilibriumError, NewtonSettings, solve_contact
 from fe_ste.tools.notebook import html_table, value_range
 from fe_ste.transmission_error.search import hertz_half_width, least_contact_length, normal_load
 

@@ -11,9 +11,10 @@ from scipy.spatial import cKDTree
 from fe_ste.contact.cells import Cells
 from fe_ste.elasticity.sectors import OpenSector, refined_sectors
 from fe_ste.geometry.gears import GearPair
+from fe_ste.reference.contact_model import ContactModel
 from fe_ste.reference.finite_deformation import von_mises
 from fe_ste.reference.mortar import Surface
-from fe_ste.reference.newton import ContactModel, fixed_body_displacement
+from fe_ste.reference.newton import fixed_body_displacement
 from fe_ste.reference.position import NonlinearPosition, NonlinearSettings, gear_model
 from fe_ste.tools.arrays import Floats
 from fe_ste.transmission_error.compliance import PairCompliance
@@ -179,7 +180,7 @@ def _on_surface(points: Floats, surface: Surface, load_points: Floats, loads: Fl
     middle = corners.mean(axis=1)
     normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    # Facets are long and narrow: the nearest one is where the place lies within its two directions.
+    # Facets are long and narrow: the nearest one is where the point lies within its two directions.
     _, neighbours = cKDTree(middle[:, :2]).query(load_points[:, :2], k=min(_CANDIDATES, len(middle)))
     candidates = np.asarray(neighbours, dtype=np.int64).reshape(len(load_points), -1)
     along, across = corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0]

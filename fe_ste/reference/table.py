@@ -20,8 +20,9 @@ import numpy as np
 import xarray as xr
 
 from fe_ste.geometry.gears import GearPair
+from fe_ste.reference.contact_model import Iteration, convergence_table
 from fe_ste.reference.finite_deformation import von_mises
-from fe_ste.reference.newton import EquilibriumError, Iteration, convergence_table
+from fe_ste.reference.newton import EquilibriumError
 from fe_ste.reference.position import NonlinearPosition, NonlinearSettings, nonlinear_position
 from fe_ste.tools.files import FileError
 from fe_ste.tools.notebook import html_table, value_range

@@ -1,4 +1,7 @@
-"""What all diagrams share: style, colours, figures written whole or not at all."""
+"""What all diagrams share: style, colours, figures written whole or not at all.
+
+matplotlib is imported when a diagram is drawn and needs no display: figures are made without pyplot.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""What all rendered pictures share: an off-screen plotter, images without margins, a scale."""
+"""What all rendered pictures share: an off-screen plotter, images without margins, a scale.
+
+pyvista is imported when a picture is rendered. VTK renders into memory without a display through EGL or OSMesa.
+Where neither is there it ends the process, so the first picture tries it in a process of its own.
+"""
 
 from __future__ import annotations
 

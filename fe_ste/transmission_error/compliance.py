@@ -1,4 +1,8 @@
-"""A gear pair with the compliance of both loaded flanks: all that does not depend on position or load."""
+"""A gear pair with the compliance of both loaded flanks: all that does not depend on position or load.
+
+The finite elements of both gears are the costly part of a table. They are computed here once and used at all positions,
+loads, centre distances and modifications. Frame and signs as in `fe_ste.contact.kinematics`.
+"""
 
 from __future__ import annotations
 

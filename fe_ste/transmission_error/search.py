@@ -1,4 +1,9 @@
-"""One position of the mesh cycle under one load: the window that contact fills, and the state in it."""
+"""One position in the mesh cycle (pmc) under one load: the window that contact fills, and the state in it.
+
+Where contact will be is not known before it is solved. So cells are laid in a window about each contact line, those
+too far apart to touch are left out, and the problem is solved; if contact then fills the window, or cells left out
+would touch, the start is mended and the search goes on. Frame and signs as in `fe_ste.contact.kinematics`.
+"""
 
 from __future__ import annotations
 
@@ -33,8 +38,8 @@ _UNLOADED_WIDTH = 3e-3
 _TOUCHING = 1e-12
 _WINDOW_ATTEMPTS = 20
 
-#: Places across the window that an address tells apart.
-_PLACES = 64
+#: Distances from the contact line, in cells, that an address tells apart.
+_DISTANCES = 64
 
 
 def hertz_half_width(pair: GearPair, line_load: float) -> float:
@@ -58,6 +63,7 @@ def least_contact_length(pair: GearPair, samples: int = 100) -> float:
     """Least total length of the contact lines over the mesh cycle, m."""
     axial = np.linspace(-0.5, 0.5, 401) * pair.face_width
     pitch = pair.transverse_base_pitch
+    # A helix shifts the contact along the path by tan(beta_b) times the axial position; a tooth more by a base pitch.
     lines = pair.path_pitch_point + math.tan(pair.pinion.base_helix_angle) * axial
     reach = math.ceil(pair.total_contact_ratio) + 1
     lines = lines + pitch * np.arange(-reach, reach + 1)[:, None]
@@ -141,7 +147,7 @@ class _Window:
     end : ndarray (n,)
         Whether a cell ends the window where no tip edge does.
     address : ndarray (n,)
-        Tooth pair, slice and place relative to the contact line in one number.
+        Tooth pair, slice and distance from the contact line, in cells, in one number.
     gap, near : dict
         Misalignment's index -> gap (n,), m, and which cells are near enough to touch.
     """
@@ -204,9 +210,9 @@ class _Search:
         axial = self.compliance.axial[cells.layer]
         line_roll = pair.working_roll + self.rotation + cells.tooth * pair.pitch_1 + pair.twist_1 * axial
         from_line = 0.5 * radius * (cells.roll**2 - line_roll * np.abs(line_roll)) / self.cell_width
-        from_middle = np.clip(np.rint(from_line) + _PLACES // 2, 0, _PLACES - 1).astype(np.int64)
+        from_middle = np.clip(np.rint(from_line) + _DISTANCES // 2, 0, _DISTANCES - 1).astype(np.int64)
         row = (cells.tooth - self.compliance.teeth[0]) * len(self.compliance.axial) + cells.layer
-        return np.asarray(row * _PLACES + from_middle, dtype=np.int64)
+        return np.asarray(row * _DISTANCES + from_middle, dtype=np.int64)
 
     def solve(self, window: _Window, group: list[int]) -> None:
         """Solve the states of `group`; one that needs other cells stays pending, with a start that asks for them."""
@@ -245,11 +251,13 @@ class _Search:
         start = self.starts[index]
         depth = solution.approach - gap.min()
         if depth > 0.95 * _GAP_REACH * start.depth:
+            # Cells were left out that touch at this approach: look deeper, but not to where too many teeth took part.
             if depth >= self.too_deep[index]:
                 most = self.compliance.reach + 1
                 raise ContactError(f"contact spreads over more than {most} tooth pairs: the torque is too large")
             self.starts[index] = replace(start, depth=min(1.2 * depth, 0.5 * (depth + self.too_deep[index])))
             return False
+        # Load at the end of the window would go on beyond it.
         if (solution.force[end] > 0).any():
             self.starts[index] = replace(start, cells=start.cells + 2 * math.ceil(_WINDOW_GROWTH * start.cells))
             return False

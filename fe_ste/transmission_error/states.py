@@ -1,4 +1,8 @@
-"""States of contact and their axes, and how results are gathered over them."""
+"""States of contact and their axes, and how results are gathered over them; signs as in `fe_ste.contact.kinematics`.
+
+A state is the solved contact of a pair at one position in the mesh cycle (pmc), torque, centre distance and
+misalignment. Results are kept in arrays over these four axes and labelled as a dataset at the end.
+"""
 
 from __future__ import annotations
 
@@ -256,6 +260,8 @@ class StateResults:
             return
         cosine = math.cos(compliance.pair.pinion.base_helix_angle)
         cells, solution = state.cells, state.solution
+        # From the contact normal, on which the contact is solved, to the transverse line of action: lengths grow by
+        # 1 / cos(beta_b), forces lessen by it.
         self.values["ste"][index] = solution.approach / cosine
         self.values["tangent_stiffness"][index] = cosine**2 / solution.approach_per_load
         axial = compliance.axial[cells.layer]

@@ -1,10 +1,8 @@
 """Static transmission error of a gear pair over the mesh cycle.
 
-Signs. Gear 1 is held, gear 2 turns about its axis under a torque that presses its flank on gear 1. The static
-transmission error is the rotation of gear 2 as a length on the transverse line of action, from the position in which
-the unmodified rigid flanks would roll: positive, the loaded gear yields. ``pmc`` is the part of a mesh cycle by which
-gear 1 has turned in its driving sense from where tooth pair 0 touches at the pitch point in the middle of the common
-face width.
+Frame and signs as in `fe_ste.contact.kinematics`: the static transmission error is positive where the loaded gear
+yields; the position in the mesh cycle (pmc) is 0 where tooth pair 0 touches at the pitch point in the middle of the
+common face width.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from exugear.bodies.of_gearbox import ElasticBody, reduced_bodies
+from exugear.bodies.of_gearbox.elastic_bodies import ElasticBody, reduced_bodies
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.modes import Modes, eigenmodes

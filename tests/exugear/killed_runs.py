@@ -26,7 +26,7 @@ from exugear.results.run_file import load_run
 from exugear.runs import recorder, runup
 from exugear.runs.outcome import Run
 from exugear.runs.run_folder import refuse_to_resume, run_directory
-from exugear.tooth_mesh.stiffness import mesh_stiffness
+from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 
 CALLS = ("open", "fsync", "replace", "unlink", "rmdir", "mkdir")
 DURATION = 0.024

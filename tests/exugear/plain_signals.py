@@ -17,9 +17,10 @@ from exugear.dynamics.signals import signal_layout
 from exugear.kernels.connectors import connector_load, connector_motion
 from exugear.kernels.elastic import elastic_energies, scratch_for
 from exugear.kernels.inertia import kinetic_energies
-from exugear.kernels.meshes import STATE_SIZE, mesh_state
+from exugear.kernels.meshes import STATE_SIZE
 from exugear.kernels.turning import turning_energies, turning_memory
 from exugear.model.sections.entries import GROUND
+from exugear.tooth_mesh.laws.forms import mesh_state
 
 
 def sampled(assembly: Assembly, q: np.ndarray, v: np.ndarray) -> np.ndarray:

@@ -45,7 +45,7 @@ def check(case: CaseArgument, files_below: FilesBelowOption = None, as_json: Jso
 
 def _tell_scripts(gearbox: Gearbox) -> None:
     """Check the solids, and say which of them only a script makes."""
-    from exugear.bodies.of_gearbox import solids_of
+    from exugear.bodies.of_gearbox.solids import solids_of
 
     with model_errors():
         for key, model in solids_of(gearbox):

@@ -10,12 +10,12 @@ from exugear.cli.console import note, print_json, print_table, say
 from exugear.cli.dynamics import compute_modes, label_of
 from exugear.cli.errors import exit_codes
 from exugear.cli.options import (
+    USUAL_LAW,
     CaseArgument,
     FilesBelowOption,
     InertiasOption,
     JsonOption,
     LawOption,
-    MeshLaw,
     OutOption,
     ScriptsOption,
     VariantOption,
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 def modes(
     case: CaseArgument,
     variant: VariantOption,
-    mesh_law: LawOption = MeshLaw.line_of_action,
+    mesh_law: LawOption = USUAL_LAW,
     inertias: InertiasOption = None,
     out: OutOption = None,
     files_below: FilesBelowOption = None,

@@ -21,12 +21,12 @@ from exugear.cli.errors import (
     model_errors,
 )
 from exugear.cli.options import (
+    USUAL_LAW,
     CaseArgument,
     FilesBelowOption,
     InertiasOption,
     JsonOption,
     LawOption,
-    MeshLaw,
     OutOption,
     ScriptsOption,
     Variant,
@@ -58,7 +58,7 @@ class MeshRoute(StrEnum):
 def run(
     case: CaseArgument,
     variant: VariantOption,
-    mesh_law: LawOption = MeshLaw.line_of_action,
+    mesh_law: LawOption = USUAL_LAW,
     inertias: InertiasOption = None,
     load_case: Annotated[
         str | None, typer.Option("--load-case", metavar="NAME", help="Load case. (default: the first of the file)")
@@ -121,10 +121,11 @@ def _label_of(project: Project, solver: Solver, route: MeshRoute) -> str:
 def _check_extent(project: Project, duration: float | None, folder: Path) -> None:
     """Refuse a simulated time that is too short, or whose results do not fit on the disk."""
     from exugear.runs.extent import check_disk, check_duration, sample_bytes
+    from exugear.tooth_mesh.laws.registry import LAWS
 
     gearbox, load_case = project.gearbox, _load_case(project)
     supports = gearbox.joints if project.choice.variant == Variant.rigid else gearbox.bearings
-    size = sample_bytes(len(gearbox.meshes), len(supports), project.choice.mesh_law == MeshLaw.table)
+    size = sample_bytes(len(gearbox.meshes), len(supports), LAWS[project.choice.mesh_law].signals_positions)
     with model_errors():
         check_duration(gearbox, load_case, duration)
         check_disk(gearbox, load_case, folder, duration, sample_bytes=size)

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
     from exugear.model.gearbox import Gearbox
-    from exugear.tooth_mesh.reference_tables import ReferenceOrder
-    from exugear.tooth_mesh.tables import TableOrder
-    from fe_ste.reference.newton import Iteration
+    from exugear.tooth_mesh.reference_tables import ReferenceRequest
+    from exugear.tooth_mesh.tables import TableRequest
+    from fe_ste.reference.contact_model import Iteration
     from fe_ste.reference.table import NonlinearTable
     from fe_ste.transmission_error.table import MeshTable
 
@@ -90,15 +90,15 @@ def ste(
 
 def _requested_tables(
     gearbox: Gearbox, case: Path, out: Path | None, names: list[str], positions: int | None, grid: bool
-) -> tuple[list[TableOrder], Path]:
+) -> tuple[list[TableRequest], Path]:
     from exugear.model.reading import CaseError
     from exugear.project import default_folder
     from exugear.results.folder import keep_case
-    from exugear.tooth_mesh.tables import order_tables
+    from exugear.tooth_mesh.tables import requested_tables
 
     folder = out or default_folder(case)
     try:
-        requests = order_tables(gearbox, folder, names, positions, grid)
+        requests = requested_tables(gearbox, folder, names, positions, grid)
     except CaseError as error:
         raise BadInputError(error) from error
     make_results_folder(folder)
@@ -118,11 +118,11 @@ def _compute_references(
     from exugear.model.reading import CaseError
     from exugear.project import default_folder
     from exugear.results.folder import keep_case, time_noted
-    from exugear.tooth_mesh.reference_tables import order_references, summarise_reference
+    from exugear.tooth_mesh.reference_tables import requested_references, summarise_reference
 
     folder = out or default_folder(case)
     try:
-        requests = order_references(gearbox, folder, names, positions)
+        requests = requested_references(gearbox, folder, names, positions)
     except CaseError as error:
         raise BadInputError(error) from error
     make_results_folder(folder)
@@ -143,7 +143,7 @@ def _compute_references(
         raise FailedError("\n".join(["positions that are not solved:", *failures]))
 
 
-def _compute_reference(request: ReferenceOrder, bar: Progress, task: TaskID) -> NonlinearTable:
+def _compute_reference(request: ReferenceRequest, bar: Progress, task: TaskID) -> NonlinearTable:
     from fe_ste.geometry.checks import GeometryError
 
     before = bar.tasks[task].completed
@@ -156,12 +156,12 @@ def _compute_reference(request: ReferenceOrder, bar: Progress, task: TaskID) -> 
         bar.update(task, completed=before + done, description=text)
 
     try:
-        return request.fill(at_iteration)
+        return request.compute(at_iteration)
     except GeometryError as error:
         raise BadInputError(f"pairs.{request.name}: {error}") from error
 
 
-def _draw_contacts(requests: list[TableOrder], tables: dict[str, MeshTable], folder: Path) -> list[Path]:
+def _draw_contacts(requests: list[TableRequest], tables: dict[str, MeshTable], folder: Path) -> list[Path]:
     """Draw the teeth in contact where the picture is missing or the table is new; return all such pictures."""
     from exugear.pictures.tables import contact_picture, draw_contact
     from fe_ste.contact.kinematics import ContactError
@@ -187,7 +187,7 @@ def _draw_contacts(requests: list[TableOrder], tables: dict[str, MeshTable], fol
 def _tell_tables(
     case: Path,
     folder: Path,
-    requests: list[TableOrder],
+    requests: list[TableRequest],
     tables: dict[str, MeshTable],
     pictures: list[Path],
     as_json: bool,

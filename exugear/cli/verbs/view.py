@@ -12,12 +12,12 @@ from exugear.cli.console import note, print_json, say
 from exugear.cli.dynamics import compute_modes, label_of
 from exugear.cli.errors import BadInputError, exit_codes
 from exugear.cli.options import (
+    USUAL_LAW,
     CaseArgument,
     FilesBelowOption,
     InertiasOption,
     JsonOption,
     LawOption,
-    MeshLaw,
     OutOption,
     ScriptsOption,
     Variant,
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 def view(
     case: CaseArgument,
     variant: Annotated[Variant, typer.Option(help="How the shafts are held.")] = Variant.bushing,
-    mesh_law: LawOption = MeshLaw.line_of_action,
+    mesh_law: LawOption = USUAL_LAW,
     inertias: InertiasOption = None,
     near: Annotated[
         float | None,

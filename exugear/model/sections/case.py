@@ -71,7 +71,7 @@ class DampingSection(Section):
 class ElasticitySection(Section):
     """How finely elastic bodies are described (variant `flexible`).
 
-    Vibrations of each body up to `band_Hz` are kept exactly; what vibrates above `limit_Hz` is slowed down to it, so
+    Normal modes of each body up to `band_Hz` are exact; mass scaling brings those above `limit_Hz` down to it, so
     that a solver's step is not ruled by it.
     """
 

@@ -5,10 +5,20 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from exugear.kernels.elastic import ElasticArrays, ElasticMotion
-from exugear.kernels.table_law import Scratch, TableArrays
+from exugear.kernels.fast_meshes import Meshes, MeshMemory
 from exugear.kernels.travelling import TravellingArrays
 from exugear.kernels.turning import TurningArrays
 from fe_ste.tools.arrays import Floats, Integers
+
+STIFFNESS, DAMPING, ANGLE, SPEED, HALF_ACCELERATION = range(5)
+"""Columns of `Loads.law`."""
+W_X, W_Y, W_Z, SIN_A, COS_A, SIN_B, COS_B = range(9, 16)
+"""Columns of `Work.frames` behind the rotation matrix, row by row: angular velocity, sine and cosine of the tilts."""
+FRAME_SIZE = 16
+COSINE, SINE = range(2)
+"""Columns of `Work.turns`."""
+STRAIN, STRAIN_RATE, TRUE_RATE, LOCAL_FORCE = range(4)
+"""Rows of `Work.motion`."""
 
 
 class Bodies(NamedTuple):
@@ -40,14 +50,14 @@ class Connectors(NamedTuple):
 
     Attributes
     ----------
-    number : (c,) place of each connector in the assembly
+    number : (c,) position of each connector in the assembly
     ends : (c, 2) numbers of the two bodies in `Bodies`
     local : (c, 2, 3) attachment in each body's axes, m
     gap : (c, 3) second attachment against the first at zero angles, m
     repeated : (c,) 1 where the one before has the same ends, so that angles and their rates are known
     twisting : (c,) 1 where the angle about z acts on these ends, else 0
     first : (c + 1,) first entry of each connector
-    row, column : (e,) place of each entry in the 6x6 matrix
+    row, column : (e,) where each entry stands in the 6x6 matrix
     stiffness, damping : (e,) its values
     """
 
@@ -64,36 +74,6 @@ class Connectors(NamedTuple):
     damping: Floats
 
 
-class Meshes(NamedTuple):
-    """Meshes as in `exugear.kernels.meshes.MeshArrays`, with missing coordinates pointing to one that stays zero.
-
-    Attributes
-    ----------
-    coordinates : (m, 13)
-    slot : (m,) where `Work.turns` has the sine of the frame's angle
-    place : (m, 2, 2) zero for gears without translations
-    conjugate : (m,) 1 where the force row is the deflection row
-    spinning : (m,) 1 where the gears have their spins alone
-    """
-
-    coordinates: Integers
-    slot: Integers
-    place: Floats
-    deflection: Floats
-    force: Floats
-    conjugate: Integers
-    spinning: Integers
-    cycles: Floats
-    phase: Floats
-    pieces: Integers
-    stiffness: Floats
-    damping: Floats
-    line_of_action: Floats
-    error_pieces: Integers
-    error: Floats
-    table: TableArrays
-
-
 class Loads(NamedTuple):
     """What acts from outside.
 
@@ -103,7 +83,8 @@ class Loads(NamedTuple):
     coordinate : (s,) coordinates with a torque given over time
     first : (s + 1,) first line of each series in `time` (s) and `torque` (N m), linear between the lines
     drive : (d,) coordinates driven behind a spring and damper
-    law : (d, 5) stiffness, damping, and angle law[2] + law[3] t + law[4] t^2
+    law : (d, 5) stiffness (N m/rad), damping (N m s/rad), and the angle that the drive follows: its value (rad),
+        speed and half the acceleration at t = 0
     """
 
     steady: Floats
@@ -169,13 +150,9 @@ class Work(NamedTuple):
     frames : (b + e + 1, 16) rotation matrix, angular velocity, sine and cosine of the tilts
     wrench : (b + e + 1, 6) force and moment on each body, global axes
     motion : (4, 6) strain, its rate, the true rate of change, force of a connector in its own axes
-    gradient : (3, 13) gradients of the deflection and of the force row, and the force of a mesh with a table
+    mesh : memory of the meshes' laws
     series : (s,) line of each torque series that was used last
-    states : (m, 4) deflection and its rate, 1 where a table's axis was left, scalar force
     scratch, memory : memory of the elastic bodies, and of those in turning frames
-    pieces : (m, 2) load piece of each flank's table that was used last
-    law : memory of the law `table`
-    row : (12,) row of the push between the axes and the moment of misalignment
     """
 
     q: Floats
@@ -189,11 +166,7 @@ class Work(NamedTuple):
     frames: Floats
     wrench: Floats
     motion: Floats
-    gradient: Floats
+    mesh: MeshMemory
     series: Integers
-    states: Floats
     scratch: Floats
     memory: Floats
-    pieces: Integers
-    law: Scratch
-    row: Floats

@@ -4,7 +4,24 @@ from __future__ import annotations
 
 import math
 
-from exugear.solvers.compiled.arrays import Bodies, Connectors, Work
+from exugear.kernels.coordinates import SPIN, TILT
+from exugear.solvers.compiled.arrays import (
+    COS_A,
+    COS_B,
+    COSINE,
+    LOCAL_FORCE,
+    SIN_A,
+    SIN_B,
+    SINE,
+    STRAIN,
+    STRAIN_RATE,
+    W_X,
+    W_Y,
+    W_Z,
+    Bodies,
+    Connectors,
+    Work,
+)
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import kernel
 
@@ -14,19 +31,20 @@ def place_bodies(q: Floats, v: Floats, bodies: Bodies, work: Work) -> None:
     """Take sines, rotation matrices and angular velocities of all bodies, once per evaluation."""
     for n in range(bodies.turning.size):
         angle = q[bodies.turning[n]]
-        work.turns[n, 0], work.turns[n, 1] = math.cos(angle), math.sin(angle)
+        work.turns[n, COSINE], work.turns[n, SINE] = math.cos(angle), math.sin(angle)
     for n in range(bodies.start.size - 1):
         o = bodies.start[n]
-        a, b = q[o + 3], q[o + 4]
+        a, b = q[o + TILT], q[o + TILT + 1]
         ca, sa, cb, sb = math.cos(a), math.sin(a), math.cos(b), math.sin(b)
-        cg, sg = work.turns[bodies.slot[n], 0], work.turns[bodies.slot[n], 1]
+        cg, sg = work.turns[bodies.slot[n], COSINE], work.turns[bodies.slot[n], SINE]
         frame = work.frames[n]
+        # Rx(a) Ry(b) Rz(spin), row by row; then the angular velocity in global axes.
         frame[0], frame[1], frame[2] = cb * cg, -cb * sg, sb
         frame[3], frame[4], frame[5] = ca * sg + sa * sb * cg, ca * cg - sa * sb * sg, -sa * cb
         frame[6], frame[7], frame[8] = sa * sg - ca * sb * cg, sa * cg + ca * sb * sg, ca * cb
-        da, db, dg = v[o + 3], v[o + 4], v[o + 5]
-        frame[9], frame[10], frame[11] = da + sb * dg, ca * db - sa * cb * dg, sa * db + ca * cb * dg
-        frame[12], frame[13], frame[14], frame[15] = sa, ca, sb, cb
+        da, db, dg = v[o + TILT], v[o + TILT + 1], v[o + SPIN]
+        frame[W_X], frame[W_Y], frame[W_Z] = da + sb * dg, ca * db - sa * cb * dg, sa * db + ca * cb * dg
+        frame[SIN_A], frame[COS_A], frame[SIN_B], frame[COS_B] = sa, ca, sb, cb
 
 
 @kernel
@@ -40,12 +58,13 @@ def move_connector(
     """
     i, j = connectors.ends[n, 0], connectors.ends[n, 1]
     o, p = bodies.start[i], bodies.start[j]
-    one, two = work.frames[i], work.frames[j]
+    frame_1, frame_2 = work.frames[i], work.frames[j]
+    # Second attachment: its arm turned into global axes, its place and velocity there.
     x, y, z = connectors.local[n, 1]
-    bx = two[0] * x + two[1] * y + two[2] * z
-    by = two[3] * x + two[4] * y + two[5] * z
-    bz = two[6] * x + two[7] * y + two[8] * z
-    wx, wy, wz = two[9], two[10], two[11]
+    bx = frame_2[0] * x + frame_2[1] * y + frame_2[2] * z
+    by = frame_2[3] * x + frame_2[4] * y + frame_2[5] * z
+    bz = frame_2[6] * x + frame_2[7] * y + frame_2[8] * z
+    wx, wy, wz = frame_2[W_X], frame_2[W_Y], frame_2[W_Z]
     dx = connectors.gap[n, 0] + q[p] + (bx - x)
     dy = connectors.gap[n, 1] + q[p + 1] + (by - y)
     dz = connectors.gap[n, 2] + q[p + 2] + (bz - z)
@@ -53,20 +72,22 @@ def move_connector(
     uy = v[p + 1] + (wz * bx - wx * bz)
     uz = v[p + 2] + (wx * by - wy * bx)
     ax, ay, az = connectors.local[n, 0]
-    strain, rate = work.motion[0], work.motion[1]
+    strain, rate = work.motion[STRAIN], work.motion[STRAIN_RATE]
+    # On the ground the first body's axes are the global ones: nothing has to be turned.
     if i == bodies.start.size - 1:
         strain[0], strain[1], strain[2] = dx, dy, dz
         rate[0], rate[1], rate[2] = ux, uy, uz
         if connectors.repeated[n] == 1:
             return ax, ay, az, bx, by, bz
-        rate[3], rate[4], rate[5] = wx, wy, wz
-        strain[3], strain[4] = q[p + 3], q[p + 4]
+        rate[TILT], rate[TILT + 1], rate[SPIN] = wx, wy, wz
+        strain[TILT], strain[TILT + 1] = q[p + TILT], q[p + TILT + 1]
     else:
+        # First attachment likewise; the difference of both is then seen in the first body's axes.
         x, y, z = ax, ay, az
-        ax = one[0] * x + one[1] * y + one[2] * z
-        ay = one[3] * x + one[4] * y + one[5] * z
-        az = one[6] * x + one[7] * y + one[8] * z
-        ox, oy, oz = one[9], one[10], one[11]
+        ax = frame_1[0] * x + frame_1[1] * y + frame_1[2] * z
+        ay = frame_1[3] * x + frame_1[4] * y + frame_1[5] * z
+        az = frame_1[6] * x + frame_1[7] * y + frame_1[8] * z
+        ox, oy, oz = frame_1[W_X], frame_1[W_Y], frame_1[W_Z]
         dx += (x - ax) - q[o]
         dy += (y - ay) - q[o + 1]
         dz += (z - az) - q[o + 2]
@@ -74,34 +95,36 @@ def move_connector(
         uy -= v[o + 1] + (oz * ax - ox * az)
         uz -= v[o + 2] + (ox * ay - oy * ax)
         for k in range(3):
-            strain[k] = one[k] * dx + one[3 + k] * dy + one[6 + k] * dz
-            rate[k] = one[k] * ux + one[3 + k] * uy + one[6 + k] * uz
+            strain[k] = frame_1[k] * dx + frame_1[3 + k] * dy + frame_1[6 + k] * dz
+            rate[k] = frame_1[k] * ux + frame_1[3 + k] * uy + frame_1[6 + k] * uz
         if connectors.repeated[n] == 1:
             return ax, ay, az, bx, by, bz
         wx, wy, wz = wx - ox, wy - oy, wz - oz
         for k in range(3):
-            rate[3 + k] = one[k] * wx + one[3 + k] * wy + one[6 + k] * wz
-        first = one[0] * two[2] + one[3] * two[5] + one[6] * two[8]
-        second = one[1] * two[2] + one[4] * two[5] + one[7] * two[8]
-        third = one[2] * two[2] + one[5] * two[5] + one[8] * two[8]
-        strain[3] = math.atan2(-second, third)
-        strain[4] = math.asin(min(1.0, max(-1.0, first)))
-    strain[5] = 0.0
+            rate[TILT + k] = frame_1[k] * wx + frame_1[3 + k] * wy + frame_1[6 + k] * wz
+        # Tilts from the second body's z axis as the first body sees it.
+        axis_x = frame_1[0] * frame_2[2] + frame_1[3] * frame_2[5] + frame_1[6] * frame_2[8]
+        axis_y = frame_1[1] * frame_2[2] + frame_1[4] * frame_2[5] + frame_1[7] * frame_2[8]
+        axis_z = frame_1[2] * frame_2[2] + frame_1[5] * frame_2[5] + frame_1[8] * frame_2[8]
+        strain[TILT] = math.atan2(-axis_y, axis_z)
+        strain[TILT + 1] = math.asin(min(1.0, max(-1.0, axis_x)))
+    # The angle about z costs an arc tangent, and bearings rarely resist it.
+    strain[SPIN] = 0.0
     if connectors.twisting[n] == 1:
-        cosine = one[0] * two[0] + one[3] * two[3] + one[6] * two[6]
-        sine = one[0] * two[1] + one[3] * two[4] + one[6] * two[7]
-        strain[5] = math.atan2(-sine, cosine)
+        cosine = frame_1[0] * frame_2[0] + frame_1[3] * frame_2[3] + frame_1[6] * frame_2[6]
+        sine = frame_1[0] * frame_2[1] + frame_1[3] * frame_2[4] + frame_1[6] * frame_2[7]
+        strain[SPIN] = math.atan2(-sine, cosine)
     return ax, ay, az, bx, by, bz
 
 
 @kernel
 def connector_force(n: int, connectors: Connectors, work: Work) -> None:
-    """Fill the force of connector n on its first body, in that body's axes, into `work.motion[3]`."""
-    strain, rate, own = work.motion[0], work.motion[1], work.motion[3]
-    own[:] = 0.0
+    """Fill the force of connector n on its first body, in that body's axes, into `work.motion`."""
+    strain, rate, force = work.motion[STRAIN], work.motion[STRAIN_RATE], work.motion[LOCAL_FORCE]
+    force[:] = 0.0
     for entry in range(connectors.first[n], connectors.first[n + 1]):
         column = connectors.column[entry]
-        own[connectors.row[entry]] += (
+        force[connectors.row[entry]] += (
             connectors.stiffness[entry] * strain[column] + connectors.damping[entry] * rate[column]
         )
 
@@ -114,33 +137,35 @@ def add_connectors(q: Floats, v: Floats, bodies: Bodies, connectors: Connectors,
         ax, ay, az, bx, by, bz = move_connector(q, v, n, bodies, connectors, work)
         connector_force(n, connectors, work)
         i, j = connectors.ends[n, 0], connectors.ends[n, 1]
-        own, turn = work.motion[3], work.frames[i]
-        fx = turn[0] * own[0] + turn[1] * own[1] + turn[2] * own[2]
-        fy = turn[3] * own[0] + turn[4] * own[1] + turn[5] * own[2]
-        fz = turn[6] * own[0] + turn[7] * own[1] + turn[8] * own[2]
-        mx = turn[0] * own[3] + turn[1] * own[4] + turn[2] * own[5]
-        my = turn[3] * own[3] + turn[4] * own[4] + turn[5] * own[5]
-        mz = turn[6] * own[3] + turn[7] * own[4] + turn[8] * own[5]
-        one, two = work.wrench[i], work.wrench[j]
-        one[0] += fx
-        one[1] += fy
-        one[2] += fz
-        one[3] += mx + (ay * fz - az * fy)
-        one[4] += my + (az * fx - ax * fz)
-        one[5] += mz + (ax * fy - ay * fx)
-        two[0] -= fx
-        two[1] -= fy
-        two[2] -= fz
-        two[3] -= mx + (by * fz - bz * fy)
-        two[4] -= my + (bz * fx - bx * fz)
-        two[5] -= mz + (bx * fy - by * fx)
+        # From the first body's axes to global ones, then to both bodies with their arms.
+        force, turn = work.motion[LOCAL_FORCE], work.frames[i]
+        fx = turn[0] * force[0] + turn[1] * force[1] + turn[2] * force[2]
+        fy = turn[3] * force[0] + turn[4] * force[1] + turn[5] * force[2]
+        fz = turn[6] * force[0] + turn[7] * force[1] + turn[8] * force[2]
+        mx = turn[0] * force[3] + turn[1] * force[4] + turn[2] * force[5]
+        my = turn[3] * force[3] + turn[4] * force[4] + turn[5] * force[5]
+        mz = turn[6] * force[3] + turn[7] * force[4] + turn[8] * force[5]
+        wrench_1, wrench_2 = work.wrench[i], work.wrench[j]
+        wrench_1[0] += fx
+        wrench_1[1] += fy
+        wrench_1[2] += fz
+        wrench_1[3] += mx + (ay * fz - az * fy)
+        wrench_1[4] += my + (az * fx - ax * fz)
+        wrench_1[5] += mz + (ax * fy - ay * fx)
+        wrench_2[0] -= fx
+        wrench_2[1] -= fy
+        wrench_2[2] -= fz
+        wrench_2[3] -= mx + (by * fz - bz * fy)
+        wrench_2[4] -= my + (bz * fx - bx * fz)
+        wrench_2[5] -= mz + (bx * fy - by * fx)
     f = work.force
     for n in range(bodies.start.size - 1):
         o, load, frame = bodies.start[n], work.wrench[n], work.frames[n]
-        sa, ca, sb, cb = frame[12], frame[13], frame[14], frame[15]
+        sa, ca, sb, cb = frame[SIN_A], frame[COS_A], frame[SIN_B], frame[COS_B]
+        # Moments about the axes that the three angles turn about: x, the tilted y, the body's z.
         f[o] += load[0]
         f[o + 1] += load[1]
         f[o + 2] += load[2]
-        f[o + 3] += load[3]
-        f[o + 4] += ca * load[4] + sa * load[5]
-        f[o + 5] += sb * load[3] - sa * cb * load[4] + ca * cb * load[5]
+        f[o + TILT] += load[3]
+        f[o + TILT + 1] += ca * load[4] + sa * load[5]
+        f[o + SPIN] += sb * load[3] - sa * cb * load[4] + ca * cb * load[5]

@@ -1,7 +1,6 @@
 """Equations of motion and a Runge-Kutta loop as one compiled piece that allocates nothing per step.
 
-The laws are those of `exugear.kernels.meshes`, which the tests hold them against; here they are arranged for speed:
-every
+The laws are those of `exugear.kernels`, which the tests hold them against; here they are arranged for speed: every
 sine is taken once per evaluation, constant entries that are zero are left out, bearing forces are collected per body
 before they are turned into generalized ones. Bodies without a coordinate point to one that stays zero, so that
 the loops need no exceptions.
@@ -11,10 +10,24 @@ from __future__ import annotations
 
 import math
 
+from exugear.kernels.coordinates import SPIN, TILT
 from exugear.kernels.elastic import set_elastic_motion
 from exugear.kernels.travelling import place_travelling, share_travelling_forces
 from exugear.kernels.turning import set_turning_motion
-from exugear.solvers.compiled.arrays import Bodies, Equations, Loads, Springs, Work
+from exugear.solvers.compiled.arrays import (
+    ANGLE,
+    COS_B,
+    DAMPING,
+    HALF_ACCELERATION,
+    SIN_B,
+    SPEED,
+    STIFFNESS,
+    Bodies,
+    Equations,
+    Loads,
+    Springs,
+    Work,
+)
 from exugear.solvers.compiled.connectors import add_connectors, place_bodies
 from exugear.solvers.compiled.meshes import add_meshes
 from fe_ste.tools.arrays import Floats, Integers
@@ -38,6 +51,7 @@ def set_loads(t: float, q: Floats, v: Floats, loads: Loads, series: Integers, f:
         f[i] = loads.steady[i]
     for n in range(loads.coordinate.size):
         first, last = loads.first[n], loads.first[n + 1] - 1
+        # Time mostly goes on: look from the line that was used last.
         line = series[n]
         while line < last - 1 and loads.time[line + 1] <= t:
             line += 1
@@ -49,8 +63,9 @@ def set_loads(t: float, q: Floats, v: Floats, loads: Loads, series: Integers, f:
         f[loads.coordinate[n]] += loads.torque[line] + share * (loads.torque[line + 1] - loads.torque[line])
     for n in range(loads.drive.size):
         i, law = loads.drive[n], loads.law[n]
-        angle, speed = law[2] + t * (law[3] + t * law[4]), law[3] + 2.0 * t * law[4]
-        f[i] += law[0] * (angle - q[i]) + law[1] * (speed - v[i])
+        angle = law[ANGLE] + t * (law[SPEED] + t * law[HALF_ACCELERATION])
+        speed = law[SPEED] + 2.0 * t * law[HALF_ACCELERATION]
+        f[i] += law[STIFFNESS] * (angle - q[i]) + law[DAMPING] * (speed - v[i])
 
 
 @kernel
@@ -59,16 +74,18 @@ def set_accelerations(v: Floats, bodies: Bodies, work: Work) -> None:
     f, out = work.force, work.rate
     for n in range(bodies.mass.size):
         o, jt, ja = bodies.start[n], bodies.transverse[n], bodies.axial[n]
-        sb, cb = work.frames[n, 14], work.frames[n, 15]
+        sb, cb = work.frames[n, SIN_B], work.frames[n, COS_B]
         for i in range(3):
             out[o + i] = f[o + i] / bodies.mass[n]
-        da, db = v[o + 3], v[o + 4]
-        p = ja * (v[o + 5] + da * sb)
-        out[o + 3] = (f[o + 3] - f[o + 5] * sb - p * db * cb + 2.0 * jt * da * db * sb * cb) / (jt * cb * cb)
-        out[o + 4] = (f[o + 4] - jt * da * da * sb * cb + p * da * cb) / jt
-        out[o + 5] = f[o + 5] / ja - out[o + 3] * sb - da * db * cb
+        a, b, spin = o + TILT, o + TILT + 1, o + SPIN
+        da, db = v[a], v[b]
+        p = ja * (v[spin] + da * sb)  # angular momentum about the body's axis
+        out[a] = (f[a] - f[spin] * sb - p * db * cb + 2.0 * jt * da * db * sb * cb) / (jt * cb * cb)
+        out[b] = (f[b] - jt * da * da * sb * cb + p * da * cb) / jt
+        out[spin] = f[spin] / ja - out[a] * sb - da * db * cb
     for n in range(bodies.spin.size):
         out[bodies.spin[n]] = f[bodies.spin[n]] / bodies.spin_inertia[n]
+    # Gears that only roll share their inertia: one dense product instead of the above.
     for n in range(bodies.inverse.shape[0]):
         out[bodies.spin[n]] = 0.0
         for m in range(bodies.inverse.shape[1]):
@@ -106,6 +123,7 @@ def advance(first: int, step: float, equations: Equations, work: Work, out_q: Fl
             total[i], out_q[n, i] = 0.0, 0.0
         for stage in range(4):  # a loop, so that the equations are compiled once
             evaluate(begin + (0.0 if stage == 0 else half if stage < 3 else step), x, u, equations, work)
+            # Weights 1, 2, 2, 1 of the four stages; the positions' sum needs the first three alone.
             weight = 2.0 if stage == 1 or stage == 2 else 1.0
             ahead = half if stage < 2 else step
             for i in range(size):
@@ -114,6 +132,7 @@ def advance(first: int, step: float, equations: Equations, work: Work, out_q: Fl
                     out_q[n, i] += a[i]
                     x[i] = q[i] + ahead * u[i]
                     u[i] = v[i] + ahead * a[i]
+        # A sum that is not finite shows any entry that is not, without a test for each.
         check = 0.0
         for i in range(size):
             q[i] += step * (v[i] + step / 6.0 * out_q[n, i])

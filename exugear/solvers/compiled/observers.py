@@ -15,20 +15,49 @@ from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.modes import overall_row
 from exugear.dynamics.signals import ENERGIES, POWERS, SignalLayout, signal_layout
 from exugear.kernels.elastic import elastic_energies
-from exugear.kernels.table_law import FIRST_TWO
+from exugear.kernels.fast_meshes import (
+    ALONG_FORCE,
+    DISSIPATED,
+    ELASTIC,
+    KINETIC,
+    LAST_DEFLECTION,
+    LAST_FORCE,
+    LAST_OUTSIDE,
+    NON_CONSERVATIVE,
+    OF_BEARING_RATES,
+    OF_LOADS,
+    OF_VARYING_STIFFNESS,
+    Meshes,
+    mesh_row,
+)
+from exugear.kernels.table_law import ENERGY_DERIVATIVES
 from exugear.kernels.travelling import place_travelling
 from exugear.kernels.turning import turning_energies
-from exugear.solvers.compiled.arrays import Bodies, Connectors, Equations, Joints, Loads, Meshes, Springs, Work
+from exugear.solvers.compiled.arrays import (
+    COS_B,
+    COSINE,
+    LOCAL_FORCE,
+    SIN_B,
+    SINE,
+    STRAIN,
+    STRAIN_RATE,
+    TRUE_RATE,
+    Bodies,
+    Connectors,
+    Equations,
+    Joints,
+    Loads,
+    Springs,
+    Work,
+)
 from exugear.solvers.compiled.connectors import move_connector, place_bodies
 from exugear.solvers.compiled.equations import set_loads
-from exugear.solvers.compiled.meshes import mesh_motion, mesh_row, mesh_stiffness, table_mesh
+from exugear.solvers.compiled.meshes import mesh_law, mesh_motion
 from exugear.solvers.compiled.packing import equations_of, work_for
 from exugear.solvers.loads import LoadTable
+from exugear.tooth_mesh.laws.table import TABLE_FORM, fast_table_force
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import kernel
-
-KINETIC, ELASTIC, OF_LOADS, DISSIPATED, OF_VARYING_STIFFNESS, NON_CONSERVATIVE, OF_BEARING_RATES = range(7)
-"""Columns of what is observed of energy: `ENERGIES` (J), then `POWERS` (W) of `exugear.dynamics.signals`."""
 
 
 class Columns(NamedTuple):
@@ -50,10 +79,10 @@ def observe_gear_positions(
     q: Floats, v: Floats, m: int, meshes: Meshes, work: Work, columns: Columns, sample: Floats
 ) -> None:
     """Fill change of centre distance (m) and misalignment (rad) of mesh m with a table; after `observe_meshes`."""
-    table, index, place = meshes.table, meshes.coordinates[m], meshes.place[m]
-    c, s = work.turns[meshes.slot[m], 0], work.turns[meshes.slot[m], 1]
-    centre, _ = mesh_row(q, v, index, place, table.centre[m], c, s, work.gradient[1])
-    tilted, _ = mesh_row(q, v, index, place, table.tilt[m], c, s, work.gradient[1])
+    table, index, axis = meshes.table, meshes.coordinates[m], meshes.axis[m]
+    c, s = work.turns[meshes.slot[m], COSINE], work.turns[meshes.slot[m], SINE]
+    centre, _ = mesh_row(q, v, index, axis, table.centre[m], c, s, work.mesh.gradient[ALONG_FORCE])
+    tilted, _ = mesh_row(q, v, index, axis, table.misalignment[m], c, s, work.mesh.gradient[ALONG_FORCE])
     sample[columns.centre_distance_change + m] = centre
     sample[columns.misalignment + m] = table.nominal[m, 2] + tilted
 
@@ -63,11 +92,12 @@ def observe_table(
     q: Floats, v: Floats, m: int, meshes: Meshes, work: Work, columns: Columns, sample: Floats, energy: Floats
 ) -> None:
     """Fill the signals of mesh m with a table and add its energy and powers: see `observe_meshes`."""
-    force = table_mesh(q, v, m, FIRST_TWO + 1, meshes, work, energy)
-    work.states[m, 3] = force
-    sample[columns.mesh_dte + m] = work.states[m, 0]
+    c, s = work.turns[meshes.slot[m], COSINE], work.turns[meshes.slot[m], SINE]
+    force = fast_table_force(q, v, m, ENERGY_DERIVATIVES, meshes, c, s, work.mesh, energy)
+    work.mesh.states[m, LAST_FORCE] = force
+    sample[columns.mesh_dte + m] = work.mesh.states[m, LAST_DEFLECTION]
     sample[columns.mesh_force + m] = force
-    sample[columns.outside_table + m] = work.states[m, 2]
+    sample[columns.outside_table + m] = work.mesh.states[m, LAST_OUTSIDE]
     if meshes.spinning[m] == 0:
         observe_gear_positions(q, v, m, meshes, work, columns, sample)
     else:  # gears that only turn stay where they are
@@ -81,29 +111,28 @@ def observe_meshes(
 ) -> None:
     """Fill the signals of each mesh into a sample; add energy and powers (see `observe`).
 
-    The scalar force of each mesh, or that along its line of action, is left in `work.states[:, 3]`.
+    The scalar force of each mesh, or that along its line of action, is left in `work.mesh.states`.
     """
     for m in range(meshes.coordinates.shape[0]):
-        if meshes.table.shape[m, 0] > 0:
+        if meshes.form[m] == TABLE_FORM:
             observe_table(q, v, m, meshes, work, columns, sample, energy)
             continue
         delta, rate, acting = mesh_motion(q, v, m, meshes, work)
-        k, slope = mesh_stiffness(q, m, meshes)
-        force = k * delta + meshes.damping[m] * rate
-        work.states[m, 3] = force
+        elastic, _, _, stored, cycle_power = mesh_law(q, v, m, delta, meshes)
+        force = elastic + meshes.damping[m] * rate
+        work.mesh.states[m, LAST_FORCE] = force
         sample[columns.mesh_dte + m] = delta
         sample[columns.mesh_force + m] = force * meshes.line_of_action[m]
-        cycling = meshes.cycles[m] * (v[meshes.coordinates[m, 5]] - v[meshes.coordinates[m, 12]])
-        energy[ELASTIC] += 0.5 * k * delta * delta
+        energy[ELASTIC] += stored
         energy[DISSIPATED] += meshes.damping[m] * rate * rate
-        energy[OF_VARYING_STIFFNESS] -= 0.5 * slope * cycling * delta * delta
+        energy[OF_VARYING_STIFFNESS] += cycle_power
         energy[NON_CONSERVATIVE] += force * (acting - rate)
 
 
 @kernel
 def true_rate(n: int, first_body: Floats, work: Work) -> None:
     """Fill the derivative of the strain into `work.motion[2]`: see `exugear.kernels.connectors.connector_motion`."""
-    d, w, out = work.motion[0], work.motion[1], work.motion[2]
+    d, w, out = work.motion[STRAIN], work.motion[STRAIN_RATE], work.motion[TRUE_RATE]
     x = first_body[0] * first_body[9] + first_body[3] * first_body[10] + first_body[6] * first_body[11]
     y = first_body[1] * first_body[9] + first_body[4] * first_body[10] + first_body[7] * first_body[11]
     z = first_body[2] * first_body[9] + first_body[5] * first_body[10] + first_body[8] * first_body[11]
@@ -132,7 +161,8 @@ def observe_connectors(
         move_connector(q, v, n, bodies, connectors, work)
         turn = work.frames[connectors.ends[n, 0]]
         true_rate(n, turn, work)
-        strain, rate, derivative, force = work.motion[0], work.motion[1], work.motion[2], work.motion[3]
+        strain, rate = work.motion[STRAIN], work.motion[STRAIN_RATE]
+        derivative, force = work.motion[TRUE_RATE], work.motion[LOCAL_FORCE]
         force[:] = 0.0
         for entry in range(connectors.first[n], connectors.first[n + 1]):
             row, column = connectors.row[entry], connectors.column[entry]
@@ -154,11 +184,11 @@ def observe_joints(v: Floats, meshes: Meshes, joints: Joints, work: Work, column
     forces = sample[columns.support_force : columns.support_force + 3 * joints.host.size]
     forces[:] = 0.0
     for m in range(meshes.coordinates.shape[0]):
-        c, s = work.turns[meshes.slot[m], 0], work.turns[meshes.slot[m], 1]
+        c, s = work.turns[meshes.slot[m], COSINE], work.turns[meshes.slot[m], SINE]
         for end in range(2):
             j = joints.ends[m, end]
             if j >= 0:
-                force = work.states[m, 3]
+                force = work.mesh.states[m, LAST_FORCE]
                 row = meshes.force[m]
                 if force < 0.0 and meshes.table.shape[m, 0] > 0:  # the other flank pushes
                     force, row = -force, meshes.table.back[m]
@@ -168,7 +198,7 @@ def observe_joints(v: Floats, meshes: Meshes, joints: Joints, work: Work, column
                 forces[3 * j + 2] += force * z
     for j in range(joints.host.size):
         if joints.planet[j, 0] > 0.0:  # held on its orbit
-            c, s = work.turns[joints.slot[j], 0], work.turns[joints.slot[j], 1]
+            c, s = work.turns[joints.slot[j], COSINE], work.turns[joints.slot[j], SINE]
             pull = joints.planet[j, 0] * v[joints.carrier[j]] ** 2
             forces[3 * j] -= pull * (c * joints.planet[j, 1] - s * joints.planet[j, 2])
             forces[3 * j + 1] -= pull * (s * joints.planet[j, 1] + c * joints.planet[j, 2])
@@ -181,7 +211,7 @@ def observe_joints(v: Floats, meshes: Meshes, joints: Joints, work: Work, column
 def observe_bodies(q: Floats, v: Floats, bodies: Bodies, work: Work, energy: Floats) -> None:
     """Add the kinetic energy of all bodies (see `observe`)."""
     for n in range(bodies.mass.size):
-        o, sb, cb = bodies.start[n], work.frames[n, 14], work.frames[n, 15]
+        o, sb, cb = bodies.start[n], work.frames[n, SIN_B], work.frames[n, COS_B]
         square = v[o] * v[o] + v[o + 1] * v[o + 1] + v[o + 2] * v[o + 2]
         tilting = (v[o + 3] * cb) ** 2 + v[o + 4] * v[o + 4]
         spin = v[o + 5] + v[o + 3] * sb

@@ -3,17 +3,31 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exugear.dynamics.assembly import Assembly
 from exugear.kernels.connectors import ConnectorArrays
+from exugear.kernels.coordinates import BODY_SIZE, SPIN, TILT
 from exugear.kernels.elastic import elastic_motion, scratch_for
+from exugear.kernels.fast_meshes import Meshes, MeshMemory
+from exugear.kernels.meshes import FRAME, ROW_SIZE, SPIN_1, SPIN_2
 from exugear.kernels.table_law import scratch_memory
 from exugear.kernels.turning import turning_memory
 from exugear.model.sections.entries import GROUND
-from exugear.solvers.compiled.arrays import Bodies, Connectors, Equations, Joints, Loads, Meshes, Springs, Work
+from exugear.solvers.compiled.arrays import (
+    COS_A,
+    COS_B,
+    FRAME_SIZE,
+    Bodies,
+    Connectors,
+    Equations,
+    Joints,
+    Loads,
+    Springs,
+    Work,
+)
 from exugear.solvers.loads import LoadTable
-from fe_ste.tools.arrays import Floats
+from exugear.tooth_mesh.laws.registry import LAWS
+from fe_ste.tools.arrays import Booleans, Floats, Integers
 
 ROUND_OFF = 1e-14
 """Entries of a bearing's matrix this small beside its diagonal are left-overs of rotating it, and left out."""
@@ -21,7 +35,7 @@ ROUND_OFF = 1e-14
 
 def extended_size(assembly: Assembly) -> int:
     """Count the coordinates with those of travelling seats."""
-    return assembly.size + 6 * assembly.travelling.first.size
+    return assembly.size + BODY_SIZE * assembly.travelling.first.size
 
 
 class _Numbers:
@@ -41,7 +55,7 @@ class _Numbers:
         return len(self.starts) if start < 0 else self.starts.index(start)
 
     def slot(self, coordinate: int) -> int:
-        """Place of a coordinate's sine, taken up if it is new; 0 for none."""
+        """Tell where a coordinate's sine stands, taking it up if it is new; 0 for none."""
         if coordinate < 0:
             return 0
         if coordinate not in self.turning:
@@ -49,7 +63,7 @@ class _Numbers:
         return self.turning.index(coordinate)
 
 
-def _connectors(numbers: _Numbers) -> tuple[Connectors, NDArray[np.int64]]:
+def _connectors(numbers: _Numbers) -> tuple[Connectors, Integers]:
     """Connectors, and the slot of the sine of each body's spin where a connector needs it."""
     given = numbers.assembly.connectors
     ends = np.array([[numbers.body(int(s)) for s in pair] for pair in given.bodies], dtype=np.int64).reshape(-1, 2)
@@ -61,19 +75,19 @@ def _connectors(numbers: _Numbers) -> tuple[Connectors, NDArray[np.int64]]:
     first, entries = [0], []
     for n, (i, j) in enumerate(ends):
         stiffness, damping = _without_round_off(given.stiffness[n]), _without_round_off(given.damping[n])
-        twisting[(ends == ends[n]).all(axis=1)] |= stiffness[:, 5].any()
-        for end, needed in ((i, True), (j, stiffness[:, 5].any() or given.local[n, 1, :2].any())):
+        twisting[(ends == ends[n]).all(axis=1)] |= stiffness[:, SPIN].any()
+        for end, needed in ((i, True), (j, stiffness[:, SPIN].any() or given.local[n, 1, :2].any())):
             if needed and end < len(numbers.starts):
-                slots[end] = numbers.slot(numbers.starts[end] + 5)
-        places = np.argwhere((stiffness != 0.0) | (damping != 0.0))
-        entries += [(r, c, stiffness[r, c], damping[r, c]) for r, c in places]
+                slots[end] = numbers.slot(numbers.starts[end] + SPIN)
+        filled = np.argwhere((stiffness != 0.0) | (damping != 0.0))
+        entries += [(r, c, stiffness[r, c], damping[r, c]) for r, c in filled]
         first.append(len(entries))
     columns = list(zip(*entries, strict=True)) if entries else [(), (), (), ()]
     connectors = Connectors(
         number=order,
         ends=ends,
         local=given.local,
-        gap=(given.place[:, 1] + given.local[:, 1]) - (given.place[:, 0] + given.local[:, 0]),
+        gap=(given.node[:, 1] + given.local[:, 1]) - (given.node[:, 0] + given.local[:, 0]),
         repeated=np.append(0, (ends[1:] == ends[:-1]).all(axis=1)).astype(np.int64)[: len(ends)],
         twisting=twisting,
         first=np.array(first, dtype=np.int64),
@@ -88,19 +102,20 @@ def _connectors(numbers: _Numbers) -> tuple[Connectors, NDArray[np.int64]]:
 def _without_round_off(matrix: Floats) -> Floats:
     """Set entries to zero that are nothing beside the translations' and the tilts' stiffness."""
     entries = np.abs(matrix)
-    size = np.sqrt(np.repeat([entries[:3, :3].max(), entries[3:, 3:].max()], 3))
+    size = np.sqrt(np.repeat([entries[:TILT, :TILT].max(), entries[TILT:, TILT:].max()], 3))
     return np.where(entries <= ROUND_OFF * np.outer(size, size), 0.0, matrix)
 
 
 def _meshes(numbers: _Numbers) -> Meshes:
     given = numbers.assembly.meshes
-    place = given.place.copy()
-    place[given.coordinates[:, :12].reshape(-1, 2, 6)[:, :, 0] < 0] = 0.0
-    others = np.delete(given.coordinates[:, :12], [5, 11], axis=1)
+    axis = given.axis.copy()
+    axis[given.coordinates[:, :FRAME].reshape(-1, 2, BODY_SIZE)[:, :, 0] < 0] = 0.0
+    others = np.delete(given.coordinates[:, :FRAME], [SPIN_1, SPIN_2], axis=1)
     return Meshes(
         coordinates=np.where(given.coordinates < 0, numbers.size, given.coordinates),
-        slot=np.array([numbers.slot(int(c)) for c in given.coordinates[:, 12]], dtype=np.int64),
-        place=place,
+        slot=np.array([numbers.slot(int(c)) for c in given.coordinates[:, FRAME]], dtype=np.int64),
+        axis=axis,
+        form=given.form,
         deflection=given.deflection,
         force=given.force,
         conjugate=np.all(given.deflection == given.force, axis=1).astype(np.int64),
@@ -168,7 +183,7 @@ def equations_of(assembly: Assembly, loads: LoadTable) -> Equations:
         axial=inertia.axial,
         spin=inertia.spin,
         spin_inertia=inertia.spin_inertia,
-        inverse=_rolling_inverse(assembly) if assembly.law == "rigid" else np.zeros((0, 0)),
+        inverse=np.zeros((0, 0)) if LAWS[assembly.law].has_force else _rolling_inverse(assembly),
         turning=np.array(numbers.turning, dtype=np.int64),
     )
     return Equations(
@@ -185,11 +200,11 @@ def equations_of(assembly: Assembly, loads: LoadTable) -> Equations:
     )
 
 
-def _acted(assembly: Assembly) -> NDArray[np.bool_]:
+def _acted(assembly: Assembly) -> Booleans:
     """Coordinates that forces act on: of what goes on between an elastic body's seats only its weight."""
     acted = assembly.weight != 0.0
-    for name, place in assembly.elastic_slices.items():
-        acted[place.start : place.start + 6 * len(assembly.elastic_bodies[name].reduced.seats)] = True
+    for name, whole in assembly.elastic_slices.items():
+        acted[whole.start : whole.start + BODY_SIZE * len(assembly.elastic_bodies[name].reduced.seats)] = True
     return np.asarray(acted)
 
 
@@ -202,9 +217,10 @@ def _rolling_inverse(assembly: Assembly) -> Floats:
 
 def work_for(equations: Equations, q: Floats, v: Floats) -> Work:
     """Memory for the compiled loops, at the state q, v (size,)."""
-    size = equations.loads.steady.size + 6
-    frames = np.zeros((equations.bodies.start.size, 16))
-    frames[-1, [0, 4, 8, 13, 15]] = 1.0  # the ground neither turns nor tilts
+    size = equations.loads.steady.size + BODY_SIZE
+    count = equations.meshes.slot.size
+    frames = np.zeros((equations.bodies.start.size, FRAME_SIZE))
+    frames[-1, [0, 4, 8, COS_A, COS_B]] = 1.0  # the ground neither turns nor tilts
     return Work(
         q=np.append(q, np.zeros(size - q.size)),
         v=np.append(v, np.zeros(size - q.size)),
@@ -215,14 +231,16 @@ def work_for(equations: Equations, q: Floats, v: Floats) -> Work:
         total=np.zeros(size),
         turns=np.zeros((equations.bodies.turning.size, 2)),
         frames=frames,
-        wrench=np.zeros((equations.bodies.start.size, 6)),
-        motion=np.zeros((4, 6)),
-        gradient=np.zeros((3, 13)),
+        wrench=np.zeros((equations.bodies.start.size, BODY_SIZE)),
+        motion=np.zeros((4, BODY_SIZE)),
+        mesh=MeshMemory(
+            gradient=np.zeros((3, ROW_SIZE)),
+            states=np.zeros((count, 4)),
+            pieces=np.zeros((count, 2), dtype=np.int64),
+            law=scratch_memory(),
+            row=np.zeros(FRAME),
+        ),
         series=equations.loads.first[:-1].copy(),
-        states=np.zeros((equations.meshes.slot.size, 4)),
         scratch=scratch_for(equations.elastic),
         memory=turning_memory(equations.turning),
-        pieces=np.zeros((equations.meshes.slot.size, 2), dtype=np.int64),
-        law=scratch_memory(),
-        row=np.zeros(12),
     )

@@ -13,7 +13,7 @@ from exugear.solvers.loads import LoadTable
 from fe_ste.tools.arrays import Floats
 
 
-def refusal(assembly: Assembly) -> str:
+def unsupported_reason(assembly: Assembly) -> str:
     """Reason why the compiled solver cannot take a variant, empty if it can.
 
     Every body of an assembly is axially symmetric with its centre of mass on its axis and at its node, as the

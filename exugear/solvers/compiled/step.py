@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.linearised import Linearised, linearise
 from exugear.dynamics.modes import coordinate_labels
-from fe_ste.tools.arrays import Floats
+from fe_ste.tools.arrays import Complexes, Floats
 
 STABILITY_LIMIT = 2.6
 """Below this |lambda| h the method is stable for every damped motion, oscillating or creeping."""
@@ -19,13 +18,13 @@ ACCURATE = 1.02
 """Allowed w h at the top of the band: the response to an excitation there is then 0.15 % in error."""
 RESONANCE_ERROR = 1e-3
 """Allowed error on the slope of a resonance, as a share of its peak."""
-MEANT = 2.0 / 3.0
+ACCURATE_BAND_FRACTION = 2.0 / 3.0
 """Share of elastic bodies' band up to which they vibrate as they should on bearings (`exugear.bodies.reduction`)."""
 LIGHTEST_DAMPING = 2e-3
 """Damping ratio that lighter ones count as: an undamped resonance would ask for no error at all."""
 
 
-def eigenvalues(assembly: Assembly) -> NDArray[np.complex128]:
+def eigenvalues(assembly: Assembly) -> Complexes:
     """Eigenvalues (1/s) of the system linearised at rest, mean mesh stiffness, damping included."""
     linear = linearise(assembly, np.zeros(assembly.size), assembly.linear_meshes())
     return scipy.linalg.eigvals(_free_motions(linear, assembly.motions)[1]).astype(np.complex128)
@@ -91,8 +90,10 @@ def choose_step(assembly: Assembly, sample_rate: float, band: float) -> float:
     values = eigenvalues(assembly)
     rates = np.maximum(np.abs(values), 1e-9)
     ratio = np.maximum(-values.real / rates, LIGHTEST_DAMPING)
-    meant = min(band, MEANT * assembly.gearbox.case.elasticity.band_Hz) if assembly.elastic_bodies else band
-    resonant = rates < 2.0 * np.pi * meant
+    accurate_band = band
+    if assembly.elastic_bodies:
+        accurate_band = min(band, ACCURATE_BAND_FRACTION * assembly.gearbox.case.elasticity.band_Hz)
+    resonant = rates < 2.0 * np.pi * accurate_band
     slopes = (240.0 * ratio[resonant] * RESONANCE_ERROR) ** 0.25 / rates[resonant]
     longest = min(STABLE / rates.max(), ACCURATE / (2.0 * np.pi * band), slopes.min(initial=np.inf))
     return float(1.0 / (sample_rate * np.ceil(1.0 / (sample_rate * longest) - 1e-9)))

@@ -9,14 +9,17 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from exugear.bearings import contact, matrices, rollers
-from exugear.bodies.of_gearbox import shaft_model
+from exugear.bearings.contact import pitch_averaged_tangent
+from exugear.bearings.matrices import axially_symmetric
+from exugear.bearings.rollers import BearingPair, TaperedRollerBearing
+from exugear.bodies.finite_elements.shaft_sections import ShaftSection
+from exugear.bodies.of_gearbox.shafts import shaft_model
 from exugear.bodies.reduced_body import ReducedBody
-from exugear.bodies.turned_section import ShaftSection
 from exugear.bodies.turned_shaft import ShaftModel, reduce_shaft
 from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.energy_shares import BODY_MOTIONS
 from exugear.dynamics.linearised import linearise
-from exugear.dynamics.modes import MOTIONS, modes_of
+from exugear.dynamics.modes import modes_of
 from exugear.dynamics.statics import accelerating_start
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
@@ -96,7 +99,7 @@ def test_the_shaft_alone_bends_free_as_a_timoshenko_beam(model: ShaftModel) -> N
     shaft = reduce_shaft(replace(model, sections=sections, seats=seats, blanks={}))
     mass, stiffness, _ = beam(sections, [])
     expected = frequencies(mass, stiffness)[2:4]
-    assert shaft.figures.free_frequencies["bending"][:2] == pytest.approx(expected, rel=4e-3)
+    assert shaft.summary.free_interface_frequencies["bending"][:2] == pytest.approx(expected, rel=4e-3)
 
 
 def test_the_rotor_on_its_bearings_nods_as_on_a_beam(model: ShaftModel, reduced: ReducedBody) -> None:
@@ -111,9 +114,9 @@ def test_the_rotor_on_its_bearings_nods_as_on_a_beam(model: ShaftModel, reduced:
     free = [n for n in range(len(mass)) if n not in (at["shrink_disc"], at["shrink_disc"] + 1)]
     expected = frequencies(mass[np.ix_(free, free)], stiffness[np.ix_(free, free)])[:2]
     held = reduced.stiffness.copy()
-    across = reduced.seat("main_bearing")
+    across = reduced.first_coordinate("main_bearing")
     held[across, across] += MAIN_BEARING
-    clamp = reduced.seat("shrink_disc")
+    clamp = reduced.first_coordinate("shrink_disc")
     plane = next(block for block in reduced.blocks if across in block)
     left = [n for n in plane if n not in range(clamp, clamp + 6)]
     found = frequencies(reduced.mass[np.ix_(left, left)], held[np.ix_(left, left)])[:2]
@@ -132,7 +135,7 @@ def twist_per_torque(model: ShaftModel) -> float:
 
 
 def test_the_shaft_winds_up_as_its_sections_say(reduced: ReducedBody, model: ShaftModel, with_shaft: Gearbox) -> None:
-    hub, disc = (reduced.seat(seat) + 5 for seat in ("torque", "shrink_disc"))
+    hub, disc = (reduced.first_coordinate(seat) + 5 for seat in ("torque", "shrink_disc"))
     free = [n for n in next(block for block in reduced.blocks if hub in block) if n != disc]
     load = np.array([float(n == hub) for n in free])
     wound = np.linalg.solve(reduced.stiffness[np.ix_(free, free)], load)[free.index(hub)]
@@ -150,7 +153,7 @@ def test_the_rotor_turns_against_the_gearbox_as_two_inertias(flexible: Assembly,
     train = 240e3 / state.rates["carrier"] - rotor
     assert train == pytest.approx(5.97e3, rel=1e-3)  # 5.96e3 by the case file, and the shaft beyond the main bearing
     wound = modes.strain[:, modes.element_names.index("main_shaft_body")] > 0.8
-    turning = modes.kinetic[:, :, MOTIONS.index("spin")].sum(axis=1) > 0.8
+    turning = modes.kinetic[:, :, BODY_MOTIONS.index("spin")].sum(axis=1) > 0.8
     (seen,) = np.flatnonzero(wound & turning)
 
     def two_inertias(stiffness: float) -> float:
@@ -191,9 +194,9 @@ def test_both_solvers_join_the_shaft_to_the_carrier_at_its_seat(flexible: Assemb
 
 def test_the_main_bearing_is_as_stiff_as_two_rows_whose_pressure_lines_meet_on_the_axis(with_shaft: Gearbox) -> None:
     angle = math.radians(11.0)
-    row = rollers.TaperedRollerBearing(bore=0.38, outside_diameter=0.56, width=0.09, contact_angle=angle)
-    pair = rollers.BearingPair(bearing=row, arrangement="X", row_distance=0.47 * math.tan(angle))
-    found = np.diag(matrices.axially_symmetric(contact.pitch_averaged_tangent(pair, (200e3, 0.0, 0.0))))
+    row = TaperedRollerBearing(bore=0.38, outside_diameter=0.56, width=0.09, contact_angle=angle)
+    pair = BearingPair(bearing=row, arrangement="X", row_distance=0.47 * math.tan(angle))
+    found = np.diag(axially_symmetric(pitch_averaged_tangent(pair, (200e3, 0.0, 0.0))))
     given = with_shaft.case.bearings["main_bearing"].stiffness
     assert given is not None
     assert given.radial_N_per_m == pytest.approx(found[0], rel=0.05)  # given with two digits

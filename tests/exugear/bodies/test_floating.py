@@ -11,11 +11,13 @@ import pytest
 import skfem
 import xarray as xr
 
-from exugear.bodies.floating import FloatingCoordinates, floating_body, load_or_reduce_floating
-from exugear.bodies.of_gearbox import shaft_model, solid_of_shaft
+from exugear.bodies.finite_elements.shaft_sections import MeshSize
+from exugear.bodies.finite_elements.solid_seats import SolidSeat
+from exugear.bodies.floating import floating_body, load_or_reduce_floating
+from exugear.bodies.floating_coordinates import FloatingCoordinates
+from exugear.bodies.of_gearbox.shafts import shaft_model, solid_of_shaft
 from exugear.bodies.reduced_body import Blank, ReductionError
-from exugear.bodies.solids import SolidModel, SolidSeat, reduce_matrices, reduce_solid
-from exugear.bodies.turned_section import MeshSize
+from exugear.bodies.solids import SolidModel, reduce_matrices, reduce_solid
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.signals import energy_residual
 from exugear.dynamics.statics import accelerating_start
@@ -23,8 +25,9 @@ from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
 from exugear.runs.outcome import RunError
-from exugear.solvers.compiled.solver import refusal
-from exugear.solvers.exudyn_model.floating import elements, exudyn, frame_integrals
+from exugear.solvers.compiled.solver import unsupported_reason
+from exugear.solvers.exudyn_model.floating_object import frame_integrals
+from exugear.solvers.exudyn_model.library import elements, exudyn
 from exugear.solvers.exudyn_model.system import ExudynSystem
 from exugear.solvers.loads import Drive, Loading
 from fe_ste.geometry.gears import Material
@@ -73,7 +76,7 @@ def test_integrals_are_those_that_exudyn_computes_from_the_mesh(model: SolidMode
     mesh = elements.FEMinterface()
     mesh.nodes = {"Position": matrices.solid.nodes - body.centre}
     mesh.massMatrix, mesh.stiffnessMatrix = matrices.solid.mass, matrices.solid.stiffness
-    mesh.modeBasis = {"matrix": matrices.part.shapes @ body.coordinates, "type": "NormalModes"}
+    mesh.modeBasis = {"matrix": matrices.component.component_modes @ body.mode_coordinates, "type": "NormalModes"}
     kind = exudyn.NodeType.RotationEulerParameters
     expected = elements.ObjectFFRFreducedOrderInterface(mesh, rigidBodyNodeType=kind)
     found = frame_integrals(body, kind)
@@ -97,7 +100,7 @@ def test_a_blank_adds_its_own_rigid_inertia(model: SolidModel) -> None:
 
     def inertia(body, about: np.ndarray) -> np.ndarray:
         """Of int rho x x' about a point, by the parallel axes."""
-        second = body.moments[:, :, 0, 0] + body.mass * np.outer(body.centre - about, body.centre - about)
+        second = body.second_moments[:, :, 0, 0] + body.mass * np.outer(body.centre - about, body.centre - about)
         return np.trace(second) * np.eye(3) - second
 
     added = inertia(ringed, seat) - inertia(bare, seat)
@@ -261,8 +264,9 @@ def test_a_run_goes_on_from_its_own_state(floating: Assembly) -> None:
 def test_the_compiled_solver_leaves_floating_frames_to_exudyn(
     floating: Assembly, gearbox: Gearbox, stiffness: dict, tmp_path: Path
 ) -> None:
-    assert refusal(floating) == "bodies.shaft.flexibility = 'ffrf' runs in Exudyn only, 'nonrotating' in both"
-    assert refusal(in_the_frame_that_does_not_turn(floating)) == ""
+    told = "bodies.shaft.flexibility = 'ffrf' runs in Exudyn only, 'nonrotating' in both"
+    assert unsupported_reason(floating) == told
+    assert unsupported_reason(in_the_frame_that_does_not_turn(floating)) == ""
     with pytest.raises(RunError, match="flexibility = 'ffrf' runs in Exudyn only.*use --solver exudyn"):
         simulated(gearbox, Choice("flexible", load_case="steady"), stiffness, tmp_path, solver="compiled")
 
@@ -284,10 +288,10 @@ def test_a_body_in_a_floating_frame_has_the_inertia_of_its_set(floating: Assembl
     body, found = gearbox.body("shaft"), floating.floating["shaft"]
     reduced = floating.elastic_bodies["shaft"].reduced.rigid_inertia
     assert (found.mass, reduced.mass) == pytest.approx((body.mass, body.mass), rel=1e-9)
-    centre = found.centre + found.first[:, 0] / found.mass
+    centre = found.centre + found.first_moments[:, 0] / found.mass
     assert centre == pytest.approx([*body.axis, body.centre_of_mass_z], abs=1e-12)
     arm = centre - found.centre
-    second = found.moments[:, :, 0, 0] - found.mass * np.outer(arm, arm)
+    second = found.second_moments[:, :, 0, 0] - found.mass * np.outer(arm, arm)
     inertia = np.trace(second) * np.eye(3) - second
     assert inertia == pytest.approx(np.diag([body.transverse, body.transverse, body.axial]), abs=1e-12)
     assert found.centre[2] != pytest.approx(centre[2], abs=1e-3)  # the frame stays where shape and rings have theirs
@@ -306,5 +310,5 @@ def test_both_descriptions_are_kept_in_a_folder(model: SolidModel, tmp_path: Pat
     again, same = load_or_reduce_floating(model, tmp_path)
     assert [file.stat().st_mtime_ns for file in kept] == before
     assert np.array_equal(again.stiffness, reduced.stiffness)
-    assert np.array_equal(same.moments, body.moments)
+    assert np.array_equal(same.second_moments, body.second_moments)
     assert (same.name, same.seats, same.mass) == (body.name, body.seats, body.mass)

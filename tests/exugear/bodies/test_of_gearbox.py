@@ -7,7 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from exugear.bodies.of_gearbox import reduced_bodies, shaft_model, solid_body
+from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies
+from exugear.bodies.of_gearbox.shafts import shaft_model
+from exugear.bodies.of_gearbox.solids import solid_body
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly, VariantError
 from exugear.dynamics.linearised import linearise
@@ -84,8 +86,8 @@ def test_a_shaft_has_the_rigid_inertia_of_its_body(flexible: Assembly, grc: Gear
 def test_shapes_of_the_grc_weigh_about_what_is_printed(flexible: Assembly, grc: Gearbox) -> None:
     # Without what bearings and couplings add: 30 % on the light high-speed shaft, 10 % on the others.
     for name, share in (("lss", 0.02), ("ims", 0.11), ("hss", 0.27)):
-        assert flexible.elastic_bodies[name].own.mass == pytest.approx(grc.body(name).mass, rel=share)
-        assert flexible.elastic_bodies[name].own.axial == pytest.approx(grc.body(name).axial, rel=0.15)
+        assert flexible.elastic_bodies[name].shape_inertia.mass == pytest.approx(grc.body(name).mass, rel=share)
+        assert flexible.elastic_bodies[name].shape_inertia.axial == pytest.approx(grc.body(name).axial, rel=0.15)
 
 
 def test_turning_the_whole_train_stores_nothing(flexible: Assembly) -> None:
@@ -253,6 +255,13 @@ def test_modes_on_rigid_shafts_are_found_again_on_stiff_ones(grc: Gearbox, stiff
     alone = np.append(True, gaps) & np.append(gaps, True)
     assert np.array_equal(place[alone], np.flatnonzero(alone))
     assert share[alone].min() > 0.99
+
+
+def test_elastic_bodies_show_themselves_in_one_line(flexible: Assembly) -> None:
+    for name, body in flexible.elastic_bodies.items():
+        assert name in repr(body) and repr(body.reduced) in repr(body)
+        assert f"{len(body.reduced.seats)} seats, {len(body.reduced.modal_groups)} modal coordinates" in repr(body)
+        assert len(repr(body)) < 200
 
 
 def test_modes_are_their_own_counterparts(flexible: Assembly) -> None:

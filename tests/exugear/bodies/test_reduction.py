@@ -11,11 +11,12 @@ import pytest
 import scipy.linalg
 import scipy.sparse.linalg
 
+from exugear.bodies.finite_elements.shaft_sections import MeshSize, SeatBand, ShaftSection
+from exugear.bodies.finite_elements.turned_section import Shaft
 from exugear.bodies.reduced_body import Blank, ReducedBody, ReductionError, RigidInertia
-from exugear.bodies.reduction import stiffened, with_rigid_inertia
-from exugear.bodies.store import kept_arrays
-from exugear.bodies.turned_section import MeshSize, SeatBand, Shaft, ShaftSection
-from exugear.bodies.turned_shaft import ShaftModel, load_or_reduce, reduce_shaft
+from exugear.bodies.reduction import with_rigid_inertia, with_stiffness_factor
+from exugear.bodies.store import stored_arrays
+from exugear.bodies.turned_shaft import ShaftModel, load_or_reduce_shaft, reduce_shaft
 from fe_ste.geometry.gears import Material
 from fe_ste.tools.sealed import write_sealed
 
@@ -70,10 +71,10 @@ def whirl(body: ReducedBody, speed: float) -> np.ndarray:
     """Whirl frequencies (rad/s) on bearings of 1 MN/m at both ends, spin and thrust held softly."""
     stiffness = body.stiffness.copy()
     for seat in ("a", "b"):
-        first = body.seat(seat)
+        first = body.first_coordinate(seat)
         stiffness[[first, first + 1], [first, first + 1]] += 1e6
     across = [i for i in range(body.size) if i >= 24 or i % 6 in (0, 1, 3, 4)]
-    across = [i for i in across if i < 24 or body.groups[i - 24].startswith("bending")]
+    across = [i for i in across if i < 24 or body.modal_groups[i - 24].startswith("bending")]
     m, k, g = (matrix[np.ix_(across, across)] for matrix in (body.mass, stiffness, speed * body.gyroscopic))
     n = len(m)
     state = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(m, k), -np.linalg.solve(m, g)]])
@@ -93,7 +94,7 @@ def test_forward_whirl_rises_with_speed_and_turns_with_the_shaft(two_discs):
     # In y' = i w y the forward mode has y = -i x: a quarter turn behind x. Swapping the sign of G would swap them.
     speed = 4000 * math.pi / 30
     body = two_discs
-    first = body.seat("two")
+    first = body.first_coordinate("two")
     assert body.gyroscopic[first + 3, first + 4] > 0.0  # row thx, column thy: + polar inertia
     slow, fast = whirl(body, 0.2 * speed), whirl(body, speed)
     assert fast[0] < slow[0] < slow[1] < fast[1]
@@ -162,7 +163,7 @@ def test_reduced_vibrations_are_those_of_the_full_model(bearing):
         held, 7, full.mass, sigma=-1e6, return_eigenvectors=False, v0=np.ones(full.mass.shape[0])
     )
     expected = np.sqrt(np.maximum(np.sort(values), 0.0)) / (2 * np.pi)
-    inner = [i for i in range(18, body.size) if body.groups[i - 18] == "bending x"]
+    inner = [i for i in range(18, body.size) if body.modal_groups[i - 18] == "bending x"]
     index = [i for i in range(18) if i % 6 in (0, 4)] + inner
     k, m = body.stiffness[np.ix_(index, index)].copy(), body.mass[np.ix_(index, index)]
     k[:6, :6] += springs
@@ -181,14 +182,14 @@ def test_static_deflections_are_those_of_the_full_model(stepped):
     load = np.zeros(stepped.size)
     load[17] = 1.0
     others = [i for i in range(stepped.size) if i not in range(6)] + [5]
-    own = [i for i in others if i in (5, 11, 17) or (i >= 18 and stepped.groups[i - 18] == "torsion")]
+    own = [i for i in others if i in (5, 11, 17) or (i >= 18 and stepped.modal_groups[i - 18] == "torsion")]
     reduced = np.linalg.solve(k[np.ix_(own, own)], load[own])
     assert [reduced[own.index(i)] for i in (5, 11, 17)] == pytest.approx(twist, rel=1e-7)
 
 
-def test_vibrations_above_the_limit_are_slowed_down_and_nothing_else_moves():
+def test_mass_scaling_brings_modes_above_the_limit_to_it_and_moves_no_other():
     high, low = reduce_shaft(replace(STEPPED, limit=1e6)), reduce_shaft(replace(STEPPED, limit=12e3))
-    assert sum(len(found) for found in low.figures.lowered.values()) > 0
+    assert sum(len(found) for found in low.summary.mass_scaled_frequencies.values()) > 0
     assert high.free_frequencies.max() > 12e3
     assert low.free_frequencies.max() == pytest.approx(12e3, rel=1e-6)
     kept = high.free_frequencies < 12e3
@@ -223,7 +224,7 @@ def test_stiffer_shafts_tend_to_the_rigid_body(stepped):
     rigid = np.sqrt(scipy.linalg.eigh(rigid_k, np.diag([inertia.mass, inertia.transverse]), eigvals_only=True)[0])
     gaps = []
     for factor in (1.0, 10.0, 100.0):
-        k = stiffened(stepped, factor).stiffness.copy()
+        k = with_stiffness_factor(stepped, factor).stiffness.copy()
         for n in seats:
             k[[n, n + 1], [n, n + 1]] += bearing
         values = scipy.linalg.eigh(k, stepped.mass, eigvals_only=True)
@@ -251,37 +252,37 @@ def test_the_surface_moves_rigidly_with_the_seats_and_strains_where_it_bends(ste
 
 
 def test_a_reduction_is_kept_and_found_again(stepped, tmp_path):
-    first = load_or_reduce(STEPPED, tmp_path)
+    first = load_or_reduce_shaft(STEPPED, tmp_path)
     files = list(tmp_path.iterdir())
     assert [file.name for file in files] == [f"stepped-{STEPPED.key[:16]}.npz"]
     stamp = files[0].stat().st_mtime_ns
-    again = load_or_reduce(STEPPED, tmp_path)
+    again = load_or_reduce_shaft(STEPPED, tmp_path)
     assert files[0].stat().st_mtime_ns == stamp
     for one, two in ((first, again), (first, stepped)):
         assert np.array_equal(one.mass, two.mass)
         assert np.array_equal(one.gyroscopic, two.gyroscopic)
         assert one.seats == two.seats
-        assert one.groups == two.groups
-        assert one.figures.free_frequencies == two.figures.free_frequencies
+        assert one.modal_groups == two.modal_groups
+        assert one.summary.free_interface_frequencies == two.summary.free_interface_frequencies
         assert np.array_equal(one.surface.strain, two.surface.strain)
 
 
 def test_a_damaged_file_is_computed_again_with_a_word(tmp_path, caplog):
-    first = load_or_reduce(STEPPED, tmp_path)
+    first = load_or_reduce_shaft(STEPPED, tmp_path)
     file = next(tmp_path.iterdir())
     content = file.read_bytes()
     for damaged in damages(content, 100):
         file.write_bytes(damaged)
-        assert kept_arrays(file, STEPPED.key) is None
+        assert stored_arrays(file, STEPPED.key) is None
         assert "the body is reduced again" in caplog.messages[-1]
-    assert np.array_equal(load_or_reduce(STEPPED, tmp_path).mass, first.mass)
-    assert kept_arrays(file, STEPPED.key) is not None
+    assert np.array_equal(load_or_reduce_shaft(STEPPED, tmp_path).mass, first.mass)
+    assert stored_arrays(file, STEPPED.key) is not None
 
 
 def test_a_reduction_of_another_body_under_this_name_is_not_used(tmp_path):
-    load_or_reduce(replace(STEPPED, band=2000.0), tmp_path)
+    load_or_reduce_shaft(replace(STEPPED, band=2000.0), tmp_path)
     next(tmp_path.iterdir()).rename(tmp_path / f"stepped-{STEPPED.key[:16]}.npz")
-    again = load_or_reduce(STEPPED, tmp_path)
+    again = load_or_reduce_shaft(STEPPED, tmp_path)
     assert np.array_equal(again.mass, reduce_shaft(STEPPED).mass)
 
 
@@ -290,7 +291,7 @@ def test_a_stored_object_is_never_unpickled(tmp_path):
     content = io.BytesIO()
     np.savez(content, key=np.array("key"), words=np.array([print], dtype=object))
     write_sealed(tmp_path / "body.npz", content.getvalue())
-    assert kept_arrays(tmp_path / "body.npz", "key") is None
+    assert stored_arrays(tmp_path / "body.npz", "key") is None
 
 
 def test_the_version_of_the_method_and_no_comment_decides_on_the_key(monkeypatch):
@@ -315,4 +316,4 @@ def test_faults_name_body_and_seat(stepped):
     with pytest.raises(ReductionError, match="shaft stepped: blank on 'gaer', but the seats are left, gear, right"):
         reduce_shaft(replace(STEPPED, blanks={"gaer": Blank(1.0, 1.0, 1.0)}))
     with pytest.raises(ReductionError, match="body stepped: no seat 'middle'"):
-        stepped.seat("middle")
+        stepped.first_coordinate("middle")

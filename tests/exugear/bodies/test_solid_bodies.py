@@ -11,14 +11,16 @@ import pytest
 import scipy.sparse
 import xarray as xr
 
-from exugear.bodies.of_gearbox import reduced_bodies, solid_body
-from exugear.bodies.solids import assemble as assemble_solid
-from exugear.bodies.solids import seat_rows
+from exugear.bodies.finite_elements.solid_matrices import assemble as assemble_solid
+from exugear.bodies.finite_elements.solid_seats import seat_rows
+from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies
+from exugear.bodies.of_gearbox.solids import solid_body
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly, VariantError
+from exugear.dynamics.energy_shares import BODY_MOTIONS
 from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.linearised import linearise
-from exugear.dynamics.modes import MOTIONS, counterparts, eigenmodes, modes_of
+from exugear.dynamics.modes import counterparts, eigenmodes, modes_of
 from exugear.dynamics.signals import energy_residual
 from exugear.dynamics.statics import accelerating_start, locked_equilibrium
 from exugear.model.choice import Choice
@@ -146,8 +148,8 @@ def test_weight_and_mass_of_a_housing_are_those_of_its_solid(box: Gearbox) -> No
     heavy = assembled(box.varied({"gravity.acceleration_m_per_s2": [0.0, -9.81, 0.0]}), Choice("flexible"), STIFFNESS)
     mass = 7850.0 * 0.125 * 0.05 * 0.012
     body, place = heavy.elastic_bodies["box"], heavy.elastic_slices["box"]
-    assert body.own.mass == pytest.approx(mass, rel=1e-9)
-    assert body.own.centre == pytest.approx((0.0375, 0.0, -0.006), abs=1e-9)
+    assert body.shape_inertia.mass == pytest.approx(mass, rel=1e-9)
+    assert body.shape_inertia.centre == pytest.approx((0.0375, 0.0, -0.006), abs=1e-9)
     down = body.reduced.rigid_motions((0.0, 0.0, 0.0))[:, 1]
     assert down @ heavy.weight[place] == pytest.approx(-9.81 * mass, rel=1e-9)
     q = locked_equilibrium(heavy, {}, ["shaft_2"], heavy.mean_meshes)
@@ -165,8 +167,8 @@ def test_modes_tell_of_the_housing(housed: Assembly) -> None:
     assert any(name.startswith("box radial") for name in modes.names)
     names = [body.name for body in housed.bodies]
     shares = modes.kinetic[:, names.index("box")].max(axis=0)
-    assert shares[MOTIONS.index("deformation")] > 0.05
-    assert shares[[MOTIONS.index(motion) for motion in ("bending", "twist", "stretch")]].max() == 0.0
+    assert shares[BODY_MOTIONS.index("deformation")] > 0.05
+    assert shares[[BODY_MOTIONS.index(motion) for motion in ("bending", "twist", "stretch")]].max() == 0.0
     scene = elastic_scene(housed, modes.shapes[:, 3])
     assert len(scene.bodies) == 1
     assert not scene.gears
@@ -257,11 +259,11 @@ def test_a_script_step_and_its_mesh_are_the_same_body(tmp_path: Path) -> None:
     script = bodies.pop("plate.geo")
     volume = 0.16 * 0.08 * 0.02 - 2 * np.pi * 0.015**2 * 0.02
     # Circles are eight parabolas: their area is 8e-4 off, and is a ninth of the plate's.
-    assert script.own.mass == pytest.approx(7850.0 * volume, rel=1.5e-4)
-    assert script.shared == {"foot": "bearing_2"}
+    assert script.shape_inertia.mass == pytest.approx(7850.0 * volume, rel=1.5e-4)
+    assert script.shared_seats == {"foot": "bearing_2"}
     for file, body in bodies.items():
         tolerance = 1e-9 if file == "plate.msh" else 0.01
-        assert body.own.mass == pytest.approx(script.own.mass, rel=1e-5)
+        assert body.shape_inertia.mass == pytest.approx(script.shape_inertia.mass, rel=1e-5)
         assert body.reduced.stiffness[:12, :12].diagonal() == pytest.approx(
             script.reduced.stiffness[:12, :12].diagonal(), rel=tolerance
         )
@@ -301,7 +303,8 @@ def test_the_grc_stands_on_its_mounts_with_elastic_housing(grc: Gearbox, stiffne
     # The published finite-element analysis of the real rear housing has tilts of 0.12 to 0.54 mrad at 401 kN m.
     housing, place = assembly.elastic_bodies["housing"].reduced, assembly.elastic_slices["housing"]
     tilts = [
-        np.hypot(*q[place][housing.seat(name) + 3 : housing.seat(name) + 5]) for name in ("lss_bc", "ims_bc", "hss_bc")
+        np.hypot(*q[place][housing.first_coordinate(name) + 3 : housing.first_coordinate(name) + 5])
+        for name in ("lss_bc", "ims_bc", "hss_bc")
     ]
     assert 1e-4 < max(tilts) < 1e-3
     run = simulated(grc, Choice("flexible", load_case="generating"), stiffness, tmp_path, duration=0.02)
@@ -355,5 +358,5 @@ def test_faults_name_body_key_and_what_would_be_right(tmp_path: Path, monkeypatc
     def missing(name: str) -> Any:
         raise ModuleNotFoundError(name)
 
-    monkeypatch.setattr("exugear.bodies.solid_mesh.importlib.import_module", missing)
+    monkeypatch.setattr("exugear.bodies.finite_elements.solid_files.importlib.import_module", missing)
     refused({f"{solid}.length_unit_mm": 1.001}, r"meshio is not installed: pip install 'exugear\[mesh\]'")

@@ -18,20 +18,16 @@ import scipy.sparse
 import scipy.sparse.linalg
 import skfem
 
-from exugear.bodies import solid_mesh
+from exugear.bodies.finite_elements import second_order, solid_files
+from exugear.bodies.finite_elements.second_order import SolidError
+from exugear.bodies.finite_elements.shaft_sections import MeshSize, SeatBand, ShaftSection
+from exugear.bodies.finite_elements.solid_files import read_solid, tetrahedra
+from exugear.bodies.finite_elements.solid_matrices import assemble
+from exugear.bodies.finite_elements.solid_seats import SolidSeat, seat_rows
+from exugear.bodies.finite_elements.turned_hexahedra import turned_hexahedra
+from exugear.bodies.finite_elements.turned_section import Shaft
 from exugear.bodies.reduced_body import Blank, ReducedBody, ReductionError
-from exugear.bodies.solid_mesh import SolidError, read_solid, tetrahedra, turned_hexahedra
-from exugear.bodies.solids import (
-    SolidModel,
-    SolidSeat,
-    assemble,
-    gyroscopic_matrix,
-    load_or_reduce_solid,
-    reduce_matrices,
-    reduce_solid,
-    seat_rows,
-)
-from exugear.bodies.turned_section import MeshSize, SeatBand, Shaft, ShaftSection
+from exugear.bodies.solids import SolidModel, gyroscopic_matrix, load_or_reduce_solid, reduce_matrices, reduce_solid
 from exugear.bodies.turned_shaft import ShaftModel, reduce_shaft
 from fe_ste.geometry.gears import Material
 from fe_ste.tools.sparse import factorise
@@ -203,7 +199,7 @@ TUBE_SEATS = (
 def test_a_broken_pipe_stays_an_error_after_meshing():
     """Else a process that meshed a solid would end without a word when a worker of its grid is lost."""
     code = (
-        "import os\nfrom exugear.bodies.solid_mesh import tetrahedra\n"
+        "import os\nfrom exugear.bodies.finite_elements.solid_files import tetrahedra\n"
         "tetrahedra(lambda occ: occ.addBox(0.0, 0.0, 0.0, 1.0, 0.5, 0.25), 0.5)\n"
         "reader, writer = os.pipe()\nos.close(reader)\n"
         "try:\n    os.write(writer, b'x')\nexcept BrokenPipeError:\n    print('an error')\n"
@@ -219,7 +215,7 @@ def test_tetrahedra_and_hexahedra_of_a_tube_agree():
     frequencies = []
     for mesh in (turned_hexahedra(shaft, 8), tetrahedra(tube, 0.06, curvature=8)):
         found = reduce_solid(SolidModel("tube", mesh, STEEL, TUBE_SEATS, "ground", 4000.0, 1e6))
-        frequencies.append(found.figures.free_frequencies["whole"][:3])
+        frequencies.append(found.summary.free_interface_frequencies["whole"][:3])
     assert frequencies[1] == pytest.approx(frequencies[0], rel=2e-3)
 
 
@@ -236,7 +232,7 @@ def test_meshes_are_read_from_files(tmp_path, suffix, options, kind):
     if kind.startswith("hexa"):
         straight = skfem.MeshHex.init_tensor(*[np.linspace(0, s, 2) for s in (2, 1, 1)])
         cells, points = straight.t.T[:, np.argsort([6, 2, 5, 7, 1, 3, 4, 0])], straight.p.T
-    edges = solid_mesh._TET_EDGES if kind == "tetra10" else solid_mesh._HEX_EDGES
+    edges = second_order.TET_EDGES if kind == "tetra10" else second_order.HEX_EDGES
     if kind in ("tetra10", "hexahedron20"):
         middles = points[cells[:, edges]].mean(axis=2).reshape(-1, 3)
         extra = len(points) + np.arange(len(middles)).reshape(len(cells), -1)
@@ -268,7 +264,7 @@ def test_a_missing_system_library_is_named(monkeypatch):
     def missing(name: str) -> Any:
         raise OSError("libGLU.so.1: cannot open shared object file")
 
-    monkeypatch.setattr(solid_mesh.importlib, "import_module", missing)
+    monkeypatch.setattr(solid_files.importlib, "import_module", missing)
     with pytest.raises(SolidError, match=r"libGLU\.so\.1.*install libglu1-mesa"):
         tetrahedra(tube, 0.1)
 
@@ -305,7 +301,7 @@ def test_a_reduction_is_kept_and_every_input_has_its_own_key(tmp_path: Path):
     assert [file.stat().st_mtime_ns for file in tmp_path.iterdir()] == stamps
     assert np.array_equal(first.mass, again.mass)
     assert np.array_equal(first.surface.quads, again.surface.quads)
-    assert first.figures.unknowns == again.figures.unknowns == {"whole": 3 * mesh.doflocs.shape[1]}
+    assert first.summary.unknowns == again.summary.unknowns == {"whole": 3 * mesh.doflocs.shape[1]}
     others = [
         replace(bar, mesh=tetrahedra(lambda occ: occ.addBox(-0.1, -0.1, 0.0, 0.2, 0.2, 0.3), 0.1)),
         replace(bar, frame="ground"),
@@ -390,8 +386,8 @@ def test_the_ring_of_the_grc_turns_oval_as_a_thin_ring(shapes):
     radius, thickness = (0.595 + 0.5235) / 2, 0.595 - 0.5235
     speed = math.sqrt(model.material.youngs_modulus / model.material.density)
     expected = 6 / math.sqrt(5) * thickness / math.sqrt(12) * speed / radius**2 / (2 * math.pi)
-    assert ring.figures.free_frequencies["whole"][:2] == pytest.approx([expected, expected], rel=1e-2)
-    assert ring.free_frequencies[:2] == pytest.approx(ring.figures.free_frequencies["whole"][:2], rel=1e-6)
+    assert ring.summary.free_interface_frequencies["whole"][:2] == pytest.approx([expected, expected], rel=1e-2)
+    assert ring.free_frequencies[:2] == pytest.approx(ring.summary.free_interface_frequencies["whole"][:2], rel=1e-6)
 
 
 @needs_gmsh

@@ -21,7 +21,7 @@ from typer.testing import CliRunner
 from exugear.cli.app import app
 from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption
 from exugear.model.gearbox import Gearbox
-from exugear.tooth_mesh.tables import order_tables
+from exugear.tooth_mesh.tables import requested_tables
 from fe_ste.contact.cells import ContactSettings
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.elasticity.sectors import ContactMesh
@@ -203,16 +203,16 @@ def test_a_second_run_keeps_what_fits_and_another_number_of_positions_does_not(c
     assert "kept" in outcome.stderr
     assert table.stat().st_mtime_ns == written
     gearbox = Gearbox.from_toml(case)
-    assert order_tables(gearbox, out, positions=8)[0].stored
-    assert "another input" in order_tables(gearbox, out, positions=9)[0].replaces
+    assert requested_tables(gearbox, out, positions=8)[0].stored
+    assert "another input" in requested_tables(gearbox, out, positions=9)[0].replaces
 
 
 def test_a_damaged_table_is_computed_again(spur_case, tmp_path):
     (tmp_path / "tables").mkdir()
     (tmp_path / "tables" / "spur.nc").write_bytes(b"no netCDF")
-    (order,) = order_tables(Gearbox.from_toml(spur_case), tmp_path)
-    assert order.stored is None
-    assert "spur.nc" in order.replaces
+    (request,) = requested_tables(Gearbox.from_toml(spur_case), tmp_path)
+    assert request.stored is None
+    assert "spur.nc" in request.replaces
 
 
 @pytest.mark.parametrize(
@@ -252,7 +252,7 @@ def test_the_nonlinear_method_writes_a_table_of_its_own_and_goes_on_from_it(spur
     again = exugear(*command)
     assert again.exit_code == 0 and "1/1" in again.stdout
     assert path.stat().st_mtime_ns == before
-    assert not order_tables(Gearbox.from_toml(spur_case), tmp_path)[0].stored
+    assert not requested_tables(Gearbox.from_toml(spur_case), tmp_path)[0].stored
 
 
 def test_a_results_folder_that_is_a_file_is_told_before_the_work(spur_case):
@@ -271,8 +271,8 @@ def test_a_pair_without_load_is_bad_input(tmp_path):
 
 def test_positions_that_are_not_solved_are_reported_and_end_with_code_1(computed, tmp_path):
     case, out, _ = computed
-    (order,) = order_tables(Gearbox.from_toml(case), out, positions=8)
-    data = order.stored.dataset.copy(deep=True)
+    (request,) = requested_tables(Gearbox.from_toml(case), out, positions=8)
+    data = request.stored.dataset.copy(deep=True)
     data["converged"][2], data["ste"][2] = False, np.nan
     data.attrs["failures"] = "pmc 0.250, torque 100 N m: no balance"
     MeshTable(data).save(tmp_path / "tables" / "spur.nc")

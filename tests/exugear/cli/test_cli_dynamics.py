@@ -20,10 +20,10 @@ from exugear.model.gearbox import Gearbox
 from exugear.runs.outcome import RunError
 from exugear.runs.runup import SOLVERS
 from exugear.runs.runup import simulate as real_simulate
-from exugear.tooth_mesh.element import MESH_LAWS
+from exugear.tooth_mesh.laws.registry import MESH_LAWS
+from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.tooth_mesh.placement import MeshError
-from exugear.tooth_mesh.stiffness import mesh_stiffness
-from exugear.tooth_mesh.tables import missing_tables, order_tables
+from exugear.tooth_mesh.tables import missing_tables, requested_tables
 from fe_ste.tools.rendering import RenderingError
 
 from ..floating_case import FLOATING_CASE
@@ -138,11 +138,11 @@ def test_missing_tables_are_computed_first_and_kept_for_the_next_verb(case, tmp_
 def test_dynamics_refuses_a_table_of_another_input_but_not_of_other_positions(case, tmp_path):
     out = tmp_path / "out"
     gearbox = Gearbox.from_toml(case)
-    order_tables(gearbox, out, positions=9)[0].fill()
+    requested_tables(gearbox, out, positions=9)[0].compute()
     assert not missing_tables(gearbox, out)
     assert mesh_stiffness(gearbox, "line_of_action", out)["spur"].shape == (9,)
     wider = gearbox.varied({"gears.wheel.face_width_mm": 16.0})
-    assert [order.name for order in missing_tables(wider, out)] == ["spur"]
+    assert [request.name for request in missing_tables(wider, out)] == ["spur"]
     with pytest.raises(MeshError, match="another input"):
         mesh_stiffness(wider, "line_of_action", out)
 

@@ -333,7 +333,13 @@ def test_linearisation_ignores_the_slope_of_the_stiffness(grc: Gearbox, stiffnes
     assert np.abs(stiff @ rolling).max() < 1e-9 * np.abs(stiff).max()
 
 
-def test_modes_show_themselves_in_a_line_and_a_small_table(grc: Gearbox, stiffness: dict) -> None:
-    modes = eigenmodes(grc, Choice("rigid"), stiffness)
-    assert repr(modes).startswith(f"Modes(rigid, line_of_action, assemblies: {modes.frequency.size}, 0 to ")
-    assert f"<th>modes</th><td>{modes.frequency.size}</td>" in modes._repr_html_()
+def test_modes_show_themselves_in_one_line_and_as_a_table(grc: Gearbox, stiffness: dict) -> None:
+    modes = eigenmodes(grc, Choice("bushing"), stiffness)
+    assert repr(modes).startswith("<Modes of 'GRC") and "bushing" in repr(modes)
+    assert f"{len(modes.frequency)} modes up to {modes.frequency[-1]:.5g} Hz" in repr(modes)
+    table = modes._repr_html_()
+    assert table.count("<tr>") == 12
+    assert f"2: {modes.frequency[1]:.1f} Hz" in table and modes.names[1] in table
+    linear = linearise(modes.assembly, np.zeros(modes.assembly.size))
+    assert f"{modes.assembly.size} coordinates" in repr(linear)
+    assert max(len(repr(shown)) for shown in (modes, linear)) < 200

@@ -17,13 +17,14 @@ from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.signals import signal_layout
 from exugear.dynamics.statics import accelerating_start
 from exugear.kernels.connectors import ConnectorArrays, add_connector_forces
-from exugear.kernels.meshes import STATE_SIZE, add_mesh_forces, mesh_state
+from exugear.kernels.meshes import STATE_SIZE
 from exugear.kernels.springs import add_spring_forces
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.compiled.step import choose_step
 from exugear.solvers.loads import LoadTable
+from exugear.tooth_mesh.laws.forms import add_mesh_forces, mesh_state
 
 from ..assembled import assembled
 from ..plain_signals import energies_of, sampled

@@ -17,7 +17,7 @@ from exugear.dynamics.sensitivity import (
 )
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
-from exugear.tooth_mesh.stiffness import mesh_stiffness
+from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 
 from ..spur_case import SPUR_CASE
 

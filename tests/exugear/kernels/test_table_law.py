@@ -16,14 +16,14 @@ import xarray as xr
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.statics import locked_equilibrium
-from exugear.kernels.meshes import add_mesh_forces
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.runs.runup import simulate
 from exugear.solvers.compiled.observers import Observer
 from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.loads import LoadTable
-from exugear.tooth_mesh.element import pack
+from exugear.tooth_mesh.laws.forms import add_mesh_forces
+from exugear.tooth_mesh.laws.packing import pack
 from fe_ste.transmission_error.surface import SteSurface
 
 from ..assembled import assembled, simulated

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 import scipy.sparse
 
-from exugear.bodies.solid_mesh import turned_hexahedra
-from exugear.bodies.solids import SolidSeat, assemble, seat_rows
-from exugear.bodies.turned_section import MeshSize, SeatBand, Shaft, ShaftSection
+from exugear.bodies.finite_elements.shaft_sections import MeshSize, SeatBand, ShaftSection
+from exugear.bodies.finite_elements.solid_matrices import assemble
+from exugear.bodies.finite_elements.solid_seats import SolidSeat, seat_rows
+from exugear.bodies.finite_elements.turned_hexahedra import turned_hexahedra
+from exugear.bodies.finite_elements.turned_section import Shaft
 from exugear.kernels.travelling import TravellingArrays, follow, share_travelling_forces, travelling_tangent
 from fe_ste.geometry.gears import Material
 from fe_ste.tools.sparse import factorise

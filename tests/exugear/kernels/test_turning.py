@@ -10,11 +10,13 @@ import pytest
 import scipy.linalg
 import skfem
 
+from exugear.bodies.finite_elements.shaft_sections import MeshSize, SeatBand, ShaftSection
+from exugear.bodies.finite_elements.solid_seats import SolidSeat
+from exugear.bodies.finite_elements.turned_hexahedra import turned_hexahedra
+from exugear.bodies.finite_elements.turned_section import Shaft
 from exugear.bodies.reduced_body import ReducedBody, RigidInertia
 from exugear.bodies.reduction import with_rigid_inertia
-from exugear.bodies.solid_mesh import turned_hexahedra
-from exugear.bodies.solids import SolidModel, SolidSeat, gyroscopic_matrix, reduce_matrices, reduce_solid
-from exugear.bodies.turned_section import MeshSize, SeatBand, Shaft, ShaftSection
+from exugear.bodies.solids import SolidModel, gyroscopic_matrix, reduce_matrices, reduce_solid
 from exugear.bodies.turning_frame import TurningBody, turning_arrays
 from exugear.kernels.turning import set_turning_motion, turning_energies, turning_memory
 from fe_ste.geometry.gears import Material

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from exugear.bearings import supports
 from exugear.bearings.supports import bearing_matrices, elastic_names
-from exugear.bodies.of_gearbox import check_elastic_body
+from exugear.bodies.of_gearbox.elastic_bodies import check_elastic_body
 from exugear.cli.app import app
 from exugear.dynamics.readiness import check_parts, lacking, remarks
 from exugear.model import sections as case_sections
@@ -53,7 +53,7 @@ def read_keys(monkeypatch: pytest.MonkeyPatch) -> set[tuple[str, str]]:
 
 
 def test_every_key_is_read(read_keys: set[tuple[str, str]], tmp_path: Path) -> None:
-    supports._catalogue_stiffness.cache_clear()  # what other tests had computed would not be read again
+    supports.catalogue_stiffness.cache_clear()  # what other tests had computed would not be read again
     contents = bases(tmp_path)
     contents["spur"]["ste"] = {"method": "nonlinear", "positions": 8}
     for name, content in contents.items():

@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from exugear.bodies.solid_mesh import SolidError, mesh_geometry, read_solid
+from exugear.bodies.finite_elements.second_order import SolidError
+from exugear.bodies.finite_elements.solid_files import mesh_geometry, read_solid
 from exugear.cli.app import app
 from exugear.model.gearbox import Gearbox
 from exugear.model.named_files import LARGEST_TABLE, Permissions

@@ -5,7 +5,8 @@ import pytest
 import skfem
 from matplotlib.figure import Figure
 
-from exugear.bodies.solids import SolidModel, SolidSeat, reduce_solid
+from exugear.bodies.finite_elements.solid_seats import SolidSeat
+from exugear.bodies.solids import SolidModel, reduce_solid
 from exugear.pictures.solid_scene import draw_free_vibration
 from fe_ste.geometry.gear_relations import Material
 from fe_ste.tools.rendering import RenderingError, require_rendering

@@ -19,8 +19,8 @@ from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
 from exugear.report.writer import ReportError, write_report
 from exugear.results.folder import bodies_folder, keep_case, kept_case, modes_path, note_time, times_spent
-from exugear.tooth_mesh.stiffness import mesh_stiffness
-from exugear.tooth_mesh.tables import order_tables
+from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear.tooth_mesh.tables import requested_tables
 from fe_ste.tools.rendering import RenderingError
 
 from ..assembled import assembled, modes_with_bodies, simulated
@@ -53,8 +53,8 @@ def results(tmp_path_factory):
     case.write_text(SPUR_CASE, encoding="utf-8")
     gearbox = Gearbox.from_toml(case)
     keep_case(gearbox, folder)
-    for order in order_tables(gearbox, folder):
-        order.fill()
+    for request in requested_tables(gearbox, folder):
+        request.compute()
     stiffness = mesh_stiffness(gearbox, LAW, folder)
     for variant in ("rigid", "bushing"):
         simulated(gearbox, Choice(variant, load_case="run_up"), stiffness, folder)
@@ -111,7 +111,8 @@ sections = [{ length_mm = 80.0, outer_diameter_mm = 25.0 }]
     modes = modes_with_bodies(gearbox, Choice("flexible", LAW), stiffness, folder=kept)
     modes.save(modes_path(tmp_path, Choice("flexible", LAW, "disc")))
     simulated(gearbox, Choice("flexible", load_case="run_up"), stiffness, tmp_path, duration=0.2)
-    monkeypatch.setattr("exugear.bodies.of_gearbox.reduce_shaft", lambda model: pytest.fail("reduced again"))
+    reduction = "exugear.bodies.of_gearbox.elastic_bodies.reduce_shaft"
+    monkeypatch.setattr(reduction, lambda model: pytest.fail("reduced again"))
     before = set(kept.iterdir())
     report = write_report(tmp_path, target=1000.0)
     assert [line for line in report.left_out if "picture" not in line] == []

@@ -19,7 +19,7 @@ from exugear.model.gearbox import Gearbox
 from exugear.results.run_file import load_run
 from exugear.runs import recorder, runup
 from exugear.runs.outcome import Progress
-from exugear.tooth_mesh.stiffness import mesh_stiffness
+from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 from fe_ste.tools.files import FileError
 from fe_ste.transmission_error.table import MeshTable
 
@@ -78,7 +78,7 @@ from pathlib import Path
 from exugear.runs import recorder, runup
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
-from exugear.tooth_mesh.stiffness import mesh_stiffness
+from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 
 case, out, solver, room = sys.argv[1:]
 gearbox = Gearbox.from_toml(case)
@@ -171,7 +171,7 @@ from pathlib import Path
 from exugear.runs import recorder, runup
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
-from exugear.tooth_mesh.stiffness import mesh_stiffness
+from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 
 case, out, go = map(Path, sys.argv[1:])
 recorder.FLUSH_INTERVAL = 0.0025
@@ -275,8 +275,8 @@ from exugear.model.gearbox import Gearbox
 from tests.exugear.spur_case import COARSE_INPUT
 
 exugear.tooth_mesh.tables.TableInput = COARSE_INPUT
-(order,) = exugear.tooth_mesh.tables.order_tables(Gearbox.from_toml(sys.argv[1]), Path(sys.argv[2]))
-order.fill()
+(request,) = exugear.tooth_mesh.tables.requested_tables(Gearbox.from_toml(sys.argv[1]), Path(sys.argv[2]))
+request.compute()
 """
 
 

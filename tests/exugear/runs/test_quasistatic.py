@@ -15,7 +15,7 @@ from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.statics import locked_equilibrium
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
-from exugear.tooth_mesh.element import pack
+from exugear.tooth_mesh.laws.packing import pack
 from fe_ste.transmission_error.surface import SteSurface
 from fe_ste.transmission_error.table import MeshTable, TableInput
 

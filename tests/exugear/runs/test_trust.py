@@ -30,7 +30,7 @@ from exugear.runs.outcome import LimitError, Progress, RunError
 from exugear.runs.runup import simulate
 from exugear.runs.trust import LIMITS, Judge, verdict_of
 from exugear.solvers.compiled.step import STABILITY_LIMIT, highest_rate
-from exugear.tooth_mesh.stiffness import mesh_stiffness
+from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 
 from ..assembled import simulated
 from ..spur_case import SPUR_CASE
@@ -240,8 +240,8 @@ from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.loads import LoadTable
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
-from exugear.kernels.meshes import add_mesh_forces
-from exugear.tooth_mesh.stiffness import mesh_stiffness
+from exugear.tooth_mesh.laws.forms import add_mesh_forces
+from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 
 sys.path.insert(0, sys.argv[1])
 from spur_case import SPUR_CASE

@@ -21,12 +21,14 @@ from exugear.results.run_file import load_run
 from exugear.runs.outcome import RunError
 from exugear.runs.runup import simulate
 from exugear.solvers.compiled.observers import Observer
-from exugear.solvers.compiled.solver import CompiledSystem, refusal
+from exugear.solvers.compiled.solver import CompiledSystem, unsupported_reason
 from exugear.solvers.compiled.step import choose_step, highest_rate
-from exugear.solvers.exudyn_model.system import ExudynSystem, exudyn
+from exugear.solvers.exudyn_model.library import exudyn
+from exugear.solvers.exudyn_model.system import ExudynSystem
 from exugear.solvers.loads import DriveLaw, Loading, LoadTable
 from exugear.spectra.order_cut import order_cut
 from exugear.spectra.orders import harmonics
+from exugear.tooth_mesh.laws.registry import LAWS
 
 from ..assembled import assembled, simulated
 from ..plain_signals import energies_of, sampled
@@ -67,7 +69,7 @@ def with_full_matrices(assembly: Assembly, off_axis: float) -> Assembly:
 
 def assemblies(grc: Gearbox, stiffness: dict) -> Iterator[Assembly]:
     for variant in ("rigid", "bushing"):
-        for law in ("line_of_action", "seed", "constant"):
+        for law in (name for name, law in LAWS.items() if law.has_force and not law.needs_axes):
             yield assembled(grc, Choice(variant, law), stiffness)
     yield assemble(grc, Choice("rigid", "rigid"), {})
     yield with_full_matrices(assemble(grc, Choice("bushing"), stiffness), off_axis=0.05)
@@ -320,7 +322,7 @@ def test_unstable_step_is_refused(grc: Gearbox, stiffness: dict, tmp_path: Path)
 
 
 def test_what_it_cannot_take_is_refused_with_the_way_out(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
-    assert refusal(assemble(grc, Choice("bushing"), stiffness)) == ""
+    assert unsupported_reason(assemble(grc, Choice("bushing"), stiffness)) == ""
     with pytest.raises(RunError, match="jointed keeps ideal joints as constraints.*use --solver exudyn"):
         simulate(grc, Choice("jointed"), stiffness, tmp_path, duration=0.01, solver="compiled")
     with pytest.raises(RunError, match="user-function loads exist in Exudyn only.*use --solver exudyn"):

@@ -10,12 +10,14 @@ import pytest
 import scipy.linalg
 import skfem
 
+from exugear.bodies.finite_elements.shaft_sections import MeshSize, SeatBand, ShaftSection
+from exugear.bodies.finite_elements.solid_seats import SolidSeat
+from exugear.bodies.finite_elements.turned_hexahedra import turned_hexahedra
+from exugear.bodies.finite_elements.turned_section import Shaft
 from exugear.bodies.floating import FloatingBody, floating_body
 from exugear.bodies.reduced_body import Blank
-from exugear.bodies.reduction import lowered
-from exugear.bodies.solid_mesh import turned_hexahedra
-from exugear.bodies.solids import ReducedSolid, SolidModel, SolidSeat, gyroscopic_matrix, reduce_matrices
-from exugear.bodies.turned_section import MeshSize, SeatBand, Shaft, ShaftSection
+from exugear.bodies.reduction import selective_mass_scaling
+from exugear.bodies.solids import ReducedSolid, SolidModel, gyroscopic_matrix, reduce_matrices
 from exugear.solvers.exudyn_model.floating import FloatingSystem, SeatLaw, linear_supports
 from fe_ste.geometry.gears import Material
 
@@ -84,15 +86,15 @@ class Rotor:
 def on_bearings(model: SolidModel, bearings: np.ndarray, vibration: np.ndarray | None = None) -> Rotor:
     """Both descriptions of a body whose elastic vibrations begin with what the modes have of given seat velocities."""
     reduced, body = reduce_matrices(model), floating_body(model)
-    stiffness = reduced.part.stiffness
-    mass, _ = lowered(reduced.part.mass, stiffness, model.limit)
+    stiffness = reduced.component.stiffness
+    mass, _ = selective_mass_scaling(reduced.component.mass, stiffness, model.limit)
     turned = scipy.linalg.eigh(stiffness, mass)[1]
     seats = 6 * len(model.seats)
     moved = np.kron(np.ones((len(model.seats), 1)), np.eye(6))[:, :3] @ VELOCITY
     initial = turned.T @ mass @ np.concatenate([moved, np.zeros(len(mass) - seats)])
     # Signs of modes, and directions in a pair of equal frequencies, are each description's own.
     wanted = np.zeros(seats) if vibration is None else vibration
-    exact = int(np.count_nonzero(body.slowing == 0.0))  # what is slowed down is there for statics
+    exact = int(np.count_nonzero(body.added_mass == 0.0))  # modes with added mass are there for statics
     rates = np.zeros(len(body.stiffness))
     rates[:exact] = np.linalg.lstsq(body.at_seats[:, :exact], wanted)[0]
     initial[6 : 6 + exact] += np.linalg.lstsq(turned[:seats, 6 : 6 + exact], wanted)[0]
@@ -192,7 +194,7 @@ def test_the_added_stiffness_follows_a_run_up(rotor):
     # Omega' C q with C = G / 2, then; without it bearings are wrong by 1.3 %, the size of Omega' / (Omega omega) being
     # 6 %. Reference: classical Runge-Kutta with prescribed speed.
     start, rise, steps, step = 200.0, 4000.0, 5000, 1e-5
-    shapes = reduce_matrices(rotor.model).part.mass
+    shapes = reduce_matrices(rotor.model).component.mass
     spin = np.zeros(len(shapes))
     spin[5:24:6] = 1.0
     load = np.zeros(24)

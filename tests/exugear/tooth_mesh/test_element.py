@@ -9,15 +9,18 @@ import pytest
 
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
-from exugear.kernels.meshes import STATE_SIZE, add_mesh_forces, mesh_state, periodic_cubic, stiffness_at
+from exugear.kernels.meshes import STATE_SIZE, periodic_cubic, stiffness_at
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.tooth_mesh.element import mesh_elements
+from exugear.tooth_mesh.laws.forms import add_mesh_forces, mesh_state
+from exugear.tooth_mesh.laws.registry import LAWS as ALL_LAWS
+from exugear.tooth_mesh.laws.registry import law_of
 from exugear.tooth_mesh.placement import MeshError, MeshGeometry, loaded_flanks, mesh_phases
 
 from ..assembled import assembled
 
-LAWS = ["line_of_action", "seed", "constant", "iso6336"]
+LAWS = [name for name, law in ALL_LAWS.items() if law.has_force and not law.needs_axes]
 RATED = 22.1 * math.pi / 30
 
 
@@ -157,7 +160,8 @@ def test_force_directions_for_both_hands_and_flanks(
         changes[f"gears.{gear}.helix_angle_deg"] = hand * section.helix_angle_deg
     gearbox = grc.varied(changes)
     flanks = dict.fromkeys(loaded_flanks(gearbox), flank)
-    element = next(e for e in mesh_elements(gearbox, stiffness, flanks=flanks) if e.mesh.name == name)
+    elements = mesh_elements(gearbox, stiffness, law_of("line_of_action"), flanks=flanks)
+    element = next(e for e in elements if e.mesh.name == name)
     geometry = MeshGeometry.of(element.mesh)
     on_first = -element.force[:6]  # a positive scalar force acts with minus the row
     assert on_first[5] == pytest.approx(-flank * element.mesh.pair.pinion.base_radius, rel=1e-12)
@@ -206,12 +210,12 @@ def test_phase_between_sun_and_ring_follows_from_the_planets_tooth_thickness(grc
 
 def test_phase_in_the_file_overrides_geometry(grc: Gearbox, stiffness: dict) -> None:
     gearbox = grc.varied({"meshes.ring_planet.phase": [0.1, 0.2, 0.3]})
-    found = [e.phase for e in mesh_elements(gearbox, stiffness) if e.mesh.family == "ring_planet"]
-    assert found == pytest.approx([0.1, 0.2, 0.3])
+    elements = mesh_elements(gearbox, stiffness, law_of("line_of_action"))
+    assert [e.phase for e in elements if e.mesh.family == "ring_planet"] == pytest.approx([0.1, 0.2, 0.3])
 
 
 def test_seed_stiffness_is_cos_squared_of_the_tables(grc: Gearbox, stiffness: dict) -> None:
-    for element in mesh_elements(grc, stiffness, "seed"):
+    for element in mesh_elements(grc, stiffness, law_of("seed")):
         angle = element.mesh.pair.pinion.transverse_pressure_angle
         expected = math.cos(angle) ** 2 * stiffness[element.mesh.pair.name]
         assert np.allclose(element.stiffness, expected, rtol=1e-14)
@@ -219,7 +223,7 @@ def test_seed_stiffness_is_cos_squared_of_the_tables(grc: Gearbox, stiffness: di
 
 def test_seed_force_has_the_printed_direction(grc: Gearbox, stiffness: dict) -> None:
     # T = {1, tan(phi_n) / cos(beta), -tan(beta)}, reference angles, magnitudes.
-    for element in mesh_elements(grc, stiffness, "seed"):
+    for element in mesh_elements(grc, stiffness, law_of("seed")):
         geometry, pinion = MeshGeometry.of(element.mesh), element.mesh.pair.pinion
         force = element.force[:3]
         assert force @ geometry.tangential == pytest.approx(element.flank, rel=1e-12)
@@ -245,8 +249,8 @@ def test_cubic_passes_through_its_samples_and_is_smooth() -> None:
 
 def test_missing_or_impossible_stiffness_is_refused(grc: Gearbox, stiffness: dict) -> None:
     with pytest.raises(MeshError, match="no stiffness for pair 'high_speed'"):
-        mesh_elements(grc, {k: v for k, v in stiffness.items() if k != "high_speed"})
+        mesh_elements(grc, {k: v for k, v in stiffness.items() if k != "high_speed"}, law_of("line_of_action"))
     with pytest.raises(MeshError, match="positive and finite"):
-        mesh_elements(grc, {**stiffness, "high_speed": np.array([1e9, np.nan])})
+        mesh_elements(grc, {**stiffness, "high_speed": np.array([1e9, np.nan])}, law_of("line_of_action"))
     with pytest.raises(MeshError, match="'springs' has no force element"):
-        mesh_elements(grc, stiffness, "springs")
+        law_of("springs")

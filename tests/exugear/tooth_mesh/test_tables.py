@@ -15,9 +15,9 @@ from exugear.cli.app import app
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
 from exugear.report.writer import write_report
+from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.tooth_mesh.placement import MeshError
-from exugear.tooth_mesh.stiffness import mesh_stiffness
-from exugear.tooth_mesh.tables import missing_tables, order_tables, wanted_table
+from exugear.tooth_mesh.tables import missing_tables, requested_tables, wanted_table
 
 from ..spur_case import COARSE_INPUT, SPUR_CASE
 
@@ -61,9 +61,9 @@ def test_axes_are_those_of_the_file_and_the_static_state_lies_on_them_exactly(co
 def test_a_grid_serves_where_only_the_static_state_is_needed(computed: tuple[Path, Path]) -> None:
     case, out = computed
     gearbox = Gearbox.from_toml(case)
-    assert order_tables(gearbox, out)[0].stored
+    assert requested_tables(gearbox, out)[0].stored
     assert missing_tables(gearbox, out) == missing_tables(gearbox, out, grid=True) == []
-    alone = order_tables(gearbox, out.parent / "alone")[0].fill()
+    alone = requested_tables(gearbox, out.parent / "alone")[0].compute()
     stiffness = alone.static_state["mesh_stiffness"].to_numpy()
     # One solution of one problem, found from other starts.
     assert mesh_stiffness(gearbox, "line_of_action", out)["spur"] == pytest.approx(stiffness, rel=1e-9)
@@ -77,8 +77,8 @@ def test_one_state_does_not_serve_where_a_grid_is_needed_nor_a_grid_with_other_a
     other.write_text(case.read_text(encoding="utf-8").replace("[0.2, 1.0]", "[0.3, 1.0]"), encoding="utf-8")
     gearbox = Gearbox.from_toml(other)
     assert missing_tables(gearbox, out) == []
-    assert [order.name for order in missing_tables(gearbox, out, grid=True)] == ["spur"]
-    order_tables(gearbox, tmp_path)[0].fill()
+    assert [request.name for request in missing_tables(gearbox, out, grid=True)] == ["spur"]
+    requested_tables(gearbox, tmp_path)[0].compute()
     assert missing_tables(gearbox, tmp_path) == []
     assert missing_tables(gearbox, tmp_path, grid=True)[0].wanted == wanted_table(gearbox, "spur", 8, grid=True)
 
@@ -97,7 +97,7 @@ def test_law_table_runs_from_the_command_line_on_its_grid(computed: tuple[Path, 
     outcome = CliRunner().invoke(app, ["modes", str(case), *arguments])
     assert outcome.exit_code == 0, outcome.stderr
     write_report(out)
-    order_tables(Gearbox.from_toml(case), tmp_path)[0].fill()
+    requested_tables(Gearbox.from_toml(case), tmp_path)[0].compute()
     with pytest.raises(MeshError, match="exugear ste --grid"):
         mesh_stiffness(Gearbox.from_toml(case), "table", tmp_path)
 
@@ -105,9 +105,9 @@ def test_law_table_runs_from_the_command_line_on_its_grid(computed: tuple[Path, 
 def test_file_may_ask_for_the_axes(tmp_path: Path) -> None:
     case = tmp_path / "spur.toml"
     case.write_text(CASE.replace("ste = { ", "ste = { grid = true, "), encoding="utf-8")
-    (order,) = order_tables(Gearbox.from_toml(case), tmp_path)
-    assert len(order.wanted.torque) == 2
-    assert order.wanted.static_torque == order.wanted.torque[1]
+    (request,) = requested_tables(Gearbox.from_toml(case), tmp_path)
+    assert len(request.wanted.torque) == 2
+    assert request.wanted.static_torque == request.wanted.torque[1]
 
 
 def test_default_axes_have_7500_states(grc: Gearbox) -> None:

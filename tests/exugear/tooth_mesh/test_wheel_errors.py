@@ -18,7 +18,7 @@ from exugear.model.reading import CaseError
 from exugear.runs.runup import simulate
 from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.loads import LoadTable
-from exugear.tooth_mesh.element import pack
+from exugear.tooth_mesh.laws.packing import pack
 from exugear.tooth_mesh.placement import MeshGeometry, loaded_flanks, tooth_places
 from exugear.tooth_mesh.wheel_errors import contact_line_shares
 

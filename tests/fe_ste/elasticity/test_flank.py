@@ -12,7 +12,8 @@ from skfem.helpers import dot
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from fe_ste.elasticity.bricks import skfem_mesh, stiffness_matrix
-from fe_ste.elasticity.flank import FlankCompliance, depth_readout, flank_compliance, flank_normals
+from fe_ste.elasticity.condensation import depth_readout, flank_normals
+from fe_ste.elasticity.flank import FlankCompliance, flank_compliance
 from fe_ste.elasticity.halfspace import tent_weights
 from fe_ste.elasticity.hexmesh import MeshSettings, sector_mesh
 from fe_ste.geometry.gears import Gear, Material

@@ -7,7 +7,8 @@ import pytest
 import scipy.sparse
 
 from fe_ste.elasticity.bricks import stiffness_matrix
-from fe_ste.elasticity.flank import FlankCompliance, _flank_functionals, _near_field, flank_compliance
+from fe_ste.elasticity.condensation import flank_functionals
+from fe_ste.elasticity.flank import FlankCompliance, _near_field, flank_compliance
 from fe_ste.elasticity.halfspace import tent_weights
 from fe_ste.elasticity.hexmesh import MeshSettings, SectorMesh, sector_mesh
 from fe_ste.elasticity.ring import chain, joined, open_chain_faces, ring_faces, uniform_faces
@@ -53,7 +54,7 @@ def meshed_compliance(mesh: SectorMesh, sectors: int, closed: bool) -> dict[tupl
 
     held = np.unique(np.concatenate([number[mesh.held_nodes + sector * count] for sector in range(sectors)]))
     free = np.setdiff1d(np.arange(stiffness.shape[0]), (3 * held[:, None] + np.arange(3)).ravel())
-    surface, below = _flank_functionals(mesh, 1, DEPTH)
+    surface, below = flank_functionals(mesh, 1, DEPTH)
     loads, depths = [], []
     for sector in range(sectors):
         turn = scipy.sparse.kron(scipy.sparse.identity(count), rotation(sector * pitch)).tocsr()

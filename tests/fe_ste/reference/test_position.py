@@ -11,7 +11,8 @@ import pytest
 from fe_ste.elasticity.sectors import ContactMesh
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.reference.newton import EquilibriumError, NewtonSettings
-from fe_ste.reference.position import NonlinearSettings, nonlinear_position, normal_load
+from fe_ste.reference.position import NonlinearSettings, nonlinear_position
+from fe_ste.transmission_error.search import normal_load
 
 SPUR = Gear(name="spur", teeth=50, normal_module=3e-3, face_width=20e-3, held_diameter=100e-3)
 PAIR = GearPair(name="spur", pinion=SPUR, gear=SPUR, centre_distance=150e-3)

@@ -13,11 +13,11 @@ from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.elasticity.sectors import ContactMesh
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.pictures.stress import draw_contact_stress
-from fe_ste.reference.position import NonlinearSettings, nonlinear_position, normal_load
+from fe_ste.reference.position import NonlinearSettings, nonlinear_position
 from fe_ste.reference.stress import stress_of_position, stress_of_state
 from fe_ste.tools.rendering import RenderingError, require_rendering
 from fe_ste.transmission_error.compliance import pair_compliance
-from fe_ste.transmission_error.search import contact_state, hertz_half_width
+from fe_ste.transmission_error.search import contact_state, hertz_half_width, normal_load
 
 SPUR = Gear(name="spur", teeth=50, normal_module=3e-3, face_width=20e-3, held_diameter=100e-3)
 PAIR = GearPair(name="spur", pinion=SPUR, gear=SPUR, centre_distance=150e-3)

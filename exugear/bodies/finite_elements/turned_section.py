@@ -25,80 +25,26 @@ from typing import Any, Literal
 import numpy as np
 import scipy.sparse
 import skfem
-from numpy.typing import NDArray
 
+from exugear.bodies.finite_elements.shaft_sections import (
+    SAME,
+    STANDARD_SIZE,
+    MeshSize,
+    SeatBand,
+    ShaftSection,
+    check_sections,
+    locate,
+)
 from fe_ste.geometry.gears import Material
-from fe_ste.tools.arrays import Floats, SparseMatrix
+from fe_ste.tools.arrays import Booleans, Floats, Integers, SparseMatrix
 
-Motion = Literal["bending", "torsion", "stretching"]
+HarmonicName = Literal["bending", "torsion", "stretching"]
+FIELDS: dict[HarmonicName, int] = {"bending": 3, "torsion": 1, "stretching": 2}
+"""Unknowns at each node."""
 GRADING = 0.35
 """Ratio of neighbouring element sizes towards a re-entrant corner."""
 INTEGRATION_ORDER = 5
 """Exact for the mass matrix but for the factor r; the strains' 1/r is no polynomial anyway."""
-MOST_ELEMENTS = 50_000
-"""Most elements over a half-section: 10 m of shaft with 3 m diameter; 4 GB."""
-SAME = 1e-9
-"""Two places (m) this close are one."""
-
-
-class ShaftError(ValueError):
-    """A shaft that cannot be, or a seat that does not lie on it."""
-
-
-@dataclass(frozen=True)
-class ShaftSection:
-    """A cylindrical piece of a shaft: length, outer and inner diameter, m.
-
-    Raises
-    ------
-    ShaftError
-        Length or outer diameter not positive, or no wall between the diameters.
-    """
-
-    length: float
-    outer_diameter: float
-    inner_diameter: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Refuse what cannot be turned."""
-        if self.length <= 0.0 or self.outer_diameter <= 0.0 or not 0.0 <= self.inner_diameter < self.outer_diameter:
-            raise ShaftError(
-                f"section of length {self.length:g} m and diameters {self.outer_diameter:g} over "
-                f"{self.inner_diameter:g} m: it needs a positive length and a wall"
-            )
-
-
-@dataclass(frozen=True)
-class MeshSize:
-    """Element sizes over the half-section.
-
-    Attributes
-    ----------
-    axial, radial : largest element, m
-    grading : number of lines that close in on each shoulder
-    """
-
-    axial: float = 0.025
-    radial: float = 0.0125
-    grading: int = 3
-
-
-STANDARD_SIZE = MeshSize()
-
-
-@dataclass(frozen=True)
-class SeatBand:
-    """Where something sits on a shaft: a band of the outer surface, or a plane cross-section if it has no width.
-
-    Attributes
-    ----------
-    z : middle, m from the beginning of the first section
-    width : m; 0 for the cross-section
-    """
-
-    name: str
-    z: float
-    width: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -107,14 +53,14 @@ class Harmonic:
 
     Attributes
     ----------
-    motion : what it describes
+    name : what it describes
     mass, stiffness : (n, n) sparse, kg and N/m
     gyroscopic : (n, n) sparse symmetric g of M q'' - 2 i Omega g q' + K q, q = q_x + i q_y; None but for bending
     seats : (s, n) averages over the seats: per seat displacement and tilt (bending), twist, or axial displacement
     rigid : (n, k) rigid motions: along x and tilt about the origin (bending), turn, or along z
     """
 
-    motion: Motion
+    name: HarmonicName
     mass: SparseMatrix
     stiffness: SparseMatrix
     gyroscopic: SparseMatrix | None
@@ -128,9 +74,9 @@ class Outline:
 
     r: Floats
     z: Floats
-    nodes: NDArray[np.int64]
-    edges: NDArray[np.int64]
-    elements: NDArray[np.int64]
+    nodes: Integers
+    edges: Integers
+    elements: Integers
 
 
 class Shaft:
@@ -172,7 +118,7 @@ class Shaft:
         self.seats = tuple(seats)
         self.size = size
         self._ends = np.concatenate([[0.0], np.cumsum([section.length for section in sections])])
-        _check_sections(self.sections)
+        check_sections(self.sections)
         self._bands = [self._locate(seat) for seat in self.seats]
         radii, heights = self._lines()
         self.mesh = _half_section(radii, heights, self._solid)
@@ -188,7 +134,7 @@ class Shaft:
         """Return the section that a seat lies on: the thicker one where it is a plane between two."""
         return self._locate(seat)[0]
 
-    def _solid(self, r: Floats, z: Floats) -> NDArray[np.bool_]:
+    def _solid(self, r: Floats, z: Floats) -> Booleans:
         """Tell which points of the half-section are steel."""
         number = np.clip(np.searchsorted(self._ends, z) - 1, 0, len(self.sections) - 1)
         outer = np.array([section.outer_diameter for section in self.sections])[number]
@@ -224,7 +170,7 @@ class Shaft:
         radius = np.asarray(basis.global_coordinates())[0]
         return values, slopes[0], slopes[1], radius, radius * basis.dx
 
-    def strains(self, motion: Motion, points: tuple[Floats, Floats, Floats, Floats] | None = None) -> Floats:
+    def strains(self, harmonic: HarmonicName, points: tuple[Floats, Floats, Floats, Floats] | None = None) -> Floats:
         """Strain amplitudes per unknown, (elements, points, 6, 9 fields): rr, phi phi, zz, rz, r phi, phi z.
 
         Parameters
@@ -234,16 +180,16 @@ class Shaft:
         """
         n, n_r, n_z, r = self._fields[:4] if points is None else points
         over_r = n / r[..., None]
-        fields = {"bending": 3, "torsion": 1, "stretching": 2}[motion]
+        fields = FIELDS[harmonic]
         e = np.zeros((*n.shape[:2], 6, n.shape[2], fields))
-        if motion == "bending":  # unknowns A, S, W: U = S + A, V = S - A
+        if harmonic == "bending":  # unknowns A, S, W: U = S + A, V = S - A
             e[:, :, 0, :, 0], e[:, :, 0, :, 1] = n_r, n_r
             e[:, :, 1, :, 1] = 2.0 * over_r
             e[:, :, 2, :, 2] = n_z
             e[:, :, 3, :, 0], e[:, :, 3, :, 1], e[:, :, 3, :, 2] = n_z, n_z, n_r
             e[:, :, 4, :, 0], e[:, :, 4, :, 1] = -n_r, n_r - 2.0 * over_r
             e[:, :, 5, :, 0], e[:, :, 5, :, 1], e[:, :, 5, :, 2] = -n_z, n_z, -over_r
-        elif motion == "torsion":  # unknown V
+        elif harmonic == "torsion":  # unknown V
             e[:, :, 4, :, 0], e[:, :, 5, :, 0] = n_r - over_r, n_z
         else:  # unknowns U, W
             e[:, :, 0, :, 0], e[:, :, 1, :, 0], e[:, :, 2, :, 1] = n_r, over_r, n_z
@@ -260,38 +206,38 @@ class Shaft:
         d[:3, :3] += lame
         return d
 
-    def harmonic(self, motion: Motion) -> Harmonic:
+    def harmonic(self, harmonic: HarmonicName) -> Harmonic:
         """Matrices, seat averages and rigid motions of one harmonic."""
         n, _, _, _, weight = self._fields
-        around = math.pi if motion == "bending" else 2.0 * math.pi
-        strain = self.strains(motion)
+        around = math.pi if harmonic == "bending" else 2.0 * math.pi
+        strain = self.strains(harmonic)
         stress = np.einsum("st,epti->epsi", self.elasticity, strain)
         size = strain.shape[-1]
         flat = strain.reshape(len(strain), -1, size)
         weighted = (stress * (around * weight)[..., None, None]).reshape(len(strain), -1, size)
         stiffness = flat.transpose(0, 2, 1) @ weighted
         scalar = (n.transpose(0, 2, 1) * (self.material.density * around * weight)[:, None, :]) @ n
-        inertia = {"bending": [2.0, 2.0, 1.0], "torsion": [1.0], "stretching": [1.0, 1.0]}[motion]
-        free = self.free_unknowns(motion)
+        inertia = {"bending": [2.0, 2.0, 1.0], "torsion": [1.0], "stretching": [1.0, 1.0]}[harmonic]
+        free = self.free_unknowns(harmonic)
         gyroscopic = None
-        if motion == "bending":
+        if harmonic == "bending":
             gyroscopic = self._gather(_by_field(scalar, [0.0, 4.0, 1.0]), 3, free)
         return Harmonic(
-            motion=motion,
+            name=harmonic,
             mass=self._gather(_by_field(scalar, inertia), len(inertia), free),
             stiffness=self._gather(stiffness, len(inertia), free),
             gyroscopic=gyroscopic,
-            seats=self._seat_rows(motion)[:, free],
-            rigid=self._rigid(motion)[free],
+            seats=self._seat_rows(harmonic)[:, free],
+            rigid=self._rigid(harmonic)[free],
         )
 
-    def free_unknowns(self, motion: Motion) -> NDArray[np.int64]:
+    def free_unknowns(self, harmonic: HarmonicName) -> Integers:
         """Unknowns that the axis leaves free, numbered field by field within each node."""
         on_axis = self.nodes[0] < SAME
-        held = {"bending": [False, True, True], "torsion": [True], "stretching": [True, False]}[motion]
+        held = {"bending": [False, True, True], "torsion": [True], "stretching": [True, False]}[harmonic]
         return np.flatnonzero(~(on_axis[:, None] & np.array(held)).ravel())
 
-    def _gather(self, blocks: Floats, fields: int, free: NDArray[np.int64]) -> SparseMatrix:
+    def _gather(self, blocks: Floats, fields: int, free: Integers) -> SparseMatrix:
         """Sparse matrix over the free unknowns from one block per element (elements, 9 fields, 9 fields)."""
         dofs = (np.asarray(self.basis.element_dofs).T[:, :, None] * fields + np.arange(fields)).reshape(len(blocks), -1)
         rows = np.broadcast_to(dofs[:, :, None], blocks.shape).ravel()
@@ -301,27 +247,27 @@ class Shaft:
         gathered = whole[free][:, free]
         return scipy.sparse.csr_array(0.5 * (gathered + gathered.T))
 
-    def _rigid(self, motion: Motion) -> Floats:
+    def _rigid(self, harmonic: HarmonicName) -> Floats:
         """Rigid motions over all unknowns, about the origin."""
         r, z = self.nodes
         zero, one = np.zeros_like(r), np.ones_like(r)
-        fields: dict[Motion, list[list[Floats]]] = {
+        fields: dict[HarmonicName, list[list[Floats]]] = {
             "bending": [[one, zero, zero], [z, zero, -r]],
             "torsion": [[r]],
             "stretching": [[zero, one]],
         }
-        motions: list[Floats] = [np.stack(amplitudes, axis=1).ravel() for amplitudes in fields[motion]]
+        motions: list[Floats] = [np.stack(columns, axis=1).ravel() for columns in fields[harmonic]]
         return np.stack(motions, axis=1)
 
-    def _seat_rows(self, motion: Motion) -> Floats:
+    def _seat_rows(self, harmonic: HarmonicName) -> Floats:
         """Seat averages over all unknowns: the rigid motion nearest to the surface's, area by area (RBE3)."""
-        fields = {"bending": 3, "torsion": 1, "stretching": 2}[motion]
+        fields = FIELDS[harmonic]
         rows = []
         for seat, (section, low, high) in zip(self.seats, self._bands, strict=True):
             nodes, weight = self._surface(seat, section, low, high)
             r, arm = self.nodes[0, nodes], self.nodes[1, nodes] - seat.z
             weight = weight / weight.sum()
-            if motion == "bending":
+            if harmonic == "bending":
                 inertia = weight @ (arm**2 + r**2 / 2.0)
                 row, tilt = np.zeros((fields, self.nodes.shape[1])), np.zeros((fields, self.nodes.shape[1]))
                 row[0, nodes] = weight
@@ -329,13 +275,11 @@ class Shaft:
                 rows += [row.T.ravel(), tilt.T.ravel()]
             else:
                 row = np.zeros((fields, self.nodes.shape[1]))
-                row[-1, nodes] = weight * r / (weight @ r**2) if motion == "torsion" else weight
+                row[-1, nodes] = weight * r / (weight @ r**2) if harmonic == "torsion" else weight
                 rows.append(row.T.ravel())
         return np.array(rows).reshape(len(rows), fields * self.nodes.shape[1])
 
-    def _surface(
-        self, seat: SeatBand, section: ShaftSection, low: float, high: float
-    ) -> tuple[NDArray[np.int64], Floats]:
+    def _surface(self, seat: SeatBand, section: ShaftSection, low: float, high: float) -> tuple[Integers, Floats]:
         """Nodes of a seat's surface and their share of its area, by Simpson's rule over each element's edge."""
         r, z = self.nodes
         if seat.width > 0.0:
@@ -367,18 +311,18 @@ class Shaft:
             elements=np.asarray(self.mesh.f2t[0, facets]),
         )
 
-    def displacement(self, motion: Motion, nodes: NDArray[np.int64], shapes: Floats) -> Floats:
+    def displacement(self, harmonic: HarmonicName, nodes: Integers, shapes: Floats) -> Floats:
         """Amplitudes of u_r, u_phi, u_z (nodes, 3, k) at nodes for shapes (free unknowns, k)."""
-        values = self._whole(motion, shapes)[nodes]
+        values = self._whole(harmonic, shapes)[nodes]
         zero = np.zeros_like(values[:, 0])
-        if motion == "bending":
+        if harmonic == "bending":
             a, s, w = values[:, 0], values[:, 1], values[:, 2]
             return np.stack([s + a, s - a, w], axis=1)
-        if motion == "torsion":
+        if harmonic == "torsion":
             return np.stack([zero, values[:, 0], zero], axis=1)
         return np.stack([values[:, 0], zero, values[:, 1]], axis=1)
 
-    def strain_at_edges(self, motion: Motion, elements: NDArray[np.int64], shapes: Floats) -> Floats:
+    def strain_at_edges(self, harmonic: HarmonicName, elements: Integers, shapes: Floats) -> Floats:
         """Strain amplitudes (elements, 6, k) in the middle of elements for shapes (free unknowns, k)."""
         middle = skfem.Basis(
             self.mesh, skfem.ElementQuad2(), quadrature=(np.array([[0.5], [0.5]]), np.ones(1)), elements=elements
@@ -386,66 +330,16 @@ class Shaft:
         values = np.stack([np.broadcast_to(b[0], middle.dx.shape) for b in middle.basis], axis=-1)
         slopes = np.stack([b[0].grad for b in middle.basis], axis=-1)
         radius = np.asarray(middle.global_coordinates())[0]
-        strain = self.strains(motion, (values, slopes[0], slopes[1], radius))[:, 0]
-        local = self._whole(motion, shapes)[np.asarray(self.basis.element_dofs)[:, elements].T]
+        strain = self.strains(harmonic, (values, slopes[0], slopes[1], radius))[:, 0]
+        local = self._whole(harmonic, shapes)[np.asarray(self.basis.element_dofs)[:, elements].T]
         return np.asarray(strain @ local.reshape(len(elements), -1, shapes.shape[1]))
 
-    def _whole(self, motion: Motion, shapes: Floats) -> Floats:
+    def _whole(self, harmonic: HarmonicName, shapes: Floats) -> Floats:
         """Shapes over all unknowns (nodes, fields, k), zero where the axis holds them."""
-        fields = {"bending": 3, "torsion": 1, "stretching": 2}[motion]
+        fields = FIELDS[harmonic]
         values = np.zeros((fields * self.nodes.shape[1], shapes.shape[1]))
-        values[self.free_unknowns(motion)] = shapes
+        values[self.free_unknowns(harmonic)] = shapes
         return values.reshape(self.nodes.shape[1], fields, -1)
-
-
-def locate(sections: Sequence[ShaftSection], seat: SeatBand) -> tuple[ShaftSection, float, float]:
-    """Section under a seat, lower and upper edge (m); neighbours of one diameter count as one.
-
-    Raises
-    ------
-    ShaftError
-        The seat lies outside the shaft or across a step.
-    """
-    ends = np.concatenate([[0.0], np.cumsum([section.length for section in sections])])
-    low, high = seat.z - seat.width / 2.0, seat.z + seat.width / 2.0
-    if low < -SAME or high > ends[-1] + SAME:
-        raise ShaftError(f"seat {seat.name}: it reaches from {low:g} to {high:g} m, the shaft from 0 to {ends[-1]:g} m")
-    under = [
-        section
-        for section, start, end in zip(sections, ends[:-1], ends[1:], strict=True)
-        if (start < high - SAME and end > low + SAME) or (seat.width == 0.0 and start - SAME <= low <= end + SAME)
-    ]
-    if seat.width > 0.0 and len({section.outer_diameter for section in under}) > 1:
-        raise ShaftError(f"seat {seat.name}: a shoulder lies between {low:g} and {high:g} m; move or narrow it")
-    return max(under, key=lambda section: section.outer_diameter), low, high
-
-
-def check_shaft(sections: Sequence[ShaftSection], seats: Sequence[SeatBand], size: MeshSize = STANDARD_SIZE) -> None:
-    """Refuse a shaft before it is meshed.
-
-    Raises
-    ------
-    ShaftError
-        Sections that do not touch each other, seats that do not lie on them, or more elements than memory holds.
-    """
-    _check_sections(tuple(sections))
-    for seat in seats:
-        locate(sections, seat)
-    length, radius = sum(s.length for s in sections), max(s.outer_diameter for s in sections) / 2.0
-    elements = length / size.axial * radius / size.radial
-    if elements > MOST_ELEMENTS:
-        raise ShaftError(
-            f"a shaft of {length:g} m and {2.0 * radius:g} m diameter needs {elements:.0f} elements over its section; "
-            f"{MOST_ELEMENTS} are the most"
-        )
-
-
-def _check_sections(sections: tuple[ShaftSection, ...]) -> None:
-    if not sections:
-        raise ShaftError("a shaft needs at least one section")
-    for number, (left, right) in enumerate(zip(sections[:-1], sections[1:], strict=True), start=1):
-        if min(left.outer_diameter, right.outer_diameter) <= max(left.inner_diameter, right.inner_diameter):
-            raise ShaftError(f"sections {number} and {number + 1} do not touch: the bore of one clears the other")
 
 
 def _by_field(scalar: Floats, factors: Sequence[float]) -> Floats:

@@ -1,10 +1,7 @@
-"""Meshes of solid bodies: second-order hexahedra of turned shafts, tetrahedra by gmsh, files by meshio.
+"""Solids from files: shapes meshed with tetrahedra by gmsh, meshes read by meshio.
 
 Files may come from a stranger. Scripts of gmsh run only where they are permitted to; shapes are read without what
 lies beside them, meshes in formats that refer to no other file.
-
-Every mesh comes out as scikit-fem's `MeshHex2` (27 nodes) or `MeshTet2` (10 nodes). Elements of first order keep their
-straight edges and get nodes in the middle; the displacement is of second order in either case.
 
 gmsh (under the GPL) and meshio are loaded only where used.
 """
@@ -22,22 +19,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import skfem
 
-from exugear.bodies.turned_section import SAME, Shaft
-from fe_ste.elasticity.bricks import skfem_mesh
-from fe_ste.tools.arrays import Floats, Integers
+from exugear.bodies.finite_elements.second_order import CORNERS, SolidError, second_order
 
-CORE = 0.5
-"""Radius of the square core of a solid section over that of its first ring of lines."""
-BULGE = 0.5
-"""How far the sides of the core lean towards a circle: 0 is a square, 1 a circle without corners."""
-_TET_EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
-_HEX_EDGES = np.array([[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]])
-_HEX_FACES = np.array([[0, 4, 7, 3], [1, 2, 6, 5], [0, 1, 5, 4], [3, 7, 6, 2], [0, 3, 2, 1], [4, 5, 6, 7]])
-_HEX_FACE_EDGES = np.array([[3, 8, 7, 11], [1, 9, 5, 10], [0, 9, 4, 8], [2, 11, 6, 10], [0, 1, 2, 3], [4, 5, 6, 7]])
-"""Corners of edges and faces, and edges of faces, in the order of VTK."""
-_CORNERS = {"tetra": 4, "tetra10": 4, "hexahedron": 8, "hexahedron20": 8, "hexahedron27": 8}
 SCRIPT = ".geo"
 """Ending of gmsh scripts. Such a script can run any command of the system."""
 CAD = {".step": "step", ".stp": "step", ".brep": "brep"}
@@ -52,100 +36,6 @@ UNPERMITTED = (
     "EXUGEAR_ALLOW_SCRIPTS=1; a STEP file needs no permission"
 )
 """Why a script is refused, and what would be right."""
-
-
-class SolidError(ValueError):
-    """A solid that cannot be meshed or read, or a seat that does not lie on it."""
-
-
-def turned_hexahedra(shaft: Shaft, around: int = 8) -> Any:
-    """Mesh a turned shaft with hexahedra on the lines of its half-section.
-
-    A section without bore has a square core with bulging sides, which the first ring surrounds; all other rings are
-    those of the half-section. All nodes lie on true circles.
-
-    Parameters
-    ----------
-    shaft : Shaft
-        Its axis is the z axis, its beginning z = 0.
-    around : int
-        Elements around, a multiple of 8. The mass is 0.08 % short with 8, 0.005 % with 16.
-
-    Returns
-    -------
-    skfem.MeshHex2
-
-    Raises
-    ------
-    SolidError
-        `around` is not a multiple of 8.
-    """
-    if around < 8 or around % 8:
-        raise SolidError(f"{around} elements around a shaft: it must be a multiple of 8")
-    corners = np.asarray(shaft.mesh.p)[:, np.asarray(shaft.mesh.t)]
-    radii, heights = (np.unique(np.round(np.asarray(line) / SAME)) * SAME for line in shaft.mesh.p)
-    middle = corners.mean(axis=1)
-    rings, layers = np.searchsorted(radii, middle[0]) - 1, np.searchsorted(heights, middle[1]) - 1
-    on_axis = bool(radii[0] < SAME)
-    points, faces, level = _square_rings(around, len(radii) if on_axis else len(radii) + 1)
-    # Level 0 is the core, level 1 the ring about it: both fill the first cell of the half-section.
-    ring_of = np.maximum(level - 1, 0) if on_axis else level - 2
-    count = len(points)
-    bricks = [
-        np.hstack([faces[ring_of == ring] + count * layer, faces[ring_of == ring] + count * (layer + 1)])
-        for ring, layer in zip(rings, layers, strict=True)
-    ]
-    used, numbers = np.unique(np.concatenate(bricks), return_inverse=True)
-    logical = np.column_stack([points[used % count], heights[used // count]])
-    mesh = skfem.MeshHex2.from_mesh(skfem_mesh(logical, numbers.reshape(-1, 8)))
-    circles = np.concatenate([[0.0], radii[1:]]) if on_axis else np.concatenate([[0.0], radii])
-    return skfem.MeshHex2(_to_circles(np.asarray(mesh.doflocs), circles), mesh.t)
-
-
-def _square_rings(around: int, levels: int) -> tuple[Floats, Integers, Integers]:
-    """Square of logical rings: points (n, 2), faces (f, 4), level (f,) of each face; level 0 is the core.
-
-    A point at the largest coordinate s lies on ring s, and at 45 degrees times the smaller coordinate over s.
-    """
-    side = around // 8
-    core = np.linspace(-1.0, 1.0, 2 * side + 1)
-    x, y = np.meshgrid(core, core, indexing="ij")
-    grid = np.arange(x.size).reshape(x.shape)
-    faces = [np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=-1).reshape(-1, 4)]
-    border = np.concatenate([grid[:-1, 0], grid[-1, :-1], grid[:0:-1, -1], grid[0, :0:-1]])
-    points = [np.stack([x.ravel(), y.ravel()], axis=1)]
-    unit = points[0][border]
-    inner, total = border, x.size
-    for level in range(1, levels):
-        points.append((level + 1.0) * unit)
-        outer = total + np.arange(around)
-        faces.append(np.stack([inner, outer, np.roll(outer, -1), np.roll(inner, -1)], axis=1))
-        inner, total = outer, total + around
-    numbers = np.repeat(np.arange(levels), [len(f) for f in faces])
-    return np.concatenate(points), np.concatenate(faces).astype(np.int64), numbers
-
-
-def _to_circles(logical: Floats, circles: Floats) -> Floats:
-    """Move points (3, n) of the logical square onto circles; `circles` are the radii of rings 1, 2, 3, ..."""
-    x, y, z = logical
-    ring = np.maximum(np.abs(x), np.abs(y))
-    safe = np.where(ring > 0.0, ring, 1.0)
-    sideways = np.abs(x) < np.abs(y)
-    angle = np.pi / 4.0 * np.where(sideways, x, y) / safe * np.sign(np.where(sideways, y, x))
-    direction = np.where(
-        sideways,
-        np.sign(y) * np.array([np.sin(angle), np.cos(angle)]),
-        np.sign(x) * np.array([np.cos(angle), np.sin(angle)]),
-    )
-    square = np.array([x, y]) / safe / np.sqrt(2.0)
-    bulging = CORE * circles[1] * ((1.0 - BULGE * ring) * square + BULGE * ring * direction)
-    inside = ring * bulging
-    edge = CORE * circles[1] * ((1.0 - BULGE) * square + BULGE * direction)
-    share = np.clip(ring - 1.0, 0.0, 1.0)
-    between = (1.0 - share) * edge + share * circles[1] * direction
-    radius = np.interp(ring, 1.0 + np.arange(len(circles)), circles)
-    plane = np.where(ring <= 1.0, inside, np.where(ring <= 2.0, between, radius * direction))
-    return np.vstack([plane, z])
 
 
 def tetrahedra(build: Callable[[Any], None], size: float, curvature: int = 12) -> Any:
@@ -297,11 +187,11 @@ def read_solid(path: Path, unit: float = 1.0) -> Any:
         raise SolidError(f"{path}: meshio cannot read it as {kind} ({error or type(error).__name__})") from None
     solid: dict[str, list[Any]] = {}
     for block in content.cells:
-        if block.type in _CORNERS:
+        if block.type in CORNERS:
             solid.setdefault(block.type, []).append(block.data)
     if len(solid) != 1:
         found = ", ".join(solid or sorted({block.type for block in content.cells})) or "nothing"
-        raise SolidError(f"{path}: found {found}; a solid needs elements of one kind among {', '.join(_CORNERS)}")
+        raise SolidError(f"{path}: found {found}; a solid needs elements of one kind among {', '.join(CORNERS)}")
     kind, blocks = solid.popitem()
     return second_order(unit * np.asarray(content.points), np.concatenate(blocks).astype(np.int64), kind)
 
@@ -365,62 +255,6 @@ class SolidFile:
             raise SolidError(f"{self.path}: no such file")
         how = f"{self.path.suffix.lower()} {self.unit!r} {self.size!r} {self.curvature}"
         return hashlib.sha256(self.path.read_bytes() + how.encode()).digest()
-
-
-def second_order(points: Floats, cells: Integers, kind: str) -> Any:
-    """Mesh of second order from nodes (n, 3), cells (m, k) in the order of VTK, and their kind in meshio's words.
-
-    Raises
-    ------
-    SolidError
-        An element is turned inside out.
-    """
-    corners = cells[:, : _CORNERS[kind]]
-    used, numbers = np.unique(corners, return_inverse=True)
-    numbers = numbers.reshape(corners.shape)
-    tetrahedral = kind.startswith("tetra")
-    straight = _linear_tetrahedra(points[used], numbers) if tetrahedral else skfem_mesh(points[used], numbers)
-    mesh = (skfem.MeshTet2 if tetrahedral else skfem.MeshHex2).from_mesh(straight)
-    places = np.array(mesh.doflocs)
-    first = len(used)
-    edges = points[cells[:, _CORNERS[kind] :]]
-    if kind == "tetra10":
-        _place(places[:, first:], mesh.edges, numbers[:, _TET_EDGES], edges)
-    elif kind in ("hexahedron20", "hexahedron27"):
-        _place(places[:, first:], mesh.edges, numbers[:, _HEX_EDGES], edges[:, :12])
-        first += mesh.edges.shape[1]
-        faces, bodies = edges[:, 12:18], edges[:, 18:19]
-        if kind == "hexahedron20":  # the serendipity element's own place of these, or linear fields are lost
-            ends = points[corners]
-            faces = 0.5 * edges[:, _HEX_FACE_EDGES].sum(axis=2) - 0.25 * ends[:, _HEX_FACES].sum(axis=2)
-            bodies = 0.25 * edges.sum(axis=1, keepdims=True) - 0.25 * ends.sum(axis=1, keepdims=True)
-        _place(places[:, first:], mesh.facets, numbers[:, _HEX_FACES], faces)
-        places[:, first + mesh.facets.shape[1] :] = bodies[:, 0].T
-    found = type(mesh)(places, mesh.t)
-    determinant = found.mapping().detDF(skfem.quadrature.get_quadrature(found.elem(), 4)[0])
-    turned = np.flatnonzero((determinant.min(axis=1) < 0.0) == (determinant.max(axis=1) > 0.0))
-    if turned.size:
-        raise SolidError(f"element {turned[0]} of {len(cells)} is turned inside out; mesh finer where it is curved")
-    return found
-
-
-def _linear_tetrahedra(points: Floats, cells: Integers) -> Any:
-    return skfem.MeshTet(np.ascontiguousarray(points.T), np.ascontiguousarray(cells.T))
-
-
-def entity_numbers(entities: Integers, corners: Integers) -> Integers:
-    """Numbers (m,) of edges or faces, given by corners (m, c) in any order, among all of a mesh (c, n)."""
-    known, asked = np.sort(np.asarray(entities), axis=0).T, np.sort(corners, axis=1)
-    _, label = np.unique(np.concatenate([known, asked]), axis=0, return_inverse=True)
-    label = label.ravel()
-    number = np.empty(label.max() + 1, dtype=np.int64)
-    number[label[: len(known)]] = np.arange(len(known))
-    return number[label[len(known) :]]
-
-
-def _place(places: Floats, entities: Integers, own: Integers, wanted: Floats) -> None:
-    """Put the nodes (3, ...) of edges or faces, (corners, n), where elements (m, e, corners) want them (m, e, 3)."""
-    places[:, entity_numbers(entities, own.reshape(-1, own.shape[2]))] = wanted.reshape(-1, 3).T
 
 
 def _library(name: str) -> Any:

@@ -1,0 +1,156 @@
+"""The elastic bodies of a gearbox: all that are elastic, reduced, with the rigid inertia of an inertia set.
+
+The mass of a body that turns comes from its shape and the blanks on it. What the body's inertia set says beyond that
+(or short of it) is spread over the rigid part of the motion, so that an elastic body accelerates and orbits exactly as
+the rigid one does and only its deformation is new. A fixed body has no inertia set: its mass is that of its solid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+
+from exugear.bearings.supports import elastic_names
+from exugear.bodies.finite_elements.second_order import SolidError
+from exugear.bodies.finite_elements.shaft_sections import ShaftError, check_shaft
+from exugear.bodies.floating import FloatingBody, load_or_reduce_floating, with_inertia
+from exugear.bodies.of_gearbox.shafts import TORQUE_SEAT, shaft_model, solid_of_shaft
+from exugear.bodies.of_gearbox.solids import solid_body
+from exugear.bodies.reduced_body import ReducedBody, ReductionError, RigidInertia
+from exugear.bodies.reduction import with_rigid_inertia
+from exugear.bodies.solids import SolidModel, load_or_reduce_solid, reduce_solid
+from exugear.bodies.turned_shaft import ShaftModel, load_or_reduce_shaft, reduce_shaft
+from exugear.model.gearbox import Gearbox
+from exugear.model.parts import Body
+
+
+@dataclass(frozen=True)
+class ElasticBody:
+    """A reduced body of a gearbox.
+
+    Attributes
+    ----------
+    reduced : with the rigid inertia of the body's inertia set
+    shape_inertia : rigid inertia of shape and blanks by themselves
+    main_seat : seat whose spin stands for the body: where torques act, else the first gear
+    sectors : seats on equal sectors by internal gear, an odd number, the first about +x, then on towards +y
+    shared_seats : seat that a second bearing sits on, by the bearing
+    floating : its modes in a frame that floats with it, for a body that moves so in Exudyn
+    """
+
+    reduced: ReducedBody
+    shape_inertia: RigidInertia
+    main_seat: str
+    sectors: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    shared_seats: Mapping[str, str] = field(default_factory=dict)
+    floating: FloatingBody | None = None
+
+    def __repr__(self) -> str:
+        """Reduced body and how it takes part, in one line."""
+        more = f", {len(self.sectors)} gears on sectors" if self.sectors else ""
+        frame = ", floating frame" if self.floating is not None else ""
+        return f"<ElasticBody of {self.reduced!r}: main seat {self.main_seat}{more}{frame}>"
+
+
+def reduced_bodies(
+    gearbox: Gearbox, inertias: str, folder: Path | None = None, begin: Callable[[str], None] | None = None
+) -> dict[str, ElasticBody]:
+    """Reduce all elastic bodies of a gearbox, or take them from where they are stored.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    inertias : str
+        Inertia set whose rigid inertias the bodies get that turn.
+    folder : Path, optional
+        Folder of a results folder in which reductions are stored; only the process remembers them otherwise.
+    begin : callable, optional
+        Called with the name of each body before it is reduced.
+
+    Raises
+    ------
+    CaseError
+        A shape or solid that cannot be, or that its gears and bearings do not fit on.
+    """
+    bodies = {}
+    for name in elastic_names(gearbox):
+        if begin is not None:
+            begin(name)
+        bodies[name] = _elastic_body(gearbox, gearbox.body(name, inertias), folder)
+    return bodies
+
+
+def _elastic_body(gearbox: Gearbox, body: Body, folder: Path | None) -> ElasticBody:
+    section = gearbox.case.bodies[body.family]
+    solid = None if section.solid is None else solid_body(gearbox, body.name)
+    key = "shape" if solid is None else "solid"
+    model = shaft_model(gearbox, body.name) if solid is None else solid.model
+    floating = None
+    try:
+        if section.flexibility == "ffrf":
+            of_shape, floating = _floating(_Hashed(model), folder)
+        else:
+            of_shape = _reduced(_Hashed(model), folder)
+    except (ShaftError, SolidError, ReductionError) as error:
+        raise gearbox.fault(f"bodies.{body.family}.{key}: {error}") from None
+    wanted = RigidInertia(body.mass, (*body.axis, body.centre_of_mass_z), body.transverse, body.axial)
+    reduced = of_shape if body.fixed else with_rigid_inertia(of_shape, wanted)
+    floating = None if floating is None else with_inertia(floating, wanted)
+    inertia = of_shape.rigid_inertia
+    if solid is not None:
+        return ElasticBody(reduced, inertia, solid.main_seat, solid.sectors, solid.shared_seats, floating)
+    seats = [seat.name for seat in of_shape.seats]
+    return ElasticBody(reduced, inertia, TORQUE_SEAT if TORQUE_SEAT in seats else seats[0], floating=floating)
+
+
+def check_elastic_body(gearbox: Gearbox, name: str) -> None:
+    """Refuse an elastic body before its finite elements are made.
+
+    Raises
+    ------
+    CaseError
+        A shape or solid that cannot be, a solid whose file is not there, seats that do not fit.
+    """
+    family = gearbox.body(name).family
+    if gearbox.case.bodies[family].solid is not None:
+        solid_body(gearbox, name)
+        return
+    model = shaft_model(gearbox, name)
+    if not model.seats:
+        raise gearbox.fault(
+            f"bodies.{family}.shape: nothing sits on the body; give it a gear, a bearing or torque_z_mm"
+        )
+    try:
+        check_shaft(model.sections, model.seats)
+    except ShaftError as error:
+        raise gearbox.fault(f"bodies.{family}.shape: {error}") from None
+
+
+class _Hashed:
+    """A model of a body by its key, so that it can be looked up."""
+
+    def __init__(self, model: ShaftModel | SolidModel) -> None:
+        self.model = model
+        self.key = model.key
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Hashed) and self.key == other.key
+
+    def __hash__(self) -> int:
+        return hash(self.key)
+
+
+@lru_cache(maxsize=64)
+def _reduced(hashed: _Hashed, folder: Path | None) -> ReducedBody:
+    model = hashed.model
+    if isinstance(model, SolidModel):
+        return reduce_solid(model) if folder is None else load_or_reduce_solid(model, folder)
+    return reduce_shaft(model) if folder is None else load_or_reduce_shaft(model, folder)
+
+
+@lru_cache(maxsize=16)
+def _floating(hashed: _Hashed, folder: Path | None) -> tuple[ReducedBody, FloatingBody]:
+    model = hashed.model
+    return load_or_reduce_floating(model if isinstance(model, SolidModel) else solid_of_shaft(model), folder)

@@ -1,0 +1,103 @@
+"""Turned shafts of a gearbox: shapes from its file, seats where gears and bearings sit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from exugear.bearings.supports import mounts_at_work
+from exugear.bodies.finite_elements.shaft_sections import MeshSize, SeatBand, ShaftSection
+from exugear.bodies.finite_elements.solid_seats import SolidSeat
+from exugear.bodies.finite_elements.turned_hexahedra import turned_hexahedra
+from exugear.bodies.finite_elements.turned_section import Shaft
+from exugear.bodies.of_gearbox.sections import blank_of, frame_of, material_of, seat_width
+from exugear.bodies.solids import SolidModel
+from exugear.bodies.turned_shaft import ShaftModel
+from exugear.model.gearbox import Gearbox
+from exugear.model.parts import Body
+from exugear.model.sections.bodies import ShapeSection
+
+TORQUE_SEAT = "torque"
+"""Name of the seat where torques and couplings act."""
+SOLID_SIZE = MeshSize(0.05, 0.05, 1)
+"""Elements of a shaft as a solid: frequencies of its normal modes come out up to 0.6 % too high."""
+
+
+def shaft_model(gearbox: Gearbox, name: str) -> ShaftModel:
+    """All that the reduction of a body's shaft depends on.
+
+    Raises
+    ------
+    CaseError
+        The body has no shape, or a shape that its gears and bearings do not fit on.
+    """
+    body = gearbox.body(name)
+    shape = gearbox.case.bodies[body.family].shape
+    if shape is None:
+        raise gearbox.fault(f"bodies.{body.family}: no shape; give a [bodies.{body.family}.shape] table")
+    if frame_of(gearbox, body) == "carrier":
+        raise gearbox.fault(f"bodies.{body.family}.shape: the body carries planets; give a .solid table instead")
+    start = shape.start_z_mm * 1e-3
+    seats = tuple(SeatBand(seat, z - start, width) for seat, z, width in _seats(gearbox, body, shape))
+    names = [seat.name for seat in seats]
+    doubled = next((seat for seat in names if names.count(seat) > 1), None)
+    if doubled is not None:
+        raise gearbox.fault(f"bodies.{body.family}: a gear and a bearing on it are both named {doubled!r}; rename one")
+    key = f"bodies.{body.family}.shape"
+    unknown = next((blank for blank in shape.blanks if blank not in names), None)
+    if unknown is not None:
+        raise gearbox.fault(f"{key}.blanks.{unknown}: no such seat; seats are {', '.join(names)}")
+    return ShaftModel(
+        name=name,
+        sections=tuple(
+            ShaftSection(s.length_mm * 1e-3, s.outer_diameter_mm * 1e-3, s.inner_diameter_mm * 1e-3)
+            for s in shape.sections
+        ),
+        material=material_of(shape.material),
+        origin=(*body.axis, start),
+        seats=seats,
+        blanks={seat: blank_of(blank) for seat, blank in shape.blanks.items()},
+        band=gearbox.case.elasticity.band_Hz,
+        limit=gearbox.case.elasticity.limit_Hz,
+    )
+
+
+def _seats(gearbox: Gearbox, body: Body, shape: ShapeSection) -> Iterator[tuple[str, float, float]]:
+    """Name, z and width (m) of each seat."""
+    for gear, z in body.wheels.items():
+        yield gear, z, gearbox.gears[gear].face_width
+    for bearing in gearbox.bearings:
+        if body.name in (bearing.body, bearing.on):
+            yield bearing.name, bearing.position[2], seat_width(bearing)
+    for mount in mounts_at_work(gearbox):
+        if mount.body == body.name:
+            yield mount.name, mount.position[2], 0.0
+    if shape.torque_z_mm is not None:
+        yield TORQUE_SEAT, shape.torque_z_mm * 1e-3, 0.0
+
+
+def solid_of_shaft(model: ShaftModel, size: MeshSize = SOLID_SIZE) -> SolidModel:
+    """Return the same shaft as a solid of hexahedra with the same seats.
+
+    Raises
+    ------
+    exugear.bodies.finite_elements.shaft_sections.ShaftError
+        A shaft that cannot be, or a seat that does not lie on it.
+    """
+    shaft = Shaft(model.sections, model.material, model.seats, size)
+    seats = []
+    x, y, z = model.origin
+    for seat in model.seats:
+        section = shaft.section_under(seat)
+        hole = section.inner_diameter / 2.0 if seat.width == 0.0 else 0.0
+        seats.append(SolidSeat(seat.name, (x, y, z + seat.z), section.outer_diameter / 2.0, seat.width, hole))
+    return SolidModel(
+        name=model.name,
+        mesh=turned_hexahedra(shaft).translated(model.origin),
+        material=model.material,
+        seats=tuple(seats),
+        frame="nonrotating",
+        band=model.band,
+        limit=model.limit,
+        blanks=model.blanks,
+        axis=(x, y),
+    )

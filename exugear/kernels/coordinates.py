@@ -1,0 +1,22 @@
+"""Coordinates of bodies, as all compiled laws read them: what each is, and where it stands among a body's six.
+
+Coordinates are those of Exudyn's ``NodeRigidBodyRxyz``: translations x, y, z of the body's node (m), tilts a and b
+(rad) about x and about the tilted y, and the unwrapped spin about the body's own z axis (rad), so that its axes
+are turned by Rx(a) Ry(b) Rz(spin). All are zero in the reference state. Rates are the time derivatives of the
+coordinates. Generalized forces are conjugate to them: N for translations, N m for angles.
+
+A body has all six one after the other, or its spin alone; the ground has none. So has each seat of an elastic body,
+which a mesh or a bearing takes for a rigid body. Laws that allow for missing coordinates give them the index -1; in
+the arrays of the compiled solver they point to a coordinate that stays zero.
+"""
+
+from __future__ import annotations
+
+AXIAL = 2
+"""Translation along z, behind those along x and y."""
+TILT = 3
+"""First of the two tilts; the other one follows."""
+SPIN = 5
+"""Spin about the body's axis."""
+BODY_SIZE = 6
+"""Coordinates of a body or a seat."""

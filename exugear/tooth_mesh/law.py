@@ -1,0 +1,93 @@
+"""What a mesh law has to say: the data it reads, its rows, its stiffness, and the numbers of its compiled form."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from exugear.kernels.meshes import periodic_cubic
+from exugear.model.gearbox import Gearbox
+from exugear.model.parts import Mesh
+from exugear.tooth_mesh.placement import line_of_action_row
+from fe_ste.tools.arrays import Floats
+from fe_ste.transmission_error.surface import SteSurface
+
+MeshData = ArrayLike | SteSurface
+"""What a law knows of a pair: stiffness over the mesh cycle (N/m), or the table's surface."""
+Angles = Literal["reference", "operating"]
+
+
+@dataclass(frozen=True)
+class TableFlanks:
+    """What the law `table` needs of a mesh beyond its rows.
+
+    Attributes
+    ----------
+    surface : SteSurface of the loaded flank
+    back, back_misalignment : (12,) rows of the other flank's deflection and misalignment
+    backlash : approach from flank to flank along the transverse line of action, m
+    back_phase : PMC of the other flank at zero angles
+    damping_time : damping over tangent stiffness, s
+    """
+
+    surface: SteSurface
+    back: Floats
+    back_misalignment: Floats
+    backlash: float
+    back_phase: float
+    damping_time: float
+
+
+class Law:
+    """A mesh law with a force; what it does not say otherwise is as along the line of action.
+
+    Attributes
+    ----------
+    form : number of the law's compiled form in `exugear.tooth_mesh.laws.forms`
+    """
+
+    form: ClassVar[int]
+
+    def read(self, gearbox: Gearbox, pair: str, directory: Path) -> Floats | SteSurface:
+        """Read or compute what the law knows of a pair.
+
+        Parameters
+        ----------
+        gearbox : Gearbox
+        pair : str
+        directory : Path
+            Results folder with ``tables/<pair>.nc``, for laws that need tables.
+
+        Raises
+        ------
+        MeshError
+            A table is missing, holds unsolved positions, or was computed from another input.
+        """
+        raise NotImplementedError
+
+    def rows(self, mesh: Mesh, flank: int, nodes: tuple[Floats, Floats], angles: Angles) -> tuple[Floats, Floats]:
+        """Deflection row and force row (12,) about the two bodies' nodes."""
+        row = line_of_action_row(mesh, flank, nodes)
+        return row, row
+
+    def samples(self, data: MeshData, mesh: Mesh, static_force: float) -> Floats:
+        """F_bt over STE along the line of action (n,), N/m, over the mesh cycle; at the static force (N)."""
+        return np.atleast_1d(np.asarray(data, dtype=np.float64))
+
+    def stiffness(self, mesh: Mesh, line_of_action: Floats, angles: Angles) -> tuple[Floats, float]:
+        """Stiffness (n,) in the law's own coordinate, N/m, from that of `samples`; F_bt per scalar force of the law."""
+        return line_of_action, 1.0
+
+    def coefficients(self, stiffness: Floats) -> Floats:
+        """Numbers (n, 4) that the compiled form reads over n equal pieces of the mesh cycle."""
+        return periodic_cubic(stiffness)
+
+    def table_flanks(
+        self, mesh: Mesh, flank: int, nodes: tuple[Floats, Floats], phase: float, data: MeshData, time: float
+    ) -> TableFlanks | None:
+        """Both flanks' tables of a law that follows one, with damping time (s) and PMC at zero angles."""
+        return None

@@ -1,0 +1,21 @@
+"""Mesh law `constant`: as `line_of_action` with the mean of the table's stiffness."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from exugear.model.parts import Mesh
+from exugear.tooth_mesh.law import Angles
+from exugear.tooth_mesh.laws.line_of_action import LineOfAction
+from fe_ste.tools.arrays import Floats
+
+
+class Constant(LineOfAction):
+    """Mean stiffness over the mesh cycle."""
+
+    def stiffness(self, mesh: Mesh, line_of_action: Floats, angles: Angles) -> tuple[Floats, float]:
+        """Mean of F_bt over STE, (1,), N/m."""
+        return np.array([np.mean(line_of_action)]), 1.0
+
+
+LAW = Constant()

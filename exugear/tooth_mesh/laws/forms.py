@@ -1,0 +1,151 @@
+"""Compiled forces of all meshes: the form that each mesh's law has, chosen by its number, on one geometry.
+
+A law whose force depends on the deflection along a row and on pmc is one branch in `row_law`; forces, tangents, energy
+and powers follow for both solvers. The law `table` depends on where the gears stand as well and has forms of its own.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from exugear.kernels.meshes import (
+    CYCLE_POWER,
+    DAMPED_POWER,
+    DEFLECTION,
+    ENERGY,
+    FORCE,
+    FRAME,
+    OTHER_POWER,
+    OUTSIDE,
+    PMC,
+    RATE,
+    ROW_SIZE,
+    SPIN_1,
+    STATE_SIZE,
+    STIFFNESS,
+    MeshArrays,
+    mesh_pmc,
+    net_deflection,
+    rate_gradient,
+    relative_spin,
+    row_dot,
+    turn_rows,
+)
+from exugear.kernels.table_law import NOMINAL_DEFLECTION
+from exugear.tooth_mesh.laws.line_of_action import stiffness_law
+from exugear.tooth_mesh.laws.table import TABLE_FORM, add_table_tangent, table_force
+from fe_ste.tools.arrays import Floats
+from fe_ste.tools.compilation import compiled, kernel
+
+
+@kernel
+def row_law(
+    form: int, coefficients: Floats, pieces: int, delta: float, pmc: float, cycling: float
+) -> tuple[float, float, float, float, float]:
+    """Elastic force of a law along a row; results as of `stiffness_law`, which is the form of most laws."""
+    return stiffness_law(coefficients, pieces, delta, pmc, cycling)
+
+
+@compiled
+def row_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, out: Floats, acting: Floats) -> None:
+    """Fill the state of a mesh with a law along a row, as in `mesh_state`, and its negative generalized force (13,)."""
+    gradient, turning, bend = np.empty(ROW_SIZE), np.empty(ROW_SIZE), np.empty(2)
+    index = meshes.coordinates[m]
+    # What deflects, and how fast.
+    delta = meshes.table.nominal[m, NOMINAL_DEFLECTION]
+    delta += net_deflection(q, m, meshes, meshes.deflection[m], 1.0, gradient, turning, bend)
+    rate = row_dot(index, gradient, v)
+    pmc = mesh_pmc(q, m, meshes)
+    cycling = meshes.cycles[m] * relative_spin(v, index, 0)
+    # The law, and its damper beside it.
+    elastic, k, _, energy, cycle_power = row_law(
+        meshes.form[m], meshes.stiffness[m], meshes.pieces[m], delta, pmc, cycling
+    )
+    force = elastic + meshes.damping[m] * rate
+    # It acts along a row of its own, which for most laws is that of the deflection.
+    net_deflection(q, m, meshes, meshes.force[m], 1.0, acting, turning, bend)
+    out[DEFLECTION], out[RATE], out[PMC], out[STIFFNESS] = delta, rate, pmc - math.floor(pmc), k
+    out[FORCE] = force * meshes.line_of_action[m]
+    out[ENERGY] = energy
+    out[DAMPED_POWER] = meshes.damping[m] * rate * rate
+    out[CYCLE_POWER] = cycle_power
+    out[OTHER_POWER] = force * (row_dot(index, acting, v) - rate)
+    out[OUTSIDE] = 0.0
+    acting *= force
+
+
+@compiled
+def add_row_tangent(q: Floats, v: Floats, m: int, meshes: MeshArrays, jq: Floats, jv: Floats) -> None:
+    """Add the derivatives of the negative force of a mesh with a law along a row, (13, 13)."""
+    gradient, turning, bend = np.empty(ROW_SIZE), np.empty(ROW_SIZE), np.empty(2)
+    acting, acting_turning = np.empty(ROW_SIZE), np.empty(ROW_SIZE)
+    slope = np.empty(ROW_SIZE)
+    index = meshes.coordinates[m]
+    delta = meshes.table.nominal[m, NOMINAL_DEFLECTION]
+    delta += net_deflection(q, m, meshes, meshes.deflection[m], 1.0, gradient, turning, bend)
+    elastic, k, by_pmc, _, _ = row_law(
+        meshes.form[m], meshes.stiffness[m], meshes.pieces[m], delta, mesh_pmc(q, m, meshes), 0.0
+    )
+    c = meshes.damping[m]
+    force = elastic + c * row_dot(index, gradient, v)
+    # Slope of the scalar force: of the damper's rate, of the deflection, and of pmc by both its angles.
+    rate_gradient(v, index, turning, bend, slope)
+    slope *= c
+    slope += k * gradient
+    slope[SPIN_1] += by_pmc * meshes.cycles[m]
+    slope[FRAME] -= by_pmc * meshes.cycles[m]
+    # Product rule: the row times the force's slope, and the row's own turning times the force.
+    net_deflection(q, m, meshes, meshes.force[m], 1.0, acting, acting_turning, bend)
+    for i in range(ROW_SIZE):
+        for j in range(ROW_SIZE):
+            jq[i, j] += acting[i] * slope[j]
+            jv[i, j] += acting[i] * c * gradient[j]
+    turn_rows(acting_turning, bend, force, jq)
+
+
+@compiled
+def add_mesh_forces(q: Floats, v: Floats, meshes: MeshArrays, f: Floats) -> None:
+    """Add the generalized forces of all meshes to f, shape of q."""
+    state, acting = np.empty(STATE_SIZE), np.empty(ROW_SIZE)
+    for m in range(meshes.coordinates.shape[0]):
+        if meshes.form[m] == TABLE_FORM:
+            table_force(q, v, m, meshes, state, acting)
+        else:
+            row_force(q, v, m, meshes, state, acting)
+        index = meshes.coordinates[m]
+        for i in range(ROW_SIZE):
+            if index[i] >= 0:
+                f[index[i]] -= acting[i]
+
+
+@compiled
+def add_mesh_jacobian(q: Floats, v: Floats, meshes: MeshArrays, jq: Floats, jv: Floats) -> None:
+    """Add d f/dq and d f/dv of `add_mesh_forces` to jq and jv, each (n, n)."""
+    local_q, local_v = np.empty((ROW_SIZE, ROW_SIZE)), np.empty((ROW_SIZE, ROW_SIZE))
+    for m in range(meshes.coordinates.shape[0]):
+        local_q[:] = 0.0
+        local_v[:] = 0.0
+        if meshes.form[m] == TABLE_FORM:
+            for side in (1, -1):
+                add_table_tangent(q, v, m, side, meshes, local_q, local_v)
+        else:
+            add_row_tangent(q, v, m, meshes, local_q, local_v)
+        index = meshes.coordinates[m]
+        for i in range(ROW_SIZE):
+            for j in range(ROW_SIZE):
+                if index[i] >= 0 and index[j] >= 0:
+                    jq[index[i], index[j]] -= local_q[i, j]
+                    jv[index[i], index[j]] -= local_v[i, j]
+
+
+@compiled
+def mesh_state(q: Floats, v: Floats, meshes: MeshArrays, out: Floats) -> None:
+    """Fill (m, 10): what each mesh does; columns as named in `exugear.kernels.meshes`."""
+    acting = np.empty(ROW_SIZE)
+    for m in range(meshes.coordinates.shape[0]):
+        if meshes.form[m] == TABLE_FORM:
+            table_force(q, v, m, meshes, out[m], acting)
+        else:
+            row_force(q, v, m, meshes, out[m], acting)

@@ -1,0 +1,398 @@
+"""Mesh law `table`: the potential of a pair's table over deflection, centre distance and misalignment.
+
+The potential (`exugear.kernels.table_law`) depends on the deflection delta, on the centre distance a and on the
+misalignment gamma, each a row of the same coordinates. The generalized force is
+
+    f = -(F d delta/dq + U_a da/dq + U_gamma d gamma/dq).
+
+Teeth are apart in the backlash; beyond it the other flank touches. A table is that of the flank s = +1; the flank
+s = -1 is it turned by pi about the line of centres: the same table with misalignment reversed. Two forms of the force
+stand here, `table_force` with its tangent, and `fast_table_force` for the compiled solver, which tests hold together.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from exugear.kernels.fast_meshes import (
+    ALONG_DEFLECTION,
+    ALONG_FORCE,
+    DISSIPATED,
+    ELASTIC,
+    LAST_DEFLECTION,
+    LAST_OUTSIDE,
+    LAST_RATE,
+    OF_VARYING_STIFFNESS,
+    TABLE_FORCE,
+    Meshes,
+    MeshMemory,
+    mesh_row,
+    subtract_wheel_errors,
+)
+from exugear.kernels.meshes import (
+    CYCLE_POWER,
+    DAMPED_POWER,
+    DEFLECTION,
+    ENERGY,
+    FORCE,
+    FRAME,
+    OUTSIDE,
+    PMC,
+    RATE,
+    ROW_SIZE,
+    SPIN_1,
+    SPIN_2,
+    STIFFNESS,
+    MeshArrays,
+    frame_row,
+    gear_position,
+    mesh_pmc,
+    net_deflection,
+    rate_gradient,
+    relative_spin,
+    row_dot,
+    turn_rows,
+)
+from exugear.kernels.table_law import (
+    FORCE_DERIVATIVES,
+    LAW_BY_DISTANCE,
+    LAW_BY_MISALIGNMENT,
+    LAW_BY_PMC,
+    LAW_FORCE,
+    LAW_OUTSIDE,
+    LAW_POTENTIAL,
+    LAW_STIFFNESS,
+    NOMINAL_DEFLECTION,
+    NOMINAL_DISTANCE,
+    NOMINAL_MISALIGNMENT,
+    ORDERS,
+    TableArrays,
+    scratch_memory,
+    surface_law,
+    surface_tangent,
+)
+from exugear.model.gearbox import Gearbox
+from exugear.model.parts import Mesh
+from exugear.tooth_mesh.element import MeshElement
+from exugear.tooth_mesh.law import Law, MeshData, TableFlanks
+from exugear.tooth_mesh.placement import MeshError, ToothContact, line_of_action_row, position_rows
+from exugear.tooth_mesh.tables import fitting_table, table_path
+from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.compilation import compiled, kernel
+from fe_ste.transmission_error.surface import InterpolationError, SteSurface, axis_weights, slope_axis_weights
+from fe_ste.transmission_error.table import TableError
+
+TABLE_FORM = 1
+
+
+class Table(Law):
+    """The whole table of a pair, both flanks."""
+
+    form = TABLE_FORM
+
+    def read(self, gearbox: Gearbox, pair: str, directory: Path) -> Floats | SteSurface:
+        """Surface through a pair's table over all axes, which must have been computed from exactly this case."""
+        try:
+            return SteSurface.from_table(fitting_table(gearbox, pair, directory, grid=True).dataset)
+        except TableError as error:
+            raise MeshError(f"pair {pair}: {error} (exugear ste --grid)") from None
+        except InterpolationError as error:
+            raise MeshError(f"pair {pair}: {table_path(directory, pair)}: {error}") from None
+
+    def samples(self, data: MeshData, mesh: Mesh, static_force: float) -> Floats:
+        """Mean stiffness of the table at the static load, (1,), N/m: for damping and for linear models."""
+        mean = _surface_of(mesh, data).mean_stiffness(abs(static_force), mesh.centre_distance)
+        return np.atleast_1d(np.asarray(mean, dtype=np.float64))
+
+    def table_flanks(
+        self, mesh: Mesh, flank: int, nodes: tuple[Floats, Floats], phase: float, data: MeshData, time: float
+    ) -> TableFlanks | None:
+        """Surface of the loaded flank, and rows, phase and distance of the other one."""
+        pair = mesh.pair.with_centre_distance(mesh.centre_distance)
+        orientation = ToothContact(mesh, flank, 1).orientation(phase)
+        return TableFlanks(
+            surface=_surface_of(mesh, data),
+            back=line_of_action_row(mesh, -flank, nodes),
+            back_misalignment=position_rows(mesh, -flank, nodes)[1],
+            backlash=pair.circumferential_backlash * math.cos(pair.working_pressure_angle),
+            back_phase=ToothContact(mesh, -flank, 1).pmc(orientation) % 1.0,
+            damping_time=time,
+        )
+
+
+def _surface_of(mesh: Mesh, data: MeshData) -> SteSurface:
+    if not isinstance(data, SteSurface):
+        raise MeshError(f"pair {mesh.pair.name}: the law table needs its table, not a stiffness")
+    return data
+
+
+@compiled
+def flank_of(side: int, m: int, meshes: MeshArrays) -> tuple[Floats, Floats, float, float, float]:
+    """Rows of deflection and misalignment, deflection at zero coordinates, phase and cycles of one flank (1, -1)."""
+    table = meshes.table
+    deflection = table.nominal[m, NOMINAL_DEFLECTION]
+    if side > 0:
+        return meshes.deflection[m], table.misalignment[m], deflection, meshes.phase[m], meshes.cycles[m]
+    # The other flank closes when the loaded one opens by the backlash, and its cycle runs the other way.
+    offset = -deflection - table.backlash[m]
+    return table.back[m], table.back_misalignment[m], offset, table.back_phase[m], -meshes.cycles[m]
+
+
+@compiled
+def table_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, out: Floats, acting: Floats) -> None:
+    """Fill the state of a mesh with a table, as in `mesh_state`, and its generalized force, negative (13,)."""
+    table, memory = meshes.table, scratch_memory()
+    gradient, turning, bend = np.empty(ROW_SIZE), np.empty(ROW_SIZE), np.empty(2)
+    index, axis = meshes.coordinates[m], meshes.axis[m]
+    centre = gear_position(q, m, meshes, table.centre[m], table.nominal[m, NOMINAL_DISTANCE])
+    spin, cycling = relative_spin(q, index, 0), relative_spin(v, index, 0)
+    pmc = mesh_pmc(q, m, meshes)
+    out[:] = 0.0
+    acting[:] = 0.0
+    out[PMC] = pmc - math.floor(pmc)
+    for side in (1, -1):
+        row, misalignment_row, offset, phase, cycles = flank_of(side, m, meshes)
+        delta = offset + net_deflection(q, m, meshes, row, float(side), gradient, turning, bend)
+        rate = row_dot(index, gradient, v)
+        if side > 0:
+            out[DEFLECTION], out[RATE] = delta, rate
+        # Most of the time one flank is far away: nothing of its table needs to be read.
+        if delta <= table.lowest[m]:
+            continue
+        # The table is that of the flank +1: on the other one it is seen from the other end of the gear.
+        sense = side * table.sense[m]
+        misalignment = sense * gear_position(q, m, meshes, misalignment_row, table.nominal[m, NOMINAL_MISALIGNMENT])
+        pmc = phase + cycles * spin
+        surface_law(delta, pmc, centre, misalignment, m, table, 0, ORDERS.shape[0], memory)
+        law = memory.law
+        # Damping goes with the tangent stiffness, so that it fades as the teeth part.
+        damping = table.damping_time[m] * law[LAW_STIFFNESS]
+        force = law[LAW_FORCE] + damping * rate
+        for i in range(ROW_SIZE):
+            acting[i] += force * gradient[i]
+        # Push between the axes and moment of misalignment, as one row.
+        push = law[LAW_BY_DISTANCE] * table.centre[m] + law[LAW_BY_MISALIGNMENT] * sense * misalignment_row
+        frame_row(q, index, axis, push, gradient, turning)
+        for i in range(ROW_SIZE):
+            acting[i] += gradient[i]
+        out[STIFFNESS] += law[LAW_STIFFNESS]
+        out[FORCE] += side * force
+        out[ENERGY] += law[LAW_POTENTIAL]
+        out[DAMPED_POWER] += damping * rate * rate
+        out[CYCLE_POWER] -= law[LAW_BY_PMC] * cycles * cycling
+        out[OUTSIDE] = max(out[OUTSIDE], law[LAW_OUTSIDE])
+
+
+@compiled
+def add_table_tangent(q: Floats, v: Floats, m: int, side: int, meshes: MeshArrays, jq: Floats, jv: Floats) -> None:
+    """Add the derivatives of the negative force of one flank of a mesh with a table, (13, 13)."""
+    table, memory = meshes.table, scratch_memory()
+    index, axis = meshes.coordinates[m], meshes.axis[m]
+    row, misalignment_row, offset, phase, cycles = flank_of(side, m, meshes)
+    # Gradients of the four arguments of the law: delta, centre distance, misalignment, pmc.
+    gradients, slopes = np.zeros((4, ROW_SIZE)), np.zeros((4, ROW_SIZE))
+    turning, bend, changing = np.empty(ROW_SIZE), np.empty(2), np.empty(ROW_SIZE)
+    delta = offset + net_deflection(q, m, meshes, row, float(side), gradients[0], turning, bend)
+    if delta <= table.lowest[m]:
+        return
+    centre = table.nominal[m, NOMINAL_DISTANCE] + frame_row(q, index, axis, table.centre[m], gradients[1], changing)
+    sense = side * table.sense[m]
+    tilting = sense * misalignment_row
+    misalignment = sense * table.nominal[m, NOMINAL_MISALIGNMENT]
+    misalignment += frame_row(q, index, axis, tilting, gradients[2], changing)
+    pmc = phase + cycles * relative_spin(q, index, 0)
+    gradients[3, SPIN_1], gradients[3, FRAME] = cycles, -cycles
+    piece, t = surface_law(delta, pmc, centre, misalignment, m, table, 0, ORDERS.shape[0], memory)
+    if t < 0.0:
+        return
+    second = np.empty((4, 4))
+    surface_tangent(t, piece, m, table, memory, second)
+    law, time = memory.law, table.damping_time[m]
+    rate = row_dot(index, gradients[0], v)
+    # Slopes of F, U_a and U_gamma over the coordinates, by the chain rule; those of the damping go with F.
+    for a in range(3):
+        for b in range(4):
+            slopes[a] += second[a, b] * gradients[b]
+    rate_gradient(v, index, turning, bend, changing)
+    for b in range(4):
+        slopes[0] += time * rate * second[3, b] * gradients[b]
+    slopes[0] += time * law[LAW_STIFFNESS] * changing
+    for a in range(3):
+        for i in range(ROW_SIZE):
+            for j in range(ROW_SIZE):
+                jq[i, j] += gradients[a, i] * slopes[a, j]
+    for i in range(ROW_SIZE):
+        for j in range(ROW_SIZE):
+            jv[i, j] += time * law[LAW_STIFFNESS] * gradients[0, i] * gradients[0, j]
+    # The rows turn with the frame: second derivatives of all three times what acts along them.
+    turn_rows(turning, bend, law[LAW_FORCE] + time * law[LAW_STIFFNESS] * rate, jq)
+    bend[:] = 0.0
+    push = law[LAW_BY_DISTANCE] * table.centre[m] + law[LAW_BY_MISALIGNMENT] * tilting
+    frame_row(q, index, axis, push, gradients[0], turning)
+    turn_rows(turning, bend, 1.0, jq)
+
+
+@kernel
+def fast_flank_force(
+    q: Floats,
+    v: Floats,
+    m: int,
+    side: int,
+    centre: float,
+    count: int,
+    meshes: Meshes,
+    c: float,
+    s: float,
+    memory: MeshMemory,
+    energy: Floats,
+) -> float:
+    """Add the negative generalized force of one flank (1, -1) of a mesh with a table to `memory.gradient`.
+
+    Its scalar force is returned; with more derivatives asked for (`count`) than a force needs, energy and powers are
+    added to `energy`, columns as in `exugear.kernels.fast_meshes`. c and s are those of the frame's angle.
+    """
+    table, index, axis = meshes.table, meshes.coordinates[m], meshes.axis[m]
+    gradient, total = memory.gradient[ALONG_DEFLECTION], memory.gradient[TABLE_FORCE]
+    deflection = table.nominal[m, NOMINAL_DEFLECTION]
+    if side > 0:
+        row, misalignment_row, offset = meshes.deflection[m], table.misalignment[m], deflection
+        phase, cycles, number = meshes.phase[m], meshes.cycles[m], 0
+    else:
+        row, misalignment_row, offset = table.back[m], table.back_misalignment[m], -deflection - table.backlash[m]
+        phase, cycles, number = table.back_phase[m], -meshes.cycles[m], 1
+    delta, rate = mesh_row(q, v, index, axis, row, c, s, gradient)
+    less, slower = subtract_wheel_errors(q, v, m, float(side), meshes, gradient)
+    delta, rate = delta + offset + less, rate + slower
+    if side > 0:
+        memory.states[m, LAST_DEFLECTION], memory.states[m, LAST_RATE] = delta, rate
+    if delta <= table.lowest[m]:
+        return 0.0
+    sense = side * table.sense[m]
+    misalignment = sense * table.nominal[m, NOMINAL_MISALIGNMENT]
+    # Gears with their spin alone neither move apart nor tilt.
+    spinning = meshes.spinning[m] == 1
+    if not spinning:
+        misalignment += sense * mesh_row(q, v, index, axis, misalignment_row, c, s, memory.gradient[ALONG_FORCE])[0]
+    pmc = phase + cycles * (q[index[SPIN_1]] - q[index[FRAME]])
+    # From step to step the load stays on a piece: the search begins where it ended.
+    guess = memory.pieces[m, number]
+    piece, _ = surface_law(delta, pmc, centre, misalignment, m, table, guess, count, memory.law)
+    memory.pieces[m, number] = piece
+    law = memory.law.law
+    damping = table.damping_time[m] * law[LAW_STIFFNESS]
+    force: float = law[LAW_FORCE] + damping * rate
+    for i in range(ROW_SIZE):
+        total[i] += force * gradient[i]
+    if not spinning:
+        for i in range(FRAME):
+            memory.row[i] = (
+                law[LAW_BY_DISTANCE] * table.centre[m, i] + law[LAW_BY_MISALIGNMENT] * sense * misalignment_row[i]
+            )
+        mesh_row(q, v, index, axis, memory.row, c, s, memory.gradient[ALONG_FORCE])
+        for i in range(ROW_SIZE):
+            total[i] += memory.gradient[ALONG_FORCE, i]
+    memory.states[m, LAST_OUTSIDE] = max(memory.states[m, LAST_OUTSIDE], law[LAW_OUTSIDE])
+    if count > FORCE_DERIVATIVES:
+        energy[ELASTIC] += law[LAW_POTENTIAL]
+        energy[DISSIPATED] += damping * rate * rate
+        energy[OF_VARYING_STIFFNESS] -= law[LAW_BY_PMC] * cycles * (v[index[SPIN_1]] - v[index[FRAME]])
+    return force
+
+
+@kernel
+def fast_table_force(
+    q: Floats,
+    v: Floats,
+    m: int,
+    count: int,
+    meshes: Meshes,
+    c: float,
+    s: float,
+    memory: MeshMemory,
+    energy: Floats,
+) -> float:
+    """Fill `memory.gradient` with the negative generalized force of a mesh with a table; F_bt is returned.
+
+    Parameters as of `fast_flank_force`.
+    """
+    table = meshes.table
+    memory.gradient[TABLE_FORCE, :] = 0.0
+    memory.states[m, LAST_OUTSIDE] = 0.0
+    centre = table.nominal[m, NOMINAL_DISTANCE]
+    if meshes.spinning[m] == 0:
+        index, gradient = meshes.coordinates[m], memory.gradient[ALONG_FORCE]
+        centre += mesh_row(q, v, index, meshes.axis[m], table.centre[m], c, s, gradient)[0]
+    force = 0.0
+    for side in (1, -1):
+        force += side * fast_flank_force(q, v, m, side, centre, count, meshes, c, s, memory, energy)
+    return force
+
+
+def pack_tables(elements: tuple[MeshElement, ...], index: Integers, averaged: bool, linear: bool) -> TableArrays:
+    """Arrays of all tables; those of gears that stay where they are hold that place only."""
+    by_mesh = [
+        None if linear else _surface(element, row, averaged) for element, row in zip(elements, index, strict=True)
+    ]
+    surfaces = [surface for surface in by_mesh if surface is not None]
+    count = len(elements)
+    size = max((s.coefficients.size for s in surfaces), default=0)
+    loads = max((s.root_force.size for s in surfaces), default=0)
+    longest = max((len(knots) for s in surfaces for knots in (s.centre_distance, s.misalignment)), default=0)
+    arrays = TableArrays(
+        shape=np.zeros((count, 4), dtype=np.int64),
+        axes=np.zeros((count, 2), dtype=np.int64),
+        values=np.zeros((count, size)),
+        root=np.zeros((count, loads)),
+        knots=np.zeros((count, 2, longest)),
+        first_node=np.zeros((count, 2, longest), dtype=np.int64),
+        weights=np.zeros((count, 2, longest, 4, 4)),
+        lowest=np.zeros(count),
+        centre=np.array([e.centre for e in elements]).reshape(count, FRAME),
+        misalignment=np.array([e.misalignment for e in elements]).reshape(count, FRAME),
+        back=np.zeros((count, FRAME)),
+        back_misalignment=np.zeros((count, FRAME)),
+        nominal=np.array([e.offset + [0.0, e.mesh.centre_distance, 0.0] for e in elements]).reshape(count, 3),
+        backlash=np.zeros(count),
+        back_phase=np.zeros(count),
+        damping_time=np.zeros(count),
+        sense=np.array([e.flank for e in elements], dtype=np.float64),
+    )
+    for m, (element, surface) in enumerate(zip(elements, by_mesh, strict=True)):
+        if surface is not None and element.table is not None:
+            _fill_table(arrays, m, element.table, surface)
+    return arrays
+
+
+def _surface(element: MeshElement, row: Integers, averaged: bool) -> SteSurface | None:
+    if element.table is None:
+        return None
+    surface = element.table.surface
+    if np.all(np.delete(row[:FRAME], [SPIN_1, SPIN_2]) < 0):
+        surface = surface.at_nominal(element.mesh.centre_distance)
+    return surface.averaged() if averaged else surface
+
+
+def _fill_table(arrays: TableArrays, m: int, flanks: TableFlanks, surface: SteSurface) -> None:
+    flat = np.ascontiguousarray(surface.coefficients).ravel()
+    arrays.shape[m] = surface.coefficients.shape[:4]
+    arrays.values[m, : flat.size] = flat
+    arrays.root[m, : surface.root_force.size] = surface.root_force
+    axes = (surface.centre_distance, axis_weights), (surface.misalignment, slope_axis_weights)
+    for axis, (knots, weights_of) in enumerate(axes):
+        first_node, weights = weights_of(knots)
+        arrays.axes[m, axis] = len(knots)
+        arrays.knots[m, axis, : len(knots)] = knots
+        arrays.first_node[m, axis, : len(first_node)] = first_node
+        arrays.weights[m, axis, : len(first_node)] = weights
+    step = 1 if surface.misalignment.size == 1 else 2
+    unloaded = surface.coefficients[:, :, ::step, 0, 0]
+    arrays.lowest[m] = unloaded.min() - np.ptp(unloaded)  # weights may carry the surface below its nodes
+    arrays.back[m], arrays.back_misalignment[m] = flanks.back, flanks.back_misalignment
+    arrays.backlash[m], arrays.back_phase[m] = flanks.backlash, flanks.back_phase
+    arrays.damping_time[m] = flanks.damping_time
+
+
+LAW = Table()

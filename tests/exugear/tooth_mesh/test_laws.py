@@ -1,0 +1,79 @@
+"""Mesh laws: one table of all, which the rest of the program and its documents go by; what a form must fulfil."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from exugear.dynamics.assemble import assemble
+from exugear.model.gearbox import Gearbox
+from exugear.tooth_mesh.laws.forms import row_law
+from exugear.tooth_mesh.laws.line_of_action import STIFFNESS_FORM
+from exugear.tooth_mesh.laws.registry import LAWS, law_of
+from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear.tooth_mesh.laws.table import TABLE_FORM
+from exugear.tooth_mesh.placement import MeshError
+
+from ..table_case import surfaces
+
+GUIDE = Path(__file__).parents[3] / "docs" / "user_guide.md"
+WITH_FORCE = [name for name, law in LAWS.items() if law.has_force]
+ALONG_A_ROW = [name for name in WITH_FORCE if law_of(name).form != TABLE_FORM]
+SAMPLES = 3e9 * (1.0 + 0.1 * np.sin(2.0 * np.pi * np.arange(12) / 12.0))
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_the_user_guide_says_of_a_law_what_the_table_says(name: str) -> None:
+    law = LAWS[name]
+    shown = f"`{name}` (default)" if name == "line_of_action" else f"`{name}`"
+    tables = "needed, best with `--grid`" if law.needs_axes else "needed" if law.needs_tables else ""
+    assert f"| {shown} | {law.description} | {tables} |".replace("|  |", "| |") in GUIDE.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", ["rigid", "springs"])
+def test_what_has_no_force_is_refused_with_the_laws_that_have_one(name: str) -> None:
+    with pytest.raises(MeshError, match=rf"mesh law '{name}' has no force element; laws are {', '.join(WITH_FORCE)}"):
+        law_of(name)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_a_law_that_needs_tables_asks_for_their_folder(grc: Gearbox, name: str) -> None:
+    if LAWS[name].needs_tables:
+        with pytest.raises(MeshError, match=f"mesh law '{name}' needs STE tables"):
+            mesh_stiffness(grc, name)
+    else:
+        assert len(mesh_stiffness(grc, name)) == (len(grc.pairs) if LAWS[name].has_force else 0)
+
+
+@pytest.mark.parametrize("name", ALONG_A_ROW)
+def test_force_tangent_and_energy_of_a_form_belong_together(name: str) -> None:
+    """Force is the slope of the energy, the tangent that of the force; pmc likewise; against finite differences."""
+    law = law_of(name)
+    coefficients = law.coefficients(SAMPLES)
+
+    def at(delta: float, pmc: float) -> np.ndarray:
+        return np.array(row_law(law.form, coefficients, len(coefficients), delta, pmc, 50.0))
+
+    for delta in (-20e-6, 5e-6, 30e-6):
+        force, tangent, by_pmc, _, cycle_power = at(delta, 0.3)
+        step, pmc_step = 1e-9, 1e-5
+        by_delta = (at(delta + step, 0.3) - at(delta - step, 0.3)) / (2.0 * step)
+        over_cycle = (at(delta, 0.3 + pmc_step) - at(delta, 0.3 - pmc_step)) / (2.0 * pmc_step)
+        assert by_delta[3] == pytest.approx(force, rel=1e-6)
+        assert by_delta[0] == pytest.approx(tangent, rel=1e-6)
+        assert over_cycle[0] == pytest.approx(by_pmc, rel=1e-6, abs=1e-9 * abs(force))
+        assert -50.0 * over_cycle[3] == pytest.approx(cycle_power, rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", WITH_FORCE)
+def test_linear_models_have_the_form_of_a_stiffness_and_no_table(grc: Gearbox, stiffness: dict, name: str) -> None:
+    data = surfaces(grc) if LAWS[name].needs_axes else stiffness
+    assembly = assemble(grc, "rigid", data, name)
+    assert set(assembly.meshes.form) == {law_of(name).form}
+    linear = assembly.linear_meshes()
+    assert set(linear.form) == {STIFFNESS_FORM}
+    assert not linear.table.shape.any()
+    means = [element.stiffness.mean() for element in assembly.elements]
+    assert linear.stiffness[:, 0, 0] == pytest.approx(means, rel=1e-14)
