@@ -10,7 +10,7 @@ import html
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from exugear.bodies.elastic_body import ElasticBody
 from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies
@@ -20,7 +20,6 @@ from exugear.dynamics.modes import Modes, eigenmodes
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.named_files import NOTHING_MORE, Permissions
-from exugear.report.writer import Report, write_report
 from exugear.results.folder import bodies_folder, keep_case, kept_case, modes_path, time_noted
 from exugear.results.run_file import FINAL_NAME
 from exugear.runs.outcome import Run
@@ -31,6 +30,9 @@ from exugear.tooth_mesh.laws.registry import LAWS
 from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.tooth_mesh.tables import TableRequest, missing_tables, requested_tables
 from fe_ste.transmission_error.table import MeshTable
+
+if TYPE_CHECKING:
+    from exugear.report.writer import Report
 
 
 @dataclass(frozen=True)
@@ -205,6 +207,8 @@ class Project:
 
     def report(self, near: float | None = None, tell: Callable[[str], None] | None = None) -> Report:
         """Write the report of all that the folder holds: see `exugear.report.writer.write_report`."""
+        from exugear.report.writer import write_report  # what draws, which a run needs not
+
         with time_noted(self.folder, "report"):
             return write_report(self.folder, near, tell, self.gearbox.permissions.below)
 

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import os
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from exugear.cli.console import note
 from exugear.cli.errors import BadInputError, model_errors
-from exugear.cli.options import MeshLaw, Variant
+from exugear.cli.options import Variant
 
 if TYPE_CHECKING:
+    from exugear.model.choice import Choice
     from exugear.model.gearbox import Gearbox
+    from exugear.project import Project
 
 
 def read_gearbox(case: Path, files_below: Path | None = None, scripts: bool = False, *, tell: bool = True) -> Gearbox:
@@ -41,12 +40,20 @@ def check_files_below(folder: Path | None) -> None:
         raise BadInputError(f"--files-below {folder}: no such folder; name one that the gearbox file may read from")
 
 
-def results_folder(case: Path, out: Path | None, make: bool = True) -> Path:
-    """Return the folder that a verb writes into; make it unless told not to."""
-    folder = out or Path("results") / case.resolve().parent.name
-    if make:
-        make_results_folder(folder)
-    return folder
+def open_project(
+    case: Path,
+    choice: Choice,
+    out: Path | None,
+    files_below: Path | None,
+    scripts: bool,
+) -> Project:
+    """Read a gearbox file and refuse choices that it does not have, or may not have; write nothing."""
+    from exugear.project import Project, default_folder
+
+    gearbox = read_gearbox(case, files_below, scripts)
+    folder = out or default_folder(case)
+    check_choice(gearbox, choice, folder)
+    return Project(gearbox, folder, choice)
 
 
 def make_results_folder(folder: Path) -> None:
@@ -59,14 +66,7 @@ def make_results_folder(folder: Path) -> None:
         raise BadInputError(f"--out {folder}: not writable; name another folder")
 
 
-def check_choices(
-    gearbox: Gearbox,
-    variant: Variant,
-    law: MeshLaw,
-    inertias: str | None,
-    folder: Path,
-    load_case: str | None = None,
-) -> None:
+def check_choice(gearbox: Gearbox, choice: Choice, folder: Path) -> None:
     """Refuse what the gearbox does not have, or may not do, before anything is written into the results folder."""
     from exugear.bodies.of_gearbox.solids import check_solids
     from exugear.dynamics.readiness import lacking
@@ -74,27 +74,16 @@ def check_choices(
     from exugear.tooth_mesh.laws.registry import LAWS
 
     with model_errors():
-        gearbox.bodies(inertias)
-        if load_case is not None and load_case not in gearbox.load_cases:
+        gearbox.bodies(choice.inertias)
+        if choice.load_case is not None and choice.load_case not in gearbox.load_cases:
             known = ", ".join(gearbox.load_cases) or "none"
-            raise gearbox.fault(f"no load case {load_case!r}; load cases are {known}")
-        reason = lacking(gearbox, variant.value)
+            raise gearbox.fault(f"no load case {choice.load_case!r}; load cases are {known}")
+        reason = lacking(gearbox, choice.variant)
         if reason:
-            raise gearbox.fault(f"variant {variant}: {reason}")
-        if variant is Variant.flexible:
+            raise gearbox.fault(f"variant {choice.variant}: {reason}")
+        if choice.variant == Variant.flexible:
             check_solids(gearbox, bodies_folder(folder))
-    if not LAWS[law].has_force and variant is not Variant.rigid:
-        raise BadInputError(f"--mesh-law {law}: its gears only roll, which needs the variant rigid, not {variant}")
-
-
-@contextmanager
-def time_noted(folder: Path, step: str) -> Iterator[None]:
-    """Write into the results folder how long a step took, if it ended well."""
-    from exugear.results.folder import note_time
-
-    start = time.perf_counter()
-    yield
-    try:
-        note_time(folder, step, time.perf_counter() - start)
-    except OSError as error:  # the work itself is done
-        note(f"The time that it took is not noted: {error}", style="yellow")
+    if not LAWS[choice.mesh_law].has_force and choice.variant != Variant.rigid:
+        raise BadInputError(
+            f"--mesh-law {choice.mesh_law}: its gears only roll, which needs the variant rigid, not {choice.variant}"
+        )

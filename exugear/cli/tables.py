@@ -3,36 +3,29 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from exugear.cli.case import time_noted
 from exugear.cli.console import note, progress_bar
 from exugear.cli.errors import BadInputError, FailedError, interruption, model_errors
-from exugear.cli.options import MeshLaw
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
-    from exugear.model.gearbox import Gearbox
+    from exugear.project import Project
     from exugear.tooth_mesh.tables import TableRequest
     from fe_ste.transmission_error.table import MeshTable
 
 
-def compute_missing_tables(gearbox: Gearbox, folder: Path, law: MeshLaw) -> None:
-    """Compute the tables that a law needs and that are not there or belong to another input."""
-    from exugear.results.folder import keep_case
-    from exugear.tooth_mesh.laws.registry import LAWS
-    from exugear.tooth_mesh.tables import missing_tables
+def compute_missing_tables(project: Project) -> None:
+    """Compute the tables that the mesh law needs and that are not there or belong to another input."""
+    from exugear.results.folder import time_noted
 
-    requests = []
-    if LAWS[law].needs_tables:
-        with model_errors():
-            requests = missing_tables(gearbox, folder, grid=LAWS[law].needs_axes)
-    keep_case(gearbox, folder)
+    with model_errors():
+        requests = project.missing_tables()
+    project.keep_case()
     for request in requests:
-        note(request.replaces or f"{request.name}: no table in {folder}; it is computed first")
-    with time_noted(folder, "tables, computed before dynamics") if requests else nullcontext():
+        note(request.replaces or f"{request.name}: no table in {project.folder}; it is computed first")
+    with time_noted(project.folder, "tables, computed before dynamics") if requests else nullcontext():
         tables = compute_tables(requests)
     failures = [f"{name}: {line}" for name, table in tables.items() for line in table.failures]
     if failures:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from exugear.cli.case import check_choices, read_gearbox, results_folder, time_noted
+from exugear.cli.case import make_results_folder, open_project
 from exugear.cli.console import note, print_json, print_table, say
 from exugear.cli.dynamics import compute_modes, label_of
 from exugear.cli.errors import exit_codes
@@ -41,12 +41,14 @@ def modes(
     Tables that are missing or do not fit the case are computed first.
     """
     with exit_codes():
-        gearbox = read_gearbox(case, files_below, scripts)
-        check_choices(gearbox, variant, mesh_law, inertias, results_folder(case, out, make=False))
-        folder = results_folder(case, out)
-        compute_missing_tables(gearbox, folder, mesh_law)
-        with time_noted(folder, f"modes, {variant}, {inertias or gearbox.case.default_inertias}, {mesh_law}"):
-            found, path = compute_modes(gearbox, folder, variant.value, mesh_law.value, inertias)
+        from exugear.model.choice import Choice
+        from exugear.results.folder import time_noted
+
+        project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
+        make_results_folder(project.folder)
+        compute_missing_tables(project)
+        with time_noted(project.folder, f"modes, {variant}, {project.choice.inertias}, {mesh_law}"):
+            found, path = compute_modes(project), project.modes_path
             picture = _draw_campbell(found, path)
         rows = _mode_summaries(found)
         if found.growth_rate > 0.0:

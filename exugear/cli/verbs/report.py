@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from exugear.cli.case import check_files_below, time_noted
+from exugear.cli.case import check_files_below
 from exugear.cli.console import note, print_json, print_table, progress_bar, say
 from exugear.cli.errors import BadInputError, exit_codes
 from exugear.cli.options import FilesBelowOption, JsonOption
@@ -29,6 +29,7 @@ def report(
     with exit_codes():
         from exugear.model.reading import CaseError
         from exugear.report.writer import ReportError, write_report
+        from exugear.results.folder import time_noted
 
         check_files_below(files_below)
         if not folder.is_dir():

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from exugear.cli.case import check_choices, read_gearbox, results_folder, time_noted
+from exugear.cli.case import make_results_folder, open_project
 from exugear.cli.console import note, print_json, progress_bar, say
 from exugear.cli.dynamics import reduce_elastic_bodies
 from exugear.cli.errors import (
@@ -27,7 +27,6 @@ from exugear.cli.options import (
     InertiasOption,
     JsonOption,
     LawOption,
-    MeshLaw,
     OutOption,
     ScriptsOption,
     Variant,
@@ -37,8 +36,9 @@ from exugear.cli.tables import compute_missing_tables
 
 if TYPE_CHECKING:
     from exugear.model.gearbox import Gearbox
-    from exugear.runs.outcome import Progress as RunProgress
-    from exugear.runs.outcome import Run
+    from exugear.model.parts import LoadCase
+    from exugear.project import Project
+    from exugear.runs.outcome import Progress, Run
 
 
 class Solver(StrEnum):
@@ -86,52 +86,49 @@ def run(
     """
     with exit_codes():
         from exugear.model.choice import Choice
-        from exugear.runs.run_folder import refuse_if_busy, refuse_to_resume, run_directory
+        from exugear.results.folder import time_noted
 
-        gearbox = read_gearbox(case, files_below, scripts)
-        loads = load_case or next(iter(gearbox.load_cases), "")
-        check_choices(gearbox, variant, mesh_law, inertias, results_folder(case, out, make=False), loads)
-        _check_freedom(gearbox)
-        _check_extent(gearbox, variant, mesh_law, loads, duration, out or Path("results"))
-        _check_solver(gearbox, variant, solver)
+        choice = Choice(variant.value, mesh_law.value, inertias, load_case)
+        project = open_project(case, choice, out, files_below, scripts)
+        _check_freedom(project.gearbox)
+        _check_extent(project, duration, out or Path("results"))
+        _check_solver(project.gearbox, variant, solver)
         _check_mesh_route(mesh_route, variant, solver)
-        inertias = inertias or gearbox.case.default_inertias
-        folder = results_folder(case, out, make=not resume)
-        directory = run_directory(folder, Choice(variant.value, mesh_law.value, inertias, loads))
-        refuse_if_busy(directory)
-        if resume and (reason := refuse_to_resume(directory)):
-            raise BadInputError(f"--resume: {reason}; run without it")
-        _tell_doubts(gearbox, loads)
-        compute_missing_tables(gearbox, folder, mesh_law)
-        route = ", meshes as loads" if mesh_route is MeshRoute.loads else ""
-        with time_noted(folder, f"run, {variant}, {loads}, {inertias}, {mesh_law}, solver {solver}{route}"):
-            finished = _simulate(
-                gearbox,
-                folder,
-                variant.value,
-                mesh_law.value,
-                inertias,
-                loads,
-                solver.value,
-                mesh_route.value,
-                duration,
-                resume,
-            )
+        if not resume:
+            make_results_folder(project.folder)
+        _check_run_directory(project.run_directory, resume)
+        _tell_doubts(project)
+        compute_missing_tables(project)
+        with time_noted(project.folder, _label_of(project, solver, mesh_route)):
+            finished = _simulate(project, resume, solver=solver.value, mesh_route=mesh_route.value, duration=duration)
         _tell_run(case, finished, as_json)
 
 
-def _check_extent(
-    gearbox: Gearbox, variant: Variant, law: MeshLaw, load_case: str, duration: float | None, folder: Path
-) -> None:
+def _load_case(project: Project) -> LoadCase:
+    """Load case of the run, which is there unless the file has none."""
+    if project.choice.load_case is None:
+        raise BadInputError(project.gearbox.fault("no load case ''; load cases are none"))
+    return project.gearbox.load_cases[project.choice.load_case]
+
+
+def _label_of(project: Project, solver: Solver, route: MeshRoute) -> str:
+    """Name of a run in the account of times."""
+    choice = project.choice
+    label = f"run, {choice.variant}, {choice.load_case}, {choice.inertias}, {choice.mesh_law}, solver {solver}"
+    return f"{label}, meshes as loads" if route is MeshRoute.loads else label
+
+
+def _check_extent(project: Project, duration: float | None, folder: Path) -> None:
     """Refuse a simulated time that is too short, or whose results do not fit on the disk."""
     from exugear.runs.extent import check_disk, check_duration, sample_bytes
     from exugear.tooth_mesh.laws.registry import LAWS
 
-    supports = gearbox.joints if variant is Variant.rigid else gearbox.bearings
-    size = sample_bytes(len(gearbox.meshes), len(supports), LAWS[law].signals_positions)
+    gearbox, load_case = project.gearbox, _load_case(project)
+    supports = gearbox.joints if project.choice.variant == Variant.rigid else gearbox.bearings
+    size = sample_bytes(len(gearbox.meshes), len(supports), LAWS[project.choice.mesh_law].signals_positions)
     with model_errors():
-        check_duration(gearbox, gearbox.load_cases[load_case], duration)
-        check_disk(gearbox, gearbox.load_cases[load_case], folder, duration, sample_bytes=size)
+        check_duration(gearbox, load_case, duration)
+        check_disk(gearbox, load_case, folder, duration, sample_bytes=size)
 
 
 def _check_solver(gearbox: Gearbox, variant: Variant, solver: Solver) -> None:
@@ -171,62 +168,46 @@ def _check_freedom(gearbox: Gearbox) -> None:
         )
 
 
-def _tell_doubts(gearbox: Gearbox, load_case: str) -> None:
+def _check_run_directory(directory: Path, resume: bool) -> None:
+    """Refuse a run that another process is at work on, and one to go on with that cannot be gone on with."""
+    from exugear.runs.run_folder import refuse_if_busy, refuse_to_resume
+
+    refuse_if_busy(directory)
+    if resume and (reason := refuse_to_resume(directory)):
+        raise BadInputError(f"--resume: {reason}; run without it")
+
+
+def _tell_doubts(project: Project) -> None:
     """Say what looks like the wrong sign of a torque."""
     from exugear.loads.summary import doubts_about, summarise_loads
 
+    load_case = _load_case(project)
     with model_errors():
-        doubts = doubts_about(summarise_loads(gearbox, gearbox.load_cases[load_case]))
+        doubts = doubts_about(summarise_loads(project.gearbox, load_case))
     for doubt in doubts:
-        note(f"load_cases.{load_case}: {doubt}", style="yellow")
+        note(f"load_cases.{load_case.name}: {doubt}", style="yellow")
 
 
-def _simulate(
-    gearbox: Gearbox,
-    folder: Path,
-    variant: str,
-    law: str,
-    inertias: str,
-    load_case: str,
-    solver: Literal["compiled", "exudyn"],
-    mesh_route: Literal["element", "loads"],
-    duration: float | None,
-    resume: bool,
-) -> Run:
-    """Run a load case behind a progress bar."""
-    from exugear.model.choice import Choice
+def _simulate(project: Project, resume: bool, **options: Any) -> Run:
+    """Run the load case behind a progress bar; options as those of `exugear.runs.runup.simulate`."""
     from exugear.runs.outcome import LimitError, RunError
-    from exugear.runs.run_folder import refuse_to_resume, run_directory
-    from exugear.runs.runup import simulate
-    from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+    from exugear.runs.run_folder import refuse_to_resume
 
-    choice = Choice(variant, law, inertias, load_case)
-    directory = run_directory(folder, choice)
+    directory, variant = project.run_directory, project.choice.variant
     if not resume and not refuse_to_resume(directory):
         note(f"{directory}: a stopped run is begun anew; --resume would have gone on from it")
-    bodies = reduce_elastic_bodies(gearbox, folder, variant, inertias)
+    reduce_elastic_bodies(project)
     with progress_bar() as bar:
         task = bar.add_task(f"{variant}: start in balance", total=None)
 
-        def show(at: RunProgress) -> None:
+        def show(at: Progress) -> None:
             interruption.check()
             text = f"{variant}: {at.simulated:.2f} of {at.total:g} s, {at.speed:.2f} simulated s per s"
             bar.update(task, completed=at.simulated, total=at.total, description=text)
 
         try:
             with model_errors():
-                return simulate(
-                    gearbox,
-                    choice,
-                    mesh_stiffness(gearbox, law, folder),
-                    folder,
-                    bodies=bodies,
-                    duration=duration,
-                    solver=solver,
-                    mesh_route=mesh_route,
-                    resume=resume,
-                    progress=show,
-                )
+                return project.run(resume=resume, progress=show, **options)
         except LimitError as error:
             return error.run
         except RunError as error:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from exugear.cli.case import make_results_folder, read_gearbox, time_noted
+from exugear.cli.case import make_results_folder, read_gearbox
 from exugear.cli.console import note, print_json, print_table, progress_bar, say
 from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption
 from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption, OutOption
@@ -68,6 +68,7 @@ def ste(
     """
     with exit_codes():
         from exugear.pictures.tables import draw_curves
+        from exugear.results.folder import time_noted
         from exugear.tooth_mesh.tables import stored_tables
 
         gearbox = read_gearbox(case, files_below)
@@ -91,10 +92,11 @@ def _requested_tables(
     gearbox: Gearbox, case: Path, out: Path | None, names: list[str], positions: int | None, grid: bool
 ) -> tuple[list[TableRequest], Path]:
     from exugear.model.reading import CaseError
+    from exugear.project import default_folder
     from exugear.results.folder import keep_case
     from exugear.tooth_mesh.tables import requested_tables
 
-    folder = out or Path("results") / case.resolve().parent.name
+    folder = out or default_folder(case)
     try:
         requests = requested_tables(gearbox, folder, names, positions, grid)
     except CaseError as error:
@@ -114,10 +116,11 @@ def _compute_references(
 ) -> None:
     """Run the reference analysis of the pairs and report; each position is kept as soon as it is solved."""
     from exugear.model.reading import CaseError
-    from exugear.results.folder import keep_case
+    from exugear.project import default_folder
+    from exugear.results.folder import keep_case, time_noted
     from exugear.tooth_mesh.reference_tables import requested_references, summarise_reference
 
-    folder = out or Path("results") / case.resolve().parent.name
+    folder = out or default_folder(case)
     try:
         requests = requested_references(gearbox, folder, names, positions)
     except CaseError as error:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from exugear.cli.case import check_choices, read_gearbox, results_folder
+from exugear.cli.case import make_results_folder, open_project
 from exugear.cli.console import note, print_json, say
 from exugear.cli.dynamics import compute_modes, label_of
 from exugear.cli.errors import BadInputError, exit_codes
@@ -47,14 +47,15 @@ def view(
 ) -> None:
     """Show the gearbox and its modes in three dimensions: a web page that stands alone, and pictures."""
     with exit_codes():
-        gearbox = read_gearbox(case, files_below, scripts)
-        check_choices(gearbox, variant, mesh_law, inertias, results_folder(case, out, make=False))
-        folder = results_folder(case, out)
-        compute_missing_tables(gearbox, folder, mesh_law)
-        found, path = compute_modes(gearbox, folder, variant.value, mesh_law.value, inertias)
-        wanted = gearbox.case.report.reference_frequency_Hz if near is None else near
+        from exugear.model.choice import Choice
+
+        project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
+        make_results_folder(project.folder)
+        compute_missing_tables(project)
+        found = compute_modes(project)
+        wanted = project.gearbox.case.report.reference_frequency_Hz if near is None else near
         first = int(found.overall.argmax()) if wanted is None else found.nearest(wanted)
-        written = _draw_modes(found, path.parent, first, animation)
+        written = _draw_modes(found, project.modes_path.parent, first, animation)
         if as_json:
             print_json({"case": str(case), "mode": first + 1, "files": [str(file) for file in written]})
             return

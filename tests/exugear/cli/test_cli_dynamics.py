@@ -172,7 +172,7 @@ def test_a_run_that_fails_ends_with_code_1(case, monkeypatch):
     def failing(*arguments, **options):
         raise RunError("the state is not finite at t = 0.1 s")
 
-    monkeypatch.setattr("exugear.runs.runup.simulate", failing)
+    monkeypatch.setattr("exugear.project.simulate", failing)
     outcome = iso("run", case, "--variant", "rigid")
     assert outcome.exit_code == 1
     assert "Failed: the state is not finite" in outcome.stderr
@@ -188,7 +188,7 @@ def test_ctrl_c_keeps_the_run_and_resume_ends_it_as_if_nothing_had_been(case, mo
 
     duration = ("--variant", "rigid", "--duration", 0.6)
     with monkeypatch.context() as patch:
-        patch.setattr("exugear.runs.runup.simulate", interrupted)
+        patch.setattr("exugear.project.simulate", interrupted)
         stopped = iso("run", case, *duration)
     assert stopped.exit_code == 130
     assert "--resume" in stopped.stderr
