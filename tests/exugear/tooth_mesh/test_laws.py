@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from exugear.dynamics.assemble import assemble
+from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.tooth_mesh.laws.forms import row_law
 from exugear.tooth_mesh.laws.line_of_action import STIFFNESS_FORM
@@ -70,7 +71,7 @@ def test_force_tangent_and_energy_of_a_form_belong_together(name: str) -> None:
 @pytest.mark.parametrize("name", WITH_FORCE)
 def test_linear_models_have_the_form_of_a_stiffness_and_no_table(grc: Gearbox, stiffness: dict, name: str) -> None:
     data = surfaces(grc) if LAWS[name].needs_axes else stiffness
-    assembly = assemble(grc, "rigid", data, name)
+    assembly = assemble(grc, Choice("rigid", name), data)
     assert set(assembly.meshes.form) == {law_of(name).form}
     linear = assembly.linear_meshes()
     assert set(linear.form) == {STIFFNESS_FORM}
