@@ -17,7 +17,7 @@ from exugear.dynamics.signals import signal_layout
 from exugear.kernels.connectors import connector_load, connector_motion
 from exugear.kernels.elastic import elastic_energies, scratch_for
 from exugear.kernels.inertia import kinetic_energies
-from exugear.kernels.meshes import STATE_SIZE
+from exugear.kernels.meshes import DEFLECTION, ENERGY, FORCE, OUTSIDE, STATE_SIZE
 from exugear.kernels.turning import turning_energies, turning_memory
 from exugear.model.sections.entries import GROUND
 from exugear.tooth_mesh.laws.forms import mesh_state
@@ -44,7 +44,7 @@ def sampled(assembly: Assembly, q: np.ndarray, v: np.ndarray) -> np.ndarray:
             centre, misalignment = assembly.gear_positions(x).T
             row[layout["centre_distance_change"]] = centre - nominal
             row[layout["misalignment"]] = misalignment
-            row[layout["outside_table"]] = assembly.mesh_states(x, u)[:, 9]
+            row[layout["outside_table"]] = assembly.mesh_states(x, u)[:, OUTSIDE]
     return out
 
 
@@ -65,8 +65,8 @@ def mesh_signals(q, v, meshes, out) -> None:
     for n in range(q.shape[0]):
         mesh_state(q[n], v[n], meshes, state)
         for m in range(count):
-            out[n, m] = state[m, 0]
-            out[n, count + m] = state[m, 4]
+            out[n, m] = state[m, DEFLECTION]
+            out[n, count + m] = state[m, FORCE]
 
 
 @numba.njit
@@ -97,7 +97,7 @@ def joint_signals(q, v, meshes, ends, hosts, planets, out) -> None:
         for m in range(meshes.cycles.size):
             psi = q[n, meshes.coordinates[m, 12]] if meshes.coordinates[m, 12] >= 0 else 0.0
             cosine, sine = math.cos(psi), math.sin(psi)
-            scalar, row = state[m, 4] / meshes.line_of_action[m], meshes.force[m]
+            scalar, row = state[m, FORCE] / meshes.line_of_action[m], meshes.force[m]
             if scalar < 0.0 and meshes.table.shape[m, 0] > 0:  # the other flank pushes
                 scalar, row = -scalar, meshes.table.back[m]
             for end in range(2):
@@ -125,7 +125,7 @@ def mesh_energies(q, v, meshes, state, out) -> None:
     mesh_state(q, v, meshes, state)
     for m in range(meshes.cycles.size):
         for i in range(4):
-            out[i] += state[m, 5 + i]
+            out[i] += state[m, ENERGY + i]
 
 
 @numba.njit
