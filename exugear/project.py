@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from exugear.bodies.of_gearbox.elastic_bodies import ElasticBody, reduced_bodies
+from exugear.bodies.elastic_body import ElasticBody
+from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.modes import Modes, eigenmodes

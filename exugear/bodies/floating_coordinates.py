@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exugear.bodies.floating import FloatingBody
+from exugear.bodies.floating_body import FloatingBody
 from exugear.bodies.reduced_body import ReductionError
 from exugear.bodies.rotations import IDENTITY, euler_rotation, skew, tilts_and_spin
 from exugear.kernels.coordinates import BODY_SIZE, SPIN

@@ -10,7 +10,7 @@ from exugear.cli.errors import BadInputError, FailedError, model_errors
 from exugear.cli.options import Variant
 
 if TYPE_CHECKING:
-    from exugear.bodies.of_gearbox.elastic_bodies import ElasticBody
+    from exugear.bodies.elastic_body import ElasticBody
     from exugear.dynamics.modes import Modes
     from exugear.model.gearbox import Gearbox
 

@@ -11,7 +11,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from exugear.bearings.supports import ON_BEARINGS, bearing_matrices, elastic_names, mounts_at_work, unsupported
-from exugear.bodies.of_gearbox.elastic_bodies import ElasticBody
+from exugear.bodies.elastic_body import ElasticBody
 from exugear.dynamics.assembly import Assembly, VariantError
 from exugear.kernels.connectors import ConnectorArrays, no_connectors
 from exugear.kernels.elastic import ElasticArrays, no_elastic

@@ -20,8 +20,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from exugear.bodies.floating import FloatingBody
-from exugear.bodies.of_gearbox.elastic_bodies import ElasticBody
+from exugear.bodies.elastic_body import ElasticBody
+from exugear.bodies.floating_body import FloatingBody
 from exugear.bodies.turning_frame import TurningBody, turning_arrays
 from exugear.kernels.connectors import ConnectorArrays, add_connector_forces, connector_load
 from exugear.kernels.elastic import ElasticArrays, add_elastic_forces, scratch_for, set_elastic_accelerations

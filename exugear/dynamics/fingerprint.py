@@ -7,7 +7,6 @@ import json
 
 import numpy as np
 
-from exugear.bodies.of_gearbox.solids import solid_body
 from exugear.dynamics.assembly import Assembly
 from exugear.model.versions import MODES, REDUCTION, RUN
 from fe_ste.transmission_error.surface import SteSurface
@@ -47,9 +46,7 @@ def input_hash(assembly: Assembly, load_case: str | None = None) -> str:
         "load_case": load_case,
         "torque_series": hashlib.sha256(series.read_bytes()).hexdigest() if series else None,
         "solids": {
-            name: hashlib.sha256(solid_body(gearbox, name).model.mesh.path.read_bytes()).hexdigest()
-            for name in assembly.elastic_bodies
-            if gearbox.case.bodies[name].solid is not None
+            name: body.file_digest for name, body in assembly.elastic_bodies.items() if body.file_digest is not None
         },
         # Rounded: another machine's last digits must not make another hash.
         "stiffness": {

@@ -17,7 +17,7 @@ import scipy.optimize
 import xarray as xr
 from numpy.typing import NDArray
 
-from exugear.bodies.of_gearbox.elastic_bodies import ElasticBody
+from exugear.bodies.elastic_body import ElasticBody
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.energy_shares import BODY_MOTIONS, kinetic_shares, mode_name

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.optimize
 
-from exugear.bodies.of_gearbox.elastic_bodies import ElasticBody
+from exugear.bodies.elastic_body import ElasticBody
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.modes import Modes, modes_of

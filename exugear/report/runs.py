@@ -20,7 +20,7 @@ from exugear.spectra.orders import order_lines
 from exugear.spectra.run_spectra import Finding, VariantRun
 
 MESH_TIME_LABELS = ("longest pull of a mesh", "longest time teeth are apart", "longest time outside a table")
-"""Labels of `exugear.results.run_file.MESH_TIMES`, in their order."""
+"""Labels of `exugear.dynamics.signals.MESH_TIMES`, in their order."""
 
 
 def runs_section(context: Context, results: StoredResults) -> str:

@@ -7,15 +7,17 @@ the rigid one does and only its deformation is new. A fixed body has no inertia 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+import hashlib
+from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 
 from exugear.bearings.supports import elastic_names
+from exugear.bodies.elastic_body import ElasticBody
 from exugear.bodies.finite_elements.second_order import SolidError
 from exugear.bodies.finite_elements.shaft_sections import ShaftError, check_shaft
-from exugear.bodies.floating import FloatingBody, load_or_reduce_floating, with_inertia
+from exugear.bodies.floating import load_or_reduce_floating, with_inertia
+from exugear.bodies.floating_body import FloatingBody
 from exugear.bodies.of_gearbox.shafts import TORQUE_SEAT, shaft_model, solid_of_shaft
 from exugear.bodies.of_gearbox.solids import solid_body
 from exugear.bodies.reduced_body import ReducedBody, ReductionError, RigidInertia
@@ -24,34 +26,6 @@ from exugear.bodies.solids import SolidModel, load_or_reduce_solid, reduce_solid
 from exugear.bodies.turned_shaft import ShaftModel, load_or_reduce_shaft, reduce_shaft
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Body
-
-
-@dataclass(frozen=True)
-class ElasticBody:
-    """A reduced body of a gearbox.
-
-    Attributes
-    ----------
-    reduced : with the rigid inertia of the body's inertia set
-    shape_inertia : rigid inertia of shape and blanks by themselves
-    main_seat : seat whose spin stands for the body: where torques act, else the first gear
-    sectors : seats on equal sectors by internal gear, an odd number, the first about +x, then on towards +y
-    shared_seats : seat that a second bearing sits on, by the bearing
-    floating : its modes in a frame that floats with it, for a body that moves so in Exudyn
-    """
-
-    reduced: ReducedBody
-    shape_inertia: RigidInertia
-    main_seat: str
-    sectors: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    shared_seats: Mapping[str, str] = field(default_factory=dict)
-    floating: FloatingBody | None = None
-
-    def __repr__(self) -> str:
-        """Reduced body and how it takes part, in one line."""
-        more = f", {len(self.sectors)} gears on sectors" if self.sectors else ""
-        frame = ", floating frame" if self.floating is not None else ""
-        return f"<ElasticBody of {self.reduced!r}: main seat {self.main_seat}{more}{frame}>"
 
 
 def reduced_bodies(
@@ -100,7 +74,8 @@ def _elastic_body(gearbox: Gearbox, body: Body, folder: Path | None) -> ElasticB
     floating = None if floating is None else with_inertia(floating, wanted)
     inertia = of_shape.rigid_inertia
     if solid is not None:
-        return ElasticBody(reduced, inertia, solid.main_seat, solid.sectors, solid.shared_seats, floating)
+        digest = hashlib.sha256(solid.model.mesh.path.read_bytes()).hexdigest()
+        return ElasticBody(reduced, inertia, solid.main_seat, solid.sectors, solid.shared_seats, floating, digest)
     seats = [seat.name for seat in of_shape.seats]
     return ElasticBody(reduced, inertia, TORQUE_SEAT if TORQUE_SEAT in seats else seats[0], floating=floating)
 

@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from exugear.bodies.floating import FloatingBody
+from exugear.bodies.floating_body import FloatingBody
 from exugear.bodies.floating_coordinates import NO_TURN
 from exugear.bodies.reduced_body import TILT_X, TILT_Y
 from exugear.bodies.rotations import euler_rotation

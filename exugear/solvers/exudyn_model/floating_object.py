@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from exugear.bodies.floating import FloatingBody
+from exugear.bodies.floating_body import FloatingBody
 from exugear.bodies.rotations import skew
 from exugear.solvers.exudyn_model.library import elements, exudyn, items
 

@@ -14,7 +14,8 @@ from exugear.bodies.finite_elements.shaft_sections import MeshSize, SeatBand, Sh
 from exugear.bodies.finite_elements.solid_seats import SolidSeat
 from exugear.bodies.finite_elements.turned_hexahedra import turned_hexahedra
 from exugear.bodies.finite_elements.turned_section import Shaft
-from exugear.bodies.floating import FloatingBody, floating_body
+from exugear.bodies.floating import floating_body
+from exugear.bodies.floating_body import FloatingBody
 from exugear.bodies.reduced_body import Blank
 from exugear.bodies.reduction import selective_mass_scaling
 from exugear.bodies.solids import ReducedSolid, SolidModel, gyroscopic_matrix, reduce_matrices
