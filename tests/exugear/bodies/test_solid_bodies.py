@@ -33,7 +33,7 @@ from exugear.solvers.exudyn_model.system import ExudynSystem
 from exugear.solvers.loads import Loading, LoadTable
 from fe_ste.tools.sparse import factorise
 
-from ..assembled import assembled, modes_with_bodies, simulated
+from ..assembled import assembled, bodies_of, modes_with_bodies, simulated
 from ..box_case import box_content
 from ..limit_case import unchecked
 from ..plain_signals import sampled
@@ -211,7 +211,11 @@ def test_work_of_the_loads_is_accounted_for(box: Gearbox, tmp_path: Path) -> Non
     # Everything is accounted for, so only the quadrature of the powers is left.
     assert abs(energy_residual(data)) < 1e-6
     assert list(data.support.values) == ["bearing_1", "bearing_2", "foot"]
-    assert [file.name.split("-")[0] for file in (tmp_path / "bodies").iterdir()] == ["box"]
+
+
+def test_the_reduction_of_a_solid_is_stored_under_its_body(box: Gearbox, tmp_path: Path) -> None:
+    bodies_of(box, Choice("flexible"), tmp_path)
+    assert [file.name.split("-")[0] for file in tmp_path.iterdir()] == ["box"]
 
 
 PLATE = """
