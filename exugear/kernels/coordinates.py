@@ -8,6 +8,8 @@ coordinates. Generalized forces are conjugate to them: N for translations, N m f
 A body has all six one after the other, or its spin alone; the ground has none. So has each seat of an elastic body,
 which a mesh or a bearing takes for a rigid body. Laws that allow for missing coordinates give them the index -1; in
 the arrays of the compiled solver they point to a coordinate that stays zero.
+
+Numbers here become part of machine code: `fe_ste.tools.compilation` compiles anew when this file changes.
 """
 
 from __future__ import annotations

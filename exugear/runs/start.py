@@ -78,7 +78,7 @@ def _pieces_to_resume(plan: RunPlan, layout: SignalLayout) -> RunPieces:
         raise RunError(f"{reason}; run without resuming")
     pieces = RunPieces(plan.partial_path, layout)
     for key, value in plan.attributes().items():
-        kept = pieces.attributes.get(key)
+        kept = pieces.attributes.get(key, "element" if key == "mesh_route" else None)  # earlier runs had no other
         if key not in ("complete", "solver") and kept != value:
             raise RunError(f"{plan.partial_path}: was run with {key} = {kept}, not {value}; start anew")
     return pieces

@@ -1,4 +1,7 @@
-"""Arrays of the compiled solver: what its right-hand side reads, and its working memory."""
+"""Arrays of the compiled solver: what its right-hand side reads, and its working memory.
+
+Names of columns become part of machine code: `fe_ste.tools.compilation` compiles anew when this file changes.
+"""
 
 from __future__ import annotations
 
