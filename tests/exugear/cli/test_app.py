@@ -18,7 +18,8 @@ import pytest
 import xarray
 from typer.testing import CliRunner
 
-from exugear.cli.app import app
+from exugear.cli import verbs
+from exugear.cli.app import VERBS, app
 from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption
 from exugear.model.gearbox import Gearbox
 from exugear.tooth_mesh.tables import requested_tables
@@ -152,6 +153,12 @@ def test_exit_codes(error, code, said, capsys):
 def test_an_error_of_the_program_itself_keeps_its_traceback():
     with pytest.raises(ZeroDivisionError), exit_codes():
         raise ZeroDivisionError
+
+
+def test_every_file_of_a_verb_is_offered_as_one():
+    files = {path.stem for path in Path(verbs.__file__).parent.glob("*.py")} - {"__init__"}
+    assert set(VERBS) == files
+    assert [command.callback.__name__ for command in app.registered_commands] == list(VERBS)
 
 
 def test_the_version_is_that_of_the_distribution():
