@@ -37,7 +37,7 @@ class ShaftSectionSection(Section):
     inner_diameter_mm: q.BoreMm = 0.0
 
     @model_validator(mode="after")
-    def _hascheck_wall(self) -> ShaftSectionSection:
+    def _has_wall(self) -> ShaftSectionSection:
         check_wall(self.inner_diameter_mm, self.outer_diameter_mm, "inner_diameter_mm")
         return self
 

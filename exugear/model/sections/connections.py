@@ -57,7 +57,7 @@ class CatalogueSection(Section):
     axial_load_kN: q.AxialLoadKN = 0.0
 
     @model_validator(mode="after")
-    def _hascheck_wall(self) -> CatalogueSection:
+    def _has_wall(self) -> CatalogueSection:
         check_wall(self.bore_mm, self.outer_diameter_mm, "bore_mm")
         return self
 
