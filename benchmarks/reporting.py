@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -550,7 +551,15 @@ def page(results: Results) -> str:
     return "\n".join([head, *(SECTIONS[name](results[name]) for name in SECTIONS if name in results)])
 
 
+DOCUMENT_WIDTH = 100
+
+
 # -- quoted elsewhere ----------------------------------------------------------------------------------------------
+
+
+def wrapped(text: str) -> str:
+    """Paragraph with lines as long as documents have them."""
+    return textwrap.fill(text, DOCUMENT_WIDTH, break_long_words=False, break_on_hyphens=False)
 
 
 def in_short(results: Results) -> str:
@@ -591,16 +600,19 @@ def in_short(results: Results) -> str:
                     ["`exugear --help`", duration(start_of(startup, "--help")["wall_s"])],
                 ],
             ),
-            f"Two cores ({dynamics['machine']['processor']}), load average at the start {load:.2f}, others kept up to "
-            f"{busy:.2f} cores busy. All of it, what bounds it, and growth with planets, stages and "
-            "table size: [benchmarks/results.md](benchmarks/results.md).\n",
+            wrapped(
+                f"Two cores ({dynamics['machine']['processor']}), load average at the start {load:.2f}, others kept up "
+                f"to {busy:.2f} cores busy. All of it, what bounds it, and growth with planets, stages and "
+                "table size: [benchmarks/results.md](benchmarks/results.md)."
+            )
+            + "\n",
         ]
     )
 
 
 def amplitudes(results: Results) -> str:
     """Lines for the validation page."""
-    return f"{AMPLITUDES}\n\n{amplitude_table(results['dynamics'])}"
+    return f"{wrapped(AMPLITUDES)}\n\n{amplitude_table(results['dynamics'])}"
 
 
 QUOTES = {"in_short": in_short, "amplitudes": amplitudes}
