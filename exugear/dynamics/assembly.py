@@ -82,6 +82,11 @@ class Assembly:
     elastic: ElasticArrays
     motions: Floats
 
+    def __repr__(self) -> str:
+        """One line."""
+        choice = f"{self.variant}, {self.law}, {self.inertias}"
+        return f"Assembly({self.gearbox.name!r}, {choice}: {self.size} coordinates, {len(self.elements)} meshes)"
+
     @property
     def variant(self) -> str:
         """How bodies are held."""

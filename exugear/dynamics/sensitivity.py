@@ -73,6 +73,11 @@ class ParameterVariation:
     amplification: Floats
     damping_ratio: Floats
 
+    def __repr__(self) -> str:
+        """One line."""
+        values, modes = self.frequency.shape
+        return f"ParameterVariation({self.parameter.label}: {values} values, {modes} modes)"
+
     def near(self, window: tuple[float, float], least_share: float) -> ParameterVariation:
         """Keep modes that somewhere lie in a window (Hz) while they have a least share."""
         inside = (self.frequency >= window[0]) & (self.frequency <= window[1]) & (self.share >= least_share)
@@ -268,6 +273,10 @@ class FrequencyMatch:
     value: float
     modes: Modes
     index: int
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"FrequencyMatch({self.parameter.label} = {self.value:.3g}: {self.frequency:.5g} Hz)"
 
     @property
     def frequency(self) -> float:

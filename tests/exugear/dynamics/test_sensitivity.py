@@ -7,8 +7,11 @@ import tomllib
 import numpy as np
 import pytest
 
+from exugear.dynamics.modes import modes_of
 from exugear.dynamics.sensitivity import (
+    FrequencyMatch,
     Parameter,
+    ParameterVariation,
     assumed_parameters,
     frequency_matches,
     planet_bearings,
@@ -103,3 +106,13 @@ def test_inertias_no_rigid_body_has_are_not_built(grc, stiffness):
     built = inertia.build(max(inertia.values)).gearbox.body("hss", "gears")
     assert built.axial == max(inertia.values)
     assert built.axial <= 2.0 * built.transverse
+
+
+def test_variations_and_assemblies_show_themselves_in_a_line(grc: Gearbox, stiffness: dict) -> None:
+    parameters = assumed_parameters(grc, Choice("rigid"), stiffness)
+    assembly = parameters[0].build(parameters[0].default)
+    assert repr(assembly) == "Assembly('GRC 750 kW', rigid, line_of_action, assemblies: 8 coordinates, 8 meshes)"
+    variation = ParameterVariation(parameters[0], *(np.ones((9, 3)) for _ in range(4)))
+    assert repr(variation) == "ParameterVariation(axial inertia of hss / kg m²: 9 values, 3 modes)"
+    match = FrequencyMatch(parameters[0], 2.0, modes_of(assembly), 1)
+    assert repr(match).startswith("FrequencyMatch(axial inertia of hss / kg m² = 2: ") and len(repr(match)) < 100
