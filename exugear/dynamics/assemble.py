@@ -48,7 +48,8 @@ def assemble(
     stiffness : mapping of pair name to (n,) array, or to the table's surface
         Mesh stiffness over the cycle, N/m: see `exugear.tooth_mesh.element.mesh_elements`.
     bodies : mapping of body name to ElasticBody, optional
-        Reduced elastic bodies, which the variant `flexible` needs: see `exugear.bodies.of_gearbox.reduced_bodies`.
+        Reduced elastic bodies, which the variant `flexible` needs; `reduced_bodies` of
+        `exugear.bodies.of_gearbox.elastic_bodies` gives them.
     flanks, angles
         As in `exugear.tooth_mesh.element.mesh_elements`.
 
@@ -116,7 +117,7 @@ def _chosen_bodies(names: tuple[str, ...], bodies: Mapping[str, ElasticBody]) ->
     if missing:
         raise VariantError(
             f"variant flexible: no reduced body for {', '.join(missing)}; "
-            "give what exugear.bodies.of_gearbox.reduced_bodies returns"
+            "give what exugear.bodies.of_gearbox.elastic_bodies.reduced_bodies returns"
         )
     return {name: bodies[name] for name in names}
 
