@@ -16,7 +16,6 @@ from exugear.model.parts import Bearing
 from exugear.model.reading import CaseError
 from exugear.tooth_mesh.placement import MeshError, loaded_flanks, tooth_places
 
-VARIANTS = ("rigid", "bushing", "flexible")
 MOST_STATES = 200_000
 """Most states of one table: at 50 ms each, three hours."""
 
@@ -51,7 +50,7 @@ def lacking(gearbox: Gearbox, variant: str) -> str:
     Examples
     --------
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
-    >>> [lacking(gearbox, variant) for variant in VARIANTS]
+    >>> [lacking(gearbox, variant) for variant in USER_VARIANTS]
     ['', '', '']
     """
     return unsupported(gearbox, variant) or (free_motion(gearbox, variant) if variant in ON_BEARINGS else "")

@@ -10,6 +10,8 @@ from exugear.model.gearbox import Gearbox
 Variant = Literal["rigid", "bushing", "flexible", "jointed"]
 VARIANTS: tuple[str, ...] = get_args(Variant)
 """How bodies are held: on ideal joints in minimal coordinates, on bearings, on these with elastic bodies, on joints."""
+USER_VARIANTS = ("rigid", "bushing", "flexible")
+"""Those that the command line offers; `jointed` is what `rigid` is checked against."""
 
 
 @dataclass(frozen=True)

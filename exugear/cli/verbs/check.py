@@ -18,13 +18,14 @@ if TYPE_CHECKING:
 def check(case: CaseArgument, files_below: FilesBelowOption = None, as_json: JsonOption = False) -> None:
     """Read and check a gearbox file, and sum up its load cases; compute nothing."""
     with exit_codes():
-        from exugear.dynamics.readiness import VARIANTS, lacking, remarks
+        from exugear.dynamics.readiness import lacking, remarks
+        from exugear.model.choice import USER_VARIANTS
 
         gearbox = read_gearbox(case, files_below, tell=False)
         _tell_scripts(gearbox)
         pairs = [_pair_summary(name, spec) for name, spec in gearbox.pairs.items()]
         loads = _load_summaries(gearbox)
-        variants = {variant: lacking(gearbox, variant) for variant in VARIANTS}
+        variants = {variant: lacking(gearbox, variant) for variant in USER_VARIANTS}
         if as_json:
             summary = {"case": str(case), "name": gearbox.name, "ratio": gearbox.train.ratio, "pairs": pairs}
             print_json({**summary, "load_cases": loads, "variants": variants, "warnings": remarks(gearbox)})

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from exugear.cli.app import app
 from exugear.cli.options import MeshLaw, Variant
 from exugear.cli.verbs.run import Solver
-from exugear.dynamics.readiness import VARIANTS
+from exugear.model.choice import USER_VARIANTS
 from exugear.model.gearbox import Gearbox
 from exugear.runs.outcome import RunError
 from exugear.runs.runup import SOLVERS
@@ -55,7 +55,7 @@ def test_the_choices_offered_are_those_of_the_library():
     assert [law.value for law in MeshLaw] == list(MESH_LAWS)
     assert {solver.value for solver in Solver} == set(SOLVERS)
     # The third variant keeps joints as constraints: a cross-check, not a model for users.
-    assert [variant.value for variant in Variant] == [name for name in VARIANTS if name != "jointed"]
+    assert [variant.value for variant in Variant] == list(USER_VARIANTS)
 
 
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
