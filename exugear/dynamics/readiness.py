@@ -50,7 +50,7 @@ def lacking(gearbox: Gearbox, variant: str) -> str:
     Examples
     --------
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
-    >>> [lacking(gearbox, variant) for variant in USER_VARIANTS]
+    >>> [lacking(gearbox, variant) for variant in ("rigid", "bushing", "flexible")]
     ['', '', '']
     """
     return unsupported(gearbox, variant) or (free_motion(gearbox, variant) if variant in ON_BEARINGS else "")

@@ -50,10 +50,11 @@ def fastest_motion(assembly: Assembly) -> str:
     Examples
     --------
     >>> from exugear.dynamics.assemble import assemble
+    >>> from exugear.model.choice import Choice
     >>> from exugear.model.gearbox import Gearbox
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
     >>> stiffness = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
-    >>> fastest_motion(assemble(gearbox, "rigid", stiffness))
+    >>> fastest_motion(assemble(gearbox, Choice("rigid"), stiffness))
     'the fastest motion, 9.25e+03 rad/s, is of hss.spin against high_speed'
     """
     linear = linearise(assembly, np.zeros(assembly.size), assembly.linear_meshes())
@@ -81,10 +82,11 @@ def choose_step(assembly: Assembly, sample_rate: float, band: float) -> float:
     Examples
     --------
     >>> from exugear.dynamics.assemble import assemble
+    >>> from exugear.model.choice import Choice
     >>> from exugear.model.gearbox import Gearbox
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
     >>> stiffness = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
-    >>> choose_step(assemble(gearbox, "rigid", stiffness), sample_rate=20e3, band=6.4e3)
+    >>> choose_step(assemble(gearbox, Choice("rigid"), stiffness), sample_rate=20e3, band=6.4e3)
     2.5e-05
     """
     values = eigenvalues(assembly)
