@@ -14,41 +14,44 @@ from exugear.bearings import supports
 from exugear.bearings.supports import bearing_matrices, elastic_names
 from exugear.bodies.of_gearbox.elastic_bodies import check_elastic_body
 from exugear.cli.app import app
+from exugear.dynamics.assemble import assemble
 from exugear.dynamics.readiness import check_parts, lacking, remarks
-from exugear.model import sections as case_sections
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import stiffness_matrix
+from exugear.model.sections import bodies, case, connections, entries, gears
+from exugear.model.sections.entries import Section
 from exugear.results.folder import keep_case
 from exugear.tooth_mesh.tables import wanted_table
 
-from ..assembled import assembled
 from ..case_mutations import bases, toml_text
 
 FOR_PEOPLE = {"LoadCaseSection.description", "CatalogueSection.designation"}
 """Keys that stand in the file and its copy in the results for people to read."""
 
 
-def section_kinds() -> list[type[Any]]:
-    return [
-        kind
-        for kind in vars(case_sections).values()
-        if isinstance(kind, type) and issubclass(kind, case_sections._Section)
-    ]
+CASE_MODEL = (entries, gears, bodies, connections, case)
+"""Modules of the case model."""
+
+
+def sections() -> set[type[Any]]:
+    kinds = {kind for module in CASE_MODEL for kind in vars(module).values() if isinstance(kind, type)}
+    return {kind for kind in kinds if issubclass(kind, Section)}
 
 
 @pytest.fixture
 def read_keys(monkeypatch: pytest.MonkeyPatch) -> set[tuple[str, str]]:
     """Collect the keys that anything but the case model itself reads."""
     found: set[tuple[str, str]] = set()
-    plain = case_sections._Section.__getattribute__
+    plain = Section.__getattribute__
+    own_files = {module.__file__ for module in CASE_MODEL}
 
     def noted(section: Any, name: str) -> Any:
-        if sys._getframe(1).f_code.co_filename != case_sections.__file__:
+        if sys._getframe(1).f_code.co_filename not in own_files:
             found.add((type(section).__name__, name))
         return plain(section, name)
 
-    monkeypatch.setattr(case_sections._Section, "__getattribute__", noted)
+    monkeypatch.setattr(Section, "__getattribute__", noted)
     return found
 
 
@@ -67,7 +70,7 @@ def test_every_key_is_read(read_keys: set[tuple[str, str]], tmp_path: Path) -> N
             wanted_table(gearbox, pair, gearbox.ste.positions, gearbox.ste.grid)
         for variant in ("rigid", "bushing"):
             lacking(gearbox, variant)
-            assembly = assembled(gearbox, Choice(variant), {pair: np.array([1e9]) for pair in gearbox.pairs})
+            assembly = assemble(gearbox, Choice(variant), {pair: np.array([1e9]) for pair in gearbox.pairs})
             assert assembly.weight.shape == (assembly.size,)
         for support in (*gearbox.bearings, *gearbox.mounts):
             bearing_matrices(support, gearbox.case.damping.bearing_time_s)
@@ -79,5 +82,5 @@ def test_every_key_is_read(read_keys: set[tuple[str, str]], tmp_path: Path) -> N
     assert CliRunner().invoke(app, ["ste", str(tmp_path / "spur.toml"), "--grid"]).exit_code == 2
     keep_case(gearbox, tmp_path)
     assert CliRunner().invoke(app, ["report", str(tmp_path)]).exit_code == 2
-    known = {(kind.__name__, key) for kind in section_kinds() for key in kind.model_fields}
+    known = {(kind.__name__, key) for kind in sections() for key in kind.model_fields}
     assert {f"{kind}.{key}" for kind, key in known - read_keys} <= FOR_PEOPLE
