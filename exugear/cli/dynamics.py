@@ -54,5 +54,5 @@ def compute_modes(project: Project) -> Modes:
 def label_of(modes: Modes) -> str:
     """Return what modes belong to: variant, mesh law, inertia set and housing factor."""
     assembly = modes.assembly
-    law = f"law {assembly.law}, inertias {assembly.inertias}"
+    law = f"law {assembly.mesh_law}, inertias {assembly.inertias}"
     return f"{assembly.variant}, {law}, housing factor {assembly.housing_factor:g}"

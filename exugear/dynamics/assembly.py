@@ -84,7 +84,7 @@ class Assembly:
 
     def __repr__(self) -> str:
         """One line."""
-        choice = f"{self.variant}, {self.law}, {self.inertias}"
+        choice = f"{self.variant}, {self.mesh_law}, {self.inertias}"
         return f"Assembly({self.gearbox.name!r}, {choice}: {self.size} coordinates, {len(self.elements)} meshes)"
 
     @property
@@ -93,7 +93,7 @@ class Assembly:
         return self.choice.variant
 
     @property
-    def law(self) -> str:
+    def mesh_law(self) -> str:
         """Mesh law."""
         return self.choice.mesh_law
 

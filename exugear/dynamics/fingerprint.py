@@ -41,7 +41,7 @@ def input_hash(assembly: Assembly, load_case: str | None = None) -> str:
         "reduction_version": REDUCTION if assembly.elastic_bodies else None,
         "gearbox": gearbox.content,
         "variant": assembly.variant,
-        "law": assembly.law,
+        "law": assembly.mesh_law,
         "inertias": assembly.inertias,
         "load_case": load_case,
         "torque_series": hashlib.sha256(series.read_bytes()).hexdigest() if series else None,

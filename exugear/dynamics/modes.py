@@ -74,7 +74,7 @@ class Modes:
         """Gearbox, variant, number of modes and their range in one line."""
         assembly = self.assembly
         return (
-            f"<Modes of {assembly.gearbox.name[:60]!r}, {assembly.variant}, {assembly.law}: "
+            f"<Modes of {assembly.gearbox.name[:60]!r}, {assembly.variant}, {assembly.mesh_law}: "
             f"{len(self.frequency)} modes up to {self.frequency.max(initial=0.0):.5g} Hz>"
         )
 
@@ -117,7 +117,7 @@ class Modes:
         attributes = {
             "gearbox": assembly.gearbox.name,
             "variant": assembly.variant,
-            "mesh_law": assembly.law,
+            "mesh_law": assembly.mesh_law,
             "inertias": assembly.inertias,
             "input_hash": input_hash(assembly),
             "method_version": MODES,
@@ -250,7 +250,7 @@ def modes_of(assembly: Assembly, preload: bool = True) -> Modes:
             mode_name(assembly, element_names, kinetic[m], strain[m]) if elastic[m] else FREE_ROTATION
             for m in range(frequency.size)
         ),
-        growth_rate=growth_rate(linear) if LAWS[assembly.law].has_force else 0.0,
+        growth_rate=growth_rate(linear) if LAWS[assembly.mesh_law].has_force else 0.0,
     )
 
 

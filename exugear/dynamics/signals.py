@@ -386,7 +386,7 @@ def signal_layout(assembly: Assembly) -> SignalLayout:
     gearbox = assembly.gearbox
     joints = tuple(joint.name for joint in gearbox.joints) if assembly.variant == "rigid" else ()
     return SignalLayout(
-        signals_of(LAWS[assembly.law].signals_positions),
+        signals_of(LAWS[assembly.mesh_law].signals_positions),
         {"mesh": assembly.mesh_names, "support": assembly.connector_names or joints},
         gearbox.gears[gearbox.case.overall.output_gear].base_radius,
     )

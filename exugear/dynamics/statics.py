@@ -215,7 +215,7 @@ def _touching(
     solve: Callable[[Floats, MeshArrays | None], Floats],
 ) -> Floats:
     """Begin where linear teeth would be, on the flanks that they press: table flanks that are apart hold nothing."""
-    if not LAWS[assembly.law].loses_contact:
+    if not LAWS[assembly.mesh_law].loses_contact:
         return start
     x = solve(start, assembly.linear_meshes())
     q = to_coordinates(x)

@@ -85,7 +85,7 @@ class RunPlan:
             "gearbox": gearbox.name,
             "variant": assembly.variant,
             "load_case": self.case.name,
-            "mesh_law": assembly.law,
+            "mesh_law": assembly.mesh_law,
             "inertias": assembly.inertias,
             "input_hash": input_hash(assembly, self.case.name),
             "method_version": RUN,

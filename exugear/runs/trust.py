@@ -131,7 +131,7 @@ class Judge:
         self.limits = limits
         self.figures = np.full(FIGURES, np.nan)
         self.figures[:ACCOUNT, LARGEST] = 0.0
-        self._law = assembly.law
+        self._law = assembly.mesh_law
         self._bodies = tuple(radii)
         self._spins = np.array([assembly.spin[name] for name in self._bodies], dtype=np.int64)
         self._radii = np.array([radii[name] for name in self._bodies])

@@ -55,7 +55,7 @@ def modes(
             note(f"Unstable: disturbances grow by up to {found.growth_rate:.3g} 1/s; a run diverges", style="yellow")
         if as_json:
             assembly = found.assembly
-            label = {"variant": assembly.variant, "mesh_law": assembly.law, "inertias": assembly.inertias}
+            label = {"variant": assembly.variant, "mesh_law": assembly.mesh_law, "inertias": assembly.inertias}
             print_json({"case": str(case), **label, "modes": rows, "file": str(path), "picture": str(picture)})
             return
         print_table(f"Modes of {label_of(found)}", [_mode_row(row) for row in rows], ("what moves",))

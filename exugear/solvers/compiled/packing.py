@@ -183,7 +183,7 @@ def equations_of(assembly: Assembly, loads: LoadTable) -> Equations:
         axial=inertia.axial,
         spin=inertia.spin,
         spin_inertia=inertia.spin_inertia,
-        inverse=np.zeros((0, 0)) if LAWS[assembly.law].has_force else _rolling_inverse(assembly),
+        inverse=np.zeros((0, 0)) if LAWS[assembly.mesh_law].has_force else _rolling_inverse(assembly),
         turning=np.array(numbers.turning, dtype=np.int64),
     )
     return Equations(
