@@ -152,6 +152,7 @@ def mesh_solid(geometry: Path, solid: dict[str, Any], targets: list[Path]) -> No
     """Mesh a solid of a case by gmsh, as the program does."""
     import gmsh
 
+    on_end = signal.getsignal(signal.SIGTERM)
     gmsh.initialize(["same_numbers", "-nopopup"], readConfigFiles=False, interruptible=False)
     gmsh.option.setNumber("General.Terminal", 0)
     gmsh.option.setNumber("Geometry.OCCUnionUnify", 0)
@@ -166,6 +167,7 @@ def mesh_solid(geometry: Path, solid: dict[str, Any], targets: list[Path]) -> No
     for target in targets:
         gmsh.write(str(target))
     gmsh.finalize()
+    signal.signal(signal.SIGTERM, on_end)  # gmsh takes it away
 
 
 def share_housing_mesh(pair: list[Checkout]) -> None:
