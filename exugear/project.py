@@ -28,6 +28,7 @@ from exugear.runs.runup import simulate
 from exugear.tooth_mesh.law import MeshData
 from exugear.tooth_mesh.laws.registry import LAWS
 from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear.tooth_mesh.placement import MeshError
 from exugear.tooth_mesh.tables import TableRequest, missing_tables, requested_tables
 from fe_ste.transmission_error.table import MeshTable
 
@@ -164,9 +165,15 @@ class Project:
 
     def stiffness(self) -> dict[str, MeshData]:
         """Mesh stiffness by gear pair, as the mesh law needs it; tables that are missing are computed first."""
-        for request in self.missing_tables():
-            self.keep_case()
-            request.compute()
+        try:
+            return self._read_stiffness()
+        except MeshError:  # looking for what is missing reads the tables once more
+            for request in self.missing_tables():
+                self.keep_case()
+                request.compute()
+            return self._read_stiffness()
+
+    def _read_stiffness(self) -> dict[str, MeshData]:
         return dict(mesh_stiffness(self.gearbox, self.choice.mesh_law, self.folder))
 
     def bodies(self, begin: Callable[[str], None] | None = None) -> dict[str, ElasticBody]:
