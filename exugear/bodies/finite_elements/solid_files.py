@@ -122,6 +122,7 @@ def mesh_geometry(path: Path, size: float, curvature: int = 12, unit: float = 1e
 def _meshed(load: Callable[[Any], None], size: float, curvature: int, unit: float = 1.0) -> Any:
     """Mesh what `load` puts into gmsh, in lengths of `unit` (m)."""
     gmsh = _library("gmsh")
+    handlers = _signal_handlers()
     gmsh.initialize(["exugear", "-nopopup"], readConfigFiles=False, interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
@@ -140,7 +141,8 @@ def _meshed(load: Callable[[Any], None], size: float, curvature: int, unit: floa
         raise SolidError(f"gmsh cannot mesh it ({str(error).strip()})") from error
     finally:
         gmsh.finalize()
-        _keep_broken_pipes()
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
     if not len(kinds):
         raise SolidError("the shape has no volume to mesh")
     order = np.argsort(tags)
@@ -149,10 +151,12 @@ def _meshed(load: Callable[[Any], None], size: float, curvature: int, unit: floa
     return second_order(unit * places.reshape(-1, 3), cells[:, [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]], "tetra10")
 
 
-def _keep_broken_pipes() -> None:
-    """Make a broken pipe an error again: gmsh leaves it to end the process, and with it a grid that lost a worker."""
-    if hasattr(signal, "SIGPIPE") and threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGPIPE, signal.SIG_IGN)
+def _signal_handlers() -> dict[int, Any]:
+    """Handlers that gmsh sets back to their defaults: its broken pipes and requests to stop would end the process."""
+    if threading.current_thread() is not threading.main_thread():
+        return {}
+    handlers = {number: signal.getsignal(number) for number in signal.valid_signals()}
+    return {number: handler for number, handler in handlers.items() if handler not in (None, signal.SIG_DFL)}
 
 
 def read_solid(path: Path, unit: float = 1.0) -> Any:

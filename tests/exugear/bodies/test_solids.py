@@ -209,6 +209,20 @@ def test_a_broken_pipe_stays_an_error_after_meshing():
 
 
 @needs_gmsh
+def test_a_request_to_stop_is_heard_after_meshing():
+    """Where it would end the process, gmsh has taken its handler away."""
+    program = """
+import signal
+signal.signal(signal.SIGTERM, lambda number, frame: print("heard"))
+from exugear.bodies.finite_elements.solid_files import tetrahedra
+tetrahedra(lambda occ: occ.addBox(0, 0, 0, 1, 1, 1), size=1.0)
+signal.raise_signal(signal.SIGTERM)
+"""
+    outcome = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert outcome.stdout.strip() == "heard", outcome.stderr
+
+
+@needs_gmsh
 def test_tetrahedra_and_hexahedra_of_a_tube_agree():
     # Finer meshes of either kind move the first three frequencies by less than 0.1 %.
     shaft = Shaft((ShaftSection(0.4, 0.12, 0.06),), STEEL, (), MeshSize(0.04, 0.015, 0))
