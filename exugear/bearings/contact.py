@@ -65,7 +65,7 @@ def lamina_arrays(rows: Sequence[RollerRow], first_roller_angle: float = 0.0) ->
     LaminaArrays
     """
     parts = [_row_laminae(row, first_roller_angle) for row in rows]
-    offsets = np.cumsum([0, *(row.roller_count for row in rows)])
+    offsets = np.cumsum([0, *(row.element_count for row in rows)])
     return LaminaArrays(
         direction=np.concatenate([part.direction for part in parts]),
         gap=np.concatenate([part.gap for part in parts]),
@@ -75,18 +75,17 @@ def lamina_arrays(rows: Sequence[RollerRow], first_roller_angle: float = 0.0) ->
 
 
 def _row_laminae(row: RollerRow, first_roller_angle: float) -> LaminaArrays:
-    number = np.repeat(np.arange(row.roller_count), row.laminae)
-    polar = first_roller_angle + 2.0 * math.pi * number / row.roller_count
+    number = np.repeat(np.arange(row.element_count), row.laminae)
+    polar = first_roller_angle + 2.0 * math.pi * number / row.element_count
     slices = (np.arange(row.laminae) + 0.5) / row.laminae - 0.5  # middle of each slice, in roller lengths
-    along = np.tile(slices, row.roller_count) * row.effective_length
+    along = np.tile(slices, row.element_count) * row.effective_length
     cosine, sine = math.cos(row.contact_angle), math.sin(row.contact_angle)
     normal = np.column_stack([cosine * np.cos(polar), cosine * np.sin(polar), np.full(polar.size, sine)])
     radius = 0.5 * row.pitch_diameter - along * sine
     point = np.column_stack([radius * np.cos(polar), radius * np.sin(polar), row.axial_position + along * cosine])
-    drop = -row.profile_factor * row.roller_diameter * np.log(1.0 - (2.0 * along / row.effective_length) ** 2)
     return LaminaArrays(
         direction=np.hstack([normal, np.cross(point, normal)]),
-        gap=0.5 * row.radial_clearance * cosine + 2.0 * drop,
+        gap=0.5 * row.radial_clearance * cosine + 2.0 * row.drop(along),
         constant=np.full(polar.size, row.contact_constant / row.laminae),
         roller=number,
     )
@@ -338,7 +337,7 @@ def pitch_averaged_tangent(bearing: RollerBearing, force: ArrayLike, positions: 
     >>> float(round(stiffness[0, 0] / 1e9, 1))
     2.4
     """
-    pitch = 2.0 * math.pi / bearing.rows[0].roller_count
+    pitch = 2.0 * math.pi / bearing.rows[0].element_count
     total = np.zeros((6, 6))
     for position in range(positions):
         angle = pitch * position / positions

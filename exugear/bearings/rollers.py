@@ -33,7 +33,7 @@ class CylindricalRollerBearing:
         Boundary dimensions d, D, B, m.
     full_complement : bool
         Without a cage.
-    roller_diameter, effective_length, roller_count : optional
+    element_diameter, effective_length, element_count : optional
         Replace the estimates where they are known.
     radial_clearance, profile_factor, laminae
         See `RollerRow`.
@@ -41,7 +41,7 @@ class CylindricalRollerBearing:
     Examples
     --------
     >>> bearing = CylindricalRollerBearing(bore=0.160, outside_diameter=0.290, width=0.080)
-    >>> bearing.rows[0].roller_count
+    >>> bearing.rows[0].element_count
     17
     """
 
@@ -49,9 +49,9 @@ class CylindricalRollerBearing:
     outside_diameter: float
     width: float
     full_complement: bool = False
-    roller_diameter: float | None = None
+    element_diameter: float | None = None
     effective_length: float | None = None
-    roller_count: int | None = None
+    element_count: int | None = None
     radial_clearance: float = 0.0
     profile_factor: float = 0.0
     laminae: int = 30
@@ -81,7 +81,7 @@ class TaperedRollerBearing:
         Boundary dimensions d, D, T, m.
     contact_angle : float
         Nominal contact angle, rad, signed as in `RollerRow`.
-    full_complement, roller_diameter, effective_length, roller_count : optional
+    full_complement, element_diameter, effective_length, element_count : optional
         As in `CylindricalRollerBearing`.
     radial_clearance, profile_factor, laminae
         As in `CylindricalRollerBearing`.
@@ -91,7 +91,7 @@ class TaperedRollerBearing:
     >>> bearing = TaperedRollerBearing(
     ...     bore=0.160, outside_diameter=0.240, width=0.051, contact_angle=math.radians(17.0)
     ... )
-    >>> round(1e3 * bearing.rows[0].roller_diameter, 1)
+    >>> round(1e3 * bearing.rows[0].element_diameter, 1)
     21.6
     """
 
@@ -100,9 +100,9 @@ class TaperedRollerBearing:
     width: float
     contact_angle: float
     full_complement: bool = False
-    roller_diameter: float | None = None
+    element_diameter: float | None = None
     effective_length: float | None = None
-    roller_count: int | None = None
+    element_count: int | None = None
     radial_clearance: float = 0.0
     profile_factor: float = 0.0
     laminae: int = 30
@@ -188,13 +188,13 @@ def _check_boundary_dimensions(bore: float, outside_diameter: float, width: floa
 def _row_from_catalogue(bearing: CylindricalRollerBearing | TaperedRollerBearing, contact_angle: float) -> RollerRow:
     """Fill what the catalogue leaves open with the usual proportions of the design."""
     pitch_diameter = 0.5 * (bearing.bore + bearing.outside_diameter)
-    diameter = bearing.roller_diameter or 0.27 * (bearing.outside_diameter - bearing.bore)
+    diameter = bearing.element_diameter or 0.27 * (bearing.outside_diameter - bearing.bore)
     pitch_over_diameter = 1.01 if bearing.full_complement else 1.15
     return RollerRow(
-        roller_diameter=diameter,
+        element_diameter=diameter,
         effective_length=bearing.effective_length or 0.75 * bearing.width,
         pitch_diameter=pitch_diameter,
-        roller_count=bearing.roller_count or int(math.pi * pitch_diameter / (pitch_over_diameter * diameter)),
+        element_count=bearing.element_count or int(math.pi * pitch_diameter / (pitch_over_diameter * diameter)),
         contact_angle=contact_angle,
         radial_clearance=bearing.radial_clearance,
         profile_factor=bearing.profile_factor,

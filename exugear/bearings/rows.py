@@ -1,4 +1,4 @@
-"""Rows of rollers: the element that all roller bearings are made of.
+"""Rows of rollers and of balls: the elements that all rolling bearings are made of.
 
 Frame: origin at the middle of the bearing, z along its axis; coordinates
 ``(u_x, u_y, u_z, theta_x, theta_y, theta_z)`` of the inner ring relative to the outer ring, SI units.
@@ -10,9 +10,15 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
+from fe_ste.tools.arrays import Floats
+
 LINE_CONTACT_CONSTANT = 35948.0e6
 """Load-deflection constant of steel line contact, roller against both raceways, N/m^2 in SI:
 35948 N/mm^(10/9) mm^(-8/9), where the exponents of the length add up to two (ISO/TS 16281)."""
+LEAST_ELEMENTS = 3
+"""Fewer balls or rollers than these hold nothing in all directions."""
 
 
 class BearingError(ValueError):
@@ -20,61 +26,136 @@ class BearingError(ValueError):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RollerRow:
-    """One row of rollers, the element all roller bearings are made of.
+class RollingRow:
+    """What a row of rollers and one of balls have in common.
 
     Attributes
     ----------
-    roller_diameter, effective_length, pitch_diameter : float
-        Mean roller diameter, effective contact length and pitch circle diameter, m.
-    roller_count : int
-        Number of rollers.
+    element_diameter, pitch_diameter : float
+        Diameter of a ball, or mean diameter of a roller, and of the circle of their middles, m.
+    element_count : int
+        Number of rolling elements.
     contact_angle : float
         Angle between the contact normal and the radial plane, rad, signed: positive where the row holds an
         inner ring that is pushed towards +z. Zero for cylindrical rollers.
     axial_position : float
-        Middle of the rollers in the frame of the bearing, m.
+        Middle of the elements in the frame of the bearing, m.
     radial_clearance : float
         Diametral clearance of the mounted row in the radial plane, m. Negative: preload.
+    aligning : bool
+        Whether the outer raceway is a sphere about the middle of the bearing: tilting the rings loads nothing.
+    """
+
+    element_diameter: float
+    pitch_diameter: float
+    element_count: int
+    contact_angle: float = 0.0
+    axial_position: float = 0.0
+    radial_clearance: float = 0.0
+    aligning: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be built."""
+        for key in ("element_diameter", "pitch_diameter"):
+            if not getattr(self, key) > 0.0:
+                raise BearingError(f"row: {key} = {getattr(self, key)!r} must be positive")
+        if self.element_count < LEAST_ELEMENTS:
+            raise BearingError(f"row: element_count = {self.element_count} must be at least {LEAST_ELEMENTS}")
+        if not abs(self.contact_angle) < math.pi / 2:
+            raise BearingError(f"row: contact_angle = {self.contact_angle} rad must lie within +-pi/2")
+        # Neighbours on the pitch circle are a chord apart.
+        chord = self.pitch_diameter * math.sin(math.pi / self.element_count)
+        if self.element_diameter > chord:
+            raise BearingError(
+                f"row: {self.element_count} rolling elements of {1e3 * self.element_diameter:.1f} mm "
+                f"do not fit on a pitch circle of {1e3 * self.pitch_diameter:.1f} mm"
+            )
+
+    @property
+    def diameter_ratio(self) -> float:
+        """Diameter of the elements, seen in the radial plane, over that of the pitch circle: gamma of ISO 281."""
+        return self.element_diameter * math.cos(self.contact_angle) / self.pitch_diameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class RollerRow(RollingRow):
+    """One row of rollers.
+
+    Attributes
+    ----------
+    effective_length : float
+        Effective contact length, m.
     profile_factor : float
         Logarithmic profile over roller diameter; 0 for a straight roller.
+    profile_table : tuple of (share, drop), optional
+        Instead: the gap (m) between roller and raceway at shares, 0 to 1, of half the length, linear between.
+    crown_curvature : float
+        Curvature of the roller's outline less that of the raceway's, 1/m: spherical rollers.
     laminae : int
         Slices per roller; ISO/TS 16281 asks for at least 30.
     """
 
-    roller_diameter: float
     effective_length: float
-    pitch_diameter: float
-    roller_count: int
-    contact_angle: float = 0.0
-    axial_position: float = 0.0
-    radial_clearance: float = 0.0
     profile_factor: float = 0.0
+    profile_table: tuple[tuple[float, float], ...] | None = None
+    crown_curvature: float = 0.0
     laminae: int = 30
 
     def __post_init__(self) -> None:
         """Refuse what cannot be built."""
-        for key in ("roller_diameter", "effective_length", "pitch_diameter"):
-            if not getattr(self, key) > 0.0:
-                raise BearingError(f"roller row: {key} = {getattr(self, key)!r} must be positive")
-        if self.roller_count < 3:
-            raise BearingError(f"roller row: roller_count = {self.roller_count} must be at least 3")
+        super().__post_init__()
+        if not self.effective_length > 0.0:
+            raise BearingError(f"roller row: effective_length = {self.effective_length!r} must be positive")
         if self.laminae < 1:
             raise BearingError(f"roller row: laminae = {self.laminae} must be at least 1")
-        if not abs(self.contact_angle) < math.pi / 2:
-            raise BearingError(f"roller row: contact_angle = {self.contact_angle} rad must lie within +-pi/2")
         if self.profile_factor < 0.0:
             raise BearingError(f"roller row: profile_factor = {self.profile_factor} must not be negative")
-        if self.roller_count * self.roller_diameter > math.pi * self.pitch_diameter:
-            raise BearingError(
-                f"roller row: {self.roller_count} rollers of {1e3 * self.roller_diameter:.1f} mm "
-                f"do not fit on a pitch circle of {1e3 * self.pitch_diameter:.1f} mm"
-            )
 
     @property
     def contact_constant(self) -> float:
         """``c_L`` of a whole roller, N/m^(10/9)."""
         return LINE_CONTACT_CONSTANT * float(self.effective_length ** (8.0 / 9.0))
+
+    def drop(self, along: Floats) -> Floats:
+        """Gap (m) between roller and one raceway at places (m) along the roller, from its middle; even in them."""
+        share = np.abs(2.0 * along / self.effective_length)
+        drop: Floats = 0.5 * self.crown_curvature * along**2
+        if self.profile_table is not None:
+            shares, drops = np.array(self.profile_table).T
+            drop = drop + np.interp(share, shares, drops)
+        elif self.profile_factor > 0.0:
+            drop = drop - self.profile_factor * self.element_diameter * np.log(1.0 - share**2)
+        return drop
+
+
+@dataclass(frozen=True, kw_only=True)
+class BallRow(RollingRow):
+    """One row of balls.
+
+    Attributes
+    ----------
+    inner_conformity, outer_conformity : float
+        Radius of each raceway's groove over the ball's diameter; above 0.5.
+    """
+
+    inner_conformity: float = 0.52
+    outer_conformity: float = 0.52
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be built."""
+        super().__post_init__()
+        for key in ("inner_conformity", "outer_conformity"):
+            if not getattr(self, key) > 0.5:
+                raise BearingError(f"ball row: {key} = {getattr(self, key)!r} must be above 0.5, or no ball fits in")
+
+
+class RollingBearing(Protocol):
+    """Anything made of rows of rolling elements between one inner and one outer ring body."""
+
+    @property
+    def rows(self) -> tuple[RollingRow, ...]:
+        """Rows in the frame of the bearing."""
+        ...
 
 
 class RollerBearing(Protocol):

@@ -112,7 +112,7 @@ class SingleRow:
         self.rows = (row,)
 
 
-FINE_ROW = RollerRow(roller_diameter=0.01, effective_length=0.02, pitch_diameter=0.65, roller_count=200)
+FINE_ROW = RollerRow(element_diameter=0.01, effective_length=0.02, pitch_diameter=0.65, element_count=200)
 
 
 def continuous_row_integral():
@@ -157,7 +157,7 @@ def test_clearance_narrows_the_load_zone_as_the_load_distribution_factor_says():
 def test_pure_axial_load_spreads_evenly_over_a_tapered_row():
     bearing = tapered(160, 240, 51, 17.0)
     state = equilibrium(bearing, (0.0, 0.0, 40e3))
-    count = bearing.rows[0].roller_count
+    count = bearing.rows[0].element_count
     expected = 40e3 / (count * math.sin(math.radians(17.0)))
     np.testing.assert_allclose(state.roller_load, expected, rtol=1e-9)  # Newton's tolerance
 
@@ -231,7 +231,7 @@ def test_secant_returns_the_load():
 
 @pytest.mark.parametrize("bearing", [NJ2232, HSS_PAIR], ids=["NJ", "O"])
 def test_turning_the_load_by_a_roller_pitch_turns_the_answer(bearing):
-    pitch = 2.0 * math.pi / bearing.rows[0].roller_count
+    pitch = 2.0 * math.pi / bearing.rows[0].element_count
     force = np.array([40e3, 0.0, 0.0])
     turned_force = 40e3 * np.array([math.cos(pitch), math.sin(pitch), 0.0])
     straight = equilibrium(bearing, force).tangent
@@ -253,7 +253,7 @@ def test_preload_stiffens_an_o_pair_along_the_axis():
     state = equilibrium(preloaded, (0.0, 0.0, 1.0))
     approach = 10e-6 * math.sin(math.radians(15.6))
     slope = 10.0 / 9.0 * row.contact_constant * approach ** (1.0 / 9.0)
-    expected = 2.0 * row.roller_count * slope * math.sin(math.radians(15.6)) ** 2
+    expected = 2.0 * row.element_count * slope * math.sin(math.radians(15.6)) ** 2
     assert state.tangent[2, 2] == pytest.approx(expected, rel=1e-4)  # the unit force itself shifts the point
 
 
@@ -296,7 +296,7 @@ def test_a_state_shows_itself_in_one_line():
         (lambda: equilibrium(NJ2232, (1.0, 0.0)), "three finite numbers"),
         (lambda: cylindrical(290, 160, 80), "bore = 0.29"),
         (lambda: cylindrical(160, 290, 0), "width"),
-        (lambda: cylindrical(160, 290, 80, roller_count=40), "do not fit"),
+        (lambda: cylindrical(160, 290, 80, element_count=40), "do not fit"),
         (lambda: tapered(160, 240, 51, 0.0), "contact_angle = 0"),
         (lambda: BearingPair(bearing=NJ2232, arrangement="Y"), "arrangement = 'Y'"),
         (lambda: BearingPair(bearing=NJ2232, arrangement="X", axial_preload=1e-5), "axial_preload"),
