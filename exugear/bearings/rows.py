@@ -87,6 +87,8 @@ class RollerRow(RollingRow):
         Effective contact length, m.
     profile_factor : float
         Logarithmic profile over roller diameter; 0 for a straight roller.
+    straight_share : float
+        Share of the length, about the middle, that the logarithmic profile leaves straight: long rollers.
     profile_table : tuple of (share, drop), optional
         Instead: the gap (m) between roller and raceway at shares, 0 to 1, of half the length, linear between.
     crown_curvature : float
@@ -97,6 +99,7 @@ class RollerRow(RollingRow):
 
     effective_length: float
     profile_factor: float = 0.0
+    straight_share: float = 0.0
     profile_table: tuple[tuple[float, float], ...] | None = None
     crown_curvature: float = 0.0
     laminae: int = 30
@@ -110,6 +113,8 @@ class RollerRow(RollingRow):
             raise BearingError(f"roller row: laminae = {self.laminae} must be at least 1")
         if self.profile_factor < 0.0:
             raise BearingError(f"roller row: profile_factor = {self.profile_factor} must not be negative")
+        if not 0.0 <= self.straight_share < 1.0:
+            raise BearingError(f"roller row: straight_share = {self.straight_share} must lie between 0 and 1")
 
     @property
     def contact_constant(self) -> float:
@@ -124,7 +129,8 @@ class RollerRow(RollingRow):
             shares, drops = np.array(self.profile_table).T
             drop = drop + np.interp(share, shares, drops)
         elif self.profile_factor > 0.0:
-            drop = drop - self.profile_factor * self.element_diameter * np.log(1.0 - share**2)
+            curved = np.maximum(share - self.straight_share, 0.0) / (1.0 - self.straight_share)
+            drop = drop - self.profile_factor * self.element_diameter * np.log(1.0 - curved**2)
         return drop
 
 
@@ -148,6 +154,11 @@ class BallRow(RollingRow):
             if not getattr(self, key) > 0.5:
                 raise BearingError(f"ball row: {key} = {getattr(self, key)!r} must be above 0.5, or no ball fits in")
 
+    @property
+    def groove_distance(self) -> float:
+        """Distance of the centres of the grooves of both rings while the ball touches them without load, m."""
+        return (self.inner_conformity + self.outer_conformity - 1.0) * self.element_diameter
+
 
 class RollingBearing(Protocol):
     """Anything made of rows of rolling elements between one inner and one outer ring body."""
@@ -158,10 +169,14 @@ class RollingBearing(Protocol):
         ...
 
 
-class RollerBearing(Protocol):
-    """Anything made of rows of rollers between one inner and one outer ring body."""
+@dataclass(frozen=True)
+class BearingOfRows:
+    """A bearing that is given by its rows.
 
-    @property
-    def rows(self) -> tuple[RollerRow, ...]:
-        """Rows in the frame of the bearing."""
-        ...
+    Attributes
+    ----------
+    rows : tuple of RollingRow
+        In the frame of the bearing.
+    """
+
+    rows: tuple[RollingRow, ...]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from functools import lru_cache
 
 import numpy as np
 
 from exugear.bearings import matrices
-from exugear.bearings.rollers import cylindrical_roller_stiffness, tapered_roller_stiffness
+from exugear.bearings.catalogue import catalogue_rows
+from exugear.bearings.contact import pitch_averaged_tangent
+from exugear.bearings.rows import BearingError, BearingOfRows
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Bearing, stiffness_matrix
 from exugear.model.sections.connections import CatalogueSection
@@ -16,12 +17,6 @@ from fe_ste.tools.arrays import Floats
 
 ON_BEARINGS = ("bushing", "flexible")
 """Variants whose bodies sit on bearings."""
-CATALOGUE_LAWS: Mapping[str, Callable[[CatalogueSection], Floats]] = {
-    "cylindrical_roller": cylindrical_roller_stiffness,
-    "tapered_roller": tapered_roller_stiffness,
-}
-"""Laws by the `type` of a catalogue section: each gives the stiffness (6, 6) of its bearings at the stated load, with z
-along their axis. A new kind is one file beside `rollers`, its type in the section, and a line here."""
 
 
 def unsupported(gearbox: Gearbox, variant: str) -> str:
@@ -96,4 +91,7 @@ def catalogue_stiffness(section: CatalogueSection) -> Floats:
     exugear.bearings.rows.BearingError
         The catalogue dimensions or the load are impossible.
     """
-    return matrices.axially_symmetric(CATALOGUE_LAWS[section.type](section))
+    if section.radial_load_kN is None:
+        raise BearingError("radial_load_kN is missing: the load under which its stiffness is taken")
+    force = (1e3 * section.radial_load_kN, 0.0, 1e3 * (section.axial_load_kN or 0.0))
+    return matrices.axially_symmetric(pitch_averaged_tangent(BearingOfRows(catalogue_rows(section)), force))
