@@ -10,7 +10,7 @@ from typing import Literal
 
 from exugear.bearings.pairs import pair_rows
 from exugear.bearings.proportions import PROPORTIONS, ROLLER_LENGTH, element_count, standard_profile
-from exugear.bearings.rows import BearingError, RollerRow
+from exugear.bearings.rows import LAMINAE, BearingError, RollerRow
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +50,7 @@ class CylindricalRollerBearing:
     element_count: int | None = None
     radial_clearance: float = 0.0
     profile_factor: float | None = None
-    laminae: int = 30
+    laminae: int = LAMINAE
 
     def __post_init__(self) -> None:
         """Check the boundary dimensions and the row that follows from them."""
@@ -102,7 +102,7 @@ class TaperedRollerBearing:
     element_count: int | None = None
     radial_clearance: float = 0.0
     profile_factor: float | None = None
-    laminae: int = 30
+    laminae: int = LAMINAE
 
     def __post_init__(self) -> None:
         """Check the boundary dimensions and the row that follows from them."""

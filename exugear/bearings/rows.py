@@ -17,6 +17,10 @@ from fe_ste.tools.arrays import Floats
 LINE_CONTACT_CONSTANT = 35948.0e6
 """Load-deflection constant of steel line contact, roller against both raceways, N/m^2 in SI:
 35948 N/mm^(10/9) mm^(-8/9), where the exponents of the length add up to two (ISO/TS 16281)."""
+LAMINAE = 240
+"""Slices per roller. ISO/TS 16281 asks for at least 30, which is enough for loads. The slope of a contact sets in almost
+as a step at its end: 30 slices of a profiled roller leave up to 2 % (under light loads 10 %) in the tilt stiffness,
+240 leave 0.5 %."""
 LEAST_ELEMENTS = 3
 """Fewer balls or rollers than these hold nothing in all directions."""
 
@@ -94,7 +98,7 @@ class RollerRow(RollingRow):
     crown_curvature : float
         Curvature of the roller's outline less that of the raceway's, 1/m: spherical rollers.
     laminae : int
-        Slices per roller; ISO/TS 16281 asks for at least 30.
+        Slices of equal length per roller; ISO/TS 16281 asks for at least 30.
     """
 
     effective_length: float
@@ -102,7 +106,7 @@ class RollerRow(RollingRow):
     straight_share: float = 0.0
     profile_table: tuple[tuple[float, float], ...] | None = None
     crown_curvature: float = 0.0
-    laminae: int = 30
+    laminae: int = LAMINAE
 
     def __post_init__(self) -> None:
         """Refuse what cannot be built."""
