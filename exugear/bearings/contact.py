@@ -36,6 +36,8 @@ LINE_CONTACT_EXPONENT = 10.0 / 9.0
 """Load of a line contact over its approach."""
 MOST_NEWTON_STEPS = 200
 """Steps after which the search for an equilibrium is given up."""
+HIDDEN_FALL = 1e-9
+"""Fall of the energy, over the energy, that rounding may hide: approaches are differences of longer distances."""
 MOST_TRAVEL = 1.0
 """Displacement (m) at which a ring is taken for one that nothing holds."""
 LEAST_SHOULDER = 1e-6
@@ -416,9 +418,9 @@ def _line_search(
     tolerance: float,
 ) -> Floats:
     """Halve the step until the energy falls; close to the minimum rounding hides the fall, take it whole."""
-    if descent <= tolerance * float(np.linalg.norm(step)):
-        return displacement + step
     start = surplus(displacement)
+    if descent <= max(tolerance * float(np.linalg.norm(step)), HIDDEN_FALL * abs(start)):
+        return displacement + step
     fraction = 1.0
     while surplus(displacement + fraction * step) > start - 1e-4 * fraction * descent and fraction > 1e-6:
         fraction *= 0.5
