@@ -190,6 +190,29 @@ def test_a_given_number_of_elements_makes_smaller_ones():
     assert row.element_diameter < row.pitch_diameter * math.sin(math.pi / 30)
 
 
+@pytest.mark.parametrize(
+    ("kind", "bore", "outer", "printed"),
+    [
+        ("cylindrical_roller", 40.0, 80.0, 50.0),
+        ("cylindrical_roller", 100.0, 180.0, 85.0),
+        ("cylindrical_roller", 280.0, 420.0, 195.0),
+        ("cylindrical_roller", 450.0, 600.0, 310.0),
+        ("spherical_roller", 100.0, 180.0, 100.0),
+        ("spherical_roller", 280.0, 420.0, 260.0),
+        ("deep_groove_ball", 40.0, 80.0, 20.0),
+        ("deep_groove_ball", 100.0, 180.0, 36.0),
+        ("deep_groove_ball", 160.0, 290.0, 53.0),
+        ("self_aligning_ball", 100.0, 180.0, 48.0),
+        ("four_point_ball", 100.0, 180.0, 156.0 * math.tan(math.radians(35.0))),
+    ],
+)
+def test_the_clearance_that_a_file_leaves_open_reaches_to_the_normal_group(kind, bore, outer, printed):
+    # ISO 5753, as printed in SKF's General Catalogue (2008): greatest normal clearance of the step that ends here.
+    found = estimate(section(kind, bore, outer, 0.3 * (outer - bore)), "radial_clearance_mm")
+    assert found.value == found.low == 0.0
+    assert 1e3 * found.high == pytest.approx(printed, rel=0.15)
+
+
 # -- types, directions, places -------------------------------------------------------------------------------------
 
 
