@@ -1,7 +1,7 @@
 """States in balance: the output locked under load, and the start of a run in uniform acceleration.
 
 Both are Newton solutions of the assembly's own forces; elastic deflections are small against the geometry, so
-that a few steps with a difference quotient of the residual reach round-off.
+that a few steps reach round-off.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 import scipy.linalg
 
 from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.linearised import linearise
 from exugear.kernels.meshes import FORCE, MeshArrays
 from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
@@ -24,6 +25,8 @@ MOST_NEWTON_STEPS = 30
 """Steps after which the search for a balance is given up."""
 LARGEST_RESIDUAL = 1e-9
 """Share of the load at which a residual that stops falling is round-off."""
+SHORTEST_STEP = 1e-4
+"""Share of a step of Newton's method to which it is halved while it does not lower the residual."""
 
 
 class BalanceError(RuntimeError):
@@ -51,21 +54,27 @@ class StartState:
         return f"<StartState: {len(self.q)} coordinates, drive torque {self.drive_torque:.4g} N m>"
 
 
-def _newton(residual: Callable[[Floats], Floats], start: Floats, steps: Floats, scale: Floats, what: str) -> Floats:
-    """Newton's method with central differences, until the residual stops falling.
+def _newton(
+    residual: Callable[[Floats], Floats],
+    derivative: Callable[[Floats], Floats],
+    start: Floats,
+    scale: Floats,
+    what: str,
+) -> Floats:
+    """Newton's method until the residual stops falling; steps that would enlarge it are shortened.
 
-    `steps` are those of the differences, `scale` is the size of each residual that counts as one. Being small against
-    the loads ends nothing: a train near balance accelerates with a ten-thousandth of them. Residuals are sums of spring
-    forces, and rounding of places near 1 m is what these cannot resolve: under a small load that is more of it than
-    under a large one, and no step can make it less.
+    `derivative` is that of the residual, a matrix; `scale` is the size of each residual that counts as one. Being small
+    against the loads ends nothing: a train near balance accelerates with a ten-thousandth of them. Residuals are sums of
+    spring forces, and rounding of places near 1 m is what these cannot resolve: under a small load that is more of it
+    than under a large one, and no step can make it less.
     """
     x, solution, best = start, start, np.inf
     if not x.size:
         return x
     rounding = np.zeros_like(x)
+    r = residual(x)
     for _ in range(MOST_NEWTON_STEPS):
-        r = residual(x)
-        error = float(np.max(np.abs(r) / scale))
+        error = _size(r, scale)
         if not np.isfinite(error):
             break
         stalled = error > 0.5 * best
@@ -74,18 +83,42 @@ def _newton(residual: Callable[[Floats], Floats], start: Floats, steps: Floats, 
         small = best < LARGEST_RESIDUAL or bool(np.all(np.abs(r) <= rounding))
         if error == 0.0 or (stalled and small):
             return solution
-        columns = [(residual(x + e) - residual(x - e)) / (2.0 * e.sum()) for e in np.diag(steps)]
-        matrix = np.array(columns).T
+        matrix = derivative(x)
         rounding = np.abs(matrix) @ np.full(x.size, np.finfo(float).eps)
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("error", scipy.linalg.LinAlgWarning)
-                x = x - scipy.linalg.solve(matrix / scale[:, None], r / scale)
-        except (scipy.linalg.LinAlgError, scipy.linalg.LinAlgWarning):
-            raise BalanceError(
-                f"{what}: the stiffness matrix is singular; a body may move without resistance"
-            ) from None
+        step = _solved(matrix / scale[:, None], -r / scale)
+        if step is None:
+            raise BalanceError(f"{what}: the stiffness matrix is singular; a body may move without resistance")
+        # Rollers that touch and part bend the residual: a whole step may lead away from the balance.
+        share, ahead = 1.0, residual(x + step)
+        while not small and share > SHORTEST_STEP and not _size(ahead, scale) < error:
+            share *= 0.5
+            ahead = residual(x + share * step)
+        x, r = x + share * step, ahead
     raise BalanceError(f"{what}: no balance found, the residual stays at {best:.2e} of the load")
+
+
+def _size(residual: Floats, scale: Floats) -> float:
+    return float(np.max(np.abs(residual) / scale))
+
+
+def _solved(matrix: Floats, right_hand_side: Floats) -> Floats | None:
+    """Solution of linear equations, None where the matrix is singular to working precision."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", scipy.linalg.LinAlgWarning)
+            return np.asarray(scipy.linalg.solve(matrix, right_hand_side), dtype=np.float64)
+    except (scipy.linalg.LinAlgError, scipy.linalg.LinAlgWarning):
+        return None
+
+
+def _by_differences(residual: Callable[[Floats], Floats], steps: Floats) -> Callable[[Floats], Floats]:
+    """Derivative of a residual by central differences, a step for each unknown."""
+
+    def derivative(x: Floats) -> Floats:
+        columns = [(residual(x + e) - residual(x - e)) / (2.0 * e.sum()) for e in np.diag(steps)]
+        return np.array(columns).T
+
+    return derivative
 
 
 def locked_equilibrium(
@@ -119,8 +152,12 @@ def locked_equilibrium(
         def residual(x: Floats) -> Floats:
             return free.T @ (assembly.forces(free @ x, rest, meshes) + applied)
 
-        steps, scale = np.full(start.size, DIFFERENCE_STEP), np.full(start.size, _load_scale(applied))
-        return _newton(residual, start, steps, scale, "static state")
+        def derivative(x: Floats) -> Floats:
+            stiffness = linearise(assembly, free @ x, assembly.meshes if meshes is None else meshes).total_stiffness
+            return np.asarray(-free.T @ stiffness @ free)
+
+        scale = np.full(start.size, _load_scale(applied))
+        return _newton(residual, derivative, start, scale, "static state")
 
     start = _touching(assembly, np.zeros(free.shape[1]), lambda x: np.asarray(free @ x), solve)
     return np.asarray(free @ solve(start, meshes))
@@ -279,7 +316,8 @@ def accelerating_start(
 
         # The residual is linear in the last unknown, an acceleration or a torque: no step is too long for it.
         steps = np.append(np.full(start.size - 1, DIFFERENCE_STEP), 1.0)
-        return _newton(residual, start, steps, np.full(start.size, size), "start of the run")
+        derivative = _by_differences(residual, steps)
+        return _newton(residual, derivative, start, np.full(start.size, size), "start of the run")
 
     x = _touching(assembly, np.zeros(motions.shape[1] + 1), lambda x: split(x)[0], solve)
     q, rates, torque = split(solve(x, None))
