@@ -25,6 +25,10 @@ MOST_NEWTON_STEPS = 30
 """Steps after which the search for a balance is given up."""
 LARGEST_RESIDUAL = 1e-9
 """Share of the load at which a residual that stops falling is round-off."""
+EASING_SHARES = (0.1, 1e-3, 0.0)
+"""Shares of the stiffness of non-linear bearings that act beside their rows, one search after the other."""
+HOLDING_SHARE = 1e-6
+"""The same in Newton's matrix alone: it holds bearings that carry nothing."""
 SHORTEST_STEP = 1e-4
 """Share of a step of Newton's method to which it is halved while it does not lower the residual."""
 
@@ -148,19 +152,21 @@ def locked_equilibrium(
     applied = assembly.torque_vector(torques)
     rest = np.zeros(assembly.size)
 
-    def solve(start: Floats, meshes: MeshArrays | None) -> Floats:
+    def solve(assembly: Assembly, start: Floats, meshes: MeshArrays | None) -> Floats:
+        held = assembly.eased(HOLDING_SHARE)
+
         def residual(x: Floats) -> Floats:
             return free.T @ (assembly.forces(free @ x, rest, meshes) + applied)
 
         def derivative(x: Floats) -> Floats:
-            stiffness = linearise(assembly, free @ x, assembly.meshes if meshes is None else meshes).total_stiffness
+            stiffness = linearise(held, free @ x, held.meshes if meshes is None else meshes).total_stiffness
             return np.asarray(-free.T @ stiffness @ free)
 
         scale = np.full(start.size, _load_scale(applied))
         return _newton(residual, derivative, start, scale, "static state")
 
-    start = _touching(assembly, np.zeros(free.shape[1]), lambda x: np.asarray(free @ x), solve)
-    return np.asarray(free @ solve(start, meshes))
+    x = _from_linear(assembly, np.zeros(free.shape[1]), lambda x: np.asarray(free @ x), solve, meshes)
+    return np.asarray(free @ x)
 
 
 @dataclass(frozen=True)
@@ -245,19 +251,37 @@ def _held(assembly: Assembly, torques: Mapping[str, float], locked: Sequence[str
     return held
 
 
+def _from_linear(
+    assembly: Assembly,
+    start: Floats,
+    to_coordinates: Callable[[Floats], Floats],
+    solve: Callable[[Assembly, Floats, MeshArrays | None], Floats],
+    meshes: MeshArrays | None,
+) -> Floats:
+    """Solve for linear bearings and teeth, then let their own laws take over.
+
+    Rows of rolling elements that are apart hold nothing, nor do table flanks: the search begins where they touch.
+    """
+    linear = assembly.with_linear_supports()
+    x = _touching(linear, start, to_coordinates, solve)
+    for stage in (linear, *(assembly.eased(share) for share in EASING_SHARES)) if assembly.has_rows else (assembly,):
+        x = solve(stage, x, meshes)
+    return x
+
+
 def _touching(
     assembly: Assembly,
     start: Floats,
     to_coordinates: Callable[[Floats], Floats],
-    solve: Callable[[Floats, MeshArrays | None], Floats],
+    solve: Callable[[Assembly, Floats, MeshArrays | None], Floats],
 ) -> Floats:
     """Begin where linear teeth would be, on the flanks that they press: table flanks that are apart hold nothing."""
     if not LAWS[assembly.mesh_law].loses_contact:
         return start
-    x = solve(start, assembly.linear_meshes())
+    x = solve(assembly, start, assembly.linear_meshes())
     q = to_coordinates(x)
     reversed_flanks = assembly.mesh_states(q, np.zeros_like(q), assembly.linear_meshes())[:, FORCE] < 0.0
-    return solve(x, assembly.linear_meshes(reversed_flanks)) if reversed_flanks.any() else x
+    return solve(assembly, x, assembly.linear_meshes(reversed_flanks)) if reversed_flanks.any() else x
 
 
 def _load_scale(applied: Floats) -> float:
@@ -306,7 +330,7 @@ def accelerating_start(
         torque = size * float(x[-1]) if driven is not None else 0.0
         return motions @ x[:-1], {name: value * rate for name, value in unit.items()}, torque
 
-    def solve(start: Floats, meshes: MeshArrays | None) -> Floats:
+    def solve(assembly: Assembly, start: Floats, meshes: MeshArrays | None) -> Floats:
         def residual(x: Floats) -> Floats:
             q, rates, torque = split(x)
             v = assembly.rolling_velocity(q, speeds)
@@ -319,6 +343,6 @@ def accelerating_start(
         derivative = _by_differences(residual, steps)
         return _newton(residual, derivative, start, np.full(start.size, size), "start of the run")
 
-    x = _touching(assembly, np.zeros(motions.shape[1] + 1), lambda x: split(x)[0], solve)
-    q, rates, torque = split(solve(x, None))
+    x = _from_linear(assembly, np.zeros(motions.shape[1] + 1), lambda x: split(x)[0], solve, None)
+    q, rates, torque = split(x)
     return StartState(q, assembly.rolling_velocity(q, speeds), rates, torque)
