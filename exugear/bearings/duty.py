@@ -12,7 +12,7 @@ from exugear.bearings.contact import contacts_of, equilibrium, state_at, tangent
 from exugear.bearings.life import basic_rating_life, reference_life
 from exugear.bearings.operating_point import OperatingPoint
 from exugear.bearings.ratings import basic_dynamic_rating, basic_static_rating, equivalent_load, equivalent_static_load
-from exugear.bearings.rows import BearingError
+from exugear.bearings.rows import BearingError, BearingOfRows
 from exugear.bearings.support_laws import holds_one_way
 from exugear.model.sections.connections import CatalogueSection
 from fe_ste.tools.arrays import Floats
@@ -134,7 +134,13 @@ def duty_of(point: OperatingPoint, reaction: Floats | None = None) -> BearingDut
         pressure=float(state.element_pressure.max(initial=0.0)),
         ratings=ratings,
         basic_life=basic_rating_life(ratings.dynamic, equivalent, section.type),
-        reference_life=reference_life(rows, state.lamina_load, not bearing.carries_outer_ring),
+        reference_life=reference_life(
+            rows,
+            state.lamina_load,
+            section.type,
+            dynamic_rating=ratings.dynamic,
+            inner_ring_turns_against_load=not bearing.carries_outer_ring,
+        ),
         reaction=None if reaction is None else math.hypot(reaction[0], reaction[1]),
         remarks=tuple(_remarks(point, ratings, reaction)),
     )
@@ -182,7 +188,7 @@ def estimate_effects(point: OperatingPoint) -> tuple[Sensitivity, ...]:
 def _radial_stiffness(section: CatalogueSection, point: OperatingPoint) -> float:
     try:
         rows = catalogue_rows(section)
-        displacement = equilibrium(rows, point.load[:3], tilt=point.displacement[3:5]).displacement
+        displacement = equilibrium(BearingOfRows(rows), point.load[:3], tilt=point.displacement[3:5]).displacement
     except BearingError:
         return float("nan")
     along = np.array([np.cos(point.direction), np.sin(point.direction)])

@@ -11,7 +11,7 @@ from exugear.bearings import matrices
 from exugear.bearings.catalogue import catalogue_rows
 from exugear.bearings.contact import bearing_load, contacts_of, pitch_averaged_tangent, tangent_stiffness
 from exugear.bearings.ratings import basic_dynamic_rating
-from exugear.bearings.rows import RollingRow
+from exugear.bearings.rows import BearingOfRows, RollingRow
 from exugear.bearings.support_laws import LEAST_LOAD, holding_force
 from exugear.model.parts import Bearing
 from fe_ste.tools.arrays import Floats
@@ -100,7 +100,7 @@ def operating_point(bearing: Bearing, displacement: Floats, load_stands_still: b
     least = LEAST_LOAD * basic_dynamic_rating(rows, bearing.catalogue.type)
     is_unloaded = float(np.linalg.norm(load[:3])) < least
     if is_unloaded:
-        stiffness = pitch_averaged_tangent(rows, holding_force(rows, least))
+        stiffness = pitch_averaged_tangent(BearingOfRows(rows), holding_force(rows, least))
     if is_unloaded or not load_stands_still:
         stiffness = matrices.axially_symmetric(stiffness)
     return OperatingPoint(bearing, rows, displacement, load, stiffness, is_unloaded)

@@ -17,6 +17,10 @@ from fe_ste.tools.arrays import Floats
 LINE_CONTACT_CONSTANT = 35948.0e6
 """Load-deflection constant of steel line contact, roller against both raceways, N/m^2 in SI:
 35948 N/mm^(10/9) mm^(-8/9), where the exponents of the length add up to two (ISO/TS 16281)."""
+LAMINAE = 240
+"""Slices per roller. ISO/TS 16281 asks for at least 30, which is enough for loads. The slope of a contact sets in almost
+as a step at its end: 30 slices of a profiled roller leave up to 2 % (under light loads 10 %) in the tilt stiffness,
+240 leave 0.5 %."""
 LEAST_ELEMENTS = 3
 """Fewer balls or rollers than these hold nothing in all directions."""
 
@@ -87,19 +91,22 @@ class RollerRow(RollingRow):
         Effective contact length, m.
     profile_factor : float
         Logarithmic profile over roller diameter; 0 for a straight roller.
+    straight_share : float
+        Share of the length, about the middle, that the logarithmic profile leaves straight: long rollers.
     profile_table : tuple of (share, drop), optional
         Instead: the gap (m) between roller and raceway at shares, 0 to 1, of half the length, linear between.
     crown_curvature : float
         Curvature of the roller's outline less that of the raceway's, 1/m: spherical rollers.
     laminae : int
-        Slices per roller; ISO/TS 16281 asks for at least 30.
+        Slices of equal length per roller; ISO/TS 16281 asks for at least 30.
     """
 
     effective_length: float
     profile_factor: float = 0.0
+    straight_share: float = 0.0
     profile_table: tuple[tuple[float, float], ...] | None = None
     crown_curvature: float = 0.0
-    laminae: int = 30
+    laminae: int = LAMINAE
 
     def __post_init__(self) -> None:
         """Refuse what cannot be built."""
@@ -110,6 +117,8 @@ class RollerRow(RollingRow):
             raise BearingError(f"roller row: laminae = {self.laminae} must be at least 1")
         if self.profile_factor < 0.0:
             raise BearingError(f"roller row: profile_factor = {self.profile_factor} must not be negative")
+        if not 0.0 <= self.straight_share < 1.0:
+            raise BearingError(f"roller row: straight_share = {self.straight_share} must lie between 0 and 1")
 
     @property
     def contact_constant(self) -> float:
@@ -124,7 +133,8 @@ class RollerRow(RollingRow):
             shares, drops = np.array(self.profile_table).T
             drop = drop + np.interp(share, shares, drops)
         elif self.profile_factor > 0.0:
-            drop = drop - self.profile_factor * self.element_diameter * np.log(1.0 - share**2)
+            curved = np.maximum(share - self.straight_share, 0.0) / (1.0 - self.straight_share)
+            drop = drop - self.profile_factor * self.element_diameter * np.log(1.0 - curved**2)
         return drop
 
 
@@ -148,6 +158,11 @@ class BallRow(RollingRow):
             if not getattr(self, key) > 0.5:
                 raise BearingError(f"ball row: {key} = {getattr(self, key)!r} must be above 0.5, or no ball fits in")
 
+    @property
+    def groove_distance(self) -> float:
+        """Distance of the centres of the grooves of both rings while the ball touches them without load, m."""
+        return (self.inner_conformity + self.outer_conformity - 1.0) * self.element_diameter
+
 
 class RollingBearing(Protocol):
     """Anything made of rows of rolling elements between one inner and one outer ring body."""
@@ -158,10 +173,14 @@ class RollingBearing(Protocol):
         ...
 
 
-class RollerBearing(Protocol):
-    """Anything made of rows of rollers between one inner and one outer ring body."""
+@dataclass(frozen=True)
+class BearingOfRows:
+    """A bearing that is given by its rows.
 
-    @property
-    def rows(self) -> tuple[RollerRow, ...]:
-        """Rows in the frame of the bearing."""
-        ...
+    Attributes
+    ----------
+    rows : tuple of RollingRow
+        In the frame of the bearing.
+    """
+
+    rows: tuple[RollingRow, ...]

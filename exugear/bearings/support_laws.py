@@ -21,7 +21,7 @@ from exugear.bearings.catalogue import catalogue_rows
 from exugear.bearings.contact import pitch_averaged_tangent
 from exugear.bearings.potential import rolling_arrays
 from exugear.bearings.ratings import basic_dynamic_rating
-from exugear.bearings.rows import BearingError, RollingRow
+from exugear.bearings.rows import BearingError, BearingOfRows, RollingRow
 from exugear.kernels.connectors import ConnectorArrays
 from exugear.model.parts import Bearing, stiffness_matrix
 from exugear.model.sections.connections import CatalogueSection
@@ -188,10 +188,10 @@ def catalogue_stiffness(section: CatalogueSection) -> Floats:
     """
     rows = catalogue_rows(section)
     if section.radial_load_kN is not None:
-        force = (section.radial_load_kN * 1e3, 0.0, section.axial_load_kN * 1e3)
+        force = (1e3 * section.radial_load_kN, 0.0, 1e3 * (section.axial_load_kN or 0.0))
     else:
         force = holding_force(rows, NOMINAL_LOAD * basic_dynamic_rating(rows, section.type))
-    return matrices.axially_symmetric(pitch_averaged_tangent(rows, force))
+    return matrices.axially_symmetric(pitch_averaged_tangent(BearingOfRows(rows), force))
 
 
 def holds_one_way(rows: Sequence[RollingRow]) -> bool:

@@ -10,6 +10,7 @@ from exugear.bearings.catalogue import catalogue_rows
 from exugear.bearings.contact import equilibrium
 from exugear.bearings.duty import BearingDuty, duty_of
 from exugear.bearings.operating_point import OperatingPoint, operating_point
+from exugear.bearings.rows import BearingOfRows
 from exugear.bearings.support_laws import catalogue_stiffness
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.statics import static_state
@@ -38,8 +39,8 @@ def bearing_points(assembly: Assembly) -> tuple[OperatingPoint, ...]:
 def _stated_point(bearing: Bearing) -> OperatingPoint:
     """Operating point of a bearing whose load the file states: along x, the stiffness the same in all directions."""
     assert bearing.catalogue is not None and bearing.catalogue.radial_load_kN is not None
-    force = (1e3 * bearing.catalogue.radial_load_kN, 0.0, 1e3 * bearing.catalogue.axial_load_kN)
-    displacement = equilibrium(catalogue_rows(bearing.catalogue), force).displacement
+    force = (1e3 * bearing.catalogue.radial_load_kN, 0.0, 1e3 * (bearing.catalogue.axial_load_kN or 0.0))
+    displacement = equilibrium(BearingOfRows(catalogue_rows(bearing.catalogue)), force).displacement
     return replace(operating_point(bearing, displacement, False), stiffness=catalogue_stiffness(bearing.catalogue))
 
 

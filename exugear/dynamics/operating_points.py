@@ -14,6 +14,7 @@ import numpy as np
 
 from exugear.bearings.contact import bearing_load, contacts_of, equilibrium
 from exugear.bearings.operating_point import OperatingPoint, operating_point
+from exugear.bearings.rows import BearingOfRows
 from exugear.bearings.support_laws import (
     SupportLaw,
     bearing_rows,
@@ -109,7 +110,7 @@ def _point(assembly: Assembly, support: Bearing, law: SupportLaw, strain: Floats
     rows = bearing_rows(support)
     if rows != law.rows:  # its seat yields, and it has clearance
         force = bearing_load(contacts_of(law.rows), displacement)[:3]
-        displacement = equilibrium(rows, force, tilt=displacement[3:5]).displacement if force.any() else displacement
+        displacement = equilibrium(BearingOfRows(rows), force, tilt=displacement[3:5]).displacement if force.any() else displacement
     bodies = {body.name: body for body in assembly.gearbox.bodies()}
     sits_still = support.on not in bodies or bodies[support.on].fixed or bodies[support.body].carrier == support.on
     return operating_point(support, displacement, sits_still)

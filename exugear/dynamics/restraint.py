@@ -41,8 +41,9 @@ def free_motion(gearbox: Gearbox, variant: str) -> str:
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
     >>> free_motion(gearbox, "bushing")
     ''
-    >>> floating = {"bearings.lss_a.stiffness": {}, "bearings.lss_bc.catalogue.type": "cylindrical_roller"}
-    >>> free_motion(gearbox.varied({**floating, "bearings.lss_bc.catalogue.axial_load_kN": 0.0}), "bushing")
+    >>> pair = {"type": "cylindrical_roller", "contact_angle_deg": 0.0, "axial_load_kN": 0.0}
+    >>> floating = {f"bearings.lss_bc.catalogue.{key}": value for key, value in pair.items()}
+    >>> free_motion(gearbox.varied({**floating, "bearings.lss_a.stiffness": {}}), "bushing")
     'body lss can move along z without resistance; add or stiffen a bearing'
     """
     moving = [body for body in gearbox.bodies() if not body.fixed or _is_elastic(gearbox, variant, body)]

@@ -16,20 +16,18 @@ from exugear.bearings.contact import (
     tangent_stiffness,
 )
 from exugear.bearings.matrices import axially_symmetric, rotate_stiffness
-from exugear.bearings.rollers import (
-    CYLINDRICAL_ROLLER_PROFILE,
-    BearingPair,
-    CylindricalRollerBearing,
-    TaperedRollerBearing,
-)
+from exugear.bearings.rollers import BearingPair, CylindricalRollerBearing, TaperedRollerBearing
 from exugear.bearings.rows import BearingError, RollerRow
 
 
+# Closed forms hold for straight rollers: all bearings here have those unless a test says otherwise.
 def cylindrical(bore, outside, width, **options):
+    options.setdefault("profile_factor", 0.0)
     return CylindricalRollerBearing(bore=1e-3 * bore, outside_diameter=1e-3 * outside, width=1e-3 * width, **options)
 
 
 def tapered(bore, outside, width, degrees, **options):
+    options.setdefault("profile_factor", 0.0)
     return TaperedRollerBearing(
         bore=1e-3 * bore,
         outside_diameter=1e-3 * outside,
@@ -100,7 +98,7 @@ def test_pairs_tilt_about_their_pressure_centres(pair):
     stiffness = axially_symmetric(pitch_averaged_tangent(pair, (50e3, 0.0, 0.0)))
     lever = row.axial_position - 0.5 * row.pitch_diameter * math.tan(row.contact_angle)
     sloped_length = row.effective_length / math.cos(row.contact_angle)
-    # 30 laminae stand for a continuous line (0.1 % of its part), a few rollers for a continuous row.
+    # A few rollers stand for a continuous row.
     expected = stiffness[0, 0] * (lever**2 + sloped_length**2 / 12.0)
     assert stiffness[4, 4] == pytest.approx(expected, rel=2e-3)
 
@@ -264,20 +262,31 @@ def test_o_arrangement_tilts_stiffer_than_x():
 
 
 def test_roller_profile_softens():
-    profiled = cylindrical(160, 290, 80, profile_factor=CYLINDRICAL_ROLLER_PROFILE)
+    profiled = cylindrical(160, 290, 80, profile_factor=None)
     straight, round_ended = (equilibrium(b, (129.9e3, 0.0, 0.0)).tangent for b in (NJ2232, profiled))
     assert round_ended[0, 0] < straight[0, 0]
     assert round_ended[4, 4] < straight[4, 4]
 
 
-def test_laminae_have_converged_at_thirty():
-    coarse, fine = (
-        equilibrium(cylindrical(160, 290, 80, laminae=count), (129.9e3, 0.0, 0.0), tilt=(0.0, 5e-4))
-        for count in (30, 300)
+LOADED = {
+    "cylindrical": (lambda **options: cylindrical(160, 290, 80, **options), (129.9e3, 0.0, 0.0)),
+    "cylindrical, light": (lambda **options: cylindrical(160, 290, 80, **options), (5e3, 0.0, 0.0)),
+    "tapered": (lambda **options: tapered(110, 200, 56, 15.6, **options), (21.8e3, 0.0, 12.9e3)),
+    "tapered, light": (lambda **options: tapered(110, 200, 56, 15.6, **options), (2e3, 0.0, 1e3)),
+}
+
+
+@pytest.mark.parametrize("name", LOADED)
+@pytest.mark.parametrize("profile", [None, 0.0], ids=["standard profile", "none"])
+@pytest.mark.parametrize("tilt", [0.0, 5e-4], ids=["straight", "misaligned"])
+def test_the_laminae_leave_half_a_percent_in_the_stiffness(name, profile, tilt):
+    build, force = LOADED[name]
+    usual, fine = (
+        equilibrium(build(profile_factor=profile, **laminae), force, tilt=(0.0, tilt)).tangent
+        for laminae in ({}, {"laminae": 960})
     )
-    # Misaligned by 0.5 mrad the zone ends along the roller; ISO/TS 16281 asks for 30 slices.
-    np.testing.assert_allclose(np.diag(coarse.tangent)[:2], np.diag(fine.tangent)[:2], rtol=2e-3)
-    assert coarse.tangent[4, 4] == pytest.approx(fine.tangent[4, 4], rel=1e-2)
+    assert usual[0, 0] == pytest.approx(fine[0, 0], rel=5e-3)
+    assert usual[4, 4] == pytest.approx(fine[4, 4], rel=5e-3)
 
 
 def test_a_state_shows_itself_in_one_line():
