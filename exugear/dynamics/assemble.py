@@ -16,6 +16,7 @@ from exugear.dynamics.assembly import Assembly, VariantError
 from exugear.kernels.connectors import ConnectorArrays, no_connectors
 from exugear.kernels.elastic import ElasticArrays, no_elastic
 from exugear.kernels.inertia import InertiaArrays
+from exugear.kernels.rolling import no_rolling
 from exugear.kernels.springs import SpringArrays
 from exugear.kernels.travelling import TravellingArrays, no_travelling
 from exugear.model.choice import VARIANTS, Choice
@@ -314,6 +315,7 @@ def _connectors(
         node=np.array(places),
         stiffness=np.array([stiffness for stiffness, _ in matrices]),
         damping=np.array([damping for _, damping in matrices]),
+        rolling=no_rolling(len(supports)),
     )
 
 

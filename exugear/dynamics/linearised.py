@@ -11,7 +11,7 @@ import scipy.optimize
 
 from exugear.bodies.turning_frame import TurningBody
 from exugear.dynamics.assembly import Assembly
-from exugear.kernels.connectors import ConnectorArrays, add_connector_forces
+from exugear.kernels.connectors import add_connector_forces
 from exugear.kernels.meshes import MeshArrays
 from exugear.kernels.springs import SpringArrays, add_spring_forces
 from fe_ste.tools.arrays import Floats
@@ -61,7 +61,7 @@ def linearise(assembly: Assembly, q: Floats, meshes: MeshArrays | None = None) -
         jq, jv = assembly.mesh_jacobians(q, rest, averaged.one(n))
         stiffness[name], damping[name] = -jq, -jv
     for n, name in enumerate(assembly.connector_names):
-        connector = ConnectorArrays._make(values[n : n + 1] for values in assembly.connectors)
+        connector = assembly.connectors.one(n)
         stiffness[name], damping[name] = _tangents(assembly.size, q, connector, add_connector_forces)
     for n, name in enumerate(assembly.spring_names):
         spring = SpringArrays._make(values[n : n + 1] for values in assembly.springs)

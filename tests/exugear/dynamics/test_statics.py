@@ -10,7 +10,7 @@ import pytest
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.statics import BalanceError, accelerating_start, locked_equilibrium
-from exugear.kernels.connectors import ConnectorArrays, add_connector_forces
+from exugear.kernels.connectors import add_connector_forces
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 
@@ -94,7 +94,7 @@ def test_bearing_reactions_balance_the_mesh_forces(grc: Gearbox, stiffness: dict
 def assembly_of_one_bearing(assembly: Assembly, name: str, q: np.ndarray) -> np.ndarray:
     n = assembly.connector_names.index(name)
     f = np.zeros(assembly.size)
-    add_connector_forces(q, 0 * q, ConnectorArrays._make(v[n : n + 1] for v in assembly.connectors), f)
+    add_connector_forces(q, 0 * q, assembly.connectors.one(n), f)
     return f
 
 
