@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.bearings.catalogue import catalogue_rows, estimates, with_estimate
-from exugear.bearings.contact import contacts_of, equilibrium, state_at, tangent_stiffness
+from exugear.bearings.contact import lamina_arrays, equilibrium, state_at, tangent_stiffness
 from exugear.bearings.life import basic_rating_life, reference_life
 from exugear.bearings.operating_point import OperatingPoint
 from exugear.bearings.ratings import basic_dynamic_rating, basic_static_rating, equivalent_load, equivalent_static_load
@@ -192,4 +192,4 @@ def _radial_stiffness(section: CatalogueSection, point: OperatingPoint) -> float
     except BearingError:
         return float("nan")
     along = np.array([np.cos(point.direction), np.sin(point.direction)])
-    return float(along @ tangent_stiffness(contacts_of(rows), displacement)[:2, :2] @ along)
+    return float(along @ tangent_stiffness(lamina_arrays(rows), displacement)[:2, :2] @ along)
