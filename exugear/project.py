@@ -213,7 +213,7 @@ class Project:
         return modes
 
     def bearings(self) -> tuple[BearingDuty, ...]:
-        """What catalogue bearings bear at the static load, written to `bearings_path`."""
+        """Find what catalogue bearings bear at the static load, written to `bearings_path`."""
         assembly = self.assembly()
         duties = bearing_duties(assembly)
         self.keep_case()

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.bearings.catalogue import catalogue_rows, estimates, with_estimate
-from exugear.bearings.contact import lamina_arrays, equilibrium, state_at, tangent_stiffness
+from exugear.bearings.contact import equilibrium, lamina_arrays, state_at, tangent_stiffness
 from exugear.bearings.life import basic_rating_life, reference_life
 from exugear.bearings.operating_point import OperatingPoint
 from exugear.bearings.ratings import basic_dynamic_rating, basic_static_rating, equivalent_load, equivalent_static_load
@@ -156,7 +156,7 @@ def _remarks(point: OperatingPoint, ratings: Ratings, reaction: Floats | None) -
         found = math.hypot(reaction[0], reaction[1])
         if abs(found - point.radial_load) > STATED_DEVIATION * max(found, point.radial_load):
             remarks.append(
-                f"radial_load_kN = {1e-3 * point.radial_load:.4g} is stated, and the static load gives {1e-3 * found:.4g}"
+                f"radial_load_kN = {1e-3 * point.radial_load:.4g} is stated, the static load gives {1e-3 * found:.4g}"
             )
     if holds_one_way(rows):
         sense = "+z" if rows[0].contact_angle > 0.0 else "-z"
@@ -180,8 +180,9 @@ def estimate_effects(point: OperatingPoint) -> tuple[Sensitivity, ...]:
     assert section is not None
     effects = []
     for estimate in estimates(section):
-        ends = [_radial_stiffness(with_estimate(section, estimate, end), point) for end in (estimate.low, estimate.high)]
-        effects.append(Sensitivity(estimate.key, estimate.value, estimate.low, estimate.high, *ends))
+        limits = (estimate.low, estimate.high)
+        ends = [_radial_stiffness(with_estimate(section, estimate, limit), point) for limit in limits]
+        effects.append(Sensitivity(estimate.key, estimate.value, *limits, *ends))
     return tuple(effects)
 
 

@@ -16,13 +16,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from exugear.bearings.ratings import (
-    BearingType,
     basic_dynamic_rating,
     groove_conformities,
     groove_ratio,
     row_count,
 )
 from exugear.bearings.rows import BallRow, BearingError, RollerRow, RollingRow
+from exugear.model.sections.connections import BearingType
 from fe_ste.tools.arrays import Floats
 
 LINE_CONTACT_LIFE = 9.0 / 8.0
@@ -164,7 +164,8 @@ def _stress_loads(row: RollingRow, load: Floats) -> Floats:
     """Return the loads that count, (elements, laminae): balls as one lamina, rollers with their edge stress."""
     stressed = np.asarray(load, dtype=np.float64)
     wanted = "(elements, laminae)" if isinstance(row, RollerRow) else "(elements,)"
-    if stressed.ndim != len(wanted.split()) or len(stressed) % row.element_count or stressed.size == 0:
+    fits = stressed.ndim == 2 if isinstance(row, RollerRow) else stressed.shape[1:] in ((), (1,))
+    if not fits or stressed.size == 0 or len(stressed) % row.element_count:
         raise BearingError(
             f"reference life: loads of shape {stressed.shape} for a row of {row.element_count} elements; give {wanted}"
         )

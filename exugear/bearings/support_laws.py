@@ -1,17 +1,18 @@
 """Laws of supports: stiffness and damping as matrices, or rows of rolling elements with a law of their own.
 
 A bearing with `law = "stiffness"` is linear: given matrices, or the tangent of its rows at a load. One with
-`law = "iso16281"` keeps its rows. The housing factor f stands for the seat: it gives way in proportion to the bearing, so
-that the bearing takes the share f of a deflection under any load. A linear bearing is then f times as stiff, and the rows
-of a non-linear one see f times the deflection: both agree in the limit of small motions, and forces keep a potential.
-A clearance closes without load, which no share of a deflection does: such rows want an elastic housing or no factor.
+`law = "iso16281"` keeps its rows. The housing factor f stands for the seat: it gives way in proportion to the
+bearing, so that the bearing takes the share f of a deflection under any load. A linear bearing is then f times as
+stiff, and the rows of a non-linear one see f times the deflection: both agree in the limit of small motions, and
+forces keep a potential. A clearance closes without load, which no share of a deflection does: such rows want an
+elastic housing or no factor.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -34,8 +35,8 @@ LEAST_LOAD = 0.01
 HOLDING_LOAD = 1.25
 """Axial load over the least that one row with a contact angle needs beside a radial one, where neither is known."""
 QUARTER_PITCH = 0.25
-"""Place of a cage that stands still, in pitches past the load: there the stiffness has its mean over the pitch, to the
-second harmonic."""
+"""Place of a cage that stands still, in pitches past the load: the stiffness has its mean over the pitch there, to
+the second harmonic."""
 
 
 @dataclass(frozen=True)
@@ -85,8 +86,8 @@ def bearing_rows(bearing: Bearing) -> tuple[RollingRow, ...]:
     rows = catalogue_rows(bearing.catalogue)
     if bearing.law == "iso16281" and bearing.factor != 1.0 and any(row.radial_clearance > 0.0 for row in rows):
         raise BearingError(
-            f'law = "iso16281" with clearance and the housing factor {bearing.factor:g}: a clearance closes without load, '
-            "so the factor does not apply; set housing_factor_applies = false, or make the housing elastic"
+            f'law = "iso16281" with clearance and the housing factor {bearing.factor:g}: a clearance closes without '
+            "load, so the factor does not apply; set housing_factor_applies = false, or make the housing elastic"
         )
     return rows
 
@@ -150,7 +151,7 @@ def rolling_law(bearing: Bearing, damping_time: float, of_rows: Floats, directio
 
 
 def cage_ratio(row: RollingRow, outer_ring_turns: bool) -> float:
-    """Turns of a cage per turn of one ring while the other one stands still; rolling elements that do not slip.
+    """Find the turns of a cage per turn of one ring while the other one stands still, without slip.
 
     Examples
     --------
@@ -169,10 +170,10 @@ def with_laws(connectors: ConnectorArrays, laws: Sequence[SupportLaw]) -> Connec
         damping=np.array([law.damping for law in laws]).reshape(-1, 6, 6),
         rolling=rolling_arrays(
             [law.rows for law in laws],
-            scale=np.array([law.scale for law in laws]),
-            time=np.array([law.damping_time for law in laws]),
-            cage_ratio=np.array([law.cage_ratio for law in laws]),
-            phase=np.array([law.phase for law in laws]),
+            scale=[law.scale for law in laws],
+            time=[law.damping_time for law in laws],
+            cage_ratio=[law.cage_ratio for law in laws],
+            phase=[law.phase for law in laws],
         ),
     )
 

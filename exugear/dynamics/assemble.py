@@ -314,7 +314,7 @@ def _connectors(
         if bearing.body in gearbox.pin_offsets:
             local[-1][0] = local[-1][0] + [*gearbox.pin_offsets[bearing.body], 0.0]
         places.append(at)
-    places = ConnectorArrays(
+    connectors = ConnectorArrays(
         bodies=np.array(starts, dtype=np.int64),
         local=np.array(local),
         node=np.array(places),
@@ -322,7 +322,7 @@ def _connectors(
         damping=np.zeros((0, 6, 6)),
         rolling=no_rolling(0),
     )
-    return with_laws(places, [linear_law(bearing, gearbox.case.damping.bearing_time_s) for bearing in supports])
+    return with_laws(connectors, [linear_law(bearing, gearbox.case.damping.bearing_time_s) for bearing in supports])
 
 
 def _attached(coordinates: Mapping[str, tuple[int, ...]], body: str, item: str | None) -> str | None:

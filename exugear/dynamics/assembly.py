@@ -72,8 +72,8 @@ class Assembly:
     elastic_bodies : elastic bodies by name, in the order of their coordinates
     elastic : matrices of those whose frame does not turn
     motions : (size, n) motions that are free; the identity, but for the law `rigid` the rolling ones
-    rows_stiffness : (supports, 6, 6) stiffness of the rows of non-linear bearings at their static load, for methods that
-        begin with linear ones; zero for linear supports
+    rows_stiffness : (supports, 6, 6) stiffness of the rows of non-linear bearings at their static load, for methods
+        that begin with linear ones; zero for linear supports
     operating_points : of each support, None for those that are no catalogue bearings; empty where there are none
     """
 

@@ -45,7 +45,7 @@ def _stated_point(bearing: Bearing) -> OperatingPoint:
 
 
 def bearing_duties(assembly: Assembly) -> tuple[BearingDuty, ...]:
-    """What all catalogue bearings of an assembly bear under the static load of its gearbox file.
+    """Find what all catalogue bearings of an assembly bear under the static load of its gearbox file.
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """Catalogue bearings at the loads that they really carry: the static state with the full law of their rows.
 
-A bearing's stiffness depends on its load, and the load on the stiffness of all bearings. The static state is solved with
-the non-linear law of every row, so that both belong to each other to round-off; a linear bearing then has the tangent
-there. The problem is convex, and starts from the bearings' stiffness at a nominal load.
+A bearing's stiffness depends on its load, and the load on the stiffness of all bearings. The static state is solved
+with the non-linear law of every row, so that both belong to each other to round-off; a linear bearing then has the
+tangent there. The problem is convex, and starts from the bearings' stiffness at a nominal load.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from exugear.bearings.contact import bearing_load, lamina_arrays, equilibrium
+from exugear.bearings.contact import bearing_load, equilibrium, lamina_arrays
 from exugear.bearings.operating_point import OperatingPoint, operating_point
 from exugear.bearings.rows import BearingOfRows
 from exugear.bearings.support_laws import (
@@ -42,8 +42,8 @@ def at_static_load(assembly: Assembly) -> Assembly:
     Returns
     -------
     Assembly
-        With the operating points of its catalogue bearings; those without `radial_load_kN` in the file have the stiffness
-        there, non-linear ones keep their rows.
+        With the operating points of its catalogue bearings; those without `radial_load_kN` in the file have the
+        stiffness there, non-linear ones keep their rows.
 
     Raises
     ------
@@ -110,7 +110,8 @@ def _point(assembly: Assembly, support: Bearing, law: SupportLaw, strain: Floats
     rows = bearing_rows(support)
     if rows != law.rows:  # its seat yields, and it has clearance
         force = bearing_load(lamina_arrays(law.rows), displacement)[:3]
-        displacement = equilibrium(BearingOfRows(rows), force, tilt=displacement[3:5]).displacement if force.any() else displacement
+        if force.any():
+            displacement = equilibrium(BearingOfRows(rows), force, tilt=displacement[3:5]).displacement
     bodies = {body.name: body for body in assembly.gearbox.bodies()}
     sits_still = support.on not in bodies or bodies[support.on].fixed or bodies[support.body].carrier == support.on
     return operating_point(support, displacement, sits_still)

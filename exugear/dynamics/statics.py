@@ -67,10 +67,10 @@ def _newton(
 ) -> Floats:
     """Newton's method until the residual stops falling; steps that would enlarge it are shortened.
 
-    `derivative` is that of the residual, a matrix; `scale` is the size of each residual that counts as one. Being small
-    against the loads ends nothing: a train near balance accelerates with a ten-thousandth of them. Residuals are sums of
-    spring forces, and rounding of places near 1 m is what these cannot resolve: under a small load that is more of it
-    than under a large one, and no step can make it less.
+    `derivative` is that of the residual, a matrix; `scale` is the size of each residual that counts as one. Being
+    small against the loads ends nothing: a train near balance accelerates with a ten-thousandth of them. Residuals are
+    sums of spring forces, and rounding of places near 1 m is what these cannot resolve: under a small load that is
+    more of it than under a large one, and no step can make it less.
     """
     x, solution, best = start, start, np.inf
     if not x.size:
@@ -116,7 +116,7 @@ def _solved(matrix: Floats, right_hand_side: Floats) -> Floats | None:
 
 
 def _by_differences(residual: Callable[[Floats], Floats], steps: Floats) -> Callable[[Floats], Floats]:
-    """Derivative of a residual by central differences, a step for each unknown."""
+    """Differentiate a residual by central differences, a step for each unknown."""
 
     def derivative(x: Floats) -> Floats:
         columns = [(residual(x + e) - residual(x - e)) / (2.0 * e.sum()) for e in np.diag(steps)]

@@ -1,4 +1,4 @@
-"""The file of what bearings bear: JSON with the unit in each key, the hash of its input and the version of its method."""
+"""The file of what bearings bear: JSON, units in the keys, with the hash of its input and its method's version."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def check(case: CaseArgument, files_below: FilesBelowOption = None, as_json: JsonOption = False) -> None:
     """Read and check a gearbox file; sum up its gear pairs, bearings and load cases. Writes nothing."""
     with exit_codes():
-        from exugear.dynamics.readiness import lacking, remarks
+        from exugear.checks.readiness import lacking, remarks
         from exugear.model.choice import USER_VARIANTS
 
         gearbox = read_gearbox(case, files_below, tell=False)
@@ -95,7 +95,6 @@ def _bearing_summaries(gearbox: Gearbox) -> tuple[list[dict[str, Any]], list[str
     from exugear.bearings.duty import estimate_effects
     from exugear.dynamics.assemble import assemble
     from exugear.dynamics.bearing_duties import bearing_duties, bearing_points
-    from exugear.dynamics.statics import BalanceError
     from exugear.model.choice import Choice
     from exugear.results.bearings_file import duty_summary
     from exugear.tooth_mesh.laws.stiffness import mesh_stiffness

@@ -7,6 +7,7 @@ code itself, which was written by others from the standard. The rest are limit c
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -21,11 +22,12 @@ from exugear.bearings.life import (
     reference_life,
 )
 from exugear.bearings.ratings import basic_dynamic_rating
-from exugear.bearings.rollers import CYLINDRICAL_ROLLER_PROFILE, CylindricalRollerBearing
-from exugear.bearings.rows import BallRow, BearingError, RollerRow
+from exugear.bearings.rows import BallRow, BearingError, BearingOfRows, RollerRow
 
 RPM = math.pi / 30.0
-NJ2232 = {"bore": 0.160, "outside_diameter": 0.290, "width": 0.080}
+CYLINDRICAL_ROLLER_PROFILE = 0.00035
+# Estimated rollers of an NJ 2232 (160 x 290 x 80): 0.27 (D - d) thick, 0.75 B long, 1.15 diameters apart.
+NJ2232 = RollerRow(element_diameter=0.0351, pitch_diameter=0.225, element_count=17, effective_length=0.060, laminae=30)
 PLANET_LOAD = 129.9e3
 
 
@@ -52,10 +54,8 @@ def roller_life(
 
 
 def nj2232_life(force=PLANET_LOAD, profile_factor=0.0, radial_clearance=0.0, laminae=30, **options):
-    bearing = CylindricalRollerBearing(
-        **NJ2232, profile_factor=profile_factor, radial_clearance=radial_clearance, laminae=laminae
-    )
-    return roller_life(bearing, force, **options)
+    row = replace(NJ2232, profile_factor=profile_factor, radial_clearance=radial_clearance, laminae=laminae)
+    return roller_life(BearingOfRows((row,)), force, **options)
 
 
 def ball_row(count, diameter=0.0115, pitch_diameter=0.0435):
@@ -147,20 +147,17 @@ CODE_RESULTS = [
 def test_reference_life_of_rollers_is_that_of_another_code(
     count, diameter, pitch, length, first, rating, force, clearance, profile, life
 ):
-    class Bearing:
-        rows = (
-            RollerRow(
-                element_diameter=1e-3 * diameter,
-                pitch_diameter=1e-3 * pitch,
-                element_count=count,
-                effective_length=1e-3 * length,
-                radial_clearance=1e-3 * clearance,
-                profile_factor=profile,
-            ),
-        )
-
+    row = RollerRow(
+        element_diameter=1e-3 * diameter,
+        pitch_diameter=1e-3 * pitch,
+        element_count=count,
+        effective_length=1e-3 * length,
+        radial_clearance=1e-3 * clearance,
+        profile_factor=profile,
+        laminae=30,
+    )
     options = {"first": math.radians(first), "positions": 1, "edge_stress": False, "dynamic_rating": rating}
-    assert roller_life(Bearing(), force, **options) == pytest.approx(life, rel=1e-5)
+    assert roller_life(BearingOfRows((row,)), force, **options) == pytest.approx(life, rel=1e-5)
 
 
 # An independent calculation of the GRC's planet bearing (rollers estimated, four cage positions), Mrev.
@@ -184,14 +181,14 @@ def test_clearance_tilt_and_straight_rollers_shorten_the_life_as_calculated_befo
 
 
 def test_basic_rating_life_of_the_planet_bearing_is_a_third_of_the_reference_life():
-    rating = basic_dynamic_rating(CylindricalRollerBearing(**NJ2232).rows, "cylindrical_roller")
+    rating = basic_dynamic_rating([NJ2232], "cylindrical_roller")
     life = basic_rating_life(rating, PLANET_LOAD, "cylindrical_roller")
     assert life == pytest.approx(631.0, rel=0.001)
     assert nj2232_life(profile_factor=CYLINDRICAL_ROLLER_PROFILE) == pytest.approx(3.0 * life, rel=0.02)
 
 
 def test_straight_rollers_live_a_million_revolutions_at_their_rating():
-    rating = basic_dynamic_rating(CylindricalRollerBearing(**NJ2232).rows, "cylindrical_roller")
+    rating = basic_dynamic_rating([NJ2232], "cylindrical_roller")
     life = nj2232_life(rating, edge_stress=False)
     # ISO 281 takes 0.83 of the capacity for uneven loads that the laminae show by themselves. The constants 0.378
     # and 0.364 are Lundberg's load integrals for the exponent 1.1, laminae have 10/9: 2 %.

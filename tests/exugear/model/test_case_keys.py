@@ -14,9 +14,9 @@ from exugear.bearings import supports
 from exugear.bearings.catalogue import catalogue_rows
 from exugear.bearings.supports import bearing_matrices, elastic_names
 from exugear.bodies.of_gearbox.elastic_bodies import check_elastic_body
+from exugear.checks.readiness import check_parts, lacking, remarks
 from exugear.cli.app import app
 from exugear.dynamics.assemble import assemble
-from exugear.dynamics.readiness import check_parts, lacking, remarks
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import stiffness_matrix

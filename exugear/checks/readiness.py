@@ -10,7 +10,7 @@ import numpy as np
 from exugear.bearings.rows import BearingError
 from exugear.bearings.support_laws import linear_law
 from exugear.bearings.supports import ON_BEARINGS, elastic_names, unsupported
-from exugear.dynamics.restraint import free_motion
+from exugear.checks.restraint import free_motion
 from exugear.loads.torque_series import torque_series
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Bearing
