@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from exugear.bearings import proportions
-from exugear.bearings.pairs import moved, pair_rows
-from exugear.bearings.rows import BallRow, BearingError, RollerRow, RollingRow
+from exugear.bearings.rows import BallRow, BearingError, RollerRow, RollingRow, moved, pair_rows
 from exugear.model.sections.connections import CONTACT_ANGLES_DEG, TYPES_OF_KEYS, CatalogueSection
 
 ALIGNING = ("spherical_roller", "self_aligning_ball")

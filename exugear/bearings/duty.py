@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.bearings.catalogue import catalogue_rows, estimates, with_estimate
-from exugear.bearings.contact import equilibrium, lamina_arrays, state_at, tangent_stiffness
+from exugear.bearings.contact import BearingState, bearing_state, equilibrium, row_contacts, tangent_stiffness
 from exugear.bearings.life import basic_rating_life, reference_life
 from exugear.bearings.operating_point import OperatingPoint
 from exugear.bearings.ratings import basic_dynamic_rating, basic_static_rating, equivalent_load, equivalent_static_load
@@ -118,7 +118,7 @@ def duty_of(point: OperatingPoint, reaction: Floats | None = None) -> BearingDut
     bearing, rows, section = point.bearing, point.rows, point.bearing.catalogue
     assert section is not None
     ratings = ratings_of(section)
-    state = state_at(rows, point.displacement)
+    state = bearing_state(row_contacts(rows), point.displacement)
     radial, axial = point.radial_load, float(point.load[2])
     equivalent = equivalent_load(rows, section.type, radial, abs(axial), ratings.static)
     return BearingDuty(
@@ -136,7 +136,7 @@ def duty_of(point: OperatingPoint, reaction: Floats | None = None) -> BearingDut
         basic_life=basic_rating_life(ratings.dynamic, equivalent, section.type),
         reference_life=reference_life(
             rows,
-            state.lamina_load,
+            loads_of_rows(state),
             section.type,
             dynamic_rating=ratings.dynamic,
             inner_ring_turns_against_load=not bearing.carries_outer_ring,
@@ -144,6 +144,15 @@ def duty_of(point: OperatingPoint, reaction: Floats | None = None) -> BearingDut
         reaction=None if reaction is None else math.hypot(reaction[0], reaction[1]),
         remarks=tuple(_remarks(point, ratings, reaction)),
     )
+
+
+def loads_of_rows(state: BearingState) -> list[Floats]:
+    """Loads of each row as its life needs them, N: (elements, laminae) of rollers, (elements,) of balls."""
+    first = state.contacts.first
+    return [
+        state.element_load[begin:end] if laminae is None else laminae
+        for laminae, begin, end in zip(state.lamina_load, first[:-1], first[1:], strict=True)
+    ]
 
 
 def _remarks(point: OperatingPoint, ratings: Ratings, reaction: Floats | None) -> list[str]:
@@ -193,4 +202,4 @@ def _radial_stiffness(section: CatalogueSection, point: OperatingPoint) -> float
     except BearingError:
         return float("nan")
     along = np.array([np.cos(point.direction), np.sin(point.direction)])
-    return float(along @ tangent_stiffness(lamina_arrays(rows), displacement)[:2, :2] @ along)
+    return float(along @ tangent_stiffness(row_contacts(rows), displacement)[:2, :2] @ along)

@@ -9,7 +9,7 @@ import numpy as np
 
 from exugear.bearings import matrices
 from exugear.bearings.catalogue import catalogue_rows
-from exugear.bearings.contact import bearing_load, lamina_arrays, pitch_averaged_tangent, tangent_stiffness
+from exugear.bearings.contact import bearing_load, pitch_averaged_tangent, row_contacts, tangent_stiffness
 from exugear.bearings.ratings import basic_dynamic_rating
 from exugear.bearings.rows import BearingOfRows, RollingRow
 from exugear.bearings.support_laws import LEAST_LOAD, holding_force
@@ -94,7 +94,7 @@ def operating_point(bearing: Bearing, displacement: Floats, load_stands_still: b
     pitch = 2.0 * math.pi / rows[0].element_count
     load, stiffness = np.zeros(6), np.zeros((6, 6))
     for position in range(CAGE_POSITIONS):
-        contacts = lamina_arrays(rows, pitch * position / CAGE_POSITIONS)
+        contacts = row_contacts(rows, pitch * position / CAGE_POSITIONS)
         load += bearing_load(contacts, displacement) / CAGE_POSITIONS
         stiffness += tangent_stiffness(contacts, displacement) / CAGE_POSITIONS
     least = LEAST_LOAD * basic_dynamic_rating(rows, bearing.catalogue.type)

@@ -8,9 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from exugear.bearings.pairs import pair_rows
 from exugear.bearings.proportions import PROPORTIONS, ROLLER_LENGTH, element_count, standard_profile
-from exugear.bearings.rows import LAMINAE, BearingError, RollerRow
+from exugear.bearings.rows import LAMINAE, BearingError, RollerRow, pair_rows
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from exugear.bearings.contact import bearing_load, equilibrium, lamina_arrays
+from exugear.bearings.contact import bearing_load, equilibrium, row_contacts
 from exugear.bearings.operating_point import OperatingPoint, operating_point
 from exugear.bearings.rows import BearingOfRows
 from exugear.bearings.support_laws import (
@@ -109,7 +109,7 @@ def _point(assembly: Assembly, support: Bearing, law: SupportLaw, strain: Floats
     displacement = law.scale * strain
     rows = bearing_rows(support)
     if rows != law.rows:  # its seat yields, and it has clearance
-        force = bearing_load(lamina_arrays(law.rows), displacement)[:3]
+        force = bearing_load(row_contacts(law.rows), displacement)[:3]
         if force.any():
             displacement = equilibrium(BearingOfRows(rows), force, tilt=displacement[3:5]).displacement
     bodies = {body.name: body for body in assembly.gearbox.bodies()}

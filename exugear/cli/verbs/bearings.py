@@ -61,14 +61,20 @@ def bearings(
             choice = {"variant": variant.value, "mesh_law": mesh_law.value, "inertias": project.choice.inertias}
             print_json({"case": str(case), **choice, "bearings": [*map(duty_summary, duties)], "file": str(path)})
             return
-        print_table(f"Bearings under the static load, {variant.value}", [_row(duty) for duty in duties])
-        say(f"L10 by ISO 281, L10r by ISO/TS 16281, both basic: lubricant and cleanliness are left out. File: {path}")
+        title = f"Bearings under the static load, {variant.value}"
+        print_table(f"{title}: loads, stiffness of the rows", [_load_row(duty) for duty in duties])
+        print_table(
+            "Contact, ratings and life, basic: lubricant and cleanliness are left out", [*map(_life_row, duties)]
+        )
+        if any(duty.ratings.estimated for duty in duties):
+            say("* rating estimated; dynamic_rating_kN and static_rating_kN of the file replace it")
+        say(f"Bearings in {path}")
         for duty in duties:
             for remark in duty.remarks:
                 note(f"bearings.{duty.name}: {remark}", style="yellow")
 
 
-def _row(duty: BearingDuty) -> dict[str, str]:
+def _load_row(duty: BearingDuty) -> dict[str, str]:
     return {
         "bearing": duty.name,
         "radial\nkN": f"{1e-3 * duty.radial_load:.4g}",
@@ -76,9 +82,18 @@ def _row(duty: BearingDuty) -> dict[str, str]:
         "radial\nGN/m": f"{1e-9 * duty.radial_stiffness:.3g}",
         "axial\nGN/m": f"{1e-9 * duty.stiffness[2, 2]:.3g}",
         "tilt\nMN m/rad": f"{0.5e-6 * (duty.stiffness[3, 3] + duty.stiffness[4, 4]):.3g}",
-        "misalign.\nmrad": f"{1e3 * duty.misalignment:.3f}",
-        "element\nkN": f"{1e-3 * duty.element_load:.3g}",
+        "misaligned\nmrad": f"{1e3 * duty.misalignment:.3f}",
+    }
+
+
+def _life_row(duty: BearingDuty) -> dict[str, str]:
+    sign = "*" if duty.ratings.estimated else ""
+    return {
+        "bearing": duty.name,
+        "most loaded\nelement kN": f"{1e-3 * duty.element_load:.3g}",
         "pressure\nMPa": f"{1e-6 * duty.pressure:.0f}",
-        "L10\nMrev": f"{duty.basic_life:.4g}",
-        "L10r\nMrev": f"{duty.reference_life:.4g}",
+        "C_r\nkN": f"{1e-3 * duty.ratings.dynamic:.4g}{sign}",
+        "C_0r\nkN": f"{1e-3 * duty.ratings.static:.4g}{sign}",
+        "L10\nMrev": f"{duty.basic_life:.3g}",
+        "L10r\nMrev": f"{duty.reference_life:.3g}",
     }
