@@ -27,16 +27,16 @@ def main() -> None:
     """Print a line for each pair of clearances."""
     project = grc_project(Choice("bushing", "iso6336"))
     print("clearance of bearings, mm    largest share of a planet over a third (K_gamma)")
-    print("carrier  planets             with weight   without")
+    print("carrier  planets")
     for carrier in CLEARANCES_MM:
         for planets in CLEARANCES_MM:
-            factors = [load_sharing_factor(project, carrier, planets, weight) for weight in (WEIGHT, [0.0] * 3)]
-            print(f"{carrier:6.2f}  {planets:6.2f}              {factors[0]:8.3f}   {factors[1]:8.3f}", flush=True)
+            factor = load_sharing_factor(project, carrier, planets)
+            print(f"{carrier:6.2f}  {planets:6.2f}              {factor:8.3f}", flush=True)
 
 
-def load_sharing_factor(project: Project, carrier: float, planets: float, weight: list[float]) -> float:
+def load_sharing_factor(project: Project, carrier: float, planets: float) -> float:
     """Largest share of a planet, times their number, over all angles of the carrier."""
-    changes: dict[str, object] = {"gravity.acceleration_m_per_s2": weight}
+    changes: dict[str, object] = {"gravity.acceleration_m_per_s2": WEIGHT}
     for bearing, clearance in (("plc_a", carrier), ("plc_b", carrier), ("pl_a", planets), ("pl_b", planets)):
         changes[f"bearings.{bearing}.law"] = "iso16281"
         changes[f"bearings.{bearing}.catalogue.radial_clearance_mm"] = clearance

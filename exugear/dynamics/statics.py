@@ -27,8 +27,8 @@ LARGEST_RESIDUAL = 1e-9
 """Share of the load at which a residual that stops falling is round-off."""
 EASING_SHARES = (0.1, 1e-3, 0.0)
 """Shares of the stiffness of non-linear bearings that act beside their rows, one search after the other."""
-HOLDING_SHARE = 1e-6
-"""The same in Newton's matrix alone: it holds bearings that carry nothing."""
+HOLDING_SHARES = (1e-6, 1e-4, 1e-2)
+"""The same in Newton's matrix alone, each where the one before fails: it holds bearings that carry nothing."""
 SHORTEST_STEP = 1e-4
 """Share of a step of Newton's method to which it is halved while it does not lower the residual."""
 
@@ -153,17 +153,22 @@ def locked_equilibrium(
     rest = np.zeros(assembly.size)
 
     def solve(assembly: Assembly, start: Floats, meshes: MeshArrays | None) -> Floats:
-        held = assembly.eased(HOLDING_SHARE)
-
         def residual(x: Floats) -> Floats:
             return free.T @ (assembly.forces(free @ x, rest, meshes) + applied)
 
-        def derivative(x: Floats) -> Floats:
+        def derivative(x: Floats, held: Assembly) -> Floats:
             stiffness = linearise(held, free @ x, held.meshes if meshes is None else meshes).total_stiffness
             return np.asarray(-free.T @ stiffness @ free)
 
         scale = np.full(start.size, _load_scale(applied))
-        return _newton(residual, derivative, start, scale, "static state")
+        for share in HOLDING_SHARES if assembly.has_rows else HOLDING_SHARES[:1]:
+            held = assembly.eased(share)
+            try:
+                return _newton(residual, lambda x, held=held: derivative(x, held), start, scale, "static state")
+            except BalanceError:
+                if share == HOLDING_SHARES[-1] or not assembly.has_rows:
+                    raise
+        raise AssertionError  # the last share returns or raises
 
     x = _from_linear(assembly, np.zeros(free.shape[1]), lambda x: np.asarray(free @ x), solve, meshes)
     return np.asarray(free @ x)

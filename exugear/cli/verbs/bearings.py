@@ -62,12 +62,13 @@ def bearings(
             print_json({"case": str(case), **choice, "bearings": [*map(duty_summary, duties)], "file": str(path)})
             return
         title = f"Bearings under the static load, {variant.value}"
-        print_table(f"{title}: loads, stiffness of the rows", [_load_row(duty) for duty in duties])
+        print_table(title, [_load_row(duty) for duty in duties])
         print_table(
-            "Contact, ratings and life, basic: lubricant and cleanliness are left out", [*map(_life_row, duties)]
+            "Contact, ratings, basic rating life", [*map(_life_row, duties)]
         )
         if any(duty.ratings.estimated for duty in duties):
             say("* rating estimated; dynamic_rating_kN and static_rating_kN of the file replace it")
+        say("Lives are basic: lubricant and cleanliness are left out, and so are ribs")
         say(f"Bearings in {path}")
         for duty in duties:
             for remark in duty.remarks:

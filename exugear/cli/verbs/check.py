@@ -39,7 +39,7 @@ def check(case: CaseArgument, files_below: FilesBelowOption = None, as_json: Jso
                 title = f"Load cases, rolling at the overall input {gearbox.case.overall.input}"
                 print_table(title, [_load_row(one) for one in loads], ("loaded flanks",))
             if bearings:
-                print_table("Bearings under the static load", [_bearing_row(one) for one in bearings], ("estimated",))
+                print_table("Bearings under the static load", [_bearing_row(one) for one in bearings], ("most by",))
             for variant, reason in variants.items():
                 say(f"variant {variant}: {f'not possible, {reason}' if reason else 'possible'}")
             for line in warnings:
@@ -126,15 +126,20 @@ def _bearing_summaries(gearbox: Gearbox) -> tuple[list[dict[str, Any]], list[str
 
 
 def _bearing_row(summary: dict[str, Any]) -> dict[str, str]:
-    ends = [end for one in summary["estimated"].values() for end in one["radial_stiffness_N_per_m"] if end is not None]
+    ranges = {
+        key: [end for end in one["radial_stiffness_N_per_m"] if end is not None]
+        for key, one in summary["estimated"].items()
+    }
+    ends = [end for pair in ranges.values() for end in pair]
     spread = f"{1e-9 * min(ends):.3g} to {1e-9 * max(ends):.3g}" if ends else ""
+    most = max(ranges, key=lambda key: max(ranges[key], default=0.0) - min(ranges[key], default=0.0), default="")
     return {
         "bearing": summary["bearing"],
         "radial\nkN": f"{summary['radial_load_kN']:.4g}",
         "axial\nkN": f"{summary['axial_load_kN']:.4g}",
         "radial\nGN/m": f"{1e-9 * summary['radial_stiffness_N_per_m']:.3g}",
         "over the range\nof estimates": spread,
-        "estimated": ", ".join(summary["estimated"]),
+        "most by": most,
     }
 
 
