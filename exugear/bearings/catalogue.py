@@ -85,7 +85,7 @@ def estimates(section: CatalogueSection) -> tuple[Estimate, ...]:
     --------
     >>> section = CatalogueSection(type="cylindrical_roller", bore_mm=160.0, outer_diameter_mm=290.0, width_mm=80.0)
     >>> [(estimate.key, round(estimate.value, 2)) for estimate in estimates(section)][1:4]
-    [('element_diameter_mm', 35.1), ('element_count', 17.0), ('element_length_mm', 60.0)]
+    [('element_diameter_mm', 35.1), ('element_count', 17.0), ('element_length_mm', 51.2)]
     """
     found = []
     for estimated in _ESTIMATED.values():

@@ -1,6 +1,23 @@
 """Usual proportions of rolling bearings: what catalogues leave open, from the boundary dimensions.
 
-Each proportion has a value and the range that bearings of known geometry cover.
+Diameters, numbers and lengths were set so that the static ratings that follow from them (ISO 76) are those of SKF's
+General Catalogue (2008), its edition of 2017 for needle roller bearings. For each type: how many bearings, and
+estimated over printed rating, the median and the range of the middle nine tenths:
+
+==================== === ==== =========
+cylindrical roller   125 1.00 0.91-1.21
+the same, no cage     94 1.06 0.89-1.27
+needle roller         40 1.00 0.92-1.06
+tapered roller       188 1.00 0.88-1.17
+spherical roller      87 1.00 0.87-1.13
+deep-groove ball      68 0.96 0.93-1.08
+angular-contact ball  38 0.94 0.87-1.02
+self-aligning ball    72 1.00 0.71-1.21
+four-point ball       51 1.01 0.93-1.13
+==================== === ==== =========
+
+The range of each single proportion is that of bearings whose inside is published (Harris and Kotzalas, Rolling
+Bearing Analysis; data sets of faulty bearings), widened where the ratings ask for it.
 """
 
 from __future__ import annotations
@@ -47,23 +64,23 @@ class Proportions:
 
 
 PROPORTIONS: Mapping[str, Proportions] = {
-    "cylindrical_roller": Proportions(Proportion(0.27, 0.24, 0.29), Proportion(1.15, 1.08, 1.30)),
-    "needle_roller": Proportions(Proportion(0.16, 0.12, 0.20), Proportion(1.40, 1.20, 1.70)),
-    "tapered_roller": Proportions(Proportion(0.27, 0.23, 0.29), Proportion(1.15, 1.08, 1.25)),
-    "spherical_roller": Proportions(Proportion(0.26, 0.23, 0.29), Proportion(1.20, 1.10, 1.30)),
-    "deep_groove_ball": Proportions(Proportion(0.30, 0.29, 0.32), Proportion(1.70, 1.60, 1.85)),
-    "angular_contact_ball": Proportions(Proportion(0.305, 0.28, 0.32), Proportion(1.15, 1.08, 1.25)),
-    "self_aligning_ball": Proportions(Proportion(0.25, 0.22, 0.28), Proportion(1.30, 1.15, 1.45)),
-    "four_point_ball": Proportions(Proportion(0.305, 0.28, 0.32), Proportion(1.15, 1.08, 1.25)),
+    "cylindrical_roller": Proportions(Proportion(0.27, 0.24, 0.29), Proportion(1.15, 1.08, 1.45)),
+    "needle_roller": Proportions(Proportion(0.16, 0.12, 0.20), Proportion(1.40, 1.20, 1.60)),
+    "tapered_roller": Proportions(Proportion(0.27, 0.24, 0.29), Proportion(1.15, 1.08, 1.25)),
+    "spherical_roller": Proportions(Proportion(0.26, 0.23, 0.28), Proportion(1.15, 1.08, 1.25)),
+    "deep_groove_ball": Proportions(Proportion(0.305, 0.29, 0.32), Proportion(1.70, 1.60, 1.85)),
+    "angular_contact_ball": Proportions(Proportion(0.32, 0.29, 0.335), Proportion(1.08, 1.04, 1.20)),
+    "self_aligning_ball": Proportions(Proportion(0.26, 0.22, 0.31), Proportion(1.25, 1.15, 1.40)),
+    "four_point_ball": Proportions(Proportion(0.3175, 0.29, 0.335), Proportion(1.12, 1.05, 1.20)),
 }
 """Proportions by type."""
 PITCH_BEYOND_MEAN = Proportion(0.0, -0.02, 0.03)
 """Pitch diameter less the mean of bore and outer diameter, over outer diameter less bore."""
 ROLLER_LENGTH: Mapping[str, Proportion] = {
-    "cylindrical_roller": Proportion(0.75, 0.55, 0.80),
-    "needle_roller": Proportion(0.78, 0.65, 0.88),
-    "tapered_roller": Proportion(0.75, 0.60, 0.80),
-    "spherical_roller": Proportion(0.70, 0.60, 0.80),
+    "cylindrical_roller": Proportion(0.64, 0.50, 0.74),
+    "needle_roller": Proportion(0.68, 0.60, 0.76),
+    "tapered_roller": Proportion(0.68, 0.58, 0.76),
+    "spherical_roller": Proportion(0.74, 0.65, 0.82),
 }
 """Effective length of rollers over the width of their row, by type."""
 CONTACT_ANGLE_DEG: Mapping[str, Proportion] = {

@@ -17,8 +17,8 @@ class CylindricalRollerBearing:
     """Single-row cylindrical roller bearing from its boundary dimensions.
 
     What the catalogue does not print is estimated from the boundary dimensions: roller diameter
-    ``0.27 (D - d)``, effective length ``0.75 B``, and as many rollers as fit on the pitch circle at a
-    pitch of 1.15 roller diameters (with a cage) or 1.01 (full complement).
+    ``0.27 (D - d)``, effective length ``0.64 B``, and as many rollers as fit on the pitch circle at a
+    pitch of 1.15 roller diameters (with a cage) or 1.01 (full complement); see `exugear.bearings.proportions`.
 
     Parameters
     ----------

@@ -20,14 +20,17 @@ from exugear.bearings.rollers import BearingPair, CylindricalRollerBearing, Tape
 from exugear.bearings.rows import BearingError, RollerRow
 
 
-# Closed forms hold for straight rollers: all bearings here have those unless a test says otherwise.
+# Closed forms hold for straight rollers, and the hand estimate has rollers of 0.75 of the width: so have all bearings
+# here unless a test says otherwise.
 def cylindrical(bore, outside, width, **options):
     options.setdefault("profile_factor", 0.0)
+    options.setdefault("effective_length", 0.75e-3 * width or None)
     return CylindricalRollerBearing(bore=1e-3 * bore, outside_diameter=1e-3 * outside, width=1e-3 * width, **options)
 
 
 def tapered(bore, outside, width, degrees, **options):
     options.setdefault("profile_factor", 0.0)
+    options.setdefault("effective_length", 0.75e-3 * width)
     return TaperedRollerBearing(
         bore=1e-3 * bore,
         outside_diameter=1e-3 * outside,
