@@ -5,7 +5,7 @@ one, along the outer ring's axes: q = x cos p + y sin p, z, and the tilt in its 
 has a potential U(q, z, w), which the tables and constants of `exugear.bearings.potential` give:
 
     roller       U(d, w),  d = cos(al) q + sin(al) z + e w - gap,  e = r sin(al) - z0 cos(al)
-    ball         2/5 k max(0, l - span)^(5/2),  l the distance of the grooves' centres: the contact angle follows it
+    ball         2/5 k max(0, l - span)^(5/2),  l the distance of the grooves' centres, whose line is the normal
     aligned      the same of d, without tilt: the outer raceway is a sphere about the bearing's middle
 
 Forces are its gradient, tangents its second derivatives: both exact, so that energy closes. A cage that turns with the
@@ -215,7 +215,9 @@ def element_law(
     c, s, lever = row[COSINE], row[SINE], row[LEVER]
     d = c * q + s * z + lever * w - row[GAP]
     if form == ROLLER:
-        u, f, m, dd, dw, ww = roller_law(r, d, row[TILTING] * w, rolling)
+        tilting = row[TILTING]
+        u, f, m, dd, dw, ww = roller_law(r, d, tilting * w, rolling)
+        m, dw, ww = tilting * m, tilting * dw, tilting * ww
     else:
         approach = max(d, 0.0)
         dd = 1.5 * row[CONSTANT] * math.sqrt(approach)
