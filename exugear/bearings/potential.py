@@ -52,15 +52,16 @@ from fe_ste.tools.arrays import Floats
 
 SLICES = 240
 """Slices of a roller: their sum is within 1e-4 of that of infinitely many where 30 are 1 % soft against tilting."""
-ROOTS, TILTS = 32, 24
-"""Steps of a table along the root of the depth and along the tilt."""
+STEPS, MORE_STEPS = (32, 24), (48, 32)
+"""Steps of a table along the root of the depth and along the tilt; more where first contact is no smooth function of
+the tilt, as of straight rollers."""
 MOST_TILT_OF_TABLE = 5e-3
 """Tilt (rad) up to which a table goes: more than any bearing stands. Beyond it slices are summed."""
 MOST_PRESSURE = 4e9
 """Contact pressure (Pa) that a table goes to: that of the static rating of roller bearings (ISO 76)."""
 PLANE_STRAIN_MODULUS = 206e9 / (1.0 - 0.3**2)
 """Young's modulus of steel over 1 - Poisson's ratio squared, Pa."""
-ROUNDING = 0.002
+ROUNDING = 2e-4
 """How far the bound of first contact is rounded off where the roller has no smooth crown, as a share of the depth."""
 
 
@@ -92,13 +93,14 @@ def roller_table(row: RollerRow) -> RollerTable:
     # The load of a line contact, flat against flat raceway, at the limit of pressure; then the approach under it.
     load = MOST_PRESSURE**2 * math.pi * row.effective_length * row.element_diameter / PLANE_STRAIN_MODULUS
     depth = float((load / row.contact_constant) ** (1.0 / LINE_POWER))
-    count = 1 if row.aligning else TILTS
+    steps, count = STEPS if _is_crowned(row) else MORE_STEPS
+    count = 1 if row.aligning else count
     tilts = MOST_TILT_OF_TABLE * (np.arange(count + 1) / count) ** 2
     # An aligning roller is never tilted: both ends of its only strip are the same.
     at = np.zeros(2) if row.aligning else tilts
     onset, slope = _first_contact(row, at, ROUNDING * depth)
     most_depth = 1.2 * depth + 4.0 * row.profile_factor * row.element_diameter + float(onset[0] - onset[-1])
-    roots = math.sqrt(most_depth) * np.arange(ROOTS + 1) / ROOTS
+    roots = math.sqrt(most_depth) * np.arange(steps + 1) / steps
     nodes = np.stack([_nodes(row, roots, *line) for line in zip(at, onset, slope, strict=True)], axis=1)
     width = np.diff(tilts)
     cubics = HERMITE @ np.stack([onset[:-1], slope[:-1] * width, onset[1:], slope[1:] * width])
@@ -123,6 +125,11 @@ def _patches(nodes: Floats, width: Floats) -> Floats:
     return patches
 
 
+def _is_crowned(row: RollerRow) -> bool:
+    """Tell whether the roller curves away from its middle on, so that first contact moves steadily with the tilt."""
+    return row.profile_table is None and (row.profile_factor > 0.0 or row.crown_curvature > 0.0)
+
+
 def _along(row: RollerRow) -> Floats:
     """Middles of the slices along a roller, m."""
     along: Floats = ((np.arange(SLICES) + 0.5) / SLICES - 0.5) * row.effective_length
@@ -135,8 +142,7 @@ def _first_contact(row: RollerRow, tilts: Floats, rounding: float) -> tuple[Floa
     The least of gap and tilt times place over the roller's length. A slight crown, and its height taken off again,
     keeps it smooth where the roller has none of its own, so that forces have no jump at zero tilt.
     """
-    crowned = row.profile_table is None and (row.profile_factor > 0.0 or row.crown_curvature > 0.0)
-    height = 0.0 if crowned else rounding
+    height = 0.0 if _is_crowned(row) else rounding
     share = np.linspace(-1.0, 1.0, 8001)[1:-1]
     place = 0.5 * row.effective_length * share
     gaps = 2.0 * row.drop(place) + height * share**2 + np.outer(tilts, place)
@@ -231,20 +237,23 @@ class _Packing:
     def place(self, row: RollingRow) -> tuple[list[int], Floats]:
         """Layout and geometry of a row."""
         cosine, sine = math.cos(row.contact_angle), math.sin(row.contact_angle)
-        radius = 0.5 * row.pitch_diameter
         layout, geometry = [0] * LAYOUT_SIZE, np.zeros(GEOMETRY_SIZE)
         layout[COUNT], layout[CIRCLE] = row.element_count, self._circle(row.element_count)
-        geometry[[COSINE, SINE, RADIUS, AXIAL]] = cosine, sine, radius, row.axial_position
-        geometry[GAP] = 0.5 * row.radial_clearance * cosine
+        geometry[[COSINE, SINE, GAP]] = cosine, sine, 0.5 * row.radial_clearance * cosine
         if not row.aligning:
-            geometry[LEVER], geometry[TILTING] = radius * sine - row.axial_position * cosine, 1.0
+            lever = 0.5 * row.pitch_diameter * sine - row.axial_position * cosine
+            geometry[LEVER], geometry[TILTING] = lever, 1.0
         if isinstance(row, RollerRow):
             self._place_rollers(row, layout, geometry)
         elif isinstance(row, BallRow):
-            centres = (row.inner_conformity + row.outer_conformity - 1.0) * row.element_diameter
-            layout[FORM] = ALIGNED_BALL if row.aligning else BALL
-            geometry[[CONSTANT, SPAN]] = ball_constant(row), centres + geometry[GAP]
-            geometry[[CENTRE_RADIAL, CENTRE_AXIAL]] = centres * cosine, centres * sine
+            layout[FORM], geometry[CONSTANT] = ALIGNED_BALL if row.aligning else BALL, ball_constant(row)
+            # The law follows the centre of the inner groove, which lies beyond the ball.
+            beyond = (row.inner_conformity - 0.5) * row.element_diameter
+            geometry[RADIUS] = 0.5 * row.pitch_diameter + beyond * cosine
+            geometry[AXIAL] = row.axial_position + beyond * sine
+            span = (row.inner_conformity + row.outer_conformity - 1.0) * row.element_diameter
+            geometry[SPAN] = span
+            geometry[[CENTRE_RADIAL, CENTRE_AXIAL]] = span * cosine - 0.5 * row.radial_clearance, span * sine
         else:
             raise BearingError(f"row: {type(row).__name__} has no rolling law; it must be a RollerRow or a BallRow")
         return layout, geometry

@@ -179,7 +179,7 @@ def connector_load(q: Floats, v: Floats, n: int, connectors: ConnectorArrays, ar
         forces = np.empty(FORCES_SIZE)
         turned = turn_between(q, n, connectors)
         rolling_forces(n, motion[DISPLACEMENT], motion[RATE], turned, connectors.rolling, forces)
-        for i in range(SPIN):
+        for i in range(BODY_SIZE):
             local[i] += forces[ELASTIC_PART + i] + forces[DAMPED_PART + i]
         torque = forces[CAGE_TORQUE]
     for i in range(3):

@@ -5,7 +5,7 @@ one, along the outer ring's axes: q = x cos p + y sin p, z, and the tilt in its 
 has a potential U(q, z, w), which the tables and constants of `exugear.bearings.potential` give:
 
     roller       U(d, w),  d = cos(al) q + sin(al) z + e w - gap,  e = r sin(al) - z0 cos(al)
-    ball         2/5 k max(0, l - span)^(5/2),  l the distance of the grooves' centres: the contact angle follows it
+    ball         2/5 k max(0, l - span)^(5/2),  l the distance of the grooves' centres, whose line is the normal
     aligned      the same of d, without tilt: the outer raceway is a sphere about the bearing's middle
 
 Forces are its gradient, tangents its second derivatives: both exact, so that energy closes. A cage that turns with the
@@ -39,9 +39,11 @@ STRIP_TILT, STRIP_PER = 4, 5
 """In each strip of tilts behind the four coefficients of D: its first tilt, and 1 over its width."""
 STRIP_SIZE = 6
 PATCH_SIZE = 16
-ELASTIC_PART, DAMPED_PART, CAGE_TORQUE, STORED = 0, 5, 10, 11
-"""Entries of what `rolling_forces` fills: five elastic forces, five damped ones, torque, energy."""
-FORCES_SIZE = 12
+ELASTIC_PART, DAMPED_PART, CAGE_TORQUE, STORED, MEMORY = 0, 6, 12, 13, 14
+"""Entries of what `rolling_forces` fills: six elastic forces, six damped ones, torque, energy, memory."""
+FORCES_SIZE = 35
+SUMS_SIZE, ENERGY = 11, 10
+"""Sums over elements in the cage's axes: five elastic forces, five damped ones, energy."""
 LINE_POWER = 10.0 / 9.0
 """Load of a line contact over its approach (ISO/TS 16281)."""
 
@@ -189,95 +191,197 @@ def roller_law(r: int, d: float, w: float, rolling: RollingArrays) -> tuple[floa
 
 
 @summing_kernel
-def element_law(
-    r: int, q: float, z: float, w: float, rolling: RollingArrays
-) -> tuple[float, float, float, float, float, float, float, float, float, float]:
-    """Potential of an element (J), its derivatives by q, z, w, then by q q, q z, q w, z z, z w, w w."""
-    form, row = rolling.layout[r, FORM], rolling.geometry[r]
-    if form == BALL:
-        radius, axial = row[RADIUS], row[AXIAL]
-        x = row[CENTRE_RADIAL] + q - axial * w
-        y = row[CENTRE_AXIAL] + z + radius * w
-        length = math.sqrt(x * x + y * y)
-        approach = length - row[SPAN]
-        if approach <= 0.0:
-            return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        x, y = x / length, y / length
-        root = row[CONSTANT] * math.sqrt(approach)
-        force = root * approach
-        # Along the normal it is Hertz's contact that yields, across it the normal that turns.
-        along, across = 1.5 * root, force / length
-        xx, xy, yy = along * x * x + across * y * y, (along - across) * x * y, along * y * y + across * x * x
-        fx, fy = force * x, force * y
-        xw, yw = radius * xy - axial * xx, radius * yy - axial * xy
-        fw, ww = radius * fy - axial * fx, radius * yw - axial * xw
-        return 0.4 * force * approach, fx, fy, fw, xx, xy, xw, yy, yw, ww
-    c, s, lever = row[COSINE], row[SINE], row[LEVER]
-    d = c * q + s * z + lever * w - row[GAP]
-    if form == ROLLER:
-        u, f, m, dd, dw, ww = roller_law(r, d, row[TILTING] * w, rolling)
-    else:
-        approach = max(d, 0.0)
-        dd = 1.5 * row[CONSTANT] * math.sqrt(approach)
-        f = dd * approach / 1.5
-        u, m, dw, ww = 0.4 * f * approach, 0.0, 0.0, 0.0
-    across = lever * dd + dw
-    return (
-        u, c * f, s * f, lever * f + m,
-        c * c * dd, c * s * dd, c * across, s * s * dd, s * across, lever * (across + dw) + ww,
-    )  # fmt: skip
+def normal_law(r: int, d: float, w: float, rolling: RollingArrays) -> tuple[float, float, float, float, float, float]:
+    """Potential of an element whose normal stays, as `slices_law`."""
+    if rolling.layout[r, FORM] == ROLLER:
+        return roller_law(r, d, w, rolling)
+    if d <= 0.0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    root = rolling.geometry[r, CONSTANT] * math.sqrt(d)
+    return 0.4 * root * d * d, root * d, 0.0, 1.5 * root, 0.0, 0.0
+
+
+@summing_kernel
+def ball_law(r: int, x: float, y: float, rolling: RollingArrays) -> tuple[float, float, float, float, float, float]:
+    """Potential of a ball whose normal follows the grooves' centres, y axially and x radially apart (m).
+
+    Returns U, its derivatives by x and y, then by x x, x y, y y.
+    """
+    length = math.sqrt(x * x + y * y)
+    approach = length - rolling.geometry[r, SPAN]
+    if approach <= 0.0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    x, y = x / length, y / length
+    root = rolling.geometry[r, CONSTANT] * math.sqrt(approach)
+    force = root * approach
+    # Along the normal it is Hertz's contact that yields, across it the normal that turns.
+    along, across = 1.5 * root, force / length
+    second = along * x * x + across * y * y, (along - across) * x * y, along * y * y + across * x * x
+    return 0.4 * force * approach, force * x, force * y, second[0], second[1], second[2]
+
+
+@summing_kernel
+def add_normal_row(r: int, turned: Floats, rolling: RollingArrays, sums: Floats) -> None:
+    """Add energy and forces of a row whose normals stay to sums: see `rolling_forces`."""
+    x, y, z, a, b = turned[0], turned[1], turned[2], turned[3], turned[4]
+    dx, dy, dz, da, db = turned[5], turned[6], turned[7], turned[8], turned[9]
+    row = rolling.geometry[r]
+    cosine, sine, lever, tilting = row[COSINE], row[SINE], row[LEVER], row[TILTING]
+    # Approach and tilt are sums of a constant, a cosine and a sine of the element's place.
+    d0, dc, ds = sine * z - row[GAP], cosine * x - lever * b, cosine * y + lever * a
+    e0, ec, es = sine * dz, cosine * dx - lever * db, cosine * dy + lever * da
+    a, b, da, db = tilting * a, tilting * b, tilting * da, tilting * db
+    energy, f, fc, fs, mc, ms, g, gc, gs, nc, ns = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    start = rolling.layout[r, CIRCLE]
+    for k in range(start, start + rolling.layout[r, COUNT]):
+        c, s = rolling.circle[k, 0], rolling.circle[k, 1]
+        u, force, moment, dd, dw, ww = normal_law(r, d0 + dc * c + ds * s, a * s - b * c, rolling)
+        if u == 0.0:
+            continue
+        energy += u
+        f += force
+        fc += force * c
+        fs += force * s
+        mc += moment * c
+        ms += moment * s
+        d_rate, w_rate = e0 + ec * c + es * s, da * s - db * c
+        force, moment = dd * d_rate + dw * w_rate, dw * d_rate + ww * w_rate
+        g += force
+        gc += force * c
+        gs += force * s
+        nc += moment * c
+        ns += moment * s
+    sums[0] += cosine * fc
+    sums[1] += cosine * fs
+    sums[2] += sine * f
+    sums[3] += lever * fs + tilting * ms
+    sums[4] -= lever * fc + tilting * mc
+    sums[5] += cosine * gc
+    sums[6] += cosine * gs
+    sums[7] += sine * g
+    sums[8] += lever * gs + tilting * ns
+    sums[9] -= lever * gc + tilting * nc
+    sums[ENERGY] += energy
+
+
+@summing_kernel
+def add_ball_row(r: int, turned: Floats, rolling: RollingArrays, sums: Floats) -> None:
+    """Add energy and forces of a row of balls to sums: see `rolling_forces`."""
+    x, y, z, a, b = turned[0], turned[1], turned[2], turned[3], turned[4]
+    dx, dy, dz, da, db = turned[5], turned[6], turned[7], turned[8], turned[9]
+    row = rolling.geometry[r]
+    radius, axial, radial_start, axial_start = row[RADIUS], row[AXIAL], row[CENTRE_RADIAL], row[CENTRE_AXIAL] + z
+    energy, rc, rs, t, tc, ts = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    hc, hs, v, vc, vs = 0.0, 0.0, 0.0, 0.0, 0.0
+    start = rolling.layout[r, CIRCLE]
+    for k in range(start, start + rolling.layout[r, COUNT]):
+        c, s = rolling.circle[k, 0], rolling.circle[k, 1]
+        w = a * s - b * c
+        u, fx, fy, xx, xy, yy = ball_law(r, radial_start + x * c + y * s - axial * w, axial_start + radius * w, rolling)
+        if u == 0.0:
+            continue
+        energy += u
+        rc += fx * c
+        rs += fx * s
+        t += fy
+        tc += fy * c
+        ts += fy * s
+        w = da * s - db * c
+        x_rate, y_rate = dx * c + dy * s - axial * w, dz + radius * w
+        fx, fy = xx * x_rate + xy * y_rate, xy * x_rate + yy * y_rate
+        hc += fx * c
+        hs += fx * s
+        v += fy
+        vc += fy * c
+        vs += fy * s
+    sums[0] += rc
+    sums[1] += rs
+    sums[2] += t
+    sums[3] += radius * ts - axial * rs
+    sums[4] -= radius * tc - axial * rc
+    sums[5] += hc
+    sums[6] += hs
+    sums[7] += v
+    sums[8] += radius * vs - axial * hs
+    sums[9] -= radius * vc - axial * hc
+    sums[ENERGY] += energy
+
+
+@summing_kernel
+def turn_pairs(cosine: float, sine: float, values: Floats) -> None:
+    """Turn the components across the axis of two displacements or loads (10,) about z by an angle."""
+    for n in (0, 3, 5, 8):
+        x, y = values[n], values[n + 1]
+        values[n], values[n + 1] = cosine * x - sine * y, sine * x + cosine * y
 
 
 @summing_kernel
 def rolling_forces(n: int, strain: Floats, rate: Floats, turn: float, rolling: RollingArrays, out: Floats) -> None:
-    """Fill elastic and damped forces, cage torque and energy of connector n into out (12,).
+    """Fill elastic and damped forces, cage torque and energy of connector n into out (35,).
 
     Parameters
     ----------
     n : int
-    strain, rate : (5 or more,) displacement of the second body against the first in the first one's axes and its
-        rate, m, rad and per s
+    strain : (5 or 6,) displacement and tilts of the second body against the first in the first one's axes, m, rad
+    rate : (6,) velocity and angular velocity likewise, m/s, rad/s
     turn : spin of the second body less that of the first, rad
     rolling : RollingArrays
-    out : (12,) elastic part from `ELASTIC_PART` and damped part from `DAMPED_PART` on of force and moment on the first
-        body, along x, y, z, about x, y (N, N m); at `CAGE_TORQUE` the derivative of the energy by `turn` (N m), which
-        acts on the first body's spin and against that of the second; at `STORED` the energy (J)
+    out : (35,) elastic part from `ELASTIC_PART` and damped part from `DAMPED_PART` on, six each, of force and moment
+        on the first body (N, N m); at `CAGE_TORQUE` the derivative of the energy by `turn` (N m), which acts on the
+        first body's spin and against that of the second; at `STORED` the energy (J); the rest is memory
+
+    Notes
+    -----
+    The potential knows the tilts a and b, whose rates are w_x - b w_z and w_y + a w_z to first order where the second
+    body spins. Moments that do no work on the spin have the part a M_y - b M_x about z.
     """
     scale = rolling.scale[n]
     angle = rolling.phase[n] + rolling.cage_ratio[n] * turn
-    c0, s0 = math.cos(angle), math.sin(angle)
-    x, y, z, a, b = scale * strain[0], scale * strain[1], scale * strain[2], scale * strain[3], scale * strain[4]
+    cosine, sine = math.cos(angle), math.sin(angle)
+    sums, turned = out[MEMORY : MEMORY + SUMS_SIZE], out[MEMORY + SUMS_SIZE :]
+    sums[:] = 0.0
     slow = scale * rolling.time[n]
-    dx, dy, dz, da, db = slow * rate[0], slow * rate[1], slow * rate[2], slow * rate[3], slow * rate[4]
-    fx, fy, fz, fa, fb, energy, torque = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    gx, gy, gz, ga, gb = 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(5):
+        turned[i], turned[5 + i] = scale * strain[i], slow * rate[i]
+    turned[8] -= slow * strain[4] * rate[5]
+    turned[9] += slow * strain[3] * rate[5]
+    # In the cage's axes elements stay where they are.
+    turn_pairs(cosine, -sine, turned)
     for r in range(rolling.first[n], rolling.first[n + 1]):
-        start = rolling.layout[r, CIRCLE]
-        for k in range(start, start + rolling.layout[r, COUNT]):
-            ck, sk = rolling.circle[k, 0], rolling.circle[k, 1]
-            c, s = c0 * ck - s0 * sk, s0 * ck + c0 * sk
-            u, q, t, m, qq, qt, qm, tt, tm, mm = element_law(r, x * c + y * s, z, a * s - b * c, rolling)
-            if u == 0.0:
-                continue
-            energy += u
-            fx += c * q
-            fy += s * q
-            fz += t
-            fa += s * m
-            fb -= c * m
-            torque += q * (y * c - x * s) + m * (a * c + b * s)
-            dq, dm = dx * c + dy * s, da * s - db * c
-            q, t, m = qq * dq + qt * dz + qm * dm, qt * dq + tt * dz + tm * dm, qm * dq + tm * dz + mm * dm
-            gx += c * q
-            gy += s * q
-            gz += t
-            ga += s * m
-            gb -= c * m
+        if rolling.layout[r, FORM] == BALL:
+            add_ball_row(r, turned, rolling, sums)
+        else:
+            add_normal_row(r, turned, rolling, sums)
+    # A cage that turns ahead does what the ring does that stays behind.
+    about_axis = turned[1] * sums[0] - turned[0] * sums[1] + turned[4] * sums[3] - turned[3] * sums[4]
+    turn_pairs(cosine, sine, sums)
     sense, share = (1.0, scale) if scale > 0.0 else (-1.0, -scale)
-    out[0], out[1], out[2], out[3], out[4] = sense * fx, sense * fy, sense * fz, sense * fa, sense * fb
-    out[5], out[6], out[7], out[8], out[9] = sense * gx, sense * gy, sense * gz, sense * ga, sense * gb
-    out[CAGE_TORQUE] = rolling.cage_ratio[n] * torque / share
-    out[STORED] = energy / share
+    for i in range(5):
+        out[ELASTIC_PART + i], out[DAMPED_PART + i] = sense * sums[i], sense * sums[5 + i]
+    for part in (ELASTIC_PART, DAMPED_PART):
+        out[part + 5] = strain[3] * out[part + 4] - strain[4] * out[part + 3]
+    out[CAGE_TORQUE] = rolling.cage_ratio[n] * about_axis / share
+    out[STORED] = sums[ENERGY] / share
+
+
+@summing_kernel
+def element_stiffness(
+    r: int, q: float, z: float, w: float, rolling: RollingArrays
+) -> tuple[float, float, float, float, float, float]:
+    """Second derivatives of an element's potential by q q, q z, q w, z z, z w, w w (see the module)."""
+    row = rolling.geometry[r]
+    if rolling.layout[r, FORM] == BALL:
+        radius, axial = row[RADIUS], row[AXIAL]
+        x, y = row[CENTRE_RADIAL] + q - axial * w, row[CENTRE_AXIAL] + z + radius * w
+        _, _, _, xx, xy, yy = ball_law(r, x, y, rolling)
+        xw, yw = radius * xy - axial * xx, radius * yy - axial * xy
+        return xx, xy, xw, yy, yw, radius * yw - axial * xw
+    c, s, lever, tilting = row[COSINE], row[SINE], row[LEVER], row[TILTING]
+    d = c * q + s * z + lever * w - row[GAP]
+    _, _, _, dd, dw, ww = normal_law(r, d, tilting * w, rolling)
+    dw, ww = tilting * dw, tilting * ww
+    across = lever * dd + dw
+    return c * c * dd, c * s * dd, c * across, s * s * dd, s * across, lever * (across + dw) + ww
 
 
 @summing_kernel
@@ -294,8 +398,7 @@ def rolling_tangent(n: int, strain: Floats, turn: float, rolling: RollingArrays,
         for k in range(start, start + rolling.layout[r, COUNT]):
             ck, sk = rolling.circle[k, 0], rolling.circle[k, 1]
             c, s = c0 * ck - s0 * sk, s0 * ck + c0 * sk
-            law = element_law(r, x * c + y * s, z, a * s - b * c, rolling)
-            qq, qt, qm, tt, tm, mm = law[4], law[5], law[6], law[7], law[8], law[9]
+            qq, qt, qm, tt, tm, mm = element_stiffness(r, x * c + y * s, z, a * s - b * c, rolling)
             out[0, 0] += share * qq * c * c
             out[0, 1] += share * qq * c * s
             out[0, 2] += share * qt * c

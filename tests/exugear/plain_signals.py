@@ -148,8 +148,9 @@ def bearing_energies(q, v, connectors, out) -> None:
             turned = turn_between(q, n, connectors)
             rolling_forces(n, motion[0], motion[1], turned, connectors.rolling, forces)
             out[0] += forces[STORED]
-            out[4] += np.dot(forces[ELASTIC_PART:DAMPED_PART], (motion[1] - motion[2])[:5])
-            out[1] += np.dot(forces[DAMPED_PART:CAGE_TORQUE], motion[1, :5])
+            elastic = forces[ELASTIC_PART:DAMPED_PART]
+            out[4] += np.dot(elastic, motion[1]) - np.dot(elastic[:5], motion[2, :5])
+            out[1] += np.dot(forces[DAMPED_PART:CAGE_TORQUE], motion[1])
 
 
 @numba.njit

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from exugear.kernels.coordinates import SPIN, TILT
+from exugear.kernels.coordinates import BODY_SIZE, SPIN, TILT
 from exugear.kernels.rolling import CAGE_TORQUE, DAMPED_PART, ELASTIC_PART, rolling_forces
 from exugear.solvers.compiled.arrays import (
     COS_A,
@@ -131,7 +131,7 @@ def roll(q: Floats, n: int, bodies: Bodies, connectors: Connectors, work: Work) 
 def add_rolling(q: Floats, n: int, bodies: Bodies, connectors: Connectors, work: Work) -> None:
     """Add the rolling law of connector n to its force in `work.motion`, its cage's torque to the spins."""
     roll(q, n, bodies, connectors, work)
-    for i in range(SPIN):
+    for i in range(BODY_SIZE):
         work.motion[LOCAL_FORCE, i] += work.rolling[ELASTIC_PART + i] + work.rolling[DAMPED_PART + i]
     ground = bodies.start.size - 1
     first, second = connectors.ends[n, 0], connectors.ends[n, 1]

@@ -157,11 +157,12 @@ def observe_rolling(q: Floats, n: int, bodies: Bodies, connectors: Connectors, w
     roll(q, n, bodies, connectors, work)
     rate, derivative = work.motion[STRAIN_RATE], work.motion[TRUE_RATE]
     energy[ELASTIC] += work.rolling[STORED]
-    for i in range(SPIN):
+    for i in range(BODY_SIZE):
         elastic, damped = work.rolling[ELASTIC_PART + i], work.rolling[DAMPED_PART + i]
         work.motion[LOCAL_FORCE, i] += elastic + damped
         energy[DISSIPATED] += damped * rate[i]
-        energy[OF_BEARING_RATES] += elastic * (rate[i] - derivative[i])
+        # The potential knows no angle about z, whose moment but keeps the others from working on the spin.
+        energy[OF_BEARING_RATES] += elastic * (rate[i] - (derivative[i] if i < SPIN else 0.0))
 
 
 @kernel
