@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from exugear.bearings.rows import BearingError
-from exugear.bearings.support_laws import linear_law
+from exugear.bearings.support_laws import bearing_rows, linear_law
 from exugear.bearings.supports import ON_BEARINGS, elastic_names, unsupported
 from exugear.checks.restraint import free_motion
 from exugear.loads.torque_series import torque_series
@@ -72,6 +72,8 @@ def remarks(gearbox: Gearbox) -> tuple[str, ...]:
 def _build_bearing(gearbox: Gearbox, bearing: Bearing) -> None:
     try:
         stiffness = linear_law(bearing, 0.0).stiffness
+        if bearing.law == "iso16281":
+            bearing_rows(bearing)
     except BearingError as error:
         raise gearbox.fault(f"bearings.{bearing.family}.catalogue: {error}") from None
     if not np.all(np.isfinite(stiffness)):

@@ -63,9 +63,7 @@ def bearings(
             return
         title = f"Bearings under the static load, {variant.value}"
         print_table(title, [_load_row(duty) for duty in duties])
-        print_table(
-            "Contact, ratings, basic rating life", [*map(_life_row, duties)]
-        )
+        print_table("Contact, ratings, basic rating life", [*map(_life_row, duties)])
         if any(duty.ratings.estimated for duty in duties):
             say("* rating estimated; dynamic_rating_kN and static_rating_kN of the file replace it")
         say("Lives are basic: lubricant and cleanliness are left out, and so are ribs")
