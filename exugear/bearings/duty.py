@@ -147,7 +147,7 @@ def duty_of(point: OperatingPoint, reaction: Floats | None = None) -> BearingDut
 
 
 def loads_of_rows(state: BearingState) -> list[Floats]:
-    """Loads of each row as its life needs them, N: (elements, laminae) of rollers, (elements,) of balls."""
+    """Give the loads of each row as its life needs them, N: (elements, laminae) of rollers, (elements,) of balls."""
     first = state.contacts.first
     return [
         state.element_load[begin:end] if laminae is None else laminae

@@ -9,6 +9,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy.linalg
@@ -156,15 +157,14 @@ def locked_equilibrium(
         def residual(x: Floats) -> Floats:
             return free.T @ (assembly.forces(free @ x, rest, meshes) + applied)
 
-        def derivative(x: Floats, held: Assembly) -> Floats:
+        def derivative(held: Assembly, x: Floats) -> Floats:
             stiffness = linearise(held, free @ x, held.meshes if meshes is None else meshes).total_stiffness
             return np.asarray(-free.T @ stiffness @ free)
 
         scale = np.full(start.size, _load_scale(applied))
         for share in HOLDING_SHARES if assembly.has_rows else HOLDING_SHARES[:1]:
-            held = assembly.eased(share)
             try:
-                return _newton(residual, lambda x, held=held: derivative(x, held), start, scale, "static state")
+                return _newton(residual, partial(derivative, assembly.eased(share)), start, scale, "static state")
             except BalanceError:
                 if share == HOLDING_SHARES[-1] or not assembly.has_rows:
                     raise
