@@ -1,19 +1,9 @@
-"""What holds the bodies of a variant: which supports are at work, and their stiffness and damping as matrices."""
+"""What holds the bodies of a variant: which supports are at work."""
 
 from __future__ import annotations
 
-from functools import lru_cache
-
-import numpy as np
-
-from exugear.bearings import matrices
-from exugear.bearings.catalogue import catalogue_rows
-from exugear.bearings.contact import pitch_averaged_tangent
-from exugear.bearings.rows import BearingError, BearingOfRows
 from exugear.model.gearbox import Gearbox
-from exugear.model.parts import Bearing, stiffness_matrix
-from exugear.model.sections.connections import CatalogueSection
-from fe_ste.tools.arrays import Floats
+from exugear.model.parts import Bearing
 
 ON_BEARINGS = ("bushing", "flexible")
 """Variants whose bodies sit on bearings."""
@@ -60,38 +50,3 @@ def mounts_at_work(gearbox: Gearbox) -> tuple[Bearing, ...]:
     if not any(bodies[name].fixed for name in elastic):
         return ()
     return tuple(mount for mount in gearbox.mounts if mount.body in elastic or not bodies[mount.body].fixed)
-
-
-def bearing_matrices(bearing: Bearing, damping_time: float) -> tuple[Floats, Floats]:
-    """Stiffness and damping (6, 6) of a bearing, housing factor included, in the axes of what it sits on.
-
-    Catalogue bearings: tangent of ISO/TS 16281 at the stated load, averaged over cage positions and
-    directions, raised to the stated floor. Given ones: as given. Damping as given, else time times stiffness.
-
-    Raises
-    ------
-    exugear.bearings.rows.BearingError
-        The catalogue dimensions or the load are impossible.
-    """
-    given = stiffness_matrix(bearing.stiffness)
-    if bearing.catalogue is not None:
-        given = matrices.regularised(catalogue_stiffness(bearing.catalogue), np.diag(given))
-    stiffness = bearing.factor * given
-    if bearing.damping is not None:
-        return stiffness, stiffness_matrix(bearing.damping)
-    return stiffness, matrices.proportional_damping(stiffness, damping_time)
-
-
-@lru_cache(maxsize=64)
-def catalogue_stiffness(section: CatalogueSection) -> Floats:
-    """Stiffness (6, 6) that a catalogue gives, the same in all directions across the axis.
-
-    Raises
-    ------
-    exugear.bearings.rows.BearingError
-        The catalogue dimensions or the load are impossible.
-    """
-    if section.radial_load_kN is None:
-        raise BearingError("radial_load_kN is missing: the load under which its stiffness is taken")
-    force = (1e3 * section.radial_load_kN, 0.0, 1e3 * (section.axial_load_kN or 0.0))
-    return matrices.axially_symmetric(pitch_averaged_tangent(BearingOfRows(catalogue_rows(section)), force))

@@ -1,4 +1,4 @@
-"""Compiled law of 6x6 connectors (bearings) on arrays of coordinates.
+"""Compiled law of 6x6 connectors (bearings) on arrays of coordinates, with rolling laws in parallel to the matrices.
 
 Displacement and rate are those of Exudyn's RigidBodySpringDamper. Coordinates are those of
 `exugear.kernels.coordinates`.
@@ -12,6 +12,16 @@ from typing import NamedTuple
 import numpy as np
 
 from exugear.kernels.coordinates import BODY_SIZE, SPIN, TILT
+from exugear.kernels.rolling import (
+    CAGE_TORQUE,
+    DAMPED_PART,
+    ELASTIC_PART,
+    FORCES_SIZE,
+    RollingArrays,
+    no_rolling,
+    rolling_forces,
+    selected_rolling,
+)
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import compiled
 
@@ -30,6 +40,7 @@ class ConnectorArrays(NamedTuple):
     local : (c, 2, 3) attachment in each body's axes, relative to its node, m
     node : (c, 2, 3) node positions at zero angles, m (for ground: zero)
     stiffness, damping : (c, 6, 6) N/m .. N m/rad, and times s
+    rolling : rolling laws, which act in parallel to the matrices
     """
 
     bodies: Integers
@@ -37,6 +48,22 @@ class ConnectorArrays(NamedTuple):
     node: Floats
     stiffness: Floats
     damping: Floats
+    rolling: RollingArrays
+
+    def one(self, n: int) -> ConnectorArrays:
+        """Arrays of connector n alone."""
+        return self.chosen(np.array([n], dtype=np.int64))
+
+    def chosen(self, numbers: Integers) -> ConnectorArrays:
+        """Arrays of some connectors, in the order of their numbers."""
+        return ConnectorArrays(
+            bodies=self.bodies[numbers],
+            local=self.local[numbers],
+            node=self.node[numbers],
+            stiffness=self.stiffness[numbers],
+            damping=self.damping[numbers],
+            rolling=selected_rolling(self.rolling, numbers),
+        )
 
 
 @compiled
@@ -125,15 +152,40 @@ def connector_motion(
 
 
 @compiled
-def connector_load(q: Floats, v: Floats, n: int, connectors: ConnectorArrays, arms: Floats, out: Floats) -> None:
-    """Fill force and moment (6,) that connector n takes from its second body, global axes; arms (2, 3)."""
+def turn_between(q: Floats, n: int, connectors: ConnectorArrays) -> float:
+    """Spin of the second body less that of the first, rad, unwrapped; the ground has none."""
+    first, second = connectors.bodies[n]
+    turn = 0.0
+    if second >= 0:
+        turn += q[second + SPIN]
+    if first >= 0:
+        turn -= q[first + SPIN]
+    return turn
+
+
+@compiled
+def connector_load(q: Floats, v: Floats, n: int, connectors: ConnectorArrays, arms: Floats, out: Floats) -> float:
+    """Fill force and moment (6,) that connector n takes from its second body, global axes; arms (2, 3).
+
+    Returns the torque of a turning cage: the generalized force that it takes from the second body's spin and gives to
+    that of the first, N m.
+    """
     turn, motion = np.empty((3, 3)), np.empty((3, BODY_SIZE))
     connector_motion(q, v, n, connectors, turn, arms, motion)
     # Force and moment in the first body's axes, then turned into global ones.
     local = connectors.stiffness[n] @ motion[DISPLACEMENT] + connectors.damping[n] @ motion[RATE]
+    torque = 0.0
+    if connectors.rolling.first[n] < connectors.rolling.first[n + 1]:
+        forces = np.empty(FORCES_SIZE)
+        turned = turn_between(q, n, connectors)
+        rolling_forces(n, motion[DISPLACEMENT], motion[RATE], turned, connectors.rolling, forces)
+        for i in range(BODY_SIZE):
+            local[i] += forces[ELASTIC_PART + i] + forces[DAMPED_PART + i]
+        torque = forces[CAGE_TORQUE]
     for i in range(3):
         out[i] = turn[i, 0] * local[0] + turn[i, 1] * local[1] + turn[i, 2] * local[2]
         out[3 + i] = turn[i, 0] * local[3] + turn[i, 1] * local[4] + turn[i, 2] * local[5]
+    return torque
 
 
 @compiled
@@ -160,13 +212,18 @@ def add_connector_forces(q: Floats, v: Floats, connectors: ConnectorArrays, f: F
     """Add the generalized forces of all connectors to f."""
     load, arms = np.empty(BODY_SIZE), np.empty((2, 3))
     for n in range(connectors.bodies.shape[0]):
-        connector_load(q, v, n, connectors, arms, load)
-        add_wrench(q, connectors.bodies[n, 0], 1.0, load, arms[0], f)
-        add_wrench(q, connectors.bodies[n, 1], -1.0, load, arms[1], f)
+        torque = connector_load(q, v, n, connectors, arms, load)
+        first, second = connectors.bodies[n]
+        add_wrench(q, first, 1.0, load, arms[0], f)
+        add_wrench(q, second, -1.0, load, arms[1], f)
+        if first >= 0:
+            f[first + SPIN] += torque
+        if second >= 0:
+            f[second + SPIN] -= torque
 
 
 def no_connectors() -> ConnectorArrays:
     """Arrays of a system without bearings."""
     empty = np.zeros((0, 2, 3))
     matrices = np.zeros((0, BODY_SIZE, BODY_SIZE))
-    return ConnectorArrays(np.zeros((0, 2), dtype=np.int64), empty, empty, matrices, matrices)
+    return ConnectorArrays(np.zeros((0, 2), dtype=np.int64), empty, empty, matrices, matrices, no_rolling(0))

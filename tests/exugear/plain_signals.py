@@ -14,10 +14,11 @@ import numpy as np
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.modes import overall_row
 from exugear.dynamics.signals import signal_layout
-from exugear.kernels.connectors import connector_load, connector_motion
+from exugear.kernels.connectors import connector_load, connector_motion, turn_between
 from exugear.kernels.elastic import elastic_energies, scratch_for
 from exugear.kernels.inertia import kinetic_energies
 from exugear.kernels.meshes import DEFLECTION, ENERGY, FORCE, OUTSIDE, STATE_SIZE
+from exugear.kernels.rolling import CAGE_TORQUE, DAMPED_PART, ELASTIC_PART, FORCES_SIZE, STORED, rolling_forces
 from exugear.kernels.turning import turning_energies, turning_memory
 from exugear.model.sections.entries import GROUND
 from exugear.tooth_mesh.laws.forms import mesh_state
@@ -136,12 +137,20 @@ def bearing_energies(q, v, connectors, out) -> None:
     couples tilt and translation the elastic force then does a little work of its own, of second order.
     """
     turn, arms, motion = np.empty((3, 3)), np.empty((2, 3)), np.empty((3, 6))
+    forces = np.empty(FORCES_SIZE)
     for n in range(connectors.bodies.shape[0]):
         connector_motion(q, v, n, connectors, turn, arms, motion)
         elastic = connectors.stiffness[n] @ motion[0]
         out[0] += 0.5 * np.dot(motion[0], elastic)
         out[4] += np.dot(elastic, motion[1] - motion[2])
         out[1] += np.dot(motion[1], connectors.damping[n] @ motion[1])
+        if connectors.rolling.first[n] < connectors.rolling.first[n + 1]:
+            turned = turn_between(q, n, connectors)
+            rolling_forces(n, motion[0], motion[1], turned, connectors.rolling, forces)
+            out[0] += forces[STORED]
+            elastic = forces[ELASTIC_PART:DAMPED_PART]
+            out[4] += np.dot(elastic, motion[1]) - np.dot(elastic[:5], motion[2, :5])
+            out[1] += np.dot(forces[DAMPED_PART:CAGE_TORQUE], motion[1])
 
 
 @numba.njit

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from exugear.kernels.elastic import ElasticArrays, ElasticMotion
 from exugear.kernels.fast_meshes import Meshes, MeshMemory
+from exugear.kernels.rolling import RollingArrays
 from exugear.kernels.travelling import TravellingArrays
 from exugear.kernels.turning import TurningArrays
 from fe_ste.tools.arrays import Floats, Integers
@@ -62,6 +63,7 @@ class Connectors(NamedTuple):
     first : (c + 1,) first entry of each connector
     row, column : (e,) where each entry stands in the 6x6 matrix
     stiffness, damping : (e,) its values
+    rolling : rolling laws, in parallel to these
     """
 
     number: Integers
@@ -75,6 +77,7 @@ class Connectors(NamedTuple):
     column: Integers
     stiffness: Floats
     damping: Floats
+    rolling: RollingArrays
 
 
 class Loads(NamedTuple):
@@ -153,6 +156,7 @@ class Work(NamedTuple):
     frames : (b + e + 1, 16) rotation matrix, angular velocity, sine and cosine of the tilts
     wrench : (b + e + 1, 6) force and moment on each body, global axes
     motion : (4, 6) strain, its rate, the true rate of change, force of a connector in its own axes
+    rolling : (35,) see `exugear.kernels.rolling.rolling_forces`
     mesh : memory of the meshes' laws
     series : (s,) line of each torque series that was used last
     scratch, memory : memory of the elastic bodies, and of those in turning frames
@@ -169,6 +173,7 @@ class Work(NamedTuple):
     frames: Floats
     wrench: Floats
     motion: Floats
+    rolling: Floats
     mesh: MeshMemory
     series: Integers
     scratch: Floats

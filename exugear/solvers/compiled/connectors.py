@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from exugear.kernels.coordinates import SPIN, TILT
+from exugear.kernels.coordinates import BODY_SIZE, SPIN, TILT
+from exugear.kernels.rolling import CAGE_TORQUE, DAMPED_PART, ELASTIC_PART, rolling_forces
 from exugear.solvers.compiled.arrays import (
     COS_A,
     COS_B,
@@ -118,6 +119,29 @@ def move_connector(
 
 
 @kernel
+def roll(q: Floats, n: int, bodies: Bodies, connectors: Connectors, work: Work) -> None:
+    """Fill `work.rolling` with the rolling law of connector n, after `move_connector`."""
+    # The ground points to a coordinate that stays zero.
+    first, second = bodies.start[connectors.ends[n, 0]], bodies.start[connectors.ends[n, 1]]
+    turn = q[second + SPIN] - q[first + SPIN]
+    rolling_forces(n, work.motion[STRAIN], work.motion[STRAIN_RATE], turn, connectors.rolling, work.rolling)
+
+
+@kernel
+def add_rolling(q: Floats, n: int, bodies: Bodies, connectors: Connectors, work: Work) -> None:
+    """Add the rolling law of connector n to its force in `work.motion`, its cage's torque to the spins."""
+    roll(q, n, bodies, connectors, work)
+    for i in range(BODY_SIZE):
+        work.motion[LOCAL_FORCE, i] += work.rolling[ELASTIC_PART + i] + work.rolling[DAMPED_PART + i]
+    ground = bodies.start.size - 1
+    first, second = connectors.ends[n, 0], connectors.ends[n, 1]
+    if first != ground:
+        work.force[bodies.start[first] + SPIN] += work.rolling[CAGE_TORQUE]
+    if second != ground:
+        work.force[bodies.start[second] + SPIN] -= work.rolling[CAGE_TORQUE]
+
+
+@kernel
 def connector_force(n: int, connectors: Connectors, work: Work) -> None:
     """Fill the force of connector n on its first body, in that body's axes, into `work.motion`."""
     strain, rate, force = work.motion[STRAIN], work.motion[STRAIN_RATE], work.motion[LOCAL_FORCE]
@@ -136,6 +160,8 @@ def add_connectors(q: Floats, v: Floats, bodies: Bodies, connectors: Connectors,
     for n in range(connectors.ends.shape[0]):
         ax, ay, az, bx, by, bz = move_connector(q, v, n, bodies, connectors, work)
         connector_force(n, connectors, work)
+        if connectors.rolling.first[n] < connectors.rolling.first[n + 1]:
+            add_rolling(q, n, bodies, connectors, work)
         i, j = connectors.ends[n, 0], connectors.ends[n, 1]
         # From the first body's axes to global ones, then to both bodies with their arms.
         force, turn = work.motion[LOCAL_FORCE], work.frames[i]

@@ -31,6 +31,7 @@ from exugear.kernels.fast_meshes import (
     Meshes,
     mesh_row,
 )
+from exugear.kernels.rolling import DAMPED_PART, ELASTIC_PART, STORED
 from exugear.kernels.table_law import ENERGY_DERIVATIVES, NOMINAL_MISALIGNMENT
 from exugear.kernels.travelling import place_travelling
 from exugear.kernels.turning import turning_energies
@@ -54,7 +55,7 @@ from exugear.solvers.compiled.arrays import (
     Springs,
     Work,
 )
-from exugear.solvers.compiled.connectors import move_connector, place_bodies
+from exugear.solvers.compiled.connectors import move_connector, place_bodies, roll
 from exugear.solvers.compiled.equations import set_loads
 from exugear.solvers.compiled.meshes import mesh_law, mesh_motion
 from exugear.solvers.compiled.packing import equations_of, work_for
@@ -151,6 +152,20 @@ def true_rate(n: int, first_body: Floats, work: Work) -> None:
 
 
 @kernel
+def observe_rolling(q: Floats, n: int, bodies: Bodies, connectors: Connectors, work: Work, energy: Floats) -> None:
+    """Add the rolling law of connector n to its force in `work.motion`, and energy and powers (see `observe`)."""
+    roll(q, n, bodies, connectors, work)
+    rate, derivative = work.motion[STRAIN_RATE], work.motion[TRUE_RATE]
+    energy[ELASTIC] += work.rolling[STORED]
+    for i in range(BODY_SIZE):
+        elastic, damped = work.rolling[ELASTIC_PART + i], work.rolling[DAMPED_PART + i]
+        work.motion[LOCAL_FORCE, i] += elastic + damped
+        energy[DISSIPATED] += damped * rate[i]
+        # The potential knows no angle about z, whose moment but keeps the others from working on the spin.
+        energy[OF_BEARING_RATES] += elastic * (rate[i] - (derivative[i] if i < SPIN else 0.0))
+
+
+@kernel
 def observe_connectors(
     q: Floats,
     v: Floats,
@@ -177,6 +192,8 @@ def observe_connectors(
             energy[ELASTIC] += 0.5 * elastic * strain[row]
             energy[DISSIPATED] += damped * rate[row]
             energy[OF_BEARING_RATES] += elastic * (rate[row] - derivative[row])
+        if connectors.rolling.first[n] < connectors.rolling.first[n + 1]:
+            observe_rolling(q, n, bodies, connectors, work, energy)
         first = columns.support_force + 3 * connectors.number[n]
         for i in range(3):
             o = 3 * i

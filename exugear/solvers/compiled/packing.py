@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from exugear.dynamics.assembly import Assembly
-from exugear.kernels.connectors import ConnectorArrays
 from exugear.kernels.coordinates import BODY_SIZE, SPIN, TILT
 from exugear.kernels.elastic import elastic_motion, scratch_for
 from exugear.kernels.fast_meshes import Meshes, MeshMemory
 from exugear.kernels.meshes import FRAME, ROW_SIZE, SPIN_1, SPIN_2
+from exugear.kernels.rolling import FORCES_SIZE
 from exugear.kernels.table_law import scratch_memory
 from exugear.kernels.turning import turning_memory
 from exugear.model.sections.entries import GROUND
@@ -68,7 +68,7 @@ def _connectors(numbers: _Numbers) -> tuple[Connectors, Integers]:
     given = numbers.assembly.connectors
     ends = np.array([[numbers.body(int(s)) for s in pair] for pair in given.bodies], dtype=np.int64).reshape(-1, 2)
     order = np.lexsort((ends[:, 1], ends[:, 0])).astype(np.int64)
-    given = ConnectorArrays._make(values[order] for values in given)
+    given = given.chosen(order)
     ends = ends[order]
     slots = np.zeros(len(numbers.starts) + 1, dtype=np.int64)
     twisting = np.zeros(len(ends), dtype=np.int64)
@@ -95,6 +95,7 @@ def _connectors(numbers: _Numbers) -> tuple[Connectors, Integers]:
         column=np.array(columns[1], dtype=np.int64),
         stiffness=np.array(columns[2], dtype=np.float64),
         damping=np.array(columns[3], dtype=np.float64),
+        rolling=given.rolling,
     )
     return connectors, slots
 
@@ -233,6 +234,7 @@ def work_for(equations: Equations, q: Floats, v: Floats) -> Work:
         frames=frames,
         wrench=np.zeros((equations.bodies.start.size, BODY_SIZE)),
         motion=np.zeros((4, BODY_SIZE)),
+        rolling=np.zeros(FORCES_SIZE),
         mesh=MeshMemory(
             gradient=np.zeros((3, ROW_SIZE)),
             states=np.zeros((count, 4)),

@@ -12,7 +12,7 @@ import numpy as np
 
 from exugear.bodies.floating_coordinates import FRAME_COORDINATES, MODAL, FloatingCoordinates, FloatingMotion
 from exugear.dynamics.assembly import Assembly
-from exugear.kernels.connectors import ConnectorArrays, add_connector_forces
+from exugear.kernels.connectors import add_connector_forces
 from exugear.kernels.coordinates import SPIN
 from exugear.kernels.meshes import MeshArrays
 from exugear.kernels.springs import SpringArrays, add_spring_forces
@@ -118,7 +118,7 @@ class FloatingBodies:
         applied : what acts from outside, on any coordinates; taken for the floating bodies alone
         """
         assembly = self._assembly
-        connectors = ConnectorArrays._make(values[self.connectors] for values in assembly.connectors)
+        connectors = assembly.connectors.chosen(self.connectors)
         springs = SpringArrays._make(values[self.couplings] for values in assembly.springs)
         damping_time = assembly.gearbox.case.damping.body_time_s
         matrices = {name: assembly.elastic_bodies[name].reduced for name in self._coordinates}

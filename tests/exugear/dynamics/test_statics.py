@@ -10,7 +10,7 @@ import pytest
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.statics import BalanceError, accelerating_start, locked_equilibrium
-from exugear.kernels.connectors import ConnectorArrays, add_connector_forces
+from exugear.kernels.connectors import add_connector_forces
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 
@@ -86,7 +86,8 @@ def test_bearing_reactions_balance_the_mesh_forces(grc: Gearbox, stiffness: dict
             force += state[4] * turn @ element.force[6:9]
             moment += state[4] * turn @ element.force[9:12]
     assert np.abs(force).max() < 1e-8 * FORCES["ring_planet"]
-    assert abs(moment[2]) < 1e-8 * TORQUE["carrier"]
+    # A bearing takes its force where its first ring is: with the lag of the other across the force, a small moment.
+    assert abs(moment[2]) < 3e-8 * TORQUE["carrier"]
     # Rows act about the undeflected nodes, which have moved by up to 0.1 mm: force times displacement.
     assert np.abs(moment).max() < 1e-4 * FORCES["ring_planet"]
 
@@ -94,7 +95,7 @@ def test_bearing_reactions_balance_the_mesh_forces(grc: Gearbox, stiffness: dict
 def assembly_of_one_bearing(assembly: Assembly, name: str, q: np.ndarray) -> np.ndarray:
     n = assembly.connector_names.index(name)
     f = np.zeros(assembly.size)
-    add_connector_forces(q, 0 * q, ConnectorArrays._make(v[n : n + 1] for v in assembly.connectors), f)
+    add_connector_forces(q, 0 * q, assembly.connectors.one(n), f)
     return f
 
 

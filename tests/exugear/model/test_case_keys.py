@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from exugear.bearings import supports
 from exugear.bearings.catalogue import catalogue_rows
-from exugear.bearings.supports import bearing_matrices, elastic_names
+from exugear.bearings.support_laws import catalogue_stiffness, linear_law
+from exugear.bearings.supports import elastic_names
 from exugear.bodies.of_gearbox.elastic_bodies import check_elastic_body
+from exugear.checks.readiness import check_parts, lacking, remarks
 from exugear.cli.app import app
 from exugear.dynamics.assemble import assemble
-from exugear.dynamics.readiness import check_parts, lacking, remarks
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import stiffness_matrix
@@ -64,7 +64,7 @@ def read_keys(monkeypatch: pytest.MonkeyPatch) -> set[tuple[str, str]]:
 
 
 def test_every_key_is_read(read_keys: set[tuple[str, str]], tmp_path: Path) -> None:
-    supports.catalogue_stiffness.cache_clear()  # what other tests had computed would not be read again
+    catalogue_stiffness.cache_clear()  # what other tests had computed would not be read again
     contents = bases(tmp_path)
     contents["spur"]["ste"] = {"method": "nonlinear", "positions": 8}
     for kind in get_args(connections.BearingType):
@@ -83,7 +83,7 @@ def test_every_key_is_read(read_keys: set[tuple[str, str]], tmp_path: Path) -> N
             assembly = assemble(gearbox, Choice(variant), {pair: np.array([1e9]) for pair in gearbox.pairs})
             assert assembly.weight.shape == (assembly.size,)
         for support in (*gearbox.bearings, *gearbox.mounts):
-            bearing_matrices(support, gearbox.case.damping.bearing_time_s)
+            linear_law(support, gearbox.case.damping.bearing_time_s)
             stiffness_matrix(support.stiffness)
         for body in elastic_names(gearbox):
             check_elastic_body(gearbox, body)

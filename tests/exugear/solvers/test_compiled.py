@@ -32,6 +32,7 @@ from exugear.tooth_mesh.laws.registry import LAWS
 
 from ..assembled import assembled, simulated
 from ..plain_signals import energies_of, sampled
+from ..rolling_case import BALLS, CYLINDRICAL, TAPERED, on_rolling
 from ..rounding import allowed_difference
 
 LOAD = {"carrier": 240e3, "hss": -3000.0}
@@ -73,6 +74,10 @@ def assemblies(grc: Gearbox, stiffness: dict) -> Iterator[Assembly]:
             yield assembled(grc, Choice(variant, law), stiffness)
     yield assemble(grc, Choice("rigid", "rigid"), {})
     yield with_full_matrices(assemble(grc, Choice("bushing"), stiffness), off_axis=0.05)
+    preloaded = replace(CYLINDRICAL, radial_clearance=-20e-6)
+    pair = tuple(replace(TAPERED, contact_angle=a, axial_position=0.1 * a) for a in (0.3, -0.3))
+    bushing = assemble(grc, Choice("bushing"), stiffness)
+    yield on_rolling(bushing, [(preloaded,), (), (BALLS,), pair], stiffness=0.5)
     heavy = grc.varied({"gravity.acceleration_m_per_s2": [0.0, -9.81, 0.0]})
     yield assemble(heavy, Choice("bushing"), stiffness)
 

@@ -1,0 +1,419 @@
+"""Compiled law of rolling bearings: rows of rollers and of balls between two rigid rings, one element after the other.
+
+An element at the polar angle p sees three numbers of the inner ring's displacement (x, y, z, a, b) against the outer
+one, along the outer ring's axes: q = x cos p + y sin p, z, and the tilt in its axial plane w = a sin p - b cos p. Each
+has a potential U(q, z, w), which the tables and constants of `exugear.bearings.potential` give:
+
+    roller       U(d, w),  d = cos(al) q + sin(al) z + e w - gap,  e = r sin(al) - z0 cos(al)
+    ball         2/5 k max(0, l - span)^(5/2),  l the distance of the grooves' centres, whose line is the normal
+    aligned      the same of d, without tilt: the outer raceway is a sphere about the bearing's middle
+
+Forces are its gradient, tangents its second derivatives: both exact, so that energy closes. A cage that turns with the
+rings (phi = phase + cage_ratio * spin between them) takes the torque -U_phi from them. Damping is time * tangent * rate
+and acts where something touches alone. Machine code is kept by `fe_ste.tools.compilation`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.compilation import summing_kernel
+
+ROLLER, BALL, ALIGNED_BALL = range(3)
+"""Values of `FORM`."""
+FORM, COUNT, CIRCLE, TABLE, STRIPS, GAPS, HALF_SLICES = range(7)
+"""Columns of `RollingArrays.layout`."""
+LAYOUT_SIZE = 7
+COSINE, SINE, LEVER, GAP, TILTING, RADIUS, AXIAL, CONSTANT = range(8)
+"""First columns of `RollingArrays.geometry`; `CONSTANT` is that of a ball, or of one slice of a roller."""
+CENTRE_RADIAL, CENTRE_AXIAL, SPAN = range(8, 11)
+"""What a row of balls has behind them."""
+PER_TILT, MOST_TILT, PER_ROOT, MOST_DEPTH, SLICE_LENGTH = range(8, 13)
+"""What a row of rollers has behind them."""
+GEOMETRY_SIZE = 13
+STRIP_TILT, STRIP_PER = 4, 5
+"""In each strip of tilts behind the four coefficients of D: its first tilt, and 1 over its width."""
+STRIP_SIZE = 6
+PATCH_SIZE = 16
+ELASTIC_PART, DAMPED_PART, CAGE_TORQUE, STORED, MEMORY = 0, 6, 12, 13, 14
+"""Entries of what `rolling_forces` fills: six elastic forces, six damped ones, torque, energy, memory."""
+FORCES_SIZE = 35
+SUMS_SIZE, ENERGY = 11, 10
+"""Sums over elements in the cage's axes: five elastic forces, five damped ones, energy."""
+LINE_POWER = 10.0 / 9.0
+"""Load of a line contact over its approach (ISO/TS 16281)."""
+
+
+class RollingArrays(NamedTuple):
+    """Rolling laws of c connectors; r rows.
+
+    Attributes
+    ----------
+    first : (c + 1,) first row of each connector; equal neighbours: no rolling law
+    scale : (c,) displacement of the inner ring against the outer one over the connector's strain: its sign is
+        negative where the second body carries the outer ring, its size is the share f of the deflection that
+        the bearing takes, the seat the rest. Energy is U / f, so that force and tangent are those of a potential
+    time : (c,) damping over tangent stiffness, s
+    cage_ratio, phase : (c,) cage angle (rad) = phase + ratio * (spin of second body - spin of first body)
+    layout : (r, 7) form, number of elements, first line in `circle`; of a row of rollers first entry of its table in
+        `tables`, number of strips, first entry of its gaps, half the number of slices
+    geometry : (r, 13) columns as named in this module, m, rad, N
+    circle : (e, 2) cosine and sine of the elements' angles in their cage
+    tables : flat: of each kind of roller its strips (n, 6) of tilts, patches (m, n, 16) over the root of the depth with
+        the coefficients of U / depth^2, those along the root together, gaps (h,) of the slices of half a roller
+    """
+
+    first: Integers
+    scale: Floats
+    time: Floats
+    cage_ratio: Floats
+    phase: Floats
+    layout: Integers
+    geometry: Floats
+    circle: Floats
+    tables: Floats
+
+
+def no_rolling(connectors: int) -> RollingArrays:
+    """Arrays of connectors without any rolling law."""
+    none = np.zeros(connectors)
+    return RollingArrays(
+        first=np.zeros(connectors + 1, dtype=np.int64),
+        scale=np.ones(connectors),
+        time=none,
+        cage_ratio=none,
+        phase=none,
+        layout=np.zeros((0, LAYOUT_SIZE), dtype=np.int64),
+        geometry=np.zeros((0, GEOMETRY_SIZE)),
+        circle=np.zeros((0, 2)),
+        tables=np.zeros(0),
+    )
+
+
+def selected_rolling(rolling: RollingArrays, connectors: Integers) -> RollingArrays:
+    """Arrays of some connectors, in the order of their numbers; tables are shared, not copied."""
+    counts = np.diff(rolling.first)[connectors]
+    rows = [np.arange(rolling.first[n], rolling.first[n + 1]) for n in connectors]
+    chosen = np.concatenate([np.zeros(0, dtype=np.int64), *rows])
+    return rolling._replace(
+        first=np.append(0, np.cumsum(counts)).astype(np.int64),
+        scale=rolling.scale[connectors],
+        time=rolling.time[connectors],
+        cage_ratio=rolling.cage_ratio[connectors],
+        phase=rolling.phase[connectors],
+        layout=rolling.layout[chosen],
+        geometry=rolling.geometry[chosen],
+    )
+
+
+@summing_kernel
+def slices_law(r: int, d: float, w: float, rolling: RollingArrays) -> tuple[float, float, float, float, float, float]:
+    """Sum over the slices of a roller: U, its derivatives by d and w, then by d d, d w, w w."""
+    first, half = rolling.layout[r, GAPS], rolling.layout[r, HALF_SLICES]
+    constant, length = rolling.geometry[r, CONSTANT], rolling.geometry[r, SLICE_LENGTH]
+    u, ud, uw, udd, udw, uww = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for n in range(2 * half):
+        t = (n - half + 0.5) * length
+        approach = d - w * t - rolling.tables[first + (n - half if n >= half else half - 1 - n)]
+        if approach > 0.0:
+            stiffness = constant * approach ** (LINE_POWER - 1.0)
+            force = stiffness * approach
+            stiffness *= LINE_POWER
+            u += force * approach / (1.0 + LINE_POWER)
+            ud += force
+            uw -= force * t
+            udd += stiffness
+            udw -= stiffness * t
+            uww += stiffness * t * t
+    return u, ud, uw, udd, udw, uww
+
+
+@summing_kernel
+def cubic(patch: Floats, n: int, y: float) -> tuple[float, float, float]:
+    """Cubic of every fourth coefficient from the n-th on, at the share y of a step, and its two derivatives."""
+    a, b, c, d = patch[n], patch[n + 4], patch[n + 8], patch[n + 12]
+    return ((d * y + c) * y + b) * y + a, (3.0 * d * y + 2.0 * c) * y + b, 6.0 * d * y + 2.0 * c
+
+
+@summing_kernel
+def roller_law(r: int, d: float, w: float, rolling: RollingArrays) -> tuple[float, float, float, float, float, float]:
+    """Potential of a roller at the approach d (m) of its middle and the tilt w (rad), as `slices_law`, from its table.
+
+    With the depth s = d - D(w) behind first contact and x = sqrt(s) the table has V(x, w) = U / s^2, even in w. It
+    hardly varies, so that cubics serve from first touch to the limit of the raceways. Beyond it slices are summed.
+    """
+    geometry, layout, tilt = rolling.geometry[r], rolling.layout[r], abs(w)
+    if d + layout[HALF_SLICES] * geometry[SLICE_LENGTH] * tilt <= 0.0:  # not even an end of the roller
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    if tilt >= geometry[MOST_TILT]:
+        return slices_law(r, d, w, rolling)
+    j = int(math.sqrt(tilt * geometry[PER_TILT]))
+    at = layout[TABLE] + STRIP_SIZE * j
+    strip = rolling.tables[at : at + STRIP_SIZE]
+    per = strip[STRIP_PER]
+    y = (tilt - strip[STRIP_TILT]) * per
+    depth = d - (((strip[3] * y + strip[2]) * y + strip[1]) * y + strip[0])
+    if depth <= 0.0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    if depth >= geometry[MOST_DEPTH]:
+        return slices_law(r, d, w, rolling)
+    slope = ((3.0 * strip[3] * y + 2.0 * strip[2]) * y + strip[1]) * per
+    bend = (6.0 * strip[3] * y + 2.0 * strip[2]) * per * per
+    root, per_root = math.sqrt(depth), geometry[PER_ROOT]
+    x = root * per_root
+    i = int(x)
+    x -= i
+    at = layout[TABLE] + STRIP_SIZE * layout[STRIPS] + PATCH_SIZE * (i * layout[STRIPS] + j)
+    patch = rolling.tables[at : at + PATCH_SIZE]
+    # Coefficients along the root at this tilt, and their derivatives by the tilt; then along the root.
+    v0, w0, b0 = cubic(patch, 0, y)
+    v1, w1, b1 = cubic(patch, 1, y)
+    v2, w2, b2 = cubic(patch, 2, y)
+    v3, w3, b3 = cubic(patch, 3, y)
+    v = ((v3 * x + v2) * x + v1) * x + v0
+    vx = ((3.0 * v3 * x + 2.0 * v2) * x + v1) * per_root
+    vxx = (6.0 * v3 * x + 2.0 * v2) * per_root * per_root
+    vw = (((w3 * x + w2) * x + w1) * x + w0) * per
+    vxw = ((3.0 * w3 * x + 2.0 * w2) * x + w1) * per_root * per
+    vww = (((b3 * x + b2) * x + b1) * x + b0) * per * per
+    # U = s^2 V by s, and by w at constant s; then at constant d, where s changes with -D'(w).
+    square = depth * depth
+    us, uss = depth * (2.0 * v + 0.5 * root * vx), 2.0 * v + 1.75 * root * vx + 0.25 * depth * vxx
+    usw = depth * (2.0 * vw + 0.5 * root * vxw)
+    mixed = usw - slope * uss
+    sense = 1.0 if w >= 0.0 else -1.0
+    twice = square * vww - slope * (usw + mixed) - bend * us
+    return square * v, us, sense * (square * vw - slope * us), uss, sense * mixed, twice
+
+
+@summing_kernel
+def normal_law(r: int, d: float, w: float, rolling: RollingArrays) -> tuple[float, float, float, float, float, float]:
+    """Potential of an element whose normal stays, as `slices_law`."""
+    if rolling.layout[r, FORM] == ROLLER:
+        return roller_law(r, d, w, rolling)
+    if d <= 0.0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    root = rolling.geometry[r, CONSTANT] * math.sqrt(d)
+    return 0.4 * root * d * d, root * d, 0.0, 1.5 * root, 0.0, 0.0
+
+
+@summing_kernel
+def ball_law(r: int, x: float, y: float, rolling: RollingArrays) -> tuple[float, float, float, float, float, float]:
+    """Potential of a ball whose normal follows the grooves' centres, y axially and x radially apart (m).
+
+    Returns U, its derivatives by x and y, then by x x, x y, y y.
+    """
+    length = math.sqrt(x * x + y * y)
+    approach = length - rolling.geometry[r, SPAN]
+    if approach <= 0.0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    x, y = x / length, y / length
+    root = rolling.geometry[r, CONSTANT] * math.sqrt(approach)
+    force = root * approach
+    # Along the normal it is Hertz's contact that yields, across it the normal that turns.
+    along, across = 1.5 * root, force / length
+    second = along * x * x + across * y * y, (along - across) * x * y, along * y * y + across * x * x
+    return 0.4 * force * approach, force * x, force * y, second[0], second[1], second[2]
+
+
+@summing_kernel
+def add_normal_row(r: int, turned: Floats, rolling: RollingArrays, sums: Floats) -> None:
+    """Add energy and forces of a row whose normals stay to sums: see `rolling_forces`."""
+    x, y, z, a, b = turned[0], turned[1], turned[2], turned[3], turned[4]
+    dx, dy, dz, da, db = turned[5], turned[6], turned[7], turned[8], turned[9]
+    row = rolling.geometry[r]
+    cosine, sine, lever, tilting = row[COSINE], row[SINE], row[LEVER], row[TILTING]
+    # Approach and tilt are sums of a constant, a cosine and a sine of the element's place.
+    d0, dc, ds = sine * z - row[GAP], cosine * x - lever * b, cosine * y + lever * a
+    e0, ec, es = sine * dz, cosine * dx - lever * db, cosine * dy + lever * da
+    a, b, da, db = tilting * a, tilting * b, tilting * da, tilting * db
+    energy, f, fc, fs, mc, ms, g, gc, gs, nc, ns = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    start = rolling.layout[r, CIRCLE]
+    for k in range(start, start + rolling.layout[r, COUNT]):
+        c, s = rolling.circle[k, 0], rolling.circle[k, 1]
+        u, force, moment, dd, dw, ww = normal_law(r, d0 + dc * c + ds * s, a * s - b * c, rolling)
+        if u == 0.0:
+            continue
+        energy += u
+        f += force
+        fc += force * c
+        fs += force * s
+        mc += moment * c
+        ms += moment * s
+        d_rate, w_rate = e0 + ec * c + es * s, da * s - db * c
+        force, moment = dd * d_rate + dw * w_rate, dw * d_rate + ww * w_rate
+        g += force
+        gc += force * c
+        gs += force * s
+        nc += moment * c
+        ns += moment * s
+    sums[0] += cosine * fc
+    sums[1] += cosine * fs
+    sums[2] += sine * f
+    sums[3] += lever * fs + tilting * ms
+    sums[4] -= lever * fc + tilting * mc
+    sums[5] += cosine * gc
+    sums[6] += cosine * gs
+    sums[7] += sine * g
+    sums[8] += lever * gs + tilting * ns
+    sums[9] -= lever * gc + tilting * nc
+    sums[ENERGY] += energy
+
+
+@summing_kernel
+def add_ball_row(r: int, turned: Floats, rolling: RollingArrays, sums: Floats) -> None:
+    """Add energy and forces of a row of balls to sums: see `rolling_forces`."""
+    x, y, z, a, b = turned[0], turned[1], turned[2], turned[3], turned[4]
+    dx, dy, dz, da, db = turned[5], turned[6], turned[7], turned[8], turned[9]
+    row = rolling.geometry[r]
+    radius, axial, radial_start, axial_start = row[RADIUS], row[AXIAL], row[CENTRE_RADIAL], row[CENTRE_AXIAL] + z
+    energy, rc, rs, t, tc, ts = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    hc, hs, v, vc, vs = 0.0, 0.0, 0.0, 0.0, 0.0
+    start = rolling.layout[r, CIRCLE]
+    for k in range(start, start + rolling.layout[r, COUNT]):
+        c, s = rolling.circle[k, 0], rolling.circle[k, 1]
+        w = a * s - b * c
+        u, fx, fy, xx, xy, yy = ball_law(r, radial_start + x * c + y * s - axial * w, axial_start + radius * w, rolling)
+        if u == 0.0:
+            continue
+        energy += u
+        rc += fx * c
+        rs += fx * s
+        t += fy
+        tc += fy * c
+        ts += fy * s
+        w = da * s - db * c
+        x_rate, y_rate = dx * c + dy * s - axial * w, dz + radius * w
+        fx, fy = xx * x_rate + xy * y_rate, xy * x_rate + yy * y_rate
+        hc += fx * c
+        hs += fx * s
+        v += fy
+        vc += fy * c
+        vs += fy * s
+    sums[0] += rc
+    sums[1] += rs
+    sums[2] += t
+    sums[3] += radius * ts - axial * rs
+    sums[4] -= radius * tc - axial * rc
+    sums[5] += hc
+    sums[6] += hs
+    sums[7] += v
+    sums[8] += radius * vs - axial * hs
+    sums[9] -= radius * vc - axial * hc
+    sums[ENERGY] += energy
+
+
+@summing_kernel
+def turn_pairs(cosine: float, sine: float, values: Floats) -> None:
+    """Turn the components across the axis of two displacements or loads (10,) about z by an angle."""
+    for n in (0, 3, 5, 8):
+        x, y = values[n], values[n + 1]
+        values[n], values[n + 1] = cosine * x - sine * y, sine * x + cosine * y
+
+
+@summing_kernel
+def rolling_forces(n: int, strain: Floats, rate: Floats, turn: float, rolling: RollingArrays, out: Floats) -> None:
+    """Fill elastic and damped forces, cage torque and energy of connector n into out (35,).
+
+    Parameters
+    ----------
+    n : int
+    strain : (5 or 6,) displacement and tilts of the second body against the first in the first one's axes, m, rad
+    rate : (6,) velocity and angular velocity likewise, m/s, rad/s
+    turn : spin of the second body less that of the first, rad
+    rolling : RollingArrays
+    out : (35,) elastic part from `ELASTIC_PART` and damped part from `DAMPED_PART` on, six each, of force and moment
+        on the first body (N, N m); at `CAGE_TORQUE` the derivative of the energy by `turn` (N m), which acts on the
+        first body's spin and against that of the second; at `STORED` the energy (J); the rest is memory
+
+    Notes
+    -----
+    The potential knows the tilts a and b, whose rates are w_x - b w_z and w_y + a w_z to first order where the second
+    body spins. Moments that do no work on the spin have the part a M_y - b M_x about z.
+    """
+    scale = rolling.scale[n]
+    angle = rolling.phase[n] + rolling.cage_ratio[n] * turn
+    cosine, sine = math.cos(angle), math.sin(angle)
+    sums, turned = out[MEMORY : MEMORY + SUMS_SIZE], out[MEMORY + SUMS_SIZE :]
+    sums[:] = 0.0
+    slow = scale * rolling.time[n]
+    for i in range(5):
+        turned[i], turned[5 + i] = scale * strain[i], slow * rate[i]
+    turned[8] -= slow * strain[4] * rate[5]
+    turned[9] += slow * strain[3] * rate[5]
+    # In the cage's axes elements stay where they are.
+    turn_pairs(cosine, -sine, turned)
+    for r in range(rolling.first[n], rolling.first[n + 1]):
+        if rolling.layout[r, FORM] == BALL:
+            add_ball_row(r, turned, rolling, sums)
+        else:
+            add_normal_row(r, turned, rolling, sums)
+    # A cage that turns ahead does what the ring does that stays behind.
+    about_axis = turned[1] * sums[0] - turned[0] * sums[1] + turned[4] * sums[3] - turned[3] * sums[4]
+    turn_pairs(cosine, sine, sums)
+    sense, share = (1.0, scale) if scale > 0.0 else (-1.0, -scale)
+    for i in range(5):
+        out[ELASTIC_PART + i], out[DAMPED_PART + i] = sense * sums[i], sense * sums[5 + i]
+    for part in (ELASTIC_PART, DAMPED_PART):
+        out[part + 5] = strain[3] * out[part + 4] - strain[4] * out[part + 3]
+    out[CAGE_TORQUE] = rolling.cage_ratio[n] * about_axis / share
+    out[STORED] = sums[ENERGY] / share
+
+
+@summing_kernel
+def element_stiffness(
+    r: int, q: float, z: float, w: float, rolling: RollingArrays
+) -> tuple[float, float, float, float, float, float]:
+    """Second derivatives of an element's potential by q q, q z, q w, z z, z w, w w (see the module)."""
+    row = rolling.geometry[r]
+    if rolling.layout[r, FORM] == BALL:
+        radius, axial = row[RADIUS], row[AXIAL]
+        x, y = row[CENTRE_RADIAL] + q - axial * w, row[CENTRE_AXIAL] + z + radius * w
+        _, _, _, xx, xy, yy = ball_law(r, x, y, rolling)
+        xw, yw = radius * xy - axial * xx, radius * yy - axial * xy
+        return xx, xy, xw, yy, yw, radius * yw - axial * xw
+    c, s, lever, tilting = row[COSINE], row[SINE], row[LEVER], row[TILTING]
+    d = c * q + s * z + lever * w - row[GAP]
+    _, _, _, dd, dw, ww = normal_law(r, d, tilting * w, rolling)
+    dw, ww = tilting * dw, tilting * ww
+    across = lever * dd + dw
+    return c * c * dd, c * s * dd, c * across, s * s * dd, s * across, lever * (across + dw) + ww
+
+
+@summing_kernel
+def rolling_tangent(n: int, strain: Floats, turn: float, rolling: RollingArrays, out: Floats) -> None:
+    """Fill the derivative of the elastic force of `rolling_forces` by the strain into out (5 or more, same)."""
+    scale = rolling.scale[n]
+    angle = rolling.phase[n] + rolling.cage_ratio[n] * turn
+    c0, s0 = math.cos(angle), math.sin(angle)
+    x, y, z, a, b = scale * strain[0], scale * strain[1], scale * strain[2], scale * strain[3], scale * strain[4]
+    out[:] = 0.0
+    share = abs(scale)
+    for r in range(rolling.first[n], rolling.first[n + 1]):
+        start = rolling.layout[r, CIRCLE]
+        for k in range(start, start + rolling.layout[r, COUNT]):
+            ck, sk = rolling.circle[k, 0], rolling.circle[k, 1]
+            c, s = c0 * ck - s0 * sk, s0 * ck + c0 * sk
+            qq, qt, qm, tt, tm, mm = element_stiffness(r, x * c + y * s, z, a * s - b * c, rolling)
+            out[0, 0] += share * qq * c * c
+            out[0, 1] += share * qq * c * s
+            out[0, 2] += share * qt * c
+            out[0, 3] += share * qm * c * s
+            out[0, 4] -= share * qm * c * c
+            out[1, 1] += share * qq * s * s
+            out[1, 2] += share * qt * s
+            out[1, 3] += share * qm * s * s
+            out[1, 4] -= share * qm * c * s
+            out[2, 2] += share * tt
+            out[2, 3] += share * tm * s
+            out[2, 4] -= share * tm * c
+            out[3, 3] += share * mm * s * s
+            out[3, 4] -= share * mm * c * s
+            out[4, 4] += share * mm * c * c
+    for i in range(1, 5):
+        for j in range(i):
+            out[i, j] = out[j, i]
