@@ -210,7 +210,10 @@ def _osculation(section: CatalogueSection) -> Estimate:
 
 def _row_distance(section: CatalogueSection) -> Estimate | None:
     if section.arrangement != "single":
-        return Estimate("row_distance_mm", section.width_mm, 0.85 * section.width_mm, 1.15 * section.width_mm, "mm")
+        distance = proportions.PAIR_DISTANCE
+        if section.type == "tapered_roller":
+            distance = proportions.TAPERED_PAIR_DISTANCE.get(section.arrangement, distance)
+        return _scaled("row_distance_mm", distance, section.width_mm, "mm")
     rows = row_count(section)
     if rows == 1 or section.type in ALIGNING:
         return None

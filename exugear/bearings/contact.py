@@ -36,6 +36,8 @@ LINE_CONTACT_EXPONENT = 10.0 / 9.0
 """Load of a line contact over its approach."""
 MOST_NEWTON_STEPS = 200
 """Steps after which the search for an equilibrium is given up."""
+HIDDEN_FALL = 1e-9
+"""Fall of the energy, over the energy, that rounding may hide: approaches are differences of longer distances."""
 MOST_TRAVEL = 1.0
 """Displacement (m) at which a ring is taken for one that nothing holds."""
 LEAST_SHOULDER = 1e-6
@@ -119,8 +121,17 @@ def _lamina_pressure(row: RollerRow) -> float:
 
 def lamina_loads(laminae: LaminaArrays, displacement: Floats) -> Floats:
     """Load of each lamina, N, shape (n,), at a displacement of the inner ring, shape (6,)."""
-    approach = np.maximum(laminae.direction @ displacement - laminae.gap, 0.0)
-    return laminae.constant * approach**LINE_CONTACT_EXPONENT
+    approach, carrying = _approaches(laminae, displacement)
+    load = np.zeros(len(laminae.gap))
+    load[carrying] = laminae.constant[carrying] * approach**LINE_CONTACT_EXPONENT
+    return load
+
+
+def _approaches(laminae: LaminaArrays, displacement: Floats) -> tuple[Floats, Integers]:
+    """Approaches (m) of the laminae that carry, and which they are: most do not."""
+    approach = laminae.direction @ displacement - laminae.gap
+    carrying = np.flatnonzero(approach > 0.0)
+    return approach[carrying], carrying
 
 
 @dataclass(frozen=True)
@@ -174,9 +185,9 @@ def elastic_energy(contacts: RowContacts, displacement: Floats) -> float:
     """Energy stored in all contacts, J; its gradient is `bearing_load`."""
     energy = 0.0
     if contacts.laminae is not None:
-        approach = np.maximum(contacts.laminae.direction @ displacement - contacts.laminae.gap, 0.0)
+        approach, carrying = _approaches(contacts.laminae, displacement)
         power = LINE_CONTACT_EXPONENT + 1.0
-        energy += float(np.sum(contacts.laminae.constant * approach**power) / power)
+        energy += float(contacts.laminae.constant[carrying] @ approach**power / power)
     if contacts.balls is not None:
         energy += ball_energy(contacts.balls, displacement)
     return energy
@@ -186,7 +197,9 @@ def bearing_load(contacts: RowContacts, displacement: Floats) -> Floats:
     """Force and moment that hold the inner ring at a displacement, N and N m, shape (6,)."""
     load = np.zeros(6)
     if contacts.laminae is not None:
-        load += contacts.laminae.direction.T @ lamina_loads(contacts.laminae, displacement)
+        laminae = contacts.laminae
+        approach, carrying = _approaches(laminae, displacement)
+        load += (laminae.constant[carrying] * approach**LINE_CONTACT_EXPONENT) @ laminae.direction[carrying]
     if contacts.balls is not None:
         load += ball_ring_load(contacts.balls, displacement)
     return load
@@ -197,9 +210,10 @@ def tangent_stiffness(contacts: RowContacts, displacement: Floats) -> Floats:
     tangent = np.zeros((6, 6))
     if contacts.laminae is not None:
         laminae = contacts.laminae
-        approach = np.maximum(laminae.direction @ displacement - laminae.gap, 0.0)
-        slope = LINE_CONTACT_EXPONENT * laminae.constant * approach ** (LINE_CONTACT_EXPONENT - 1.0)
-        gram = laminae.direction.T @ (np.where(approach > 0.0, slope, 0.0)[:, None] * laminae.direction)
+        approach, carrying = _approaches(laminae, displacement)
+        slope = LINE_CONTACT_EXPONENT * laminae.constant[carrying] * approach ** (LINE_CONTACT_EXPONENT - 1.0)
+        direction = laminae.direction[carrying]
+        gram = direction.T @ (slope[:, None] * direction)
         tangent += 0.5 * (gram + gram.T)
     if contacts.balls is not None:
         tangent += ball_tangent(contacts.balls, displacement)
@@ -416,9 +430,9 @@ def _line_search(
     tolerance: float,
 ) -> Floats:
     """Halve the step until the energy falls; close to the minimum rounding hides the fall, take it whole."""
-    if descent <= tolerance * float(np.linalg.norm(step)):
-        return displacement + step
     start = surplus(displacement)
+    if descent <= max(tolerance * float(np.linalg.norm(step)), HIDDEN_FALL * abs(start)):
+        return displacement + step
     fraction = 1.0
     while surplus(displacement + fraction * step) > start - 1e-4 * fraction * descent and fraction > 1e-6:
         fraction *= 0.5
@@ -426,25 +440,18 @@ def _line_search(
 
 
 def _first_touch(contacts: RowContacts, force: Floats, start: Floats) -> Floats:
-    """Start in contact: from `start` along the force until the load has its size in that direction."""
+    """Start in contact: from `start` along the force until the load has at least its size in that direction."""
     if elastic_energy(contacts, start) > 0.0:
         return start  # preloaded or tilted rows are in contact already
     size = float(np.linalg.norm(force))
     direction = np.concatenate([force / size, np.zeros(3)])
 
-    def carried(distance: float) -> float:
-        return float(bearing_load(contacts, start + distance * direction) @ direction)
-
-    upper = 1e-6
-    while carried(upper) < size:
-        upper *= 2.0
-        if upper > MOST_TRAVEL:
+    distance = 1e-6
+    while float(bearing_load(contacts, start + distance * direction) @ direction) < size:
+        distance *= 2.0
+        if distance > MOST_TRAVEL:
             raise _no_equilibrium(force)
-    lower = 0.0
-    while upper - lower > 1e-3 * upper:
-        middle = 0.5 * (lower + upper)
-        lower, upper = (middle, upper) if carried(middle) < size else (lower, middle)
-    return start + upper * direction
+    return start + distance * direction
 
 
 def pitch_averaged_tangent(bearing: RollingBearing, force: ArrayLike, positions: int = 4) -> Floats:
