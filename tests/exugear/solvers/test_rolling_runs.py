@@ -33,8 +33,8 @@ def linear(grc: Gearbox, stiffness: dict) -> Assembly:
 
 @pytest.fixture(scope="module")
 def start(linear: Assembly) -> tuple[np.ndarray, np.ndarray]:
-    """Preloaded state at 215 rpm of the linear bearings."""
-    state = accelerating_start(linear, LOAD, 22.5)
+    """Preloaded state of the linear bearings at 46 rpm: at full speed a step covers many pieces of k(PMC)."""
+    state = accelerating_start(linear, LOAD, -4.8)
     return state.q, state.v
 
 
@@ -75,7 +75,7 @@ def test_account_of_energy_closes(linear: Assembly, start: tuple[np.ndarray, np.
     change = energies[-1].sum() - energies[0].sum()
     stored = np.ptp(energies[:, 1])
     assert stored > 10.0  # J
-    assert abs(work - change) < 1e-4 * stored
+    assert abs(work - change) < 3e-5 * stored
     forces = signals[:, signal_layout(assembly)["support_force"]]
     # What a run keeps as a support's force is that of the plain kernels.
     n = len(q) // 2
