@@ -12,15 +12,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from exugear.bearings.duty import BearingDuty
 from exugear.bodies.elastic_body import ElasticBody
 from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.bearing_duties import bearing_duties
+from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.modes import Modes, eigenmodes
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.named_files import NOTHING_MORE, Permissions
-from exugear.results.folder import bodies_folder, keep_case, kept_case, modes_path, time_noted
+from exugear.results.bearings_file import write_duties
+from exugear.results.folder import bearings_path, bodies_folder, keep_case, kept_case, modes_path, time_noted
 from exugear.results.run_file import FINAL_NAME
 from exugear.runs.outcome import Run
 from exugear.runs.run_folder import run_directory
@@ -116,6 +120,11 @@ class Project:
         return modes_path(self.folder, self.choice)
 
     @property
+    def bearings_path(self) -> Path:
+        """File of what the bearings bear."""
+        return bearings_path(self.folder, self.choice)
+
+    @property
     def run_directory(self) -> Path:
         """Folder of the run: its files, what was stopped included."""
         return run_directory(self.folder, self.choice)
@@ -202,6 +211,14 @@ class Project:
             modes = eigenmodes(self.gearbox, choice, stiffness, bodies)
             modes.save(self.modes_path)
         return modes
+
+    def bearings(self) -> tuple[BearingDuty, ...]:
+        """Find what catalogue bearings bear at the static load, written to `bearings_path`."""
+        assembly = self.assembly()
+        duties = bearing_duties(assembly)
+        self.keep_case()
+        write_duties(self.bearings_path, duties, input_hash(assembly))
+        return duties
 
     def run(self, **options: Any) -> Run:
         """Run the load case in time; options as those of `exugear.runs.runup.simulate`.

@@ -1,10 +1,11 @@
-"""Contact of rollers with their raceways by ISO/TS 16281: lamina loads, the inner ring in balance, its tangent.
+"""Contact of rolling elements with their raceways by ISO/TS 16281: loads, the inner ring in balance, its tangent.
 
-Rows of rollers between two rigid rings. Each roller is cut into laminae; a lamina between both raceways
-carries ``c_L / n * delta^(10/9)`` with ``c_L = 35948 L_we^(8/9)`` (N, mm), its approach ``delta`` following
-from the six displacements of the inner ring relative to the outer one. Because every lamina has a potential,
-the load of the bearing is the gradient of a convex function: the equilibrium under a given force is unique
-and the tangent symmetric.
+Rows of rollers and of balls between two rigid rings. Each roller is cut into laminae; a lamina between both
+raceways carries ``c_L / n * delta^(10/9)`` with ``c_L = 35948 L_we^(8/9)`` (N, mm), its approach ``delta`` following
+from the six displacements of the inner ring relative to the outer one. Balls are in
+`exugear.bearings.point_contact`. Every contact has a potential that grows with its approach, which is a convex
+function of the displacements; so the load of the bearing is the gradient of a convex function, the equilibrium under
+a given force unique and the tangent symmetric.
 
 Rings are rigid, ribs, cage, friction, centrifugal forces and the housing are left out. The frame is that of
 `exugear.bearings.rows`.
@@ -19,13 +20,26 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from exugear.bearings.rows import BearingError, RollerBearing, RollerRow
+from exugear.bearings.point_contact import (
+    BallArrays,
+    ball_arrays,
+    ball_energy,
+    ball_loads,
+    ball_ring_load,
+    ball_state,
+    ball_tangent,
+)
+from exugear.bearings.rows import STEEL_MODULUS, BallRow, BearingError, RollerRow, RollingBearing, RollingRow
 from fe_ste.tools.arrays import Floats, Integers
 
 LINE_CONTACT_EXPONENT = 10.0 / 9.0
 """Load of a line contact over its approach."""
 MOST_NEWTON_STEPS = 200
 """Steps after which the search for an equilibrium is given up."""
+MOST_TRAVEL = 1.0
+"""Displacement (m) at which a ring is taken for one that nothing holds."""
+LEAST_SHOULDER = 1e-6
+"""Least sine of the contact angle that a ball of a row with a contact angle may come down to."""
 
 
 @dataclass(frozen=True)
@@ -40,23 +54,26 @@ class LaminaArrays:
         Approach at which the lamina begins to carry, m.
     constant : (n,) array
         ``c_L / laminae``, N/m^(10/9).
-    roller : (n,) array of int
-        Number of the roller that each lamina belongs to, counted through all rows.
+    pressure : (n,) array
+        Pressure on the inner raceway over the square root of the lamina's load, Pa/N^(1/2).
+    element : (n,) array of int
+        Number of the roller that each lamina belongs to, counted through all rows of the bearing.
     """
 
     direction: Floats
     gap: Floats
     constant: Floats
-    roller: Integers
+    pressure: Floats
+    element: Integers
 
 
-def lamina_arrays(rows: Sequence[RollerRow], first_roller_angle: float = 0.0) -> LaminaArrays:
+def lamina_arrays(rows: Sequence[tuple[RollerRow, int]], first_roller_angle: float = 0.0) -> LaminaArrays:
     """Place the rollers and their laminae.
 
     Parameters
     ----------
-    rows : sequence of RollerRow
-        Rows in the frame of the bearing.
+    rows : sequence of (RollerRow, int)
+        Rows in the frame of the bearing, and the number of the first roller of each.
     first_roller_angle : float
         Polar angle of the first roller of each row, rad.
 
@@ -64,17 +81,13 @@ def lamina_arrays(rows: Sequence[RollerRow], first_roller_angle: float = 0.0) ->
     -------
     LaminaArrays
     """
-    parts = [_row_laminae(row, first_roller_angle) for row in rows]
-    offsets = np.cumsum([0, *(row.element_count for row in rows)])
+    parts = [_row_laminae(row, first, first_roller_angle) for row, first in rows]
     return LaminaArrays(
-        direction=np.concatenate([part.direction for part in parts]),
-        gap=np.concatenate([part.gap for part in parts]),
-        constant=np.concatenate([part.constant for part in parts]),
-        roller=np.concatenate([part.roller + offset for part, offset in zip(parts, offsets, strict=False)]),
+        *(np.concatenate([getattr(part, key) for part in parts]) for key in LaminaArrays.__annotations__)
     )
 
 
-def _row_laminae(row: RollerRow, first_roller_angle: float) -> LaminaArrays:
+def _row_laminae(row: RollerRow, first: int, first_roller_angle: float) -> LaminaArrays:
     number = np.repeat(np.arange(row.element_count), row.laminae)
     polar = first_roller_angle + 2.0 * math.pi * number / row.element_count
     slices = (np.arange(row.laminae) + 0.5) / row.laminae - 0.5  # middle of each slice, in roller lengths
@@ -83,12 +96,25 @@ def _row_laminae(row: RollerRow, first_roller_angle: float) -> LaminaArrays:
     normal = np.column_stack([cosine * np.cos(polar), cosine * np.sin(polar), np.full(polar.size, sine)])
     radius = 0.5 * row.pitch_diameter - along * sine
     point = np.column_stack([radius * np.cos(polar), radius * np.sin(polar), row.axial_position + along * cosine])
+    if row.aligning:
+        point[:] = 0.0  # the raceway is a sphere: contact forces pass through its centre, that of the bearing
     return LaminaArrays(
         direction=np.hstack([normal, np.cross(point, normal)]),
         gap=0.5 * row.radial_clearance * cosine + 2.0 * row.drop(along),
         constant=np.full(polar.size, row.contact_constant / row.laminae),
-        roller=number,
+        pressure=np.full(polar.size, _lamina_pressure(row)),
+        element=first + number,
     )
+
+
+def _lamina_pressure(row: RollerRow) -> float:
+    """Pressure of a lamina on the inner raceway over the square root of its load, Pa/N^(1/2).
+
+    Hertz, two cylinders: ``p^2 = q E S / (2 pi (1 - nu^2))`` with the load q per length and the sum S of curvatures.
+    """
+    curvature = 2.0 / (row.element_diameter * (1.0 - row.diameter_ratio))
+    length = row.effective_length / row.laminae
+    return math.sqrt(STEEL_MODULUS * curvature / (2.0 * math.pi * length))
 
 
 def lamina_loads(laminae: LaminaArrays, displacement: Floats) -> Floats:
@@ -97,43 +123,126 @@ def lamina_loads(laminae: LaminaArrays, displacement: Floats) -> Floats:
     return laminae.constant * approach**LINE_CONTACT_EXPONENT
 
 
-def elastic_energy(laminae: LaminaArrays, displacement: Floats) -> float:
+@dataclass(frozen=True)
+class RowContacts:
+    """All contacts of a bearing, the input of the functions below.
+
+    Attributes
+    ----------
+    rows : tuple of RollingRow
+        The rows.
+    first : tuple of int
+        Number of the first element of each row, and the number of all elements at the end.
+    laminae : LaminaArrays
+        Of the rows of rollers; empty without any.
+    balls : BallArrays
+        Of the rows of balls; empty without any.
+    """
+
+    rows: tuple[RollingRow, ...]
+    first: tuple[int, ...]
+    laminae: LaminaArrays | None
+    balls: BallArrays | None
+
+
+def row_contacts(rows: Sequence[RollingRow], first_roller_angle: float = 0.0) -> RowContacts:
+    """Place all rolling elements.
+
+    Parameters
+    ----------
+    rows : sequence of RollingRow
+        Rows of rollers, of balls, or of both, in the frame of the bearing.
+    first_roller_angle : float
+        Polar angle of the first element of each row, rad.
+
+    Returns
+    -------
+    RowContacts
+    """
+    first = (0, *np.cumsum([row.element_count for row in rows]).tolist())
+    rollers = [(row, start) for row, start in zip(rows, first, strict=False) if isinstance(row, RollerRow)]
+    balls = [(row, start) for row, start in zip(rows, first, strict=False) if isinstance(row, BallRow)]
+    return RowContacts(
+        rows=tuple(rows),
+        first=first,
+        laminae=lamina_arrays(rollers, first_roller_angle) if rollers else None,
+        balls=ball_arrays(balls, first_roller_angle) if balls else None,
+    )
+
+
+def elastic_energy(contacts: RowContacts, displacement: Floats) -> float:
     """Energy stored in all contacts, J; its gradient is `bearing_load`."""
-    approach = np.maximum(laminae.direction @ displacement - laminae.gap, 0.0)
-    power = LINE_CONTACT_EXPONENT + 1.0
-    return float(np.sum(laminae.constant * approach**power) / power)
+    energy = 0.0
+    if contacts.laminae is not None:
+        approach = np.maximum(contacts.laminae.direction @ displacement - contacts.laminae.gap, 0.0)
+        power = LINE_CONTACT_EXPONENT + 1.0
+        energy += float(np.sum(contacts.laminae.constant * approach**power) / power)
+    if contacts.balls is not None:
+        energy += ball_energy(contacts.balls, displacement)
+    return energy
 
 
-def bearing_load(laminae: LaminaArrays, displacement: Floats) -> Floats:
+def bearing_load(contacts: RowContacts, displacement: Floats) -> Floats:
     """Force and moment that hold the inner ring at a displacement, N and N m, shape (6,)."""
-    load: Floats = laminae.direction.T @ lamina_loads(laminae, displacement)
+    load = np.zeros(6)
+    if contacts.laminae is not None:
+        load += contacts.laminae.direction.T @ lamina_loads(contacts.laminae, displacement)
+    if contacts.balls is not None:
+        load += ball_ring_load(contacts.balls, displacement)
     return load
 
 
-def tangent_stiffness(laminae: LaminaArrays, displacement: Floats) -> Floats:
+def tangent_stiffness(contacts: RowContacts, displacement: Floats) -> Floats:
     """Differentiate `bearing_load` with respect to the displacement, shape (6, 6), symmetric."""
-    approach = np.maximum(laminae.direction @ displacement - laminae.gap, 0.0)
-    slope = LINE_CONTACT_EXPONENT * laminae.constant * approach ** (LINE_CONTACT_EXPONENT - 1.0)
-    return _weighted_gram(laminae.direction, np.where(approach > 0.0, slope, 0.0))
+    tangent = np.zeros((6, 6))
+    if contacts.laminae is not None:
+        laminae = contacts.laminae
+        approach = np.maximum(laminae.direction @ displacement - laminae.gap, 0.0)
+        slope = LINE_CONTACT_EXPONENT * laminae.constant * approach ** (LINE_CONTACT_EXPONENT - 1.0)
+        gram = laminae.direction.T @ (np.where(approach > 0.0, slope, 0.0)[:, None] * laminae.direction)
+        tangent += 0.5 * (gram + gram.T)
+    if contacts.balls is not None:
+        tangent += ball_tangent(contacts.balls, displacement)
+    return tangent
 
 
-def secant_stiffness(laminae: LaminaArrays, displacement: Floats) -> Floats:
-    """Symmetric matrix that turns the displacement into the load at that displacement, shape (6, 6).
+def element_loads(contacts: RowContacts, displacement: Floats) -> Floats:
+    """Load of each rolling element, row by row, N, shape (elements,)."""
+    load = np.zeros(contacts.first[-1])
+    if contacts.laminae is not None:
+        np.add.at(load, contacts.laminae.element, lamina_loads(contacts.laminae, displacement))
+    if contacts.balls is not None:
+        load[contacts.balls.element] = ball_loads(contacts.balls, displacement)
+    return load
 
-    Each lamina counts with its load over its whole approach, clearance included.
+
+def element_pressures(contacts: RowContacts, displacement: Floats) -> Floats:
+    """Greatest pressure of each rolling element on a raceway by Hertz, row by row, Pa, shape (elements,).
+
+    Of rollers that of the lamina that carries most, on the inner raceway, which is the narrower one; pressures at
+    the very end of a roller, higher than Hertz's, are left out. Of balls that on the raceway that fits them less.
     """
-    whole_approach = laminae.direction @ displacement
-    load = lamina_loads(laminae, displacement)
-    carrying = load > 0.0
-    if np.any(whole_approach[carrying] <= 0.0):
-        raise BearingError("a preloaded row carries where the displacement opens it: it has no secant, use the tangent")
-    return _weighted_gram(laminae.direction, np.divide(load, whole_approach, out=np.zeros_like(load), where=carrying))
+    pressure = np.zeros(contacts.first[-1])
+    if contacts.laminae is not None:
+        laminae = contacts.laminae
+        np.maximum.at(pressure, laminae.element, laminae.pressure * np.sqrt(lamina_loads(laminae, displacement)))
+    if contacts.balls is not None:
+        balls = contacts.balls
+        pressure[balls.element] = balls.pressure * np.cbrt(ball_loads(balls, displacement))
+    return pressure
 
 
-def _weighted_gram(direction: Floats, weight: Floats) -> Floats:
-    gram = direction.T @ (weight[:, None] * direction)
-    symmetric: Floats = 0.5 * (gram + gram.T)
-    return symmetric
+def loads_of_laminae(contacts: RowContacts, displacement: Floats) -> tuple[Floats | None, ...]:
+    """Load of each lamina, N, for each row an array (elements, laminae); None for rows of balls."""
+    if contacts.laminae is None:
+        return (None,) * len(contacts.rows)
+    load = lamina_loads(contacts.laminae, displacement)
+    return tuple(
+        load[(contacts.laminae.element >= start) & (contacts.laminae.element < end)].reshape(-1, row.laminae)
+        if isinstance(row, RollerRow)
+        else None
+        for row, start, end in zip(contacts.rows, contacts.first[:-1], contacts.first[1:], strict=True)
+    )
 
 
 @dataclass(frozen=True)
@@ -148,20 +257,26 @@ class BearingState:
         Force and moment on the inner ring that hold it there, N and N m.
     tangent : (6, 6) array
         Derivative of the load, N/m, N, N m/rad.
-    roller_load : (rollers,) array
-        Load of each roller, row by row, N.
+    element_load : (elements,) array
+        Load of each roller or ball, row by row, N.
+    element_pressure : (elements,) array
+        Greatest pressure of each on a raceway, Pa.
+    lamina_load : tuple of (elements, laminae) arrays
+        For each row of rollers the load of each lamina, N; None for a row of balls.
     energy : float
         Elastic energy, J.
-    laminae : LaminaArrays
+    contacts : RowContacts
         The contacts, for further evaluation.
     """
 
     displacement: Floats
     load: Floats
     tangent: Floats
-    roller_load: Floats
+    element_load: Floats
+    element_pressure: Floats
+    lamina_load: tuple[Floats | None, ...]
     energy: float
-    laminae: LaminaArrays
+    contacts: RowContacts
 
     def __repr__(self) -> str:
         """Displacement and load in one line."""
@@ -169,13 +284,8 @@ class BearingState:
             ", ".join(f"{round(value, 3) + 0.0:.3g}" for value in values.tolist())
             for values in (1e6 * self.displacement[:3], 1e-3 * self.load[:3])
         )
-        rollers = f"{np.count_nonzero(self.roller_load)} of {len(self.roller_load)} rollers loaded"
-        return f"<BearingState ({displacement}) um under ({load}) kN, {rollers}>"
-
-    @property
-    def secant(self) -> Floats:
-        """Secant stiffness, shape (6, 6): ``secant @ displacement = load``."""
-        return secant_stiffness(self.laminae, self.displacement)
+        carrying = f"{np.count_nonzero(self.element_load)} of {len(self.element_load)} elements loaded"
+        return f"<BearingState ({displacement}) um under ({load}) kN, {carrying}>"
 
     @property
     def radial_stiffness(self) -> float:
@@ -184,25 +294,39 @@ class BearingState:
         return float(direction @ self.tangent[:2, :2] @ direction)
 
 
+def bearing_state(contacts: RowContacts, displacement: Floats) -> BearingState:
+    """Evaluate loads, pressures and tangent of a bearing at a displacement of the inner ring, shape (6,)."""
+    return BearingState(
+        displacement=displacement,
+        load=bearing_load(contacts, displacement),
+        tangent=tangent_stiffness(contacts, displacement),
+        element_load=element_loads(contacts, displacement),
+        element_pressure=element_pressures(contacts, displacement),
+        lamina_load=loads_of_laminae(contacts, displacement),
+        energy=elastic_energy(contacts, displacement),
+        contacts=contacts,
+    )
+
+
 def equilibrium(
-    bearing: RollerBearing,
+    bearing: RollingBearing,
     force: ArrayLike,
     *,
     tilt: ArrayLike = (0.0, 0.0),
     first_roller_angle: float = 0.0,
 ) -> BearingState:
-    """Displace the inner ring until the rollers balance a force.
+    """Displace the inner ring until the rolling elements balance a force.
 
     Parameters
     ----------
-    bearing : RollerBearing
+    bearing : RollingBearing
         The bearing.
     force : array_like, shape (3,)
         Force of the shaft on the inner ring, N, z along the axis.
     tilt : array_like, shape (2,)
         Rotations of the inner ring about x and y, rad, held: shaft and housing decide about them.
     first_roller_angle : float
-        Polar angle of the first roller of each row, rad.
+        Polar angle of the first element of each row, rad.
 
     Returns
     -------
@@ -211,12 +335,12 @@ def equilibrium(
     Raises
     ------
     BearingError
-        If no displacement balances the force: an axial force on cylindrical rollers, or on a single tapered
-        row an axial force below what its radial load induces.
+        If no displacement balances the force: an axial force on cylindrical rollers or against the direction that
+        the rows hold, or on a single row with a contact angle an axial force below what its radial load induces.
 
     Notes
     -----
-    Newton's method with line search on ``U(u) - F u``, which is convex because each lamina's energy is.
+    Newton's method with line search on ``U(u) - F u``, which is convex because the energy of each contact is.
 
     Examples
     --------
@@ -224,52 +348,64 @@ def equilibrium(
     >>> bearing = CylindricalRollerBearing(bore=0.160, outside_diameter=0.290, width=0.080)
     >>> state = equilibrium(bearing, (129.9e3, 0.0, 0.0))
     >>> round(1e6 * state.displacement[0])  # micrometres
-    33
+    53
     """
     applied = np.asarray(force, dtype=np.float64)
     if applied.shape != (3,) or not np.all(np.isfinite(applied)):
         raise BearingError(f"bearing: force = {force!r} must be three finite numbers")
     if not np.any(applied):
-        raise BearingError("bearing: force = 0; without load or preload a roller bearing has no stiffness")
-    laminae = lamina_arrays(bearing.rows, first_roller_angle)
-    if applied[2] != 0.0 and not np.any(laminae.direction[:, 2] * np.sign(applied[2]) > 0.0):
+        raise BearingError("bearing: force = 0; without load or preload a rolling bearing has no stiffness")
+    if applied[2] != 0.0 and not any(_holds(row, applied[2]) for row in bearing.rows):
         raise BearingError(f"bearing: no row holds an axial force of {applied[2]:.6g} N")
-    displacement = _balance(laminae, applied, np.asarray(tilt, dtype=np.float64))
-    roller_load = np.zeros(laminae.roller[-1] + 1)
-    np.add.at(roller_load, laminae.roller, lamina_loads(laminae, displacement))
-    return BearingState(
-        displacement=displacement,
-        load=bearing_load(laminae, displacement),
-        tangent=tangent_stiffness(laminae, displacement),
-        roller_load=roller_load,
-        energy=elastic_energy(laminae, displacement),
-        laminae=laminae,
+    contacts = row_contacts(bearing.rows, first_roller_angle)
+    displacement = _balance(contacts, applied, np.asarray(tilt, dtype=np.float64))
+    _check_shoulders(contacts, displacement, applied)
+    return bearing_state(contacts, displacement)
+
+
+def _holds(row: RollingRow, axial_force: float) -> bool:
+    """Tell whether a row can hold an axial force on the inner ring: balls in grooves without contact angle, both."""
+    if row.contact_angle == 0.0:
+        return isinstance(row, BallRow) and not row.aligning
+    return (row.contact_angle > 0.0) == (axial_force > 0.0)
+
+
+def _no_equilibrium(force: Floats) -> BearingError:
+    return BearingError(
+        f"bearing: no equilibrium with the force {force.tolist()} N; "
+        "a single row with a contact angle needs an axial force that covers what its radial load induces"
     )
 
 
-def _balance(laminae: LaminaArrays, force: Floats, tilt: Floats) -> Floats:
+def _check_shoulders(contacts: RowContacts, displacement: Floats, force: Floats) -> None:
+    """Refuse balls on the side of a groove where a bearing with a contact angle has no shoulder."""
+    if contacts.balls is None:
+        return
+    state = ball_state(contacts.balls, displacement)
+    loaded = (state.approach > 0.0) & (contacts.balls.start[:, 1] != 0.0)
+    held = np.sign(contacts.balls.start[loaded, 1]) * state.direction[loaded, 1]
+    if np.any(held < LEAST_SHOULDER):
+        raise _no_equilibrium(force)
+
+
+def _balance(contacts: RowContacts, force: Floats, tilt: Floats) -> Floats:
     """Displacement whose first three load components are `force` (N), the tilt held."""
-    displacement = np.zeros(6)
-    displacement[3:5] = tilt
-    displacement[:3] = _first_touch(laminae, force)
+    displacement = _first_touch(contacts, force, np.concatenate([np.zeros(3), tilt, [0.0]]))
     tolerance = 1e-10 * float(np.linalg.norm(force))
 
     def surplus(candidate: Floats) -> float:
-        return elastic_energy(laminae, candidate) - float(force @ candidate[:3])
+        return elastic_energy(contacts, candidate) - float(force @ candidate[:3])
 
     for _ in range(MOST_NEWTON_STEPS):
-        residual = force - bearing_load(laminae, displacement)[:3]
+        residual = force - bearing_load(contacts, displacement)[:3]
         if np.linalg.norm(residual) <= tolerance:
             return displacement
         # The least-squares step leaves directions without stiffness and without load where they are.
-        stiffness = tangent_stiffness(laminae, displacement)[:3, :3]
+        stiffness = tangent_stiffness(contacts, displacement)[:3, :3]
         step = np.zeros(6)
         step[:3] = np.linalg.lstsq(stiffness, residual, rcond=1e-12)[0]
         displacement = _line_search(surplus, displacement, step, float(residual @ step[:3]), tolerance)
-    raise BearingError(
-        f"bearing: no equilibrium with the force {force.tolist()} N; "
-        "a single tapered row needs an axial force that covers what its radial load induces"
-    )
+    raise _no_equilibrium(force)
 
 
 def _line_search(
@@ -289,36 +425,36 @@ def _line_search(
     return displacement + fraction * step
 
 
-def _first_touch(laminae: LaminaArrays, force: Floats) -> Floats:
-    """Start in contact: along the force until the rollers that face it would carry it alone."""
-    if np.any(laminae.gap < 0.0):
-        return np.zeros(3)  # preloaded rows are in contact already
-    direction = force / np.linalg.norm(force)
-    facing = laminae.direction[:, :3] @ direction
-    touching = facing > 0.5 * facing.max()
+def _first_touch(contacts: RowContacts, force: Floats, start: Floats) -> Floats:
+    """Start in contact: from `start` along the force until the load has its size in that direction."""
+    if elastic_energy(contacts, start) > 0.0:
+        return start  # preloaded or tilted rows are in contact already
+    size = float(np.linalg.norm(force))
+    direction = np.concatenate([force / size, np.zeros(3)])
 
-    def shortage(distance: float) -> float:
-        approach = np.maximum(facing[touching] * distance - laminae.gap[touching], 0.0)
-        load = laminae.constant[touching] * approach**LINE_CONTACT_EXPONENT
-        return float(np.linalg.norm(force) - load @ facing[touching])
+    def carried(distance: float) -> float:
+        return float(bearing_load(contacts, start + distance * direction) @ direction)
 
-    upper = float(np.max(laminae.gap[touching] / facing[touching])) + 1e-6
-    while shortage(upper) > 0.0:
+    upper = 1e-6
+    while carried(upper) < size:
         upper *= 2.0
-    import scipy.optimize  # a tenth of a second that a gearbox with given stiffnesses need not wait
+        if upper > MOST_TRAVEL:
+            raise _no_equilibrium(force)
+    lower = 0.0
+    while upper - lower > 1e-3 * upper:
+        middle = 0.5 * (lower + upper)
+        lower, upper = (middle, upper) if carried(middle) < size else (lower, middle)
+    return start + upper * direction
 
-    distance: Floats = scipy.optimize.brentq(shortage, 0.0, upper) * direction
-    return distance
 
-
-def pitch_averaged_tangent(bearing: RollerBearing, force: ArrayLike, positions: int = 4) -> Floats:
+def pitch_averaged_tangent(bearing: RollingBearing, force: ArrayLike, positions: int = 4) -> Floats:
     """Tangent under a force, averaged over the cage positions within one roller pitch.
 
     A linear model knows no cage; the mean over the pitch is what a turning bearing shows.
 
     Parameters
     ----------
-    bearing : RollerBearing
+    bearing : RollingBearing
         The bearing.
     force : array_like, shape (3,)
         Force on the inner ring, N.
@@ -335,7 +471,7 @@ def pitch_averaged_tangent(bearing: RollerBearing, force: ArrayLike, positions: 
     >>> bearing = CylindricalRollerBearing(bore=0.100, outside_diameter=0.180, width=0.046)
     >>> stiffness = pitch_averaged_tangent(bearing, (33.5e3, 0.0, 0.0))
     >>> float(round(stiffness[0, 0] / 1e9, 1))
-    2.4
+    1.9
     """
     pitch = 2.0 * math.pi / bearing.rows[0].element_count
     total = np.zeros((6, 6))

@@ -1,22 +1,15 @@
-"""Catalogue roller bearings: rows of rollers and their stiffness from boundary dimensions.
+"""Roller bearings from their boundary dimensions, for use from Python: rows of rollers.
 
 What a catalogue does not print is estimated from the boundary dimensions by the usual proportions of the design.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
-from exugear.bearings.contact import pitch_averaged_tangent
-from exugear.bearings.rows import BearingError, RollerBearing, RollerRow
-from exugear.model.sections.connections import CatalogueSection
-from fe_ste.tools.arrays import Floats
-
-CYLINDRICAL_ROLLER_PROFILE = 0.00035
-TAPERED_ROLLER_PROFILE = 0.00045
-"""Logarithmic roller profiles of ISO/TS 16281: drop / roller diameter, for `RollerRow.profile_factor`."""
+from exugear.bearings.proportions import PROPORTIONS, ROLLER_LENGTH, element_count, standard_profile
+from exugear.bearings.rows import LAMINAE, BearingError, RollerRow, pair_rows
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,8 +17,8 @@ class CylindricalRollerBearing:
     """Single-row cylindrical roller bearing from its boundary dimensions.
 
     What the catalogue does not print is estimated from the boundary dimensions: roller diameter
-    ``0.27 (D - d)``, effective length ``0.75 B``, and as many rollers as fit on the pitch circle at a
-    pitch of 1.15 roller diameters (with a cage) or 1.01 (full complement).
+    ``0.27 (D - d)``, effective length ``0.64 B``, and as many rollers as fit on the pitch circle at a
+    pitch of 1.15 roller diameters (with a cage) or 1.01 (full complement); see `exugear.bearings.proportions`.
 
     Parameters
     ----------
@@ -35,8 +28,10 @@ class CylindricalRollerBearing:
         Without a cage.
     element_diameter, effective_length, element_count : optional
         Replace the estimates where they are known.
-    radial_clearance, profile_factor, laminae
+    radial_clearance, laminae
         See `RollerRow`.
+    profile_factor : float, optional
+        See `RollerRow`; by default the standard profile of ISO/TS 16281.
 
     Examples
     --------
@@ -53,8 +48,8 @@ class CylindricalRollerBearing:
     effective_length: float | None = None
     element_count: int | None = None
     radial_clearance: float = 0.0
-    profile_factor: float = 0.0
-    laminae: int = 30
+    profile_factor: float | None = None
+    laminae: int = LAMINAE
 
     def __post_init__(self) -> None:
         """Check the boundary dimensions and the row that follows from them."""
@@ -64,7 +59,7 @@ class CylindricalRollerBearing:
     @property
     def rows(self) -> tuple[RollerRow, ...]:
         """The one row, in the middle of the bearing."""
-        return (_row_from_catalogue(self, contact_angle=0.0),)
+        return (_row_from_catalogue("cylindrical_roller", self, 0.0),)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,6 +83,7 @@ class TaperedRollerBearing:
 
     Examples
     --------
+    >>> import math
     >>> bearing = TaperedRollerBearing(
     ...     bore=0.160, outside_diameter=0.240, width=0.051, contact_angle=math.radians(17.0)
     ... )
@@ -104,8 +100,8 @@ class TaperedRollerBearing:
     effective_length: float | None = None
     element_count: int | None = None
     radial_clearance: float = 0.0
-    profile_factor: float = 0.0
-    laminae: int = 30
+    profile_factor: float | None = None
+    laminae: int = LAMINAE
 
     def __post_init__(self) -> None:
         """Check the boundary dimensions and the row that follows from them."""
@@ -117,7 +113,7 @@ class TaperedRollerBearing:
     @property
     def rows(self) -> tuple[RollerRow, ...]:
         """The one row, in the middle of the bearing."""
-        return (_row_from_catalogue(self, contact_angle=self.contact_angle),)
+        return (_row_from_catalogue("tapered_roller", self, self.contact_angle),)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,6 +135,7 @@ class BearingPair:
 
     Examples
     --------
+    >>> import math
     >>> taper = TaperedRollerBearing(
     ...     bore=0.160, outside_diameter=0.240, width=0.051, contact_angle=math.radians(17.0)
     ... )
@@ -154,28 +151,14 @@ class BearingPair:
 
     def __post_init__(self) -> None:
         """Refuse distances and arrangements that do not exist."""
-        if self.arrangement not in ("X", "O", "tandem"):
-            raise BearingError(f"bearing pair: arrangement = {self.arrangement!r} is not 'X', 'O' or 'tandem'")
-        if self.row_distance is not None and self.row_distance < 0.0:
-            raise BearingError(f"bearing pair: row_distance = {self.row_distance} m must not be negative")
-        if self.axial_preload != 0.0 and self.rows[0].contact_angle == 0.0:
-            raise BearingError("bearing pair: axial_preload needs rows with a contact angle")
+        _ = self.rows
 
     @property
     def rows(self) -> tuple[RollerRow, ...]:
         """The row at -z, then the row at +z."""
         (row,) = self.bearing.rows
-        half_distance = 0.5 * (self.bearing.width if self.row_distance is None else self.row_distance)
-        angle = abs(row.contact_angle)
-        tandem = (row.contact_angle, row.contact_angle)
-        angles = {"X": (-angle, angle), "O": (angle, -angle), "tandem": tandem}[self.arrangement]
-        # An axial approach of both rows is shared by halves and closes each as a radial clearance does.
-        clearance = row.radial_clearance - self.axial_preload * math.tan(angle)
-        lower, upper = (
-            replace(row, contact_angle=signed, axial_position=position, radial_clearance=clearance)
-            for signed, position in zip(angles, (-half_distance, half_distance), strict=True)
-        )
-        return lower, upper
+        distance = self.bearing.width if self.row_distance is None else self.row_distance
+        return pair_rows(row, self.arrangement, distance, self.axial_preload)
 
 
 def _check_boundary_dimensions(bore: float, outside_diameter: float, width: float) -> None:
@@ -185,52 +168,24 @@ def _check_boundary_dimensions(bore: float, outside_diameter: float, width: floa
         raise BearingError(f"bearing: width = {width} m must be positive")
 
 
-def _row_from_catalogue(bearing: CylindricalRollerBearing | TaperedRollerBearing, contact_angle: float) -> RollerRow:
-    """Fill what the catalogue leaves open with the usual proportions of the design."""
+def _row_from_catalogue(kind: str, bearing: CylindricalRollerBearing | TaperedRollerBearing, angle: float) -> RollerRow:
+    """Fill what the catalogue leaves open with the usual proportions of the type."""
+    usual = PROPORTIONS[kind]
     pitch_diameter = 0.5 * (bearing.bore + bearing.outside_diameter)
-    diameter = bearing.element_diameter or 0.27 * (bearing.outside_diameter - bearing.bore)
-    pitch_over_diameter = 1.01 if bearing.full_complement else 1.15
+    diameter = bearing.element_diameter or usual.diameter.value * (bearing.outside_diameter - bearing.bore)
+    length = bearing.effective_length or ROLLER_LENGTH[kind].value * bearing.width
+    estimated = element_count(kind, diameter / pitch_diameter, usual.spacing.value, bearing.full_complement)
+    factor, straight = standard_profile(kind, diameter, length)
+    if bearing.profile_factor is not None:
+        factor, straight = bearing.profile_factor, 0.0
     return RollerRow(
         element_diameter=diameter,
-        effective_length=bearing.effective_length or 0.75 * bearing.width,
+        effective_length=length,
         pitch_diameter=pitch_diameter,
-        element_count=bearing.element_count or int(math.pi * pitch_diameter / (pitch_over_diameter * diameter)),
-        contact_angle=contact_angle,
+        element_count=bearing.element_count or estimated,
+        contact_angle=angle,
         radial_clearance=bearing.radial_clearance,
-        profile_factor=bearing.profile_factor,
+        profile_factor=factor,
+        straight_share=straight,
         laminae=bearing.laminae,
     )
-
-
-def cylindrical_roller_stiffness(section: CatalogueSection) -> Floats:
-    """Stiffness (6, 6) of cylindrical roller bearings at the load that the file states, in the bearing's axes."""
-    bearing = CylindricalRollerBearing(
-        bore=section.bore_mm * 1e-3,
-        outside_diameter=section.outer_diameter_mm * 1e-3,
-        width=section.width_mm * 1e-3,
-        full_complement=section.full_complement,
-        radial_clearance=section.radial_clearance_mm * 1e-3,
-    )
-    return _loaded_stiffness(section, bearing)
-
-
-def tapered_roller_stiffness(section: CatalogueSection) -> Floats:
-    """Stiffness (6, 6) of tapered roller bearings at the load that the file states, in the bearing's axes."""
-    bearing = TaperedRollerBearing(
-        bore=section.bore_mm * 1e-3,
-        outside_diameter=section.outer_diameter_mm * 1e-3,
-        width=section.width_mm * 1e-3,
-        contact_angle=math.radians(section.contact_angle_deg),
-        radial_clearance=section.radial_clearance_mm * 1e-3,
-    )
-    return _loaded_stiffness(section, bearing)
-
-
-def _loaded_stiffness(section: CatalogueSection, bearing: CylindricalRollerBearing | TaperedRollerBearing) -> Floats:
-    """Tangent (6, 6) of a bearing, or of two as the file arranges them, under the load that it states."""
-    arranged: RollerBearing = bearing
-    if section.arrangement != "single":
-        distance = None if section.row_distance_mm is None else section.row_distance_mm * 1e-3
-        arranged = BearingPair(bearing=bearing, arrangement=section.arrangement, row_distance=distance)
-    force = (section.radial_load_kN * 1e3, 0.0, section.axial_load_kN * 1e3)
-    return pitch_averaged_tangent(arranged, force)

@@ -1,27 +1,12 @@
-"""What holds the bodies of a variant: which supports are at work, and their stiffness and damping as matrices."""
+"""What holds the bodies of a variant: which supports are at work."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from functools import lru_cache
-
-import numpy as np
-
-from exugear.bearings import matrices
-from exugear.bearings.rollers import cylindrical_roller_stiffness, tapered_roller_stiffness
 from exugear.model.gearbox import Gearbox
-from exugear.model.parts import Bearing, stiffness_matrix
-from exugear.model.sections.connections import CatalogueSection
-from fe_ste.tools.arrays import Floats
+from exugear.model.parts import Bearing
 
 ON_BEARINGS = ("bushing", "flexible")
 """Variants whose bodies sit on bearings."""
-CATALOGUE_LAWS: Mapping[str, Callable[[CatalogueSection], Floats]] = {
-    "cylindrical_roller": cylindrical_roller_stiffness,
-    "tapered_roller": tapered_roller_stiffness,
-}
-"""Laws by the `type` of a catalogue section: each gives the stiffness (6, 6) of its bearings at the stated load, with z
-along their axis. A new kind is one file beside `rollers`, its type in the section, and a line here."""
 
 
 def unsupported(gearbox: Gearbox, variant: str) -> str:
@@ -65,35 +50,3 @@ def mounts_at_work(gearbox: Gearbox) -> tuple[Bearing, ...]:
     if not any(bodies[name].fixed for name in elastic):
         return ()
     return tuple(mount for mount in gearbox.mounts if mount.body in elastic or not bodies[mount.body].fixed)
-
-
-def bearing_matrices(bearing: Bearing, damping_time: float) -> tuple[Floats, Floats]:
-    """Stiffness and damping (6, 6) of a bearing, housing factor included, in the axes of what it sits on.
-
-    Catalogue bearings: tangent of ISO/TS 16281 at the stated load, averaged over cage positions and
-    directions, raised to the stated floor. Given ones: as given. Damping as given, else time times stiffness.
-
-    Raises
-    ------
-    exugear.bearings.rows.BearingError
-        The catalogue dimensions or the load are impossible.
-    """
-    given = stiffness_matrix(bearing.stiffness)
-    if bearing.catalogue is not None:
-        given = matrices.regularised(catalogue_stiffness(bearing.catalogue), np.diag(given))
-    stiffness = bearing.factor * given
-    if bearing.damping is not None:
-        return stiffness, stiffness_matrix(bearing.damping)
-    return stiffness, matrices.proportional_damping(stiffness, damping_time)
-
-
-@lru_cache(maxsize=64)
-def catalogue_stiffness(section: CatalogueSection) -> Floats:
-    """Stiffness (6, 6) that a catalogue gives, the same in all directions across the axis.
-
-    Raises
-    ------
-    exugear.bearings.rows.BearingError
-        The catalogue dimensions or the load are impossible.
-    """
-    return matrices.axially_symmetric(CATALOGUE_LAWS[section.type](section))

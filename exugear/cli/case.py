@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 def read_gearbox(case: Path, files_below: Path | None = None, scripts: bool = False, *, tell: bool = True) -> Gearbox:
     """Read a gearbox file for a verb, with what the user permits it, and try all its parts; tell what is unusual."""
-    from exugear.dynamics.readiness import check_parts
+    from exugear.checks.readiness import check_parts
     from exugear.model.gearbox import Gearbox
     from exugear.model.named_files import Permissions
     from exugear.model.reading import CaseError
@@ -69,7 +69,7 @@ def make_results_folder(folder: Path) -> None:
 def check_choice(gearbox: Gearbox, choice: Choice, folder: Path) -> None:
     """Refuse what the gearbox does not have, or may not do, before anything is written into the results folder."""
     from exugear.bodies.of_gearbox.solids import check_solids
-    from exugear.dynamics.readiness import lacking
+    from exugear.checks.readiness import lacking
     from exugear.results.folder import bodies_folder
     from exugear.tooth_mesh.laws.registry import LAWS
 

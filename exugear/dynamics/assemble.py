@@ -10,9 +10,11 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from exugear.bearings.supports import ON_BEARINGS, bearing_matrices, elastic_names, mounts_at_work, unsupported
+from exugear.bearings.support_laws import linear_law, with_laws
+from exugear.bearings.supports import ON_BEARINGS, elastic_names, mounts_at_work, unsupported
 from exugear.bodies.elastic_body import ElasticBody
 from exugear.dynamics.assembly import Assembly, VariantError
+from exugear.dynamics.operating_points import at_static_load
 from exugear.kernels.connectors import ConnectorArrays, no_connectors
 from exugear.kernels.elastic import ElasticArrays, no_elastic
 from exugear.kernels.inertia import InertiaArrays
@@ -58,6 +60,8 @@ def assemble(
     ------
     VariantError
         Unknown variant, or supports or elastic bodies missing for it.
+    BalanceError
+        The static load, which catalogue bearings take their stiffness from, cannot be held.
     MeshError
         Unknown law, or no stiffness for a pair at work.
 
@@ -92,7 +96,7 @@ def assemble(
     displaced = gearbox.pin_offsets if variant not in ON_BEARINGS else {}  # bearings carry the planets along
     settings = (inertias, flanks, angles, displaced, nodes)
     elements = () if only_rolls else mesh_elements(gearbox, stiffness, law_of(law), *settings)
-    return Assembly(
+    assembly = Assembly(
         gearbox=gearbox,
         choice=replace(choice, inertias=inertias),
         bodies=(*six, *alone, *(body for body in moving if body.name in flexible)),
@@ -109,7 +113,9 @@ def assemble(
         elastic_bodies=flexible,
         elastic=elastic_arrays(flexible, size, gearbox.case.damping.body_time_s),
         motions=_rolling_motions(gearbox, coordinates) if only_rolls else np.eye(size),
+        rows_stiffness=np.zeros((len(supports), 6, 6)),
     )
+    return at_static_load(assembly)
 
 
 def _chosen_bodies(names: tuple[str, ...], bodies: Mapping[str, ElasticBody]) -> dict[str, ElasticBody]:
@@ -308,15 +314,15 @@ def _connectors(
         if bearing.body in gearbox.pin_offsets:
             local[-1][0] = local[-1][0] + [*gearbox.pin_offsets[bearing.body], 0.0]
         places.append(at)
-    matrices = [bearing_matrices(bearing, gearbox.case.damping.bearing_time_s) for bearing in supports]
-    return ConnectorArrays(
+    connectors = ConnectorArrays(
         bodies=np.array(starts, dtype=np.int64),
         local=np.array(local),
         node=np.array(places),
-        stiffness=np.array([stiffness for stiffness, _ in matrices]),
-        damping=np.array([damping for _, damping in matrices]),
-        rolling=no_rolling(len(supports)),
+        stiffness=np.zeros((0, 6, 6)),
+        damping=np.zeros((0, 6, 6)),
+        rolling=no_rolling(0),
     )
+    return with_laws(connectors, [linear_law(bearing, gearbox.case.damping.bearing_time_s) for bearing in supports])
 
 
 def _attached(coordinates: Mapping[str, tuple[int, ...]], body: str, item: str | None) -> str | None:

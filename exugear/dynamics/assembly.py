@@ -14,19 +14,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from exugear.bearings.operating_point import OperatingPoint
 from exugear.bodies.elastic_body import ElasticBody
 from exugear.bodies.floating_body import FloatingBody
 from exugear.bodies.turning_frame import TurningBody, turning_arrays
-from exugear.kernels.connectors import ConnectorArrays, add_connector_forces, connector_load
+from exugear.kernels.connectors import (
+    DISPLACEMENT,
+    ConnectorArrays,
+    add_connector_forces,
+    connector_load,
+    connector_motion,
+)
+from exugear.kernels.coordinates import BODY_SIZE
 from exugear.kernels.elastic import ElasticArrays, add_elastic_forces, scratch_for, set_elastic_accelerations
 from exugear.kernels.inertia import InertiaArrays, accelerations
 from exugear.kernels.meshes import STATE_SIZE, MeshArrays, gear_positions
+from exugear.kernels.rolling import no_rolling
 from exugear.kernels.springs import SpringArrays, add_spring_forces
 from exugear.kernels.table_law import NOMINAL_DEFLECTION
 from exugear.kernels.travelling import TravellingArrays, follow, share_travelling_forces, travelling_tangent
@@ -63,6 +72,9 @@ class Assembly:
     elastic_bodies : elastic bodies by name, in the order of their coordinates
     elastic : matrices of those whose frame does not turn
     motions : (size, n) motions that are free; the identity, but for the law `rigid` the rolling ones
+    rows_stiffness : (supports, 6, 6) stiffness of the rows of non-linear bearings at their static load, for methods
+        that begin with linear ones; zero for linear supports
+    operating_points : of each support, None for those that are no catalogue bearings; empty where there are none
     """
 
     gearbox: Gearbox
@@ -81,6 +93,8 @@ class Assembly:
     elastic_bodies: Mapping[str, ElasticBody]
     elastic: ElasticArrays
     motions: Floats
+    rows_stiffness: Floats
+    operating_points: tuple[OperatingPoint | None, ...] = ()
 
     def __repr__(self) -> str:
         """One line."""
@@ -134,6 +148,29 @@ class Assembly:
     def turning_arrays(self) -> TurningArrays:
         """Arrays of the same bodies."""
         return turning_arrays((self.elastic_slices[name].start, body) for name, body in self.turning.items())
+
+    @cached_property
+    def has_rows(self) -> bool:
+        """Whether bearings are non-linear."""
+        return bool(self.connectors.rolling.first[-1] > 0)
+
+    def with_linear_supports(self, factor: float = 1.0) -> Assembly:
+        """Replace the rows of non-linear bearings by their stiffness at the static load times a factor."""
+        connectors = self.connectors
+        if not self.has_rows:
+            return self
+        of_rows, time = factor * self.rows_stiffness, connectors.rolling.time[:, None, None]
+        linear = connectors._replace(
+            stiffness=connectors.stiffness + of_rows,
+            damping=connectors.damping + time * of_rows,
+            rolling=no_rolling(len(of_rows)),
+        )
+        return replace(self, connectors=linear, rows_stiffness=np.zeros_like(of_rows))
+
+    def eased(self, share: float) -> Assembly:
+        """Let a share of the stiffness of non-linear bearings act beside their rows."""
+        stiffness = self.connectors.stiffness + share * self.rows_stiffness
+        return replace(self, connectors=self.connectors._replace(stiffness=stiffness)) if self.has_rows else self
 
     def rigid_part(self, vector: Floats) -> Floats:
         """Copy of a vector of coordinates in which a shaft's main seat has the mean motion of the whole shaft.
@@ -327,6 +364,15 @@ class Assembly:
         for n, load in enumerate(loads):
             connector_load(q, v, n, self.connectors, arms, load)
         return loads
+
+    def support_strains(self, q: Floats) -> Floats:
+        """Displacement of each support's body against what it sits on, (supports, 6), in the axes of the latter."""
+        strains, rest = np.zeros((len(self.connector_names), BODY_SIZE)), np.zeros_like(q)
+        turn, arms, motion = np.empty((3, 3)), np.empty((2, 3)), np.empty((3, BODY_SIZE))
+        for n in range(len(strains)):
+            connector_motion(q, rest, n, self.connectors, turn, arms, motion)
+            strains[n] = motion[DISPLACEMENT]
+        return strains
 
     def mesh_states(self, q: Floats, v: Floats, meshes: MeshArrays | None = None) -> Floats:
         """State of each mesh, (meshes, 10): columns as named in `exugear.kernels.meshes`."""

@@ -11,13 +11,15 @@ import scipy.optimize
 
 from exugear.bodies.turning_frame import TurningBody
 from exugear.dynamics.assembly import Assembly
-from exugear.kernels.connectors import add_connector_forces
+from exugear.kernels.connector_tangents import add_connector_tangents
 from exugear.kernels.meshes import MeshArrays
 from exugear.kernels.springs import SpringArrays, add_spring_forces
 from fe_ste.tools.arrays import Floats
 
 DIFFERENCE_STEP = 1e-6
 """Step of central differences, m or rad, and per second."""
+ROLLING_STEP = 1e-8
+"""The same for rows of rolling elements: a thousandth of what these yield under load, which bends their law."""
 RIGID_BODY_LIMIT = 0.1
 """Modes below this frequency (Hz) are motions of the whole train without deflection."""
 
@@ -61,8 +63,10 @@ def linearise(assembly: Assembly, q: Floats, meshes: MeshArrays | None = None) -
         jq, jv = assembly.mesh_jacobians(q, rest, averaged.one(n))
         stiffness[name], damping[name] = -jq, -jv
     for n, name in enumerate(assembly.connector_names):
-        connector = assembly.connectors.one(n)
-        stiffness[name], damping[name] = _tangents(assembly.size, q, connector, add_connector_forces)
+        stiffness[name], damping[name] = np.zeros((assembly.size,) * 2), np.zeros((assembly.size,) * 2)
+        first = assembly.connectors.rolling.first
+        step = ROLLING_STEP if first[n + 1] > first[n] else DIFFERENCE_STEP
+        add_connector_tangents(q, n, step, assembly.connectors, stiffness[name], damping[name])
     for n, name in enumerate(assembly.spring_names):
         spring = SpringArrays._make(values[n : n + 1] for values in assembly.springs)
         stiffness[name], damping[name] = _tangents(assembly.size, q, spring, add_spring_forces)

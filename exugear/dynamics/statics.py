@@ -1,7 +1,7 @@
 """States in balance: the output locked under load, and the start of a run in uniform acceleration.
 
 Both are Newton solutions of the assembly's own forces; elastic deflections are small against the geometry, so
-that a few steps with a difference quotient of the residual reach round-off.
+that a few steps reach round-off.
 """
 
 from __future__ import annotations
@@ -9,11 +9,13 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy.linalg
 
 from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.linearised import linearise
 from exugear.kernels.meshes import FORCE, MeshArrays
 from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
@@ -24,6 +26,12 @@ MOST_NEWTON_STEPS = 30
 """Steps after which the search for a balance is given up."""
 LARGEST_RESIDUAL = 1e-9
 """Share of the load at which a residual that stops falling is round-off."""
+EASING_SHARES = (0.1, 1e-3, 0.0)
+"""Shares of the stiffness of non-linear bearings that act beside their rows, one search after the other."""
+HOLDING_SHARES = (1e-6, 1e-4, 1e-2)
+"""The same in Newton's matrix alone, each where the one before fails: it holds bearings that carry nothing."""
+SHORTEST_STEP = 1e-4
+"""Share of a step of Newton's method to which it is halved while it does not lower the residual."""
 
 
 class BalanceError(RuntimeError):
@@ -51,21 +59,27 @@ class StartState:
         return f"<StartState: {len(self.q)} coordinates, drive torque {self.drive_torque:.4g} N m>"
 
 
-def _newton(residual: Callable[[Floats], Floats], start: Floats, steps: Floats, scale: Floats, what: str) -> Floats:
-    """Newton's method with central differences, until the residual stops falling.
+def _newton(
+    residual: Callable[[Floats], Floats],
+    derivative: Callable[[Floats], Floats],
+    start: Floats,
+    scale: Floats,
+    what: str,
+) -> Floats:
+    """Newton's method until the residual stops falling; steps that would enlarge it are shortened.
 
-    `steps` are those of the differences, `scale` is the size of each residual that counts as one. Being small against
-    the loads ends nothing: a train near balance accelerates with a ten-thousandth of them. Residuals are sums of spring
-    forces, and rounding of places near 1 m is what these cannot resolve: under a small load that is more of it than
-    under a large one, and no step can make it less.
+    `derivative` is that of the residual, a matrix; `scale` is the size of each residual that counts as one. Being
+    small against the loads ends nothing: a train near balance accelerates with a ten-thousandth of them. Residuals are
+    sums of spring forces, and rounding of places near 1 m is what these cannot resolve: under a small load that is
+    more of it than under a large one, and no step can make it less.
     """
     x, solution, best = start, start, np.inf
     if not x.size:
         return x
     rounding = np.zeros_like(x)
+    r = residual(x)
     for _ in range(MOST_NEWTON_STEPS):
-        r = residual(x)
-        error = float(np.max(np.abs(r) / scale))
+        error = _size(r, scale)
         if not np.isfinite(error):
             break
         stalled = error > 0.5 * best
@@ -74,18 +88,42 @@ def _newton(residual: Callable[[Floats], Floats], start: Floats, steps: Floats, 
         small = best < LARGEST_RESIDUAL or bool(np.all(np.abs(r) <= rounding))
         if error == 0.0 or (stalled and small):
             return solution
-        columns = [(residual(x + e) - residual(x - e)) / (2.0 * e.sum()) for e in np.diag(steps)]
-        matrix = np.array(columns).T
+        matrix = derivative(x)
         rounding = np.abs(matrix) @ np.full(x.size, np.finfo(float).eps)
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("error", scipy.linalg.LinAlgWarning)
-                x = x - scipy.linalg.solve(matrix / scale[:, None], r / scale)
-        except (scipy.linalg.LinAlgError, scipy.linalg.LinAlgWarning):
-            raise BalanceError(
-                f"{what}: the stiffness matrix is singular; a body may move without resistance"
-            ) from None
+        step = _solved(matrix / scale[:, None], -r / scale)
+        if step is None:
+            raise BalanceError(f"{what}: the stiffness matrix is singular; a body may move without resistance")
+        # Rollers that touch and part bend the residual: a whole step may lead away from the balance.
+        share, ahead = 1.0, residual(x + step)
+        while not small and share > SHORTEST_STEP and not _size(ahead, scale) < error:
+            share *= 0.5
+            ahead = residual(x + share * step)
+        x, r = x + share * step, ahead
     raise BalanceError(f"{what}: no balance found, the residual stays at {best:.2e} of the load")
+
+
+def _size(residual: Floats, scale: Floats) -> float:
+    return float(np.max(np.abs(residual) / scale))
+
+
+def _solved(matrix: Floats, right_hand_side: Floats) -> Floats | None:
+    """Solution of linear equations, None where the matrix is singular to working precision."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", scipy.linalg.LinAlgWarning)
+            return np.asarray(scipy.linalg.solve(matrix, right_hand_side), dtype=np.float64)
+    except (scipy.linalg.LinAlgError, scipy.linalg.LinAlgWarning):
+        return None
+
+
+def _by_differences(residual: Callable[[Floats], Floats], steps: Floats) -> Callable[[Floats], Floats]:
+    """Differentiate a residual by central differences, a step for each unknown."""
+
+    def derivative(x: Floats) -> Floats:
+        columns = [(residual(x + e) - residual(x - e)) / (2.0 * e.sum()) for e in np.diag(steps)]
+        return np.array(columns).T
+
+    return derivative
 
 
 def locked_equilibrium(
@@ -115,15 +153,25 @@ def locked_equilibrium(
     applied = assembly.torque_vector(torques)
     rest = np.zeros(assembly.size)
 
-    def solve(start: Floats, meshes: MeshArrays | None) -> Floats:
+    def solve(assembly: Assembly, start: Floats, meshes: MeshArrays | None) -> Floats:
         def residual(x: Floats) -> Floats:
             return free.T @ (assembly.forces(free @ x, rest, meshes) + applied)
 
-        steps, scale = np.full(start.size, DIFFERENCE_STEP), np.full(start.size, _load_scale(applied))
-        return _newton(residual, start, steps, scale, "static state")
+        def derivative(held: Assembly, x: Floats) -> Floats:
+            stiffness = linearise(held, free @ x, held.meshes if meshes is None else meshes).total_stiffness
+            return np.asarray(-free.T @ stiffness @ free)
 
-    start = _touching(assembly, np.zeros(free.shape[1]), lambda x: np.asarray(free @ x), solve)
-    return np.asarray(free @ solve(start, meshes))
+        scale = np.full(start.size, _load_scale(applied))
+        for share in HOLDING_SHARES if assembly.has_rows else HOLDING_SHARES[:1]:
+            try:
+                return _newton(residual, partial(derivative, assembly.eased(share)), start, scale, "static state")
+            except BalanceError:
+                if share == HOLDING_SHARES[-1] or not assembly.has_rows:
+                    raise
+        raise AssertionError  # the last share returns or raises
+
+    x = _from_linear(assembly, np.zeros(free.shape[1]), lambda x: np.asarray(free @ x), solve, meshes)
+    return np.asarray(free @ x)
 
 
 @dataclass(frozen=True)
@@ -208,19 +256,37 @@ def _held(assembly: Assembly, torques: Mapping[str, float], locked: Sequence[str
     return held
 
 
+def _from_linear(
+    assembly: Assembly,
+    start: Floats,
+    to_coordinates: Callable[[Floats], Floats],
+    solve: Callable[[Assembly, Floats, MeshArrays | None], Floats],
+    meshes: MeshArrays | None,
+) -> Floats:
+    """Solve for linear bearings and teeth, then let their own laws take over.
+
+    Rows of rolling elements that are apart hold nothing, nor do table flanks: the search begins where they touch.
+    """
+    linear = assembly.with_linear_supports()
+    x = _touching(linear, start, to_coordinates, solve)
+    for stage in (linear, *(assembly.eased(share) for share in EASING_SHARES)) if assembly.has_rows else (assembly,):
+        x = solve(stage, x, meshes)
+    return x
+
+
 def _touching(
     assembly: Assembly,
     start: Floats,
     to_coordinates: Callable[[Floats], Floats],
-    solve: Callable[[Floats, MeshArrays | None], Floats],
+    solve: Callable[[Assembly, Floats, MeshArrays | None], Floats],
 ) -> Floats:
     """Begin where linear teeth would be, on the flanks that they press: table flanks that are apart hold nothing."""
     if not LAWS[assembly.mesh_law].loses_contact:
         return start
-    x = solve(start, assembly.linear_meshes())
+    x = solve(assembly, start, assembly.linear_meshes())
     q = to_coordinates(x)
     reversed_flanks = assembly.mesh_states(q, np.zeros_like(q), assembly.linear_meshes())[:, FORCE] < 0.0
-    return solve(x, assembly.linear_meshes(reversed_flanks)) if reversed_flanks.any() else x
+    return solve(assembly, x, assembly.linear_meshes(reversed_flanks)) if reversed_flanks.any() else x
 
 
 def _load_scale(applied: Floats) -> float:
@@ -269,7 +335,7 @@ def accelerating_start(
         torque = size * float(x[-1]) if driven is not None else 0.0
         return motions @ x[:-1], {name: value * rate for name, value in unit.items()}, torque
 
-    def solve(start: Floats, meshes: MeshArrays | None) -> Floats:
+    def solve(assembly: Assembly, start: Floats, meshes: MeshArrays | None) -> Floats:
         def residual(x: Floats) -> Floats:
             q, rates, torque = split(x)
             v = assembly.rolling_velocity(q, speeds)
@@ -279,8 +345,9 @@ def accelerating_start(
 
         # The residual is linear in the last unknown, an acceleration or a torque: no step is too long for it.
         steps = np.append(np.full(start.size - 1, DIFFERENCE_STEP), 1.0)
-        return _newton(residual, start, steps, np.full(start.size, size), "start of the run")
+        derivative = _by_differences(residual, steps)
+        return _newton(residual, derivative, start, np.full(start.size, size), "start of the run")
 
-    x = _touching(assembly, np.zeros(motions.shape[1] + 1), lambda x: split(x)[0], solve)
-    q, rates, torque = split(solve(x, None))
+    x = _from_linear(assembly, np.zeros(motions.shape[1] + 1), lambda x: split(x)[0], solve, None)
+    q, rates, torque = split(x)
     return StartState(q, assembly.rolling_velocity(q, speeds), rates, torque)

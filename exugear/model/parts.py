@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -123,6 +124,12 @@ class Bearing:
         As the file gives it; in proportion to the stiffness otherwise.
     factor : float
         Factor of the housing on its stiffness, not yet multiplied in.
+    carries_outer_ring : bool
+        Whether the outer ring sits in the body, as in planets; else the inner ring does.
+    law : {"stiffness", "iso16281"}
+        Linear, or the law of the rolling elements themselves.
+    cage : {"averaged", "turning"}
+        Of a non-linear bearing: whether rolling elements move on as its rings turn.
     """
 
     name: str
@@ -134,6 +141,9 @@ class Bearing:
     catalogue: CatalogueSection | None
     damping: StiffnessSection | None
     factor: float
+    carries_outer_ring: bool = False
+    law: Literal["stiffness", "iso16281"] = "stiffness"
+    cage: Literal["averaged", "turning"] = "averaged"
 
     def __repr__(self) -> str:
         """Return one short line."""

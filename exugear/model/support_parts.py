@@ -59,6 +59,9 @@ def bearings(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Bearing, ...]:
                 catalogue=section.catalogue,
                 damping=section.damping,
                 factor=origin.case.housing.factor if section.housing_factor_applies else 1.0,
+                carries_outer_ring=bodies[body].carrier == on,
+                law=section.law,
+                cage=section.cage,
             )
             for suffix, body, on in origin.instances(key, section.body, section.on)
         )

@@ -75,6 +75,11 @@ def modes_path(folder: str | Path, choice: Choice) -> Path:
     return Path(folder) / choice.variant / f"{choice.mesh_law}-{choice.inertias}" / "modes.nc"
 
 
+def bearings_path(folder: str | Path, choice: Choice) -> Path:
+    """Place of what the bearings of a choice bear: beside its modes."""
+    return modes_path(folder, choice).with_name("bearings.json")
+
+
 def bodies_folder(folder: Path) -> Path:
     """Place of the reductions of elastic bodies: ``bodies``."""
     return folder / "bodies"

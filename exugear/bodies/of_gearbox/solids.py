@@ -109,14 +109,13 @@ def _items(gearbox: Gearbox, body: Body) -> dict[str, _Item]:
     for name, z in body.wheels.items():
         gear = gearbox.gears[name]
         items[name] = _Item(name, "gear", (*body.axis, z), gear.held_diameter, gear.face_width)
-    planets = {other.name: other.carrier for other in gearbox.bodies()}
     for bearing in gearbox.bearings:
         if body.name not in (bearing.body, bearing.on):
             continue
         diameter, width = None, None
         if bearing.catalogue is not None:
-            on_pin = planets[bearing.body] == bearing.on  # a planet turns about its bearing, all others in it
-            inside = (bearing.body == body.name) != on_pin
+            # A planet turns about its bearing, all other bodies in theirs.
+            inside = (bearing.body == body.name) != bearing.carries_outer_ring
             diameter = 1e-3 * (bearing.catalogue.bore_mm if inside else bearing.catalogue.outer_diameter_mm)
             width = seat_width(bearing)
         items[bearing.name] = _Item(bearing.family, "bearing", bearing.position, diameter, width)

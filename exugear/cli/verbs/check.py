@@ -1,4 +1,4 @@
-"""The verb `check`: read and check a gearbox file, compute nothing."""
+"""The verb `check`: read and check a gearbox file, and sum up what follows from it at once."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from exugear.cli.case import read_gearbox
 from exugear.cli.console import note, print_json, print_table, say
-from exugear.cli.errors import exit_codes, model_errors
+from exugear.cli.errors import FailedError, exit_codes, model_errors
 from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption
 
 if TYPE_CHECKING:
@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 
 def check(case: CaseArgument, files_below: FilesBelowOption = None, as_json: JsonOption = False) -> None:
-    """Read and check a gearbox file, and sum up its load cases; compute nothing."""
+    """Read and check a gearbox file; sum up its gear pairs, bearings and load cases. Writes nothing."""
     with exit_codes():
-        from exugear.dynamics.readiness import lacking, remarks
+        from exugear.checks.readiness import lacking, remarks
         from exugear.model.choice import USER_VARIANTS
 
         gearbox = read_gearbox(case, files_below, tell=False)
@@ -26,18 +26,23 @@ def check(case: CaseArgument, files_below: FilesBelowOption = None, as_json: Jso
         pairs = [_pair_summary(name, spec) for name, spec in gearbox.pairs.items()]
         loads = _load_summaries(gearbox)
         variants = {variant: lacking(gearbox, variant) for variant in USER_VARIANTS}
+        bearings, doubts = ([], []) if variants["bushing"] else _bearing_summaries(gearbox)
+        warnings = [*remarks(gearbox), *doubts]
         if as_json:
             summary = {"case": str(case), "name": gearbox.name, "ratio": gearbox.train.ratio, "pairs": pairs}
-            print_json({**summary, "load_cases": loads, "variants": variants, "warnings": remarks(gearbox)})
+            found = {"bearings": bearings, "load_cases": loads, "variants": variants, "warnings": warnings}
+            print_json({**summary, **found})
         else:
             say(f"{gearbox.name}: no fault found, ratio {gearbox.train.ratio:.6f}")
             print_table("Gear pairs", [_pair_row(pair) for pair in pairs])
             if loads:
                 title = f"Load cases, rolling at the overall input {gearbox.case.overall.input}"
                 print_table(title, [_load_row(one) for one in loads], ("loaded flanks",))
+            if bearings:
+                print_table("Bearings under the static load", [_bearing_row(one) for one in bearings], ("most by",))
             for variant, reason in variants.items():
                 say(f"variant {variant}: {f'not possible, {reason}' if reason else 'possible'}")
-            for line in remarks(gearbox):
+            for line in warnings:
                 note(f"Warning: {line}", style="yellow")
         for one in loads:
             for doubt in one["doubts"]:
@@ -79,6 +84,62 @@ def _pair_row(pair: dict[str, Any]) -> dict[str, str]:
         "press. angle\ndeg": f"{pair['pressure_angle_deg']:.3f}",
         "contact ratio\n+ overlap": f"{pair['transverse_contact_ratio']:.3f} + {pair['overlap_ratio']:.3f}",
         "torque 1\nN m": f"{pair['torque_gear_1_N_m']:.1f}",
+    }
+
+
+def _bearing_summaries(gearbox: Gearbox) -> tuple[list[dict[str, Any]], list[str]]:
+    """Load and stiffness of catalogue bearings, a line for those of all planets, and what is doubtful about them.
+
+    With the mesh stiffness of ISO 6336: tables may not be there, and the static loads hardly depend on it.
+    """
+    from exugear.bearings.duty import estimate_effects
+    from exugear.dynamics.assemble import assemble
+    from exugear.dynamics.bearing_duties import bearing_duties, bearing_points
+    from exugear.model.choice import Choice
+    from exugear.results.bearings_file import duty_summary
+    from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+
+    if not any(bearing.catalogue for bearing in gearbox.bearings):
+        return [], []
+    law = "iso6336"
+    try:
+        with model_errors():
+            assembly = assemble(gearbox, Choice("bushing", law), mesh_stiffness(gearbox, law))
+            duties = {duty.family: duty for duty in reversed(bearing_duties(assembly))}
+            effects = {point.bearing.family: estimate_effects(point) for point in bearing_points(assembly)}
+    except FailedError as error:
+        return [], [f"bearings: {error}"]
+    summaries = []
+    for family, duty in reversed(duties.items()):
+        ends = [[effect.at_low, effect.at_high] for effect in effects[family]]
+        estimated = {
+            effect.key: {
+                "value": effect.value,
+                "range": [effect.low, effect.high],
+                "radial_stiffness_N_per_m": [None if math.isnan(end) else end for end in pair],
+            }
+            for effect, pair in zip(effects[family], ends, strict=True)
+        }
+        summaries.append({**duty_summary(duty), "bearing": family, "estimated": estimated})
+    doubts = [f"bearings.{duty.name}: {remark}" for duty in reversed(duties.values()) for remark in duty.remarks]
+    return summaries, doubts
+
+
+def _bearing_row(summary: dict[str, Any]) -> dict[str, str]:
+    ranges = {
+        key: [end for end in one["radial_stiffness_N_per_m"] if end is not None]
+        for key, one in summary["estimated"].items()
+    }
+    ends = [end for pair in ranges.values() for end in pair]
+    spread = f"{1e-9 * min(ends):.3g} to {1e-9 * max(ends):.3g}" if ends else ""
+    most = max(ranges, key=lambda key: max(ranges[key], default=0.0) - min(ranges[key], default=0.0), default="")
+    return {
+        "bearing": summary["bearing"],
+        "radial\nkN": f"{summary['radial_load_kN']:.4g}",
+        "axial\nkN": f"{summary['axial_load_kN']:.4g}",
+        "radial\nGN/m": f"{1e-9 * summary['radial_stiffness_N_per_m']:.3g}",
+        "over the range\nof estimates": spread,
+        "most by": most,
     }
 
 

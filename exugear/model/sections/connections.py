@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
@@ -40,25 +41,164 @@ class StiffnessSection(Section):
         return self
 
 
-class CatalogueSection(Section):
-    """Boundary dimensions and operating load from which ISO/TS 16281 gives a bearing's stiffness."""
+Profile = Annotated[
+    Annotated[Literal["standard", "none"], Tag("name")]
+    | Annotated[
+        tuple[Annotated[tuple[q.ProfileShare, q.RemovedUm], Field(strict=False)], ...],
+        Field(strict=False, min_length=2, max_length=200),
+        Tag("table"),
+    ],
+    Discriminator(lambda value: "name" if isinstance(value, str) else "table"),
+]
+"""Roller profile by name, or drops (micrometres) over shares of half the length."""
+BearingType = Literal[
+    "cylindrical_roller",
+    "needle_roller",
+    "tapered_roller",
+    "spherical_roller",
+    "deep_groove_ball",
+    "angular_contact_ball",
+    "self_aligning_ball",
+    "four_point_ball",
+]
+"""Types of rolling bearings that a catalogue section can describe."""
+_ROLLERS = frozenset({"cylindrical_roller", "needle_roller", "tapered_roller", "spherical_roller"})
+_BALLS = frozenset({"deep_groove_ball", "angular_contact_ball", "self_aligning_ball", "four_point_ball"})
+_ANGULAR = frozenset({"tapered_roller", "angular_contact_ball"})
+_SELF_ALIGNING = frozenset({"spherical_roller", "self_aligning_ball"})
+_PROFILED = frozenset({"cylindrical_roller", "needle_roller", "tapered_roller"})
+_PAIRED = frozenset({"cylindrical_roller", "needle_roller", "tapered_roller", "angular_contact_ball"})
+_RADIAL = frozenset({"cylindrical_roller", "needle_roller", "deep_groove_ball"})
+TYPES_OF_KEYS: dict[str, tuple[frozenset[str], str]] = {
+    "element_length_mm": (_ROLLERS, "balls have none"),
+    "inner_groove_ratio": (_BALLS, "rollers run in no groove"),
+    "outer_groove_ratio": (_BALLS - _SELF_ALIGNING, "only balls run in grooves, self-aligning ones in a sphere"),
+    "osculation": (frozenset({"spherical_roller"}), "only barrel rollers have one"),
+    "profile": (_PROFILED, "balls have none, that of barrel rollers is their osculation"),
+    "row_count": (_RADIAL | _SELF_ALIGNING, "two rows with a contact angle are an arrangement, X or O"),
+    "holds_towards": (_ANGULAR, "it holds both directions or none"),
+    "axial_preload_um": (_ANGULAR, "only a pair with contact angles can be set along the axis"),
+}
+"""Keys of a catalogue section that only some types have, and why."""
+CONTACT_ANGLES_DEG: dict[str, tuple[float, float]] = {
+    "tapered_roller": (5.0, 45.0),
+    "spherical_roller": (2.0, 25.0),
+    "angular_contact_ball": (5.0, 59.0),
+    "self_aligning_ball": (2.0, 25.0),
+    "four_point_ball": (10.0, 50.0),
+}
+"""Contact angles that can be, by type; other types have none."""
 
-    type: Literal["cylindrical_roller", "tapered_roller"]
+
+class CatalogueSection(Section):
+    """Boundary dimensions of a rolling bearing, and what is known of its inside; the rest is estimated from them.
+
+    With `radial_load_kN` the stiffness is that under this load; without, that under the load of the statics.
+    """
+
+    type: BearingType
     designation: Text = ""
     bore_mm: q.LengthMm
     outer_diameter_mm: q.LengthMm
     width_mm: q.LengthMm
-    contact_angle_deg: q.ContactAngleDeg = 0.0
+    contact_angle_deg: q.ContactAngleDeg | None = None
     arrangement: Literal["single", "X", "O", "tandem"] = "single"
+    holds_towards: Literal["+z", "-z"] = "+z"
+    row_count: q.RollingRows | None = None
     row_distance_mm: q.BoreMm | None = None
     full_complement: bool = False
+    element_count: q.RollingElements | None = None
+    element_diameter_mm: q.LengthMm | None = None
+    element_length_mm: q.LengthMm | None = None
+    pitch_diameter_mm: q.LengthMm | None = None
+    inner_groove_ratio: q.GrooveRatio | None = None
+    outer_groove_ratio: q.GrooveRatio | None = None
+    osculation: q.Osculation | None = None
+    profile: Profile = "standard"
     radial_clearance_mm: q.ClearanceMm = 0.0
-    radial_load_kN: q.RadialLoadKN
-    axial_load_kN: q.AxialLoadKN = 0.0
+    axial_preload_um: q.AxialPreloadUm = 0.0
+    dynamic_rating_kN: q.RatingKN | None = None
+    static_rating_kN: q.RatingKN | None = None
+    radial_load_kN: q.RadialLoadKN | None = None
+    axial_load_kN: q.AxialLoadKN | None = None
 
     @model_validator(mode="after")
-    def _has_wall(self) -> CatalogueSection:
+    def _keys_of_the_type(self) -> CatalogueSection:
+        for key, (types, why) in TYPES_OF_KEYS.items():
+            if key in self.model_fields_set and getattr(self, key) is not None and self.type not in types:
+                raise ValueError(f"{key} makes no sense for type = {self.type!r}: {why}; leave it out")
+        if self.arrangement != "single" and self.type not in _PAIRED:
+            raise ValueError(
+                f"arrangement = {self.arrangement!r} makes no sense for type = {self.type!r}: use 'single'"
+            )
+        if self.type in _ANGULAR and self.arrangement in ("X", "O") and "holds_towards" in self.model_fields_set:
+            raise ValueError(f"holds_towards makes no sense for arrangement = {self.arrangement!r}: it holds both")
+        if self.axial_preload_um != 0.0 and self.arrangement not in ("X", "O"):
+            raise ValueError("axial_preload_um needs arrangement = 'X' or 'O': one bearing alone has none")
+        if self.axial_load_kN is not None and self.radial_load_kN is None:
+            raise ValueError(
+                "axial_load_kN stands beside radial_load_kN: give both, or none to take the load of the statics"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _rows(self) -> CatalogueSection:
+        rows = self.row_count or (2 if self.type in _SELF_ALIGNING else 1)
+        if self.type in _SELF_ALIGNING and (rows > 2 or self.row_distance_mm is not None):
+            raise ValueError(f"type = {self.type!r} has one or two rows, contact_angle_deg says how far apart")
+        if self.type in _SELF_ALIGNING and rows == 1 and self.contact_angle_deg is not None:
+            raise ValueError("contact_angle_deg makes no sense for row_count = 1: the row stands in the middle")
+        if rows > 1 and self.arrangement != "single":
+            raise ValueError(f"row_count = {rows} stands beside arrangement = 'single' only: count the rows of both")
+        if self.row_distance_mm is not None and rows == 1 and self.arrangement == "single":
+            raise ValueError("row_distance_mm needs a second row: row_count = 2, or arrangement 'X', 'O' or 'tandem'")
+        return self
+
+    @model_validator(mode="after")
+    def _dimensions(self) -> CatalogueSection:
         check_wall(self.bore_mm, self.outer_diameter_mm, "bore_mm")
+        height = 0.5 * (self.outer_diameter_mm - self.bore_mm)
+        if self.element_diameter_mm is not None and self.element_diameter_mm >= height:
+            raise ValueError(
+                f"element_diameter_mm = {self.element_diameter_mm:g} must be below the {height:g} mm "
+                "between bore_mm and outer_diameter_mm"
+            )
+        if self.element_length_mm is not None and self.element_length_mm > self.width_mm:
+            raise ValueError(
+                f"element_length_mm = {self.element_length_mm:g} must not be above width_mm = {self.width_mm:g}"
+            )
+        if self.pitch_diameter_mm is not None and not self.bore_mm < self.pitch_diameter_mm < self.outer_diameter_mm:
+            raise ValueError(
+                f"pitch_diameter_mm = {self.pitch_diameter_mm:g} must lie between bore_mm = {self.bore_mm:g} "
+                f"and outer_diameter_mm = {self.outer_diameter_mm:g}"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _contact_angle(self) -> CatalogueSection:
+        angle = self.contact_angle_deg
+        if angle is None:
+            return self
+        if self.type not in CONTACT_ANGLES_DEG:
+            if angle != 0.0:
+                raise ValueError(
+                    f"contact_angle_deg = {angle:g} makes no sense for type = {self.type!r}: it has none; leave it out"
+                )
+            return self
+        least, most = CONTACT_ANGLES_DEG[self.type]
+        if not least <= angle <= most:
+            raise ValueError(
+                f"contact_angle_deg = {angle:g} must lie between {least:g} and {most:g} for type = {self.type!r}"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _profile_table(self) -> CatalogueSection:
+        if isinstance(self.profile, str):
+            return self
+        shares = [share for share, _ in self.profile]
+        if shares[0] != 0.0 or any(later <= earlier for earlier, later in itertools.pairwise(shares)):
+            raise ValueError(f"profile: shares of half the length = {shares} must begin at 0 and ascend, up to 1")
         return self
 
 
@@ -72,6 +212,8 @@ class BearingSection(Section):
     on: Name = GROUND
     z_mm: q.PlaceMm
     housing_factor_applies: bool = True
+    law: Literal["stiffness", "iso16281"] = "stiffness"
+    cage: Literal["averaged", "turning"] = "averaged"
     stiffness: StiffnessSection | None = None
     catalogue: CatalogueSection | None = None
     damping: StiffnessSection | None = None
@@ -80,6 +222,16 @@ class BearingSection(Section):
     def _source(self) -> BearingSection:
         if self.stiffness is None and self.catalogue is None:
             raise ValueError("give a [.stiffness] table or a [.catalogue] table")
+        return self
+
+    @model_validator(mode="after")
+    def _law(self) -> BearingSection:
+        if self.law == "iso16281" and self.catalogue is None:
+            raise ValueError("law = 'iso16281' needs a [.catalogue] table, whose rolling elements it follows")
+        if self.law == "iso16281" and self.catalogue is not None and self.catalogue.radial_load_kN is not None:
+            raise ValueError("law = 'iso16281' follows the load: leave catalogue.radial_load_kN and .axial_load_kN out")
+        if self.law != "iso16281" and "cage" in self.model_fields_set:
+            raise ValueError(f"cage = {self.cage!r} stands beside law = 'iso16281' only")
         return self
 
 

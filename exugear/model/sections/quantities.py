@@ -112,6 +112,15 @@ DampingTimeS = Annotated[
 ]
 ContactAngleDeg = Annotated[float, Range(0.0, 59.0, (0.0, 46.0))]
 ClearanceMm = Annotated[float, Range(-1.0, 5.0, (-0.2, 1.0), "on the diameter")]
+RollingRows = Annotated[int, Range(1, 8, (1, 6))]
+RollingElements = Annotated[int, Range(3, 1000, (5, 300), "balls or rollers of one row")]
+GrooveRatio = Annotated[
+    float, Range(0.5001, 1.0, (0.505, 0.6), "radius of the groove over the ball's diameter; at 0.5 no ball rolls")
+]
+Osculation = Annotated[float, Range(0.5, 0.9999, (0.93, 0.995), "radius of the barrel's outline over the raceway's")]
+ProfileShare = Annotated[float, Range(0.0, 1.0, why="share of half the roller's length")]
+AxialPreloadUm = Annotated[float, _within(2000.0, 200.0)]
+RatingKN = Annotated[float, Range(1e-3, 1e6, (0.1, 5e4))]
 RadialLoadKN = Annotated[float, Range(0.0, 1e5, (0.0, 2e4))]
 AxialLoadKN = Annotated[float, _within(1e5, 2e4)]
 SeatFactor = Annotated[float, Range(1e-3, 1.0)]

@@ -11,25 +11,26 @@ from exugear.bearings.contact import (
     bearing_load,
     elastic_energy,
     equilibrium,
-    lamina_arrays,
     pitch_averaged_tangent,
+    row_contacts,
     tangent_stiffness,
 )
 from exugear.bearings.matrices import axially_symmetric, rotate_stiffness
-from exugear.bearings.rollers import (
-    CYLINDRICAL_ROLLER_PROFILE,
-    BearingPair,
-    CylindricalRollerBearing,
-    TaperedRollerBearing,
-)
+from exugear.bearings.rollers import BearingPair, CylindricalRollerBearing, TaperedRollerBearing
 from exugear.bearings.rows import BearingError, RollerRow
 
 
+# Closed forms hold for straight rollers, and the hand estimate has rollers of 0.75 of the width: so have all bearings
+# here unless a test says otherwise.
 def cylindrical(bore, outside, width, **options):
+    options.setdefault("profile_factor", 0.0)
+    options.setdefault("effective_length", 0.75e-3 * width or None)
     return CylindricalRollerBearing(bore=1e-3 * bore, outside_diameter=1e-3 * outside, width=1e-3 * width, **options)
 
 
 def tapered(bore, outside, width, degrees, **options):
+    options.setdefault("profile_factor", 0.0)
+    options.setdefault("effective_length", 0.75e-3 * width)
     return TaperedRollerBearing(
         bore=1e-3 * bore,
         outside_diameter=1e-3 * outside,
@@ -100,7 +101,7 @@ def test_pairs_tilt_about_their_pressure_centres(pair):
     stiffness = axially_symmetric(pitch_averaged_tangent(pair, (50e3, 0.0, 0.0)))
     lever = row.axial_position - 0.5 * row.pitch_diameter * math.tan(row.contact_angle)
     sloped_length = row.effective_length / math.cos(row.contact_angle)
-    # 30 laminae stand for a continuous line (0.1 % of its part), a few rollers for a continuous row.
+    # A few rollers stand for a continuous row.
     expected = stiffness[0, 0] * (lever**2 + sloped_length**2 / 12.0)
     assert stiffness[4, 4] == pytest.approx(expected, rel=2e-3)
 
@@ -121,12 +122,12 @@ def continuous_row_integral():
     return scipy.integrate.quad(lambda angle: math.cos(angle) ** (19.0 / 9.0), *zone)[0] / (2.0 * math.pi)
 
 
-def test_highest_roller_load_is_the_classic_factor_times_the_mean():
+def test_highest_element_load_is_the_classic_factor_times_the_mean():
     # Harris, Rolling Bearing Analysis, line contact without clearance: Q_max = F_r / (Z J_r), J_r = 0.2453.
     assert 1.0 / continuous_row_integral() == pytest.approx(4.08, abs=0.005)
     state = equilibrium(cylindrical(460, 580, 56, full_complement=True), (20e3, 0.0, 0.0))
     # 49 rollers against the integral: 0.1 %.
-    assert state.roller_load.max() == pytest.approx(20e3 / (49 * continuous_row_integral()), rel=1e-3)
+    assert state.element_load.max() == pytest.approx(20e3 / (49 * continuous_row_integral()), rel=1e-3)
 
 
 def test_deflection_and_tangent_of_many_rollers_are_the_closed_form():
@@ -151,7 +152,7 @@ def test_clearance_narrows_the_load_zone_as_the_load_distribution_factor_says():
     state = equilibrium(SingleRow(row), (50e3, 0.0, 0.0))
     half_zone = math.acos(0.5 * clearance / state.displacement[0])
     expected = 200 * half_zone / math.pi
-    assert abs(np.count_nonzero(state.roller_load) - expected) <= 1.0  # whole rollers
+    assert abs(np.count_nonzero(state.element_load) - expected) <= 1.0  # whole rollers
 
 
 def test_pure_axial_load_spreads_evenly_over_a_tapered_row():
@@ -159,7 +160,7 @@ def test_pure_axial_load_spreads_evenly_over_a_tapered_row():
     state = equilibrium(bearing, (0.0, 0.0, 40e3))
     count = bearing.rows[0].element_count
     expected = 40e3 / (count * math.sin(math.radians(17.0)))
-    np.testing.assert_allclose(state.roller_load, expected, rtol=1e-9)  # Newton's tolerance
+    np.testing.assert_allclose(state.element_load, expected, rtol=1e-9)  # Newton's tolerance
 
 
 @pytest.mark.parametrize("bearing", [NJ2232, PLANET_PAIR, LSS_PAIR, HSS_PAIR], ids=["NJ", "planet", "X", "O"])
@@ -174,14 +175,14 @@ def test_rollers_balance_the_force(bearing, tilt):
 
 @pytest.mark.parametrize("bearing", [PLANET_PAIR, LSS_PAIR, HSS_PAIR], ids=["planet", "X", "O"])
 def test_tangent_is_the_difference_quotient_of_the_load(bearing):
-    laminae = lamina_arrays(bearing.rows)
+    contacts = row_contacts(bearing.rows)
     displacement = np.array([20e-6, 10e-6, 8e-6, 1e-4, -2e-4, 0.0])
-    tangent = tangent_stiffness(laminae, displacement)
+    tangent = tangent_stiffness(contacts, displacement)
     scale = np.array([1.0, 1.0, 1.0, 10.0, 10.0, 10.0])  # 1 m of travel is like 10 rad at these radii
     for column in range(6):
         step = np.zeros(6)
         step[column] = 1e-10 * scale[column]
-        quotient = (bearing_load(laminae, displacement + step) - bearing_load(laminae, displacement - step)) / (
+        quotient = (bearing_load(contacts, displacement + step) - bearing_load(contacts, displacement - step)) / (
             2.0 * step[column]
         )
         # Laminae at the edge of the zone have a slope like delta^(1/9): 1e-5 of the largest entry of a row.
@@ -191,42 +192,34 @@ def test_tangent_is_the_difference_quotient_of_the_load(bearing):
 
 @pytest.mark.parametrize("bearing", [PLANET_PAIR, LSS_PAIR, HSS_PAIR], ids=["planet", "X", "O"])
 def test_load_is_the_gradient_of_the_energy(bearing):
-    laminae = lamina_arrays(bearing.rows)
+    contacts = row_contacts(bearing.rows)
     displacement = np.array([20e-6, 10e-6, 8e-6, 1e-4, -2e-4, 0.0])
-    load = bearing_load(laminae, displacement)
+    load = bearing_load(contacts, displacement)
     for direction, size in zip(np.eye(6), [1e-8] * 3 + [1e-7] * 3, strict=True):
-        work = elastic_energy(laminae, displacement + size * direction) - elastic_energy(
-            laminae, displacement - size * direction
+        work = elastic_energy(contacts, displacement + size * direction) - elastic_energy(
+            contacts, displacement - size * direction
         )
         # Round-off of the energy over a step of 10 nm.
         assert work / (2.0 * size) == pytest.approx(float(load @ direction), abs=1e-5 * abs(load).max())
 
 
 def test_work_along_a_path_is_the_stored_energy():
-    laminae = lamina_arrays(HSS_PAIR.rows)
+    contacts = row_contacts(HSS_PAIR.rows)
     end = np.array([15e-6, -5e-6, 20e-6, 2e-4, 1e-4, 0.0])
 
     def power(path):
-        return float(bearing_load(laminae, path * end) @ end)
+        return float(bearing_load(contacts, path * end) @ end)
 
     work, _ = scipy.integrate.quad(power, 0.0, 1.0, epsrel=1e-10)
-    assert work == pytest.approx(elastic_energy(laminae, end), rel=1e-8)
+    assert work == pytest.approx(elastic_energy(contacts, end), rel=1e-8)
 
 
 @pytest.mark.parametrize("bearing", [NJ2232, LSS_PAIR, HSS_PAIR], ids=["NJ", "X", "O"])
-def test_tangent_and_secant_are_symmetric_and_not_negative(bearing):
-    state = equilibrium(bearing, (50e3, 20e3, 0.0), tilt=(1e-4, 2e-4))
-    for matrix in (state.tangent, state.secant):
-        np.testing.assert_array_equal(matrix, matrix.T)
-        assert np.linalg.eigvalsh(matrix).min() > -1e-12 * np.abs(matrix).max()  # rounding
-        assert np.abs(matrix[5]).max() < 1e-12 * np.abs(matrix).max()  # the spin is free
-
-
-def test_secant_returns_the_load():
-    clearance = tapered(110, 200, 56, 15.6, radial_clearance=20e-6)
-    pair = BearingPair(bearing=clearance, arrangement="O")
-    state = equilibrium(pair, (21.8e3, 0.0, 12.9e3))
-    np.testing.assert_allclose(state.secant @ state.displacement, state.load, atol=1e-8 * 21.8e3)
+def test_tangent_is_symmetric_and_not_negative(bearing):
+    matrix = equilibrium(bearing, (50e3, 20e3, 0.0), tilt=(1e-4, 2e-4)).tangent
+    np.testing.assert_array_equal(matrix, matrix.T)
+    assert np.linalg.eigvalsh(matrix).min() > -1e-12 * np.abs(matrix).max()  # rounding
+    assert np.abs(matrix[5]).max() < 1e-12 * np.abs(matrix).max()  # the spin is free
 
 
 @pytest.mark.parametrize("bearing", [NJ2232, HSS_PAIR], ids=["NJ", "O"])
@@ -264,26 +257,37 @@ def test_o_arrangement_tilts_stiffer_than_x():
 
 
 def test_roller_profile_softens():
-    profiled = cylindrical(160, 290, 80, profile_factor=CYLINDRICAL_ROLLER_PROFILE)
+    profiled = cylindrical(160, 290, 80, profile_factor=None)
     straight, round_ended = (equilibrium(b, (129.9e3, 0.0, 0.0)).tangent for b in (NJ2232, profiled))
     assert round_ended[0, 0] < straight[0, 0]
     assert round_ended[4, 4] < straight[4, 4]
 
 
-def test_laminae_have_converged_at_thirty():
-    coarse, fine = (
-        equilibrium(cylindrical(160, 290, 80, laminae=count), (129.9e3, 0.0, 0.0), tilt=(0.0, 5e-4))
-        for count in (30, 300)
+LOADED = {
+    "cylindrical": (lambda **options: cylindrical(160, 290, 80, **options), (129.9e3, 0.0, 0.0)),
+    "cylindrical, light": (lambda **options: cylindrical(160, 290, 80, **options), (5e3, 0.0, 0.0)),
+    "tapered": (lambda **options: tapered(110, 200, 56, 15.6, **options), (21.8e3, 0.0, 12.9e3)),
+    "tapered, light": (lambda **options: tapered(110, 200, 56, 15.6, **options), (2e3, 0.0, 1e3)),
+}
+
+
+@pytest.mark.parametrize("name", LOADED)
+@pytest.mark.parametrize("profile", [None, 0.0], ids=["standard profile", "none"])
+@pytest.mark.parametrize("tilt", [0.0, 5e-4], ids=["straight", "misaligned"])
+def test_the_laminae_leave_half_a_percent_in_the_stiffness(name, profile, tilt):
+    build, force = LOADED[name]
+    usual, fine = (
+        equilibrium(build(profile_factor=profile, **laminae), force, tilt=(0.0, tilt)).tangent
+        for laminae in ({}, {"laminae": 960})
     )
-    # Misaligned by 0.5 mrad the zone ends along the roller; ISO/TS 16281 asks for 30 slices.
-    np.testing.assert_allclose(np.diag(coarse.tangent)[:2], np.diag(fine.tangent)[:2], rtol=2e-3)
-    assert coarse.tangent[4, 4] == pytest.approx(fine.tangent[4, 4], rel=1e-2)
+    assert usual[0, 0] == pytest.approx(fine[0, 0], rel=5e-3)
+    assert usual[4, 4] == pytest.approx(fine[4, 4], rel=5e-3)
 
 
 def test_a_state_shows_itself_in_one_line():
     state = equilibrium(NJ2232, (129.9e3, 0.0, 0.0))
-    carrying = np.count_nonzero(state.roller_load)
-    assert repr(state) == f"<BearingState (33.3, 0, 0) um under (130, 0, 0) kN, {carrying} of 17 rollers loaded>"
+    carrying = np.count_nonzero(state.element_load)
+    assert repr(state) == f"<BearingState (33.3, 0, 0) um under (130, 0, 0) kN, {carrying} of 17 elements loaded>"
 
 
 @pytest.mark.parametrize(
@@ -291,7 +295,7 @@ def test_a_state_shows_itself_in_one_line():
     [
         (lambda: equilibrium(NJ2232, (1e3, 0.0, 5.0)), "no row holds an axial force of 5 N"),
         (lambda: equilibrium(tapered(160, 240, 51, 17.0), (0.0, 0.0, -1e3)), "no row holds"),
-        (lambda: equilibrium(tapered(160, 240, 51, 17.0), (1e4, 0.0, 10.0)), "single tapered row"),
+        (lambda: equilibrium(tapered(160, 240, 51, 17.0), (1e4, 0.0, 10.0)), "single row with a contact angle"),
         (lambda: equilibrium(NJ2232, (0.0, 0.0, 0.0)), "force = 0"),
         (lambda: equilibrium(NJ2232, (1.0, 0.0)), "three finite numbers"),
         (lambda: cylindrical(290, 160, 80), "bore = 0.29"),

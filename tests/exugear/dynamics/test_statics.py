@@ -86,7 +86,8 @@ def test_bearing_reactions_balance_the_mesh_forces(grc: Gearbox, stiffness: dict
             force += state[4] * turn @ element.force[6:9]
             moment += state[4] * turn @ element.force[9:12]
     assert np.abs(force).max() < 1e-8 * FORCES["ring_planet"]
-    assert abs(moment[2]) < 1e-8 * TORQUE["carrier"]
+    # A bearing takes its force where its first ring is: with the lag of the other across the force, a small moment.
+    assert abs(moment[2]) < 3e-8 * TORQUE["carrier"]
     # Rows act about the undeflected nodes, which have moved by up to 0.1 mm: force times displacement.
     assert np.abs(moment).max() < 1e-4 * FORCES["ring_planet"]
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from exugear.checks.readiness import check_parts, lacking, remarks
 from exugear.cli.app import app
 from exugear.dynamics.modes import eigenmodes
-from exugear.dynamics.readiness import check_parts, lacking, remarks
 from exugear.dynamics.statics import locked_equilibrium
 from exugear.loads.summary import summarise_loads
 from exugear.model.choice import Choice

@@ -10,7 +10,8 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from exugear.bearings.supports import bearing_matrices, elastic_names, mounts_at_work
+from exugear.bearings.support_laws import linear_law
+from exugear.bearings.supports import elastic_names, mounts_at_work
 from exugear.kernels.coordinates import BODY_SIZE, SPIN
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Body
@@ -40,8 +41,9 @@ def free_motion(gearbox: Gearbox, variant: str) -> str:
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
     >>> free_motion(gearbox, "bushing")
     ''
-    >>> floating = {"bearings.lss_a.stiffness": {}, "bearings.lss_bc.catalogue.type": "cylindrical_roller"}
-    >>> free_motion(gearbox.varied({**floating, "bearings.lss_bc.catalogue.axial_load_kN": 0.0}), "bushing")
+    >>> pair = {"type": "cylindrical_roller", "contact_angle_deg": 0.0, "axial_load_kN": 0.0}
+    >>> floating = {f"bearings.lss_bc.catalogue.{key}": value for key, value in pair.items()}
+    >>> free_motion(gearbox.varied({**floating, "bearings.lss_a.stiffness": {}}), "bushing")
     'body lss can move along z without resistance; add or stiffen a bearing'
     """
     moving = [body for body in gearbox.bodies() if not body.fixed or _is_elastic(gearbox, variant, body)]
@@ -76,7 +78,7 @@ def _held_directions(gearbox: Gearbox, variant: str, starts: Mapping[str, int]) 
                 motion[:, starts[name] : starts[name] + 6] += sense * _motion_at(
                     bodies[name], np.array(support.position)
                 )
-        stiffness, _ = bearing_matrices(support, 0.0)
+        stiffness = linear_law(support, 0.0).stiffness
         values, vectors = np.linalg.eigh(_SCALE * stiffness * _SCALE[:, None])
         yield from (vectors[:, values > HOLDING_SHARE * values[-1]].T / _SCALE) @ motion * np.tile(_SCALE, len(starts))
     flanks = loaded_flanks(gearbox)

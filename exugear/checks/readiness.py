@@ -8,8 +8,9 @@ from functools import partial
 import numpy as np
 
 from exugear.bearings.rows import BearingError
-from exugear.bearings.supports import ON_BEARINGS, bearing_matrices, elastic_names, unsupported
-from exugear.dynamics.restraint import free_motion
+from exugear.bearings.support_laws import bearing_rows, linear_law
+from exugear.bearings.supports import ON_BEARINGS, elastic_names, unsupported
+from exugear.checks.restraint import free_motion
 from exugear.loads.torque_series import torque_series
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Bearing
@@ -70,7 +71,9 @@ def remarks(gearbox: Gearbox) -> tuple[str, ...]:
 
 def _build_bearing(gearbox: Gearbox, bearing: Bearing) -> None:
     try:
-        stiffness, _ = bearing_matrices(bearing, 0.0)
+        stiffness = linear_law(bearing, 0.0).stiffness
+        if bearing.law == "iso16281":
+            bearing_rows(bearing)
     except BearingError as error:
         raise gearbox.fault(f"bearings.{bearing.family}.catalogue: {error}") from None
     if not np.all(np.isfinite(stiffness)):

@@ -1,0 +1,205 @@
+"""What bearings bear: load, stiffness, misalignment, contact pressure and life of each at its operating point."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from exugear.bearings.catalogue import catalogue_rows, estimates, with_estimate
+from exugear.bearings.contact import BearingState, bearing_state, equilibrium, row_contacts, tangent_stiffness
+from exugear.bearings.life import basic_rating_life, reference_life
+from exugear.bearings.operating_point import OperatingPoint
+from exugear.bearings.ratings import basic_dynamic_rating, basic_static_rating, equivalent_load, equivalent_static_load
+from exugear.bearings.rows import BearingError, BearingOfRows
+from exugear.bearings.support_laws import holds_one_way
+from exugear.model.sections.connections import CatalogueSection
+from fe_ste.tools.arrays import Floats
+
+STATED_DEVIATION = 0.1
+"""Deviation of a stated radial load from the reaction beyond which a remark says so."""
+
+
+@dataclass(frozen=True)
+class Ratings:
+    """Load ratings of a bearing, N; `estimated` where its internal geometry, not the file, gives them."""
+
+    dynamic: float
+    static: float
+    estimated: bool
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Radial stiffness (N/m) at both ends of what an estimated dimension may be, under the same load.
+
+    Attributes
+    ----------
+    key : str
+        Key of the file that would replace the estimate.
+    value, low, high : float
+        Estimate and its range, in the unit of the key.
+    at_low, at_high : float
+        Radial stiffness there, N/m; NaN where such a bearing cannot be built.
+    """
+
+    key: str
+    value: float
+    low: float
+    high: float
+    at_low: float
+    at_high: float
+
+
+@dataclass(frozen=True)
+class BearingDuty:
+    """What a catalogue bearing bears.
+
+    Attributes
+    ----------
+    name, family, kind : str
+        Its name, that of its section, and the type of bearing.
+    radial_load, axial_load : float
+        Of the shaft on the inner ring, what its rows carry, N.
+    reaction : float, optional
+        Radial load that the statics find, N, where the loads before are those that the file states.
+    stiffness : (6, 6) array
+        Of the rows, mean over positions of the cage, N/m .. N m/rad.
+    radial_stiffness : float
+        Along the load, N/m.
+    misalignment : float
+        Tilt of the inner ring against the outer one, rad.
+    element_load, pressure : float
+        Load (N) and contact pressure at the inner ring (Pa) of the most loaded rolling element.
+    ratings : Ratings
+    basic_life, reference_life : float
+        L10 by ISO 281 and L10r by ISO/TS 16281 (basic: lubricant and cleanliness left out), million revolutions;
+        infinite without load.
+    remarks : tuple of str
+        What a reader should know before trusting the row.
+    """
+
+    name: str
+    family: str
+    kind: str
+    radial_load: float
+    axial_load: float
+    reaction: float | None
+    stiffness: Floats
+    radial_stiffness: float
+    misalignment: float
+    element_load: float
+    pressure: float
+    ratings: Ratings
+    basic_life: float
+    reference_life: float
+    remarks: tuple[str, ...]
+
+
+def ratings_of(section: CatalogueSection) -> Ratings:
+    """Load ratings of catalogue bearings: those that the file gives, else those of ISO 281 and ISO 76."""
+    rows = catalogue_rows(section)
+    given = (section.dynamic_rating_kN, section.static_rating_kN)
+    dynamic = basic_dynamic_rating(rows, section.type) if given[0] is None else 1e3 * given[0]
+    static = basic_static_rating(rows, section.type) if given[1] is None else 1e3 * given[1]
+    return Ratings(dynamic, static, None in given)
+
+
+def duty_of(point: OperatingPoint, reaction: Floats | None = None) -> BearingDuty:
+    """Find what a bearing bears at its operating point.
+
+    Parameters
+    ----------
+    point : OperatingPoint
+    reaction : (6,) array, optional
+        For a bearing whose load the file states: what the statics find, N and N m.
+    """
+    bearing, rows, section = point.bearing, point.rows, point.bearing.catalogue
+    assert section is not None
+    ratings = ratings_of(section)
+    state = bearing_state(row_contacts(rows), point.displacement)
+    radial, axial = point.radial_load, float(point.load[2])
+    equivalent = equivalent_load(rows, section.type, radial, abs(axial), ratings.static)
+    return BearingDuty(
+        name=bearing.name,
+        family=bearing.family,
+        kind=section.type,
+        radial_load=radial,
+        axial_load=axial,
+        stiffness=point.stiffness,
+        radial_stiffness=point.radial_stiffness,
+        misalignment=point.misalignment,
+        element_load=float(state.element_load.max(initial=0.0)),
+        pressure=float(state.element_pressure.max(initial=0.0)),
+        ratings=ratings,
+        basic_life=basic_rating_life(ratings.dynamic, equivalent, section.type),
+        reference_life=reference_life(
+            rows,
+            loads_of_rows(state),
+            section.type,
+            dynamic_rating=ratings.dynamic,
+            inner_ring_turns_against_load=not bearing.carries_outer_ring,
+        ),
+        reaction=None if reaction is None else math.hypot(reaction[0], reaction[1]),
+        remarks=tuple(_remarks(point, ratings, reaction)),
+    )
+
+
+def loads_of_rows(state: BearingState) -> list[Floats]:
+    """Give the loads of each row as its life needs them, N: (elements, laminae) of rollers, (elements,) of balls."""
+    first = state.contacts.first
+    return [
+        state.element_load[begin:end] if laminae is None else laminae
+        for laminae, begin, end in zip(state.lamina_load, first[:-1], first[1:], strict=True)
+    ]
+
+
+def _remarks(point: OperatingPoint, ratings: Ratings, reaction: Floats | None) -> list[str]:
+    section, rows = point.bearing.catalogue, point.rows
+    assert section is not None
+    remarks = []
+    if point.is_unloaded:
+        remarks.append("carries hardly anything: stiffness at a hundredth of its dynamic rating")
+    if reaction is not None:
+        found = math.hypot(reaction[0], reaction[1])
+        if abs(found - point.radial_load) > STATED_DEVIATION * max(found, point.radial_load):
+            remarks.append(
+                f"radial_load_kN = {1e-3 * point.radial_load:.4g} is stated, the static load gives {1e-3 * found:.4g}"
+            )
+    if holds_one_way(rows):
+        sense = "+z" if rows[0].contact_angle > 0.0 else "-z"
+        remarks.append(f"holds its inner ring along the axis in one direction only, against a push towards {sense}")
+    static = equivalent_static_load(rows, section.type, point.radial_load, abs(float(point.load[2])))
+    if static > ratings.static:
+        estimated = " estimated" if ratings.estimated else ""
+        remarks.append(
+            f"equivalent static load {1e-3 * static:.4g} kN is beyond its{estimated} static rating "
+            f"{1e-3 * ratings.static:.4g} kN"
+        )
+    return remarks
+
+
+def estimate_effects(point: OperatingPoint) -> tuple[Sensitivity, ...]:
+    """Radial stiffness at both ends of each dimension that the file leaves open, under the load of an operating point.
+
+    The cage stands in one position: what counts is the difference.
+    """
+    section = point.bearing.catalogue
+    assert section is not None
+    effects = []
+    for estimate in estimates(section):
+        limits = (estimate.low, estimate.high)
+        ends = [_radial_stiffness(with_estimate(section, estimate, limit), point) for limit in limits]
+        effects.append(Sensitivity(estimate.key, estimate.value, *limits, *ends))
+    return tuple(effects)
+
+
+def _radial_stiffness(section: CatalogueSection, point: OperatingPoint) -> float:
+    try:
+        rows = catalogue_rows(section)
+        displacement = equilibrium(BearingOfRows(rows), point.load[:3], tilt=point.displacement[3:5]).displacement
+    except BearingError:
+        return float("nan")
+    along = np.array([np.cos(point.direction), np.sin(point.direction)])
+    return float(along @ tangent_stiffness(row_contacts(rows), displacement)[:2, :2] @ along)

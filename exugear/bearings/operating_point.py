@@ -1,0 +1,106 @@
+"""The state that a bearing works in: what it carries, how its rings stand, and how stiff its rows are there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from exugear.bearings import matrices
+from exugear.bearings.catalogue import catalogue_rows
+from exugear.bearings.contact import bearing_load, pitch_averaged_tangent, row_contacts, tangent_stiffness
+from exugear.bearings.ratings import basic_dynamic_rating
+from exugear.bearings.rows import BearingOfRows, RollingRow
+from exugear.bearings.support_laws import LEAST_LOAD, holding_force
+from exugear.model.parts import Bearing
+from fe_ste.tools.arrays import Floats
+
+CAGE_POSITIONS = 4
+"""Positions of the cage within one pitch over which the stiffness is averaged: a linear bearing knows no cage."""
+
+
+@dataclass(frozen=True)
+class OperatingPoint:
+    """A catalogue bearing under the static load of its gearbox.
+
+    Attributes
+    ----------
+    bearing : Bearing
+    rows : tuple of RollingRow
+    displacement : (6,) array
+        Inner ring relative to outer ring, m and rad, in the axes of what the bearing sits on.
+    load : (6,) array
+        Force and moment of the shaft on the inner ring that the rows carry, N and N m.
+    stiffness : (6, 6) array
+        Derivative of that load, mean over positions of the cage.
+    is_unloaded : bool
+        Whether it carries so little that its stiffness is that at the least load.
+    """
+
+    bearing: Bearing
+    rows: tuple[RollingRow, ...]
+    displacement: Floats
+    load: Floats
+    stiffness: Floats
+    is_unloaded: bool
+
+    def __repr__(self) -> str:
+        """Name and load in one line."""
+        radial, axial = 1e-3 * self.radial_load, 1e-3 * float(self.load[2])
+        return f"<OperatingPoint of {self.bearing.name!r}: {radial:.4g} kN radially, {axial:.4g} kN axially>"
+
+    @property
+    def radial_load(self) -> float:
+        """Radial load, N."""
+        return math.hypot(self.load[0], self.load[1])
+
+    @property
+    def direction(self) -> float:
+        """Polar angle of the radial load on the inner ring, rad."""
+        return math.atan2(self.load[1], self.load[0])
+
+    @property
+    def radial_stiffness(self) -> float:
+        """Stiffness along the radial load with all other coordinates held, N/m."""
+        along = np.array([math.cos(self.direction), math.sin(self.direction)])
+        return float(along @ self.stiffness[:2, :2] @ along)
+
+    @property
+    def misalignment(self) -> float:
+        """Tilt of the inner ring against the outer one, rad."""
+        return math.hypot(self.displacement[3], self.displacement[4])
+
+
+def operating_point(bearing: Bearing, displacement: Floats, load_stands_still: bool) -> OperatingPoint:
+    """Find what a bearing carries at a displacement of its rings, and its stiffness there.
+
+    Parameters
+    ----------
+    bearing : Bearing
+        One with catalogue dimensions.
+    displacement : (6,) array
+        Inner ring relative to outer ring, m and rad, in the axes of what the bearing sits on.
+    load_stands_still : bool
+        Whether the load keeps its direction in these axes; else the stiffness is the same in all directions.
+
+    Notes
+    -----
+    The tangent holds the load's direction apart from the one across it: with clearance, fewer rolling elements resist a
+    motion across the load. A bearing that carries less than `LEAST_LOAD` of its rating gets the stiffness at that load.
+    """
+    assert bearing.catalogue is not None
+    rows = catalogue_rows(bearing.catalogue)
+    pitch = 2.0 * math.pi / rows[0].element_count
+    load, stiffness = np.zeros(6), np.zeros((6, 6))
+    for position in range(CAGE_POSITIONS):
+        contacts = row_contacts(rows, pitch * position / CAGE_POSITIONS)
+        load += bearing_load(contacts, displacement) / CAGE_POSITIONS
+        stiffness += tangent_stiffness(contacts, displacement) / CAGE_POSITIONS
+    least = LEAST_LOAD * basic_dynamic_rating(rows, bearing.catalogue.type)
+    is_unloaded = float(np.linalg.norm(load[:3])) < least
+    if is_unloaded:
+        stiffness = pitch_averaged_tangent(BearingOfRows(rows), holding_force(rows, least))
+    if is_unloaded or not load_stands_still:
+        stiffness = matrices.axially_symmetric(stiffness)
+    return OperatingPoint(bearing, rows, displacement, load, stiffness, is_unloaded)

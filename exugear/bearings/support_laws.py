@@ -1,0 +1,210 @@
+"""Laws of supports: stiffness and damping as matrices, or rows of rolling elements with a law of their own.
+
+A bearing with `law = "stiffness"` is linear: given matrices, or the tangent of its rows at a load. One with
+`law = "iso16281"` keeps its rows. The housing factor f stands for the seat: it gives way in proportion to the
+bearing, so that the bearing takes the share f of a deflection under any load. A linear bearing is then f times as
+stiff, and the rows of a non-linear one see f times the deflection: both agree in the limit of small motions, and
+forces keep a potential. A clearance closes without load, which no share of a deflection does: such rows want an
+elastic housing or no factor.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from exugear.bearings import matrices
+from exugear.bearings.catalogue import catalogue_rows
+from exugear.bearings.contact import pitch_averaged_tangent
+from exugear.bearings.potential import rolling_arrays
+from exugear.bearings.ratings import basic_dynamic_rating
+from exugear.bearings.rows import BearingError, BearingOfRows, RollingRow
+from exugear.kernels.connectors import ConnectorArrays
+from exugear.model.parts import Bearing, stiffness_matrix
+from exugear.model.sections.connections import CatalogueSection
+from fe_ste.tools.arrays import Floats
+
+NOMINAL_LOAD = 0.1
+"""Load over the basic dynamic rating at which a bearing's stiffness is taken where its load is not known yet."""
+LEAST_LOAD = 0.01
+"""Load over the basic dynamic rating below which a linear bearing counts as loaded by this: none has no stiffness."""
+HOLDING_LOAD = 1.25
+"""Axial load over the least that one row with a contact angle needs beside a radial one, where neither is known."""
+QUARTER_PITCH = 0.25
+"""Place of a cage that stands still, in pitches past the load: the stiffness has its mean over the pitch there, to
+the second harmonic."""
+
+
+@dataclass(frozen=True)
+class SupportLaw:
+    """Law of one support, in the axes of what it sits on.
+
+    Attributes
+    ----------
+    stiffness, damping : (6, 6) arrays
+        Linear part, N/m .. N m/rad, and times s.
+    rows : tuple of RollingRow
+        Rows of rolling elements that act beside it; none for a linear support.
+    scale : float
+        Displacement of the inner ring against the outer one over that of the body against what it sits on.
+    damping_time : float
+        Damping over the stiffness of the rows, s.
+    cage_ratio : float
+        Turns of the cage per turn of the body against what it sits on; 0 for a cage that stands still.
+    phase : float
+        Polar angle of the first rolling element, rad.
+    """
+
+    stiffness: Floats
+    damping: Floats
+    rows: tuple[RollingRow, ...] = ()
+    scale: float = 1.0
+    damping_time: float = 0.0
+    cage_ratio: float = 0.0
+    phase: float = 0.0
+
+
+def is_catalogued(bearing: Bearing) -> bool:
+    """Tell whether rows of rolling elements give a bearing's stiffness at the load that the statics find."""
+    return bearing.catalogue is not None and bearing.catalogue.radial_load_kN is None
+
+
+def bearing_rows(bearing: Bearing) -> tuple[RollingRow, ...]:
+    """Rows of rolling elements of a catalogue bearing.
+
+    Raises
+    ------
+    BearingError
+        It has no catalogue, or dimensions that are impossible; a non-linear one has clearance and a housing factor.
+    """
+    if bearing.catalogue is None:
+        raise BearingError(f"bearing {bearing.name}: has no catalogue data")
+    rows = catalogue_rows(bearing.catalogue)
+    if bearing.law == "iso16281" and bearing.factor != 1.0 and any(row.radial_clearance > 0.0 for row in rows):
+        raise BearingError(
+            f'law = "iso16281" with clearance and the housing factor {bearing.factor:g}: a clearance closes without '
+            "load, so the factor does not apply; set housing_factor_applies = false, or make the housing elastic"
+        )
+    return rows
+
+
+def linear_law(bearing: Bearing, damping_time: float, of_rows: Floats | None = None) -> SupportLaw:
+    """Linear law of a support, housing factor included.
+
+    Parameters
+    ----------
+    bearing : Bearing
+    damping_time : float
+        Damping over stiffness where the file gives no damping, s.
+    of_rows : (6, 6) array, optional
+        Stiffness of its rows of rolling elements; by default that at the load which the file states, or at
+        `NOMINAL_LOAD`. Directions below the stiffness that the file gives beside a catalogue are raised to it.
+
+    Raises
+    ------
+    BearingError
+        The catalogue dimensions or the load are impossible.
+    """
+    stiffness = stiffness_matrix(bearing.stiffness)
+    if bearing.catalogue is not None:
+        rows_stiffness = catalogue_stiffness(bearing.catalogue) if of_rows is None else of_rows
+        stiffness = matrices.regularised(rows_stiffness, np.diag(stiffness))
+    stiffness = bearing.factor * stiffness
+    if bearing.damping is not None:
+        return SupportLaw(stiffness, stiffness_matrix(bearing.damping))
+    return SupportLaw(stiffness, matrices.proportional_damping(stiffness, damping_time))
+
+
+def rolling_law(bearing: Bearing, damping_time: float, of_rows: Floats, direction: float) -> SupportLaw:
+    """Law of a bearing's rows of rolling elements, and what the file adds in directions that they leave free.
+
+    Parameters
+    ----------
+    bearing : Bearing
+        One with catalogue dimensions.
+    damping_time : float
+        Damping over stiffness where the file gives no damping, s.
+    of_rows : (6, 6) array
+        Stiffness of the rows at their load: the file's stiffness adds what lacks there.
+    direction : float
+        Polar angle of the load on the inner ring, rad: a cage that stands still is placed by it.
+    """
+    rows = bearing_rows(bearing)
+    stated = stiffness_matrix(bearing.stiffness)
+    added = bearing.factor * (matrices.regularised(of_rows, np.diag(stated)) - of_rows)
+    given = bearing.damping is not None
+    damping = stiffness_matrix(bearing.damping) if given else matrices.proportional_damping(added, damping_time)
+    turning = bearing.cage == "turning"
+    return SupportLaw(
+        stiffness=added,
+        damping=damping,
+        rows=rows,
+        scale=bearing.factor * (-1.0 if bearing.carries_outer_ring else 1.0),
+        damping_time=0.0 if given else damping_time,
+        cage_ratio=cage_ratio(rows[0], bearing.carries_outer_ring) if turning else 0.0,
+        phase=0.0 if turning else direction + QUARTER_PITCH * 2.0 * math.pi / rows[0].element_count,
+    )
+
+
+def cage_ratio(row: RollingRow, outer_ring_turns: bool) -> float:
+    """Find the turns of a cage per turn of one ring while the other one stands still, without slip.
+
+    Examples
+    --------
+    >>> from exugear.bearings.rows import BallRow
+    >>> row = BallRow(element_diameter=0.02, pitch_diameter=0.1, element_count=10)
+    >>> round(cage_ratio(row, False), 12), round(cage_ratio(row, True), 12)
+    (0.4, 0.6)
+    """
+    return 0.5 * (1.0 + row.diameter_ratio if outer_ring_turns else 1.0 - row.diameter_ratio)
+
+
+def with_laws(connectors: ConnectorArrays, laws: Sequence[SupportLaw]) -> ConnectorArrays:
+    """Connectors at their places, with the laws of all supports."""
+    return connectors._replace(
+        stiffness=np.array([law.stiffness for law in laws]).reshape(-1, 6, 6),
+        damping=np.array([law.damping for law in laws]).reshape(-1, 6, 6),
+        rolling=rolling_arrays(
+            [law.rows for law in laws],
+            scale=[law.scale for law in laws],
+            time=[law.damping_time for law in laws],
+            cage_ratio=[law.cage_ratio for law in laws],
+            phase=[law.phase for law in laws],
+        ),
+    )
+
+
+@lru_cache(maxsize=64)
+def catalogue_stiffness(section: CatalogueSection) -> Floats:
+    """Stiffness (6, 6) of rows at the load that the file states, else a nominal one; the same in all directions.
+
+    Raises
+    ------
+    BearingError
+        The catalogue dimensions or the load are impossible.
+    """
+    rows = catalogue_rows(section)
+    if section.radial_load_kN is not None:
+        force = (1e3 * section.radial_load_kN, 0.0, 1e3 * (section.axial_load_kN or 0.0))
+    else:
+        force = holding_force(rows, NOMINAL_LOAD * basic_dynamic_rating(rows, section.type))
+    return matrices.axially_symmetric(pitch_averaged_tangent(BearingOfRows(rows), force))
+
+
+def holds_one_way(rows: Sequence[RollingRow]) -> bool:
+    """Tell whether rows hold the inner ring in one direction along the axis only."""
+    angles = [row.contact_angle for row in rows]
+    return min(angles) > 0.0 or max(angles) < 0.0
+
+
+def holding_force(rows: Sequence[RollingRow], radial: float, direction: float = 0.0) -> tuple[float, float, float]:
+    """Force (N) on the inner ring with a radial part along a polar angle (rad), and the axial one that it needs.
+
+    Rows of one contact angle are pushed apart by a radial load alone.
+    """
+    axial = HOLDING_LOAD * radial * math.tan(rows[0].contact_angle) if holds_one_way(rows) else 0.0
+    return radial * math.cos(direction), radial * math.sin(direction), axial

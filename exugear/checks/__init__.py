@@ -1,0 +1,1 @@
+"""What a gearbox lacks, told before any work begins: parts that cannot be built, bodies that nothing holds."""

@@ -1,0 +1,98 @@
+"""The verb `bearings`: what each rolling bearing bears under the static load."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from exugear.cli.case import make_results_folder, open_project
+from exugear.cli.console import note, print_json, print_table, say
+from exugear.cli.dynamics import reduce_elastic_bodies
+from exugear.cli.errors import BadInputError, exit_codes, model_errors
+from exugear.cli.options import (
+    CaseArgument,
+    FilesBelowOption,
+    InertiasOption,
+    JsonOption,
+    LawOption,
+    MeshLaw,
+    OutOption,
+    ScriptsOption,
+    Variant,
+    VariantOption,
+)
+from exugear.cli.tables import compute_missing_tables
+
+if TYPE_CHECKING:
+    from exugear.bearings.duty import BearingDuty
+
+LAW_WITHOUT_TABLES = MeshLaw("iso6336")
+
+
+def bearings(
+    case: CaseArgument,
+    variant: VariantOption = Variant.bushing,
+    mesh_law: LawOption = LAW_WITHOUT_TABLES,
+    inertias: InertiasOption = None,
+    out: OutOption = None,
+    files_below: FilesBelowOption = None,
+    scripts: ScriptsOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Tell load, stiffness, contact pressure and life of each catalogue bearing under the static load.
+
+    How teeth push each other hardly matters here: the law of ISO 6336 needs no tables.
+    """
+    with exit_codes():
+        from exugear.model.choice import Choice
+        from exugear.results.bearings_file import duty_summary
+
+        if variant == Variant.rigid:
+            raise BadInputError("--variant rigid: has ideal joints in place of bearings; use bushing or flexible")
+        project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
+        if not any(bearing.catalogue for bearing in project.gearbox.bearings):
+            raise BadInputError(f"{case}: no bearing has catalogue data; add a [bearings.NAME.catalogue]")
+        make_results_folder(project.folder)
+        compute_missing_tables(project)
+        reduce_elastic_bodies(project)
+        with model_errors():
+            duties = project.bearings()
+        path = project.bearings_path
+        if as_json:
+            choice = {"variant": variant.value, "mesh_law": mesh_law.value, "inertias": project.choice.inertias}
+            print_json({"case": str(case), **choice, "bearings": [*map(duty_summary, duties)], "file": str(path)})
+            return
+        title = f"Bearings under the static load, {variant.value}"
+        print_table(title, [_load_row(duty) for duty in duties])
+        print_table("Contact, ratings, basic rating life", [*map(_life_row, duties)])
+        if any(duty.ratings.estimated for duty in duties):
+            say("* rating estimated; dynamic_rating_kN and static_rating_kN of the file replace it")
+        say("Lives are basic: lubricant and cleanliness are left out, and so are ribs")
+        say(f"Bearings in {path}")
+        for duty in duties:
+            for remark in duty.remarks:
+                note(f"bearings.{duty.name}: {remark}", style="yellow")
+
+
+def _load_row(duty: BearingDuty) -> dict[str, str]:
+    return {
+        "bearing": duty.name,
+        "radial\nkN": f"{1e-3 * duty.radial_load:.4g}",
+        "axial\nkN": f"{1e-3 * duty.axial_load:.4g}",
+        "radial\nGN/m": f"{1e-9 * duty.radial_stiffness:.3g}",
+        "axial\nGN/m": f"{1e-9 * duty.stiffness[2, 2]:.3g}",
+        "tilt\nMN m/rad": f"{0.5e-6 * (duty.stiffness[3, 3] + duty.stiffness[4, 4]):.3g}",
+        "misaligned\nmrad": f"{1e3 * duty.misalignment:.3f}",
+    }
+
+
+def _life_row(duty: BearingDuty) -> dict[str, str]:
+    sign = "*" if duty.ratings.estimated else ""
+    return {
+        "bearing": duty.name,
+        "most loaded\nelement kN": f"{1e-3 * duty.element_load:.3g}",
+        "pressure\nMPa": f"{1e-6 * duty.pressure:.0f}",
+        "C_r\nkN": f"{1e-3 * duty.ratings.dynamic:.4g}{sign}",
+        "C_0r\nkN": f"{1e-3 * duty.ratings.static:.4g}{sign}",
+        "L10\nMrev": f"{duty.basic_life:.3g}",
+        "L10r\nMrev": f"{duty.reference_life:.3g}",
+    }
