@@ -75,7 +75,7 @@ def test_account_of_energy_closes(linear: Assembly, start: tuple[np.ndarray, np.
     change = energies[-1].sum() - energies[0].sum()
     stored = np.ptp(energies[:, 1])
     assert stored > 10.0  # J
-    assert abs(work - change) < 3e-5 * stored
+    assert abs(work - change) < 1e-4 * stored
     forces = signals[:, signal_layout(assembly)["support_force"]]
     # What a run keeps as a support's force is that of the plain kernels.
     n = len(q) // 2
