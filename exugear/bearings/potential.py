@@ -15,7 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from exugear.bearings.rows import LEAST_ELEMENTS, BallRow, BearingError, RollerRow, RollingRow
+from exugear.bearings.point_contact import ball_constant
+from exugear.bearings.rows import LEAST_ELEMENTS, STEEL_MODULUS, BallRow, BearingError, RollerRow, RollingRow
 from exugear.kernels.rolling import (
     ALIGNED_BALL,
     AXIAL,
@@ -59,8 +60,6 @@ MOST_TILT_OF_TABLE = 5e-3
 """Tilt (rad) up to which a table goes: more than any bearing stands. Beyond it slices are summed."""
 MOST_PRESSURE = 4e9
 """Contact pressure (Pa) that a table goes to: that of the static rating of roller bearings (ISO 76)."""
-PLANE_STRAIN_MODULUS = 206e9 / (1.0 - 0.3**2)
-"""Young's modulus of steel over 1 - Poisson's ratio squared, Pa."""
 ROUNDING = 2e-4
 """How far the bound of first contact is rounded off where the roller has no smooth crown, as a share of the depth."""
 
@@ -91,7 +90,7 @@ class RollerTable(NamedTuple):
 def roller_table(row: RollerRow) -> RollerTable:
     """Table of a row; number of rollers, angle, place and clearance do not matter."""
     # The load of a line contact, flat against flat raceway, at the limit of pressure; then the approach under it.
-    load = MOST_PRESSURE**2 * math.pi * row.effective_length * row.element_diameter / PLANE_STRAIN_MODULUS
+    load = MOST_PRESSURE**2 * math.pi * row.effective_length * row.element_diameter / STEEL_MODULUS
     depth = float((load / row.contact_constant) ** (1.0 / LINE_POWER))
     steps, count = STEPS if _is_crowned(row) else MORE_STEPS
     count = 1 if row.aligning else count
@@ -286,34 +285,3 @@ class _Packing:
             angles = 2.0 * math.pi * np.arange(count) / count
             self.circles.append(np.column_stack([np.cos(angles), np.sin(angles)]))
         return self._first_on_circle[count]
-
-
-def ball_constant(row: BallRow) -> float:
-    """Load of a ball between both grooves over its approach to the power of 3/2, N/m^1.5 (Hertz)."""
-    ratio = row.diameter_ratio
-    compliance = 0.0
-    for conformity, curvature in (
-        (row.inner_conformity, 2.0 * ratio / (1.0 - ratio)),
-        (row.outer_conformity, -2.0 * ratio / (1.0 + ratio)),
-    ):
-        total = (4.0 - 1.0 / conformity + curvature) / row.element_diameter
-        difference = (1.0 / conformity + curvature) / (row.element_diameter * total)
-        compliance += _point_approach(total, difference)
-    return float(compliance**-1.5)
-
-
-def _point_approach(total: float, difference: float) -> float:
-    """Approach of steel bodies under 1 N (m), by the sum (1/m) and the relative difference of their curvatures."""
-    import scipy.optimize
-    import scipy.special
-
-    def mismatch(parameter: float) -> float:
-        first, second = scipy.special.ellipk(parameter), scipy.special.ellipe(parameter)
-        # With the ratio of the axes squared, 1 / (1 - parameter): (k2 + 1) E - 2 K = difference (k2 - 1) E.
-        square = 1.0 / (1.0 - parameter)
-        return float((square + 1.0) * second - 2.0 * first - difference * (square - 1.0) * second)
-
-    parameter = scipy.optimize.brentq(mismatch, 1e-9, 1.0 - 1e-12, xtol=1e-15)
-    first, second = scipy.special.ellipk(parameter), scipy.special.ellipe(parameter)
-    approach = 2.0 * first / math.pi * (0.5 * math.pi * (1.0 - parameter) / second) ** (1.0 / 3.0)
-    return float(approach * (3.0 / (total * PLANE_STRAIN_MODULUS)) ** (2.0 / 3.0) * 0.5 * total)

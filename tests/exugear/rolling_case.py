@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from exugear.bearings.potential import ball_constant, rolling_arrays
+from exugear.bearings.point_contact import ball_constant
+from exugear.bearings.potential import rolling_arrays
 from exugear.bearings.rows import BallRow, RollerRow, RollingRow
 from exugear.dynamics.assembly import Assembly
 

@@ -1,16 +1,22 @@
 """What joins bodies in an Exudyn system: bearings and mounts, torsional couplings, ideal joints.
 
-Bearings are ``RigidBodySpringDamper``. What acts on a body in a floating frame is left to
-`exugear.solvers.exudyn_model.floating_bodies`.
+Bearings are ``RigidBodySpringDamper``, with a user function where they have a rolling law. What acts on a body in a
+floating frame is left to `exugear.solvers.exudyn_model.floating_bodies`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
+from exugear.kernels.coordinates import BODY_SIZE, SPIN
+from exugear.kernels.rolling import CAGE_TORQUE, DAMPED_PART, ELASTIC_PART, FORCES_SIZE, rolling_forces
 from exugear.model.parts import Joint
 from exugear.solvers.exudyn_model.library import items
 from exugear.solvers.exudyn_model.parts import Parts
+from fe_ste.tools.arrays import Floats
 
 FREE_SPIN = [1, 1, 1, 1, 1, 0]
 """Axes that an ideal joint holds: all but the spin."""
@@ -26,13 +32,44 @@ def add_supports(parts: Parts) -> None:
         position = np.array(bearing.position)
         pin = np.array([*assembly.gearbox.pin_offsets.get(bearing.body, (0.0, 0.0)), 0.0])
         ends = ((bearing.on, position + pin), (bearing.body, position))
+        rolling = assembly.connectors.rolling
+        law = _rolling_law(parts, n) if rolling.first[n] < rolling.first[n + 1] else 0
         parts.mbs.AddObject(
             items.RigidBodySpringDamper(
                 markerNumbers=[parts.support_marker(body, bearing.name, at) for body, at in ends],
                 stiffness=assembly.connectors.stiffness[n],
                 damping=assembly.connectors.damping[n],
+                springForceTorqueUserFunction=law,
             )
         )
+
+
+def _rolling_law(parts: Parts, n: int) -> Callable[..., Floats]:
+    """User function of a support whose rolling law acts beside its matrices; it stands in for both."""
+    bearing, rolling = parts.assembly.supports[n], parts.assembly.connectors.rolling
+    first, second = (parts.support_spin(body, bearing.name) for body in (bearing.on, bearing.body))
+    forces = np.empty(FORCES_SIZE)
+
+    def law(
+        mbs: Any,
+        t: float,
+        item: int,
+        displacement: Any,
+        rotation: Any,
+        velocity: Any,
+        angular_velocity: Any,
+        stiffness: Any,
+        damping: Any,
+        *frames: Any,
+    ) -> Floats:
+        strain, rate = np.array([*displacement, *rotation]), np.array([*velocity, *angular_velocity])
+        rolling_forces(n, strain, rate, second() - first(), rolling, forces)
+        load: Floats = stiffness @ strain + damping @ rate
+        load += forces[ELASTIC_PART : ELASTIC_PART + BODY_SIZE] + forces[DAMPED_PART : DAMPED_PART + BODY_SIZE]
+        load[SPIN] += forces[CAGE_TORQUE]
+        return load
+
+    return law
 
 
 def add_couplings(parts: Parts) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 from exugear.dynamics.assembly import Assembly
 from exugear.model.seats import node_position, seat_key
 from exugear.solvers.exudyn_model.floating_bodies import FloatingBodies
-from exugear.solvers.exudyn_model.library import items
+from exugear.solvers.exudyn_model.library import exudyn, items
 from fe_ste.tools.arrays import Floats
 
 SPIN_COORDINATE = 5
@@ -63,6 +64,14 @@ class Parts:
         else:
             number, local = self._ground_object(), position
         return self.mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=number, localPosition=np.asarray(local).tolist()))
+
+    def support_spin(self, body: str, item: str) -> Callable[[], float]:
+        """Tell how to ask for the spin (rad, unwrapped) of what carries a support: a body, its seat, or the ground."""
+        node = self.nodes.get(seat_key(body, item), self.nodes.get(body))
+        if node is None:
+            return lambda: 0.0
+        coordinates = exudyn.OutputVariableType.Coordinates
+        return lambda: float(self.mbs.GetNodeOutput(node, coordinates)[SPIN_COORDINATE])
 
     def _ground_object(self) -> Any:
         if self._ground is None:

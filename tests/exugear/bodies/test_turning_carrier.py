@@ -27,6 +27,7 @@ from exugear.solvers.loads import Loading, LoadTable
 from ..assembled import assembled, modes_with_bodies
 from ..limit_case import unchecked
 from ..plain_signals import energies_of, sampled
+from ..stated_loads import STATED_LOADS
 
 pytestmark = pytest.mark.skipif(importlib.util.find_spec("meshio") is None, reason="meshio (extra mesh) is missing")
 
@@ -91,7 +92,7 @@ def turned_state(assembly: Assembly, angle: float, speed: float = 22.5) -> tuple
 
 def test_a_stiff_carrier_is_the_rigid_one(grc_shafts: Gearbox, carrying: Gearbox, stiffness: dict) -> None:
     # Second method: the shafts elastic, the carrier a rigid body, which it becomes as one over its stiffness.
-    limit = {"elasticity.limit_Hz": 1e6}  # no masses are added to slow anything down
+    limit = {"elasticity.limit_Hz": 1e6, **STATED_LOADS}  # no masses are added to slow anything down
     rigid = modes_with_bodies(grc_shafts.varied(limit), Choice("flexible"), stiffness).frequency[1:60]
     gaps = []
     for factor in (10.0, 100.0):

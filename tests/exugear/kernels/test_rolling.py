@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from exugear.bearings.contact import equilibrium
+from exugear.bearings.contact import bearing_load, equilibrium, row_contacts, tangent_stiffness
 from exugear.bearings.potential import rolling_arrays
 from exugear.bearings.rollers import BearingPair, TaperedRollerBearing
 from exugear.bearings.rows import BearingError, RollerRow, RollingRow
@@ -236,6 +236,23 @@ def test_a_cage_turned_by_one_pitch_is_the_same_cage(name: str) -> None:
     for state in states(row, 5):
         one, two = (forces(arrays, state, turn=turn) for turn in (0.3, 0.3 + 2.0 * pitch))
         assert np.abs(one - two)[:CAGE_TORQUE].max() < 1e-12 * max(np.abs(one[:CAGE_TORQUE]).max(), 1e3)
+
+
+@pytest.mark.parametrize("name", ALL_ROWS)
+def test_law_is_that_of_the_statics_in_its_numpy_form(name: str) -> None:
+    """Load and tangent of `exugear.bearings.contact`, which finds operating points by them."""
+    row = replace(ALL_ROWS[name], axial_position=0.02)
+    arrays, contacts = alone([row], phase=0.1), row_contacts([row], 0.1)
+    load_limit, tangent_limit = (1e-3, 1e-2) if isinstance(row, RollerRow) else (1e-11, 1e-11)
+    sizes = np.array([1.0, 1.0, 1.0, 0.1, 0.1])  # m: lever of the elements' loads
+    for state in states(row, 40):
+        expected = bearing_load(contacts, np.append(state, 0.0))[:5] / sizes
+        if np.abs(expected).max() < 0.01 * row.element_count * 1e4 * (row.element_diameter / 0.01) ** 2:
+            continue
+        assert np.abs(load(arrays, state) / sizes - expected).max() < load_limit * np.abs(expected).max()
+        stiffness = tangent_stiffness(contacts, np.append(state, 0.0))[:5, :5] / np.outer(sizes, sizes)
+        found = tangent(arrays, state) / np.outer(sizes, sizes)
+        assert np.abs(found - stiffness).max() < tangent_limit * np.abs(stiffness).max()
 
 
 def test_straight_rollers_without_tilt_are_a_closed_form() -> None:
