@@ -10,6 +10,6 @@ from __future__ import annotations
 #: Reduced elastic bodies (`exugear.bodies`). Runs and modes rest on it.
 REDUCTION = 1
 #: Eigenmodes (`exugear.dynamics.modes`, and the laws and matrices of `exugear.dynamics.assembly`).
-MODES = 1
+MODES = 2
 #: Runs in time (`exugear.runs`, both solvers, the laws, signals and filters).
-RUN = 1
+RUN = 2
