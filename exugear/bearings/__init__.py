@@ -1,1 +1,1 @@
-"""Bearings and other supports: stiffness from catalogue dimensions, matrices."""
+"""Bearings and other supports: what holds the bodies of a gearbox, and how."""

@@ -7,12 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exugear.bearings.catalogue import catalogue_rows, estimates, with_estimate
-from exugear.bearings.contact import BearingState, bearing_state, equilibrium, row_contacts, tangent_stiffness
-from exugear.bearings.life import basic_rating_life, reference_life
 from exugear.bearings.operating_point import OperatingPoint
-from exugear.bearings.ratings import basic_dynamic_rating, basic_static_rating, equivalent_load, equivalent_static_load
-from exugear.bearings.rows import BearingError, BearingOfRows
+from exugear.bearings.rolling.catalogue import catalogue_rows, estimates, with_estimate
+from exugear.bearings.rolling.contact import BearingState, bearing_state, equilibrium, row_contacts, tangent_stiffness
+from exugear.bearings.rolling.life import basic_rating_life, reference_life
+from exugear.bearings.rolling.ratings import (
+    basic_dynamic_rating,
+    basic_static_rating,
+    equivalent_load,
+    equivalent_static_load,
+)
+from exugear.bearings.rolling.rows import BearingError, BearingOfRows
 from exugear.bearings.support_laws import holds_one_way
 from exugear.model.sections.connections import CatalogueSection
 from fe_ste.tools.arrays import Floats

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from exugear.bearings.rows import BearingError
+from exugear.bearings.rolling.rows import BearingError
 from fe_ste.tools.arrays import Floats
 
 

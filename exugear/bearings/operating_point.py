@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.bearings import matrices
-from exugear.bearings.catalogue import catalogue_rows
-from exugear.bearings.contact import bearing_load, pitch_averaged_tangent, row_contacts, tangent_stiffness
-from exugear.bearings.ratings import basic_dynamic_rating
-from exugear.bearings.rows import BearingOfRows, RollingRow
+from exugear.bearings.rolling.catalogue import catalogue_rows
+from exugear.bearings.rolling.contact import bearing_load, pitch_averaged_tangent, row_contacts, tangent_stiffness
+from exugear.bearings.rolling.ratings import basic_dynamic_rating
+from exugear.bearings.rolling.rows import BearingOfRows, RollingRow
 from exugear.bearings.support_laws import LEAST_LOAD, holding_force
 from exugear.model.parts import Bearing
 from fe_ste.tools.arrays import Floats

@@ -18,11 +18,11 @@ from functools import lru_cache
 import numpy as np
 
 from exugear.bearings import matrices
-from exugear.bearings.catalogue import catalogue_rows
-from exugear.bearings.contact import pitch_averaged_tangent
-from exugear.bearings.potential import rolling_arrays
-from exugear.bearings.ratings import basic_dynamic_rating
-from exugear.bearings.rows import BearingError, BearingOfRows, RollingRow
+from exugear.bearings.rolling.catalogue import catalogue_rows
+from exugear.bearings.rolling.contact import pitch_averaged_tangent
+from exugear.bearings.rolling.potential import rolling_arrays
+from exugear.bearings.rolling.ratings import basic_dynamic_rating
+from exugear.bearings.rolling.rows import BearingError, BearingOfRows, RollingRow
 from exugear.kernels.connectors import ConnectorArrays
 from exugear.model.parts import Bearing, stiffness_matrix
 from exugear.model.sections.connections import CatalogueSection
@@ -155,7 +155,7 @@ def cage_ratio(row: RollingRow, outer_ring_turns: bool) -> float:
 
     Examples
     --------
-    >>> from exugear.bearings.rows import BallRow
+    >>> from exugear.bearings.rolling.rows import BallRow
     >>> row = BallRow(element_diameter=0.02, pitch_diameter=0.1, element_count=10)
     >>> round(cage_ratio(row, False), 12), round(cage_ratio(row, True), 12)
     (0.4, 0.6)

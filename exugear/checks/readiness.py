@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from exugear.bearings.rows import BearingError
+from exugear.bearings.rolling.rows import BearingError
 from exugear.bearings.support_laws import bearing_rows, linear_law
 from exugear.bearings.supports import ON_BEARINGS, elastic_names, unsupported
 from exugear.checks.restraint import free_motion

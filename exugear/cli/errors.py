@@ -129,7 +129,7 @@ def end_with(what: str, reason: object, code: int) -> NoReturn:
 @contextmanager
 def model_errors() -> Iterator[None]:
     """Turn errors of the model's parts into those of the command line."""
-    from exugear.bearings.rows import BearingError
+    from exugear.bearings.rolling.rows import BearingError
     from exugear.dynamics.assembly import VariantError
     from exugear.dynamics.statics import BalanceError
     from exugear.model.reading import CaseError

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from exugear.bearings.catalogue import catalogue_rows
-from exugear.bearings.contact import equilibrium
 from exugear.bearings.duty import BearingDuty, duty_of
 from exugear.bearings.operating_point import OperatingPoint, operating_point
-from exugear.bearings.rows import BearingOfRows
+from exugear.bearings.rolling.catalogue import catalogue_rows
+from exugear.bearings.rolling.contact import equilibrium
+from exugear.bearings.rolling.rows import BearingOfRows
 from exugear.bearings.support_laws import catalogue_stiffness
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.statics import static_state

@@ -12,9 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from exugear.bearings.contact import bearing_load, equilibrium, row_contacts
 from exugear.bearings.operating_point import OperatingPoint, operating_point
-from exugear.bearings.rows import BearingOfRows
+from exugear.bearings.rolling.contact import bearing_load, equilibrium, row_contacts
+from exugear.bearings.rolling.rows import BearingOfRows
 from exugear.bearings.support_laws import (
     SupportLaw,
     bearing_rows,

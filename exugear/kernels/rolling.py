@@ -2,7 +2,7 @@
 
 An element at the polar angle p sees three numbers of the inner ring's displacement (x, y, z, a, b) against the outer
 one, along the outer ring's axes: q = x cos p + y sin p, z, and the tilt in its axial plane w = a sin p - b cos p. Each
-has a potential U(q, z, w), which the tables and constants of `exugear.bearings.potential` give:
+has a potential U(q, z, w), which the tables and constants of `exugear.bearings.rolling.potential` give:
 
     roller       U(d, w),  d = cos(al) q + sin(al) z + e w - gap,  e = r sin(al) - z0 cos(al)
     ball         2/5 k max(0, l - span)^(5/2),  l the distance of the grooves' centres, whose line is the normal

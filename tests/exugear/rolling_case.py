@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from exugear.bearings.point_contact import ball_constant
-from exugear.bearings.potential import rolling_arrays
-from exugear.bearings.rows import BallRow, RollerRow, RollingRow
+from exugear.bearings.rolling.point_contact import ball_constant
+from exugear.bearings.rolling.potential import rolling_arrays
+from exugear.bearings.rolling.rows import BallRow, RollerRow, RollingRow
 from exugear.dynamics.assembly import Assembly
 
 CYLINDRICAL = RollerRow(

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from exugear.bearings.contact import pitch_averaged_tangent
 from exugear.bearings.matrices import axially_symmetric
-from exugear.bearings.rollers import BearingPair, TaperedRollerBearing
+from exugear.bearings.rolling.contact import pitch_averaged_tangent
+from exugear.bearings.rolling.rollers import BearingPair, TaperedRollerBearing
 from exugear.bodies.finite_elements.shaft_sections import ShaftSection
 from exugear.bodies.of_gearbox.shafts import shaft_model
 from exugear.bodies.reduced_body import ReducedBody

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from exugear.bearings.contact import pitch_averaged_tangent
 from exugear.bearings.matrices import axially_symmetric, in_series, proportional_damping, regularised, rotate_stiffness
-from exugear.bearings.rollers import BearingPair, CylindricalRollerBearing, TaperedRollerBearing
-from exugear.bearings.rows import BearingError
+from exugear.bearings.rolling.contact import pitch_averaged_tangent
+from exugear.bearings.rolling.rollers import BearingPair, CylindricalRollerBearing, TaperedRollerBearing
+from exugear.bearings.rolling.rows import BearingError
 
 NJ2232 = CylindricalRollerBearing(bore=0.160, outside_diameter=0.290, width=0.080)
 PAIR = BearingPair(

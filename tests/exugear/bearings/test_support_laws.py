@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from exugear.bearings.contact import pitch_averaged_tangent
 from exugear.bearings.matrices import axially_symmetric
-from exugear.bearings.rollers import BearingPair, CylindricalRollerBearing
+from exugear.bearings.rolling.contact import pitch_averaged_tangent
+from exugear.bearings.rolling.rollers import BearingPair, CylindricalRollerBearing
 from exugear.bearings.support_laws import cage_ratio, catalogue_stiffness, linear_law, rolling_law
 from exugear.model.gearbox import Gearbox
 from exugear.model.sections.connections import CatalogueSection

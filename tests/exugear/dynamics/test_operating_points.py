@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from exugear.bearings.contact import bearing_load, equilibrium, pitch_averaged_tangent, row_contacts
 from exugear.bearings.operating_point import OperatingPoint
-from exugear.bearings.rows import BearingOfRows
+from exugear.bearings.rolling.contact import bearing_load, equilibrium, pitch_averaged_tangent, row_contacts
+from exugear.bearings.rolling.rows import BearingOfRows
 from exugear.bearings.support_laws import LEAST_LOAD, catalogue_stiffness
 from exugear.checks.readiness import check_parts
 from exugear.dynamics.assemble import assemble

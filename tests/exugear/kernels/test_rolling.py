@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from exugear.bearings.contact import bearing_load, equilibrium, row_contacts, tangent_stiffness
-from exugear.bearings.potential import rolling_arrays
-from exugear.bearings.rollers import BearingPair, TaperedRollerBearing
-from exugear.bearings.rows import BearingError, RollerRow, RollingRow
+from exugear.bearings.rolling.contact import bearing_load, equilibrium, row_contacts, tangent_stiffness
+from exugear.bearings.rolling.potential import rolling_arrays
+from exugear.bearings.rolling.rollers import BearingPair, TaperedRollerBearing
+from exugear.bearings.rolling.rows import BearingError, RollerRow, RollingRow
 from exugear.kernels.rolling import (
     CAGE_TORQUE,
     DAMPED_PART,
@@ -240,7 +240,7 @@ def test_a_cage_turned_by_one_pitch_is_the_same_cage(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALL_ROWS)
 def test_law_is_that_of_the_statics_in_its_numpy_form(name: str) -> None:
-    """Load and tangent of `exugear.bearings.contact`, which finds operating points by them."""
+    """Load and tangent of `exugear.bearings.rolling.contact`, which finds operating points by them."""
     row = replace(ALL_ROWS[name], axial_position=0.02)
     arrays, contacts = alone([row], phase=0.1), row_contacts([row], 0.1)
     load_limit, tangent_limit = (1e-3, 1e-2) if isinstance(row, RollerRow) else (1e-11, 1e-11)

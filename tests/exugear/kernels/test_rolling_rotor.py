@@ -10,8 +10,8 @@ import pytest
 import scipy.linalg
 import scipy.optimize
 
-from exugear.bearings.potential import rolling_arrays
-from exugear.bearings.rows import RollingRow
+from exugear.bearings.rolling.potential import rolling_arrays
+from exugear.bearings.rolling.rows import RollingRow
 from exugear.kernels.connectors import ConnectorArrays, add_connector_forces
 from exugear.kernels.inertia import InertiaArrays, accelerations, kinetic_energies
 from exugear.kernels.rolling import STORED, rolling_forces, rolling_memory, rolling_tangent

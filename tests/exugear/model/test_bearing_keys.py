@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from exugear.dynamics.readiness import check_parts
 
+from exugear.checks.readiness import check_parts
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
 from exugear.model.sections.connections import TYPES_OF_KEYS

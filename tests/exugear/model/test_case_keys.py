@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from exugear.bearings.catalogue import catalogue_rows
+from exugear.bearings.rolling.catalogue import catalogue_rows
 from exugear.bearings.support_laws import catalogue_stiffness, linear_law
 from exugear.bearings.supports import elastic_names
 from exugear.bodies.of_gearbox.elastic_bodies import check_elastic_body

@@ -15,13 +15,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from exugear.bearings.ratings import (
+from exugear.bearings.rolling.ratings import (
     basic_dynamic_rating,
     groove_conformities,
     groove_ratio,
     row_count,
 )
-from exugear.bearings.rows import BallRow, BearingError, RollerRow, RollingRow
+from exugear.bearings.rolling.rows import BallRow, BearingError, RollerRow, RollingRow
 from exugear.model.sections.connections import BearingType
 from fe_ste.tools.arrays import Floats
 

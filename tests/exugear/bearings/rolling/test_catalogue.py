@@ -6,10 +6,10 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from exugear.bearings.catalogue import catalogue_rows, estimates, with_estimate
-from exugear.bearings.contact import element_loads, equilibrium, pitch_averaged_tangent, row_contacts
-from exugear.bearings.point_contact import ball_pressure, elliptic_contact
-from exugear.bearings.rows import BallRow, BearingError, BearingOfRows, RollerRow
+from exugear.bearings.rolling.catalogue import catalogue_rows, estimates, with_estimate
+from exugear.bearings.rolling.contact import element_loads, equilibrium, pitch_averaged_tangent, row_contacts
+from exugear.bearings.rolling.point_contact import ball_pressure, elliptic_contact
+from exugear.bearings.rolling.rows import BallRow, BearingError, BearingOfRows, RollerRow
 from exugear.model.sections.connections import BearingType, CatalogueSection
 
 TYPES = get_args(BearingType)
@@ -76,7 +76,7 @@ def static_rating(rows, kind):
 def test_estimated_bearings_have_the_static_rating_of_the_catalogue(name):
     kind, bore, outer, width, printed, keys = PRINTED[name]
     rows = catalogue_rows(section(kind, float(bore), float(outer), float(width), **keys))
-    # Nine tenths of 680 bearings lie within the ranges of `exugear.bearings.proportions`, 0.71 to 1.27 in all.
+    # Nine tenths of 680 bearings lie within the ranges of `exugear.bearings.rolling.proportions`, 0.71 to 1.27 in all.
     assert static_rating(rows, kind) == pytest.approx(printed, rel=0.3)
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from exugear.bearings.ratings import (
+from exugear.bearings.rolling.ratings import (
     basic_dynamic_rating,
     basic_static_rating,
     line_contact_factor,
@@ -13,8 +13,8 @@ from exugear.bearings.ratings import (
     row_count,
     static_factor,
 )
-from exugear.bearings.rollers import CylindricalRollerBearing, TaperedRollerBearing
-from exugear.bearings.rows import BallRow, BearingError, RollerRow
+from exugear.bearings.rolling.rollers import CylindricalRollerBearing, TaperedRollerBearing
+from exugear.bearings.rolling.rows import BallRow, BearingError, RollerRow
 
 
 def balls(diameter, pitch, count, degrees=0.0, **options):

@@ -219,7 +219,7 @@ def pair_rows(row: Row, arrangement: str, row_distance: float, axial_preload: fl
 
     Raises
     ------
-    exugear.bearings.rows.BearingError
+    exugear.bearings.rolling.rows.BearingError
         The arrangement or the distance does not exist, or the rows cannot be preloaded along the axis.
     """
     if arrangement not in ("X", "O", "tandem"):

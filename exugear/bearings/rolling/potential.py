@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from exugear.bearings.point_contact import ball_constant
-from exugear.bearings.rows import LEAST_ELEMENTS, STEEL_MODULUS, BallRow, BearingError, RollerRow, RollingRow
+from exugear.bearings.rolling.point_contact import ball_constant
+from exugear.bearings.rolling.rows import LEAST_ELEMENTS, STEEL_MODULUS, BallRow, BearingError, RollerRow, RollingRow
 from exugear.kernels.rolling import (
     ALIGNED_BALL,
     AXIAL,

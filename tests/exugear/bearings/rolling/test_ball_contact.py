@@ -8,7 +8,8 @@ import pytest
 import scipy.integrate
 import scipy.special
 
-from exugear.bearings.contact import (
+from exugear.bearings.matrices import rotate_stiffness
+from exugear.bearings.rolling.contact import (
     bearing_load,
     elastic_energy,
     element_loads,
@@ -17,15 +18,22 @@ from exugear.bearings.contact import (
     row_contacts,
     tangent_stiffness,
 )
-from exugear.bearings.matrices import rotate_stiffness
-from exugear.bearings.point_contact import (
+from exugear.bearings.rolling.point_contact import (
     ball_constant,
     ball_pressure,
     elliptic_contact,
     elliptic_integrals,
     groove_contacts,
 )
-from exugear.bearings.rows import STEEL_MODULUS, BallRow, BearingError, BearingOfRows, RollerRow, moved, pair_rows
+from exugear.bearings.rolling.rows import (
+    STEEL_MODULUS,
+    BallRow,
+    BearingError,
+    BearingOfRows,
+    RollerRow,
+    moved,
+    pair_rows,
+)
 
 DEEP_GROOVE = BallRow(element_diameter=0.0127, pitch_diameter=0.065, element_count=9)  # 209, Harris
 ANGULAR = BallRow(  # 218, Harris

@@ -6,7 +6,7 @@ load acts along the line of the groove centres, so that the contact angle follow
 a sphere about the middle of the bearing, the line stays on that middle.
 
 Forces on the ball itself (centrifugal, gyroscopic, friction) are left out: both contacts of a ball carry the same.
-The frame is that of `exugear.bearings.rows`.
+The frame is that of `exugear.bearings.rolling.rows`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from exugear.bearings.rows import STEEL_MODULUS, BallRow
+from exugear.bearings.rolling.rows import STEEL_MODULUS, BallRow
 from fe_ste.tools.arrays import Floats, Integers
 
 POINT_CONTACT_EXPONENT = 1.5

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from exugear.bearings.ratings import (
+from exugear.bearings.rolling.ratings import (
     CONTACT_ANGLES,
     DOUBLE_ROW_SMALL_Y,
     DOUBLE_ROW_X,
@@ -15,7 +15,7 @@ from exugear.bearings.ratings import (
     equivalent_load,
     equivalent_static_load,
 )
-from exugear.bearings.rows import BallRow, RollerRow
+from exugear.bearings.rolling.rows import BallRow, RollerRow
 
 
 def balls(*degrees):

@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from exugear.bearings.proportions import PROPORTIONS, ROLLER_LENGTH, element_count, standard_profile
-from exugear.bearings.rows import LAMINAE, BearingError, RollerRow, pair_rows
+from exugear.bearings.rolling.proportions import PROPORTIONS, ROLLER_LENGTH, element_count, standard_profile
+from exugear.bearings.rolling.rows import LAMINAE, BearingError, RollerRow, pair_rows
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,7 +18,7 @@ class CylindricalRollerBearing:
 
     What the catalogue does not print is estimated from the boundary dimensions: roller diameter
     ``0.27 (D - d)``, effective length ``0.64 B``, and as many rollers as fit on the pitch circle at a
-    pitch of 1.15 roller diameters (with a cage) or 1.01 (full complement); see `exugear.bearings.proportions`.
+    pitch of 1.15 roller diameters (with a cage) or 1.01 (full complement); see `exugear.bearings.rolling.proportions`.
 
     Parameters
     ----------

@@ -3,12 +3,12 @@
 Rows of rollers and of balls between two rigid rings. Each roller is cut into laminae; a lamina between both
 raceways carries ``c_L / n * delta^(10/9)`` with ``c_L = 35948 L_we^(8/9)`` (N, mm), its approach ``delta`` following
 from the six displacements of the inner ring relative to the outer one. Balls are in
-`exugear.bearings.point_contact`. Every contact has a potential that grows with its approach, which is a convex
+`exugear.bearings.rolling.point_contact`. Every contact has a potential that grows with its approach, which is a convex
 function of the displacements; so the load of the bearing is the gradient of a convex function, the equilibrium under
 a given force unique and the tangent symmetric.
 
 Rings are rigid, ribs, cage, friction, centrifugal forces and the housing are left out. The frame is that of
-`exugear.bearings.rows`.
+`exugear.bearings.rolling.rows`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from exugear.bearings.point_contact import (
+from exugear.bearings.rolling.point_contact import (
     BallArrays,
     ball_arrays,
     ball_energy,
@@ -29,7 +29,7 @@ from exugear.bearings.point_contact import (
     ball_state,
     ball_tangent,
 )
-from exugear.bearings.rows import STEEL_MODULUS, BallRow, BearingError, RollerRow, RollingBearing, RollingRow
+from exugear.bearings.rolling.rows import STEEL_MODULUS, BallRow, BearingError, RollerRow, RollingBearing, RollingRow
 from fe_ste.tools.arrays import Floats, Integers
 
 LINE_CONTACT_EXPONENT = 10.0 / 9.0
@@ -358,7 +358,7 @@ def equilibrium(
 
     Examples
     --------
-    >>> from exugear.bearings.rollers import CylindricalRollerBearing
+    >>> from exugear.bearings.rolling.rollers import CylindricalRollerBearing
     >>> bearing = CylindricalRollerBearing(bore=0.160, outside_diameter=0.290, width=0.080)
     >>> state = equilibrium(bearing, (129.9e3, 0.0, 0.0))
     >>> round(1e6 * state.displacement[0])  # micrometres
@@ -474,7 +474,7 @@ def pitch_averaged_tangent(bearing: RollingBearing, force: ArrayLike, positions:
 
     Examples
     --------
-    >>> from exugear.bearings.rollers import CylindricalRollerBearing
+    >>> from exugear.bearings.rolling.rollers import CylindricalRollerBearing
     >>> bearing = CylindricalRollerBearing(bore=0.100, outside_diameter=0.180, width=0.046)
     >>> stiffness = pitch_averaged_tangent(bearing, (33.5e3, 0.0, 0.0))
     >>> float(round(stiffness[0, 0] / 1e9, 1))

@@ -13,16 +13,16 @@ import numpy as np
 import pytest
 import scipy.optimize
 
-from exugear.bearings.contact import equilibrium
-from exugear.bearings.life import (
+from exugear.bearings.rolling.contact import equilibrium
+from exugear.bearings.rolling.life import (
     basic_rating_life,
     edge_stress_factors,
     life_in_hours,
     minimum_load,
     reference_life,
 )
-from exugear.bearings.ratings import basic_dynamic_rating
-from exugear.bearings.rows import BallRow, BearingError, BearingOfRows, RollerRow
+from exugear.bearings.rolling.ratings import basic_dynamic_rating
+from exugear.bearings.rolling.rows import BallRow, BearingError, BearingOfRows, RollerRow
 
 RPM = math.pi / 30.0
 CYLINDRICAL_ROLLER_PROFILE = 0.00035

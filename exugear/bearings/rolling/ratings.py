@@ -11,7 +11,7 @@ The equivalent load is the radial load that would wear the bearing out, or press
 radial and axial load together do. Both standards give it as the larger of two sums ``X F_r + Y F_a``; the limit
 ``e`` of ISO 281 is the ratio ``F_a / F_r`` at which the two are equal. Opposite contact angles make a double row
 bearing (or a pair in X or O), equal ones a single row bearing or a pair in tandem. Moments are not in it: rows
-that carry a moment are for the reference rating life (`exugear.bearings.life`).
+that carry a moment are for the reference rating life (`exugear.bearings.rolling.life`).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from exugear.bearings.rows import BallRow, BearingError, RollerRow, RollingRow
+from exugear.bearings.rolling.rows import BallRow, BearingError, RollerRow, RollingRow
 from exugear.model.sections.connections import BearingType
 
 MATERIAL_FACTOR: dict[BearingType, float] = {

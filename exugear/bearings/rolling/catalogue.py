@@ -1,7 +1,7 @@
 """Rows of rolling elements from a catalogue section, and estimates of what it leaves open.
 
 A catalogue prints the boundary dimensions. What the file leaves open of the inside follows from the usual
-proportions of the type (`exugear.bearings.proportions`), and is told as an estimate with its range.
+proportions of the type (`exugear.bearings.rolling.proportions`), and is told as an estimate with its range.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from exugear.bearings import proportions
-from exugear.bearings.rows import BallRow, BearingError, RollerRow, RollingRow, moved, pair_rows
+from exugear.bearings.rolling import proportions
+from exugear.bearings.rolling.rows import BallRow, BearingError, RollerRow, RollingRow, moved, pair_rows
 from exugear.model.sections.connections import CONTACT_ANGLES_DEG, TYPES_OF_KEYS, CatalogueSection
 
 ALIGNING = ("spherical_roller", "self_aligning_ball")
@@ -55,7 +55,7 @@ def catalogue_rows(section: CatalogueSection) -> tuple[RollingRow, ...]:
 
     Raises
     ------
-    exugear.bearings.rows.BearingError
+    exugear.bearings.rolling.rows.BearingError
         The elements do not fit into the bearing.
 
     Notes

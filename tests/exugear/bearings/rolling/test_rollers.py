@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 import scipy.integrate
 
-from exugear.bearings.contact import (
+from exugear.bearings.matrices import axially_symmetric, rotate_stiffness
+from exugear.bearings.rolling.contact import (
     bearing_load,
     elastic_energy,
     equilibrium,
@@ -15,9 +16,8 @@ from exugear.bearings.contact import (
     row_contacts,
     tangent_stiffness,
 )
-from exugear.bearings.matrices import axially_symmetric, rotate_stiffness
-from exugear.bearings.rollers import BearingPair, CylindricalRollerBearing, TaperedRollerBearing
-from exugear.bearings.rows import BearingError, RollerRow
+from exugear.bearings.rolling.rollers import BearingPair, CylindricalRollerBearing, TaperedRollerBearing
+from exugear.bearings.rolling.rows import BearingError, RollerRow
 
 
 # Closed forms hold for straight rollers, and the hand estimate has rollers of 0.75 of the width: so have all bearings

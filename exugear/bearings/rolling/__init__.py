@@ -1,0 +1,1 @@
+"""Rolling bearings by themselves: rows of rolling elements, their contact, ratings and life, catalogue data."""
