@@ -533,12 +533,70 @@ def elastic_section(part: Results) -> str:
     )
 
 
+# -- non-linear bearings -------------------------------------------------------------------------------------------
+
+
+def bearings_section(part: Results) -> str:
+    """Tables of the cost of bearings that follow their rolling elements."""
+    rows, runs = part["rows"], part["runs"]
+    every = runs[-1]
+    added = 1e-6 * every["added_per_row"] * every["rows"] * part["run_up"] / part["step"]
+    return "\n".join(
+        [
+            "## Non-linear bearings\n",
+            f"{circumstances(part)} In turns in one process, medians of {part['rounds']} rounds, ratios within a "
+            "round; processor time.\n",
+            "### One row, half of its elements loaded, the cage turning\n",
+            table(
+                ["row", "µs", "of a linear connector"],
+                [[row["row"], number(row["microseconds"], 2), number(row["ratio"], 2)] for row in rows],
+            ),
+            "### A step of the GRC, variant bushing, compiled solver\n",
+            f'`law = "iso16281"`, `cage = "turning"`; steps of {1e6 * part["step"]:.2f} µs by RK4, signals and files '
+            "aside.\n",
+            table(
+                [
+                    "non-linear",
+                    "rows",
+                    "rolling elements",
+                    "tables",
+                    "µs per step",
+                    "ratio",
+                    f"run-up of {number(part['run_up'])} s",
+                    "added per row and evaluation",
+                ],
+                [
+                    [
+                        str(row["bearings"]),
+                        str(row["rows"]),
+                        str(row["elements"]),
+                        f"{number(row['table_MB'], 2)} MB",
+                        number(row["microseconds_per_step"]),
+                        number(row["ratio"]),
+                        duration(row["run_up_s"]),
+                        f"{number(row['added_per_row'], 2)} µs",
+                    ]
+                    for row in runs
+                ],
+            ),
+            items(
+                [
+                    "What bounds it: four evaluations a step, each following every loaded element through its table. A "
+                    f"method with one evaluation a step would add {duration(added)} to the run-up for all "
+                    f"{every['bearings']}.",
+                ]
+            ),
+        ]
+    )
+
+
 SECTIONS = {
     "startup": startup_section,
     "tables": tables_section,
     "dynamics": dynamics_section,
     "grids": grids_section,
     "elastic": elastic_section,
+    "bearings": bearings_section,
 }
 
 

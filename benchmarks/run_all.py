@@ -55,6 +55,13 @@ def measure_elastic(quick: bool) -> dict[str, Any]:
     return elastic.measure(quick)
 
 
+def measure_bearings(quick: bool) -> dict[str, Any]:
+    """See `bearings`."""
+    import bearings
+
+    return bearings.measure(quick)
+
+
 def measure_startup(quick: bool) -> dict[str, Any]:
     """See `startup`."""
     import startup
@@ -68,6 +75,7 @@ PARTS: dict[str, Callable[[bool], dict[str, Any]]] = {
     "dynamics": measure_dynamics,
     "grids": measure_grids,
     "elastic": measure_elastic,
+    "bearings": measure_bearings,
 }
 
 

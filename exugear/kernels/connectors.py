@@ -16,10 +16,10 @@ from exugear.kernels.rolling import (
     CAGE_TORQUE,
     DAMPED_PART,
     ELASTIC_PART,
-    FORCES_SIZE,
     RollingArrays,
     no_rolling,
     rolling_forces,
+    rolling_memory,
     selected_rolling,
 )
 from fe_ste.tools.arrays import Floats, Integers
@@ -176,7 +176,7 @@ def connector_load(q: Floats, v: Floats, n: int, connectors: ConnectorArrays, ar
     local = connectors.stiffness[n] @ motion[DISPLACEMENT] + connectors.damping[n] @ motion[RATE]
     torque = 0.0
     if connectors.rolling.first[n] < connectors.rolling.first[n + 1]:
-        forces = np.empty(FORCES_SIZE)
+        forces = rolling_memory(connectors.rolling)
         turned = turn_between(q, n, connectors)
         rolling_forces(n, motion[DISPLACEMENT], motion[RATE], turned, connectors.rolling, forces)
         for i in range(BODY_SIZE):

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fe_ste.tools.arrays import Floats, Integers
-from fe_ste.tools.compilation import summing_kernel
+from fe_ste.tools.compilation import compiled, summing_kernel
 
 ROLLER, BALL, ALIGNED_BALL = range(3)
 """Values of `FORM`."""
@@ -41,9 +41,8 @@ STRIP_SIZE = 6
 PATCH_SIZE = 16
 ELASTIC_PART, DAMPED_PART, CAGE_TORQUE, STORED, MEMORY = 0, 6, 12, 13, 14
 """Entries of what `rolling_forces` fills: six elastic forces, six damped ones, torque, energy, memory."""
-FORCES_SIZE = 35
-SUMS_SIZE, ENERGY = 11, 10
-"""Sums over elements in the cage's axes: five elastic forces, five damped ones, energy."""
+ENERGY, TURNED, TOUCHING, CONTACT_SIZE = 10, 25, 35, 4
+"""Memory: sums in the cage's axes (elastic forces, damped ones, energy), the motion in them, elements in touch."""
 LINE_POWER = 10.0 / 9.0
 """Load of a line contact over its approach (ISO/TS 16281)."""
 
@@ -110,6 +109,15 @@ def selected_rolling(rolling: RollingArrays, connectors: Integers) -> RollingArr
     )
 
 
+@compiled
+def rolling_memory(rolling: RollingArrays) -> Floats:
+    """Memory for `rolling_forces`, which also holds what it finds."""
+    most = 0
+    for r in range(rolling.layout.shape[0]):
+        most = max(most, rolling.layout[r, COUNT])
+    return np.zeros(TOUCHING + CONTACT_SIZE * most)
+
+
 @summing_kernel
 def slices_law(r: int, d: float, w: float, rolling: RollingArrays) -> tuple[float, float, float, float, float, float]:
     """Sum over the slices of a roller: U, its derivatives by d and w, then by d d, d w, w w."""
@@ -140,27 +148,45 @@ def cubic(patch: Floats, n: int, y: float) -> tuple[float, float, float]:
 
 
 @summing_kernel
-def roller_law(r: int, d: float, w: float, rolling: RollingArrays) -> tuple[float, float, float, float, float, float]:
-    """Potential of a roller at the approach d (m) of its middle and the tilt w (rad), as `slices_law`, from its table.
+def first_contact(r: int, d: float, tilt: float, rolling: RollingArrays) -> tuple[float, int, float]:
+    """Depth (m) of an element whose normal stays behind its first contact, not above zero where it is apart.
 
-    With the depth s = d - D(w) behind first contact and x = sqrt(s) the table has V(x, w) = U / s^2, even in w. It
-    hardly varies, so that cubics serve from first touch to the limit of the raceways. Beyond it slices are summed.
+    Also the strip of its tilt (rad, not negative) in the table of the row and the share of the strip's width. Without
+    the table, beyond its tilts, the depth is the table's limit.
     """
-    geometry, layout, tilt = rolling.geometry[r], rolling.layout[r], abs(w)
+    geometry, layout = rolling.geometry[r], rolling.layout[r]
+    if layout[FORM] != ROLLER:
+        return d, 0, 0.0
     if d + layout[HALF_SLICES] * geometry[SLICE_LENGTH] * tilt <= 0.0:  # not even an end of the roller
-        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        return 0.0, 0, 0.0
     if tilt >= geometry[MOST_TILT]:
-        return slices_law(r, d, w, rolling)
+        return geometry[MOST_DEPTH], 0, 0.0
     j = int(math.sqrt(tilt * geometry[PER_TILT]))
     at = layout[TABLE] + STRIP_SIZE * j
     strip = rolling.tables[at : at + STRIP_SIZE]
-    per = strip[STRIP_PER]
-    y = (tilt - strip[STRIP_TILT]) * per
-    depth = d - (((strip[3] * y + strip[2]) * y + strip[1]) * y + strip[0])
-    if depth <= 0.0:
-        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    y = (tilt - strip[STRIP_TILT]) * strip[STRIP_PER]
+    return d - (((strip[3] * y + strip[2]) * y + strip[1]) * y + strip[0]), j, y
+
+
+@summing_kernel
+def contact_law(
+    r: int, d: float, w: float, depth: float, j: int, y: float, rolling: RollingArrays
+) -> tuple[float, float, float, float, float, float]:
+    """Potential of an element at the approach d (m) and the tilt w (rad), as `slices_law`, after `first_contact`.
+
+    With the depth s = d - D(w) behind first contact and x = sqrt(s) the table of a roller has V(x, w) = U / s^2, even
+    in w. It hardly varies, so that cubics serve from first touch to the limit of the raceways. Beyond it slices are
+    summed.
+    """
+    geometry, layout = rolling.geometry[r], rolling.layout[r]
+    if layout[FORM] != ROLLER:
+        stiff = geometry[CONSTANT] * math.sqrt(d)
+        return 0.4 * stiff * d * d, stiff * d, 0.0, 1.5 * stiff, 0.0, 0.0
     if depth >= geometry[MOST_DEPTH]:
         return slices_law(r, d, w, rolling)
+    at = layout[TABLE] + STRIP_SIZE * j
+    strip = rolling.tables[at : at + STRIP_SIZE]
+    per = strip[STRIP_PER]
     slope = ((3.0 * strip[3] * y + 2.0 * strip[2]) * y + strip[1]) * per
     bend = (6.0 * strip[3] * y + 2.0 * strip[2]) * per * per
     root, per_root = math.sqrt(depth), geometry[PER_ROOT]
@@ -193,12 +219,10 @@ def roller_law(r: int, d: float, w: float, rolling: RollingArrays) -> tuple[floa
 @summing_kernel
 def normal_law(r: int, d: float, w: float, rolling: RollingArrays) -> tuple[float, float, float, float, float, float]:
     """Potential of an element whose normal stays, as `slices_law`."""
-    if rolling.layout[r, FORM] == ROLLER:
-        return roller_law(r, d, w, rolling)
-    if d <= 0.0:
+    depth, j, y = first_contact(r, d, abs(w), rolling)
+    if depth <= 0.0:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    root = rolling.geometry[r, CONSTANT] * math.sqrt(d)
-    return 0.4 * root * d * d, root * d, 0.0, 1.5 * root, 0.0, 0.0
+    return contact_law(r, d, w, depth, j, y, rolling)
 
 
 @summing_kernel
@@ -221,8 +245,11 @@ def ball_law(r: int, x: float, y: float, rolling: RollingArrays) -> tuple[float,
 
 
 @summing_kernel
-def add_normal_row(r: int, turned: Floats, rolling: RollingArrays, sums: Floats) -> None:
-    """Add energy and forces of a row whose normals stay to sums: see `rolling_forces`."""
+def add_normal_row(r: int, turned: Floats, rolling: RollingArrays, sums: Floats, touching: Floats) -> None:
+    """Add energy and forces of a row whose normals stay to sums: see `rolling_forces`.
+
+    In two passes over `touching`: one element's way through its table is long, and many at once are on it like this.
+    """
     x, y, z, a, b = turned[0], turned[1], turned[2], turned[3], turned[4]
     dx, dy, dz, da, db = turned[5], turned[6], turned[7], turned[8], turned[9]
     row = rolling.geometry[r]
@@ -233,11 +260,20 @@ def add_normal_row(r: int, turned: Floats, rolling: RollingArrays, sums: Floats)
     a, b, da, db = tilting * a, tilting * b, tilting * da, tilting * db
     energy, f, fc, fs, mc, ms, g, gc, gs, nc, ns = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     start = rolling.layout[r, CIRCLE]
+    count = 0
     for k in range(start, start + rolling.layout[r, COUNT]):
         c, s = rolling.circle[k, 0], rolling.circle[k, 1]
-        u, force, moment, dd, dw, ww = normal_law(r, d0 + dc * c + ds * s, a * s - b * c, rolling)
-        if u == 0.0:
-            continue
+        depth, j, y = first_contact(r, d0 + dc * c + ds * s, abs(a * s - b * c), rolling)
+        if depth > 0.0:
+            o = CONTACT_SIZE * count
+            touching[o], touching[o + 1], touching[o + 2], touching[o + 3] = k, depth, j, y
+            count += 1
+    for n in range(count):
+        o = CONTACT_SIZE * n
+        k, depth, j, y = int(touching[o]), touching[o + 1], int(touching[o + 2]), touching[o + 3]
+        c, s = rolling.circle[k, 0], rolling.circle[k, 1]
+        d, w = d0 + dc * c + ds * s, a * s - b * c
+        u, force, moment, dd, dw, ww = contact_law(r, d, w, depth, j, y, rolling)
         energy += u
         f += force
         fc += force * c
@@ -317,7 +353,7 @@ def turn_pairs(cosine: float, sine: float, values: Floats) -> None:
 
 @summing_kernel
 def rolling_forces(n: int, strain: Floats, rate: Floats, turn: float, rolling: RollingArrays, out: Floats) -> None:
-    """Fill elastic and damped forces, cage torque and energy of connector n into out (35,).
+    """Fill elastic and damped forces, cage torque and energy of connector n into out (m,), see `rolling_memory`.
 
     Parameters
     ----------
@@ -326,7 +362,7 @@ def rolling_forces(n: int, strain: Floats, rate: Floats, turn: float, rolling: R
     rate : (6,) velocity and angular velocity likewise, m/s, rad/s
     turn : spin of the second body less that of the first, rad
     rolling : RollingArrays
-    out : (35,) elastic part from `ELASTIC_PART` and damped part from `DAMPED_PART` on, six each, of force and moment
+    out : (m,) elastic part from `ELASTIC_PART` and damped part from `DAMPED_PART` on, six each, of force and moment
         on the first body (N, N m); at `CAGE_TORQUE` the derivative of the energy by `turn` (N m), which acts on the
         first body's spin and against that of the second; at `STORED` the energy (J); the rest is memory
 
@@ -338,7 +374,7 @@ def rolling_forces(n: int, strain: Floats, rate: Floats, turn: float, rolling: R
     scale = rolling.scale[n]
     angle = rolling.phase[n] + rolling.cage_ratio[n] * turn
     cosine, sine = math.cos(angle), math.sin(angle)
-    sums, turned = out[MEMORY : MEMORY + SUMS_SIZE], out[MEMORY + SUMS_SIZE :]
+    sums, turned, touching = out[MEMORY:TURNED], out[TURNED:TOUCHING], out[TOUCHING:]
     sums[:] = 0.0
     slow = scale * rolling.time[n]
     for i in range(5):
@@ -351,7 +387,7 @@ def rolling_forces(n: int, strain: Floats, rate: Floats, turn: float, rolling: R
         if rolling.layout[r, FORM] == BALL:
             add_ball_row(r, turned, rolling, sums)
         else:
-            add_normal_row(r, turned, rolling, sums)
+            add_normal_row(r, turned, rolling, sums, touching)
     # A cage that turns ahead does what the ring does that stays behind.
     about_axis = turned[1] * sums[0] - turned[0] * sums[1] + turned[4] * sums[3] - turned[3] * sums[4]
     turn_pairs(cosine, sine, sums)

@@ -18,7 +18,7 @@ from exugear.kernels.connectors import connector_load, connector_motion, turn_be
 from exugear.kernels.elastic import elastic_energies, scratch_for
 from exugear.kernels.inertia import kinetic_energies
 from exugear.kernels.meshes import DEFLECTION, ENERGY, FORCE, OUTSIDE, STATE_SIZE
-from exugear.kernels.rolling import CAGE_TORQUE, DAMPED_PART, ELASTIC_PART, FORCES_SIZE, STORED, rolling_forces
+from exugear.kernels.rolling import CAGE_TORQUE, DAMPED_PART, ELASTIC_PART, STORED, rolling_forces, rolling_memory
 from exugear.kernels.turning import turning_energies, turning_memory
 from exugear.model.sections.entries import GROUND
 from exugear.tooth_mesh.laws.forms import mesh_state
@@ -137,7 +137,7 @@ def bearing_energies(q, v, connectors, out) -> None:
     couples tilt and translation the elastic force then does a little work of its own, of second order.
     """
     turn, arms, motion = np.empty((3, 3)), np.empty((2, 3)), np.empty((3, 6))
-    forces = np.empty(FORCES_SIZE)
+    forces = rolling_memory(connectors.rolling)
     for n in range(connectors.bodies.shape[0]):
         connector_motion(q, v, n, connectors, turn, arms, motion)
         elastic = connectors.stiffness[n] @ motion[0]

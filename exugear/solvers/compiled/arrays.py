@@ -156,7 +156,7 @@ class Work(NamedTuple):
     frames : (b + e + 1, 16) rotation matrix, angular velocity, sine and cosine of the tilts
     wrench : (b + e + 1, 6) force and moment on each body, global axes
     motion : (4, 6) strain, its rate, the true rate of change, force of a connector in its own axes
-    rolling : (35,) see `exugear.kernels.rolling.rolling_forces`
+    rolling : (m,) see `exugear.kernels.rolling.rolling_forces`
     mesh : memory of the meshes' laws
     series : (s,) line of each torque series that was used last
     scratch, memory : memory of the elastic bodies, and of those in turning frames

@@ -9,7 +9,7 @@ from exugear.kernels.coordinates import BODY_SIZE, SPIN, TILT
 from exugear.kernels.elastic import elastic_motion, scratch_for
 from exugear.kernels.fast_meshes import Meshes, MeshMemory
 from exugear.kernels.meshes import FRAME, ROW_SIZE, SPIN_1, SPIN_2
-from exugear.kernels.rolling import FORCES_SIZE
+from exugear.kernels.rolling import rolling_memory
 from exugear.kernels.table_law import scratch_memory
 from exugear.kernels.turning import turning_memory
 from exugear.model.sections.entries import GROUND
@@ -234,7 +234,7 @@ def work_for(equations: Equations, q: Floats, v: Floats) -> Work:
         frames=frames,
         wrench=np.zeros((equations.bodies.start.size, BODY_SIZE)),
         motion=np.zeros((4, BODY_SIZE)),
-        rolling=np.zeros(FORCES_SIZE),
+        rolling=rolling_memory(equations.connectors.rolling),
         mesh=MeshMemory(
             gradient=np.zeros((3, ROW_SIZE)),
             states=np.zeros((count, 4)),

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from exugear.kernels.coordinates import BODY_SIZE, SPIN
-from exugear.kernels.rolling import CAGE_TORQUE, DAMPED_PART, ELASTIC_PART, FORCES_SIZE, rolling_forces
+from exugear.kernels.rolling import CAGE_TORQUE, DAMPED_PART, ELASTIC_PART, rolling_forces, rolling_memory
 from exugear.model.parts import Joint
 from exugear.solvers.exudyn_model.library import items
 from exugear.solvers.exudyn_model.parts import Parts
@@ -48,7 +48,7 @@ def _rolling_law(parts: Parts, n: int) -> Callable[..., Floats]:
     """User function of a support whose rolling law acts beside its matrices; it stands in for both."""
     bearing, rolling = parts.assembly.supports[n], parts.assembly.connectors.rolling
     first, second = (parts.support_spin(body, bearing.name) for body in (bearing.on, bearing.body))
-    forces = np.empty(FORCES_SIZE)
+    forces = rolling_memory(rolling)
 
     def law(
         mbs: Any,

@@ -16,12 +16,12 @@ from exugear.kernels.rolling import (
     CAGE_TORQUE,
     DAMPED_PART,
     ELASTIC_PART,
-    FORCES_SIZE,
     MEMORY,
     STORED,
     RollingArrays,
     no_rolling,
     rolling_forces,
+    rolling_memory,
     rolling_tangent,
     selected_rolling,
 )
@@ -59,7 +59,7 @@ def alone(
 def forces(
     arrays: RollingArrays, strain: np.ndarray, rate: np.ndarray | None = None, turn: float = 0.0, n: int = 0
 ) -> np.ndarray:
-    out = np.empty(FORCES_SIZE)
+    out = rolling_memory(arrays)
     rolling_forces(n, strain, np.zeros(6) if rate is None else rate, turn, arrays, out)
     return out[:MEMORY]
 

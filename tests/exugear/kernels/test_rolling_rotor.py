@@ -14,7 +14,7 @@ from exugear.bearings.rolling.potential import rolling_arrays
 from exugear.bearings.rolling.rows import RollingRow
 from exugear.kernels.connectors import ConnectorArrays, add_connector_forces
 from exugear.kernels.inertia import InertiaArrays, accelerations, kinetic_energies
-from exugear.kernels.rolling import FORCES_SIZE, STORED, rolling_forces, rolling_tangent
+from exugear.kernels.rolling import STORED, rolling_forces, rolling_memory, rolling_tangent
 
 from ..rolling_case import BALLS, CYLINDRICAL
 
@@ -62,7 +62,7 @@ class Rotor:
 
     def energy(self, q: np.ndarray, v: np.ndarray) -> float:
         """Kinetic, elastic and that of the force, J."""
-        kinetic, forces = np.empty(1), np.empty(FORCES_SIZE)
+        kinetic, forces = np.empty(1), rolling_memory(self.connectors.rolling)
         kinetic_energies(q, v, self.inertia, kinetic)
         total = kinetic[0] - PULL @ q + 0.5 * len(PLACES) * FLOOR[2, 2] * q[2] ** 2
         for n in range(len(PLACES)):

@@ -18,6 +18,8 @@ from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.exudyn_model.system import ExudynSystem
 from exugear.solvers.loads import Loading, LoadTable
 
+from ..assembled import assembled
+from ..floating_case import FLOATING_CASE
 from ..rolling_case import BALLS, CYLINDRICAL, TAPERED, on_rolling
 
 LOAD = {"carrier": 240e3, "hss": -3000.0}
@@ -92,3 +94,35 @@ def test_rows_within_their_clearance_leave_a_run_as_it_is_bit_by_bit(
     one, other = (compiled_run(assembly, *start, 200) for assembly in (linear, loose))
     assert np.array_equal(one[0], other[0])
     assert np.array_equal(one[1], other[1])
+
+
+def test_a_floating_shaft_feels_its_rollers_as_in_the_frame_that_does_not_turn(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
+    """Supports of floating bodies take another way into Exudyn; spins, and so cages, come from Euler parameters."""
+    path = tmp_path_factory.mktemp("floating") / "case.toml"
+    path.write_text(FLOATING_CASE, encoding="utf-8")
+    mesh = 2e8 * (1.0 + 0.1 * np.cos(2.0 * np.pi * np.arange(50) / 50))
+    floating = assembled(Gearbox.from_toml(path), Choice("flexible"), {"pair": mesh})
+    start = accelerating_start(floating, {"shaft": 6.0, "wheel": 9.0}, 420.0)
+    small = replace(CYLINDRICAL, element_diameter=0.008, pitch_diameter=0.06, effective_length=0.01)
+    ends = []
+    for frame in (floating, without_floating_frames(floating)):
+        # Light enough for the case: 2e7 N/m by rollers instead of springs, preloaded by a few um.
+        assembly = on_rolling(frame, [(replace(small, radial_clearance=-1e-6),)], stiffness=0.5)
+        system = ExudynSystem(assembly, start.q, start.v, Loading({"shaft": 6.0, "wheel": 9.0}))
+        system.run(0.0, 100, 1e-5, explicit=False)
+        ends.append(system.state()[1])
+    moved = ends[1] - start.q
+    place = floating.elastic_slices["shaft"]
+    for motions in ((0, 1, 2), (3, 4)):
+        own = [i for i in range(place.start, place.start + 24) if (i - place.start) % 6 in motions]
+        # As of linear bearings: second order in the tilts is left out in the frame that does not turn.
+        assert np.abs(ends[0] - ends[1])[own].max() < 2e-3 * np.abs(moved[own]).max()
+        assert np.abs(moved[own]).max() > 1e-7
+
+
+def without_floating_frames(assembly: Assembly) -> Assembly:
+    """The same reduced bodies on their own coordinates."""
+    bodies = {name: replace(body, floating=None) for name, body in assembly.elastic_bodies.items()}
+    return replace(assembly, elastic_bodies=bodies)
