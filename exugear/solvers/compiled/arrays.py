@@ -50,7 +50,7 @@ class Bodies(NamedTuple):
 
 
 class Connectors(NamedTuple):
-    """6x6 connectors, those between the same bodies one after the other, entries that are not zero as lists.
+    """6x6 connectors, those between the same bodies one after the other.
 
     Attributes
     ----------
@@ -60,9 +60,10 @@ class Connectors(NamedTuple):
     gap : (c, 3) second attachment against the first at zero angles, m
     repeated : (c,) 1 where the one before has the same ends, so that angles and their rates are known
     twisting : (c,) 1 where the angle about z acts on these ends, else 0
-    first : (c + 1,) first entry of each connector
-    row, column : (e,) where each entry stands in the 6x6 matrix
-    stiffness, damping : (e,) its values
+    stiffness : (c, 6, 6) by column and row, N/m .. N m/rad
+    time : (c,) damping over stiffness where the two are in proportion, s
+    damping : (c, 6, 6) by column and row where they are not
+    damped : (c,) 1 where they are not, else 0
     rolling : rolling laws, in parallel to these
     """
 
@@ -72,11 +73,10 @@ class Connectors(NamedTuple):
     gap: Floats
     repeated: Integers
     twisting: Integers
-    first: Integers
-    row: Integers
-    column: Integers
     stiffness: Floats
+    time: Floats
     damping: Floats
+    damped: Integers
     rolling: RollingArrays
 
 

@@ -145,12 +145,17 @@ def add_rolling(q: Floats, n: int, bodies: Bodies, connectors: Connectors, work:
 def connector_force(n: int, connectors: Connectors, work: Work) -> None:
     """Fill the force of connector n on its first body, in that body's axes, into `work.motion`."""
     strain, rate, force = work.motion[STRAIN], work.motion[STRAIN_RATE], work.motion[LOCAL_FORCE]
+    stiffness, time = connectors.stiffness[n], connectors.time[n]
     force[:] = 0.0
-    for entry in range(connectors.first[n], connectors.first[n + 1]):
-        column = connectors.column[entry]
-        force[connectors.row[entry]] += (
-            connectors.stiffness[entry] * strain[column] + connectors.damping[entry] * rate[column]
-        )
+    for column in range(BODY_SIZE):
+        # Damping in proportion to the stiffness acts as a strain that is ahead of itself.
+        ahead = strain[column] + time * rate[column]
+        for row in range(BODY_SIZE):
+            force[row] += stiffness[column, row] * ahead
+    if connectors.damped[n] == 1:
+        for column in range(BODY_SIZE):
+            for row in range(BODY_SIZE):
+                force[row] += connectors.damping[n, column, row] * rate[column]
 
 
 @kernel

@@ -183,12 +183,13 @@ def observe_connectors(
         true_rate(n, turn, work)
         strain, rate = work.motion[STRAIN], work.motion[STRAIN_RATE]
         derivative, force = work.motion[TRUE_RATE], work.motion[LOCAL_FORCE]
-        force[:] = 0.0
-        for entry in range(connectors.first[n], connectors.first[n + 1]):
-            row, column = connectors.row[entry], connectors.column[entry]
-            elastic = connectors.stiffness[entry] * strain[column]
-            damped = connectors.damping[entry] * rate[column]
-            force[row] += elastic + damped
+        for row in range(BODY_SIZE):
+            elastic, damped = 0.0, 0.0
+            for column in range(BODY_SIZE):
+                stiffness = connectors.stiffness[n, column, row]
+                elastic += stiffness * strain[column]
+                damped += (connectors.time[n] * stiffness + connectors.damping[n, column, row]) * rate[column]
+            force[row] = elastic + damped
             energy[ELASTIC] += 0.5 * elastic * strain[row]
             energy[DISSIPATED] += damped * rate[row]
             energy[OF_BEARING_RATES] += elastic * (rate[row] - derivative[row])

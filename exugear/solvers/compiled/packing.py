@@ -72,17 +72,16 @@ def _connectors(numbers: _Numbers) -> tuple[Connectors, Integers]:
     ends = ends[order]
     slots = np.zeros(len(numbers.starts) + 1, dtype=np.int64)
     twisting = np.zeros(len(ends), dtype=np.int64)
-    first, entries = [0], []
+    matrices = np.zeros((2, len(ends), BODY_SIZE, BODY_SIZE))
+    time = np.zeros(len(ends))
     for n, (i, j) in enumerate(ends):
         stiffness, damping = _without_round_off(given.stiffness[n]), _without_round_off(given.damping[n])
+        time[n] = _damping_time(stiffness, damping)
+        matrices[:, n] = stiffness.T, damping.T * (time[n] == 0.0)
         twisting[(ends == ends[n]).all(axis=1)] |= stiffness[:, SPIN].any()
         for end, needed in ((i, True), (j, stiffness[:, SPIN].any() or given.local[n, 1, :2].any())):
             if needed and end < len(numbers.starts):
                 slots[end] = numbers.slot(numbers.starts[end] + SPIN)
-        filled = np.argwhere((stiffness != 0.0) | (damping != 0.0))
-        entries += [(r, c, stiffness[r, c], damping[r, c]) for r, c in filled]
-        first.append(len(entries))
-    columns = list(zip(*entries, strict=True)) if entries else [(), (), (), ()]
     connectors = Connectors(
         number=order,
         ends=ends,
@@ -90,14 +89,22 @@ def _connectors(numbers: _Numbers) -> tuple[Connectors, Integers]:
         gap=(given.node[:, 1] + given.local[:, 1]) - (given.node[:, 0] + given.local[:, 0]),
         repeated=np.append(0, (ends[1:] == ends[:-1]).all(axis=1)).astype(np.int64)[: len(ends)],
         twisting=twisting,
-        first=np.array(first, dtype=np.int64),
-        row=np.array(columns[0], dtype=np.int64),
-        column=np.array(columns[1], dtype=np.int64),
-        stiffness=np.array(columns[2], dtype=np.float64),
-        damping=np.array(columns[3], dtype=np.float64),
+        stiffness=matrices[0],
+        time=time,
+        damping=matrices[1],
+        damped=matrices[1].any(axis=(1, 2)).astype(np.int64),
         rolling=given.rolling,
     )
     return connectors, slots
+
+
+def _damping_time(stiffness: Floats, damping: Floats) -> float:
+    """Damping over stiffness (s) if they are in proportion, else 0."""
+    largest = np.unravel_index(np.argmax(np.abs(stiffness)), stiffness.shape)
+    if stiffness[largest] == 0.0:
+        return 0.0
+    time = float(damping[largest] / stiffness[largest])
+    return time if np.allclose(damping, time * stiffness, rtol=1e-12, atol=1e-14 * np.abs(damping).max()) else 0.0
 
 
 def _without_round_off(matrix: Floats) -> Floats:
