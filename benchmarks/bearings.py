@@ -13,8 +13,8 @@ import numpy as np
 from dynamics import stiffness_of
 from timing import CASE, median, say, timed
 
-from exugear.bearings.potential import rolling_arrays
-from exugear.bearings.rows import BallRow, RollerRow, RollingRow
+from exugear.bearings.rolling.potential import rolling_arrays
+from exugear.bearings.rolling.rows import BallRow, RollerRow, RollingRow
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.statics import accelerating_start
