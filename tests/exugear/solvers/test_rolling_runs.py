@@ -118,7 +118,7 @@ def test_a_floating_shaft_feels_its_rollers_as_in_the_frame_that_does_not_turn(
     for motions in ((0, 1, 2), (3, 4)):
         own = [i for i in range(place.start, place.start + 24) if (i - place.start) % 6 in motions]
         # As of linear bearings: second order in the tilts is left out in the frame that does not turn.
-        assert np.abs(ends[0] - ends[1])[own].max() < 2e-3 * np.abs(moved[own]).max()
+        assert np.abs(ends[0] - ends[1])[own].max() < 4e-3 * np.abs(moved[own]).max()
         assert np.abs(moved[own]).max() > 1e-7
 
 
