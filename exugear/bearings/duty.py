@@ -18,7 +18,7 @@ from exugear.bearings.rolling.ratings import (
     equivalent_static_load,
 )
 from exugear.bearings.rolling.rows import BearingError, BearingOfRows
-from exugear.bearings.support_laws import holds_one_way
+from exugear.bearings.support_laws import holds_one_way, law_in_words
 from exugear.model.sections.connections import CatalogueSection
 from fe_ste.tools.arrays import Floats
 
@@ -63,8 +63,8 @@ class BearingDuty:
 
     Attributes
     ----------
-    name, family, kind : str
-        Its name, that of its section, and the type of bearing.
+    name, family, kind, law : str
+        Its name, that of its section, the type of bearing, and what its force follows.
     radial_load, axial_load : float
         Of the shaft on the inner ring, what its rows carry, N.
     reaction : float, optional
@@ -88,6 +88,7 @@ class BearingDuty:
     name: str
     family: str
     kind: str
+    law: str
     radial_load: float
     axial_load: float
     reaction: float | None
@@ -130,6 +131,7 @@ def duty_of(point: OperatingPoint, reaction: Floats | None = None) -> BearingDut
         name=bearing.name,
         family=bearing.family,
         kind=section.type,
+        law=law_in_words(bearing),
         radial_load=radial,
         axial_load=axial,
         stiffness=point.stiffness,

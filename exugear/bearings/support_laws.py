@@ -68,6 +68,23 @@ class SupportLaw:
     phase: float = 0.0
 
 
+def law_in_words(bearing: Bearing) -> str:
+    """Say what a bearing's force follows.
+
+    Examples
+    --------
+    >>> from exugear.model.gearbox import Gearbox
+    >>> bearings = {bearing.family: bearing for bearing in Gearbox.from_toml("cases/grc750/gearbox.toml").bearings}
+    >>> [law_in_words(bearings[name]) for name in ("plc_a", "pl_a")]
+    ['linear, at a stated load', 'linear, at the static load']
+    """
+    if bearing.catalogue is None:
+        return "linear, stiffness given"
+    if bearing.law == "iso16281":
+        return f"rows by ISO/TS 16281, cage {bearing.cage}"
+    return "linear, at the static load" if is_catalogued(bearing) else "linear, at a stated load"
+
+
 def is_catalogued(bearing: Bearing) -> bool:
     """Tell whether rows of rolling elements give a bearing's stiffness at the load that the statics find."""
     return bearing.catalogue is not None and bearing.catalogue.radial_load_kN is None

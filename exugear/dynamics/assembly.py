@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exugear.bearings.operating_point import OperatingPoint
+from exugear.bearings.support_laws import law_in_words
 from exugear.bodies.elastic_body import ElasticBody
 from exugear.bodies.floating_body import FloatingBody
 from exugear.bodies.turning_frame import TurningBody, turning_arrays
@@ -190,6 +191,13 @@ class Assembly:
         """Factor on bearings' stiffness that stands for their seats: 1 where an elastic housing has these itself."""
         replaced = self.variant == "flexible" and all(support.factor == 1.0 for support in self.supports)
         return 1.0 if replaced else self.gearbox.case.housing.factor
+
+    @cached_property
+    def bearing_laws(self) -> str:
+        """What the force of each bearing follows, planets together: an attribute of files."""
+        held = {bearing.name for bearing in self.gearbox.bearings}
+        laws = {support.family: law_in_words(support) for support in self.supports if support.name in held}
+        return "; ".join(f"{name}: {words}" for name, words in laws.items())
 
     @cached_property
     def spin(self) -> dict[str, int]:

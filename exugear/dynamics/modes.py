@@ -122,6 +122,7 @@ class Modes:
             "input_hash": input_hash(assembly),
             "method_version": MODES,
             "housing_factor": assembly.housing_factor,
+            "bearing_laws": assembly.bearing_laws,
             "growth_rate": self.growth_rate,
         }
         return xr.Dataset(variables, coordinates, attributes)

@@ -12,6 +12,7 @@ from typing import Final
 
 from exugear.model.named_files import Permissions
 from exugear.report import page
+from exugear.report.bearings import bearings_section
 from exugear.report.context import Context
 from exugear.report.inputs import assumptions_section, provenance_section, times_section
 from exugear.report.modes import modes_section
@@ -24,6 +25,7 @@ from fe_ste.tools.files import write_file
 SECTIONS: Final[tuple[Callable[[Context, StoredResults], str], ...]] = (
     runs_section,
     modes_section,
+    bearings_section,
     tables_section,
     times_section,
     provenance_section,

@@ -18,6 +18,7 @@ def duty_summary(duty: BearingDuty) -> dict[str, Any]:
     return {
         "bearing": duty.name,
         "type": duty.kind,
+        "law": duty.law,
         "radial_load_kN": 1e-3 * duty.radial_load,
         "axial_load_kN": 1e-3 * duty.axial_load,
         "reaction_kN": None if duty.reaction is None else 1e-3 * duty.reaction,

@@ -90,6 +90,7 @@ class RunPlan:
             "input_hash": input_hash(assembly, self.case.name),
             "method_version": RUN,
             "housing_factor": assembly.housing_factor,
+            "bearing_laws": assembly.bearing_laws,
             "ratio": gearbox.train.ratio,
             "output_base_radius": gearbox.gears[gearbox.case.overall.output_gear].base_radius,
             "highest_order": max(gearbox.train.mesh_frequencies(2.0 * math.pi).values()),
