@@ -190,14 +190,15 @@ def _remarks(point: OperatingPoint, ratings: Ratings, reaction: Floats | None) -
 def estimate_effects(point: OperatingPoint) -> tuple[Sensitivity, ...]:
     """Radial stiffness at both ends of each dimension that the file leaves open, under the load of an operating point.
 
-    The cage stands in one position: what counts is the difference.
+    What changes is taken in one position of the cage.
     """
     section = point.bearing.catalogue
     assert section is not None
+    share = point.radial_stiffness / _radial_stiffness(section, point)
     effects = []
     for estimate in estimates(section):
         limits = (estimate.low, estimate.high)
-        ends = [_radial_stiffness(with_estimate(section, estimate, limit), point) for limit in limits]
+        ends = [share * _radial_stiffness(with_estimate(section, estimate, limit), point) for limit in limits]
         effects.append(Sensitivity(estimate.key, estimate.value, *limits, *ends))
     return tuple(effects)
 

@@ -72,7 +72,9 @@ class OperatingPoint:
         return math.hypot(self.displacement[3], self.displacement[4])
 
 
-def operating_point(bearing: Bearing, displacement: Floats, load_stands_still: bool) -> OperatingPoint:
+def operating_point(
+    bearing: Bearing, displacement: Floats, load_stands_still: bool, first_roller_angle: float = 0.0
+) -> OperatingPoint:
     """Find what a bearing carries at a displacement of its rings, and its stiffness there.
 
     Parameters
@@ -83,6 +85,8 @@ def operating_point(bearing: Bearing, displacement: Floats, load_stands_still: b
         Inner ring relative to outer ring, m and rad, in the axes of what the bearing sits on.
     load_stands_still : bool
         Whether the load keeps its direction in these axes; else the stiffness is the same in all directions.
+    first_roller_angle : float
+        Polar angle of the first rolling element at which the displacement holds the load, rad.
 
     Notes
     -----
@@ -92,10 +96,10 @@ def operating_point(bearing: Bearing, displacement: Floats, load_stands_still: b
     assert bearing.catalogue is not None
     rows = catalogue_rows(bearing.catalogue)
     pitch = 2.0 * math.pi / rows[0].element_count
-    load, stiffness = np.zeros(6), np.zeros((6, 6))
+    load = bearing_load(row_contacts(rows, first_roller_angle), displacement)
+    stiffness = np.zeros((6, 6))
     for position in range(CAGE_POSITIONS):
-        contacts = row_contacts(rows, pitch * position / CAGE_POSITIONS)
-        load += bearing_load(contacts, displacement) / CAGE_POSITIONS
+        contacts = row_contacts(rows, first_roller_angle + pitch * position / CAGE_POSITIONS)
         stiffness += tangent_stiffness(contacts, displacement) / CAGE_POSITIONS
     least = LEAST_LOAD * basic_dynamic_rating(rows, bearing.catalogue.type)
     is_unloaded = float(np.linalg.norm(load[:3])) < least

@@ -109,12 +109,13 @@ def _point(assembly: Assembly, support: Bearing, law: SupportLaw, strain: Floats
     displacement = law.scale * strain
     rows = bearing_rows(support)
     if rows != law.rows:  # its seat yields, and it has clearance
-        force = bearing_load(row_contacts(law.rows), displacement)[:3]
+        force = bearing_load(row_contacts(law.rows, law.phase), displacement)[:3]
         if force.any():
-            displacement = equilibrium(BearingOfRows(rows), force, tilt=displacement[3:5]).displacement
+            tilt, angle = displacement[3:5], law.phase
+            displacement = equilibrium(BearingOfRows(rows), force, tilt=tilt, first_roller_angle=angle).displacement
     bodies = {body.name: body for body in assembly.gearbox.bodies()}
     sits_still = support.on not in bodies or bodies[support.on].fixed or bodies[support.body].carrier == support.on
-    return operating_point(support, displacement, sits_still)
+    return operating_point(support, displacement, sits_still, law.phase)
 
 
 def _final_law(assembly: Assembly, support: Bearing, point: OperatingPoint | None) -> SupportLaw:

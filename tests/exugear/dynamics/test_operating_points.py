@@ -45,8 +45,7 @@ def test_loads_are_those_of_the_lever(tmp_path):
     shares = {name: point.radial_load / MESH_FORCE for name, point in points.items()}
     expected = {"ball": 0.6, "roller": 0.4, "taper_1": 0.6, "taper_2": 0.4}
     assert shares == pytest.approx(expected, rel=0.05)
-    # Told is the mean over positions of the cage at the displacement that balances in one of them.
-    assert shares["ball"] + shares["roller"] == pytest.approx(1.0, rel=5e-3)
+    assert shares["ball"] + shares["roller"] == pytest.approx(1.0, rel=1e-3)
 
 
 def test_tapered_rollers_push_each_other_along_the_axis(tmp_path):

@@ -1,0 +1,129 @@
+"""The verb `bearings`, what `check` says of bearings, and runs and modes of non-linear ones."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from typer.testing import CliRunner
+
+from exugear.cli.app import app
+from exugear.dynamics.modes import load_modes
+from exugear.dynamics.signals import energy_residual
+from exugear.results.run_file import load_run
+
+from ..bearing_case import BEARING_CASE, NAMES
+
+FIGURES = {"radial_load_kN", "radial_stiffness_N_per_m", "contact_pressure_MPa", "L10_Mrev", "L10r_Mrev", "remarks"}
+
+
+@pytest.fixture
+def case(tmp_path: Path) -> Path:
+    path = tmp_path / "bearing_case.toml"
+    path.write_text(BEARING_CASE, encoding="utf-8")
+    return path
+
+
+def exugear(*arguments: object):
+    return CliRunner().invoke(app, [*map(str, arguments)])
+
+
+def rewritten(case: Path, *changes: tuple[str, str]) -> Path:
+    content = case.read_text(encoding="utf-8")
+    for old, new in changes:
+        assert old in content
+        content = content.replace(old, new)
+    case.write_text(content, encoding="utf-8")
+    return case
+
+
+def non_linear(case: Path) -> Path:
+    for name in NAMES:
+        rewritten(case, (f"[bearings.{name}]\n", f'[bearings.{name}]\nlaw = "iso16281"\ncage = "turning"\n'))
+    return case
+
+
+def test_bearings_prints_a_table_and_writes_the_same_figures(case: Path) -> None:
+    out = case.parent / "out"
+    printed = exugear("bearings", case, "--out", out)
+    assert printed.exit_code == 0, printed.stderr
+    assert all(name in printed.stdout for name in NAMES)
+    told = json.loads(exugear("bearings", case, "--out", out, "--json").stdout)
+    written = json.loads(Path(told["file"]).read_text(encoding="utf-8"))
+    assert written["bearings"] == told["bearings"]
+    assert [bearing["bearing"] for bearing in told["bearings"]] == list(NAMES)
+    assert all(bearing.keys() >= FIGURES for bearing in told["bearings"])
+    assert len(written["input_hash"]) == 64
+
+
+def test_a_given_rating_replaces_the_estimated_one(case: Path) -> None:
+    section, ratings = "[bearings.ball.catalogue]\n", "dynamic_rating_kN = 14.0\nstatic_rating_kN = 7.8\n"
+    rated = rewritten(case, (section, section + ratings))
+    ball, roller, *_ = json.loads(exugear("bearings", rated, "--out", case.parent / "out", "--json").stdout)["bearings"]
+    assert (ball["dynamic_rating_kN"], ball["static_rating_kN"]) == (14.0, 7.8)
+    assert not ball["ratings_estimated"]
+    assert roller["ratings_estimated"]
+    # ISO 281: a pure radial load, so that P is F_r.
+    assert ball["L10_Mrev"] == pytest.approx((14.0 / ball["radial_load_kN"]) ** 3, rel=0.02)
+
+
+def test_check_tells_load_and_range_of_what_is_estimated_and_writes_nothing(case: Path) -> None:
+    summary = json.loads(exugear("check", case, "--json").stdout)
+    ball = summary["bearings"][0]
+    assert {"element_diameter_mm", "element_count", "radial_clearance_mm"} <= ball["estimated"].keys()
+    with_little, with_much = ball["estimated"]["radial_clearance_mm"]["radial_stiffness_N_per_m"]
+    assert with_little == pytest.approx(ball["radial_stiffness_N_per_m"])  # none is what is taken
+    assert with_much < with_little
+    assert any("taper_1: holds its inner ring along the axis in one direction only" in w for w in summary["warnings"])
+    assert [path.name for path in case.parent.iterdir()] == [case.name]
+
+
+def test_check_compares_a_stated_load_with_the_reaction(case: Path) -> None:
+    stated = rewritten(case, ("[bearings.ball.catalogue]\n", "[bearings.ball.catalogue]\nradial_load_kN = 9.0\n"))
+    warnings = json.loads(exugear("check", stated, "--json").stdout)["warnings"]
+    assert any("bearings.ball: radial_load_kN = 9 is stated, the static load gives 2." in line for line in warnings)
+
+
+def test_a_load_beyond_the_static_rating_is_told(case: Path) -> None:
+    heavy = rewritten(case, ("torques_N_m = { shaft_1 = 100.0 }, locked", "torques_N_m = { shaft_1 = 1200.0 }, locked"))
+    warnings = json.loads(exugear("check", heavy, "--json").stdout)["warnings"]
+    assert any(
+        "ball: equivalent static load" in line and "beyond its estimated static rating" in line for line in warnings
+    )
+
+
+def test_what_holds_no_axial_load_fails_with_the_bearings_named(case: Path) -> None:
+    loose = rewritten(case, ('holds_towards = "-z"', 'holds_towards = "+z"'))
+    failed = exugear("bearings", loose, "--out", case.parent / "out")
+    assert failed.exit_code == 1
+    assert "taper_1, taper_2: held along the axis in one direction only" in failed.stderr
+    said = json.loads(exugear("check", loose, "--json").stdout)
+    assert any("taper_1, taper_2" in line for line in said["warnings"])
+
+
+@pytest.mark.parametrize(("options", "words"), [(["--variant", "rigid"], "ideal joints in place of bearings")])
+def test_bearings_refuses_what_has_none(case: Path, options: list[str], words: str) -> None:
+    refused = exugear("bearings", case, "--out", case.parent / "out", *options)
+    assert refused.exit_code == 2
+    assert words in refused.stderr
+    assert not (case.parent / "out").exists()
+
+
+def test_non_linear_bearings_go_through_modes_run_and_file(case: Path) -> None:
+    """By the compiled solver, cages turning: energy closes, and the files say what the bearings follow."""
+    out = case.parent / "out"
+    common = [non_linear(case), "--variant", "bushing", "--mesh-law", "iso6336", "--out", out]
+    assert exugear("modes", *common).exit_code == 0
+    ran = exugear("run", *common, "--duration", 0.2)
+    assert ran.exit_code == 0, ran.stderr
+    run = load_run(next(out.rglob("run.nc")))
+    modes = load_modes(next(out.rglob("modes.nc")))
+    words = "; ".join(f"{name}: rows by ISO/TS 16281, cage turning" for name in NAMES)
+    assert run.attrs["bearing_laws"] == modes.attrs["bearing_laws"] == words
+    assert abs(energy_residual(run)) < 1e-5
+    force = np.linalg.norm(run["support_force"].to_numpy()[:, :, :2], axis=2)
+    assert isinstance(run, xr.Dataset)
+    assert np.all(force[len(force) // 2 :].mean(axis=0) > 100.0)
