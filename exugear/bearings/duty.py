@@ -22,8 +22,9 @@ from exugear.bearings.support_laws import holds_one_way, law_in_words
 from exugear.model.sections.connections import CatalogueSection
 from fe_ste.tools.arrays import Floats
 
-STATED_DEVIATION = 0.1
-"""Deviation of a stated radial load from the reaction beyond which a remark says so."""
+STATED_FACTOR = 3.0
+"""Factor between a stated radial load and the reaction beyond which a remark says so: stiffness goes with the tenth to
+the third power of the load."""
 
 
 @dataclass(frozen=True)
@@ -170,7 +171,7 @@ def _remarks(point: OperatingPoint, ratings: Ratings, reaction: Floats | None) -
         remarks.append("carries hardly anything: stiffness at a hundredth of its dynamic rating")
     if reaction is not None:
         found = math.hypot(reaction[0], reaction[1])
-        if abs(found - point.radial_load) > STATED_DEVIATION * max(found, point.radial_load):
+        if max(found, point.radial_load) > STATED_FACTOR * min(found, point.radial_load):
             remarks.append(
                 f"radial_load_kN = {1e-3 * point.radial_load:.4g} is stated, the static load gives {1e-3 * found:.4g}"
             )

@@ -41,7 +41,7 @@ def free_motion(gearbox: Gearbox, variant: str) -> str:
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
     >>> free_motion(gearbox, "bushing")
     ''
-    >>> pair = {"type": "cylindrical_roller", "contact_angle_deg": 0.0, "axial_load_kN": 0.0}
+    >>> pair = {"type": "cylindrical_roller", "contact_angle_deg": 0.0}
     >>> floating = {f"bearings.lss_bc.catalogue.{key}": value for key, value in pair.items()}
     >>> free_motion(gearbox.varied({**floating, "bearings.lss_a.stiffness": {}}), "bushing")
     'body lss can move along z without resistance; add or stiffen a bearing'

@@ -40,6 +40,8 @@ def check(case: CaseArgument, files_below: FilesBelowOption = None, as_json: Jso
                 print_table(title, [_load_row(one) for one in loads], ("loaded flanks",))
             if bearings:
                 print_table("Bearings under the static load", [_bearing_row(one) for one in bearings], ("most by",))
+                if any(one["reaction_kN"] is not None for one in bearings):
+                    say("* stated by the file, which the stiffness goes by")
             for variant, reason in variants.items():
                 say(f"variant {variant}: {f'not possible, {reason}' if reason else 'possible'}")
             for line in warnings:
@@ -132,10 +134,12 @@ def _bearing_row(summary: dict[str, Any]) -> dict[str, str]:
     }
     ends = [end for pair in ranges.values() for end in pair]
     spread = f"{1e-9 * min(ends):.3g} to {1e-9 * max(ends):.3g}" if ends else ""
+    stated = summary["reaction_kN"] is not None
     most = max(ranges, key=lambda key: max(ranges[key], default=0.0) - min(ranges[key], default=0.0), default="")
     return {
         "bearing": summary["bearing"],
-        "radial\nkN": f"{summary['radial_load_kN']:.4g}",
+        "radial\nkN": f"{summary['radial_load_kN']:.4g}{'*' if stated else ''}",
+        "statics\nkN": f"{summary['reaction_kN' if stated else 'radial_load_kN']:.4g}",
         "axial\nkN": f"{summary['axial_load_kN']:.4g}",
         "radial\nGN/m": f"{1e-9 * summary['radial_stiffness_N_per_m']:.3g}",
         "over the range\nof estimates": spread,

