@@ -64,8 +64,7 @@ def linearise(assembly: Assembly, q: Floats, meshes: MeshArrays | None = None) -
         stiffness[name], damping[name] = -jq, -jv
     for n, name in enumerate(assembly.connector_names):
         stiffness[name], damping[name] = np.zeros((assembly.size,) * 2), np.zeros((assembly.size,) * 2)
-        first = assembly.connectors.rolling.first
-        step = ROLLING_STEP if first[n + 1] > first[n] else DIFFERENCE_STEP
+        step = _connector_step(assembly, n)
         add_connector_tangents(q, n, step, assembly.connectors, stiffness[name], damping[name])
     for n, name in enumerate(assembly.spring_names):
         spring = SpringArrays._make(values[n : n + 1] for values in assembly.springs)
@@ -82,6 +81,36 @@ def linearise(assembly: Assembly, q: Floats, meshes: MeshArrays | None = None) -
         stiffness[f"{name}_body"] = matrix
         damping[f"{name}_body"] = assembly.gearbox.case.damping.body_time_s * matrix
     return Linearised(assembly.mass_at(q), stiffness, damping)
+
+
+def tangent_stiffness(assembly: Assembly, q: Floats, meshes: MeshArrays) -> Floats:
+    """Stiffness (size, size) of all elements together about the coordinates q at rest.
+
+    The sum over the elements of `linearise`, where no single one is asked for: a tenth of its time with elastic bodies.
+    """
+    size, rest = assembly.size, np.zeros(assembly.size)
+    stiffness, damping = -assembly.mesh_jacobians(q, rest, meshes)[0], np.zeros((size, size))
+    for n in range(len(assembly.connector_names)):
+        add_connector_tangents(q, n, _connector_step(assembly, n), assembly.connectors, stiffness, damping)
+    for i, (first, second) in enumerate(assembly.springs.coordinates):
+        for one, other in ((first, second), (second, first)):
+            stiffness[one, one] += assembly.springs.stiffness[i]
+            stiffness[one, other] -= assembly.springs.stiffness[i]
+    for name, of_body in assembly.elastic_slices.items():
+        if name not in assembly.turning:
+            stiffness[of_body, of_body] += assembly.elastic_bodies[name].reduced.stiffness
+            continue
+        body, place, still = assembly.turning[name], q[of_body], rest[of_body]
+        steps = DIFFERENCE_STEP * np.eye(len(place))
+        columns = [body.forces(place - e, still) - body.forces(place + e, still) for e in steps]
+        stiffness[of_body, of_body] += np.array(columns).T / (2.0 * DIFFERENCE_STEP)
+    return np.asarray(stiffness)
+
+
+def _connector_step(assembly: Assembly, n: int) -> float:
+    """Step of the differences that fits connector n."""
+    first = assembly.connectors.rolling.first
+    return ROLLING_STEP if first[n + 1] > first[n] else DIFFERENCE_STEP
 
 
 def _add_turning_forces(q: Floats, v: Floats, element: tuple[slice, TurningBody], f: Floats) -> None:

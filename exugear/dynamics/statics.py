@@ -15,7 +15,7 @@ import numpy as np
 import scipy.linalg
 
 from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.linearised import linearise
+from exugear.dynamics.linearised import tangent_stiffness
 from exugear.kernels.meshes import FORCE, MeshArrays
 from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
@@ -158,7 +158,7 @@ def locked_equilibrium(
             return free.T @ (assembly.forces(free @ x, rest, meshes) + applied)
 
         def derivative(held: Assembly, x: Floats) -> Floats:
-            stiffness = linearise(held, free @ x, held.meshes if meshes is None else meshes).total_stiffness
+            stiffness = tangent_stiffness(held, free @ x, held.meshes if meshes is None else meshes)
             return np.asarray(-free.T @ stiffness @ free)
 
         scale = np.full(start.size, _load_scale(applied))

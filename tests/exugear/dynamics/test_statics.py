@@ -9,6 +9,7 @@ import pytest
 
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.linearised import linearise, tangent_stiffness
 from exugear.dynamics.statics import BalanceError, accelerating_start, locked_equilibrium
 from exugear.kernels.connectors import add_connector_forces
 from exugear.model.choice import Choice
@@ -156,3 +157,14 @@ def test_unheld_structure_is_reported(grc: Gearbox, stiffness: dict) -> None:
     assembly = assemble(grc, Choice("rigid"), stiffness)
     with pytest.raises(BalanceError):
         locked_equilibrium(assembly, TORQUE, [])
+
+
+@pytest.mark.parametrize("variant", ["rigid", "bushing", "flexible"])
+def test_the_tangent_of_the_statics_is_the_sum_over_the_elements(
+    grc_shafts: Gearbox, stiffness: dict, variant: str
+) -> None:
+    assembly = assembled(grc_shafts, Choice(variant), stiffness)
+    q = 1e-5 * np.random.default_rng(3).normal(size=assembly.size)
+    expected = linearise(assembly, q).total_stiffness
+    found = tangent_stiffness(assembly, q, assembly.mean_meshes)
+    assert np.abs(found - expected).max() < 1e-12 * np.abs(expected).max()
