@@ -316,6 +316,22 @@ def faults_of_supports(case: CaseFile) -> Iterator[str]:
                     yield f"{key}.stiffness: is zero in all directions; give at least one above zero"
             if damping is not None:
                 yield from _faults_of_matrix(f"{key}.damping", damping)
+    yield from _bearings_at_one_place(case.bearings)
+
+
+def _bearings_at_one_place(bearings: Mapping[str, BearingSection]) -> Iterator[str]:
+    """Tell rolling bearings that stand in each other: on the same bodies, closer than half of both widths."""
+    names = [name for name, bearing in bearings.items() if bearing.catalogue is not None]
+    for place, first in enumerate(names):
+        for second in names[place + 1 :]:
+            one, other = bearings[first], bearings[second]
+            distance = abs(one.z_mm - other.z_mm)
+            half = 0.5 * sum(bearing.catalogue.width_mm for bearing in (one, other) if bearing.catalogue)
+            if (one.body, one.on) == (other.body, other.on) and distance < 0.5 * half:
+                yield (
+                    f"bearings.{second}.z_mm = {other.z_mm:g}: is where bearings.{first} is, {distance:g} mm away, and "
+                    f"both are bearings of {one.body} on {one.on}; give two places, or one bearing with an arrangement"
+                )
 
 
 def _faults_of_matrix(key: str, section: StiffnessSection) -> Iterator[str]:

@@ -128,3 +128,15 @@ def test_keys_of_a_type_alone_name_types_that_exist() -> None:
     known = set().union(*(types for types, _ in TYPES_OF_KEYS.values()))
     assert all(types for types, _ in TYPES_OF_KEYS.values())
     assert known <= set(Path("docs/user_guide.md").read_text(encoding="utf-8").replace("`", " ").split())
+
+
+@pytest.mark.parametrize(("distance", "said"), [(0.0, "0 mm away"), (7.0, "7 mm away"), (17.0, None)])
+def test_two_bearings_at_one_place_are_refused_by_name(content: Content, distance: float, said: str | None) -> None:
+    folder, case = content[0], copy.deepcopy(content[1])
+    second = copy.deepcopy(case["bearings"]["bearing_2"])
+    case["bearings"]["bearing_3"] = second | {"z_mm": second["z_mm"] + distance}
+    if said is None:  # side by side
+        Gearbox.from_dict(case, str(folder / "case.toml"))
+        return
+    with pytest.raises(CaseError, match=f"case.toml: bearings.bearing_3.z_mm.*is where bearings.bearing_2 is, {said}"):
+        Gearbox.from_dict(case, str(folder / "case.toml"))
