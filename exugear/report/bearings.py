@@ -51,7 +51,7 @@ def _row(duty: BearingDuty) -> dict[str, object]:
         "bearing": duty.name,
         "law": duty.law,
         "radial load / kN": f"{1e-3 * duty.radial_load:.4g}",
-        "axial load / kN": f"{1e-3 * duty.axial_load:.4g}",
+        "axial load / kN": f"{round(1e-3 * duty.axial_load, 3) + 0.0:.4g}",
         "radial / (GN/m)": f"{1e-9 * duty.radial_stiffness:.3g}",
         "axial / (GN/m)": f"{1e-9 * duty.stiffness[2, 2]:.3g}",
         "tilt / (MN m/rad)": f"{tilt:.3g}",

@@ -77,7 +77,7 @@ def _load_row(duty: BearingDuty) -> dict[str, str]:
     return {
         "bearing": duty.name,
         "radial\nkN": f"{1e-3 * duty.radial_load:.4g}",
-        "axial\nkN": f"{1e-3 * duty.axial_load:.4g}",
+        "axial\nkN": f"{round(1e-3 * duty.axial_load, 3) + 0.0:.4g}",
         "radial\nGN/m": f"{1e-9 * duty.radial_stiffness:.3g}",
         "axial\nGN/m": f"{1e-9 * duty.stiffness[2, 2]:.3g}",
         "tilt\nMN m/rad": f"{0.5e-6 * (duty.stiffness[3, 3] + duty.stiffness[4, 4]):.3g}",

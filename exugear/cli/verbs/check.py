@@ -140,7 +140,7 @@ def _bearing_row(summary: dict[str, Any]) -> dict[str, str]:
         "bearing": summary["bearing"],
         "radial\nkN": f"{summary['radial_load_kN']:.4g}{'*' if stated else ''}",
         "statics\nkN": f"{summary['reaction_kN' if stated else 'radial_load_kN']:.4g}",
-        "axial\nkN": f"{summary['axial_load_kN']:.4g}",
+        "axial\nkN": f"{round(summary['axial_load_kN'], 3) + 0.0:.4g}",
         "radial\nGN/m": f"{1e-9 * summary['radial_stiffness_N_per_m']:.3g}",
         "over the range\nof estimates": spread,
         "most by": most,
