@@ -18,7 +18,7 @@ from exugear.bearings.rolling.rows import BallRow, RollerRow, RollingRow
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.statics import accelerating_start
-from exugear.kernels.rolling import RollingArrays, rolling_forces, rolling_memory, rolling_tangent
+from exugear.kernels.rolling import RollingArrays, rolling_force, rolling_memory, rolling_tangent
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.solvers.compiled.arrays import Equations, Work
@@ -62,7 +62,7 @@ def linear_connectors(count: int, q: Floats, v: Floats, equations: Equations, wo
 def rows_forces(count: int, strains: Floats, rate: Floats, rolling: RollingArrays, out: Floats) -> None:
     """Take forces, damping and energy of a row, so many times, while the cage turns."""
     for n in range(count):
-        rolling_forces(0, strains[n % len(strains)], rate, 1e-3 * n, rolling, out)
+        rolling_force(0, strains[n % len(strains)], rate, 1e-3 * n, rolling, out)
 
 
 @kernel

@@ -14,11 +14,10 @@ import numpy as np
 from exugear.kernels.coordinates import BODY_SIZE, SPIN, TILT
 from exugear.kernels.rolling import (
     CAGE_TORQUE,
-    DAMPED_PART,
     ELASTIC_PART,
     RollingArrays,
     no_rolling,
-    rolling_forces,
+    rolling_force,
     rolling_memory,
     selected_rolling,
 )
@@ -178,9 +177,9 @@ def connector_load(q: Floats, v: Floats, n: int, connectors: ConnectorArrays, ar
     if connectors.rolling.first[n] < connectors.rolling.first[n + 1]:
         forces = rolling_memory(connectors.rolling)
         turned = turn_between(q, n, connectors)
-        rolling_forces(n, motion[DISPLACEMENT], motion[RATE], turned, connectors.rolling, forces)
+        rolling_force(n, motion[DISPLACEMENT], motion[RATE], turned, connectors.rolling, forces)
         for i in range(BODY_SIZE):
-            local[i] += forces[ELASTIC_PART + i] + forces[DAMPED_PART + i]
+            local[i] += forces[ELASTIC_PART + i]
         torque = forces[CAGE_TORQUE]
     for i in range(3):
         out[i] = turn[i, 0] * local[0] + turn[i, 1] * local[1] + turn[i, 2] * local[2]

@@ -9,8 +9,10 @@ has a potential U(q, z, w), which the tables and constants of `exugear.bearings.
     aligned      the same of d, without tilt: the outer raceway is a sphere about the bearing's middle
 
 Forces are its gradient, tangents its second derivatives: both exact, so that energy closes. A cage that turns with the
-rings (phi = phase + cage_ratio * spin between them) takes the torque -U_phi from them. Damping is time * tangent * rate
-and acts where something touches alone. Machine code is kept by `fe_ste.tools.compilation`.
+rings (phi = phase + cage_ratio * spin between them) takes the torque -U_phi from them. A damped row has the force of a
+displacement that is ahead by time * rate: to first order time * tangent * rate more. It acts where something touches
+alone, never pulls, takes energy at every rate (the potential is convex), and costs nothing. Machine code is kept by
+`fe_ste.tools.compilation`.
 """
 
 from __future__ import annotations
@@ -39,10 +41,10 @@ STRIP_TILT, STRIP_PER = 4, 5
 """In each strip of tilts behind the four coefficients of D: its first tilt, and 1 over its width."""
 STRIP_SIZE = 6
 PATCH_SIZE = 16
-ELASTIC_PART, DAMPED_PART, CAGE_TORQUE, STORED, MEMORY = 0, 6, 12, 13, 14
-"""Entries of what `rolling_forces` fills: six elastic forces, six damped ones, torque, energy, memory."""
-ENERGY, TURNED, TOUCHING, CONTACT_SIZE = 10, 25, 35, 4
-"""Memory: sums in the cage's axes (elastic forces, damped ones, energy), the motion in them, elements in touch."""
+ELASTIC_PART, DAMPED_PART, CAGE_TORQUE, CAGE_DAMPING, STORED, MEMORY = 0, 6, 12, 13, 14, 15
+"""Entries of what `rolling_forces` fills: six elastic forces, six damped ones, torque, its damped part, energy."""
+ENERGY, TURNED, TOUCHING, CONTACT_SIZE = 5, 21, 26, 4
+"""Memory: sums in the cage's axes (five forces, energy), the displacement in them, elements in touch."""
 LINE_POWER = 10.0 / 9.0
 """Load of a line contact over its approach (ISO/TS 16281)."""
 
@@ -246,19 +248,17 @@ def ball_law(r: int, x: float, y: float, rolling: RollingArrays) -> tuple[float,
 
 @summing_kernel
 def add_normal_row(r: int, turned: Floats, rolling: RollingArrays, sums: Floats, touching: Floats) -> None:
-    """Add energy and forces of a row whose normals stay to sums: see `rolling_forces`.
+    """Add forces and energy of a row whose normals stay to sums: see `sum_rows`.
 
     In two passes over `touching`: one element's way through its table is long, and many at once are on it like this.
     """
     x, y, z, a, b = turned[0], turned[1], turned[2], turned[3], turned[4]
-    dx, dy, dz, da, db = turned[5], turned[6], turned[7], turned[8], turned[9]
     row = rolling.geometry[r]
     cosine, sine, lever, tilting = row[COSINE], row[SINE], row[LEVER], row[TILTING]
     # Approach and tilt are sums of a constant, a cosine and a sine of the element's place.
     d0, dc, ds = sine * z - row[GAP], cosine * x - lever * b, cosine * y + lever * a
-    e0, ec, es = sine * dz, cosine * dx - lever * db, cosine * dy + lever * da
-    a, b, da, db = tilting * a, tilting * b, tilting * da, tilting * db
-    energy, f, fc, fs, mc, ms, g, gc, gs, nc, ns = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    a, b = tilting * a, tilting * b
+    energy, f, fc, fs, mc, ms = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     start = rolling.layout[r, CIRCLE]
     count = 0
     for k in range(start, start + rolling.layout[r, COUNT]):
@@ -272,83 +272,112 @@ def add_normal_row(r: int, turned: Floats, rolling: RollingArrays, sums: Floats,
         o = CONTACT_SIZE * n
         k, depth, j, y = int(touching[o]), touching[o + 1], int(touching[o + 2]), touching[o + 3]
         c, s = rolling.circle[k, 0], rolling.circle[k, 1]
-        d, w = d0 + dc * c + ds * s, a * s - b * c
-        u, force, moment, dd, dw, ww = contact_law(r, d, w, depth, j, y, rolling)
+        u, force, moment, _, _, _ = contact_law(r, d0 + dc * c + ds * s, a * s - b * c, depth, j, y, rolling)
         energy += u
         f += force
         fc += force * c
         fs += force * s
         mc += moment * c
         ms += moment * s
-        d_rate, w_rate = e0 + ec * c + es * s, da * s - db * c
-        force, moment = dd * d_rate + dw * w_rate, dw * d_rate + ww * w_rate
-        g += force
-        gc += force * c
-        gs += force * s
-        nc += moment * c
-        ns += moment * s
     sums[0] += cosine * fc
     sums[1] += cosine * fs
     sums[2] += sine * f
     sums[3] += lever * fs + tilting * ms
     sums[4] -= lever * fc + tilting * mc
-    sums[5] += cosine * gc
-    sums[6] += cosine * gs
-    sums[7] += sine * g
-    sums[8] += lever * gs + tilting * ns
-    sums[9] -= lever * gc + tilting * nc
     sums[ENERGY] += energy
 
 
 @summing_kernel
 def add_ball_row(r: int, turned: Floats, rolling: RollingArrays, sums: Floats) -> None:
-    """Add energy and forces of a row of balls to sums: see `rolling_forces`."""
+    """Add forces and energy of a row of balls to sums: see `sum_rows`."""
     x, y, z, a, b = turned[0], turned[1], turned[2], turned[3], turned[4]
-    dx, dy, dz, da, db = turned[5], turned[6], turned[7], turned[8], turned[9]
     row = rolling.geometry[r]
     radius, axial, radial_start, axial_start = row[RADIUS], row[AXIAL], row[CENTRE_RADIAL], row[CENTRE_AXIAL] + z
     energy, rc, rs, t, tc, ts = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    hc, hs, v, vc, vs = 0.0, 0.0, 0.0, 0.0, 0.0
     start = rolling.layout[r, CIRCLE]
     for k in range(start, start + rolling.layout[r, COUNT]):
         c, s = rolling.circle[k, 0], rolling.circle[k, 1]
         w = a * s - b * c
-        u, fx, fy, xx, xy, yy = ball_law(r, radial_start + x * c + y * s - axial * w, axial_start + radius * w, rolling)
-        if u == 0.0:
-            continue
+        u, fx, fy, _, _, _ = ball_law(r, radial_start + x * c + y * s - axial * w, axial_start + radius * w, rolling)
         energy += u
         rc += fx * c
         rs += fx * s
         t += fy
         tc += fy * c
         ts += fy * s
-        w = da * s - db * c
-        x_rate, y_rate = dx * c + dy * s - axial * w, dz + radius * w
-        fx, fy = xx * x_rate + xy * y_rate, xy * x_rate + yy * y_rate
-        hc += fx * c
-        hs += fx * s
-        v += fy
-        vc += fy * c
-        vs += fy * s
     sums[0] += rc
     sums[1] += rs
     sums[2] += t
     sums[3] += radius * ts - axial * rs
     sums[4] -= radius * tc - axial * rc
-    sums[5] += hc
-    sums[6] += hs
-    sums[7] += v
-    sums[8] += radius * vs - axial * hs
-    sums[9] -= radius * vc - axial * hc
     sums[ENERGY] += energy
 
 
 @summing_kernel
 def turn_pairs(cosine: float, sine: float, values: Floats) -> None:
-    """Turn the components across the axis of two displacements or loads (10,) about z by an angle."""
-    for n in (0, 3, 5, 8):
+    """Turn the components across the axis of a displacement or a load (5 or more,) about z by an angle."""
+    for n in (0, 3):
         x, y = values[n], values[n + 1]
         values[n], values[n + 1] = cosine * x - sine * y, sine * x + cosine * y
+
+
+@summing_kernel
+def sum_rows(
+    n: int, strain: Floats, rate: Floats, ahead: float, turn: float, rolling: RollingArrays, out: Floats
+) -> float:
+    """Fill forces and energy of connector n's rows into the sums in out, at a strain that is ahead by a time (s).
+
+    Returns the derivative of the energy by the angle of the cage (N m). See `rolling_forces`.
+
+    Notes
+    -----
+    The potential knows the tilts a and b, whose rates are w_x - b w_z and w_y + a w_z to first order where the second
+    body spins.
+    """
+    scale = rolling.scale[n]
+    angle = rolling.phase[n] + rolling.cage_ratio[n] * turn
+    cosine, sine = math.cos(angle), math.sin(angle)
+    sums, turned, touching = out[MEMORY:TURNED], out[TURNED:TOUCHING], out[TOUCHING:]
+    sums[:] = 0.0
+    for i in range(5):
+        turned[i] = scale * (strain[i] + ahead * rate[i])
+    turned[3] -= scale * ahead * strain[4] * rate[5]
+    turned[4] += scale * ahead * strain[3] * rate[5]
+    # In the cage's axes elements stay where they are.
+    turn_pairs(cosine, -sine, turned)
+    for r in range(rolling.first[n], rolling.first[n + 1]):
+        if rolling.layout[r, FORM] == BALL:
+            add_ball_row(r, turned, rolling, sums)
+        else:
+            add_normal_row(r, turned, rolling, sums, touching)
+    # A cage that turns ahead does what the ring does that stays behind.
+    about_axis = turned[1] * sums[0] - turned[0] * sums[1] + turned[4] * sums[3] - turned[3] * sums[4]
+    turn_pairs(cosine, sine, sums)
+    return float(about_axis)
+
+
+@summing_kernel
+def set_force(n: int, part: int, strain: Floats, about_axis: float, rolling: RollingArrays, out: Floats) -> None:
+    """Fill force and moment on the first body (6,) from `part` on, and the cage's torque, from the sums in out.
+
+    Moments that do no work on the spin have the part a M_y - b M_x about z.
+    """
+    sense, share = (1.0, rolling.scale[n]) if rolling.scale[n] > 0.0 else (-1.0, -rolling.scale[n])
+    for i in range(5):
+        out[part + i] = sense * out[MEMORY + i]
+    out[part + 5] = strain[3] * out[part + 4] - strain[4] * out[part + 3]
+    out[CAGE_TORQUE] = rolling.cage_ratio[n] * about_axis / share
+    out[STORED] = out[MEMORY + ENERGY] / share
+
+
+@summing_kernel
+def rolling_force(n: int, strain: Floats, rate: Floats, turn: float, rolling: RollingArrays, out: Floats) -> None:
+    """Fill the force of connector n with its damping from `ELASTIC_PART` on, and the cage's torque at `CAGE_TORQUE`.
+
+    Both parts of `rolling_forces` together, for half of its time.
+    """
+    about_axis = sum_rows(n, strain, rate, rolling.time[n], turn, rolling, out)
+    set_force(n, ELASTIC_PART, strain, about_axis, rolling, out)
 
 
 @summing_kernel
@@ -364,40 +393,17 @@ def rolling_forces(n: int, strain: Floats, rate: Floats, turn: float, rolling: R
     rolling : RollingArrays
     out : (m,) elastic part from `ELASTIC_PART` and damped part from `DAMPED_PART` on, six each, of force and moment
         on the first body (N, N m); at `CAGE_TORQUE` the derivative of the energy by `turn` (N m), which acts on the
-        first body's spin and against that of the second; at `STORED` the energy (J); the rest is memory
-
-    Notes
-    -----
-    The potential knows the tilts a and b, whose rates are w_x - b w_z and w_y + a w_z to first order where the second
-    body spins. Moments that do no work on the spin have the part a M_y - b M_x about z.
+        first body's spin and against that of the second, at `CAGE_DAMPING` what damping adds to it; at `STORED` the
+        energy (J); the rest is memory
     """
-    scale = rolling.scale[n]
-    angle = rolling.phase[n] + rolling.cage_ratio[n] * turn
-    cosine, sine = math.cos(angle), math.sin(angle)
-    sums, turned, touching = out[MEMORY:TURNED], out[TURNED:TOUCHING], out[TOUCHING:]
-    sums[:] = 0.0
-    slow = scale * rolling.time[n]
-    for i in range(5):
-        turned[i], turned[5 + i] = scale * strain[i], slow * rate[i]
-    turned[8] -= slow * strain[4] * rate[5]
-    turned[9] += slow * strain[3] * rate[5]
-    # In the cage's axes elements stay where they are.
-    turn_pairs(cosine, -sine, turned)
-    for r in range(rolling.first[n], rolling.first[n + 1]):
-        if rolling.layout[r, FORM] == BALL:
-            add_ball_row(r, turned, rolling, sums)
-        else:
-            add_normal_row(r, turned, rolling, sums, touching)
-    # A cage that turns ahead does what the ring does that stays behind.
-    about_axis = turned[1] * sums[0] - turned[0] * sums[1] + turned[4] * sums[3] - turned[3] * sums[4]
-    turn_pairs(cosine, sine, sums)
-    sense, share = (1.0, scale) if scale > 0.0 else (-1.0, -scale)
-    for i in range(5):
-        out[ELASTIC_PART + i], out[DAMPED_PART + i] = sense * sums[i], sense * sums[5 + i]
-    for part in (ELASTIC_PART, DAMPED_PART):
-        out[part + 5] = strain[3] * out[part + 4] - strain[4] * out[part + 3]
-    out[CAGE_TORQUE] = rolling.cage_ratio[n] * about_axis / share
-    out[STORED] = sums[ENERGY] / share
+    about_axis = sum_rows(n, strain, rate, rolling.time[n], turn, rolling, out)
+    set_force(n, DAMPED_PART, strain, about_axis, rolling, out)
+    damped_torque = out[CAGE_TORQUE]
+    about_axis = sum_rows(n, strain, rate, 0.0, turn, rolling, out)
+    set_force(n, ELASTIC_PART, strain, about_axis, rolling, out)
+    for i in range(6):
+        out[DAMPED_PART + i] -= out[ELASTIC_PART + i]
+    out[CAGE_DAMPING] = damped_torque - out[CAGE_TORQUE]
 
 
 @summing_kernel

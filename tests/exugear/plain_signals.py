@@ -18,7 +18,15 @@ from exugear.kernels.connectors import connector_load, connector_motion, turn_be
 from exugear.kernels.elastic import elastic_energies, scratch_for
 from exugear.kernels.inertia import kinetic_energies
 from exugear.kernels.meshes import DEFLECTION, ENERGY, FORCE, OUTSIDE, STATE_SIZE
-from exugear.kernels.rolling import CAGE_TORQUE, DAMPED_PART, ELASTIC_PART, STORED, rolling_forces, rolling_memory
+from exugear.kernels.rolling import (
+    CAGE_DAMPING,
+    CAGE_TORQUE,
+    DAMPED_PART,
+    ELASTIC_PART,
+    STORED,
+    rolling_forces,
+    rolling_memory,
+)
 from exugear.kernels.turning import turning_energies, turning_memory
 from exugear.model.sections.entries import GROUND
 from exugear.tooth_mesh.laws.forms import mesh_state
@@ -151,6 +159,7 @@ def bearing_energies(q, v, connectors, out) -> None:
             elastic = forces[ELASTIC_PART:DAMPED_PART]
             out[4] += np.dot(elastic, motion[1]) - np.dot(elastic[:5], motion[2, :5])
             out[1] += np.dot(forces[DAMPED_PART:CAGE_TORQUE], motion[1])
+            out[1] += forces[CAGE_DAMPING] * turn_between(v, n, connectors)
 
 
 @numba.njit

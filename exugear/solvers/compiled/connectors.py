@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from exugear.kernels.coordinates import BODY_SIZE, SPIN, TILT
-from exugear.kernels.rolling import CAGE_TORQUE, DAMPED_PART, ELASTIC_PART, rolling_forces
+from exugear.kernels.rolling import CAGE_TORQUE, ELASTIC_PART, rolling_force
 from exugear.solvers.compiled.arrays import (
     COS_A,
     COS_B,
@@ -119,20 +119,19 @@ def move_connector(
 
 
 @kernel
-def roll(q: Floats, n: int, bodies: Bodies, connectors: Connectors, work: Work) -> None:
-    """Fill `work.rolling` with the rolling law of connector n, after `move_connector`."""
-    # The ground points to a coordinate that stays zero.
+def turn_between(values: Floats, n: int, bodies: Bodies, connectors: Connectors) -> float:
+    """Spin of the second body of connector n less that of the first (rad), or their rates; the ground's stays zero."""
     first, second = bodies.start[connectors.ends[n, 0]], bodies.start[connectors.ends[n, 1]]
-    turn = q[second + SPIN] - q[first + SPIN]
-    rolling_forces(n, work.motion[STRAIN], work.motion[STRAIN_RATE], turn, connectors.rolling, work.rolling)
+    return float(values[second + SPIN] - values[first + SPIN])
 
 
 @kernel
 def add_rolling(q: Floats, n: int, bodies: Bodies, connectors: Connectors, work: Work) -> None:
     """Add the rolling law of connector n to its force in `work.motion`, its cage's torque to the spins."""
-    roll(q, n, bodies, connectors, work)
+    turn = turn_between(q, n, bodies, connectors)
+    rolling_force(n, work.motion[STRAIN], work.motion[STRAIN_RATE], turn, connectors.rolling, work.rolling)
     for i in range(BODY_SIZE):
-        work.motion[LOCAL_FORCE, i] += work.rolling[ELASTIC_PART + i] + work.rolling[DAMPED_PART + i]
+        work.motion[LOCAL_FORCE, i] += work.rolling[ELASTIC_PART + i]
     ground = bodies.start.size - 1
     first, second = connectors.ends[n, 0], connectors.ends[n, 1]
     if first != ground:

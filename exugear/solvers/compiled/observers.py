@@ -31,7 +31,7 @@ from exugear.kernels.fast_meshes import (
     Meshes,
     mesh_row,
 )
-from exugear.kernels.rolling import DAMPED_PART, ELASTIC_PART, STORED
+from exugear.kernels.rolling import CAGE_DAMPING, DAMPED_PART, ELASTIC_PART, STORED, rolling_forces
 from exugear.kernels.table_law import ENERGY_DERIVATIVES, NOMINAL_MISALIGNMENT
 from exugear.kernels.travelling import place_travelling
 from exugear.kernels.turning import turning_energies
@@ -55,7 +55,7 @@ from exugear.solvers.compiled.arrays import (
     Springs,
     Work,
 )
-from exugear.solvers.compiled.connectors import move_connector, place_bodies, roll
+from exugear.solvers.compiled.connectors import move_connector, place_bodies, turn_between
 from exugear.solvers.compiled.equations import set_loads
 from exugear.solvers.compiled.meshes import mesh_law, mesh_motion
 from exugear.solvers.compiled.packing import equations_of, work_for
@@ -152,11 +152,14 @@ def true_rate(n: int, first_body: Floats, work: Work) -> None:
 
 
 @kernel
-def observe_rolling(q: Floats, n: int, bodies: Bodies, connectors: Connectors, work: Work, energy: Floats) -> None:
+def observe_rolling(
+    q: Floats, v: Floats, n: int, bodies: Bodies, connectors: Connectors, work: Work, energy: Floats
+) -> None:
     """Add the rolling law of connector n to its force in `work.motion`, and energy and powers (see `observe`)."""
-    roll(q, n, bodies, connectors, work)
-    rate, derivative = work.motion[STRAIN_RATE], work.motion[TRUE_RATE]
+    strain, rate, derivative = work.motion[STRAIN], work.motion[STRAIN_RATE], work.motion[TRUE_RATE]
+    rolling_forces(n, strain, rate, turn_between(q, n, bodies, connectors), connectors.rolling, work.rolling)
     energy[ELASTIC] += work.rolling[STORED]
+    energy[DISSIPATED] += work.rolling[CAGE_DAMPING] * turn_between(v, n, bodies, connectors)
     for i in range(BODY_SIZE):
         elastic, damped = work.rolling[ELASTIC_PART + i], work.rolling[DAMPED_PART + i]
         work.motion[LOCAL_FORCE, i] += elastic + damped
@@ -194,7 +197,7 @@ def observe_connectors(
             energy[DISSIPATED] += damped * rate[row]
             energy[OF_BEARING_RATES] += elastic * (rate[row] - derivative[row])
         if connectors.rolling.first[n] < connectors.rolling.first[n + 1]:
-            observe_rolling(q, n, bodies, connectors, work, energy)
+            observe_rolling(q, v, n, bodies, connectors, work, energy)
         first = columns.support_force + 3 * connectors.number[n]
         for i in range(3):
             o = 3 * i

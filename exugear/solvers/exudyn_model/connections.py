@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from exugear.kernels.coordinates import BODY_SIZE, SPIN
-from exugear.kernels.rolling import CAGE_TORQUE, DAMPED_PART, ELASTIC_PART, rolling_forces, rolling_memory
+from exugear.kernels.rolling import CAGE_TORQUE, ELASTIC_PART, rolling_force, rolling_memory
 from exugear.model.parts import Joint
 from exugear.solvers.exudyn_model.library import items
 from exugear.solvers.exudyn_model.parts import Parts
@@ -63,9 +63,9 @@ def _rolling_law(parts: Parts, n: int) -> Callable[..., Floats]:
         *frames: Any,
     ) -> Floats:
         strain, rate = np.array([*displacement, *rotation]), np.array([*velocity, *angular_velocity])
-        rolling_forces(n, strain, rate, second() - first(), rolling, forces)
+        rolling_force(n, strain, rate, second() - first(), rolling, forces)
         load: Floats = stiffness @ strain + damping @ rate
-        load += forces[ELASTIC_PART : ELASTIC_PART + BODY_SIZE] + forces[DAMPED_PART : DAMPED_PART + BODY_SIZE]
+        load += forces[ELASTIC_PART : ELASTIC_PART + BODY_SIZE]
         load[SPIN] += forces[CAGE_TORQUE]
         return load
 
