@@ -108,7 +108,8 @@ def _bearing_summaries(gearbox: Gearbox) -> tuple[list[dict[str, Any]], list[str
         with model_errors():
             assembly = assemble(gearbox, Choice("bushing", law), mesh_stiffness(gearbox, law))
             duties = {duty.family: duty for duty in reversed(bearing_duties(assembly))}
-            effects = {point.bearing.family: estimate_effects(point) for point in bearing_points(assembly)}
+            points = {point.bearing.family: point for point in reversed(bearing_points(assembly))}
+            effects = {family: estimate_effects(point) for family, point in points.items()}
     except FailedError as error:
         return [], [f"bearings: {error}"]
     summaries = []
