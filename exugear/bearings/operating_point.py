@@ -9,7 +9,7 @@ import numpy as np
 
 from exugear.bearings import matrices
 from exugear.bearings.rolling.catalogue import catalogue_rows
-from exugear.bearings.rolling.contact import bearing_load, pitch_averaged_tangent, row_contacts, tangent_stiffness
+from exugear.bearings.rolling.contact import bearing_load, elastic_energy, pitch_averaged_tangent, row_contacts, tangent_stiffness
 from exugear.bearings.rolling.ratings import basic_dynamic_rating
 from exugear.bearings.rolling.rows import BearingOfRows, RollingRow
 from exugear.bearings.support_laws import LEAST_LOAD, holding_force
@@ -91,7 +91,8 @@ def operating_point(
     Notes
     -----
     The tangent holds the load's direction apart from the one across it: with clearance, fewer rolling elements resist a
-    motion across the load. A bearing that carries less than `LEAST_LOAD` of its rating gets the stiffness at that load.
+    motion across the load. A bearing without preload that carries less than `LEAST_LOAD` of its rating gets the
+    stiffness at that load.
     """
     assert bearing.catalogue is not None
     rows = catalogue_rows(bearing.catalogue)
@@ -102,7 +103,8 @@ def operating_point(
         contacts = row_contacts(rows, first_roller_angle + pitch * position / CAGE_POSITIONS)
         stiffness += tangent_stiffness(contacts, displacement) / CAGE_POSITIONS
     least = LEAST_LOAD * basic_dynamic_rating(rows, bearing.catalogue.type)
-    is_unloaded = float(np.linalg.norm(load[:3])) < least
+    is_preloaded = elastic_energy(row_contacts(rows), np.zeros(6)) > 0.0
+    is_unloaded = not is_preloaded and float(np.linalg.norm(load[:3])) < least
     if is_unloaded:
         stiffness = pitch_averaged_tangent(BearingOfRows(rows), holding_force(rows, least))
     if is_unloaded or not load_stands_still:

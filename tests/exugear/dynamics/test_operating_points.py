@@ -96,6 +96,14 @@ def test_a_bearing_without_load_has_the_stiffness_at_the_least_one(tmp_path):
     assert LEAST_LOAD == 0.01
 
 
+def test_preload_keeps_a_bearing_stiff_without_load(tmp_path):
+    keys = {"static_load__torques_N_m": {"shaft_1": 0.1}}
+    preloaded = {**keys, "bearings__roller__catalogue__radial_clearance_mm": -0.02}
+    plain, tight = (points_of(on_bearings(bearing_gearbox(tmp_path, **each)))["roller"] for each in (keys, preloaded))
+    assert (plain.is_unloaded, tight.is_unloaded) == (True, False)
+    assert tight.radial_stiffness > 1.5 * plain.radial_stiffness
+
+
 def test_clearance_makes_a_linear_bearing_softer_and_its_seat_takes_no_share_of_it(tmp_path):
     """The same load, fewer rollers: with a housing factor and without one."""
     keys = {"bearings__roller__catalogue__radial_clearance_mm": 0.04}
