@@ -9,7 +9,13 @@ import numpy as np
 
 from exugear.bearings import matrices
 from exugear.bearings.rolling.catalogue import catalogue_rows
-from exugear.bearings.rolling.contact import bearing_load, elastic_energy, pitch_averaged_tangent, row_contacts, tangent_stiffness
+from exugear.bearings.rolling.contact import (
+    bearing_load,
+    elastic_energy,
+    pitch_averaged_tangent,
+    row_contacts,
+    tangent_stiffness,
+)
 from exugear.bearings.rolling.ratings import basic_dynamic_rating
 from exugear.bearings.rolling.rows import BearingOfRows, RollingRow
 from exugear.bearings.support_laws import LEAST_LOAD, holding_force
