@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exugear.bearings.operating_point import OperatingPoint
+from exugear.bearings.operating_point import OperatingPoint, cage_angles
 from exugear.bearings.rolling.catalogue import catalogue_rows, estimates, with_estimate
 from exugear.bearings.rolling.contact import BearingState, bearing_state, equilibrium, row_contacts, tangent_stiffness
-from exugear.bearings.rolling.life import basic_rating_life, reference_life
+from exugear.bearings.rolling.life import basic_rating_life, minimum_load, reference_life
 from exugear.bearings.rolling.ratings import (
     basic_dynamic_rating,
     basic_static_rating,
@@ -18,7 +18,7 @@ from exugear.bearings.rolling.ratings import (
     equivalent_static_load,
 )
 from exugear.bearings.rolling.rows import BearingError, BearingOfRows
-from exugear.bearings.support_laws import holds_one_way, law_in_words
+from exugear.bearings.support_laws import LEAST_LOAD, holding_force, holds_one_way, law_in_words
 from exugear.model.sections.connections import CatalogueSection
 from fe_ste.tools.arrays import Floats
 
@@ -125,7 +125,10 @@ def duty_of(point: OperatingPoint, reaction: Floats | None = None) -> BearingDut
     bearing, rows, section = point.bearing, point.rows, point.bearing.catalogue
     assert section is not None
     ratings = ratings_of(section)
-    state = bearing_state(row_contacts(rows), point.displacement)
+    states = [
+        bearing_state(row_contacts(rows, angle), point.displacement)
+        for angle in cage_angles(rows, point.first_roller_angle)
+    ]
     radial, axial = point.radial_load, float(point.load[2])
     equivalent = equivalent_load(rows, section.type, radial, abs(axial), ratings.static)
     return BearingDuty(
@@ -138,13 +141,13 @@ def duty_of(point: OperatingPoint, reaction: Floats | None = None) -> BearingDut
         stiffness=point.stiffness,
         radial_stiffness=point.radial_stiffness,
         misalignment=point.misalignment,
-        element_load=float(state.element_load.max(initial=0.0)),
-        pressure=float(state.element_pressure.max(initial=0.0)),
+        element_load=max(float(state.element_load.max()) for state in states),
+        pressure=max(float(state.element_pressure.max()) for state in states),
         ratings=ratings,
         basic_life=basic_rating_life(ratings.dynamic, equivalent, section.type),
         reference_life=reference_life(
             rows,
-            loads_of_rows(state),
+            [np.concatenate(loads) for loads in zip(*map(loads_of_rows, states), strict=True)],
             section.type,
             dynamic_rating=ratings.dynamic,
             inner_ring_turns_against_load=not bearing.carries_outer_ring,
@@ -169,6 +172,8 @@ def _remarks(point: OperatingPoint, ratings: Ratings, reaction: Floats | None) -
     remarks = []
     if point.is_unloaded:
         remarks.append("carries hardly anything: stiffness at a hundredth of its dynamic rating")
+    elif math.hypot(point.radial_load, float(point.load[2])) < minimum_load(ratings.dynamic, section.type):
+        remarks.append("carries less than what rolling elements need to roll, by the usual rule: they may slide")
     if reaction is not None:
         found = math.hypot(reaction[0], reaction[1])
         if max(found, point.radial_load) > STATED_FACTOR * min(found, point.radial_load):
@@ -205,9 +210,13 @@ def estimate_effects(point: OperatingPoint) -> tuple[Sensitivity, ...]:
 
 
 def _radial_stiffness(section: CatalogueSection, point: OperatingPoint) -> float:
+    force, tilt = point.load[:3], point.displacement[3:5]
+    if point.is_unloaded:
+        least = LEAST_LOAD * basic_dynamic_rating(point.rows, section.type)
+        force, tilt = np.array(holding_force(point.rows, least, point.direction)), np.zeros(2)
     try:
         rows = catalogue_rows(section)
-        displacement = equilibrium(BearingOfRows(rows), point.load[:3], tilt=point.displacement[3:5]).displacement
+        displacement = equilibrium(BearingOfRows(rows), force, tilt=tilt).displacement
     except BearingError:
         return float("nan")
     along = np.array([np.cos(point.direction), np.sin(point.direction)])

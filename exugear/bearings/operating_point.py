@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,6 +43,8 @@ class OperatingPoint:
         Derivative of that load, mean over positions of the cage.
     is_unloaded : bool
         Whether it carries so little that its stiffness is that at the least load.
+    first_roller_angle : float
+        Polar angle of the first rolling element at which the displacement holds the load, rad.
     """
 
     bearing: Bearing
@@ -50,6 +53,7 @@ class OperatingPoint:
     load: Floats
     stiffness: Floats
     is_unloaded: bool
+    first_roller_angle: float = 0.0
 
     def __repr__(self) -> str:
         """Name and load in one line."""
@@ -78,6 +82,12 @@ class OperatingPoint:
         return math.hypot(self.displacement[3], self.displacement[4])
 
 
+def cage_angles(rows: Sequence[RollingRow], first_roller_angle: float) -> list[float]:
+    """Polar angles (rad) of the first rolling element over one pitch, from a given one on."""
+    step = 2.0 * math.pi / (rows[0].element_count * CAGE_POSITIONS)
+    return [first_roller_angle + step * position for position in range(CAGE_POSITIONS)]
+
+
 def operating_point(
     bearing: Bearing, displacement: Floats, load_stands_still: bool, first_roller_angle: float = 0.0
 ) -> OperatingPoint:
@@ -102,11 +112,10 @@ def operating_point(
     """
     assert bearing.catalogue is not None
     rows = catalogue_rows(bearing.catalogue)
-    pitch = 2.0 * math.pi / rows[0].element_count
     load = bearing_load(row_contacts(rows, first_roller_angle), displacement)
     stiffness = np.zeros((6, 6))
-    for position in range(CAGE_POSITIONS):
-        contacts = row_contacts(rows, first_roller_angle + pitch * position / CAGE_POSITIONS)
+    for angle in cage_angles(rows, first_roller_angle):
+        contacts = row_contacts(rows, angle)
         stiffness += tangent_stiffness(contacts, displacement) / CAGE_POSITIONS
     least = LEAST_LOAD * basic_dynamic_rating(rows, bearing.catalogue.type)
     is_preloaded = elastic_energy(row_contacts(rows), np.zeros(6)) > 0.0
@@ -115,4 +124,4 @@ def operating_point(
         stiffness = pitch_averaged_tangent(BearingOfRows(rows), holding_force(rows, least))
     if is_unloaded or not load_stands_still:
         stiffness = matrices.axially_symmetric(stiffness)
-    return OperatingPoint(bearing, rows, displacement, load, stiffness, is_unloaded)
+    return OperatingPoint(bearing, rows, displacement, load, stiffness, is_unloaded, first_roller_angle)

@@ -96,17 +96,31 @@ def bearing_rows(bearing: Bearing) -> tuple[RollingRow, ...]:
     Raises
     ------
     BearingError
-        It has no catalogue, or dimensions that are impossible; a non-linear one has clearance and a housing factor.
+        It has no catalogue, or dimensions that are impossible.
     """
     if bearing.catalogue is None:
         raise BearingError(f"bearing {bearing.name}: has no catalogue data")
-    rows = catalogue_rows(bearing.catalogue)
+    return catalogue_rows(bearing.catalogue)
+
+
+def misplaced_factor(bearing: Bearing) -> str:
+    """Say why a housing factor cannot stand for the seat of a bearing; empty if it can.
+
+    Examples
+    --------
+    >>> from exugear.model.gearbox import Gearbox
+    >>> bearing = next(b for b in Gearbox.from_toml("cases/grc750/gearbox.toml").bearings if b.name == "hss_a")
+    >>> misplaced_factor(bearing)
+    ''
+    """
+    rows = () if bearing.catalogue is None else catalogue_rows(bearing.catalogue)
     if bearing.law == "iso16281" and bearing.factor != 1.0 and any(row.radial_clearance > 0.0 for row in rows):
-        raise BearingError(
-            f'law = "iso16281" with clearance and the housing factor {bearing.factor:g}: a clearance closes without '
-            "load, so the factor does not apply; set housing_factor_applies = false, or make the housing elastic"
+        return (
+            f'bearings.{bearing.family}: law = "iso16281" with clearance and the housing factor {bearing.factor:g}: '
+            "a clearance closes without load, so the factor does not apply; set housing_factor_applies = false, or "
+            "use the variant flexible with an elastic housing"
         )
-    return rows
+    return ""
 
 
 def linear_law(bearing: Bearing, damping_time: float, of_rows: Floats | None = None) -> SupportLaw:
@@ -151,6 +165,8 @@ def rolling_law(bearing: Bearing, damping_time: float, of_rows: Floats, directio
         Polar angle of the load on the inner ring, rad: a cage that stands still is placed by it.
     """
     rows = bearing_rows(bearing)
+    if misplaced_factor(bearing):
+        raise BearingError(misplaced_factor(bearing))
     stated = stiffness_matrix(bearing.stiffness)
     added = bearing.factor * (matrices.regularised(of_rows, np.diag(stated)) - of_rows)
     given = bearing.damping is not None

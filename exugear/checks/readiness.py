@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from exugear.bearings.rolling.rows import BearingError
-from exugear.bearings.support_laws import bearing_rows, linear_law
+from exugear.bearings.support_laws import linear_law, misplaced_factor
 from exugear.bearings.supports import ON_BEARINGS, elastic_names, unsupported
 from exugear.checks.restraint import free_motion
 from exugear.loads.torque_series import torque_series
@@ -54,7 +54,18 @@ def lacking(gearbox: Gearbox, variant: str) -> str:
     >>> [lacking(gearbox, variant) for variant in ("rigid", "bushing", "flexible")]
     ['', '', '']
     """
-    return unsupported(gearbox, variant) or (free_motion(gearbox, variant) if variant in ON_BEARINGS else "")
+    lack = unsupported(gearbox, variant)
+    if lack or variant not in ON_BEARINGS:
+        return lack
+    return free_motion(gearbox, variant) or _misplaced_factors(gearbox, variant)
+
+
+def _misplaced_factors(gearbox: Gearbox, variant: str) -> str:
+    """Say which bearing's seat no factor can stand for; an elastic housing has seats of its own."""
+    elastic = elastic_names(gearbox) if variant == "flexible" else ()
+    seats = {body.name for body in gearbox.bodies() if body.fixed and body.name in elastic}
+    reasons = (misplaced_factor(bearing) for bearing in gearbox.bearings if not seats & {bearing.on, bearing.body})
+    return next(filter(None, reasons), "")
 
 
 def remarks(gearbox: Gearbox) -> tuple[str, ...]:
@@ -72,8 +83,6 @@ def remarks(gearbox: Gearbox) -> tuple[str, ...]:
 def _build_bearing(gearbox: Gearbox, bearing: Bearing) -> None:
     try:
         stiffness = linear_law(bearing, 0.0).stiffness
-        if bearing.law == "iso16281":
-            bearing_rows(bearing)
     except BearingError as error:
         raise gearbox.fault(f"bearings.{bearing.family}.catalogue: {error}") from None
     if not np.all(np.isfinite(stiffness)):

@@ -2,7 +2,8 @@
 
 A bearing's stiffness depends on its load, and the load on the stiffness of all bearings. The static state is solved
 with the non-linear law of every row, so that both belong to each other to round-off; a linear bearing then has the
-tangent there. The problem is convex, and starts from the bearings' stiffness at a nominal load.
+tangent there. The problem is convex, and starts from the bearings' stiffness at a nominal load. A linear model's own
+static state then shares loads a little otherwise, since tangents yield less than rows do.
 """
 
 from __future__ import annotations

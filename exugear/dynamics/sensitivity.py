@@ -202,7 +202,8 @@ def assumed_parameters(
         values = tuple(sorted({*HOUSING_FACTORS, default}))
         parameters.append(Parameter("housing factor", values, default, lambda x: built({"housing.factor": x}), False))
     planets = planet_bearings(gearbox, base)
-    if planets:
+    first = base.connectors.rolling.first
+    if planets and not any(first[number + 1] > first[number] for number in planets):  # rows have no such factor
         parameters.append(
             Parameter("planet bearings / default", FRACTIONS, 1.0, lambda x: scaled_bearings(base, planets, x))
         )

@@ -320,7 +320,7 @@ def faults_of_supports(case: CaseFile) -> Iterator[str]:
 
 
 def _bearings_at_one_place(bearings: Mapping[str, BearingSection]) -> Iterator[str]:
-    """Tell rolling bearings that stand in each other: on the same bodies, closer than half of both widths."""
+    """Tell rolling bearings of the same bodies that stand in each other by half of their width or more."""
     names = [name for name, bearing in bearings.items() if bearing.catalogue is not None]
     for place, first in enumerate(names):
         for second in names[place + 1 :]:

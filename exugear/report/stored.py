@@ -9,9 +9,11 @@ from typing import Any
 
 import xarray as xr
 
+from exugear.bearings.rolling.rows import BearingError
 from exugear.dynamics.assembly import VariantError
 from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.modes import load_modes
+from exugear.dynamics.statics import BalanceError
 from exugear.model.choice import Choice
 from exugear.model.reading import CaseError
 from exugear.report.context import Context, choice_of
@@ -113,7 +115,7 @@ def _fits(context: Context, path: Path, attributes: Mapping[str, Any]) -> bool:
         if input_hash(context.assembled(choice_of(attributes)), load_case) == attributes.get("input_hash"):
             return True
         reason = "was computed from another input; compute it again"
-    except (CaseError, MeshError, VariantError, KeyError) as error:
+    except (CaseError, MeshError, VariantError, BearingError, BalanceError, KeyError) as error:
         reason = str(error)
     context.notes.left_out.append(f"{context.name_of(path)}: {reason}")
     return False

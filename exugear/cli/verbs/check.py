@@ -107,7 +107,8 @@ def _bearing_summaries(gearbox: Gearbox) -> tuple[list[dict[str, Any]], list[str
     try:
         with model_errors():
             assembly = assemble(gearbox, Choice("bushing", law), mesh_stiffness(gearbox, law))
-            duties = {duty.family: duty for duty in reversed(bearing_duties(assembly))}
+            every = bearing_duties(assembly)
+            duties = {duty.family: duty for duty in reversed(every)}
             points = {point.bearing.family: point for point in reversed(bearing_points(assembly))}
             effects = {family: estimate_effects(point) for family, point in points.items()}
     except FailedError as error:
@@ -124,7 +125,7 @@ def _bearing_summaries(gearbox: Gearbox) -> tuple[list[dict[str, Any]], list[str
             for effect, pair in zip(effects[family], ends, strict=True)
         }
         summaries.append({**duty_summary(duty), "bearing": family, "estimated": estimated})
-    doubts = [f"bearings.{duty.name}: {remark}" for duty in reversed(duties.values()) for remark in duty.remarks]
+    doubts = [f"bearings.{duty.name}: {remark}" for duty in every for remark in duty.remarks]
     return summaries, doubts
 
 

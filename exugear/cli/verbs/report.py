@@ -9,7 +9,7 @@ import typer
 
 from exugear.cli.case import check_files_below
 from exugear.cli.console import note, print_json, print_table, progress_bar, say
-from exugear.cli.errors import BadInputError, exit_codes
+from exugear.cli.errors import BadInputError, exit_codes, model_errors
 from exugear.cli.options import FilesBelowOption, JsonOption
 
 
@@ -35,7 +35,7 @@ def report(
         if not folder.is_dir():
             raise BadInputError(f"{folder}: no such folder; name the one that `exugear run` wrote into")
         try:
-            with time_noted(folder, "report"), progress_bar() as bar:
+            with time_noted(folder, "report"), model_errors(), progress_bar() as bar:
                 task = bar.add_task("report", total=None)
                 written = write_report(folder, near, lambda what: bar.update(task, description=what), files_below)
         except (CaseError, ReportError) as error:

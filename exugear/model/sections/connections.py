@@ -83,11 +83,11 @@ TYPES_OF_KEYS: dict[str, tuple[frozenset[str], str]] = {
 CONTACT_ANGLES_DEG: dict[str, tuple[float, float]] = {
     "tapered_roller": (5.0, 45.0),
     "spherical_roller": (2.0, 25.0),
-    "angular_contact_ball": (5.0, 59.0),
+    "angular_contact_ball": (5.0, 45.0),
     "self_aligning_ball": (2.0, 25.0),
-    "four_point_ball": (10.0, 50.0),
+    "four_point_ball": (10.0, 45.0),
 }
-"""Contact angles that can be, by type; other types have none."""
+"""Contact angles that can be, by type; other types have none. Beyond 45 degrees it is a thrust bearing."""
 
 
 class CatalogueSection(Section):

@@ -20,8 +20,9 @@ RESONANCE_ERROR = 1e-3
 """Allowed error on the slope of a resonance, as a share of its peak."""
 ACCURATE_BAND_FRACTION = 2.0 / 3.0
 """Share of elastic bodies' band up to which they vibrate as they should on bearings (`exugear.bodies.reduction`)."""
-STIFFENING = 1.1
-"""Stiffness of a non-linear bearing over that at its static load: balls at 1.3 times the load, rollers at twice."""
+STIFFENING = 1.6
+"""Stiffness of a non-linear bearing over that at its static load: at twice the load rollers have up to 1.25 times the
+radial and 1.6 times the tilt stiffness, as more of them and more of their length carry."""
 LIGHTEST_DAMPING = 2e-3
 """Damping ratio that lighter ones count as: an undamped resonance would ask for no error at all."""
 

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
 
 from exugear.bearings.operating_point import OperatingPoint
 from exugear.bearings.rolling.contact import bearing_load, equilibrium, pitch_averaged_tangent, row_contacts
-from exugear.bearings.rolling.rows import BearingOfRows
+from exugear.bearings.rolling.rows import BearingError, BearingOfRows
 from exugear.bearings.support_laws import LEAST_LOAD, catalogue_stiffness
-from exugear.checks.readiness import check_parts
+from exugear.checks.readiness import lacking
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.modes import modes_of
 from exugear.dynamics.statics import BalanceError, static_state
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
-from exugear.model.reading import CaseError
 from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.loads import LoadTable
 
@@ -118,9 +118,19 @@ def test_clearance_makes_a_linear_bearing_softer_and_its_seat_takes_no_share_of_
 
 def test_a_non_linear_bearing_with_clearance_and_a_housing_factor_is_refused_by_name(tmp_path):
     keys = {"bearings.roller.law": "iso16281", "bearings.roller.catalogue.radial_clearance_mm": 0.04}
-    with pytest.raises(CaseError, match=r"bearings\.roller.*housing_factor_applies = false"):
-        check_parts(bearing_gearbox(tmp_path).varied(keys))
-    check_parts(bearing_gearbox(tmp_path).varied({**keys, "bearings.roller.housing_factor_applies": False}))
+    said = r"bearings\.roller: law.*housing_factor_applies = false"
+    refused = bearing_gearbox(tmp_path).varied(keys)
+    assert re.match(said, lacking(refused, "bushing"))
+    with pytest.raises(BearingError, match=said):
+        on_bearings(refused)
+    free = bearing_gearbox(tmp_path).varied({**keys, "bearings.roller.housing_factor_applies": False})
+    assert lacking(free, "bushing") == ""
+
+
+def test_an_elastic_housing_takes_non_linear_bearings_with_clearance(grc):
+    keys = {"bearings.hss_a.law": "iso16281", "bearings.hss_a.catalogue.radial_clearance_mm": 0.05}
+    assert lacking(grc.varied(keys), "flexible") == ""
+    assert "bearings.hss_a" in lacking(grc.varied(keys), "bushing")
 
 
 def test_a_shaft_that_is_held_one_way_only_is_named_with_its_bearings(tmp_path):

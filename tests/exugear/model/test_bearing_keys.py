@@ -53,7 +53,7 @@ def refusal(content: Content, keys: dict[str, Any], bearing: dict[str, Any] | No
         ({"contact_angle_deg": 10.0}, "contact_angle_deg = 10 makes no sense for type = 'cylindrical_roller'"),
         ({"type": "tapered_roller", "contact_angle_deg": 0.0}, "must lie between 5 and 45 for type = 'tapered_roller'"),
         ({"type": "tapered_roller", "contact_angle_deg": 50.0}, "contact_angle_deg = 50 must lie between 5 and 45"),
-        ({"type": "four_point_ball", "contact_angle_deg": 5.0}, "contact_angle_deg = 5 must lie between 10 and 50"),
+        ({"type": "four_point_ball", "contact_angle_deg": 5.0}, "contact_angle_deg = 5 must lie between 10 and 45"),
         ({"type": "spherical_roller", "arrangement": "O"}, "arrangement = 'O' makes no sense for type"),
         ({"type": "deep_groove_ball", "arrangement": "tandem"}, "arrangement = 'tandem' makes no sense for type"),
         ({"inner_groove_ratio": 0.52}, "inner_groove_ratio makes no sense for type = 'cylindrical_roller'"),
