@@ -214,6 +214,7 @@ class BearingSection(Section):
     housing_factor_applies: bool = True
     law: Literal["stiffness", "iso16281"] = "stiffness"
     cage: Literal["averaged", "turning"] = "averaged"
+    outer_ring: Literal["body", "on"] | None = None
     stiffness: StiffnessSection | None = None
     catalogue: CatalogueSection | None = None
     damping: StiffnessSection | None = None

@@ -14,6 +14,8 @@ from exugear.bearings.support_laws import cage_ratio, catalogue_stiffness, linea
 from exugear.model.gearbox import Gearbox
 from exugear.model.sections.connections import CatalogueSection
 
+from ..bearing_case import bearing_gearbox
+
 SECTION = CatalogueSection(
     type="cylindrical_roller",
     bore_mm=160.0,
@@ -63,3 +65,10 @@ def test_what_the_file_adds_acts_where_the_rows_hold_less():
     np.testing.assert_array_equal(law.damping, 4e-6 * law.stiffness)
     assert law.phase == pytest.approx(0.5 + 0.5 * np.pi / law.rows[0].element_count)
     assert law.cage_ratio == 0.0
+
+
+def test_a_gear_that_turns_about_a_fixed_pin_carries_the_outer_ring_where_the_file_says_so(tmp_path):
+    gearbox = bearing_gearbox(tmp_path, bearings__ball__outer_ring="body")
+    ball, roller, *_ = gearbox.bearings
+    assert (ball.carries_outer_ring, roller.carries_outer_ring) == (True, False)
+    assert rolling_law(ball, 0.0, np.eye(6), 0.0).scale == -ball.factor
