@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 
@@ -161,14 +162,15 @@ def locked_equilibrium(
             stiffness = tangent_stiffness(held, free @ x, held.meshes if meshes is None else meshes)
             return np.asarray(-free.T @ stiffness @ free)
 
-        scale = np.full(start.size, _load_scale(applied))
-        for share in HOLDING_SHARES if assembly.has_rows else HOLDING_SHARES[:1]:
-            try:
-                return _newton(residual, partial(derivative, assembly.eased(share)), start, scale, "static state")
-            except BalanceError:
-                if share == HOLDING_SHARES[-1] or not assembly.has_rows:
-                    raise
-        raise AssertionError  # the last share returns or raises
+        def search(share: float) -> Floats:
+            held, scale = assembly.eased(share), np.full(start.size, _load_scale(applied))
+            return _newton(residual, partial(derivative, held), start, scale, "static state")
+
+        *shares, last = HOLDING_SHARES if assembly.has_rows else HOLDING_SHARES[:1]
+        for share in shares:
+            with suppress(BalanceError):
+                return search(share)
+        return search(last)
 
     x = _from_linear(assembly, np.zeros(free.shape[1]), lambda x: np.asarray(free @ x), solve, meshes)
     return np.asarray(free @ x)

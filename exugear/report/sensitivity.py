@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import xarray as xr
 
+from exugear.bearings.rolling.rows import BearingError
 from exugear.dynamics.modes import modes_of
 from exugear.dynamics.sensitivity import (
     FrequencyMatch,
@@ -17,6 +18,7 @@ from exugear.dynamics.sensitivity import (
     frequency_matches,
     vary_parameter,
 )
+from exugear.dynamics.statics import BalanceError
 from exugear.model.choice import Choice
 from exugear.pictures.mode_diagrams import Sensitivity, plot_sensitivities
 from exugear.report import page
@@ -51,6 +53,8 @@ def sensitivity_part(
     for model in _varied_models(context, modes):
         context.tell(f"sensitivities of {words_of(model)}")
         variations = _variations(context, model)
+        if not variations:
+            continue
         matches += [ModelMatch(model, match) for match in frequency_matches(variations, target, VISIBLE_SHARE)]
         content.append(_sensitivities_picture(context, model, variations, target))
         content.append(_damping_table(variations, target))
@@ -67,7 +71,13 @@ def _varied_models(context: Context, modes: Mapping[Choice, xr.Dataset]) -> list
 def _variations(context: Context, model: Choice) -> list[ParameterVariation]:
     stiffness = context.stiffness(model.mesh_law)
     parameters = assumed_parameters(context.gearbox, model, stiffness, context.bodies_of(model))
-    return [vary_parameter(parameter) for parameter in parameters]
+    variations = []
+    for parameter in parameters:
+        try:
+            variations.append(vary_parameter(parameter))
+        except (BalanceError, BearingError) as error:  # an assumption may leave the range in which bearings balance
+            context.notes.left_out.append(f"sensitivity to {parameter.label}: {error}")
+    return variations
 
 
 def _sensitivities_picture(

@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 from exugear.cli.app import app
 from exugear.dynamics.modes import load_modes
 from exugear.dynamics.signals import energy_residual
+from exugear.dynamics.statics import BalanceError
 from exugear.results.run_file import load_run
 
 from ..bearing_case import BEARING_CASE, NAMES
@@ -127,3 +128,20 @@ def test_non_linear_bearings_go_through_modes_run_and_file(case: Path) -> None:
     force = np.linalg.norm(run["support_force"].to_numpy()[:, :, :2], axis=2)
     assert isinstance(run, xr.Dataset)
     assert np.all(force[len(force) // 2 :].mean(axis=0) > 100.0)
+
+
+@pytest.mark.parametrize("place", ["exugear.report.sensitivity.vary_parameter", "exugear.report.context.assemble"])
+def test_a_report_leaves_out_what_no_longer_balances(case: Path, monkeypatch: pytest.MonkeyPatch, place: str) -> None:
+    """An assumption that is varied too far, and a model that has no static state: a line each, no more."""
+    out = case.parent / "out"
+    assert exugear("modes", case, "--variant", "bushing", "--mesh-law", "iso6336", "--out", out).exit_code == 0
+
+    def unbalanced(*arguments: object) -> None:
+        raise BalanceError("static state: no balance found")
+
+    monkeypatch.setattr(place, unbalanced)
+    reported = exugear("report", out, "--near", 500.0)
+    assert isinstance(reported.exception, SystemExit | None)
+    assert "no balance found" in reported.stderr
+    assert "Traceback" not in reported.stderr
+    assert reported.exit_code == (0 if "sensitivity" in place else 2)
