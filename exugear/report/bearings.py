@@ -58,8 +58,8 @@ def _row(duty: BearingDuty) -> dict[str, object]:
         "misaligned / mrad": f"{1e3 * duty.misalignment:.3f}",
         "pressure / MPa": f"{1e-6 * duty.pressure:.0f}",
         "C_r / kN": f"{1e-3 * duty.ratings.dynamic:.4g}{sign}",
-        "L10": _life(duty.basic_life),
-        "L10r": _life(duty.reference_life),
+        "L10 / Mrev": _life(duty.basic_life),
+        "L10r / Mrev": _life(duty.reference_life),
     }
 
 
