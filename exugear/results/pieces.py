@@ -43,6 +43,8 @@ class Checkpoint:
         Number of the step that led to it.
     q, v : (size,) arrays
         Coordinates and velocities.
+    past : (n, size) array
+        Accelerations at the last steps, the latest last, as far as a method of integration goes back.
     pending : (n, columns) array
         Samples that the filter still holds.
     pending_first : int
@@ -60,6 +62,7 @@ class Checkpoint:
     step: int
     q: Floats
     v: Floats
+    past: Floats
     pending: Floats
     pending_first: int
     balance: Floats
@@ -190,6 +193,7 @@ class RunPieces:
             **dict(zip(MESH_TIMES, state.mesh_times, strict=True)),
             "state_q": state.q,
             "state_v": state.v,
+            "state_past": state.past,
             "state_balance": state.balance,
             "state_judgement": state.judgement,
             "state_pending": state.pending,
@@ -209,6 +213,7 @@ class RunPieces:
             step=int(attributes["state_step"]),
             q=arrays["state_q"],
             v=arrays["state_v"],
+            past=arrays["state_past"],
             pending=arrays["state_pending"],
             pending_first=int(attributes["state_pending_first"]),
             balance=arrays["state_balance"],

@@ -30,7 +30,8 @@ def integrate(plan: RunPlan, start: RunStart, recorder: Recorder, interruption: 
 def _integrate_compiled(plan: RunPlan, start: RunStart, recorder: Recorder, interruption: Interruption) -> None:
     """Let the compiled solver fill the recorder's buffer."""
     state, step = start.state, plan.step
-    system = CompiledSystem(plan.assembly, state.q, state.v, start.loads, step)
+    method = plan.integration.method
+    system = CompiledSystem(plan.assembly, state.q, state.v, start.loads, step, method, state.past)
     done = state.step
     recorder.begin(done * step, state.q, state.v)
     while done < plan.steps and not interruption.asked and not recorder.halted:
@@ -38,6 +39,7 @@ def _integrate_compiled(plan: RunPlan, start: RunStart, recorder: Recorder, inte
         good = system.advance(done, q, v)
         if good < len(q):
             recorder.fault = f"the state is not finite at t = {(done + good + 1) * step:.6g} s"
+        recorder.past = system.past
         recorder.take(step * np.arange(done + 1, done + good + 1, dtype=np.float64))
         done += good
 

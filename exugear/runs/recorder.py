@@ -81,6 +81,8 @@ class Recorder:
         Time of the last state that counts, s.
     fault : str
         What ended the run, empty if nothing did.
+    past : (n, size) array
+        Accelerations that a solver with a memory goes on from after the last state, the latest last.
     """
 
     def __init__(self, plan: RunPlan, start: RunStart, progress: Callable[[float], None] | None = None) -> None:
@@ -96,6 +98,7 @@ class Recorder:
         self._decimator.pending, self._decimator.pending_first = start.state.pending, start.state.pending_first
         self._account = EnergyAccount(plan.step, start.state.balance)
         self._mesh_times = start.state.mesh_times
+        self.past = start.state.past
         wanted = FLUSH_FACTOR[plan.solver] * FLUSH_INTERVAL / plan.step
         size = plan.assembly.size
         self.buffer = StateBuffer(buffer_rows(wanted, size, self._layout.count), size)
@@ -163,6 +166,7 @@ class Recorder:
             step=round(float(times[-1]) / self._plan.step),
             q=q[-1],
             v=v[-1],
+            past=self.past,
             pending=self._decimator.pending,
             pending_first=self._decimator.pending_first,
             balance=self._account.balance,

@@ -111,6 +111,7 @@ def _first_state(
         step=0,
         q=balanced.q,
         v=balanced.v,
+        past=np.zeros((0, assembly.size)),
         pending=np.zeros((0, layout.count)),
         pending_first=0,
         balance=np.zeros(len(BALANCE_TERMS)),

@@ -1,13 +1,16 @@
-"""The compiled solver: an assembly's equations integrated by the classical Runge-Kutta method without Exudyn.
+"""The compiled solver: an assembly's equations integrated without Exudyn.
 
 Same coordinates and same laws as the Exudyn system built from the same assembly (see
-`exugear.solvers.compiled.equations`), so that the trajectories differ by round-off only, a hundred times faster.
+`exugear.solvers.compiled.equations`), so that by the same method the trajectories differ by round-off only.
 """
 
 from __future__ import annotations
 
+import numpy as np
+
 from exugear.dynamics.assembly import Assembly
 from exugear.solvers.compiled.equations import advance, evaluate
+from exugear.solvers.compiled.methods import RUNGE_KUTTA, Method, Past
 from exugear.solvers.compiled.packing import equations_of, work_for
 from exugear.solvers.loads import LoadTable
 from fe_ste.tools.arrays import Floats
@@ -37,14 +40,35 @@ class CompiledSystem:
         Initial coordinates and velocities.
     loads : LoadTable
     step : float
-        Time step, s; `unstable` tells whether it is stable.
+        Time step, s; see `exugear.solvers.compiled.step`.
+    method : Method
+        The classical Runge-Kutta method by default.
+    past : (n, size) array, optional
+        Accelerations at the steps before, the latest at the state itself. A multistep method goes on from them as if
+        it had not stopped; without them it starts anew.
     """
 
-    def __init__(self, assembly: Assembly, q: Floats, v: Floats, loads: LoadTable, step: float) -> None:
+    def __init__(
+        self,
+        assembly: Assembly,
+        q: Floats,
+        v: Floats,
+        loads: LoadTable,
+        step: float,
+        method: Method = RUNGE_KUTTA,
+        past: Floats | None = None,
+    ) -> None:
         self.step = step
         self.equations = equations_of(assembly, loads)
         self._size = assembly.size
         self._work = work_for(self.equations, q, v)
+        self._method = method
+        self._past = Past.of(method, np.zeros((0, assembly.size)) if past is None else past)
+
+    @property
+    def past(self) -> Floats:
+        """Accelerations (n, size) to go on from."""
+        return self._past.in_order()
 
     def accelerations(self, time: float = 0.0) -> Floats:
         """Accelerations (size,) at the present state and a time (s)."""
@@ -59,4 +83,4 @@ class CompiledSystem:
         int
             Number of steps that stayed finite.
         """
-        return advance(first, self.step, self.equations, self._work, q, v)
+        return advance(first, self.step, self._method, self.equations, self._work, self._past, q, v)
