@@ -51,6 +51,8 @@ class Checkpoint:
         Number of the first of them.
     balance : (terms,) array
         Account of energy, J, as in `exugear.dynamics.signals.BALANCE_TERMS`.
+    powers : (powers,) array
+        Powers, W, as in `exugear.dynamics.signals.POWERS`.
     start_angle : float
         Angle that a drive started ahead by, rad.
     mesh_times : (times, meshes) array
@@ -66,6 +68,7 @@ class Checkpoint:
     pending: Floats
     pending_first: int
     balance: Floats
+    powers: Floats
     start_angle: float
     mesh_times: Floats
     judgement: Floats
@@ -195,6 +198,7 @@ class RunPieces:
             "state_v": state.v,
             "state_past": state.past,
             "state_balance": state.balance,
+            "state_powers": state.powers,
             "state_judgement": state.judgement,
             "state_pending": state.pending,
         }
@@ -217,6 +221,7 @@ class RunPieces:
             pending=arrays["state_pending"],
             pending_first=int(attributes["state_pending_first"]),
             balance=arrays["state_balance"],
+            powers=arrays["state_powers"],
             start_angle=float(attributes["start_angle"]),
             mesh_times=np.array([arrays[name] for name in MESH_TIMES]),
             judgement=arrays["state_judgement"],

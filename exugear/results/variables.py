@@ -9,6 +9,7 @@ STATE = (
     Variable("state_v", ("coordinate",), "m/s or rad/s"),
     Variable("state_past", ("past", "coordinate"), "m/s2 or rad/s2"),
     Variable("state_balance", ("term",), "J"),
+    Variable("state_powers", ("power",), "W"),
     Variable("state_judgement", ("criterion", "figure"), "value, s, place"),
     Variable("state_pending", ("pending", "signal"), "of the signals"),
 )

@@ -20,6 +20,9 @@ from exugear.solvers.compiled.step import Integration, unstable
 if TYPE_CHECKING:
     from exugear.solvers.exudyn_model.system import MeshRoute
 
+EXPECTATIONS = ("stability_margin", "expected_error_at_band", "expected_error_of_resonances")
+"""Attributes that say what a method and its step are expected to do."""
+
 
 @dataclass(frozen=True, eq=False)
 class RunPlan:
@@ -106,14 +109,12 @@ class RunPlan:
         }
 
     def _expectations(self) -> dict[str, float]:
-        """What the method and its step are expected to do; it is known of the compiled solver alone."""
+        """Return what the method and its step are expected to do; it is known of the compiled solver alone."""
         if self.solver != "compiled":
             return {}
-        return {
-            "stability_margin": self.integration.margin,
-            "expected_error_at_band": self.integration.forced_error,
-            "expected_error_of_resonances": self.integration.resonance_error,
-        }
+        chosen = self.integration
+        figures = (chosen.margin, chosen.forced_error, chosen.resonance_error)
+        return dict(zip(EXPECTATIONS, figures, strict=True))
 
     def _solver_name(self) -> str:
         if self.solver == "compiled":

@@ -28,7 +28,7 @@ from exugear.runs.recorder import Recorder
 from exugear.runs.run_folder import held, run_directory
 from exugear.runs.start import RunStart, prepare_start
 from exugear.solvers.compiled.solver import unsupported_reason
-from exugear.solvers.compiled.step import INTEGRATORS, choose_integration, fastest_motion
+from exugear.solvers.compiled.step import choose_integration, fastest_motion
 from exugear.tooth_mesh.law import Angles, MeshData
 
 if TYPE_CHECKING:

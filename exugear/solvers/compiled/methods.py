@@ -55,7 +55,7 @@ class Past(NamedTuple):
         """Accelerations (n, size) that are known, the latest last."""
         latest, known = self.counts
         rows = len(self.accelerations)
-        return self.accelerations[(latest - np.arange(min(known, rows))[::-1]) % rows]
+        return np.asarray(self.accelerations[(latest - np.arange(min(known, rows))[::-1]) % rows])
 
 
 class Method(NamedTuple):

@@ -9,11 +9,18 @@ from __future__ import annotations
 import numpy as np
 
 from exugear.dynamics.assembly import Assembly
-from exugear.solvers.compiled.equations import advance, evaluate
+from exugear.dynamics.signals import signal_layout
+from exugear.solvers.compiled.equations import evaluate
+from exugear.solvers.compiled.loop import advance
 from exugear.solvers.compiled.methods import RUNGE_KUTTA, Method, Past
+from exugear.solvers.compiled.observers import columns_of
 from exugear.solvers.compiled.packing import equations_of, work_for
 from exugear.solvers.loads import LoadTable
 from fe_ste.tools.arrays import Floats
+
+POWER_INTERVAL = 1.0 / 30e3
+"""Time between observations of the powers of elastic bodies, s: these vibrate up to some 10 kHz, their powers up to
+twice that, and a sum over samples errs by what lies at the rate of the samples itself."""
 
 
 def unsupported_reason(assembly: Assembly) -> str:
@@ -63,6 +70,7 @@ class CompiledSystem:
         self._size = assembly.size
         self._work = work_for(self.equations, q, v)
         self._method = method
+        self._columns = columns_of(signal_layout(assembly))
         self._past = Past.of(method, np.zeros((0, assembly.size)) if past is None else past)
 
     @property
@@ -75,12 +83,34 @@ class CompiledSystem:
         evaluate(time, self._work.q, self._work.v, self.equations, self._work)
         return self._work.rate[: self._size].copy()
 
-    def advance(self, first: int, q: Floats, v: Floats) -> int:
+    def advance(
+        self, first: int, q: Floats, v: Floats, signals: Floats | None = None, energies: Floats | None = None
+    ) -> int:
         """Fill q and v (steps, size) with the states after each step from step number `first` on.
+
+        Parameters
+        ----------
+        signals, energies : (steps, columns) and (steps, 7) arrays, optional
+            For what `exugear.solvers.compiled.observers.take_sample` fills. Powers of elastic bodies stand for as many
+            steps as make up `POWER_INTERVAL`; of energies only those of other parts are whole.
 
         Returns
         -------
         int
             Number of steps that stayed finite.
         """
-        return advance(first, self.step, self._method, self.equations, self._work, self._past, q, v)
+        none = np.empty((0, 0))
+        return advance(
+            first,
+            self.step,
+            self._method,
+            self.equations,
+            self._work,
+            self._past,
+            self._columns,
+            max(1, int(POWER_INTERVAL / self.step + 1e-9)),
+            q,
+            v,
+            none if signals is None else signals,
+            none if energies is None else energies,
+        )

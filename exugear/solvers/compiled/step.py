@@ -278,7 +278,7 @@ def choose_integration(
 
 
 def _best(choices: Iterable[Integration]) -> Integration:
-    """The cheapest that is stable with the margin and accurate; else the one of least error among the stable ones."""
+    """Return the cheapest that is stable with the margin and accurate; else the stable one of least error."""
     ranked = sorted(choices, key=lambda choice: (choice.margin < 1.0, choice.error))
     good = [choice for choice in ranked if choice.margin >= MARGIN and choice.is_accurate]
     return min(good, key=lambda choice: choice.method.evaluations) if good else ranked[0]
