@@ -256,9 +256,7 @@ def observe_springs(q: Floats, v: Floats, springs: Springs, energy: Floats) -> N
 
 
 @kernel
-def observe_elastic_bodies(
-    q: Floats, v: Floats, stride: int, equations: Equations, work: Work, energy: Floats
-) -> None:
+def observe_elastic_bodies(q: Floats, v: Floats, stride: int, equations: Equations, work: Work, energy: Floats) -> None:
     """Add energies and powers of elastic bodies, in fixed and in turning frames, these for `stride` samples."""
     kinetic, stored, damped = elastic_energies(q, v, equations.elastic, work.scratch)
     energy[KINETIC] += kinetic
