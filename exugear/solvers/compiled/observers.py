@@ -55,10 +55,11 @@ from exugear.solvers.compiled.arrays import (
     Springs,
     Work,
 )
-from exugear.solvers.compiled.connectors import move_connector, place_bodies, turn_between
+from exugear.solvers.compiled.connectors import move_connector, turn_between
 from exugear.solvers.compiled.equations import set_loads
 from exugear.solvers.compiled.meshes import mesh_law, mesh_motion
 from exugear.solvers.compiled.packing import equations_of, work_for
+from exugear.solvers.compiled.places import place_bodies
 from exugear.solvers.loads import LoadTable
 from exugear.tooth_mesh.laws.table import TABLE_FORM, fast_table_force
 from fe_ste.tools.arrays import Floats
