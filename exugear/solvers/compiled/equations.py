@@ -26,8 +26,9 @@ from exugear.solvers.compiled.arrays import (
     Springs,
     Work,
 )
-from exugear.solvers.compiled.connectors import add_connectors, place_bodies
+from exugear.solvers.compiled.connectors import add_connectors
 from exugear.solvers.compiled.meshes import add_meshes
+from exugear.solvers.compiled.places import add_loads_of_places, gather_places, place_bodies
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import kernel
 
@@ -92,14 +93,20 @@ def set_accelerations(v: Floats, bodies: Bodies, work: Work) -> None:
 
 @kernel
 def evaluate(t: float, q: Floats, v: Floats, equations: Equations, work: Work) -> None:
-    """Fill `work.rate` with the accelerations at time t (s) and state q, v (e,)."""
-    place_bodies(q, v, equations.bodies, work)
-    set_loads(t, q, v, equations.loads, work.series, work.force)
-    add_connectors(q, v, equations.bodies, equations.connectors, work)
+    """Fill `work.rate` with the accelerations at time t (s) and state q, v (e,).
+
+    What bodies, meshes and connectors do there is left in `work.frames`, `work.mesh.states` and `work.supports`.
+    """
+    bodies, places, force = equations.bodies, equations.places, work.force
+    place_bodies(q, v, bodies, work)
     place_travelling(q, v, equations.travelling)
+    gather_places(q, v, places, work)
+    set_loads(t, q, v, equations.loads, work.series, force)
+    add_connectors(q, bodies, equations.connectors, equations.pairs, work)
     add_meshes(q, v, equations.meshes, work)
-    share_travelling_forces(q, equations.travelling, work.force)
-    add_springs(q, v, equations.springs, work.force)
-    set_accelerations(v, equations.bodies, work)
-    set_elastic_motion(q, v, work.force, equations.motion, work.scratch[0], work.rate)
-    set_turning_motion(q, v, work.force, equations.turning, work.memory, work.rate)
+    add_springs(q, v, equations.springs, force)
+    add_loads_of_places(bodies, places, work)
+    share_travelling_forces(q, equations.travelling, force)
+    set_accelerations(v, bodies, work)
+    set_elastic_motion(q, v, force, equations.motion, work.scratch[0], work.rate)
+    set_turning_motion(q, v, force, equations.turning, work.memory, work.rate)

@@ -137,7 +137,7 @@ def advance(
     """Fill out_q and out_v (steps, size) with the states after each step, from `work.q`, `work.v` on.
 
     Also their signals and powers, see `exugear.solvers.compiled.observers.take_sample`, if there is room for them
-    (steps, columns) and (steps, 7); powers of elastic bodies every `stride` steps, counted from the first of the run.
+    (steps, columns) and (steps, 7); powers every `stride` steps, counted from the first of the run.
     The first step begins at the time ``first * step``. Accelerations of the past are taken from `past` and left there.
     A multistep method that has not enough of them takes Runge-Kutta steps, `START_PARTS` in place of each. Returns the
     number of steps that stayed finite.

@@ -6,7 +6,6 @@ signal stands among the columns of a sample is handed over as `Columns`.
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -21,8 +20,12 @@ from exugear.kernels.fast_meshes import (
     DISSIPATED,
     ELASTIC,
     KINETIC,
+    LAST_CYCLE,
+    LAST_DAMPED,
     LAST_DEFLECTION,
+    LAST_ENERGY,
     LAST_FORCE,
+    LAST_OTHER,
     LAST_OUTSIDE,
     NON_CONSERVATIVE,
     OF_BEARING_RATES,
@@ -37,11 +40,9 @@ from exugear.kernels.turning import turning_energies
 from exugear.solvers.compiled.arrays import (
     COS_B,
     COSINE,
-    LOCAL_FORCE,
     SIN_B,
     SINE,
-    STRAIN,
-    STRAIN_RATE,
+    SUPPORT_LOAD,
     TRUE_RATE,
     W_X,
     W_Y,
@@ -54,10 +55,10 @@ from exugear.solvers.compiled.arrays import (
     Springs,
     Work,
 )
-from exugear.solvers.compiled.connectors import move_connector, turn_between
+from exugear.solvers.compiled.connectors import turn_between
 from exugear.solvers.compiled.equations import evaluate, set_loads
-from exugear.solvers.compiled.meshes import mesh_law, mesh_motion
 from exugear.solvers.compiled.packing import equations_of, work_for
+from exugear.solvers.compiled.places import tilt_sines
 from exugear.solvers.loads import LoadTable
 from exugear.tooth_mesh.laws.table import TABLE_FORM, fast_table_force
 from fe_ste.tools.arrays import Floats
@@ -113,94 +114,96 @@ def observe_table(
 def observe_meshes(
     q: Floats, v: Floats, meshes: Meshes, work: Work, columns: Columns, sample: Floats, energy: Floats
 ) -> None:
-    """Fill the signals of each mesh into a sample; add energy and powers (see `take_sample`).
-
-    The scalar force of each mesh, or that along its line of action, is left in `work.mesh.states`.
-    """
+    """Fill the signals of each mesh into a sample; add energy and powers (see `take_sample`)."""
     for m in range(meshes.coordinates.shape[0]):
         if meshes.form[m] == TABLE_FORM:
             observe_table(q, v, m, meshes, work, columns, sample, energy)
             continue
-        delta, rate, acting = mesh_motion(q, v, m, meshes, work)
-        elastic, _, _, stored, cycle_power = mesh_law(q, v, m, delta, meshes)
-        force = elastic + meshes.damping[m] * rate
-        work.mesh.states[m, LAST_FORCE] = force
-        sample[columns.mesh_dte + m] = delta
-        sample[columns.mesh_force + m] = force * meshes.line_of_action[m]
-        energy[ELASTIC] += stored
-        energy[DISSIPATED] += meshes.damping[m] * rate * rate
-        energy[OF_VARYING_STIFFNESS] += cycle_power
-        energy[NON_CONSERVATIVE] += force * (acting - rate)
+        state = work.mesh.states[m]
+        sample[columns.mesh_dte + m] = state[LAST_DEFLECTION]
+        sample[columns.mesh_force + m] = state[LAST_FORCE] * meshes.line_of_action[m]
+        energy[ELASTIC] += state[LAST_ENERGY]
+        energy[DISSIPATED] += state[LAST_DAMPED]
+        energy[OF_VARYING_STIFFNESS] += state[LAST_CYCLE]
+        energy[NON_CONSERVATIVE] += state[LAST_OTHER]
 
 
 @kernel
-def true_rate(n: int, first_body: Floats, work: Work) -> None:
-    """Fill the derivative of the strain into `work.motion`: see `exugear.kernels.connectors.connector_motion`."""
-    d, w, out = work.motion[STRAIN], work.motion[STRAIN_RATE], work.motion[TRUE_RATE]
+def true_rate(strain: Floats, rate: Floats, first_body: Floats, out: Floats) -> None:
+    """Fill the derivative of a connector's strain: see `exugear.kernels.connectors.connector_motion`."""
+    d, w = strain, rate
     x = first_body[0] * first_body[W_X] + first_body[3] * first_body[W_Y] + first_body[6] * first_body[W_Z]
     y = first_body[1] * first_body[W_X] + first_body[4] * first_body[W_Y] + first_body[7] * first_body[W_Z]
     z = first_body[2] * first_body[W_X] + first_body[5] * first_body[W_Y] + first_body[8] * first_body[W_Z]
     out[0] = w[0] - y * d[2] + z * d[1]
     out[1] = w[1] - z * d[0] + x * d[2]
     out[2] = w[2] - x * d[1] + y * d[0]
-    a, b = d[TILT], d[TILT + 1]
-    c, s = math.cos(a), math.sin(a)
-    out[SPIN] = (c * w[SPIN] - s * w[TILT + 1]) / math.cos(b)
-    out[TILT + 1] = c * w[TILT + 1] + s * w[SPIN]
-    out[TILT] = w[TILT] - math.sin(b) * out[SPIN]
+    (ca, sa), (cb, sb) = tilt_sines(d[TILT]), tilt_sines(d[TILT + 1])
+    out[SPIN] = (ca * w[SPIN] - sa * w[TILT + 1]) / cb
+    out[TILT + 1] = ca * w[TILT + 1] + sa * w[SPIN]
+    out[TILT] = w[TILT] - sb * out[SPIN]
+
+
+@kernel
+def observe_supports(connectors: Connectors, work: Work, columns: Columns, sample: Floats) -> None:
+    """Fill the force of each bearing on its body (N), global axes."""
+    for n in range(connectors.ends.shape[0]):
+        turn, support = work.frames[connectors.ends[n, 0]], work.supports[n]
+        x, y, z = support[SUPPORT_LOAD], support[SUPPORT_LOAD + 1], support[SUPPORT_LOAD + 2]
+        first = columns.support_force + 3 * connectors.number[n]
+        sample[first] = -(turn[0] * x + turn[1] * y + turn[2] * z)
+        sample[first + 1] = -(turn[3] * x + turn[4] * y + turn[5] * z)
+        sample[first + 2] = -(turn[6] * x + turn[7] * y + turn[8] * z)
 
 
 @kernel
 def observe_rolling(
-    q: Floats, v: Floats, n: int, bodies: Bodies, connectors: Connectors, work: Work, energy: Floats
+    q: Floats,
+    v: Floats,
+    n: int,
+    stride: int,
+    derivative: Floats,
+    bodies: Bodies,
+    connectors: Connectors,
+    work: Work,
+    energy: Floats,
 ) -> None:
-    """Add the rolling law of connector n to its force in `work.motion`, and energy and powers (see `take_sample`)."""
-    strain, rate, derivative = work.motion[STRAIN], work.motion[STRAIN_RATE], work.motion[TRUE_RATE]
+    """Add energy and powers of the rolling law of connector n (see `take_sample`)."""
+    strain, rate = work.supports[n, :BODY_SIZE], work.supports[n, BODY_SIZE:SUPPORT_LOAD]
     rolling_forces(n, strain, rate, turn_between(q, n, bodies, connectors), connectors.rolling, work.rolling)
     energy[ELASTIC] += work.rolling[STORED]
-    energy[DISSIPATED] += work.rolling[CAGE_DAMPING] * turn_between(v, n, bodies, connectors)
+    energy[DISSIPATED] += stride * work.rolling[CAGE_DAMPING] * turn_between(v, n, bodies, connectors)
     for i in range(BODY_SIZE):
         elastic, damped = work.rolling[ELASTIC_PART + i], work.rolling[DAMPED_PART + i]
-        work.motion[LOCAL_FORCE, i] += elastic + damped
-        energy[DISSIPATED] += damped * rate[i]
+        energy[DISSIPATED] += stride * damped * rate[i]
         # The potential knows no angle about z, whose moment but keeps the others from working on the spin.
-        energy[OF_BEARING_RATES] += elastic * (rate[i] - (derivative[i] if i < SPIN else 0.0))
+        energy[OF_BEARING_RATES] += stride * elastic * (rate[i] - (derivative[i] if i < SPIN else 0.0))
 
 
 @kernel
 def observe_connectors(
-    q: Floats,
-    v: Floats,
-    bodies: Bodies,
-    connectors: Connectors,
-    work: Work,
-    columns: Columns,
-    sample: Floats,
-    energy: Floats,
+    q: Floats, v: Floats, stride: int, bodies: Bodies, connectors: Connectors, work: Work, energy: Floats
 ) -> None:
-    """Fill the force of each bearing on its body (N), global axes; add energy and powers (see `take_sample`)."""
+    """Add energy and powers of all bearings, these for `stride` samples (see `take_sample`)."""
+    derivative = work.motion[TRUE_RATE]
     for n in range(connectors.ends.shape[0]):
-        move_connector(q, v, n, bodies, connectors, work)
-        turn = work.frames[connectors.ends[n, 0]]
-        true_rate(n, turn, work)
-        strain, rate = work.motion[STRAIN], work.motion[STRAIN_RATE]
-        derivative, force = work.motion[TRUE_RATE], work.motion[LOCAL_FORCE]
+        strain, rate = work.supports[n, :BODY_SIZE], work.supports[n, BODY_SIZE:SUPPORT_LOAD]
+        true_rate(strain, rate, work.frames[connectors.ends[n, 0]], derivative)
+        stored, lost, turned = 0.0, 0.0, 0.0
         for row in range(BODY_SIZE):
             elastic, damped = 0.0, 0.0
             for column in range(BODY_SIZE):
                 stiffness = connectors.stiffness[n, column, row]
                 elastic += stiffness * strain[column]
                 damped += (connectors.time[n] * stiffness + connectors.damping[n, column, row]) * rate[column]
-            force[row] = elastic + damped
-            energy[ELASTIC] += 0.5 * elastic * strain[row]
-            energy[DISSIPATED] += damped * rate[row]
-            energy[OF_BEARING_RATES] += elastic * (rate[row] - derivative[row])
+            stored += elastic * strain[row]
+            lost += damped * rate[row]
+            turned += elastic * (rate[row] - derivative[row])
+        energy[ELASTIC] += 0.5 * stored
+        energy[DISSIPATED] += stride * lost
+        energy[OF_BEARING_RATES] += stride * turned
         if connectors.rolling.first[n] < connectors.rolling.first[n + 1]:
-            observe_rolling(q, v, n, bodies, connectors, work, energy)
-        first = columns.support_force + 3 * connectors.number[n]
-        for i in range(3):
-            o = 3 * i
-            sample[first + i] = -(turn[o] * force[0] + turn[o + 1] * force[1] + turn[o + 2] * force[2])
+            observe_rolling(q, v, n, stride, derivative, bodies, connectors, work, energy)
 
 
 @kernel
@@ -247,12 +250,12 @@ def observe_bodies(q: Floats, v: Floats, bodies: Bodies, work: Work, energy: Flo
 
 
 @kernel
-def observe_springs(q: Floats, v: Floats, springs: Springs, energy: Floats) -> None:
+def observe_springs(q: Floats, v: Floats, stride: int, springs: Springs, energy: Floats) -> None:
     """Add elastic energy and damping power of the torsional springs (see `take_sample`)."""
     for n in range(springs.ends.shape[0]):
         i, j = springs.ends[n, 0], springs.ends[n, 1]
         energy[ELASTIC] += 0.5 * springs.stiffness[n] * (q[j] - q[i]) ** 2
-        energy[DISSIPATED] += springs.damping[n] * (v[j] - v[i]) ** 2
+        energy[DISSIPATED] += stride * springs.damping[n] * (v[j] - v[i]) ** 2
 
 
 @kernel
@@ -270,11 +273,11 @@ def observe_elastic_bodies(q: Floats, v: Floats, stride: int, equations: Equatio
 
 
 @kernel
-def observe_loads(t: float, q: Floats, v: Floats, loads: Loads, work: Work, energy: Floats) -> None:
+def observe_loads(t: float, q: Floats, v: Floats, stride: int, loads: Loads, work: Work, energy: Floats) -> None:
     """Add the power of what acts from outside at time t (s); nothing acts on travelling seats."""
     set_loads(t, q, v, loads, work.series, work.force)
     for i in range(loads.steady.size):
-        energy[OF_LOADS] += work.force[i] * v[i]
+        energy[OF_LOADS] += stride * work.force[i] * v[i]
 
 
 @kernel
@@ -292,18 +295,20 @@ def take_sample(
     """Fill signals (columns,) and energies and powers (7,) of the state at time t (s) that was evaluated last.
 
     Signals but those that `Observer.complete` takes from a state by itself; energies in the columns `KINETIC` and so
-    on. Powers of elastic bodies stand for `stride` samples, none at 0: they take as long as the whole evaluation.
+    on. All powers but those of meshes stand for `stride` samples, none at 0, as they take longer than the signals.
     """
-    energy[:] = 0.0
-    observe_bodies(q, v, equations.bodies, work, energy)
+    for i in range(energy.size):
+        energy[i] = 0.0
     observe_meshes(q, v, equations.meshes, work, columns, sample, energy)
-    observe_connectors(q, v, equations.bodies, equations.connectors, work, columns, sample, energy)
+    observe_supports(equations.connectors, work, columns, sample)
     if equations.joints.host.size > 0:
         observe_joints(v, equations.meshes, equations.joints, work, columns, sample)
-    observe_springs(q, v, equations.springs, energy)
     if stride > 0:
+        observe_bodies(q, v, equations.bodies, work, energy)
+        observe_connectors(q, v, stride, equations.bodies, equations.connectors, work, energy)
+        observe_springs(q, v, stride, equations.springs, energy)
         observe_elastic_bodies(q, v, stride, equations, work, energy)
-    observe_loads(t, q, v, equations.loads, work, energy)
+        observe_loads(t, q, v, stride, equations.loads, work, energy)
 
 
 @kernel

@@ -19,8 +19,8 @@ from exugear.solvers.loads import LoadTable
 from fe_ste.tools.arrays import Floats
 
 POWER_INTERVAL = 1.0 / 30e3
-"""Time between observations of the powers of elastic bodies, s: these vibrate up to some 10 kHz, their powers up to
-twice that, and a sum over samples errs by what lies at the rate of the samples itself."""
+"""Time between observations of powers, s: a sum over samples errs by what lies at the rate of the samples itself, and
+powers of motions up to 10 kHz reach up to twice that."""
 
 
 def unsupported_reason(assembly: Assembly) -> str:
@@ -91,8 +91,8 @@ class CompiledSystem:
         Parameters
         ----------
         signals, energies : (steps, columns) and (steps, 7) arrays, optional
-            For what `exugear.solvers.compiled.observers.take_sample` fills. Powers of elastic bodies stand for as many
-            steps as make up `POWER_INTERVAL`; of energies only those of other parts are whole.
+            For what `exugear.solvers.compiled.observers.take_sample` fills. Powers but those of meshes stand for as
+            many steps as make up `POWER_INTERVAL`; energies are not whole.
 
         Returns
         -------

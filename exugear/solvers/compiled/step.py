@@ -241,10 +241,11 @@ def choose_integration(
 ) -> Integration:
     """Find the method and the step that take the fewest evaluations.
 
-    The step divides the sampling interval, is stable by `MARGIN` for all eigenvalues of the system at rest, meshes at their stiffest, keeps
-    amplitudes up to `band` within `FORCED_ERROR` and the slopes of resonances within `RESONANCE_ERROR`. Resonances
-    count where they are meant: with elastic bodies up to two thirds of the frequency to which these are described
-    exactly. Heavy damping shortens the steps of multistep methods: the Runge-Kutta method takes over then.
+    The step divides the sampling interval, is stable by `MARGIN` for all eigenvalues of the system at rest, meshes at
+    their stiffest, keeps amplitudes up to `band` within `FORCED_ERROR` and the slopes of resonances within
+    `RESONANCE_ERROR`. Resonances count where they are meant: with elastic bodies up to two thirds of the frequency to
+    which these are described exactly. Heavy damping shortens the steps of multistep methods: the Runge-Kutta method
+    takes over then.
 
     Parameters
     ----------

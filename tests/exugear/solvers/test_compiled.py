@@ -20,8 +20,8 @@ from exugear.model.gearbox import Gearbox
 from exugear.results.run_file import load_run
 from exugear.runs.outcome import RunError
 from exugear.runs.runup import simulate
-from exugear.solvers.compiled.observers import Observer
 from exugear.solvers.compiled.methods import RUNGE_KUTTA, Method
+from exugear.solvers.compiled.observers import Observer
 from exugear.solvers.compiled.solver import CompiledSystem, unsupported_reason
 from exugear.solvers.compiled.step import choose_integration, highest_rate
 from exugear.solvers.exudyn_model.library import exudyn
