@@ -21,7 +21,7 @@ from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import compiled, summing
 
 #: Beyond this many half sides a cell acts as its resultant with its second moments (error below 1e-3 of its part).
-_FAR = 6.0
+_FAR = 5.5
 
 
 @compiled
