@@ -235,7 +235,7 @@ class _Search:
         end, border = (marked[near] for marked in _ends(window.cells, near))
         cells, address = window.cells.select(near), window.address[near]
         compliance = self.compliance
-        matrix = compliance_matrix(cells, self.kinematics, compliance.axial, compliance.flanks, compliance.sliced)
+        matrix = compliance_matrix(cells, self.kinematics, compliance.axial, compliance.flanks, compliance.regular)
         for index in group:
             gap = window.gap[index][near]
             try:
