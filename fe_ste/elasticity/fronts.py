@@ -51,7 +51,7 @@ def schur_complement(front: Front, sizes: Integers, leaf: Callable[[Integers, In
 
 
 def _add(matrix: Floats, blocks: Integers, sizes: Integers, part_blocks: Integers, part: Floats) -> None:
-    """Add a symmetric matrix over some of the blocks; both have them in the same order, so a lower triangle stays one."""
+    """Add a symmetric matrix over some of the blocks; their order is one, so that lower triangles stay so."""
     runs = list(_runs(blocks, sizes, part_blocks))
     for column, (from_column, to_column) in enumerate(runs):
         for from_row, to_row in runs[column:]:

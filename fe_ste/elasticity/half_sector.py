@@ -21,7 +21,7 @@ from fe_ste.elasticity.dissection import Front, dissected
 from fe_ste.elasticity.fronts import schur_complement
 from fe_ste.elasticity.hexmesh import SectorMesh
 from fe_ste.elasticity.layers import LayeredElements
-from fe_ste.tools.arrays import Booleans, Floats, Integers, SparseMatrix
+from fe_ste.tools.arrays import Floats, Integers, SparseMatrix
 from fe_ste.tools.dense import mirrored_lower
 from fe_ste.tools.threads import side_by_side
 
@@ -93,13 +93,14 @@ def sector_halves(
 
 def turn_signs(mesh: SectorMesh) -> Floats:
     """Return what a half turn about the middle of the cut face does to its unknowns: 1 or -1 each, (m,), ones first."""
-    nodes = len(mesh.section.plus_cut) - np.isin(mesh.section.plus_cut, mesh.section.held).sum()
-    return np.sort(np.tile(_turn_basis(len(mesh.axial_positions))[1], nodes))[::-1]
+    nodes = len(np.setdiff1d(mesh.section.plus_cut, mesh.section.held))
+    _, signs = _turn_basis(len(mesh.axial_positions))
+    return np.asarray(np.sort(np.tile(signs, nodes))[::-1])
 
 
 def _line_turn(layers: int) -> Floats:
     """Half turn of the unknowns of a line of nodes about its middle, (3 layers, 3 layers)."""
-    return np.kron(np.eye(layers)[::-1], np.diag(_HALF_TURN))
+    return np.asarray(np.kron(np.eye(layers)[::-1], np.diag(_HALF_TURN)))
 
 
 def _turn_basis(layers: int) -> tuple[Floats, Floats]:
@@ -108,7 +109,7 @@ def _turn_basis(layers: int) -> tuple[Floats, Floats]:
     kept, reverse = ((np.eye(3 * layers) + sign * turn)[:, :front] * np.sqrt(0.5) for sign in (EVEN, ODD))
     middle = np.eye(3 * layers)[:, front : 3 * layers - front]
     basis = np.concatenate([kept, reverse, middle], axis=1)
-    return basis, np.diag(basis.T @ turn @ basis).round()
+    return np.asarray(basis), np.asarray(np.diag(basis.T @ turn @ basis).round())
 
 
 class _Halving:
@@ -217,9 +218,7 @@ class _Halving:
         kept = np.concatenate([self._face, np.arange(self._nodes, self._nodes + 1 + self._groups)])
         return dissected(np.concatenate([middles, places]), cells, self._sizes(maps), kept, _LEAF_BLOCKS)
 
-    def _leaf(
-        self, maps: dict[int, tuple[int, Floats]], sizes: Integers, cells: Integers, blocks: Integers
-    ) -> Floats:
+    def _leaf(self, maps: dict[int, tuple[int, Floats]], sizes: Integers, cells: Integers, blocks: Integers) -> Floats:
         """Sum of the matrices of some cells over the unknowns of some blocks."""
         ends = np.cumsum(sizes[blocks])
         parts = {block: slice(end - sizes[block], end) for block, end in zip(blocks.tolist(), ends, strict=True)}
@@ -254,4 +253,4 @@ def _mirror_images(mesh: SectorMesh) -> Integers:
             f"gear {mesh.gear.name}: the mesh turned by 180 deg about the middle of the tooth misses itself by "
             f"{worst:.3g} m; it must be the same"
         )
-    return images
+    return np.asarray(images)

@@ -39,9 +39,7 @@ class LayeredElements:
     stiffness: Floats
 
     @classmethod
-    def from_mesh(
-        cls, mesh: SectorMesh, quads: Integers, share: Floats, incompatible_modes: bool
-    ) -> LayeredElements:
+    def from_mesh(cls, mesh: SectorMesh, quads: Integers, share: Floats, incompatible_modes: bool) -> LayeredElements:
         """Compute the elements over some quadrilaterals, given by their number; of each a share counts.
 
         Raises
@@ -57,7 +55,8 @@ class LayeredElements:
         )
         found = [_layer(mesh, quads, float(steps[at]), incompatible_modes) for at in first]
         corners, above, _ = found[0]
-        return cls(corners, above, kinds.ravel(), np.stack([stiffness for *_, stiffness in found]) * share[:, None, None, None, None])
+        stiffness = np.stack([matrices for *_, matrices in found])
+        return cls(corners, above, kinds.ravel(), stiffness * share[:, None, None, None, None])
 
     def stack(self, elements: Integers) -> tuple[Integers, Floats]:
         """Stiffness of the stacks of bricks over some quadrilaterals, all layers joined.
@@ -88,8 +87,10 @@ class LayeredElements:
         return nodes, result.reshape(len(nodes), unknowns, len(nodes), unknowns)
 
 
-def _layer(mesh: SectorMesh, quads: Integers, height: float, incompatible_modes: bool) -> tuple[Integers, Integers, Floats]:
-    """Corners and matrices of one layer; the unknowns of its upper end are turned with the section there."""
+def _layer(
+    mesh: SectorMesh, quads: Integers, height: float, incompatible_modes: bool
+) -> tuple[Integers, Integers, Floats]:
+    """Section nodes, ends and matrices of one layer, whose upper end is turned, and its unknowns with it."""
     section = mesh.section
     angle = mesh.twist_rate * height
     turn = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])

@@ -17,7 +17,7 @@ import numpy as np
 import scipy.linalg
 
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.dense import eliminate, mirrored_lower
+from fe_ste.tools.dense import divided_by_factor, eliminate, mirrored_lower
 from fe_ste.tools.threads import side_by_side
 
 
@@ -54,10 +54,11 @@ def doubled(chain: Chain, signs: Floats) -> Chain:
 
     Examples
     --------
-    Two equal springs in series are half as stiff:
+    Two equal springs in series are half as stiff. Their ends move along the springs, which the turn reverses: even is
+    what stretches them, odd what moves them as a whole.
 
-    >>> spring = Chain(np.array([[0.0]]), np.array([[2.0]]))  # moved at one end by 1, at the other by 1 or -1
-    >>> doubled(spring, np.array([-1.0])).odd.tolist()
+    >>> spring = Chain(even=np.array([[2.0]]), odd=np.array([[0.0]]))
+    >>> doubled(spring, np.array([-1.0])).even.tolist()
     [[1.0]]
     """
     own, across, ones = chain.own, chain.across, int(np.count_nonzero(signs > 0))
@@ -70,7 +71,7 @@ def doubled(chain: Chain, signs: Floats) -> Chain:
     return Chain(*side_by_side(half, (1, -1)))
 
 
-def enclosed(inner: Floats, outer: Chain, signs: Floats) -> tuple[Floats, Floats]:
+def enclosed(inner: Floats, outer: Chain, signs: Floats) -> tuple[Floats, Floats, Floats]:
     """Join a chain to either end of another one.
 
     Parameters
@@ -84,12 +85,10 @@ def enclosed(inner: Floats, outer: Chain, signs: Floats) -> tuple[Floats, Floats
     -------
     stiffness : ndarray (m, m)
         Of the whole, even or odd as `inner`.
-    follow : ndarray (m, m)
-        Displacement of the inner plus face by that of the outer one.
+    factor, below : ndarray (m, m)
+        ``-(below @ inv(factor)).T`` is the displacement of the inner plus face by that of the outer one.
     """
-    middle = inner + outer.own * signs * signs[:, None]
-    stiffness, factor, below = _condensed(middle, outer.across * signs, outer.own)
-    return stiffness, -scipy.linalg.solve_triangular(factor, below.T, lower=True, trans="T", check_finite=False)
+    return _condensed(inner + outer.own * signs * signs[:, None], outer.across * signs, outer.own)
 
 
 def _condensed(gone: Floats, coupling: Floats, kept: Floats) -> tuple[Floats, Floats, Floats]:
@@ -140,8 +139,8 @@ def ring_faces(sector: Chain, load: Chain, signs: Floats, teeth: int, reach: int
         at = 0 if parity > 0 else 1
         stiffness, follows = rest[at], []
         for _ in range(reach):
-            stiffness, follow = enclosed(stiffness, sector, signs)
-            follows.append(follow)
+            stiffness, factor, below = enclosed(stiffness, sector, signs)
+            follows.append(-divided_by_factor(below, factor).T)
         # The plus face of the rest is the minus face of sector 0, which moves as the plus face turned, or against that.
         closed = sector[at] + stiffness * signs * signs[:, None]
         first = scipy.linalg.solve(closed, load[at], assume_a="pos", check_finite=False)

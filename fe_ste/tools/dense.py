@@ -75,13 +75,13 @@ def factorise_lower(matrix: Floats) -> None:
         raise NotPositiveDefiniteError(f"the matrix is not positive definite (pivot {found.value} of {len(matrix)})")
 
 
-def divide_by_factor(rows: Floats, factor: Floats) -> None:
-    """Multiply rows from the right by the inverse of a lower triangle transposed; both are stored by columns."""
+def _divide(rows: Floats, factor: Floats, transposed: bytes) -> None:
+    """Multiply rows from the right by the inverse of a lower triangle, or of its transpose, in place."""
     if min(rows.shape) == 0:
         return
     one = ctypes.byref(ctypes.c_double(1.0))
     sizes = _integer(rows.shape[0]), _integer(rows.shape[1])
-    _function("blas", "dtrsm")(b"R", b"L", b"T", b"N", *sizes, one, *_place(factor), *_place(rows))
+    _function("blas", "dtrsm")(b"R", b"L", transposed, b"N", *sizes, one, *_place(factor), *_place(rows))
 
 
 def eliminate(matrix: Floats, count: int) -> None:
@@ -90,8 +90,8 @@ def eliminate(matrix: Floats, count: int) -> None:
     Parameters
     ----------
     matrix : ndarray (n, n)
-        Stored by columns; its lower triangle counts. Left are the Cholesky factor L of the first `count` unknowns, below
-        it B L^-T with B their coupling to the others, and in the rest the Schur complement, lower triangle.
+        Stored by columns; its lower triangle counts. Left are the Cholesky factor L of the first `count` unknowns,
+        below it B L^-T with B their coupling to the others, and in the rest the Schur complement, lower triangle.
     count : int
 
     Raises
@@ -112,12 +112,28 @@ def eliminate(matrix: Floats, count: int) -> None:
         stop = min(start + _PANEL, count)
         factorise_lower(matrix[start:stop, start:stop])
         below = matrix[stop:, start:stop]
-        divide_by_factor(below, matrix[start:stop, start:stop])
+        _divide(below, matrix[start:stop, start:stop], b"T")
         add_product(matrix[stop:, stop:count], below, below[: count - stop], -1.0)
     subtract_square(matrix[count:, count:], matrix[count:, :count])
 
 
+def divided_by_factor(rows: Floats, factor: Floats) -> Floats:
+    """Return rows times the inverse of a lower triangle, the factor that `eliminate` leaves; stored by columns."""
+    result = np.array(rows, order="F")
+    size = len(factor)
+    for start in range((size - 1) // _PANEL * _PANEL, -1, -_PANEL):
+        stop = min(start + _PANEL, size)
+        panel = result[:, start:stop]
+        panel -= result[:, stop:] @ factor[stop:, start:stop]
+        _divide(panel, factor[start:stop, start:stop], b"N")
+    return result
+
+
 def mirrored_lower(matrix: Floats) -> Floats:
-    """Return the symmetric matrix whose lower triangle is given."""
-    lower = np.tril(matrix)
-    return np.asarray(lower + np.tril(lower, -1).T)
+    """Write the lower triangle of a symmetric matrix over the upper one, and return it."""
+    for start in range(0, len(matrix), _PANEL):
+        stop = start + _PANEL
+        corner = matrix[start:stop, start:stop]
+        corner[:] = np.tril(corner) + np.tril(corner, -1).T
+        matrix[start:stop, stop:] = matrix[stop:, start:stop].T
+    return matrix

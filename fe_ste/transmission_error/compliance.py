@@ -20,7 +20,6 @@ from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.notebook import html_table, value_range
-from fe_ste.tools.sparse import Backend
 
 
 @dataclass(frozen=True)
@@ -151,7 +150,6 @@ def pair_compliance(
     *,
     open_teeth: int | None = None,
     incompatible_modes: bool = True,
-    backend: Backend | None = None,
 ) -> PairCompliance:
     """Compute the compliance of both gears of `pair` by finite elements.
 
@@ -163,16 +161,13 @@ def pair_compliance(
     open_teeth : int, optional
         Odd number of teeth of open sectors; without it closed rings.
     incompatible_modes : bool
-    backend : {"pardiso", "superlu"}, optional
 
     Returns
     -------
     PairCompliance
     """
     pinion, gear = (
-        flank_compliance(
-            wheel, side, mesh, open_teeth=open_teeth, incompatible_modes=incompatible_modes, backend=backend
-        )
+        flank_compliance(wheel, side, mesh, open_teeth=open_teeth, incompatible_modes=incompatible_modes)
         for wheel, side in ((pair.pinion, 1), (pair.gear, -1 if pair.gear.internal else 1))
     )
     return PairCompliance.from_flanks(pair, (pinion, gear), contact)
