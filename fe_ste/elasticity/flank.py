@@ -11,7 +11,7 @@ displacements of a flank are positive into the material, as a pressing load acts
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -82,6 +82,24 @@ class FlankCompliance:
         if key not in self.regular:
             raise ValueError(f"gear {self.gear.name}: no compliance between teeth {read} and {loaded}")
         return key
+
+    def turned(self) -> FlankCompliance:
+        """Return the other flank of the same gear.
+
+        A gear is equal to itself turned by 180 degrees about the middle of a tooth: that brings one flank to the other,
+        reverses the axis and the order of the teeth, and the torque about the axis.
+        """
+        nodes = np.arange(len(self.hub_torque)).reshape(len(self.roll), -1)[:, ::-1].ravel()
+        return replace(
+            self,
+            side=-self.side,
+            axial=-self.axial[::-1],
+            regular={
+                (-read, -loaded): np.ascontiguousarray(block[np.ix_(nodes, nodes)])
+                for (read, loaded), block in self.regular.items()
+            },
+            hub_torque=-self.hub_torque[nodes],
+        )
 
     @property
     def tooth_reach(self) -> int:

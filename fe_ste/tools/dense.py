@@ -11,7 +11,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numba.extending import get_cython_function_address
 
 from fe_ste.tools.arrays import Floats
 
@@ -26,6 +25,8 @@ class NotPositiveDefiniteError(ValueError):
 @cache
 def _function(library: str, name: str) -> Callable[..., None]:
     """Fortran function: characters, integers and scalars by address, arrays as addresses."""
+    from numba.extending import get_cython_function_address  # a sixth of a second that a start need not wait
+
     address = get_cython_function_address(f"scipy.linalg.cython_{library}", name)
     return ctypes.CFUNCTYPE(None)(address)
 

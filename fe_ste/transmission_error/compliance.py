@@ -14,8 +14,9 @@ import numpy as np
 
 from fe_ste.contact.cells import ContactSettings
 from fe_ste.contact.compliance import SlicedCompliance
-from fe_ste.elasticity.flank import FlankCompliance, flank_compliance
+from fe_ste.elasticity.flank import FlankCompliance
 from fe_ste.elasticity.hexmesh import MeshSettings
+from fe_ste.elasticity.known_flanks import known_flanks
 from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats, Integers
@@ -151,7 +152,7 @@ def pair_compliance(
     open_teeth: int | None = None,
     incompatible_modes: bool = True,
 ) -> PairCompliance:
-    """Compute the compliance of both gears of `pair` by finite elements.
+    """Compute the compliance of both gears of `pair` by finite elements, or take it from where it is kept.
 
     Parameters
     ----------
@@ -165,9 +166,11 @@ def pair_compliance(
     Returns
     -------
     PairCompliance
+
+    See Also
+    --------
+    fe_ste.elasticity.known_flanks.known_flanks : Where computed gears are kept.
     """
-    pinion, gear = (
-        flank_compliance(wheel, side, mesh, open_teeth=open_teeth, incompatible_modes=incompatible_modes)
-        for wheel, side in ((pair.pinion, 1), (pair.gear, -1 if pair.gear.internal else 1))
-    )
+    sides = ((pair.pinion, 1), (pair.gear, -1 if pair.gear.internal else 1))
+    pinion, gear = known_flanks(sides, mesh, open_teeth=open_teeth, incompatible_modes=incompatible_modes)
     return PairCompliance.from_flanks(pair, (pinion, gear), contact)
