@@ -17,8 +17,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse
 
-from fe_ste.elasticity.dissection import Front, dissected
-from fe_ste.elasticity.fronts import schur_complement
+from fe_ste.elasticity.dissection import Front, dissected, schur_complement
 from fe_ste.elasticity.hexmesh import SectorMesh
 from fe_ste.elasticity.layers import LayeredElements
 from fe_ste.tools.arrays import Floats, Integers, SparseMatrix

@@ -77,11 +77,13 @@ def known_flanks(
     for key, (gear, _) in zip(keys, wanted, strict=True):
         gears.setdefault(key, gear)
 
-    def found(key: str) -> FlankCompliance:
-        return _remembered(key) or _computed(key, gears[key], settings, options)
-
+    flanks = {key: flank for key, gear in gears.items() if (flank := _known(key, gear))}
+    missing = [key for key in gears if key not in flanks]
     with one_dense_thread():
-        flanks = dict(zip(gears, side_by_side(found, gears), strict=True))
+        computed = side_by_side(lambda key: flank_compliance(gears[key], 1, settings, **options), missing)
+    for key, flank in zip(missing, computed, strict=True):
+        flanks[key] = flank
+        _keep(key, flank)
     return [
         dataclasses.replace(flanks[key] if side > 0 else flanks[key].turned(), gear=gear)
         for key, (gear, side) in zip(keys, wanted, strict=True)
@@ -111,27 +113,35 @@ def _method() -> str:
     return digest.hexdigest()
 
 
-def _remembered(key: str) -> FlankCompliance | None:
+def _known(key: str, gear: Gear) -> FlankCompliance | None:
+    """Flank from memory or from its file."""
     with _memory_lock:
-        if key in _memory:
-            _memory.move_to_end(key)
-        return _memory.get(key)
+        flank = _memory.get(key)
+    if flank is None and (path := _path(key)):
+        flank = _read(path, gear)
+    if flank is not None:
+        _remember(key, flank)
+    return flank
 
 
-def _computed(key: str, gear: Gear, settings: MeshSettings, options: dict[str, Any]) -> FlankCompliance:
-    """Flank from its file, or computed and then kept in one."""
-    folder = _folder()
-    path = None if folder is None else folder / f"flank-{key}.npz"
-    flank = None if path is None else _read(path, gear)
-    if flank is None:
-        flank = flank_compliance(gear, 1, settings, **options)
-        if path is not None:
-            _write(path, flank)
+def _keep(key: str, flank: FlankCompliance) -> None:
+    _remember(key, flank)
+    if path := _path(key):
+        _write(path, flank)
+
+
+def _remember(key: str, flank: FlankCompliance) -> None:
     with _memory_lock:
         _memory[key] = flank
+        _memory.move_to_end(key)
         while len(_memory) > _IN_MEMORY:
             _memory.popitem(last=False)
-    return flank
+
+
+def _path(key: str) -> Path | None:
+    """File of a flank, or None where none is kept."""
+    folder = _folder()
+    return None if folder is None else folder / f"flank-{key}.npz"
 
 
 def _folder() -> Path | None:

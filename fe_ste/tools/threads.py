@@ -47,15 +47,17 @@ def side_by_side(function: Callable[[Item], Result], items: Iterable[Item]) -> l
     >>> side_by_side(abs, [-1, 2])
     [1, 2]
     """
-    if available_cores() == 1 or multiprocessing.parent_process() or getattr(_here, "beside", False):
-        return [function(item) for item in items]
+    given = list(items)
+    beside_another = getattr(_here, "beside", False)
+    if len(given) < 2 or available_cores() == 1 or multiprocessing.parent_process() or beside_another:
+        return [function(item) for item in given]
 
     def beside(item: Item) -> Result:
         _here.beside = True
         return function(item)
 
     with ThreadPoolExecutor(2) as threads:
-        return list(threads.map(beside, items))
+        return list(threads.map(beside, given))
 
 
 def available_cores() -> int:

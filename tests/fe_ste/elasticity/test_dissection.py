@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fe_ste.elasticity.dissection import Front, dissected
-from fe_ste.elasticity.fronts import schur_complement
+from fe_ste.elasticity.dissection import Front, dissected, schur_complement
 from fe_ste.tools.arrays import Floats, Integers
 
 
