@@ -70,7 +70,7 @@ def known_flanks(
     ValueError
         As in `fe_ste.elasticity.flank.flank_compliance`.
     """
-    options = {"open_teeth": open_teeth, "incompatible_modes": incompatible_modes}
+    options: dict[str, Any] = {"open_teeth": open_teeth, "incompatible_modes": incompatible_modes}
     settings = settings or MeshSettings()
     keys = [_key(gear, settings, options) for gear, _ in wanted]
     gears: dict[str, Gear] = {}
