@@ -9,7 +9,7 @@ side is solved.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +25,7 @@ _FRACTIONS = np.array([0.36, 0.43, 0.5, 0.57, 0.64])
 _UNEVEN = 1.0 + 2.0 * np.abs(_FRACTIONS - 0.5)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Front:
     """A step of the elimination: some blocks are eliminated, their neighbours take up what is left.
 
@@ -136,18 +136,40 @@ def _sorted_borders(front: Front, place: Integers) -> Front:
     return Front(front.eliminated, border, children, front.cells)
 
 
-def schur_complement(front: Front, sizes: Integers, leaf: Callable[[Integers, Integers], Floats]) -> Floats:
+def parts_without(front: Front, blocks: Integers) -> list[Front]:
+    """Return the largest parts of a dissection in which no cell couples any of some blocks."""
+    found, untouched = _parts_without(front, set(blocks.tolist()))
+    return [front] if untouched else found
+
+
+def _parts_without(front: Front, blocks: set[int]) -> tuple[list[Front], bool]:
+    of_children = [(child, *_parts_without(child, blocks)) for child in front.children]
+    if blocks.isdisjoint([*front.eliminated.tolist(), *front.border.tolist()]) and all(
+        free for *_, free in of_children
+    ):
+        return [], True
+    return [part for child, found, free in of_children for part in ([child] if free else found)], False
+
+
+def schur_complement(
+    front: Front,
+    sizes: Integers,
+    leaf: Callable[[Integers, Integers], Floats],
+    known: Mapping[Front, Floats] | None = None,
+) -> Floats:
     """Eliminate all blocks but those that are kept.
 
     Parameters
     ----------
     front : Front
-        The last front of a dissection.
+        The last front of a dissection, or of a part of it.
     sizes : ndarray
         Unknowns of each block.
     leaf : callable
         Of cells and blocks: the sum of the cells' symmetric matrices over the unknowns of these blocks, stored by
         columns; its lower triangle counts.
+    known : mapping of Front to ndarray, optional
+        Results for parts of the dissection.
 
     Returns
     -------
@@ -158,12 +180,14 @@ def schur_complement(front: Front, sizes: Integers, leaf: Callable[[Integers, In
     ------
     fe_ste.tools.dense.NotPositiveDefiniteError
     """
+    if known and front in known:
+        return known[front]
     blocks = np.concatenate([front.eliminated, front.border])
     if front.children:
         count = int(sizes[blocks].sum())
         matrix = np.zeros((count, count), order="F")
         for child in front.children:
-            _add(matrix, blocks, sizes, child.border, schur_complement(child, sizes, leaf))
+            _add(matrix, blocks, sizes, child.border, schur_complement(child, sizes, leaf, known))
     else:
         matrix = leaf(front.cells, blocks)
     gone = int(sizes[front.eliminated].sum())

@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse
 
-from fe_ste.elasticity.dissection import Front, dissected, schur_complement
+from fe_ste.elasticity.dissection import Front, dissected, parts_without, schur_complement
 from fe_ste.elasticity.hexmesh import SectorMesh
 from fe_ste.elasticity.layers import LayeredElements
 from fe_ste.tools.arrays import Floats, Integers, SparseMatrix
@@ -86,7 +86,8 @@ def sector_halves(
         If the mesh is not equal to itself so turned.
     """
     halving = _Halving(mesh, scipy.sparse.hstack(columns).tocsr(), incompatible_modes)
-    even, odd = side_by_side(halving.half, (EVEN, ODD))
+    common = halving.common_parts()
+    even, odd = side_by_side(lambda parity: halving.half(parity, common), (EVEN, ODD))
     return even, odd
 
 
@@ -135,11 +136,20 @@ class _Halving:
         self._pairs = list(self._columns)
         self._plan = self._planned(middles[quads])
 
-    def half(self, parity: int) -> SectorHalf:
+    def common_parts(self) -> dict[Front, Floats]:
+        """Parts of the half that know nothing of even and odd: away from the middle line and the held surface."""
+        own_images = np.flatnonzero(self._mirrored == np.arange(self._nodes))
+        coupled = np.union1d(self._elements.corners, [node for node, _ in self._pairs])
+        crossing = self._mirrored[coupled[self._below[coupled]]]
+        parts = parts_without(self._plan, np.concatenate([own_images, crossing, [self._nodes]]))
+        maps = self._maps(EVEN)
+        return dict(zip(parts, side_by_side(lambda part: self._condensed(part, maps, {}), parts), strict=True))
+
+    def half(self, parity: int, common: dict[Front, Floats]) -> SectorHalf:
         """Condense the half for even or odd deformations."""
         maps = self._maps(parity)
         sizes = self._sizes(maps)
-        matrix = mirrored_lower(schur_complement(self._plan, sizes, lambda *part: self._leaf(maps, sizes, *part)))
+        matrix = mirrored_lower(self._condensed(self._plan, maps, common))
         # Kept blocks come by their numbers: the face's nodes, the turn of the held surface, the columns.
         signs = np.tile(_turn_basis(self._layers)[1], len(self._face))
         face = np.concatenate([np.flatnonzero(signs > 0), np.flatnonzero(signs < 0)])
@@ -152,6 +162,10 @@ class _Halving:
             face_torque=torque[face],
             fixed_torque=torque[readings],
         )
+
+    def _condensed(self, front: Front, maps: dict[int, tuple[int, Floats]], known: dict[Front, Floats]) -> Floats:
+        sizes = self._sizes(maps)
+        return schur_complement(front, sizes, lambda *part: self._leaf(maps, sizes, *part), known)
 
     @cached_property
     def _face(self) -> Integers:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fe_ste.elasticity.dissection import Front, dissected, schur_complement
+from fe_ste.elasticity.dissection import Front, dissected, parts_without, schur_complement
 from fe_ste.tools.arrays import Floats, Integers
 
 
@@ -54,6 +54,10 @@ def test_what_is_left_is_the_schur_complement(leaf_blocks: int) -> None:
     # Matrices of condition 100: rounding.
     assert np.abs(np.tril(found - expected)).max() < 1e-12 * np.abs(expected).max()
 
+    # Parts that couple none of some blocks may be known before.
+    known = {part: schur_complement(part, sizes, leaf) for part in parts_without(plan, np.array([5, 33]))}
+    assert (np.tril(schur_complement(plan, sizes, leaf, known)) == np.tril(found)).all()
+
 
 def test_each_block_is_eliminated_once_and_each_cell_is_in_one_leaf() -> None:
     middles, cells = grid(12, 12)
@@ -62,6 +66,17 @@ def test_each_block_is_eliminated_once_and_each_cell_is_in_one_leaf() -> None:
     assert np.sort(np.concatenate([front.eliminated for front in plan])).tolist() == list(range(13, 169))
     assert np.sort(np.concatenate([front.cells for front in plan])).tolist() == list(range(144))
     assert plan[0].border.tolist() == kept.tolist()
+
+
+def test_parts_without_some_blocks_are_the_largest() -> None:
+    middles, cells = grid(8, 8)
+    plan = dissected(middles, cells, np.ones(81, dtype=np.int64), np.array([], dtype=np.int64), 9)
+    parts = parts_without(plan, np.array([0]))  # a corner, which one cell couples
+    couples_it = [number for number, blocks in enumerate(cells) if 0 in blocks]
+    inside = np.concatenate([front.cells for part in parts for front in fronts_of(part)])
+    (leaf,) = (front for front in fronts_of(plan) if set(couples_it) & set(front.cells.tolist()))
+    assert sorted([*inside.tolist(), *leaf.cells.tolist()]) == list(range(64))
+    assert parts_without(plan, np.array([81])) == [plan]
 
 
 def test_a_square_grid_is_cut_along_its_lines() -> None:
