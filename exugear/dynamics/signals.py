@@ -64,8 +64,8 @@ class Signal(Variable):
     Attributes
     ----------
     filled_by : tuple of str
-        Functions and methods of `exugear.solvers.compiled.observers` that fill its columns, or its part of the
-        account. Empty where `formula` gives it, or where it is a time itself.
+        Functions of `exugear.solvers.compiled.sampling` that fill its columns, or its part of the account; or
+        methods of `exugear.solvers.compiled.observers`. Empty where `formula` gives it, or where it is a time itself.
     formula : callable, optional
         Makes it of the columns of samples: (layout, rows) to an array of rows and its further dimensions. Of a time
         that is added up: in which samples it passes.
@@ -144,7 +144,7 @@ SIGNALS = (
         "N",
         sign_convention="on the body, along the global axis",
         kind="f4",
-        filled_by=("observe_connectors", "observe_joints"),
+        filled_by=("observe_supports", "observe_joints"),
     ),
     Signal(
         "pulling_time",
