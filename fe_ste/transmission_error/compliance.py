@@ -9,18 +9,21 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fe_ste.contact.cells import ContactSettings
 from fe_ste.contact.regular import RegularCompliance
-from fe_ste.elasticity.flank import FlankCompliance, flank_compliance
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.notebook import html_table, value_range
-from fe_ste.tools.sparse import Backend
+
+if TYPE_CHECKING:
+    from fe_ste.elasticity.flank import FlankCompliance
+    from fe_ste.tools.sparse import Backend
 
 
 @dataclass(frozen=True)
@@ -170,6 +173,8 @@ def pair_compliance(
     -------
     PairCompliance
     """
+    from fe_ste.elasticity.flank import flank_compliance
+
     pinion, gear = (
         flank_compliance(
             wheel, side, mesh, open_teeth=open_teeth, incompatible_modes=incompatible_modes, backend=backend

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import fe_ste.elasticity.flank
 import fe_ste.transmission_error.table
 from fe_ste.contact.cells import ContactSettings
 from fe_ste.elasticity.hexmesh import MeshSettings
@@ -145,13 +146,13 @@ def test_netcdf_without_a_table_is_refused(tmp_path: Path) -> None:
 
 def test_a_flank_that_meshes_twice_is_computed_once(monkeypatch: pytest.MonkeyPatch) -> None:
     calls = []
-    compute = fe_ste.transmission_error.table.flank_compliance
+    compute = fe_ste.elasticity.flank.flank_compliance
 
     def counted(gear: Gear, *rest: Any) -> Any:
         calls.append(gear.name)
         return compute(gear, *rest)
 
-    monkeypatch.setattr(fe_ste.transmission_error.table, "flank_compliance", counted)
+    monkeypatch.setattr(fe_ste.elasticity.flank, "flank_compliance", counted)
     gear = dataclasses.replace(GEAR, name="meshes twice")
     pair = GearPair(name="pair", pinion=gear, gear=gear, centre_distance=90e-3)
     fe_ste.transmission_error.table.prepared_compliance(dataclasses.replace(WANTED, pair=pair))
