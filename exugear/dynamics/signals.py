@@ -10,14 +10,17 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import xarray as xr
 
 from exugear.dynamics.assembly import Assembly
 from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Booleans, Floats
+
+if TYPE_CHECKING:
+    import xarray as xr
+
 
 COMPONENTS = {"axis": 3}
 """Entries along a dimension that needs no names: x, y, z in global axes."""
@@ -392,7 +395,7 @@ def signal_layout(assembly: Assembly) -> SignalLayout:
     )
 
 
-def energy_residual(data: xr.Dataset) -> float:
+def energy_residual(data: xr.Dataset | Mapping[str, Floats]) -> float:
     """Part of the change of kinetic energy that the account of a run does not explain; NaN without a change."""
     change = {term: float(data[term][-1] - data[term][0]) for term in BALANCE_TERMS}
     explained = sum(value for term, value in change.items() if term != "work_of_loads")

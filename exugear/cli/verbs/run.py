@@ -190,11 +190,12 @@ def _tell_doubts(project: Project) -> None:
 
 def _simulate(project: Project, resume: bool, **options: Any) -> Run:
     """Run the load case behind a progress bar; options as those of `exugear.runs.runup.simulate`."""
+    from exugear.results.pieces import has_pieces
+    from exugear.results.run_file import PARTIAL_NAME
     from exugear.runs.outcome import LimitError, RunError
-    from exugear.runs.run_folder import refuse_to_resume
 
     directory, variant = project.run_directory, project.choice.variant
-    if not resume and not refuse_to_resume(directory):
+    if not resume and has_pieces(directory / PARTIAL_NAME):
         note(f"{directory}: a stopped run is begun anew; --resume would have gone on from it")
     reduce_elastic_bodies(project)
     with progress_bar() as bar:
@@ -213,7 +214,7 @@ def _simulate(project: Project, resume: bool, **options: Any) -> Run:
         except RunError as error:
             raise FailedError(error) from error
         except KeyboardInterrupt:
-            if refuse_to_resume(directory):
+            if not has_pieces(directory / PARTIAL_NAME):
                 raise
             raise StoppedError(f"kept in {directory}, --resume goes on from there") from None
 
@@ -225,13 +226,13 @@ def _tell_run(case: Path, finished: Run, as_json: bool) -> None:
         raise StoppedError(f"at {finished.end:.3f} s; kept in {finished.path}, --resume goes on from there{so_far}")
     from exugear.dynamics.signals import BALANCE_TERMS, MESH_TIMES, energy_residual
     from exugear.model.parts import RPM
-    from exugear.results.run_file import load_run
+    from exugear.results.run_file import read_run
 
-    data = load_run(finished.path, ("input_speed", *MESH_TIMES, *BALANCE_TERMS))
+    data, attributes = read_run(finished.path, ("input_speed", *MESH_TIMES, *BALANCE_TERMS))
     outside = float(data["outside_time"].max())
     summary = {
         "case": str(case),
-        **{key: str(data.attrs[key]) for key in ("variant", "load_case", "mesh_law", "inertias", "solver")},
+        **{key: str(attributes[key]) for key in ("variant", "load_case", "mesh_law", "inertias", "solver")},
         "file": str(finished.path),
         "simulated_s": finished.end,
         "wall_s": round(finished.wall, 2),
