@@ -17,11 +17,11 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse
 
-from fe_ste.elasticity.dissection import Front, dissected, parts_without, schur_complement
 from fe_ste.elasticity.hexmesh import SectorMesh
 from fe_ste.elasticity.layers import LayeredElements
+from fe_ste.elimination.dense import mirrored_lower
+from fe_ste.elimination.dissection import Front, dissected, parts_without, schur_complement
 from fe_ste.tools.arrays import Floats, Integers, SparseMatrix
-from fe_ste.tools.dense import mirrored_lower
 from fe_ste.tools.threads import side_by_side
 
 #: Blocks of a set of cells that is not dissected any more.

@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 import scipy.linalg
 
+from fe_ste.elimination.dense import divided_by_factor, eliminate, mirrored_lower
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.dense import divided_by_factor, eliminate, mirrored_lower
 from fe_ste.tools.threads import side_by_side
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import fe_ste.tools.threads
-from fe_ste.tools.dense import add_product
+from fe_ste.elimination.dense import add_product
 from fe_ste.tools.threads import one_dense_thread, side_by_side
 
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fe_ste.elimination.dense import eliminate
 from fe_ste.tools.arrays import Booleans, Floats, Integers
-from fe_ste.tools.dense import eliminate
 
 #: Directions in which a set of cells may be cut, and where, as parts of its cells.
 _DIRECTIONS = 8
@@ -178,7 +178,7 @@ def schur_complement(
 
     Raises
     ------
-    fe_ste.tools.dense.NotPositiveDefiniteError
+    fe_ste.tools.sparse.FactorisationError
     """
     if known and front in known:
         return known[front]
