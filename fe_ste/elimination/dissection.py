@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
@@ -154,7 +155,7 @@ def _parts_without(front: Front, blocks: set[int]) -> tuple[list[Front], bool]:
 def schur_complement(
     front: Front,
     sizes: Integers,
-    leaf: Callable[[Integers, Integers], Floats],
+    add_cells: Callable[[Floats, Integers, Integers], None],
     known: Mapping[Front, Floats] | None = None,
 ) -> Floats:
     """Eliminate all blocks but those that are kept.
@@ -165,9 +166,9 @@ def schur_complement(
         The last front of a dissection, or of a part of it.
     sizes : ndarray
         Unknowns of each block.
-    leaf : callable
-        Of cells and blocks: the sum of the cells' symmetric matrices over the unknowns of these blocks, stored by
-        columns; its lower triangle counts.
+    add_cells : callable
+        Adds to a matrix the symmetric matrices of cells, over the unknowns of blocks: given are the matrix, stored by
+        columns, of which the lower triangle counts, cells and blocks.
     known : mapping of Front to ndarray, optional
         Results for parts of the dissection.
 
@@ -179,20 +180,47 @@ def schur_complement(
     Raises
     ------
     fe_ste.tools.sparse.FactorisationError
+        A front is not positive definite.
     """
-    if known and front in known:
-        return known[front]
-    blocks = np.concatenate([front.eliminated, front.border])
-    if front.children:
-        count = int(sizes[blocks].sum())
-        matrix = np.zeros((count, count), order="F")
-        for child in front.children:
-            _add(matrix, blocks, sizes, child.border, schur_complement(child, sizes, leaf, known))
-    else:
-        matrix = leaf(front.cells, blocks)
-    gone = int(sizes[front.eliminated].sum())
-    eliminate(matrix, gone)
-    return matrix[gone:, gone:]
+    return _Elimination(sizes, add_cells, known or {}).result(front)
+
+
+class _Elimination:
+    """Fronts and the memory they share: fresh memory costs as much as half of what is done in it."""
+
+    def __init__(
+        self,
+        sizes: Integers,
+        add_cells: Callable[[Floats, Integers, Integers], None],
+        known: Mapping[Front, Floats],
+    ) -> None:
+        self._sizes, self._add_cells, self._known = sizes, add_cells, known
+        self._free: list[Floats] = []
+
+    def result(self, front: Front) -> Floats:
+        if front in self._known:
+            return self._known[front]
+        parts = [(child, self.result(child)) for child in front.children]
+        blocks = np.concatenate([front.eliminated, front.border])
+        matrix = self._zeros(int(self._sizes[blocks].sum()))
+        if not parts:
+            self._add_cells(matrix, front.cells, blocks)
+        for child, part in parts:
+            _add(matrix, blocks, self._sizes, child.border, part)
+            if child not in self._known:
+                self._free.append(cast(Floats, part.base))
+        gone = int(self._sizes[front.eliminated].sum())
+        eliminate(matrix, gone)
+        return matrix[gone:, gone:]
+
+    def _zeros(self, size: int) -> Floats:
+        """Square matrix, a view of the smallest piece of memory that is free and large enough, or of a new one."""
+        fitting = [piece for piece in self._free if piece.size >= size * size]
+        piece = min(fitting, key=len) if fitting else np.empty(size * size)
+        self._free = [other for other in self._free if other is not piece]
+        matrix = piece[: size * size].reshape((size, size), order="F")
+        matrix[...] = 0.0
+        return matrix
 
 
 def _add(matrix: Floats, blocks: Integers, sizes: Integers, part_blocks: Integers, part: Floats) -> None:
