@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 
@@ -182,45 +181,17 @@ def schur_complement(
     fe_ste.tools.sparse.FactorisationError
         A front is not positive definite.
     """
-    return _Elimination(sizes, add_cells, known or {}).result(front)
-
-
-class _Elimination:
-    """Fronts and the memory they share: fresh memory costs as much as half of what is done in it."""
-
-    def __init__(
-        self,
-        sizes: Integers,
-        add_cells: Callable[[Floats, Integers, Integers], None],
-        known: Mapping[Front, Floats],
-    ) -> None:
-        self._sizes, self._add_cells, self._known = sizes, add_cells, known
-        self._free: list[Floats] = []
-
-    def result(self, front: Front) -> Floats:
-        if front in self._known:
-            return self._known[front]
-        parts = [(child, self.result(child)) for child in front.children]
-        blocks = np.concatenate([front.eliminated, front.border])
-        matrix = self._zeros(int(self._sizes[blocks].sum()))
-        if not parts:
-            self._add_cells(matrix, front.cells, blocks)
-        for child, part in parts:
-            _add(matrix, blocks, self._sizes, child.border, part)
-            if child not in self._known:
-                self._free.append(cast(Floats, part.base))
-        gone = int(self._sizes[front.eliminated].sum())
-        eliminate(matrix, gone)
-        return matrix[gone:, gone:]
-
-    def _zeros(self, size: int) -> Floats:
-        """Square matrix, a view of the smallest piece of memory that is free and large enough, or of a new one."""
-        fitting = [piece for piece in self._free if piece.size >= size * size]
-        piece = min(fitting, key=len) if fitting else np.empty(size * size)
-        self._free = [other for other in self._free if other is not piece]
-        matrix = piece[: size * size].reshape((size, size), order="F")
-        matrix[...] = 0.0
-        return matrix
+    if known and front in known:
+        return known[front]
+    blocks = np.concatenate([front.eliminated, front.border])
+    count, gone = int(sizes[blocks].sum()), int(sizes[front.eliminated].sum())
+    matrix = np.zeros((count, count), order="F")
+    for child in front.children:
+        _add(matrix, blocks, sizes, child.border, schur_complement(child, sizes, add_cells, known))
+    if not front.children:
+        add_cells(matrix, front.cells, blocks)
+    eliminate(matrix, gone)
+    return matrix[gone:, gone:]
 
 
 def _add(matrix: Floats, blocks: Integers, sizes: Integers, part_blocks: Integers, part: Floats) -> None:
