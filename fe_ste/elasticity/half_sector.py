@@ -260,12 +260,14 @@ class _Halving:
 def _mirror_images(mesh: SectorMesh) -> Integers:
     """Section node that each node of a section becomes by the half turn."""
     points, axial = mesh.section.points, mesh.axial_positions
-    away = np.abs(points[:, None] - points * [1.0, -1.0]).max(axis=-1)
-    images = away.argmin(axis=1)
-    worst = max(away.min(axis=1).max(), np.abs(axial + axial[::-1]).max())
-    if worst > _ROUNDING * np.abs(points).max():
+    images, missed = np.empty(len(points), dtype=np.int64), np.abs(axial + axial[::-1]).max()
+    for some in np.array_split(np.arange(len(points)), len(points) // 256 + 1):  # all at once would be a gigabyte
+        away = np.abs(points[some, None] - points * [1.0, -1.0]).max(axis=-1)
+        images[some] = away.argmin(axis=1)
+        missed = max(missed, away.min(axis=1).max())
+    if missed > _ROUNDING * np.abs(points).max():
         raise ValueError(
             f"gear {mesh.gear.name}: the mesh turned by 180 deg about the middle of the tooth misses itself by "
-            f"{worst:.3g} m; it must be the same"
+            f"{missed:.3g} m; it must be the same"
         )
-    return np.asarray(images)
+    return images
