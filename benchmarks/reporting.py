@@ -552,8 +552,8 @@ def bearings_section(part: Results) -> str:
                 [[row["row"], number(row["microseconds"], 2), number(row["ratio"], 2)] for row in rows],
             ),
             "### A step of the GRC, variant bushing, compiled solver\n",
-            f'`law = "iso16281"`, `cage = "turning"`; steps of {1e6 * part["step"]:.2f} µs, one evaluation each, signals '
-            "and files aside.\n",
+            f'`law = "iso16281"`, `cage = "turning"`; steps of {1e6 * part["step"]:.2f} µs with one evaluation each, '
+            "signals and files aside.\n",
             table(
                 [
                     "non-linear",

@@ -36,7 +36,6 @@ from fe_ste.transmission_error.states import RESULTS, STATE_AXES, StateAxes
 if TYPE_CHECKING:
     import xarray as xr
 
-    from fe_ste.elasticity.flank import FlankCompliance
 
 
 #: Beyond this many states the start of processes is repaid.
