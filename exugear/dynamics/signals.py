@@ -67,8 +67,8 @@ class Signal(Variable):
     Attributes
     ----------
     filled_by : tuple of str
-        Functions and methods of `exugear.solvers.compiled.observers` that fill its columns, or its part of the
-        account. Empty where `formula` gives it, or where it is a time itself.
+        Functions of `exugear.solvers.compiled.sampling` that fill its columns, or its part of the account; or
+        methods of `exugear.solvers.compiled.observers`. Empty where `formula` gives it, or where it is a time itself.
     formula : callable, optional
         Makes it of the columns of samples: (layout, rows) to an array of rows and its further dimensions. Of a time
         that is added up: in which samples it passes.
@@ -109,14 +109,14 @@ SIGNALS = (
         ("time",),
         "rad/s",
         sign_convention="rotation about +z",
-        filled_by=("Observer.observe",),
+        filled_by=("Observer.complete",),
     ),
     Signal(
         "overall_dte_angle",
         ("time",),
         "rad",
         sign_convention="output ahead, about +z, of where the ratio puts it",
-        filled_by=("Observer.observe",),
+        filled_by=("Observer.complete",),
     ),
     Signal(
         "overall_dte",
@@ -147,7 +147,7 @@ SIGNALS = (
         "N",
         sign_convention="on the body, along the global axis",
         kind="f4",
-        filled_by=("observe_connectors", "observe_joints"),
+        filled_by=("observe_supports", "observe_joints"),
     ),
     Signal(
         "pulling_time",

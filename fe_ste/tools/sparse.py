@@ -19,6 +19,7 @@ import numpy as np
 import scipy.sparse.linalg
 
 from fe_ste.tools.arrays import Floats, SparseMatrix
+from fe_ste.tools.dense import NotPositiveDefiniteError
 
 Backend: TypeAlias = Literal["pardiso", "superlu"]
 RIGHT_HAND_SIDES_AT_A_TIME = 128
@@ -29,7 +30,7 @@ LARGEST_PROBE_ERROR = 1e-6
 """Relative error of a recovered known solution above which a matrix counts as singular."""
 
 
-class FactorisationError(ValueError):
+class FactorisationError(NotPositiveDefiniteError):
     """The matrix is not symmetric positive definite, or too nearly singular to solve with."""
 
 

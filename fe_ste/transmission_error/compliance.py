@@ -23,7 +23,6 @@ from fe_ste.tools.notebook import html_table, value_range
 
 if TYPE_CHECKING:
     from fe_ste.elasticity.flank import FlankCompliance
-    from fe_ste.tools.sparse import Backend
 
 
 @dataclass(frozen=True)
@@ -155,9 +154,8 @@ def pair_compliance(
     *,
     open_teeth: int | None = None,
     incompatible_modes: bool = True,
-    backend: Backend | None = None,
 ) -> PairCompliance:
-    """Compute the compliance of both gears of `pair` by finite elements.
+    """Compute the compliance of both gears of `pair` by finite elements, or take it from where it is kept.
 
     Parameters
     ----------
@@ -167,18 +165,17 @@ def pair_compliance(
     open_teeth : int, optional
         Odd number of teeth of open sectors; without it closed rings.
     incompatible_modes : bool
-    backend : {"pardiso", "superlu"}, optional
 
     Returns
     -------
     PairCompliance
-    """
-    from fe_ste.elasticity.flank import flank_compliance
 
-    pinion, gear = (
-        flank_compliance(
-            wheel, side, mesh, open_teeth=open_teeth, incompatible_modes=incompatible_modes, backend=backend
-        )
-        for wheel, side in ((pair.pinion, 1), (pair.gear, -1 if pair.gear.internal else 1))
-    )
+    See Also
+    --------
+    fe_ste.elasticity.known_flanks.known_flanks : Where computed gears are kept.
+    """
+    from fe_ste.elasticity.known_flanks import known_flanks  # loads finite elements
+
+    sides = ((pair.pinion, 1), (pair.gear, -1 if pair.gear.internal else 1))
+    pinion, gear = known_flanks(sides, mesh, open_teeth=open_teeth, incompatible_modes=incompatible_modes)
     return PairCompliance.from_flanks(pair, (pinion, gear), contact)

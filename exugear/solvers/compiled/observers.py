@@ -1,315 +1,15 @@
-"""Signals and energies of states, observed by one compiled loop over the arrays of the compiled solver.
-
-What there is to observe stands in `exugear.dynamics.signals.SIGNALS`, with the kernel here that fills it. Where a
-signal stands among the columns of a sample is handed over as `Columns`.
-"""
+"""Signals, energies and powers of given states: what a run records, for whoever has the states."""
 
 from __future__ import annotations
-
-import math
-from typing import NamedTuple
 
 import numpy as np
 
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.modes import overall_row
-from exugear.dynamics.signals import ENERGIES, POWERS, SignalLayout, signal_layout
-from exugear.kernels.coordinates import AXIAL, BODY_SIZE, SPIN, TILT
-from exugear.kernels.elastic import elastic_energies
-from exugear.kernels.fast_meshes import (
-    ALONG_FORCE,
-    DISSIPATED,
-    ELASTIC,
-    KINETIC,
-    LAST_DEFLECTION,
-    LAST_FORCE,
-    LAST_OUTSIDE,
-    NON_CONSERVATIVE,
-    OF_BEARING_RATES,
-    OF_LOADS,
-    OF_VARYING_STIFFNESS,
-    Meshes,
-    mesh_row,
-)
-from exugear.kernels.rolling import CAGE_DAMPING, DAMPED_PART, ELASTIC_PART, STORED, rolling_forces
-from exugear.kernels.table_law import ENERGY_DERIVATIVES, NOMINAL_MISALIGNMENT
-from exugear.kernels.travelling import place_travelling
-from exugear.kernels.turning import turning_energies
-from exugear.solvers.compiled.arrays import (
-    COS_B,
-    COSINE,
-    LOCAL_FORCE,
-    SIN_B,
-    SINE,
-    STRAIN,
-    STRAIN_RATE,
-    TRUE_RATE,
-    W_X,
-    W_Y,
-    W_Z,
-    Bodies,
-    Connectors,
-    Equations,
-    Joints,
-    Loads,
-    Springs,
-    Work,
-)
-from exugear.solvers.compiled.connectors import move_connector, place_bodies, turn_between
-from exugear.solvers.compiled.equations import set_loads
-from exugear.solvers.compiled.meshes import mesh_law, mesh_motion
-from exugear.solvers.compiled.packing import equations_of, work_for
+from exugear.dynamics.signals import ENERGIES, SignalLayout, signal_layout
+from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.loads import LoadTable
-from exugear.tooth_mesh.laws.table import TABLE_FORM, fast_table_force
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.compilation import kernel
-
-
-class Columns(NamedTuple):
-    """First column of each signal that a kernel here fills; -1 where a run does not hold it.
-
-    The fields have the names of the signals. Signals of each mesh take one column a mesh, forces of supports three.
-    """
-
-    mesh_dte: int
-    mesh_force: int
-    support_force: int
-    centre_distance_change: int
-    misalignment: int
-    outside_table: int
-
-
-@kernel
-def observe_gear_positions(
-    q: Floats, v: Floats, m: int, meshes: Meshes, work: Work, columns: Columns, sample: Floats
-) -> None:
-    """Fill change of centre distance (m) and misalignment (rad) of mesh m with a table; after `observe_meshes`."""
-    table, index, axis = meshes.table, meshes.coordinates[m], meshes.axis[m]
-    c, s = work.turns[meshes.slot[m], COSINE], work.turns[meshes.slot[m], SINE]
-    centre, _ = mesh_row(q, v, index, axis, table.centre[m], c, s, work.mesh.gradient[ALONG_FORCE])
-    tilted, _ = mesh_row(q, v, index, axis, table.misalignment[m], c, s, work.mesh.gradient[ALONG_FORCE])
-    sample[columns.centre_distance_change + m] = centre
-    sample[columns.misalignment + m] = table.nominal[m, NOMINAL_MISALIGNMENT] + tilted
-
-
-@kernel
-def observe_table(
-    q: Floats, v: Floats, m: int, meshes: Meshes, work: Work, columns: Columns, sample: Floats, energy: Floats
-) -> None:
-    """Fill the signals of mesh m with a table and add its energy and powers: see `observe_meshes`."""
-    c, s = work.turns[meshes.slot[m], COSINE], work.turns[meshes.slot[m], SINE]
-    force = fast_table_force(q, v, m, ENERGY_DERIVATIVES, meshes, c, s, work.mesh, energy)
-    work.mesh.states[m, LAST_FORCE] = force
-    sample[columns.mesh_dte + m] = work.mesh.states[m, LAST_DEFLECTION]
-    sample[columns.mesh_force + m] = force
-    sample[columns.outside_table + m] = work.mesh.states[m, LAST_OUTSIDE]
-    if meshes.spinning[m] == 0:
-        observe_gear_positions(q, v, m, meshes, work, columns, sample)
-    else:  # gears that only turn stay where they are
-        sample[columns.centre_distance_change + m] = 0.0
-        sample[columns.misalignment + m] = meshes.table.nominal[m, NOMINAL_MISALIGNMENT]
-
-
-@kernel
-def observe_meshes(
-    q: Floats, v: Floats, meshes: Meshes, work: Work, columns: Columns, sample: Floats, energy: Floats
-) -> None:
-    """Fill the signals of each mesh into a sample; add energy and powers (see `observe`).
-
-    The scalar force of each mesh, or that along its line of action, is left in `work.mesh.states`.
-    """
-    for m in range(meshes.coordinates.shape[0]):
-        if meshes.form[m] == TABLE_FORM:
-            observe_table(q, v, m, meshes, work, columns, sample, energy)
-            continue
-        delta, rate, acting = mesh_motion(q, v, m, meshes, work)
-        elastic, _, _, stored, cycle_power = mesh_law(q, v, m, delta, meshes)
-        force = elastic + meshes.damping[m] * rate
-        work.mesh.states[m, LAST_FORCE] = force
-        sample[columns.mesh_dte + m] = delta
-        sample[columns.mesh_force + m] = force * meshes.line_of_action[m]
-        energy[ELASTIC] += stored
-        energy[DISSIPATED] += meshes.damping[m] * rate * rate
-        energy[OF_VARYING_STIFFNESS] += cycle_power
-        energy[NON_CONSERVATIVE] += force * (acting - rate)
-
-
-@kernel
-def true_rate(n: int, first_body: Floats, work: Work) -> None:
-    """Fill the derivative of the strain into `work.motion`: see `exugear.kernels.connectors.connector_motion`."""
-    d, w, out = work.motion[STRAIN], work.motion[STRAIN_RATE], work.motion[TRUE_RATE]
-    x = first_body[0] * first_body[W_X] + first_body[3] * first_body[W_Y] + first_body[6] * first_body[W_Z]
-    y = first_body[1] * first_body[W_X] + first_body[4] * first_body[W_Y] + first_body[7] * first_body[W_Z]
-    z = first_body[2] * first_body[W_X] + first_body[5] * first_body[W_Y] + first_body[8] * first_body[W_Z]
-    out[0] = w[0] - y * d[2] + z * d[1]
-    out[1] = w[1] - z * d[0] + x * d[2]
-    out[2] = w[2] - x * d[1] + y * d[0]
-    a, b = d[TILT], d[TILT + 1]
-    c, s = math.cos(a), math.sin(a)
-    out[SPIN] = (c * w[SPIN] - s * w[TILT + 1]) / math.cos(b)
-    out[TILT + 1] = c * w[TILT + 1] + s * w[SPIN]
-    out[TILT] = w[TILT] - math.sin(b) * out[SPIN]
-
-
-@kernel
-def observe_rolling(
-    q: Floats, v: Floats, n: int, bodies: Bodies, connectors: Connectors, work: Work, energy: Floats
-) -> None:
-    """Add the rolling law of connector n to its force in `work.motion`, and energy and powers (see `observe`)."""
-    strain, rate, derivative = work.motion[STRAIN], work.motion[STRAIN_RATE], work.motion[TRUE_RATE]
-    rolling_forces(n, strain, rate, turn_between(q, n, bodies, connectors), connectors.rolling, work.rolling)
-    energy[ELASTIC] += work.rolling[STORED]
-    energy[DISSIPATED] += work.rolling[CAGE_DAMPING] * turn_between(v, n, bodies, connectors)
-    for i in range(BODY_SIZE):
-        elastic, damped = work.rolling[ELASTIC_PART + i], work.rolling[DAMPED_PART + i]
-        work.motion[LOCAL_FORCE, i] += elastic + damped
-        energy[DISSIPATED] += damped * rate[i]
-        # The potential knows no angle about z, whose moment but keeps the others from working on the spin.
-        energy[OF_BEARING_RATES] += elastic * (rate[i] - (derivative[i] if i < SPIN else 0.0))
-
-
-@kernel
-def observe_connectors(
-    q: Floats,
-    v: Floats,
-    bodies: Bodies,
-    connectors: Connectors,
-    work: Work,
-    columns: Columns,
-    sample: Floats,
-    energy: Floats,
-) -> None:
-    """Fill the force of each bearing on its body (N), global axes; add energy and powers (see `observe`)."""
-    for n in range(connectors.ends.shape[0]):
-        move_connector(q, v, n, bodies, connectors, work)
-        turn = work.frames[connectors.ends[n, 0]]
-        true_rate(n, turn, work)
-        strain, rate = work.motion[STRAIN], work.motion[STRAIN_RATE]
-        derivative, force = work.motion[TRUE_RATE], work.motion[LOCAL_FORCE]
-        for row in range(BODY_SIZE):
-            elastic, damped = 0.0, 0.0
-            for column in range(BODY_SIZE):
-                stiffness = connectors.stiffness[n, column, row]
-                elastic += stiffness * strain[column]
-                damped += (connectors.time[n] * stiffness + connectors.damping[n, column, row]) * rate[column]
-            force[row] = elastic + damped
-            energy[ELASTIC] += 0.5 * elastic * strain[row]
-            energy[DISSIPATED] += damped * rate[row]
-            energy[OF_BEARING_RATES] += elastic * (rate[row] - derivative[row])
-        if connectors.rolling.first[n] < connectors.rolling.first[n + 1]:
-            observe_rolling(q, v, n, bodies, connectors, work, energy)
-        first = columns.support_force + 3 * connectors.number[n]
-        for i in range(3):
-            o = 3 * i
-            sample[first + i] = -(turn[o] * force[0] + turn[o + 1] * force[1] + turn[o + 2] * force[2])
-
-
-@kernel
-def observe_joints(v: Floats, meshes: Meshes, joints: Joints, work: Work, columns: Columns, sample: Floats) -> None:
-    """Fill the force of each ideal joint on its body (N), global axes; after `observe_meshes`."""
-    forces = sample[columns.support_force : columns.support_force + 3 * joints.host.size]
-    forces[:] = 0.0
-    for m in range(meshes.coordinates.shape[0]):
-        c, s = work.turns[meshes.slot[m], COSINE], work.turns[meshes.slot[m], SINE]
-        for end in range(2):
-            j = joints.ends[m, end]
-            if j >= 0:
-                force = work.mesh.states[m, LAST_FORCE]
-                row = meshes.force[m]
-                if force < 0.0 and meshes.form[m] == TABLE_FORM:  # the other flank pushes
-                    force, row = -force, meshes.table.back[m]
-                x, y, z = row[BODY_SIZE * end], row[BODY_SIZE * end + 1], row[BODY_SIZE * end + AXIAL]
-                forces[3 * j] += force * (c * x - s * y)
-                forces[3 * j + 1] += force * (s * x + c * y)
-                forces[3 * j + 2] += force * z
-    for j in range(joints.host.size):
-        if joints.planet[j, 0] > 0.0:  # held on its orbit
-            c, s = work.turns[joints.slot[j], COSINE], work.turns[joints.slot[j], SINE]
-            pull = joints.planet[j, 0] * v[joints.carrier[j]] ** 2
-            forces[3 * j] -= pull * (c * joints.planet[j, 1] - s * joints.planet[j, 2])
-            forces[3 * j + 1] -= pull * (s * joints.planet[j, 1] + c * joints.planet[j, 2])
-        if joints.host[j] >= 0:  # hands its force on to the joint of the body that it sits on
-            for i in range(3):
-                forces[3 * joints.host[j] + i] += forces[3 * j + i]
-
-
-@kernel
-def observe_bodies(q: Floats, v: Floats, bodies: Bodies, work: Work, energy: Floats) -> None:
-    """Add the kinetic energy of all bodies (see `observe`)."""
-    for n in range(bodies.mass.size):
-        o, sb, cb = bodies.start[n], work.frames[n, SIN_B], work.frames[n, COS_B]
-        square = v[o] * v[o] + v[o + 1] * v[o + 1] + v[o + 2] * v[o + 2]
-        tilting = (v[o + TILT] * cb) ** 2 + v[o + TILT + 1] * v[o + TILT + 1]
-        spin = v[o + SPIN] + v[o + TILT] * sb
-        twice = bodies.mass[n] * square + bodies.transverse[n] * tilting + bodies.axial[n] * spin * spin
-        energy[KINETIC] += 0.5 * twice
-    for n in range(bodies.spin.size):
-        energy[KINETIC] += 0.5 * bodies.spin_inertia[n] * v[bodies.spin[n]] ** 2
-
-
-@kernel
-def observe_springs(q: Floats, v: Floats, springs: Springs, energy: Floats) -> None:
-    """Add elastic energy and damping power of the torsional springs (see `observe`)."""
-    for n in range(springs.ends.shape[0]):
-        i, j = springs.ends[n, 0], springs.ends[n, 1]
-        energy[ELASTIC] += 0.5 * springs.stiffness[n] * (q[j] - q[i]) ** 2
-        energy[DISSIPATED] += springs.damping[n] * (v[j] - v[i]) ** 2
-
-
-@kernel
-def observe_elastic_bodies(q: Floats, v: Floats, equations: Equations, work: Work, energy: Floats) -> None:
-    """Add energies and powers of elastic bodies, in fixed and in turning frames (see `observe`)."""
-    kinetic, stored, damped = elastic_energies(q, v, equations.elastic, work.scratch)
-    energy[KINETIC] += kinetic
-    energy[ELASTIC] += stored
-    energy[DISSIPATED] += damped
-    kinetic, stored, damped, weight = turning_energies(q, v, equations.turning, work.memory)
-    energy[KINETIC] += kinetic
-    energy[ELASTIC] += stored
-    energy[OF_LOADS] += weight
-    energy[DISSIPATED] += damped
-
-
-@kernel
-def observe_loads(t: float, q: Floats, v: Floats, loads: Loads, size: int, work: Work, energy: Floats) -> None:
-    """Add the power of what acts from outside on the first `size` coordinates at time t (s)."""
-    set_loads(t, q, v, loads, work.series, work.force)
-    for i in range(size):
-        energy[OF_LOADS] += work.force[i] * v[i]
-
-
-@kernel
-def observe(
-    time: Floats,
-    q: Floats,
-    v: Floats,
-    equations: Equations,
-    work: Work,
-    columns: Columns,
-    signals: Floats,
-    energies: Floats,
-) -> None:
-    """Fill signals (samples, columns) and energies (samples, 7) of states q, v (samples, size).
-
-    Signals but those that `Observer` takes from a state by itself; energies in the columns `KINETIC` and so on.
-    """
-    size = q.shape[1]
-    x, u = work.stage_q, work.stage_v
-    for n in range(q.shape[0]):
-        sample, energy = signals[n], energies[n]
-        energy[:] = 0.0
-        for i in range(size):
-            x[i], u[i] = q[n, i], v[n, i]
-        place_bodies(x, u, equations.bodies, work)
-        observe_bodies(x, u, equations.bodies, work, energy)
-        place_travelling(x, u, equations.travelling)
-        observe_meshes(x, u, equations.meshes, work, columns, sample, energy)
-        observe_connectors(x, u, equations.bodies, equations.connectors, work, columns, sample, energy)
-        if equations.joints.host.size > 0:
-            observe_joints(u, equations.meshes, equations.joints, work, columns, sample)
-        observe_springs(x, u, equations.springs, energy)
-        observe_elastic_bodies(x, u, equations, work, energy)
-        observe_loads(time[n], x, u, equations.loads, size, work, energy)
 
 
 class Observer:
@@ -332,11 +32,8 @@ class Observer:
         overall = assembly.gearbox.case.overall
         self._input = assembly.spin[overall.input]
         self._overall = overall_row(assembly) / self.layout.radius
-        self._columns = Columns._make(
-            self.layout[name].start if name in self.layout else -1 for name in Columns._fields
-        )
-        self._equations = equations_of(assembly, loads)
-        self._work = work_for(self._equations, np.zeros(assembly.size), np.zeros(assembly.size))
+        rest = np.zeros(assembly.size)
+        self._system = CompiledSystem(assembly, rest, rest, loads, step=1.0)
 
     def observe(self, time: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:
         """Observe states.
@@ -357,9 +54,11 @@ class Observer:
         powers : (samples, 5) array
             `exugear.dynamics.signals.POWERS`, W.
         """
-        signals = np.empty((len(time), self.layout.count))
-        energies = np.empty((len(time), len(ENERGIES) + len(POWERS)))
+        signals, energies = self._system.observe(time, q, v)
+        self.complete(q, v, signals)
+        return signals, energies[:, : len(ENERGIES)], energies[:, len(ENERGIES) :]
+
+    def complete(self, q: Floats, v: Floats, signals: Floats) -> None:
+        """Fill those signals (samples, columns) that states q, v (samples, size) have by themselves."""
         signals[:, self.layout["input_speed"]] = v[:, [self._input]]
         signals[:, self.layout["overall_dte_angle"]] = (q @ self._overall)[:, None]
-        observe(time, q, v, self._equations, self._work, self._columns, signals, energies)
-        return signals, energies[:, : len(ENERGIES)], energies[:, len(ENERGIES) :]
