@@ -37,7 +37,7 @@ _IN_MEMORY = 16
 _BYTES = 300_000_000
 
 #: Rooms whose sources make the numbers.
-_ROOMS = ("geometry", "elasticity", "tools")
+_ROOMS = ("tools", "geometry", "elimination", "elasticity")
 
 _log = logging.getLogger(__name__)
 _memory: OrderedDict[str, FlankCompliance] = OrderedDict()
@@ -150,7 +150,8 @@ def _folder() -> Path | None:
         return None if asked == "off" else Path(asked)
     import platformdirs  # needed for a table only: not worth its time at each start
 
-    return platformdirs.user_cache_path("exugear", appauthor=False) / "flanks"
+    user = platformdirs.user_cache_path("exugear", appauthor=False)
+    return user / "flanks" if user.is_absolute() else None  # a user without a home has none
 
 
 def _read(path: Path, gear: Gear) -> FlankCompliance | None:
@@ -163,8 +164,8 @@ def _read(path: Path, gear: Gear) -> FlankCompliance | None:
             stored |= {name: content[name] for name in content.files if name not in ("values", "regular")}
             flank = FlankCompliance(gear=gear, regular=regular, **stored)
     except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
-        if path.exists():
-            _log.info("%s: cannot be used and is computed again (%s)", path, error)
+        if path.exists():  # else nothing was kept so far
+            _log.warning("%s; it is computed again", error)
         return None
     with suppress(OSError):
         os.utime(path)  # the files used least lately go first

@@ -174,7 +174,7 @@ def pair_compliance(
     --------
     fe_ste.elasticity.known_flanks.known_flanks : Where computed gears are kept.
     """
-    from fe_ste.elasticity.known_flanks import known_flanks  # loads finite elements
+    from fe_ste.elasticity.known_flanks import known_flanks  # finite elements, which a table that is there spares
 
     sides = ((pair.pinion, 1), (pair.gear, -1 if pair.gear.internal else 1))
     pinion, gear = known_flanks(sides, mesh, open_teeth=open_teeth, incompatible_modes=incompatible_modes)

@@ -48,6 +48,13 @@ class Solver(StrEnum):
     exudyn = "exudyn"
 
 
+class Integrator(StrEnum):
+    """Methods of the compiled solver: multistep with one evaluation a step, or Runge-Kutta with four, the reference."""
+
+    adams = "adams"
+    rk4 = "rk4"
+
+
 class MeshRoute(StrEnum):
     """How forces of meshes enter Exudyn: by one element for all, or by a load with a user function on each gear."""
 
@@ -64,6 +71,10 @@ def run(
         str | None, typer.Option("--load-case", metavar="NAME", help="Load case. (default: the first of the file)")
     ] = None,
     solver: Annotated[Solver, typer.Option(help="What integrates.")] = Solver.compiled,
+    integrator: Annotated[
+        Integrator | None,
+        typer.Option(help="Method of the compiled solver. (default: whichever takes fewer evaluations)"),
+    ] = None,
     mesh_route: Annotated[
         MeshRoute,
         typer.Option(
@@ -94,13 +105,16 @@ def run(
         _check_extent(project, duration, out or Path("results"))
         _check_solver(project.gearbox, variant, solver)
         _check_mesh_route(mesh_route, variant, solver)
+        if integrator and solver is Solver.exudyn:
+            raise BadInputError(f"--integrator {integrator}: is a method of the compiled solver; leave it out")
         if not resume:
             make_results_folder(project.folder)
         _check_run_directory(project.run_directory, resume)
         _tell_doubts(project)
         compute_missing_tables(project)
         with time_noted(project.folder, _label_of(project, solver, mesh_route)):
-            finished = _simulate(project, resume, solver=solver.value, mesh_route=mesh_route.value, duration=duration)
+            how = {"solver": solver.value, "mesh_route": mesh_route.value, "integrator": integrator}
+            finished = _simulate(project, resume, duration=duration, **how)
         _tell_run(case, finished, as_json)
 
 

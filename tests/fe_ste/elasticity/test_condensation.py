@@ -70,7 +70,7 @@ class Reference:
         columns = [to_faces[inside], -surface[inside], -below[inside], scipy.sparse.csr_matrix(held_torque[inside]).T]
         everything = scipy.sparse.hstack(columns).tocsc()
         with factorise(stiffness[inside][:, inside]) as factor:
-            response = factor.compliance(everything, everything)
+            response = everything.T @ factor.solve(everything)
         ends = np.cumsum([columns[0].shape[1], surface.shape[1], surface.shape[1]])
         face, load, depth_part = (slice(*part) for part in zip([0, *ends[:-1]], ends, strict=True))
         return cls(

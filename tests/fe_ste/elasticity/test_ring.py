@@ -65,8 +65,8 @@ def meshed_compliance(mesh: SectorMesh, sectors: int, closed: bool) -> dict[tupl
         loads.append((place @ turn @ surface)[free])
         depths.append((place @ turn @ below)[free])
     with factorise(stiffness[free][:, free]) as factor:
-        on_surface = factor.compliance(scipy.sparse.hstack(loads).tocsc(), scipy.sparse.hstack(loads).tocsc())
-        at_depth = factor.compliance(scipy.sparse.hstack(depths).tocsc(), scipy.sparse.hstack(loads).tocsc())
+        moved = factor.solve(scipy.sparse.hstack(loads).tocsc())
+    on_surface, at_depth = scipy.sparse.hstack(loads).T @ moved, scipy.sparse.hstack(depths).T @ moved
     return _as_stored(mesh, on_surface, at_depth, sectors)
 
 
