@@ -103,9 +103,7 @@ def steps(gearbox: Gearbox, rounds: int) -> list[dict[str, Any]]:
         assembly = assembled(case, variant)
         chosen = choose_integration(assembly, SAMPLE_RATE, BAND)
         systems.append(_Steps(assembly, chosen))
-        rows.append(
-            {"elastic": name, "coordinates": assembly.size, "step": chosen.step, "method": chosen.method.name}
-        )
+        rows.append({"elastic": name, "coordinates": assembly.size, "step": chosen.step, "method": chosen.method.name})
     found = [[system.costs() for system in systems] for _ in range(rounds + 1)][1:]
     for n, row in enumerate(rows):
         row["microseconds_per_step"] = median(one[n][0] for one in found)

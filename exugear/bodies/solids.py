@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from exugear.bodies.finite_elements.lazy import at_first_use
 from exugear.bodies.finite_elements.solid_facets import ordered_corners
 from exugear.bodies.finite_elements.solid_files import SolidFile
 from exugear.bodies.finite_elements.solid_matrices import Solid, assemble, in_each_direction, shape_gradients
@@ -45,7 +46,6 @@ from exugear.kernels.coordinates import SPIN
 from exugear.model.versions import REDUCTION
 from fe_ste.geometry.gears import Material
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.lazy import at_first_use
 
 if TYPE_CHECKING:
     import skfem

@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-
 #: Beyond this many states the start of processes is repaid.
 _STATES_IN_PROCESS = 1000
 _LAYOUT = Layout(

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from exugear.bodies.finite_elements.lazy import at_first_use
 from fe_ste.tools.arrays import Floats, Integers
-from fe_ste.tools.lazy import at_first_use
 
 if TYPE_CHECKING:
     import skfem

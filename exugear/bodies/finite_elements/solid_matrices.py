@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy
 
+from exugear.bodies.finite_elements.lazy import at_first_use
 from fe_ste.geometry.gears import Material
 from fe_ste.tools.arrays import Floats, SparseMatrix
-from fe_ste.tools.lazy import at_first_use
 
 if TYPE_CHECKING:
     import skfem

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from exugear.bodies.finite_elements.lazy import at_first_use
 from exugear.bodies.finite_elements.second_order import SolidError, entity_numbers
 from exugear.bodies.finite_elements.solid_facets import ordered_corners
 from exugear.bodies.finite_elements.solid_matrices import Solid
 from fe_ste.tools.arrays import Floats, Integers
-from fe_ste.tools.lazy import at_first_use
 
 if TYPE_CHECKING:
     import skfem

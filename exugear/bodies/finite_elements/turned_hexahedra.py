@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from exugear.bodies.finite_elements.lazy import at_first_use
 from exugear.bodies.finite_elements.second_order import SolidError
 from exugear.bodies.finite_elements.shaft_sections import SAME
 from exugear.bodies.finite_elements.turned_section import Shaft
 from fe_ste.tools.arrays import Floats, Integers
-from fe_ste.tools.lazy import at_first_use
 
 if TYPE_CHECKING:
     import skfem

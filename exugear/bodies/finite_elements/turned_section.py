@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import scipy
 
+from exugear.bodies.finite_elements.lazy import at_first_use
 from exugear.bodies.finite_elements.shaft_sections import (
     SAME,
     STANDARD_SIZE,
@@ -36,7 +37,6 @@ from exugear.bodies.finite_elements.shaft_sections import (
 )
 from fe_ste.geometry.gears import Material
 from fe_ste.tools.arrays import Booleans, Floats, Integers, SparseMatrix
-from fe_ste.tools.lazy import at_first_use
 
 if TYPE_CHECKING:
     import skfem
