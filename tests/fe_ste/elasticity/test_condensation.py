@@ -96,11 +96,8 @@ class Reference:
         return blocks, self.fixed_torque + sum(self.face_torque @ both for both in ends)
 
 
-@pytest.mark.parametrize("side", [1, -1])
-@pytest.mark.parametrize("settings", [EVEN_NUMBERS, ODD_NUMBERS], ids=["even", "odd"])
-@pytest.mark.parametrize("gear", [SPUR, HELICAL, RING], ids=lambda gear: gear.name)
-def test_dissection_equals_one_sparse_factorisation(gear: Gear, settings: MeshSettings, side: int) -> None:
-    """The former condensation, by PARDISO or SuperLU; compared where the choice of face unknowns drops out."""
+def assert_equal_to_one_factorisation(gear: Gear, settings: MeshSettings, side: int) -> None:
+    """Compared as an open chain of three teeth, where the choice of face unknowns drops out."""
     mesh, depth = sector_mesh(gear, settings), 0.3 * gear.normal_module
     own = CondensedSector.from_mesh(mesh, side, depth, True)
     faces, torque = own.open_faces(3)
@@ -110,6 +107,18 @@ def test_dissection_equals_one_sparse_factorisation(gear: Gear, settings: MeshSe
     for (read, loaded), reference in blocks.items():
         found = own.displacement(read == loaded, *faces[read, loaded])
         assert np.abs(found - reference).max() < 1e-10 * np.abs(blocks[0, 0]).max()
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("settings", [EVEN_NUMBERS, ODD_NUMBERS], ids=["even", "odd"])
+@pytest.mark.parametrize("gear", [SPUR, HELICAL, RING], ids=lambda gear: gear.name)
+def test_dissection_equals_one_sparse_factorisation(gear: Gear, settings: MeshSettings, side: int) -> None:
+    assert_equal_to_one_factorisation(gear, settings, side)
+
+
+@pytest.mark.validation
+def test_dissection_equals_one_sparse_factorisation_on_the_default_mesh(any_grc_gear: Gear) -> None:
+    assert_equal_to_one_factorisation(any_grc_gear, MeshSettings(), 1)
 
 
 def test_layers_of_unequal_height_are_condensed() -> None:
