@@ -21,10 +21,9 @@ import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import skfem
 
 from exugear.bodies.finite_elements.solid_facets import ordered_corners
 from exugear.bodies.finite_elements.solid_files import SolidFile
@@ -46,7 +45,15 @@ from exugear.kernels.coordinates import SPIN
 from exugear.model.versions import REDUCTION
 from fe_ste.geometry.gears import Material
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.sparse import Backend
+from fe_ste.tools.lazy import at_first_use
+
+if TYPE_CHECKING:
+    import skfem
+
+    from fe_ste.tools.sparse import Backend
+else:
+    skfem = at_first_use("skfem")
+
 
 ASYMMETRY_TOLERANCE = 5e-3
 """Relative change of the seats' mass or stiffness by a quarter turn above which a body is none of revolution."""

@@ -15,13 +15,11 @@ from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from fe_ste.contact.cells import ContactSettings
-from fe_ste.elasticity.flank import HANDOVER_DEPTH
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.gears import GearPair
@@ -34,6 +32,11 @@ from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance
 from fe_ste.transmission_error.grid import Checkpoint, Submits, solve_grid
 from fe_ste.transmission_error.search import unloaded_states
 from fe_ste.transmission_error.states import RESULTS, STATE_AXES, StateAxes
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
 
 #: Beyond this many states the start of processes is repaid.
 _STATES_IN_PROCESS = 1000
@@ -93,6 +96,8 @@ class TableInput:
 
     def resolved(self) -> dict[str, Any]:
         """Return the input as plain data, with everything that has a default spelled out."""
+        from fe_ste.elasticity.flank import HANDOVER_DEPTH  # loads finite elements, which a table that is there spares
+
         return {"method_version": TABLE, "handover_depth": HANDOVER_DEPTH, **asdict(self)}
 
     @cached_property

@@ -9,12 +9,12 @@ from __future__ import annotations
 import numpy as np
 
 from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.signals import signal_layout
+from exugear.dynamics.signals import ENERGIES, POWERS, signal_layout
 from exugear.solvers.compiled.equations import evaluate
 from exugear.solvers.compiled.loop import advance
 from exugear.solvers.compiled.methods import RUNGE_KUTTA, Method, Past
-from exugear.solvers.compiled.observers import columns_of
 from exugear.solvers.compiled.packing import equations_of, work_for
+from exugear.solvers.compiled.sampling import columns_of
 from exugear.solvers.loads import LoadTable
 from fe_ste.tools.arrays import Floats
 
@@ -70,7 +70,8 @@ class CompiledSystem:
         self._size = assembly.size
         self._work = work_for(self.equations, q, v)
         self._method = method
-        self._columns = columns_of(signal_layout(assembly))
+        self._layout = signal_layout(assembly)
+        self._columns = columns_of(self._layout)
         self._past = Past.of(method, np.zeros((0, assembly.size)) if past is None else past)
 
     @property
@@ -91,7 +92,7 @@ class CompiledSystem:
         Parameters
         ----------
         signals, energies : (steps, columns) and (steps, 7) arrays, optional
-            For what `exugear.solvers.compiled.observers.take_sample` fills. Powers but those of meshes stand for as
+            For what `exugear.solvers.compiled.sampling.take_sample` fills. Powers but those of meshes stand for as
             many steps as make up `POWER_INTERVAL`; energies are not whole.
 
         Returns
@@ -99,18 +100,22 @@ class CompiledSystem:
         int
             Number of steps that stayed finite.
         """
+        stride = max(1, int(POWER_INTERVAL / self.step + 1e-9))
         none = np.empty((0, 0))
-        return advance(
-            first,
-            self.step,
-            self._method,
-            self.equations,
-            self._work,
-            self._past,
-            self._columns,
-            max(1, int(POWER_INTERVAL / self.step + 1e-9)),
-            q,
-            v,
-            none if signals is None else signals,
-            none if energies is None else energies,
-        )
+        outcome = q, v, none if signals is None else signals, none if energies is None else energies
+        return self._pass(np.empty(0), first, stride, *outcome)
+
+    def observe(self, times: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """Signals (n, columns) and energies (n, 7) of given states q, v (n, size) at times (n,), s.
+
+        See `exugear.solvers.compiled.sampling.take_sample`. The system itself stays where it is.
+        """
+        signals = np.empty((len(times), self._layout.count))
+        energies = np.empty((len(times), len(ENERGIES) + len(POWERS)))
+        self._pass(times, 0, 1, q, v, signals, energies)
+        return signals, energies
+
+    def _pass(self, times: Floats, first: int, stride: int, *rows: Floats) -> int:
+        """Pass through states, see `exugear.solvers.compiled.loop.advance`."""
+        how = first, self.step, self._method
+        return advance(times, *how, self.equations, self._work, self._past, self._columns, stride, *rows)
