@@ -12,8 +12,8 @@ from fe_ste.elasticity.bricks import stiffness_matrix
 from fe_ste.elasticity.condensation import CondensedSector, flank_functionals
 from fe_ste.elasticity.hexmesh import MeshSettings, SectorMesh, sector_mesh
 from fe_ste.elasticity.ring import open_chain_faces
+from fe_ste.elimination.sparse import factorise
 from fe_ste.geometry.gears import Gear
-from fe_ste.tools.sparse import factorise
 
 SPUR = Gear(name="spur", teeth=20, normal_module=3e-3, face_width=20e-3, held_diameter=30e-3, profile_shift=0.2)
 HELICAL = dataclasses.replace(SPUR, name="helical", helix_angle=np.radians(-15.0))
