@@ -43,7 +43,6 @@ def measure_pair(name: str, positions: int) -> dict[str, float | int | str]:
         "pair": name,
         "positions": positions,
         "unknowns": sum(int(flank.figures["unknowns"]) for flank in compliance.flanks),
-        "sparse_solver": str(compliance.flanks[0].figures["sparse_solver"]),
         "imports_s": imported - started,
         "once_s": offline - imported,
         "position_s": (finished - offline) / positions,
