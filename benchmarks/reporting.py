@@ -87,8 +87,9 @@ def startup_section(part: Results) -> str:
             table(["command", "wall", "processor time"], rows),
             items(
                 [
-                    "What bounds it: imports of numba, SciPy and xarray are most of a warm start, reading the kernels "
-                    "the rest. Exudyn and what draws are not loaded. Several runs in one process would pay this once.",
+                    "What bounds it: imports of numba, SciPy and the package itself are half of a warm start, reading "
+                    "the kernels and looking for the static state the rest. xarray, finite elements, Exudyn and what "
+                    "draws are not loaded. Several runs in one process would pay this once.",
                     f"The first run compiles for {duration(cold['processor_s'] - warm['processor_s'])} of processor "
                     "time; kernels compiled at installation would save it.",
                 ]
@@ -103,6 +104,9 @@ def startup_section(part: Results) -> str:
 def tables_section(part: Results) -> str:
     """Tables of the transmission error's cost."""
     pairs, states, calculix = part["pairs"], part["states"], part["calculix"]
+    known = (
+        [{**part["known"], "pair": f"{part['known']['pair']} after {part['known_from']}"}] if "known" in part else []
+    )
     pair_rows = [
         [
             row["pair"],
@@ -114,7 +118,7 @@ def tables_section(part: Results) -> str:
             duration(row["processor_s"]),
             f"{row['peak_memory_MB']:.0f} MB",
         ]
-        for row in pairs
+        for row in (*pairs, *known)
     ]
     state_rows = [
         [
@@ -152,9 +156,8 @@ def tables_section(part: Results) -> str:
                     f"What bounds it: both gears' compliance, up to {100 * share:.0f} % of a curve: right-hand sides "
                     "of the sector (cut faces and flank nodes), each a solve with the factors. Fewer right-hand sides "
                     "would save in proportion; the curve itself is what would remain.",
-                    "Per position: Cholesky factors of the cells in contact, once for each change of the active set, "
-                    "then the compliance of these cells. A factor carried over from position to position would save "
-                    "part of that.",
+                    "Per position: the compliance of the cells near the contact of the position before is half, the "
+                    "rest one Cholesky factor of the cells in contact, which changes of the active set border.",
                 ]
             ),
             f"### States of a table, {part['growing']}, gears prepared\n",
@@ -163,8 +166,7 @@ def tables_section(part: Results) -> str:
                 [
                     f"The cost grows with the number of states: {duration(first['per_state_s'])} each in a table of "
                     f"{first['states']}, {duration(last['per_state_s'])} in one of {last['states']}. What bounds it: "
-                    "every state is solved on its own; states of one position share the gap and, where the torques "
-                    "are close, most of the active set, which a grid over torques can start from.",
+                    "every state is solved on its own; it begins with the contact of the position before.",
                 ]
             ),
             f"### CalculiX {calculix['version']} on the same meshes ({source})\n",
@@ -451,10 +453,9 @@ def grids_section(part: Results) -> str:
             "## Tables over load, centre distance and misalignment\n",
             f"{circumstances(part)} Default axes, two worker processes, kernels compiled before.\n",
             table([*head, "largest deviation from alone", "a worker's memory"], rows),
-            "Bound: half of a state's time fills the compliance of the contact cells, which its misalignments share, "
-            "half factorises the cells in contact, some four times a state. Sharing makes a state at least "
-            f"{number(gain, 2)} times cheaper than alone; factors updated from state to state would save most of the "
-            "second half.\n",
+            "Bound: a third of a state's time fills the compliance of the cells, which its misalignments share, and "
+            "half finds the cells in contact, in some three steps from those of the position before. Sharing makes a "
+            f"state at least {number(gain, 2)} times cheaper than alone.\n",
         ]
     )
 
