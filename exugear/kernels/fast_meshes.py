@@ -236,9 +236,7 @@ def subtract_wheel_errors(
 
 
 @kernel
-def subtract_errors(
-    q: Floats, v: Floats, m: int, side: float, meshes: Meshes, gradient: Floats
-) -> tuple[float, float]:
+def subtract_errors(q: Floats, v: Floats, m: int, side: float, meshes: Meshes, gradient: Floats) -> tuple[float, float]:
     """Change of a deflection and its rate by the gears' errors; changes its padded gradient too."""
     delta, rate = 0.0, 0.0
     index = meshes.coordinates[m]

@@ -33,7 +33,6 @@ from exugear.kernels.fast_meshes import (
 )
 from exugear.kernels.rolling import CAGE_DAMPING, DAMPED_PART, ELASTIC_PART, STORED, rolling_forces
 from exugear.kernels.table_law import ENERGY_DERIVATIVES, NOMINAL_MISALIGNMENT
-from exugear.kernels.travelling import place_travelling
 from exugear.kernels.turning import turning_energies
 from exugear.solvers.compiled.arrays import (
     COS_B,
@@ -56,10 +55,9 @@ from exugear.solvers.compiled.arrays import (
     Work,
 )
 from exugear.solvers.compiled.connectors import move_connector, turn_between
-from exugear.solvers.compiled.equations import set_loads
+from exugear.solvers.compiled.equations import evaluate, set_loads
 from exugear.solvers.compiled.meshes import mesh_law, mesh_motion
 from exugear.solvers.compiled.packing import equations_of, work_for
-from exugear.solvers.compiled.places import place_bodies
 from exugear.solvers.loads import LoadTable
 from exugear.tooth_mesh.laws.table import TABLE_FORM, fast_table_force
 from fe_ste.tools.arrays import Floats
@@ -115,7 +113,7 @@ def observe_table(
 def observe_meshes(
     q: Floats, v: Floats, meshes: Meshes, work: Work, columns: Columns, sample: Floats, energy: Floats
 ) -> None:
-    """Fill the signals of each mesh into a sample; add energy and powers (see `observe`).
+    """Fill the signals of each mesh into a sample; add energy and powers (see `take_sample`).
 
     The scalar force of each mesh, or that along its line of action, is left in `work.mesh.states`.
     """
@@ -156,7 +154,7 @@ def true_rate(n: int, first_body: Floats, work: Work) -> None:
 def observe_rolling(
     q: Floats, v: Floats, n: int, bodies: Bodies, connectors: Connectors, work: Work, energy: Floats
 ) -> None:
-    """Add the rolling law of connector n to its force in `work.motion`, and energy and powers (see `observe`)."""
+    """Add the rolling law of connector n to its force in `work.motion`, and energy and powers (see `take_sample`)."""
     strain, rate, derivative = work.motion[STRAIN], work.motion[STRAIN_RATE], work.motion[TRUE_RATE]
     rolling_forces(n, strain, rate, turn_between(q, n, bodies, connectors), connectors.rolling, work.rolling)
     energy[ELASTIC] += work.rolling[STORED]
@@ -180,7 +178,7 @@ def observe_connectors(
     sample: Floats,
     energy: Floats,
 ) -> None:
-    """Fill the force of each bearing on its body (N), global axes; add energy and powers (see `observe`)."""
+    """Fill the force of each bearing on its body (N), global axes; add energy and powers (see `take_sample`)."""
     for n in range(connectors.ends.shape[0]):
         move_connector(q, v, n, bodies, connectors, work)
         turn = work.frames[connectors.ends[n, 0]]
@@ -236,7 +234,7 @@ def observe_joints(v: Floats, meshes: Meshes, joints: Joints, work: Work, column
 
 @kernel
 def observe_bodies(q: Floats, v: Floats, bodies: Bodies, work: Work, energy: Floats) -> None:
-    """Add the kinetic energy of all bodies (see `observe`)."""
+    """Add the kinetic energy of all bodies (see `take_sample`)."""
     for n in range(bodies.mass.size):
         o, sb, cb = bodies.start[n], work.frames[n, SIN_B], work.frames[n, COS_B]
         square = v[o] * v[o] + v[o + 1] * v[o + 1] + v[o + 2] * v[o + 2]
@@ -250,7 +248,7 @@ def observe_bodies(q: Floats, v: Floats, bodies: Bodies, work: Work, energy: Flo
 
 @kernel
 def observe_springs(q: Floats, v: Floats, springs: Springs, energy: Floats) -> None:
-    """Add elastic energy and damping power of the torsional springs (see `observe`)."""
+    """Add elastic energy and damping power of the torsional springs (see `take_sample`)."""
     for n in range(springs.ends.shape[0]):
         i, j = springs.ends[n, 0], springs.ends[n, 1]
         energy[ELASTIC] += 0.5 * springs.stiffness[n] * (q[j] - q[i]) ** 2
@@ -258,25 +256,54 @@ def observe_springs(q: Floats, v: Floats, springs: Springs, energy: Floats) -> N
 
 
 @kernel
-def observe_elastic_bodies(q: Floats, v: Floats, equations: Equations, work: Work, energy: Floats) -> None:
-    """Add energies and powers of elastic bodies, in fixed and in turning frames (see `observe`)."""
+def observe_elastic_bodies(q: Floats, v: Floats, stride: int, equations: Equations, work: Work, energy: Floats) -> None:
+    """Add energies and powers of elastic bodies, in fixed and in turning frames, these for `stride` samples."""
     kinetic, stored, damped = elastic_energies(q, v, equations.elastic, work.scratch)
     energy[KINETIC] += kinetic
     energy[ELASTIC] += stored
-    energy[DISSIPATED] += damped
+    energy[DISSIPATED] += stride * damped
     kinetic, stored, damped, weight = turning_energies(q, v, equations.turning, work.memory)
     energy[KINETIC] += kinetic
     energy[ELASTIC] += stored
-    energy[OF_LOADS] += weight
-    energy[DISSIPATED] += damped
+    energy[OF_LOADS] += stride * weight
+    energy[DISSIPATED] += stride * damped
 
 
 @kernel
-def observe_loads(t: float, q: Floats, v: Floats, loads: Loads, size: int, work: Work, energy: Floats) -> None:
-    """Add the power of what acts from outside on the first `size` coordinates at time t (s)."""
+def observe_loads(t: float, q: Floats, v: Floats, loads: Loads, work: Work, energy: Floats) -> None:
+    """Add the power of what acts from outside at time t (s); nothing acts on travelling seats."""
     set_loads(t, q, v, loads, work.series, work.force)
-    for i in range(size):
+    for i in range(loads.steady.size):
         energy[OF_LOADS] += work.force[i] * v[i]
+
+
+@kernel
+def take_sample(
+    t: float,
+    q: Floats,
+    v: Floats,
+    equations: Equations,
+    work: Work,
+    columns: Columns,
+    stride: int,
+    sample: Floats,
+    energy: Floats,
+) -> None:
+    """Fill signals (columns,) and energies and powers (7,) of the state at time t (s) that was evaluated last.
+
+    Signals but those that `Observer.complete` takes from a state by itself; energies in the columns `KINETIC` and so
+    on. Powers of elastic bodies stand for `stride` samples, none at 0: they take as long as the whole evaluation.
+    """
+    energy[:] = 0.0
+    observe_bodies(q, v, equations.bodies, work, energy)
+    observe_meshes(q, v, equations.meshes, work, columns, sample, energy)
+    observe_connectors(q, v, equations.bodies, equations.connectors, work, columns, sample, energy)
+    if equations.joints.host.size > 0:
+        observe_joints(v, equations.meshes, equations.joints, work, columns, sample)
+    observe_springs(q, v, equations.springs, energy)
+    if stride > 0:
+        observe_elastic_bodies(q, v, stride, equations, work, energy)
+    observe_loads(t, q, v, equations.loads, work, energy)
 
 
 @kernel
@@ -290,27 +317,18 @@ def observe(
     signals: Floats,
     energies: Floats,
 ) -> None:
-    """Fill signals (samples, columns) and energies (samples, 7) of states q, v (samples, size).
-
-    Signals but those that `Observer` takes from a state by itself; energies in the columns `KINETIC` and so on.
-    """
-    size = q.shape[1]
+    """Fill signals (samples, columns) and energies (samples, 7) of states q, v (samples, size); see `take_sample`."""
     x, u = work.stage_q, work.stage_v
     for n in range(q.shape[0]):
-        sample, energy = signals[n], energies[n]
-        energy[:] = 0.0
-        for i in range(size):
+        for i in range(q.shape[1]):
             x[i], u[i] = q[n, i], v[n, i]
-        place_bodies(x, u, equations.bodies, work)
-        observe_bodies(x, u, equations.bodies, work, energy)
-        place_travelling(x, u, equations.travelling)
-        observe_meshes(x, u, equations.meshes, work, columns, sample, energy)
-        observe_connectors(x, u, equations.bodies, equations.connectors, work, columns, sample, energy)
-        if equations.joints.host.size > 0:
-            observe_joints(u, equations.meshes, equations.joints, work, columns, sample)
-        observe_springs(x, u, equations.springs, energy)
-        observe_elastic_bodies(x, u, equations, work, energy)
-        observe_loads(time[n], x, u, equations.loads, size, work, energy)
+        evaluate(time[n], x, u, equations, work)
+        take_sample(time[n], x, u, equations, work, columns, 1, signals[n], energies[n])
+
+
+def columns_of(layout: SignalLayout) -> Columns:
+    """Columns of a layout, as the kernels take them."""
+    return Columns._make(layout[name].start if name in layout else -1 for name in Columns._fields)
 
 
 class Observer:
@@ -333,9 +351,6 @@ class Observer:
         overall = assembly.gearbox.case.overall
         self._input = assembly.spin[overall.input]
         self._overall = overall_row(assembly) / self.layout.radius
-        self._columns = Columns._make(
-            self.layout[name].start if name in self.layout else -1 for name in Columns._fields
-        )
         self._equations = equations_of(assembly, loads)
         self._work = work_for(self._equations, np.zeros(assembly.size), np.zeros(assembly.size))
 
@@ -360,7 +375,11 @@ class Observer:
         """
         signals = np.empty((len(time), self.layout.count))
         energies = np.empty((len(time), len(ENERGIES) + len(POWERS)))
+        observe(time, q, v, self._equations, self._work, columns_of(self.layout), signals, energies)
+        self.complete(q, v, signals)
+        return signals, energies[:, : len(ENERGIES)], energies[:, len(ENERGIES) :]
+
+    def complete(self, q: Floats, v: Floats, signals: Floats) -> None:
+        """Fill those signals (samples, columns) that states q, v (samples, size) have by themselves."""
         signals[:, self.layout["input_speed"]] = v[:, [self._input]]
         signals[:, self.layout["overall_dte_angle"]] = (q @ self._overall)[:, None]
-        observe(time, q, v, self._equations, self._work, self._columns, signals, energies)
-        return signals, energies[:, : len(ENERGIES)], energies[:, len(ENERGIES) :]
