@@ -35,7 +35,7 @@ FIXED, ALONG_COSINE, ALONG_SINE, SECOND = range(0, 4 * PADDED, PADDED)
 TURNING = 2 * PADDED
 """Place of the frame's angle in a gradient of `MeshMemory.gradients`, behind two padded gears."""
 KINETIC, ELASTIC, OF_LOADS, DISSIPATED, OF_VARYING_STIFFNESS, NON_CONSERVATIVE, OF_BEARING_RATES = range(7)
-"""Columns of an account of energy, as runs take it (`exugear.solvers.compiled.observers`).
+"""Columns of an account of energy, as runs take it (`exugear.solvers.compiled.sampling`).
 
 Kinetic and elastic energy (J); powers (W): of the loads, damped, of the stiffness that changes with pmc, of mesh forces
 that are not conjugate to their deflection, of bearings whose rate is not the derivative of their displacement.

@@ -9,18 +9,20 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fe_ste.contact.cells import ContactSettings
-from fe_ste.contact.compliance import SlicedCompliance
-from fe_ste.elasticity.flank import FlankCompliance, flank_compliance
+from fe_ste.contact.regular import RegularCompliance
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.notebook import html_table, value_range
-from fe_ste.tools.sparse import Backend
+
+if TYPE_CHECKING:
+    from fe_ste.elasticity.flank import FlankCompliance
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,8 @@ class PairCompliance:
         Tooth pairs that may touch.
     reach : int
         Largest difference of tooth pairs in contact at once.
-    sliced : tuple of SlicedCompliance
+    regular : tuple of RegularCompliance
+        Gear 1, gear 2.
     modifications : tuple of FlankModification
         Gear 1, gear 2.
     tooth_gap : ndarray, optional
@@ -52,7 +55,7 @@ class PairCompliance:
     axial: Floats
     teeth: Integers
     reach: int
-    sliced: tuple[SlicedCompliance, SlicedCompliance]
+    regular: tuple[RegularCompliance, RegularCompliance]
     modifications: tuple[FlankModification, FlankModification] = (FlankModification(), FlankModification())
     tooth_gap: Floats | None = None
 
@@ -71,7 +74,7 @@ class PairCompliance:
         teeth = np.arange(-outermost, outermost + 1)
         senses = (1, 1 if pair.gear.internal else -1)
         pinion, gear = (
-            SlicedCompliance.from_flank(flank, axial, sense, teeth, reach)
+            RegularCompliance.from_flank(flank, sense, teeth, reach)
             for flank, sense in zip(flanks, senses, strict=True)
         )
         return cls(pair, flanks, contact, axial, teeth, reach, (pinion, gear))
@@ -151,9 +154,8 @@ def pair_compliance(
     *,
     open_teeth: int | None = None,
     incompatible_modes: bool = True,
-    backend: Backend | None = None,
 ) -> PairCompliance:
-    """Compute the compliance of both gears of `pair` by finite elements.
+    """Compute the compliance of both gears of `pair` by finite elements, or take it from where it is kept.
 
     Parameters
     ----------
@@ -163,16 +165,17 @@ def pair_compliance(
     open_teeth : int, optional
         Odd number of teeth of open sectors; without it closed rings.
     incompatible_modes : bool
-    backend : {"pardiso", "superlu"}, optional
 
     Returns
     -------
     PairCompliance
+
+    See Also
+    --------
+    fe_ste.elasticity.known_flanks.known_flanks : Where computed gears are kept.
     """
-    pinion, gear = (
-        flank_compliance(
-            wheel, side, mesh, open_teeth=open_teeth, incompatible_modes=incompatible_modes, backend=backend
-        )
-        for wheel, side in ((pair.pinion, 1), (pair.gear, -1 if pair.gear.internal else 1))
-    )
+    from fe_ste.elasticity.known_flanks import known_flanks  # finite elements, which a table that is there spares
+
+    sides = ((pair.pinion, 1), (pair.gear, -1 if pair.gear.internal else 1))
+    pinion, gear = known_flanks(sides, mesh, open_teeth=open_teeth, incompatible_modes=incompatible_modes)
     return PairCompliance.from_flanks(pair, (pinion, gear), contact)

@@ -12,28 +12,30 @@ import math
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from fe_ste.contact.cells import ContactSettings
-from fe_ste.elasticity.flank import HANDOVER_DEPTH, FlankCompliance, flank_compliance
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.flanks.modifications import FlankModification
-from fe_ste.geometry.gears import Gear, GearPair
+from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.files import FileError
 from fe_ste.tools.notebook import html_table, value_range
 from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
 from fe_ste.tools.versions import TABLE
 from fe_ste.tools.workers import Workers
-from fe_ste.transmission_error.compliance import PairCompliance
+from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance
 from fe_ste.transmission_error.grid import Checkpoint, Submits, solve_grid
 from fe_ste.transmission_error.search import unloaded_states
 from fe_ste.transmission_error.states import RESULTS, STATE_AXES, StateAxes
+
+if TYPE_CHECKING:
+    import xarray as xr
+
 
 #: Beyond this many states the start of processes is repaid.
 _STATES_IN_PROCESS = 1000
@@ -93,6 +95,8 @@ class TableInput:
 
     def resolved(self) -> dict[str, Any]:
         """Return the input as plain data, with everything that has a default spelled out."""
+        from fe_ste.elasticity.flank import HANDOVER_DEPTH  # loads finite elements, which a table that is there spares
+
         return {"method_version": TABLE, "handover_depth": HANDOVER_DEPTH, **asdict(self)}
 
     @cached_property
@@ -267,19 +271,9 @@ class MeshTable:
         return StateAxes(positions, *values).ranges()
 
 
-@lru_cache(maxsize=8)
-def _flank(gear: Gear, side: int, mesh: MeshSettings) -> FlankCompliance:
-    return flank_compliance(gear, side, mesh)
-
-
 def prepared_compliance(wanted: TableInput) -> PairCompliance:
-    """Prepare the pair of a table; flanks are kept, so a planet, which meshes twice on one flank, is computed once."""
-    pair = wanted.pair
-    flanks = (
-        _flank(pair.pinion, 1, wanted.mesh),
-        _flank(pair.gear, -1 if pair.gear.internal else 1, wanted.mesh),
-    )
-    prepared = PairCompliance.from_flanks(pair, flanks, wanted.contact)
+    """Prepare the pair of a table; a planet, which meshes twice, is computed once."""
+    prepared = pair_compliance(wanted.pair, wanted.mesh, wanted.contact)
     return prepared.with_modifications(wanted.pinion_modification, wanted.gear_modification)
 
 

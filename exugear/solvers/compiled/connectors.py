@@ -133,11 +133,12 @@ def place_pair(p: int, places: Floats, pairs: Pairs, ground: int, work: Work) ->
         return
     first, turn = places[i], work.frames[i]
     nodes = pairs.data[pairs.first[p]]
-    x = place[0] - first[0] + nodes[NODES]
-    y = place[1] - first[1] + nodes[NODES + 1]
-    z = place[2] - first[2] + nodes[NODES + 2]
-    ux = place[PADDED] - first[PADDED]
-    uy = place[PADDED + 1] - first[PADDED + 1]
+    x, y, z = (
+        place[0] - first[0] + nodes[NODES],
+        place[1] - first[1] + nodes[NODES + 1],
+        place[2] - first[2] + nodes[NODES + 2],
+    )
+    ux, uy = place[PADDED] - first[PADDED], place[PADDED + 1] - first[PADDED + 1]
     uz = place[PADDED + 2] - first[PADDED + 2]
     for k in range(3):
         r, s, t = turn[k], turn[3 + k], turn[6 + k]

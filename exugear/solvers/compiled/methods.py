@@ -176,7 +176,7 @@ def forced_error(method: Method, angle: float) -> float:
 
     >>> angle = 2 * np.pi * 6400 / 60000
     >>> f"{forced_error(RUNGE_KUTTA, angle):.1e} {forced_error(adams(5), angle):.1e}"
-    '-3.3e-04 -4.3e-04'
+    '-2.1e-04 -4.3e-04'
     """
     turn = np.exp(1j * angle)
     if not method.is_multistep:

@@ -16,8 +16,8 @@ from exugear.solvers.compiled.methods import ORDERS, RUNGE_KUTTA, Method, adams,
 from fe_ste.tools.arrays import Complexes, Floats
 
 MARGIN = 1.2
-"""By this factor all motions may be faster before the step is not stable: stiffness by 1.44, room for k(PMC) at its
-peaks and for teeth that carry more than their static load."""
+"""By this factor all motions may be faster before the step is not stable: stiffness by 1.44, room for teeth that carry
+more than their static load."""
 GROWTH_ALLOWED = 1e-9
 """Growth in a step that counts as none: undamped motions gain 0.2 % in 30 s."""
 FORCED_ERROR = 7e-4
@@ -84,15 +84,18 @@ class Integration:
 
 
 def eigenvalues(assembly: Assembly) -> Complexes:
-    """Eigenvalues (1/s) of the system linearised at rest, mean mesh stiffness, damping included."""
+    """Eigenvalues (1/s) of the system linearised at rest, mesh stiffness at its peaks, damping included."""
     linear = _at_rest(assembly)
     return scipy.linalg.eigvals(_free_motions(linear, assembly.motions)[1]).astype(np.complex128)
 
 
 def _at_rest(assembly: Assembly) -> Linearised:
-    """Linearised equations with all teeth in contact, non-linear bearings stiffer than under their static load."""
+    """Linearised equations with all teeth in contact, meshes and non-linear bearings as stiff as they become."""
     stiffest = assembly.with_linear_supports(STIFFENING)
-    return linearise(stiffest, np.zeros(assembly.size), stiffest.linear_meshes())
+    meshes = stiffest.linear_meshes()
+    peaks = np.array([np.max(np.abs(e.stiffness)) / np.abs(np.mean(e.stiffness)) for e in stiffest.elements])
+    meshes = meshes._replace(stiffness=meshes.stiffness * peaks.reshape(-1, 1, 1))
+    return linearise(stiffest, np.zeros(assembly.size), meshes)
 
 
 def _free_motions(linear: Linearised, free: Floats) -> tuple[Floats, Floats]:
@@ -238,10 +241,11 @@ def choose_integration(
 ) -> Integration:
     """Find the method and the step that take the fewest evaluations.
 
-    The step divides the sampling interval, is stable by `MARGIN` for all eigenvalues of the system at rest, keeps
-    amplitudes up to `band` within `FORCED_ERROR` and the slopes of resonances within `RESONANCE_ERROR`. Resonances
-    count where they are meant: with elastic bodies up to two thirds of the frequency to which these are described
-    exactly. Heavy damping shortens the steps of multistep methods: the Runge-Kutta method takes over then.
+    The step divides the sampling interval, is stable by `MARGIN` for all eigenvalues of the system at rest, meshes at
+    their stiffest, keeps amplitudes up to `band` within `FORCED_ERROR` and the slopes of resonances within
+    `RESONANCE_ERROR`. Resonances count where they are meant: with elastic bodies up to two thirds of the frequency to
+    which these are described exactly. Heavy damping shortens the steps of multistep methods: the Runge-Kutta method
+    takes over then.
 
     Parameters
     ----------
