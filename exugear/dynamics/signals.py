@@ -106,14 +106,14 @@ SIGNALS = (
         ("time",),
         "rad/s",
         sign_convention="rotation about +z",
-        filled_by=("Observer.observe",),
+        filled_by=("Observer.complete",),
     ),
     Signal(
         "overall_dte_angle",
         ("time",),
         "rad",
         sign_convention="output ahead, about +z, of where the ratio puts it",
-        filled_by=("Observer.observe",),
+        filled_by=("Observer.complete",),
     ),
     Signal(
         "overall_dte",

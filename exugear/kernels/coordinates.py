@@ -22,3 +22,6 @@ SPIN = 5
 """Spin about the body's axis."""
 BODY_SIZE = 6
 """Coordinates of a body or a seat."""
+PADDED, PADDED_TILT, PADDED_SPIN = 8, 4, 6
+"""Size of the padded row x y z 0 a b spin 0 that loops arranged for speed take a body's coordinates in, first tilt and
+spin there."""

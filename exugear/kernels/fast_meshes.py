@@ -10,16 +10,29 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from exugear.kernels.coordinates import AXIAL, BODY_SIZE, SPIN, TILT
+import numpy as np
+
+from exugear.kernels.coordinates import AXIAL, BODY_SIZE, PADDED, PADDED_SPIN, PADDED_TILT, SPIN, TILT
 from exugear.kernels.meshes import FRAME
 from exugear.kernels.table_law import Scratch, TableArrays, piece_at
 from fe_ste.tools.arrays import Floats, Integers
-from fe_ste.tools.compilation import kernel
+from fe_ste.tools.compilation import kernel, summing_kernel
 
 ALONG_DEFLECTION, ALONG_FORCE, TABLE_FORCE = range(3)
 """Rows of `MeshMemory.gradient`."""
-LAST_DEFLECTION, LAST_RATE, LAST_OUTSIDE, LAST_FORCE = range(4)
-"""Columns of `MeshMemory.states`."""
+LAST_DEFLECTION, LAST_RATE, LAST_OUTSIDE, LAST_FORCE, LAST_ENERGY, LAST_DAMPED, LAST_CYCLE, LAST_OTHER = range(8)
+"""Columns of `MeshMemory.states`: deflection (m), rate (m/s), 1 outside a table, scalar force (N; of a table F_bt), and
+what an account of energy takes of the mesh: elastic energy (J); power damped, of the stiffness that changes with pmc,
+and of a force that is not conjugate to its deflection (W)."""
+STATES_SIZE = 8
+DEFLECTION_ROW, FORCE_ROW, CENTRE_ROW, MISALIGNMENT_ROW, BACK_ROW, BACK_MISALIGNMENT_ROW = range(6)
+"""Rows of `Meshes.rows`."""
+PLAIN_ROWS = 2
+"""Number of rows of meshes without a table."""
+FIXED, ALONG_COSINE, ALONG_SINE = range(3)
+"""Parts of each of them."""
+TURNING = 2 * PADDED
+"""Place of the frame's angle in a gradient of `MeshMemory.gradients`, behind two padded gears."""
 KINETIC, ELASTIC, OF_LOADS, DISSIPATED, OF_VARYING_STIFFNESS, NON_CONSERVATIVE, OF_BEARING_RATES = range(7)
 """Columns of an account of energy, as runs take it (`exugear.solvers.compiled.observers`).
 
@@ -38,6 +51,9 @@ class Meshes(NamedTuple):
     axis : (m, 2, 2) zero for gears without translations
     conjugate : (m,) 1 where the force row is the deflection row
     spinning : (m,) 1 where the gears have their spins alone
+    ends : (m, 2) numbers of the two gears' places
+    rows : (m, r, 2, 3, 8) rows over both gears' padded places, W = W0 + W1 cos psi + W2 sin psi; psi: the frame's angle
+    offsets : (m, r, 3) of each row: what cos psi, sin psi and psi itself add to its value
     """
 
     coordinates: Integers
@@ -48,6 +64,9 @@ class Meshes(NamedTuple):
     force: Floats
     conjugate: Integers
     spinning: Integers
+    ends: Integers
+    rows: Floats
+    offsets: Floats
     cycles: Floats
     phase: Floats
     pieces: Integers
@@ -65,17 +84,91 @@ class MeshMemory(NamedTuple):
     Attributes
     ----------
     gradient : (3, 13) gradients of the deflection and of the force row, and the force of a mesh with a table
-    states : (m, 4) deflection and its rate, 1 where a table's axis was left, scalar force
+    gradients : (4, 17) gradients over two padded places and the frame's angle; the last one is a sum
+    states : (m, 8) what each mesh does, columns as named in this module
     pieces : (m, 2) load piece of each flank's table that was used last
     law : memory of the law `table`
     row : (12,) row of the push between the axes and the moment of misalignment
     """
 
     gradient: Floats
+    gradients: Floats
     states: Floats
     pieces: Integers
     law: Scratch
     row: Floats
+
+
+def padded_rows(rows: Floats, axis: Floats) -> tuple[Floats, Floats]:
+    """Rows over padded places, their parts and offsets: see `Meshes`.
+
+    Parameters
+    ----------
+    rows : (m, r, 12) array
+        Rows over the coordinates of both gears seen from the frame.
+    axis : (m, 2, 2) array
+        Axis of each gear relative to the frame's at zero angles, m; zero for gears without translations.
+
+    Returns
+    -------
+    rows : (m, r, 2, 3, 8) array
+    offsets : (m, r, 3) array
+    """
+    count, kinds = rows.shape[:2]
+    gears = rows.reshape(count, kinds, 2, BODY_SIZE)
+    parts = np.zeros((count, kinds, 2, 3, PADDED))
+    parts[..., FIXED, AXIAL], parts[..., FIXED, PADDED_SPIN] = gears[..., AXIAL], gears[..., SPIN]
+    for i, o in ((0, 0), (TILT, PADDED_TILT)):
+        # Turned forward by psi: (c x - s y, s x + c y).
+        parts[..., ALONG_COSINE, o : o + 2] = gears[..., i : i + 2]
+        parts[..., ALONG_SINE, o], parts[..., ALONG_SINE, o + 1] = -gears[..., i + 1], gears[..., i]
+    offsets = np.zeros((count, kinds, 3))
+    x, y, px, py = gears[..., 0], gears[..., 1], axis[:, None, :, 0], axis[:, None, :, 1]
+    offsets[..., 0], offsets[..., 1] = (x * px + y * py).sum(axis=2), (x * py - y * px).sum(axis=2)
+    offsets[..., 2] = -gears[..., SPIN].sum(axis=2)
+    return parts, offsets
+
+
+@summing_kernel
+def end_motion(
+    row: Floats, place: Floats, c: float, s: float, width: int, gradient: Floats, begin: int
+) -> tuple[float, float, float]:
+    """Share of one gear in value, rate and turning of a row; fills its gradient (8 from `begin` on).
+
+    The width is handed over, because the loop is only made of vectors if it is not known.
+    """
+    value, rate, turning = 0.0, 0.0, 0.0
+    for k in range(width):
+        along, across = row[ALONG_COSINE, k], row[ALONG_SINE, k]
+        entry = row[FIXED, k] + c * along + s * across
+        gradient[begin + k] = entry
+        value += entry * place[k]
+        rate += entry * place[PADDED + k]
+        turning += (c * across - s * along) * place[k]
+    return value, rate, turning
+
+
+@kernel
+def row_motion(
+    m: int, kind: int, psi: float, psi_rate: float, c: float, s: float, meshes: Meshes, places: Floats, gradient: Floats
+) -> tuple[float, float]:
+    """Value and rate of a row of mesh m; fills its gradient (17,). c and s are those of the frame's angle psi."""
+    rows, offsets, width = meshes.rows[m, kind], meshes.offsets[m, kind], meshes.rows.shape[4]
+    level, lever, spins = offsets[0], offsets[1], offsets[2]
+    first = end_motion(rows[0], places[meshes.ends[m, 0]], c, s, width, gradient, 0)
+    second = end_motion(rows[1], places[meshes.ends[m, 1]], c, s, width, gradient, PADDED)
+    # What the frame's turning does to all of the above at once.
+    turning = (first[2] + second[2]) + (c * lever - s * level) + spins
+    gradient[TURNING] = turning
+    value = (first[0] + second[0]) + ((c * level + s * lever - level) + spins * psi)
+    return value, first[1] + second[1] + turning * psi_rate
+
+
+@kernel
+def add_gradient(factor: float, gradient: Floats, width: int, total: Floats) -> None:
+    """Add a multiple of the first `width` entries of a gradient to a sum."""
+    for k in range(width):
+        total[k] += factor * gradient[k]
 
 
 @kernel
@@ -139,4 +232,23 @@ def subtract_wheel_errors(
             rate -= side * slope * (v[spin] - v[frame])
             gradient[BODY_SIZE * end + SPIN] -= side * slope
             gradient[FRAME] += side * slope
+    return delta, rate
+
+
+@kernel
+def subtract_errors(
+    q: Floats, v: Floats, m: int, side: float, meshes: Meshes, gradient: Floats
+) -> tuple[float, float]:
+    """Change of a deflection and its rate by the gears' errors; changes its padded gradient too."""
+    delta, rate = 0.0, 0.0
+    index = meshes.coordinates[m]
+    for end in range(2):
+        if meshes.error_pieces[m, end] > 0:
+            spin, frame = index[BODY_SIZE * end + SPIN], index[FRAME]
+            error, slope = error_at(m, end, q[spin] - q[frame], meshes)
+            # A flank that stands back closes later; seen from the other flank it stands ahead (side -1).
+            delta -= side * error
+            rate -= side * slope * (v[spin] - v[frame])
+            gradient[PADDED * end + PADDED_SPIN] -= side * slope
+            gradient[TURNING] += side * slope
     return delta, rate

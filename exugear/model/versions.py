@@ -12,4 +12,4 @@ REDUCTION = 1
 #: Eigenmodes (`exugear.dynamics.modes`, and the laws and matrices of `exugear.dynamics.assembly`).
 MODES = 2
 #: Runs in time (`exugear.runs`, both solvers, the laws, signals and filters).
-RUN = 2
+RUN = 3

@@ -43,12 +43,16 @@ class Checkpoint:
         Number of the step that led to it.
     q, v : (size,) arrays
         Coordinates and velocities.
+    past : (n, size) array
+        Accelerations at the last steps, the latest last, as far as a method of integration goes back.
     pending : (n, columns) array
         Samples that the filter still holds.
     pending_first : int
         Number of the first of them.
     balance : (terms,) array
         Account of energy, J, as in `exugear.dynamics.signals.BALANCE_TERMS`.
+    powers : (powers,) array
+        Powers, W, as in `exugear.dynamics.signals.POWERS`.
     start_angle : float
         Angle that a drive started ahead by, rad.
     mesh_times : (times, meshes) array
@@ -60,9 +64,11 @@ class Checkpoint:
     step: int
     q: Floats
     v: Floats
+    past: Floats
     pending: Floats
     pending_first: int
     balance: Floats
+    powers: Floats
     start_angle: float
     mesh_times: Floats
     judgement: Floats
@@ -190,7 +196,9 @@ class RunPieces:
             **dict(zip(MESH_TIMES, state.mesh_times, strict=True)),
             "state_q": state.q,
             "state_v": state.v,
+            "state_past": state.past,
             "state_balance": state.balance,
+            "state_powers": state.powers,
             "state_judgement": state.judgement,
             "state_pending": state.pending,
         }
@@ -209,9 +217,11 @@ class RunPieces:
             step=int(attributes["state_step"]),
             q=arrays["state_q"],
             v=arrays["state_v"],
+            past=arrays["state_past"],
             pending=arrays["state_pending"],
             pending_first=int(attributes["state_pending_first"]),
             balance=arrays["state_balance"],
+            powers=arrays["state_powers"],
             start_angle=float(attributes["start_angle"]),
             mesh_times=np.array([arrays[name] for name in MESH_TIMES]),
             judgement=arrays["state_judgement"],

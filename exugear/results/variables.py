@@ -7,7 +7,9 @@ from exugear.dynamics.signals import SIGNALS, Variable
 STATE = (
     Variable("state_q", ("coordinate",), "m or rad"),
     Variable("state_v", ("coordinate",), "m/s or rad/s"),
+    Variable("state_past", ("past", "coordinate"), "m/s2 or rad/s2"),
     Variable("state_balance", ("term",), "J"),
+    Variable("state_powers", ("power",), "W"),
     Variable("state_judgement", ("criterion", "figure"), "value, s, place"),
     Variable("state_pending", ("pending", "signal"), "of the signals"),
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from exugear.dynamics.signals import BALANCE_TERMS, ENERGIES, POWERS
-from fe_ste.tools.arrays import Floats
+from fe_ste.tools.arrays import Floats, Integers
 
 INTEGRATED = [BALANCE_TERMS.index(term) for term in POWERS]
 """Columns of the account that are integrals of powers."""
@@ -22,53 +22,59 @@ class EnergyAccount:
         Time between two states, s.
     balance : (terms,) array
         Account at the state to start from, J.
+    powers : (powers,) array
+        Powers at that state, W.
 
     Attributes
     ----------
-    balance : (terms,) array
-        Account at the last state, J.
+    balance, powers : (terms,) and (powers,) arrays
+        Account and powers at the last state, J and W.
 
     Examples
     --------
     A steady 2 W of the loads over two steps of 0.5 s:
 
-    >>> account = EnergyAccount(0.5, np.zeros(len(BALANCE_TERMS)))
+    >>> account = EnergyAccount(0.5, np.zeros(len(BALANCE_TERMS)), np.zeros(len(POWERS)))
     >>> powers = np.zeros((3, len(POWERS)))
     >>> powers[:, POWERS.index("work_of_loads")] = 2.0
-    >>> account.carry_on(np.zeros((3, len(ENERGIES))), powers)[:, BALANCE_TERMS.index("work_of_loads")]
-    array([0., 1., 2.])
+    >>> lines = account.carry_on(powers, np.array([0, 2]), np.zeros((2, len(ENERGIES))))
+    >>> lines[:, BALANCE_TERMS.index("work_of_loads")]
+    array([0.5, 2.5])
     """
 
-    def __init__(self, step: float, balance: Floats) -> None:
+    def __init__(self, step: float, balance: Floats, powers: Floats) -> None:
         self.balance = balance
+        self.powers = powers
         self._step = step
-        self._last_powers: Floats | None = None
 
-    def resume(self, powers: Floats) -> None:
-        """Set the powers (1, powers) at the state that `balance` belongs to, W."""
-        self._last_powers = powers
+    def begin(self, powers: Floats) -> None:
+        """Begin with the powers (W) at the first state, which is carried on to like all others."""
+        # No time passes before the first state: the mean of its powers and these is none.
+        self.powers = -powers
 
-    def carry_on(self, energies: Floats, powers: Floats) -> Floats:
+    def carry_on(self, powers: Floats, written: Integers, energies: Floats) -> Floats:
         """Carry the account on by states one step apart; powers by the trapezoidal rule.
 
         Parameters
         ----------
-        energies, powers : (n, energies) and (n, powers) arrays
-            Of `exugear.dynamics.signals.ENERGIES`, J, and `exugear.dynamics.signals.POWERS`, W.
+        powers : (n, powers) array
+            Of `exugear.dynamics.signals.POWERS` at each state, W.
+        written : (k,) array
+            Numbers of the states whose lines are asked for, the last state's last.
+        energies : (k, energies) array
+            Of `exugear.dynamics.signals.ENERGIES` at these states, J.
 
         Returns
         -------
-        (n, terms) array
-            Account at each state, J.
+        (k, terms) array
+            Account at these states, J.
         """
-        before = powers[:1] if self._last_powers is None else self._last_powers
-        series = np.vstack([before, powers])
-        worked = self.balance[INTEGRATED] + 0.5 * self._step * np.cumsum(series[1:] + series[:-1], axis=0)
-        if self._last_powers is None:
-            worked -= self._step * powers[0]  # no time passes before the first state
-        lines = np.empty((len(powers), len(BALANCE_TERMS)))
-        lines[:, INTEGRATED] = worked
+        # Whole sums up to each line; of the first and the last power in them half is too much or missing.
+        starts = np.concatenate([[0], written[:-1] + 1])
+        sums = np.cumsum(np.add.reduceat(powers, starts, axis=0), axis=0)
+        worked = sums + 0.5 * (self.powers - powers[written])
+        lines = np.empty((len(written), len(BALANCE_TERMS)))
+        lines[:, INTEGRATED] = self.balance[INTEGRATED] + self._step * worked
         lines[:, OBSERVED] = energies
-        self._last_powers = powers[-1:]
-        self.balance = lines[-1]
+        self.powers, self.balance = powers[-1].copy(), lines[-1]
         return lines

@@ -30,15 +30,17 @@ def integrate(plan: RunPlan, start: RunStart, recorder: Recorder, interruption: 
 def _integrate_compiled(plan: RunPlan, start: RunStart, recorder: Recorder, interruption: Interruption) -> None:
     """Let the compiled solver fill the recorder's buffer."""
     state, step = start.state, plan.step
-    system = CompiledSystem(plan.assembly, state.q, state.v, start.loads, step)
+    method = plan.integration.method
+    system = CompiledSystem(plan.assembly, state.q, state.v, start.loads, step, method, state.past)
     done = state.step
     recorder.begin(done * step, state.q, state.v)
     while done < plan.steps and not interruption.asked and not recorder.halted:
-        q, v = recorder.buffer.room(min(plan.steps - done, STEPS_AT_ONCE))
-        good = system.advance(done, q, v)
-        if good < len(q):
+        room = recorder.buffer.room(min(plan.steps - done, STEPS_AT_ONCE))
+        good = system.advance(done, *room)
+        if good < len(room.q):
             recorder.fault = f"the state is not finite at t = {(done + good + 1) * step:.6g} s"
-        recorder.take(step * np.arange(done + 1, done + good + 1, dtype=np.float64))
+        recorder.past = system.past
+        recorder.take_observed(step * np.arange(done + 1, done + good + 1, dtype=np.float64))
         done += good
 
 

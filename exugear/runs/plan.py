@@ -15,10 +15,13 @@ from exugear.model.versions import RUN
 from exugear.results.run_file import FINAL_NAME, PARTIAL_NAME
 from exugear.runs.extent import too_fine
 from exugear.runs.outcome import RunError
-from exugear.solvers.compiled.step import highest_rate, unstable
+from exugear.solvers.compiled.step import Integration, unstable
 
 if TYPE_CHECKING:
     from exugear.solvers.exudyn_model.system import MeshRoute
+
+EXPECTATIONS = ("stability_margin", "expected_error_at_band", "expected_error_of_resonances")
+"""Attributes that say what a method and its step are expected to do."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,16 +34,14 @@ class RunPlan:
     case : LoadCase
     directory : Path
         Where its results go.
-    step : float
-        s.
     steps : int
         Number of steps to the end.
     steps_per_sample : int
         Number of steps between two stored samples.
     band : float
         Highest frequency whose amplitude is kept, Hz.
-    fastest_rate : float
-        Magnitude of the fastest eigenvalue, rad/s.
+    integration : Integration
+        How the compiled solver integrates; of Exudyn's own methods it tells the step.
     solver : str
         ``compiled`` or ``exudyn``.
     mesh_route : str
@@ -50,13 +51,17 @@ class RunPlan:
     assembly: Assembly
     case: LoadCase
     directory: Path
-    step: float
     steps: int
     steps_per_sample: int
     band: float
-    fastest_rate: float
+    integration: Integration
     solver: str
     mesh_route: MeshRoute = "element"
+
+    @property
+    def step(self) -> float:
+        """Time step, s."""
+        return self.integration.step
 
     @property
     def final_path(self) -> Path:
@@ -96,15 +101,24 @@ class RunPlan:
             "highest_order": max(gearbox.train.mesh_frequencies(2.0 * math.pi).values()),
             "step": self.step,
             "band": self.band,
-            "fastest_eigenvalue": self.fastest_rate,
+            "fastest_eigenvalue": self.integration.fastest_rate,
+            **self._expectations(),
             "solver": self._solver_name(),
             "mesh_route": self.mesh_route,
             "complete": 0,
         }
 
+    def _expectations(self) -> dict[str, float]:
+        """Return what the method and its step are expected to do; it is known of the compiled solver alone."""
+        if self.solver != "compiled":
+            return {}
+        chosen = self.integration
+        figures = (chosen.margin, chosen.forced_error, chosen.resonance_error)
+        return dict(zip(EXPECTATIONS, figures, strict=True))
+
     def _solver_name(self) -> str:
         if self.solver == "compiled":
-            return "compiled, RK4"
+            return f"compiled, {self.integration.method.name}"
         meshes = ", meshes as loads" if self.mesh_route == "loads" else ""
         return f"Exudyn {version('exudyn')}, {'generalized-alpha' if self.is_implicit else 'RK44'}{meshes}"
 
@@ -114,7 +128,7 @@ def plan_run(
     case: LoadCase,
     directory: Path,
     total: float,
-    step: float,
+    integration: Integration,
     band: float,
     sample_rate: float,
     solver: str,
@@ -127,9 +141,9 @@ def plan_run(
     RunError
         The step is not stable, absurdly small, or no sample falls on it.
     """
-    fastest_rate = highest_rate(assembly)
-    if solver == "compiled" and unstable(fastest_rate, step):
-        raise RunError(unstable(fastest_rate, step))
+    step = integration.step
+    if solver == "compiled" and unstable(integration):
+        raise RunError(unstable(integration))
     if too_fine(step, total, sample_rate):
         raise RunError(too_fine(step, total, sample_rate))
     steps_per_sample = max(1, round(1.0 / (step * sample_rate)))
@@ -139,4 +153,4 @@ def plan_run(
             f"use {1.0 / (steps_per_sample * step):g} Hz"
         )
     steps = round(total / step)
-    return RunPlan(assembly, case, directory, step, steps, steps_per_sample, band, fastest_rate, solver, mesh_route)
+    return RunPlan(assembly, case, directory, steps, steps_per_sample, band, integration, solver, mesh_route)

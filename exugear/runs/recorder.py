@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
+from exugear.dynamics.signals import ENERGIES, POWERS
 from exugear.results.decimation import Decimator
 from exugear.results.pieces import Checkpoint
 from exugear.runs.account import EnergyAccount
@@ -22,35 +24,43 @@ FLUSH_FACTOR = {"compiled": 4, "exudyn": 1}
 """How many times this interval each solver goes without: a piece costs as much as 2000 compiled steps."""
 
 
+class Room(NamedTuple):
+    """Rows of a `StateBuffer`: coordinates and velocities (n, size), signals (n, columns), energies, powers (n, 7)."""
+
+    q: Floats
+    v: Floats
+    signals: Floats
+    energies: Floats
+
+
 class StateBuffer:
-    """States of a run between two writes.
+    """States of a run between two writes, and what was observed of them.
 
     Parameters
     ----------
-    rows, size : int
-        Most states, and coordinates of a state.
+    rows, size, columns : int
+        Most states; coordinates and signals of a state.
 
     Attributes
     ----------
-    filled : int
-        States that are in it.
+    filled, observed : int
+        States that are in it, and how many of them have their signals.
     """
 
-    def __init__(self, rows: int, size: int) -> None:
-        self.filled = 0
+    def __init__(self, rows: int, size: int, columns: int) -> None:
+        self.filled = self.observed = 0
         self._times = np.empty(rows)
-        self._q = np.empty((rows, size))
-        self._v = np.empty((rows, size))
+        widths = (size, size, columns, len(ENERGIES) + len(POWERS))
+        self._rows = Room._make(np.empty((rows, width)) for width in widths)
 
     @property
     def full(self) -> bool:
         """Whether no state fits in any more."""
         return self.filled == len(self._times)
 
-    def room(self, most: int) -> tuple[Floats, Floats]:
-        """Coordinates and velocities (n, size) of the next states, up to so many, for a solver to fill."""
-        end = min(self.filled + most, len(self._times))
-        return self._q[self.filled : end], self._v[self.filled : end]
+    def room(self, most: int) -> Room:
+        """Rows of the next states, up to so many, for a solver to fill."""
+        return self._between(self.filled, min(self.filled + most, len(self._times)))
 
     def take(self, times: Floats) -> None:
         """Count states that were filled into the room, at times (n,), s."""
@@ -58,9 +68,12 @@ class StateBuffer:
         self._times[self.filled : end] = times
         self.filled = end
 
-    def states(self) -> tuple[Floats, Floats, Floats]:
-        """Return times (n,), coordinates and velocities (n, size) of the states in it."""
-        return self._times[: self.filled], self._q[: self.filled], self._v[: self.filled]
+    def states(self, first: int = 0) -> tuple[Floats, Room]:
+        """Return times (n,) and rows of the states in it, from a number on."""
+        return self._times[first : self.filled], self._between(first, self.filled)
+
+    def _between(self, first: int, end: int) -> Room:
+        return Room._make(rows[first:end] for rows in self._rows)
 
 
 class Recorder:
@@ -81,6 +94,8 @@ class Recorder:
         Time of the last state that counts, s.
     fault : str
         What ended the run, empty if nothing did.
+    past : (n, size) array
+        Accelerations that a solver with a memory goes on from after the last state, the latest last.
     """
 
     def __init__(self, plan: RunPlan, start: RunStart, progress: Callable[[float], None] | None = None) -> None:
@@ -94,11 +109,12 @@ class Recorder:
         self._layout = self._observer.layout
         self._decimator = Decimator(plan.steps_per_sample, self._layout.count)
         self._decimator.pending, self._decimator.pending_first = start.state.pending, start.state.pending_first
-        self._account = EnergyAccount(plan.step, start.state.balance)
+        self._account = EnergyAccount(plan.step, start.state.balance, start.state.powers)
         self._mesh_times = start.state.mesh_times
+        self.past = start.state.past
         wanted = FLUSH_FACTOR[plan.solver] * FLUSH_INTERVAL / plan.step
         size = plan.assembly.size
-        self.buffer = StateBuffer(buffer_rows(wanted, size, self._layout.count), size)
+        self.buffer = StateBuffer(buffer_rows(wanted, size, self._layout.count), size, self._layout.count)
 
     @property
     def halted(self) -> bool:
@@ -109,47 +125,63 @@ class Recorder:
         """Take the state that the run starts from, at a time (s); a resumed run has it in its pieces already."""
         if self._start.resumed:
             self.last_time = time
-            _, _, powers = self._observer.observe(np.array([time]), q[None], v[None])
-            self._account.resume(powers)
-        else:
-            self.keep(time, q, v)
+            return
+        self.keep(time, q, v)
+        if not self.fault:
+            self._observe_rest()
+            self._account.begin(self.buffer.states()[1].energies[0, len(ENERGIES) :])
 
     def keep(self, time: float, q: Floats, v: Floats) -> None:
         """Take one state at a time (s); one that is not finite is a fault."""
         if not (np.isfinite(q).all() and np.isfinite(v).all()):
             self.fault = f"the state is not finite at t = {time:.6g} s"
             return
-        next_q, next_v = self.buffer.room(1)
-        next_q[0], next_v[0] = q, v
-        self.take(np.array([time]))
+        room = self.buffer.room(1)
+        room.q[0], room.v[0] = q, v
+        self._take(np.array([time]))
 
-    def take(self, times: Floats) -> None:
-        """Take the states that a solver left in the room of the buffer, at times (n,), s."""
+    def take_observed(self, times: Floats) -> None:
+        """Take the states that a solver left in the room of the buffer, with their signals, at times (n,), s."""
+        self.buffer.observed += len(times)
+        self._take(times)
+
+    def _take(self, times: Floats) -> None:
         self.buffer.take(times)
         if len(times):
             self.last_time = float(times[-1])
         if self.buffer.full:
             self.flush()
 
+    def _observe_rest(self) -> None:
+        """Observe the states that a solver left without signals: they follow those that have them."""
+        times, rows = self.buffer.states(self.buffer.observed)
+        if not len(times):
+            return
+        rows.signals[:], energies, powers = self._observer.observe(times, rows.q, rows.v)
+        rows.energies[:, : len(ENERGIES)], rows.energies[:, len(ENERGIES) :] = energies, powers
+        self.buffer.observed = self.buffer.filled
+
     def flush(self) -> None:
         """Turn the buffered states into signals, write them and the state to go on from."""
         if not self.buffer.filled:
             return
-        times, q, v = self.buffer.states()
         with np.errstate(over="ignore", invalid="ignore"):  # a run that diverges ends in numbers too large to add up
-            signals, energies, powers = self._observer.observe(times, q, v)
-            lines = self._account.carry_on(energies, powers)
-        written = self._lines_to_write(len(times))
-        balance_times, balances = times[written], lines[written]
-        self._judge.see(times, self._layout.values("mesh_dte", signals), v, balance_times, balances)
-        self._mesh_times = self._mesh_times + self._plan.step * self._layout.mesh_times(signals)
-        centre, rows = self._decimator.push(signals)
-        numbers = centre + self._decimator.factor * np.arange(len(rows), dtype=np.float64)
+            self._observe_rest()
+            times, rows = self.buffer.states()
+            self._observer.complete(rows.q, rows.v, rows.signals)
+            written = self._lines_to_write(len(times))
+            # A solver that observes its steps leaves out the energies, which are asked for seldom.
+            _, energies, _ = self._observer.observe(times[written], rows.q[written], rows.v[written])
+            balances = self._account.carry_on(rows.energies[:, len(ENERGIES) :], written, energies)
+        self._judge.see(times, self._layout.values("mesh_dte", rows.signals), rows.v, times[written], balances)
+        self._mesh_times = self._mesh_times + self._plan.step * self._layout.mesh_times(rows.signals)
+        centre, samples = self._decimator.push(rows.signals)
+        numbers = centre + self._decimator.factor * np.arange(len(samples), dtype=np.float64)
         self.note_verdict()
-        self._start.pieces.append(self._plan.step * numbers, rows, balance_times, balances, self._checkpoint())
-        self.buffer.filled = 0
+        self._start.pieces.append(self._plan.step * numbers, samples, times[written], balances, self._checkpoint())
+        self.buffer.filled = self.buffer.observed = 0
         if self._progress is not None:
-            self._progress(float(times[-1]))
+            self._progress(self.last_time)
 
     def _lines_to_write(self, count: int) -> Integers:
         """Numbers of the lines of the account that are written, of so many: each interval's first, and the last."""
@@ -158,14 +190,16 @@ class Recorder:
 
     def _checkpoint(self) -> Checkpoint:
         """State to go on from: the last in the buffer."""
-        times, q, v = self.buffer.states()
+        times, rows = self.buffer.states()
         return Checkpoint(
             step=round(float(times[-1]) / self._plan.step),
-            q=q[-1],
-            v=v[-1],
+            q=rows.q[-1],
+            v=rows.v[-1],
+            past=self.past,
             pending=self._decimator.pending,
             pending_first=self._decimator.pending_first,
             balance=self._account.balance,
+            powers=self._account.powers,
             start_angle=self._start.state.start_angle,
             mesh_times=self._mesh_times,
             judgement=self._judge.figures,

@@ -2,8 +2,8 @@
 
 Two solvers take the same assembly: `exugear.solvers.compiled.solver`, and Exudyn as the model of record. Both hand
 their states to one `exugear.runs.recorder.Recorder`, which filters, accounts for energy and writes. Without a step
-asked for, `exugear.solvers.compiled.step.choose_step` finds the longest that is stable and keeps the excitation in
-the band: 6.4 kHz is the high-speed mesh of the GRC at 215 rpm. Exudyn is loaded only where it integrates.
+asked for, `exugear.solvers.compiled.step.choose_integration` finds method and step, stable and accurate up to the end
+of the band: 6.4 kHz is the high-speed mesh of the GRC at 215 rpm. Exudyn is loaded only where it integrates.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from exugear.runs.recorder import Recorder
 from exugear.runs.run_folder import held, run_directory
 from exugear.runs.start import RunStart, prepare_start
 from exugear.solvers.compiled.solver import unsupported_reason
-from exugear.solvers.compiled.step import choose_step, fastest_motion
+from exugear.solvers.compiled.step import choose_integration, fastest_motion
 from exugear.tooth_mesh.law import Angles, MeshData
 
 if TYPE_CHECKING:
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
 
 Solver = Literal["compiled", "exudyn"]
+Integrator = Literal["adams", "rk4"]
 SOLVERS: tuple[str, ...] = get_args(Solver)
 BAND = 6.4e3
 """Highest frequency whose amplitude is kept, Hz."""
@@ -53,6 +54,7 @@ def simulate(
     band: float = BAND,
     sample_rate: float = SAMPLE_RATE,
     solver: Solver | None = None,
+    integrator: Integrator | None = None,
     mesh_route: MeshRoute = "element",
     angles: Angles = "reference",
     resume: bool = False,
@@ -79,6 +81,8 @@ def simulate(
         Highest frequency whose amplitude is kept, and stored rate, Hz; the rate must divide the steps.
     solver : {"compiled", "exudyn"}, optional
         The compiled one where it applies by default; a body in a floating frame needs Exudyn.
+    integrator : {"adams", "rk4"}, optional
+        Kind of method of the compiled solver; whichever takes fewer evaluations by default. ``rk4`` is the reference.
     angles : {"reference", "operating"}
         Angles of the law `seed`.
     mesh_route : {"element", "loads"}
@@ -118,12 +122,12 @@ def simulate(
     directory = run_directory(out, choice)
     total = case.duration if duration is None else duration
     chosen = _solver(solver, assembly, mesh_route)
-    if step is None:
-        step = choose_step(assembly, sample_rate, band)
-        if too_fine(step, total, sample_rate):
-            raise gearbox.fault(f"{fastest_motion(assembly)}; {too_fine(step, total, sample_rate)}")
+    kind = integrator if chosen == "compiled" else "rk4"  # Exudyn's explicit method is the same
+    integration = choose_integration(assembly, sample_rate, band, step=step, integrator=kind)
+    if step is None and too_fine(integration.step, total, sample_rate):
+        raise gearbox.fault(f"{fastest_motion(assembly)}; {too_fine(integration.step, total, sample_rate)}")
     with held(directory):
-        plan = plan_run(assembly, case, directory, total, step, band, sample_rate, chosen, mesh_route)
+        plan = plan_run(assembly, case, directory, total, integration, band, sample_rate, chosen, mesh_route)
         if not resume:
             size = signal_layout(assembly).sample_bytes
             check_disk(gearbox, case, directory, total, sample_rate, sample_bytes=size)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.signals import BALANCE_TERMS, MESH_TIMES, SignalLayout, signal_layout
+from exugear.dynamics.signals import BALANCE_TERMS, MESH_TIMES, POWERS, SignalLayout, signal_layout
 from exugear.dynamics.statics import accelerating_start
 from exugear.loads.summary import drive_rate, driven_start_speed, summarise_loads
 from exugear.loads.torque_series import torque_series
@@ -17,7 +17,7 @@ from exugear.model.parts import LoadCase
 from exugear.results.pieces import Checkpoint, RunPieces
 from exugear.results.run_file import EARLIER_PARTIAL_NAME
 from exugear.runs.outcome import RunError
-from exugear.runs.plan import RunPlan
+from exugear.runs.plan import EXPECTATIONS, RunPlan
 from exugear.runs.run_folder import refuse_to_resume
 from exugear.runs.trust import PULLING, Judge
 from exugear.solvers.loads import DriveLaw, LoadTable
@@ -79,7 +79,7 @@ def _pieces_to_resume(plan: RunPlan, layout: SignalLayout) -> RunPieces:
     pieces = RunPieces(plan.partial_path, layout)
     for key, value in plan.attributes().items():
         kept = pieces.attributes.get(key, "element" if key == "mesh_route" else None)  # earlier runs had no other
-        if key not in ("complete", "solver") and kept != value:
+        if key not in ("complete", "solver", *EXPECTATIONS) and kept != value:
             raise RunError(f"{plan.partial_path}: was run with {key} = {kept}, not {value}; start anew")
     return pieces
 
@@ -111,9 +111,11 @@ def _first_state(
         step=0,
         q=balanced.q,
         v=balanced.v,
+        past=np.zeros((0, assembly.size)),
         pending=np.zeros((0, layout.count)),
         pending_first=0,
         balance=np.zeros(len(BALANCE_TERMS)),
+        powers=np.zeros(len(POWERS)),
         start_angle=start_angle,
         mesh_times=np.zeros((len(MESH_TIMES), len(layout.names["mesh"]))),
         judgement=judge.figures,

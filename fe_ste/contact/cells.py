@@ -48,14 +48,15 @@ class ContactSettings:
 @compiled
 def _lay_cells(
     pair: FlankPair, rotation: float, teeth: Integers, axial: Floats, half_window: float, count: int
-) -> tuple[Integers, Integers, Floats, Floats, Floats, Floats, Booleans]:
-    """Cells around the contact lines: tooth, slice, mid arc length, half width, gap, roll on gear 2, cut by an edge.
+) -> tuple[Integers, Integers, Floats, Floats, Floats, Floats, Booleans, Floats]:
+    """Cells around the contact lines, in the order of the attributes of `Cells`; arc lengths for rolls on gear 1.
 
     Arc lengths u = r_b roll^2 / 2 run along the transverse involute of gear 1.
     """
     most = len(teeth) * len(axial) * count
     tooth_of, slice_of = np.empty(most, np.int64), np.empty(most, np.int64)
     middle, half, gap, gear_roll = np.empty(most), np.empty(most), np.empty(most), np.empty(most)
+    offset = np.empty(most)
     cut = np.zeros(most, np.bool_)
     edges = np.empty(count + 1)
     step = 2.0 * half_window / count
@@ -95,9 +96,11 @@ def _lay_cells(
                 middle[used], half[used] = mean, 0.5 * (edges[cell + 1] - edges[cell])
                 gap[used], gear_roll[used] = distance, other
                 cut[used] = edges[cell] == bottom or edges[cell + 1] == top
+                offset[used] = (mean - centre) / step
                 used += 1
     return (
-        tooth_of[:used], slice_of[:used], middle[:used], half[:used], gap[:used], gear_roll[:used], cut[:used]
+        tooth_of[:used], slice_of[:used], middle[:used], gear_roll[:used], half[:used], gap[:used], cut[:used],
+        offset[:used],
     )  # fmt: skip
 
 
@@ -117,6 +120,8 @@ class Cells:
         Rigid gap of the unmodified flanks, m.
     cut : ndarray (n,)
         Whether a tip edge bounds the cell.
+    offset : ndarray (n,)
+        Distance of the middle from the contact line, or from the tip edge where that line is off the flanks, in cells.
     """
 
     tooth: Integers
@@ -126,6 +131,7 @@ class Cells:
     half_across: Floats
     gap: Floats
     cut: Booleans
+    offset: Floats
 
     def select(self, keep: Booleans) -> Cells:
         """Return the cells for which `keep` holds."""
@@ -141,5 +147,6 @@ def lay_cells(
     pair: FlankPair, rotation: float, teeth: Integers, axial: Floats, half_window: float, count: int
 ) -> Cells:
     """Lay the cells of all `teeth` around their contact lines at one rotation of gear 1."""
-    tooth, layer, middle, half, gap, gear_roll, cut = _lay_cells(pair, rotation, teeth, axial, half_window, count)
-    return Cells(tooth, layer, np.sqrt(2.0 * middle / pair.base_radius_1), gear_roll, half, gap, cut)
+    found = _lay_cells(pair, rotation, teeth, axial, half_window, count)
+    tooth, layer, middle, gear_roll, half, gap, cut, offset = found
+    return Cells(tooth, layer, np.sqrt(2.0 * middle / pair.base_radius_1), gear_roll, half, gap, cut, offset)

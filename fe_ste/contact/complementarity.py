@@ -9,10 +9,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
+from scipy.linalg.blas import dsymv, dtrsm
+from scipy.linalg.lapack import dpotrf
 
 from fe_ste.contact.kinematics import ContactError
-from fe_ste.tools.arrays import Booleans, Floats
+from fe_ste.tools.arrays import Booleans, Floats, Integers
+from fe_ste.tools.compilation import compiled
+
+#: Changes of the active set that a factor is carried over, as a part of its size: a border of k cells costs k / 3 n of
+#: a new factor in arithmetic, and more in calls.
+_BORDER = 0.15
 
 
 @dataclass(frozen=True)
@@ -61,7 +67,7 @@ def solve_complementarity(
     Parameters
     ----------
     compliance : ndarray (n, n)
-        Symmetric positive definite, m/N.
+        Symmetric positive definite, m/N. What is above the diagonal is not read.
     gap : ndarray (n,)
         m.
     load : float
@@ -92,26 +98,27 @@ def solve_complementarity(
     ([0.5, 0.0], 0.5)
     """
     active = guess & np.isfinite(gap)
+    factor = None
     fewest, patience = len(gap) + 1, 5
     for iteration in range(1, max_iterations + 1):
         if not active.any():  # a load needs a cell: the nearest one
             active = gap == gap.min()
-        numbers = np.flatnonzero(active)
-        rows = compliance[numbers]
-        closing, closing_per_load, approach, per_load = _solve_active(rows[:, numbers], gap[numbers], load)
-        force = np.zeros(len(gap))
-        force[numbers] = closing
-        # The matrix is symmetric, so its rows serve as columns: all cells move by the forces on the active ones.
-        clearance = closing @ rows + gap - approach
+        if factor is None or not factor.reaches(active):
+            factor = _Factor(compliance, gap, active)
+        unit, closed = factor.solve(active)
+        approach = (load + closed.sum()) / unit.sum()
+        # C f = approach - gap on active cells, so f = approach C^-1 1 - C^-1 gap; sum(f) = load gives the approach.
+        force = unit * approach - closed
+        # The lower triangle by rows is the upper one by columns, the order that BLAS works in.
+        clearance = dsymv(1.0, compliance.T, force, lower=0) + gap - approach
         if np.isnan(clearance).any():  # every comparison below would pass
             raise ContactError("the contact problem holds values that are not numbers")
         # Below rounding an open cell counts as closed, or it would change for ever.
         tolerance = 1e-12 * max(abs(approach), 1e-12)
         wrong = np.where(active, force < 0.0, clearance < -tolerance)
         if not wrong.any():
-            force_per_load = np.zeros(len(gap))
-            force_per_load[numbers] = closing_per_load
-            return ContactSolution(approach, per_load, force, force_per_load, iteration)
+            per_load = 1.0 / unit.sum()
+            return ContactSolution(float(approach), float(per_load), force, unit * per_load, iteration)
         count = int(wrong.sum())
         # Block steps are fast but may cycle. After five without progress single steps go on, which cannot
         # (Judice and Pires): each takes the wrong cell of the highest number.
@@ -127,18 +134,67 @@ def solve_complementarity(
     raise ContactError(f"the active set did not settle in {max_iterations} iterations ({count} cells still change)")
 
 
-def _solve_active(compliance: Floats, gap: Floats, load: float) -> tuple[Floats, Floats, float, float]:
-    """Solve for contact on all cells given: forces, their derivatives by the load, approach, its derivative.
+class _Factor:
+    """Factor of the compliance on one active set, which solves for sets that differ from it by a few cells, too.
 
-    Overwrites ``compliance``.
+    A cell that is gained borders the matrix by its own column, one that is lost by a column that is zero but for its
+    own row: C y + B z = r, B^T y + D z = s. With C = U^T U and W = U^-T B that is (D - W^T W) z = s - W^T U^-T r.
     """
-    try:
-        # The transpose of the symmetric matrix is in the order that LAPACK works in.
-        factor = scipy.linalg.cho_factor(compliance.T, lower=True, overwrite_a=True, check_finite=False)
-    except np.linalg.LinAlgError as error:
-        raise ContactError("the compliance of the contact cells is not positive definite") from error
-    # C f = approach - gap on active cells, so f = approach C^-1 1 - C^-1 gap; sum(f) = load then gives the approach.
-    right = np.stack([np.ones(len(gap)), gap])
-    unit, closed = scipy.linalg.cho_solve(factor, right.T, overwrite_b=True, check_finite=False).T
-    approach = (load + closed.sum()) / unit.sum()
-    return unit * approach - closed, unit / unit.sum(), float(approach), float(1.0 / unit.sum())
+
+    def __init__(self, compliance: Floats, gap: Floats, active: Booleans) -> None:
+        self._compliance, self._gap, self._active = compliance, gap, active
+        self._numbers = np.flatnonzero(active)
+        # The lower triangle by rows is the upper one by columns.
+        self._upper, failed = dpotrf(_lower_part(compliance, self._numbers).T, lower=0, clean=0, overwrite_a=1)
+        if failed:
+            raise ContactError("the compliance of the contact cells is not positive definite")
+        right = np.stack([np.ones(len(self._numbers)), gap[self._numbers]]).T
+        self._half = dtrsm(1.0, self._upper, right, trans_a=1, overwrite_b=1)
+
+    def reaches(self, active: Booleans) -> bool:
+        """Whether `active` is so near the set of the factor that a border is cheaper than a new factor."""
+        return int(np.count_nonzero(active ^ self._active)) <= _BORDER * len(self._numbers)
+
+    def solve(self, active: Booleans) -> tuple[Floats, Floats]:
+        """Solve C unit = 1 and C closed = gap on `active`; zero on the other cells."""
+        gained, lost = np.flatnonzero(active & ~self._active), np.flatnonzero(self._active & ~active)
+        half, result = self._half, np.zeros((2, len(active)))
+        if len(gained) + len(lost):
+            numbers, count = self._numbers, len(gained)
+            border = np.zeros((count + len(lost), len(numbers)))
+            _take(self._compliance, gained, numbers, border)
+            # In the size of the other columns, or the equations of the border would lose digits.
+            border[np.arange(count, len(border)), np.searchsorted(numbers, lost)] = self._compliance[lost, lost]
+            reduced = dtrsm(1.0, self._upper, border.T, trans_a=1, overwrite_b=1)
+            corner = -reduced.T @ reduced
+            square = np.empty((count, count))
+            _take(self._compliance, gained, gained, square)
+            corner[:count, :count] += square
+            right = -reduced.T @ half
+            right[:count, 0] += 1.0
+            right[:count, 1] += self._gap[gained]
+            multipliers = np.linalg.solve(corner, right)
+            half = half - reduced @ multipliers
+            result[:, gained] = multipliers[:count].T
+        result[:, self._numbers] = dtrsm(1.0, self._upper, half).T
+        result[:, lost] = 0.0
+        return result[0], result[1]
+
+
+@compiled
+def _lower_part(matrix: Floats, numbers: Integers) -> Floats:
+    """Lower triangle of the rows and columns `numbers`; what is above it is not set."""
+    part = np.empty((len(numbers), len(numbers)))
+    for i in range(len(numbers)):
+        row = matrix[numbers[i]]
+        for j in range(i + 1):
+            part[i, j] = row[numbers[j]]
+    return part
+
+
+@compiled
+def _take(matrix: Floats, rows: Integers, columns: Integers, part: Floats) -> None:
+    """Copy rows and columns of a symmetric matrix, of which the lower triangle is given, to the top of `part`."""
+    for i in range(len(rows)):
+        for j in range(len(columns)):
+            part[i, j] = matrix[max(rows[i], columns[j]), min(rows[i], columns[j])]

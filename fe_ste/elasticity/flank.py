@@ -3,7 +3,7 @@
 The sector's stiffness matrix is condensed onto its two cut faces. The ring of z equal sectors is then closed exactly
 (`fe_ste.elasticity.ring`). What is stored per gear is the normal displacement of the flank of each tooth under unit
 normal loads on the flank of one tooth. The near field of the loaded tooth depends on the mesh, so it is taken out: the
-contact puts the half-space solution there (`fe_ste.contact.compliance`).
+contact puts the half-space solution there (`fe_ste.contact.near_field`).
 
 Each gear is described by itself: tooth 0 stands on the x axis, z = 0 is the middle of its face width. Loads and
 displacements of a flank are positive into the material, as a pressing load acts.

@@ -24,7 +24,8 @@ import llvmlite
 import numba
 from numba.core import config
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
-from numba.core.dispatcher import Dispatcher
+
+from fe_ste.tools.inner_kernels import Kernel
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
@@ -85,9 +86,10 @@ def kernel_folder(source: Path) -> Path | None:
 
 def _kept(function: Function, **options: Any) -> Function:
     """Compile with numba's options and keep the machine code."""
-    made = numba.njit(**options)(function)
-    # Under NUMBA_DISABLE_JIT the function comes back as it is.
-    if isinstance(made, Dispatcher) and kernel_folder(_source_of(function)):
+    if _settings.DISABLE_JIT:
+        return function
+    made = Kernel(function, {"nopython": True, **options})
+    if kernel_folder(_source_of(function)):
         cast(Any, made)._cache = _KernelCache(function)  # type: ignore[no-untyped-call]
     return cast(Function, made)
 

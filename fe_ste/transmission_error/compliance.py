@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fe_ste.contact.cells import ContactSettings
-from fe_ste.contact.compliance import SlicedCompliance
+from fe_ste.contact.regular import RegularCompliance
 from fe_ste.elasticity.flank import FlankCompliance, flank_compliance
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.flanks.modifications import FlankModification
@@ -39,7 +39,8 @@ class PairCompliance:
         Tooth pairs that may touch.
     reach : int
         Largest difference of tooth pairs in contact at once.
-    sliced : tuple of SlicedCompliance
+    regular : tuple of RegularCompliance
+        Gear 1, gear 2.
     modifications : tuple of FlankModification
         Gear 1, gear 2.
     tooth_gap : ndarray, optional
@@ -52,7 +53,7 @@ class PairCompliance:
     axial: Floats
     teeth: Integers
     reach: int
-    sliced: tuple[SlicedCompliance, SlicedCompliance]
+    regular: tuple[RegularCompliance, RegularCompliance]
     modifications: tuple[FlankModification, FlankModification] = (FlankModification(), FlankModification())
     tooth_gap: Floats | None = None
 
@@ -71,7 +72,7 @@ class PairCompliance:
         teeth = np.arange(-outermost, outermost + 1)
         senses = (1, 1 if pair.gear.internal else -1)
         pinion, gear = (
-            SlicedCompliance.from_flank(flank, axial, sense, teeth, reach)
+            RegularCompliance.from_flank(flank, sense, teeth, reach)
             for flank, sense in zip(flanks, senses, strict=True)
         )
         return cls(pair, flanks, contact, axial, teeth, reach, (pinion, gear))

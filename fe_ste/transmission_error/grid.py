@@ -1,7 +1,9 @@
-"""Grids of contact states on an executor: split by position, stored while they grow, taken up again.
+"""Grids of contact states on an executor: split into blocks, stored while they grow, taken up again.
 
-The unit of work is all states of one or a few positions of the mesh cycle, because these share what is costly. It can
-be sent to any executor of `concurrent.futures` or with its protocol: a block carries all it needs and returns arrays.
+The unit of work is all states of a run of positions of the mesh cycle at one centre distance: in a run each position
+begins with the contact of the one before. A block can be sent to any executor of `concurrent.futures` or with its
+protocol: it carries all it needs and returns arrays. Which blocks there are depends on the axes alone, so a grid that
+was stopped and taken up again has the same bits as one that was not.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ from typing import Protocol
 import numpy as np
 import xarray as xr
 
+from fe_ste.tools.arrays import Booleans
 from fe_ste.tools.files import FileError
 from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
 from fe_ste.tools.versions import TABLE
@@ -29,18 +32,19 @@ from fe_ste.transmission_error.compliance import PairCompliance
 from fe_ste.transmission_error.states import RESULTS, STATE_AXES, StateAxes, StateResults
 from fe_ste.transmission_error.transmission_error import solve_positions
 
-#: States of a block: some seconds of work, so that little is lost and the time left is known.
-_BLOCK_STATES = 300
+#: States of a block: some seconds of work, so that little is lost and the time left is known, and a run that is long
+#: enough for its first position, which begins from nothing, not to count.
+_BLOCK_STATES = 750
 
 #: Seconds between two writings of what is finished.
 _STORE_EVERY = 10.0
 
-#: Attribute that ties a file of finished positions to its input.
+#: Attribute that ties a file of finished blocks to its input.
 _PARTIAL_OF = "partial_of"
 _LAYOUT = Layout(
     "finished positions of a table",
     TABLE,
-    {"solved": ("pmc",), "line_load": ("pmc", *STATE_AXES, "tooth", "axial_position")}
+    {"solved": ("pmc", "centre_distance"), "line_load": ("pmc", *STATE_AXES, "tooth", "axial_position")}
     | {name: ("pmc", *STATE_AXES) for name in (*RESULTS, "iterations")}
     | {name: ("pmc", *STATE_AXES, "tooth") for name in ("load_share", "tangent_load_share")},
     (_PARTIAL_OF, "failures"),
@@ -75,29 +79,41 @@ class Checkpoint:
     path: Path
     input_hash: str
 
-    def load(self, results: StateResults) -> set[int]:
-        """Fill `results` with what the file holds and return the finished positions; none if it does not fit."""
+    def load(self, results: StateResults) -> Booleans:
+        """Fill `results` with what the file holds; return which positions are finished at which centre distance."""
+        nothing = np.zeros(results.shape[::2], dtype=np.bool_)
         if not self.path.exists():
-            return set()
+            return nothing
         try:
             stored = load_dataset(self.path, _LAYOUT)
         except FileError as error:
             _log.warning("%s; its positions are computed again", error)
-            return set()
+            return nothing
         if stored.attrs[_PARTIAL_OF] != self.input_hash:
-            return set()
-        rows = np.flatnonzero(stored["solved"].to_numpy())
-        results.insert(rows.tolist(), StateResults.from_dataset(results, stored.isel(pmc=rows)))
-        return set(rows.tolist())
+            return nothing
+        finished = stored["solved"].to_numpy() != 0
+        results.restore(stored, finished)
+        return np.asarray(finished)
 
-    def store(self, results: StateResults, axes: StateAxes, finished: set[int]) -> None:
-        """Write the finished positions; the others are not a number."""
+    def store(self, results: StateResults, axes: StateAxes, finished: Booleans) -> None:
+        """Write what is finished; the other states are not a number."""
         dataset = results.dataset(axes, all_teeth=True)
-        solved = np.isin(np.arange(axes.positions), sorted(finished))
-        attributes = {"units": "1", "long_name": "whether all states of the position are finished"}
-        dataset["solved"] = ("pmc", solved.astype(np.int8), attributes)
+        attributes = {"units": "1", "long_name": "whether all states of the position and centre distance are finished"}
+        dataset["solved"] = (("pmc", "centre_distance"), finished.astype(np.int8), attributes)
         dataset.attrs |= {_PARTIAL_OF: self.input_hash, "method_version": TABLE}
         write_dataset(self.path, dataset)
+
+
+@dataclass(frozen=True)
+class _Block:
+    """Positions in a row at one centre distance."""
+
+    positions: tuple[int, ...]
+    distance: int
+
+    def axes(self, axes: StateAxes) -> StateAxes:
+        """Axes of the grid at this centre distance alone."""
+        return replace(axes, centre_distance=axes.centre_distance[[self.distance]])
 
 
 def solve_grid(
@@ -133,13 +149,13 @@ def solve_grid(
         If workers are lost.
     """
     results = StateResults.empty(compliance, axes.shape)
-    finished = checkpoint.load(results) if checkpoint else set()
-    states_each = math.prod(axes.shape[1:])
+    finished = checkpoint.load(results) if checkpoint else np.zeros(axes.shape[::2], dtype=np.bool_)
+    states_each = math.prod(axes.shape[1::2])
     total = math.prod(axes.shape)
 
     def tell(within_block: int = 0) -> None:
         if progress is not None:
-            progress(len(finished) * states_each + within_block, total)
+            progress(int(finished.sum()) * states_each + within_block, total)
 
     stored = time.monotonic()
     try:
@@ -149,43 +165,45 @@ def solve_grid(
             if executor is None
             else _solved_by_workers(compliance, axes, blocks, executor)
         )
-        for positions, part in done:
-            results.insert(positions, part)
-            finished.update(positions)
+        for block, part in done:
+            results.insert(block.positions, block.distance, part)
+            finished[list(block.positions), block.distance] = True
             if executor is not None:
                 tell()
             if checkpoint and time.monotonic() - stored > _STORE_EVERY:
                 checkpoint.store(results, axes, finished)
                 stored = time.monotonic()
     except BaseException:
-        if checkpoint and finished:
+        if checkpoint and finished.any():
             checkpoint.store(results, axes, finished)
         raise
     return results.dataset(axes)
 
 
-def _blocks(axes: StateAxes, finished: set[int]) -> list[list[int]]:
-    """Positions still to solve, in runs of neighbours."""
-    length = max(1, _BLOCK_STATES // math.prod(axes.shape[1:]))
-    left = [position for position in range(axes.positions) if position not in finished]
-    return [left[start : start + length] for start in range(0, len(left), length)]
+def _blocks(axes: StateAxes, finished: Booleans) -> list[_Block]:
+    """Blocks of which something is still to solve: all runs are about as long."""
+    positions, torques, distances, misalignments = axes.shape
+    length = max(1, _BLOCK_STATES // (torques * misalignments))
+    runs = [tuple(run.tolist()) for run in np.array_split(np.arange(positions), math.ceil(positions / length))]
+    blocks = [_Block(run, distance) for distance in range(distances) for run in runs]
+    return [block for block in blocks if not finished[list(block.positions), block.distance].all()]
 
 
 def _solved_here(
-    compliance: PairCompliance, axes: StateAxes, blocks: list[list[int]], tell: Callable[[int], None]
-) -> Iterator[tuple[list[int], StateResults]]:
-    for positions in blocks:
-        yield positions, solve_positions(compliance, axes, positions, tell)
+    compliance: PairCompliance, axes: StateAxes, blocks: list[_Block], tell: Callable[[int], None]
+) -> Iterator[tuple[_Block, StateResults]]:
+    for block in blocks:
+        yield block, solve_positions(compliance, block.axes(axes), block.positions, tell)
 
 
 def _solved_by_workers(
-    compliance: PairCompliance, axes: StateAxes, blocks: list[list[int]], executor: Submits
-) -> Iterator[tuple[list[int], StateResults]]:
+    compliance: PairCompliance, axes: StateAxes, blocks: list[_Block], executor: Submits
+) -> Iterator[tuple[_Block, StateResults]]:
     """Yield blocks in the order in which workers finish them."""
     packed = _packed(compliance)
     with _cancelled_on_error(executor) as waiting:
-        for positions in blocks:
-            waiting[executor.submit(solve_block, packed, axes, positions)] = positions
+        for block in blocks:
+            waiting[executor.submit(solve_block, packed, block.axes(axes), block.positions)] = block
         while waiting:
             for future in wait(waiting, return_when=FIRST_COMPLETED).done:
                 try:
@@ -197,8 +215,8 @@ def _solved_by_workers(
 
 
 @contextmanager
-def _cancelled_on_error(executor: Submits) -> Iterator[dict[Future[StateResults], list[int]]]:
-    waiting: dict[Future[StateResults], list[int]] = {}
+def _cancelled_on_error(executor: Submits) -> Iterator[dict[Future[StateResults], _Block]]:
+    waiting: dict[Future[StateResults], _Block] = {}
     try:
         yield waiting
     finally:
@@ -209,7 +227,7 @@ def _cancelled_on_error(executor: Submits) -> Iterator[dict[Future[StateResults]
                 future.cancel()
 
 
-def solve_block(packed: bytes, axes: StateAxes, positions: list[int]) -> StateResults:
+def solve_block(packed: bytes, axes: StateAxes, positions: tuple[int, ...]) -> StateResults:
     """Solve some positions in a worker, which unpacks the compliance of a pair once and stops if it is asked to.
 
     Parameters
@@ -217,7 +235,7 @@ def solve_block(packed: bytes, axes: StateAxes, positions: list[int]) -> StateRe
     packed : bytes
         Pickled pair, flanks, contact settings, modifications and gaps of the teeth.
     axes : StateAxes
-    positions : list of int
+    positions : tuple of int
     """
     stop_if_asked()
     return solve_positions(_unpacked(packed), axes, positions, lambda solved: stop_if_asked())

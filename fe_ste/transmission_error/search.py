@@ -124,11 +124,11 @@ def contact_states(
         For each misalignment the state, or why there is none.
     """
     search = _Search(compliance, torque, pmc, misalignments, starts)
-    for _ in range(_WINDOW_ATTEMPTS):
+    for attempt in range(_WINDOW_ATTEMPTS):
         pending = search.pending()
         if not pending:
             break
-        window = search.window(pending)
+        window = search.window(pending, margin=1 + 2 * attempt)
         for group in window.groups(compliance.reach):
             search.solve(window, group)
     for index in search.pending():
@@ -144,19 +144,19 @@ class _Window:
     Attributes
     ----------
     cells : Cells
-    end : ndarray (n,)
-        Whether a cell ends the window where no tip edge does.
     address : ndarray (n,)
         Tooth pair, slice and distance from the contact line, in cells, in one number.
     gap, near : dict
         Misalignment's index -> gap (n,), m, and which cells are near enough to touch.
+    expected : ndarray (n,)
+        Where contact is looked for under any misalignment: around that of a state nearby.
     """
 
     cells: Cells
-    end: Booleans
     address: Integers
     gap: dict[int, Floats]
     near: dict[int, Booleans]
+    expected: Booleans
 
     def groups(self, reach: int) -> list[list[int]]:
         """Misalignments whose cells are few enough tooth pairs to share a compliance matrix."""
@@ -192,27 +192,38 @@ class _Search:
         """Misalignments whose state is not found yet."""
         return [index for index in range(len(self.starts)) if index not in self.states]
 
-    def window(self, pending: list[int]) -> _Window:
-        """Lay the cells that the states of `pending` need."""
+    def window(self, pending: list[int], margin: int) -> _Window:
+        """Lay the cells that the states of `pending` need, `margin` around the contact that is expected."""
         count = max(self.starts[index].cells for index in pending)
         compliance, axial = self.compliance, self.compliance.axial
         cells = lay_cells(self.kinematics, self.rotation, compliance.teeth, axial, count * self.cell_width / 2, count)
         if not cells.tooth.size:  # wider than the flanks
-            return _Window(cells, cells.cut, cells.tooth, {}, {})
+            return _Window(cells, cells.tooth, {}, {}, cells.cut)
         removed = cells.gap + _modification_gap(compliance, cells)
         gap_per_misalignment = axial[cells.layer] * math.cos(compliance.pair.pinion.base_helix_angle)
         gap = {index: removed + self.misalignments[index] * gap_per_misalignment for index in pending}
         near = {index: g - g.min() < _GAP_REACH * self.starts[index].depth for index, g in gap.items()}
-        return _Window(cells, _window_ends(cells), self._addresses(cells), gap, near)
+        address = self._addresses(cells)
+        expected = self._expected(pending, margin)[address] | _around_least(cells, removed)
+        return _Window(cells, address, gap, near, expected)
+
+    def _expected(self, pending: list[int], margin: int) -> Booleans:
+        """Whether contact is looked for at each address: around where the states began from have it."""
+        shape = (len(self.compliance.teeth), len(self.compliance.axial), _DISTANCES)
+        expected = np.zeros(shape, dtype=np.bool_)
+        for index in pending:
+            touching = self.starts[index].touching
+            if touching is None:
+                return np.ones(expected.size, dtype=np.bool_)
+            expected.reshape(-1)[touching] = True
+        _widen(expected, axis=1, steps=margin)
+        _widen(expected, axis=2, steps=margin + 1)
+        return expected.reshape(-1)
 
     def _addresses(self, cells: Cells) -> Integers:
-        pair, radius = self.kinematics, self.kinematics.base_radius_1
-        axial = self.compliance.axial[cells.layer]
-        line_roll = pair.working_roll + self.rotation + cells.tooth * pair.pitch_1 + pair.twist_1 * axial
-        from_line = 0.5 * radius * (cells.roll**2 - line_roll * np.abs(line_roll)) / self.cell_width
-        from_middle = np.clip(np.rint(from_line) + _DISTANCES // 2, 0, _DISTANCES - 1).astype(np.int64)
         row = (cells.tooth - self.compliance.teeth[0]) * len(self.compliance.axial) + cells.layer
-        return np.asarray(row * _DISTANCES + from_middle, dtype=np.int64)
+        place = np.clip(np.floor(cells.offset + 0.25) + _DISTANCES // 2, 0, _DISTANCES - 1).astype(np.int64)
+        return np.asarray(row * _DISTANCES + place, dtype=np.int64)
 
     def solve(self, window: _Window, group: list[int]) -> None:
         """Solve the states of `group`; one that needs other cells stays pending, with a start that asks for them."""
@@ -220,17 +231,19 @@ class _Search:
         if np.ptp(window.cells.tooth[near]) > self.compliance.reach:
             self._come_nearer(group[0])
             return
-        cells, address, end = window.cells.select(near), window.address[near], window.end[near]
+        near &= window.expected
+        end, border = (marked[near] for marked in _ends(window.cells, near))
+        cells, address = window.cells.select(near), window.address[near]
         compliance = self.compliance
-        matrix = compliance_matrix(cells, self.kinematics, compliance.axial, compliance.flanks, compliance.sliced)
+        matrix = compliance_matrix(cells, self.kinematics, compliance.axial, compliance.flanks, compliance.regular)
         for index in group:
             gap = window.gap[index][near]
             try:
                 solution = solve_complementarity(matrix, gap, self.load, self._guess(index, gap, address))
-                if self._settled(index, solution, gap, end):
+                carrying = solution.force > 0
+                if self._settled(index, solution, gap, end) and not carrying[border].any():
                     self.states[index] = self._state(cells, solution)
-                    carrying = address[solution.force > 0]
-                    self.starts[index] = replace(self.starts[index], touching=carrying)
+                self.starts[index] = replace(self.starts[index], touching=address[carrying])
             except ContactError as error:
                 self.states[index] = error
 
@@ -346,12 +359,33 @@ def new_start(compliance: PairCompliance, torque: float) -> SearchStart:
     return SearchStart(compliance.contact.cells, normal_load(compliance.pair, torque) / stiffness)
 
 
-def _window_ends(cells: Cells) -> Booleans:
-    """Cells at either side of the window, but for those that a tip edge cuts."""
+def _ends(cells: Cells, looked: Booleans) -> tuple[Booleans, Booleans]:
+    """Cells next to which contact could go on unseen: at the end of the window, and beside one not `looked` at."""
     group = cells.tooth * (cells.layer.max() + 1) + cells.layer
     first = np.diff(group, prepend=group[0] - 1) != 0
     last = np.append(first[1:], True)
-    return np.asarray((first | last) & ~cells.cut)
+    before, after = np.append(True, looked[:-1]), np.append(looked[1:], True)
+    return np.asarray((first | last) & ~cells.cut), np.asarray((~first & ~before) | (~last & ~after))
+
+
+def _around_least(cells: Cells, gap: Floats) -> Booleans:
+    """In each slice the cell of the least gap, where contact begins under any misalignment, and its neighbours."""
+    group = cells.tooth * (cells.layer.max() + 1) + cells.layer
+    starts = np.flatnonzero(np.diff(group, prepend=group[0] - 1))
+    least = np.repeat(np.minimum.reduceat(gap, starts), np.diff(starts, append=len(gap))) == gap
+    around = least.copy()
+    around[1:] |= least[:-1]
+    around[:-1] |= least[1:]
+    return np.asarray(around)
+
+
+def _widen(chosen: Booleans, axis: int, steps: int) -> None:
+    """Choose the neighbours along an axis, too, up to some steps away."""
+    moved = np.moveaxis(chosen, axis, 0)
+    for _ in range(steps):
+        ahead, behind = moved[:-1].copy(), moved[1:].copy()
+        moved[1:] |= ahead
+        moved[:-1] |= behind
 
 
 def normal_load(pair: GearPair, torque: float) -> float:

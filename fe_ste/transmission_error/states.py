@@ -19,7 +19,7 @@ from fe_ste.contact.cells import Cells
 from fe_ste.contact.complementarity import ContactSolution
 from fe_ste.contact.kinematics import ContactError
 from fe_ste.geometry.gears import GearPair
-from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.arrays import Booleans, Floats, Integers
 from fe_ste.tools.notebook import html_table, value_range
 from fe_ste.transmission_error.compliance import PairCompliance
 
@@ -226,20 +226,28 @@ class StateResults:
             np.zeros(shape, dtype=np.int32),
         )
 
-    @classmethod
-    def from_dataset(cls, like: StateResults, dataset: xr.Dataset) -> StateResults:
-        """Read back a dataset with all tooth pairs; its teeth, slices and base radius are those of `like`."""
-        return cls(
-            like.teeth,
-            like.axial,
-            like.base_radius,
-            {name: dataset[name].to_numpy() for name in RESULTS},
-            dataset["line_load"].to_numpy(),
-            dataset["load_share"].to_numpy(),
-            dataset["tangent_load_share"].to_numpy(),
-            dataset["iterations"].to_numpy(),
-            [line for line in str(dataset.attrs["failures"]).splitlines() if line],
-        )
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of states along each axis."""
+        return self.iterations.shape
+
+    def restore(self, dataset: xr.Dataset, solved: Booleans) -> None:
+        """Take over the states that are solved from a dataset with all tooth pairs.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+        solved : ndarray (positions, centre distances)
+        """
+        chosen = np.broadcast_to(solved[:, None, :, None], self.shape)
+        for name, values in self._arrays().items():
+            values[chosen] = dataset[name].to_numpy()[chosen]
+        self.failures += [line for line in str(dataset.attrs["failures"]).splitlines() if line]
+
+    def _arrays(self) -> dict[str, NDArray[Any]]:
+        """All results under their names."""
+        with_teeth = {name: getattr(self, name) for name in ("line_load", "load_share", "tangent_load_share")}
+        return {**self.values, **with_teeth, "iterations": self.iterations}
 
     def put(
         self,
@@ -277,13 +285,11 @@ class StateResults:
         self.tangent_load_share[index] = np.bincount(pair_number, solution.force_per_load, len(self.teeth))
         self.iterations[index] = solution.iterations
 
-    def insert(self, positions: Sequence[int], part: StateResults) -> None:
-        """Take over the results of some positions."""
-        rows = np.asarray(positions)
-        for name, values in part.values.items():
-            self.values[name][rows] = values
-        for name in ("line_load", "load_share", "tangent_load_share", "iterations"):
-            getattr(self, name)[rows] = getattr(part, name)
+    def insert(self, positions: Sequence[int], distance: int, part: StateResults) -> None:
+        """Take over the results of some positions at one centre distance, of which `part` has no other."""
+        mine = self._arrays()
+        for name, values in part._arrays().items():
+            mine[name][list(positions), :, distance] = values[:, :, 0]
         self.failures += part.failures
 
     def dataset(self, axes: StateAxes, all_teeth: bool = False) -> xr.Dataset:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from exugear.kernels.coordinates import PADDED
 from exugear.kernels.elastic import ElasticArrays, ElasticMotion
 from exugear.kernels.fast_meshes import Meshes, MeshMemory
 from exugear.kernels.rolling import RollingArrays
@@ -23,6 +24,16 @@ COSINE, SINE = range(2)
 """Columns of `Work.turns`."""
 STRAIN, STRAIN_RATE, TRUE_RATE, LOCAL_FORCE = range(4)
 """Rows of `Work.motion`."""
+WRENCH = PADDED
+"""First column of force and moment, global axes, in `Work.loads`, behind the generalized forces."""
+RELATIVE_PLACE, RELATIVE_AXIS, RELATIVE_VELOCITY, FIRST_TURNING, SECOND_TURNING, RELATIVE_TILT = range(0, 18, 3)
+RELATIVE_SIZE = 18
+"""First columns of `Work.relative` and their number: all seen in the first body's axes."""
+FIRST_ARM, LAG, SECOND_ARM, OFF_AXIS, GAP, NODES, DAMPED = 48, 51, 52, 55, 56, 59, 62
+"""Columns of `Pairs.data` behind the six columns of the stiffness, `PADDED` each."""
+PAIR_SIZE = 64
+SUPPORT_LOAD, SUPPORT_SIZE = 12, 18
+"""Column of force and moment in `Work.supports`, behind strain and rate, and number of columns."""
 
 
 class Bodies(NamedTuple):
@@ -80,6 +91,38 @@ class Connectors(NamedTuple):
     rolling: RollingArrays
 
 
+class Places(NamedTuple):
+    """Places of bodies and seats, numbered as in `Bodies`; then those of seats that only meshes act on.
+
+    Attributes
+    ----------
+    start : (p,) first of the six coordinates
+    spin : (s,) spins of bodies with their spin alone, whose places follow, where a mesh sees them beside other bodies
+    """
+
+    start: Integers
+    spin: Integers
+
+
+class Pairs(NamedTuple):
+    """Pairs of bodies with connectors between them; p pairs, c connectors in the order of `Connectors`.
+
+    Attributes
+    ----------
+    ends : (p, 2) numbers of the two bodies in `Bodies`
+    first : (p + 1,) first connector of each pair
+    twisting : (p,) 1 where the angle about z acts, else 0
+    data : (c, 64) stiffness by column, rows padded to x y z 0 a b c 0; then attachment in the first body's axes,
+        damping over stiffness (s), attachment in the second one's axes, 1 where that is off its z axis, the second attachment
+        against the first and the second node against the first at zero angles, 1 where damping has a matrix of its own
+    """
+
+    ends: Integers
+    first: Integers
+    twisting: Integers
+    data: Floats
+
+
 class Loads(NamedTuple):
     """What acts from outside.
 
@@ -132,7 +175,9 @@ class Equations(NamedTuple):
     """All that the right-hand side reads."""
 
     bodies: Bodies
+    places: Places
     connectors: Connectors
+    pairs: Pairs
     meshes: Meshes
     travelling: TravellingArrays
     springs: Springs
@@ -154,7 +199,11 @@ class Work(NamedTuple):
     stage_q, stage_v, force, rate, total : (e,) stage, generalized forces, accelerations and their sum
     turns : (k, 2) cosine and sine of `Bodies.turning`
     frames : (b + e + 1, 16) rotation matrix, angular velocity, sine and cosine of the tilts
-    wrench : (b + e + 1, 6) force and moment on each body, global axes
+    places : (p + s, 16) padded coordinates and rates of all places
+    loads : (p + s, 16) generalized forces on all places, and force and moment in global axes, padded alike
+    relative : (18,) motion of a pair's second body against the first
+    sums : (9,) force and moments on both bodies of a pair
+    supports : (c, 18) strain of each connector, its rate, force and moment on the first body, in that body's axes
     motion : (4, 6) strain, its rate, the true rate of change, force of a connector in its own axes
     rolling : (m,) see `exugear.kernels.rolling.rolling_forces`
     mesh : memory of the meshes' laws
@@ -171,7 +220,11 @@ class Work(NamedTuple):
     total: Floats
     turns: Floats
     frames: Floats
-    wrench: Floats
+    places: Floats
+    loads: Floats
+    relative: Floats
+    sums: Floats
+    supports: Floats
     motion: Floats
     rolling: Floats
     mesh: MeshMemory

@@ -1,4 +1,4 @@
-"""Equations of motion and a Runge-Kutta loop as one compiled piece that allocates nothing per step.
+"""Equations of motion as one compiled piece that allocates nothing.
 
 The laws are those of `exugear.kernels`, which the tests hold them against; here they are arranged for speed: every
 sine is taken once per evaluation, constant entries that are zero are left out, bearing forces are collected per body
@@ -7,8 +7,6 @@ the loops need no exceptions.
 """
 
 from __future__ import annotations
-
-import math
 
 from exugear.kernels.coordinates import SPIN, TILT
 from exugear.kernels.elastic import set_elastic_motion
@@ -28,8 +26,9 @@ from exugear.solvers.compiled.arrays import (
     Springs,
     Work,
 )
-from exugear.solvers.compiled.connectors import add_connectors, place_bodies
+from exugear.solvers.compiled.connectors import add_connectors
 from exugear.solvers.compiled.meshes import add_meshes
+from exugear.solvers.compiled.places import add_loads_of_places, gather_places, place_bodies
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import kernel
 
@@ -94,52 +93,20 @@ def set_accelerations(v: Floats, bodies: Bodies, work: Work) -> None:
 
 @kernel
 def evaluate(t: float, q: Floats, v: Floats, equations: Equations, work: Work) -> None:
-    """Fill `work.rate` with the accelerations at time t (s) and state q, v (e,)."""
-    place_bodies(q, v, equations.bodies, work)
-    set_loads(t, q, v, equations.loads, work.series, work.force)
-    add_connectors(q, v, equations.bodies, equations.connectors, work)
-    place_travelling(q, v, equations.travelling)
-    add_meshes(q, v, equations.meshes, work)
-    share_travelling_forces(q, equations.travelling, work.force)
-    add_springs(q, v, equations.springs, work.force)
-    set_accelerations(v, equations.bodies, work)
-    set_elastic_motion(q, v, work.force, equations.motion, work.scratch[0], work.rate)
-    set_turning_motion(q, v, work.force, equations.turning, work.memory, work.rate)
+    """Fill `work.rate` with the accelerations at time t (s) and state q, v (e,).
 
-
-@kernel
-def advance(first: int, step: float, equations: Equations, work: Work, out_q: Floats, out_v: Floats) -> int:
-    """Fill out_q and out_v (steps, size) with the states after each step of the classical Runge-Kutta method.
-
-    Starts from `work.q`, `work.v` at time ``first * step``; returns the number of steps that stayed finite.
+    What bodies, meshes and connectors do there is left in `work.frames`, `work.mesh.states` and `work.supports`.
     """
-    size = out_q.shape[1]
-    q, v, x, u, a, total = work.q, work.v, work.stage_q, work.stage_v, work.rate, work.total
-    half = 0.5 * step
-    for n in range(out_q.shape[0]):
-        begin = (first + n) * step
-        for i in range(size):
-            x[i], u[i] = q[i], v[i]
-            total[i], out_q[n, i] = 0.0, 0.0
-        for stage in range(4):  # a loop, so that the equations are compiled once
-            evaluate(begin + (0.0 if stage == 0 else half if stage < 3 else step), x, u, equations, work)
-            # Weights 1, 2, 2, 1 of the four stages; the positions' sum needs the first three alone.
-            weight = 2.0 if stage == 1 or stage == 2 else 1.0
-            ahead = half if stage < 2 else step
-            for i in range(size):
-                total[i] += weight * a[i]
-                if stage < 3:
-                    out_q[n, i] += a[i]
-                    x[i] = q[i] + ahead * u[i]
-                    u[i] = v[i] + ahead * a[i]
-        # A sum that is not finite shows any entry that is not, without a test for each.
-        check = 0.0
-        for i in range(size):
-            q[i] += step * (v[i] + step / 6.0 * out_q[n, i])
-            v[i] += step / 6.0 * total[i]
-            out_q[n, i], out_v[n, i] = q[i], v[i]
-            check += abs(q[i]) + abs(v[i])
-        if not math.isfinite(check):
-            return n
-    steps: int = out_q.shape[0]
-    return steps
+    bodies, places, force = equations.bodies, equations.places, work.force
+    place_bodies(q, v, bodies, work)
+    place_travelling(q, v, equations.travelling)
+    gather_places(q, v, places, work)
+    set_loads(t, q, v, equations.loads, work.series, force)
+    add_connectors(q, bodies, equations.connectors, equations.pairs, work)
+    add_meshes(q, v, equations.meshes, work)
+    add_springs(q, v, equations.springs, force)
+    add_loads_of_places(bodies, places, work)
+    share_travelling_forces(q, equations.travelling, force)
+    set_accelerations(v, bodies, work)
+    set_elastic_motion(q, v, force, equations.motion, work.scratch[0], work.rate)
+    set_turning_motion(q, v, force, equations.turning, work.memory, work.rate)

@@ -1,13 +1,30 @@
-"""Forces of gear meshes in the compiled solver: the laws' forms on the geometry that is arranged for speed."""
+"""Forces of gear meshes in the compiled solver: the laws' forms on the geometry that is arranged for speed.
+
+Machine code is kept by `fe_ste.tools.compilation`.
+"""
 
 from __future__ import annotations
 
+from exugear.kernels.coordinates import PADDED
 from exugear.kernels.fast_meshes import (
     ALONG_DEFLECTION,
     ALONG_FORCE,
+    DEFLECTION_ROW,
+    FORCE_ROW,
+    LAST_CYCLE,
+    LAST_DAMPED,
+    LAST_DEFLECTION,
+    LAST_ENERGY,
+    LAST_FORCE,
+    LAST_OTHER,
+    LAST_OUTSIDE,
+    LAST_RATE,
     TABLE_FORCE,
+    TURNING,
     Meshes,
     mesh_row,
+    row_motion,
+    subtract_errors,
     subtract_wheel_errors,
 )
 from exugear.kernels.meshes import FRAME, ROW_SIZE, SPIN_1, SPIN_2
@@ -60,26 +77,82 @@ def mesh_law(q: Floats, v: Floats, m: int, delta: float, meshes: Meshes) -> tupl
 
 
 @kernel
+def add_spinning_mesh(q: Floats, v: Floats, m: int, meshes: Meshes, work: Work) -> None:
+    """Add the force of a mesh along a row between gears that only spin: two products instead of a whole row."""
+    index, state = meshes.coordinates[m], work.mesh.states[m]
+    delta, rate, acting = mesh_motion(q, v, m, meshes, work)
+    elastic, _, _, energy, cycle_power = mesh_law(q, v, m, delta, meshes)
+    force = elastic + meshes.damping[m] * rate
+    torque_1, torque_2 = force * meshes.force[m, SPIN_1], force * meshes.force[m, SPIN_2]
+    work.force[index[SPIN_1]] -= torque_1
+    work.force[index[SPIN_2]] -= torque_2
+    # The frame that carries the gears takes what they leave.
+    work.force[index[FRAME]] += torque_1 + torque_2
+    keep_state(m, delta, rate, acting, force, energy, cycle_power, meshes, state)
+
+
+@kernel
+def keep_state(
+    m: int,
+    delta: float,
+    rate: float,
+    acting: float,
+    force: float,
+    energy: float,
+    cycle_power: float,
+    meshes: Meshes,
+    state: Floats,
+) -> None:
+    """Leave what a mesh with a law along a row does: see `exugear.kernels.fast_meshes`."""
+    state[LAST_DEFLECTION], state[LAST_RATE], state[LAST_OUTSIDE], state[LAST_FORCE] = delta, rate, 0.0, force
+    state[LAST_ENERGY], state[LAST_DAMPED] = energy, meshes.damping[m] * rate * rate
+    state[LAST_CYCLE], state[LAST_OTHER] = cycle_power, force * (acting - rate)
+
+
+@kernel
+def push_apart(m: int, force: float, gradient: Floats, meshes: Meshes, work: Work) -> None:
+    """Subtract a scalar force times its gradient from what acts on the gears of mesh m and on its frame."""
+    first, second = work.loads[meshes.ends[m, 0]], work.loads[meshes.ends[m, 1]]
+    for k in range(meshes.rows.shape[4]):
+        first[k] -= force * gradient[k]
+        second[k] -= force * gradient[PADDED + k]
+    work.force[meshes.coordinates[m, FRAME]] -= force * gradient[TURNING]
+
+
+@kernel
+def add_row_mesh(q: Floats, v: Floats, m: int, meshes: Meshes, work: Work) -> None:
+    """Add the force of a mesh with a law along a row."""
+    index, gradient = meshes.coordinates[m], work.mesh.gradients[DEFLECTION_ROW]
+    psi, psi_rate = q[index[FRAME]], v[index[FRAME]]
+    c, s = work.turns[meshes.slot[m], COSINE], work.turns[meshes.slot[m], SINE]
+    clean = meshes.error_pieces[m, 0] + meshes.error_pieces[m, 1] == 0
+    delta, rate = row_motion(m, DEFLECTION_ROW, psi, psi_rate, c, s, meshes, work.places, gradient)
+    delta += meshes.table.nominal[m, NOMINAL_DEFLECTION]
+    if not clean:
+        less, slower = subtract_errors(q, v, m, 1.0, meshes, gradient)
+        delta, rate = delta + less, rate + slower
+    acting = rate
+    if meshes.conjugate[m] == 0:  # a law that pushes along its deflection has one row
+        gradient = work.mesh.gradients[FORCE_ROW]
+        _, acting = row_motion(m, FORCE_ROW, psi, psi_rate, c, s, meshes, work.places, gradient)
+        if not clean:
+            acting += subtract_errors(q, v, m, 1.0, meshes, gradient)[1]
+    elastic, _, _, energy, cycle_power = mesh_law(q, v, m, delta, meshes)
+    force = elastic + meshes.damping[m] * rate
+    push_apart(m, force, gradient, meshes, work)
+    keep_state(m, delta, rate, acting, force, energy, cycle_power, meshes, work.mesh.states[m])
+
+
+@kernel
 def add_meshes(q: Floats, v: Floats, meshes: Meshes, work: Work) -> None:
-    """Add the generalized forces of all meshes to `work.force`."""
-    f = work.force
+    """Add the forces of all meshes to `work.loads` and `work.force`; leave what they do in `work.mesh.states`."""
     for m in range(meshes.coordinates.shape[0]):
-        index = meshes.coordinates[m]
         if meshes.form[m] == TABLE_FORM:
             c, s = work.turns[meshes.slot[m], COSINE], work.turns[meshes.slot[m], SINE]
             fast_table_force(q, v, m, FORCE_DERIVATIVES, meshes, c, s, work.mesh, work.total)
             for i in range(ROW_SIZE):
-                f[index[i]] -= work.mesh.gradient[TABLE_FORCE, i]
-            continue
-        delta, rate, _ = mesh_motion(q, v, m, meshes, work)
-        force = mesh_law(q, v, m, delta, meshes)[0] + meshes.damping[m] * rate
-        if meshes.spinning[m] == 1 and meshes.error_pieces[m, 0] + meshes.error_pieces[m, 1] == 0:
-            torque_1, torque_2 = force * meshes.force[m, SPIN_1], force * meshes.force[m, SPIN_2]
-            f[index[SPIN_1]] -= torque_1
-            f[index[SPIN_2]] -= torque_2
-            # The frame that carries the gears takes what they leave.
-            f[index[FRAME]] += torque_1 + torque_2
+                work.force[meshes.coordinates[m, i]] -= work.mesh.gradient[TABLE_FORCE, i]
+        elif meshes.spinning[m] == 1 and meshes.error_pieces[m, 0] + meshes.error_pieces[m, 1] == 0:
+            add_spinning_mesh(q, v, m, meshes, work)
         else:
-            acting = work.mesh.gradient[ALONG_FORCE - meshes.conjugate[m]]
-            for i in range(ROW_SIZE):
-                f[index[i]] -= force * acting[i]
+            add_row_mesh(q, v, m, meshes, work)

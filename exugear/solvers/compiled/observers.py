@@ -6,7 +6,6 @@ signal stands among the columns of a sample is handed over as `Columns`.
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -21,8 +20,12 @@ from exugear.kernels.fast_meshes import (
     DISSIPATED,
     ELASTIC,
     KINETIC,
+    LAST_CYCLE,
+    LAST_DAMPED,
     LAST_DEFLECTION,
+    LAST_ENERGY,
     LAST_FORCE,
+    LAST_OTHER,
     LAST_OUTSIDE,
     NON_CONSERVATIVE,
     OF_BEARING_RATES,
@@ -33,16 +36,13 @@ from exugear.kernels.fast_meshes import (
 )
 from exugear.kernels.rolling import CAGE_DAMPING, DAMPED_PART, ELASTIC_PART, STORED, rolling_forces
 from exugear.kernels.table_law import ENERGY_DERIVATIVES, NOMINAL_MISALIGNMENT
-from exugear.kernels.travelling import place_travelling
 from exugear.kernels.turning import turning_energies
 from exugear.solvers.compiled.arrays import (
     COS_B,
     COSINE,
-    LOCAL_FORCE,
     SIN_B,
     SINE,
-    STRAIN,
-    STRAIN_RATE,
+    SUPPORT_LOAD,
     TRUE_RATE,
     W_X,
     W_Y,
@@ -55,10 +55,10 @@ from exugear.solvers.compiled.arrays import (
     Springs,
     Work,
 )
-from exugear.solvers.compiled.connectors import move_connector, place_bodies, turn_between
-from exugear.solvers.compiled.equations import set_loads
-from exugear.solvers.compiled.meshes import mesh_law, mesh_motion
+from exugear.solvers.compiled.connectors import turn_between
+from exugear.solvers.compiled.equations import evaluate, set_loads
 from exugear.solvers.compiled.packing import equations_of, work_for
+from exugear.solvers.compiled.places import tilt_sines
 from exugear.solvers.loads import LoadTable
 from exugear.tooth_mesh.laws.table import TABLE_FORM, fast_table_force
 from fe_ste.tools.arrays import Floats
@@ -114,94 +114,96 @@ def observe_table(
 def observe_meshes(
     q: Floats, v: Floats, meshes: Meshes, work: Work, columns: Columns, sample: Floats, energy: Floats
 ) -> None:
-    """Fill the signals of each mesh into a sample; add energy and powers (see `observe`).
-
-    The scalar force of each mesh, or that along its line of action, is left in `work.mesh.states`.
-    """
+    """Fill the signals of each mesh into a sample; add energy and powers (see `take_sample`)."""
     for m in range(meshes.coordinates.shape[0]):
         if meshes.form[m] == TABLE_FORM:
             observe_table(q, v, m, meshes, work, columns, sample, energy)
             continue
-        delta, rate, acting = mesh_motion(q, v, m, meshes, work)
-        elastic, _, _, stored, cycle_power = mesh_law(q, v, m, delta, meshes)
-        force = elastic + meshes.damping[m] * rate
-        work.mesh.states[m, LAST_FORCE] = force
-        sample[columns.mesh_dte + m] = delta
-        sample[columns.mesh_force + m] = force * meshes.line_of_action[m]
-        energy[ELASTIC] += stored
-        energy[DISSIPATED] += meshes.damping[m] * rate * rate
-        energy[OF_VARYING_STIFFNESS] += cycle_power
-        energy[NON_CONSERVATIVE] += force * (acting - rate)
+        state = work.mesh.states[m]
+        sample[columns.mesh_dte + m] = state[LAST_DEFLECTION]
+        sample[columns.mesh_force + m] = state[LAST_FORCE] * meshes.line_of_action[m]
+        energy[ELASTIC] += state[LAST_ENERGY]
+        energy[DISSIPATED] += state[LAST_DAMPED]
+        energy[OF_VARYING_STIFFNESS] += state[LAST_CYCLE]
+        energy[NON_CONSERVATIVE] += state[LAST_OTHER]
 
 
 @kernel
-def true_rate(n: int, first_body: Floats, work: Work) -> None:
-    """Fill the derivative of the strain into `work.motion`: see `exugear.kernels.connectors.connector_motion`."""
-    d, w, out = work.motion[STRAIN], work.motion[STRAIN_RATE], work.motion[TRUE_RATE]
+def true_rate(strain: Floats, rate: Floats, first_body: Floats, out: Floats) -> None:
+    """Fill the derivative of a connector's strain: see `exugear.kernels.connectors.connector_motion`."""
+    d, w = strain, rate
     x = first_body[0] * first_body[W_X] + first_body[3] * first_body[W_Y] + first_body[6] * first_body[W_Z]
     y = first_body[1] * first_body[W_X] + first_body[4] * first_body[W_Y] + first_body[7] * first_body[W_Z]
     z = first_body[2] * first_body[W_X] + first_body[5] * first_body[W_Y] + first_body[8] * first_body[W_Z]
     out[0] = w[0] - y * d[2] + z * d[1]
     out[1] = w[1] - z * d[0] + x * d[2]
     out[2] = w[2] - x * d[1] + y * d[0]
-    a, b = d[TILT], d[TILT + 1]
-    c, s = math.cos(a), math.sin(a)
-    out[SPIN] = (c * w[SPIN] - s * w[TILT + 1]) / math.cos(b)
-    out[TILT + 1] = c * w[TILT + 1] + s * w[SPIN]
-    out[TILT] = w[TILT] - math.sin(b) * out[SPIN]
+    (ca, sa), (cb, sb) = tilt_sines(d[TILT]), tilt_sines(d[TILT + 1])
+    out[SPIN] = (ca * w[SPIN] - sa * w[TILT + 1]) / cb
+    out[TILT + 1] = ca * w[TILT + 1] + sa * w[SPIN]
+    out[TILT] = w[TILT] - sb * out[SPIN]
+
+
+@kernel
+def observe_supports(connectors: Connectors, work: Work, columns: Columns, sample: Floats) -> None:
+    """Fill the force of each bearing on its body (N), global axes."""
+    for n in range(connectors.ends.shape[0]):
+        turn, support = work.frames[connectors.ends[n, 0]], work.supports[n]
+        x, y, z = support[SUPPORT_LOAD], support[SUPPORT_LOAD + 1], support[SUPPORT_LOAD + 2]
+        first = columns.support_force + 3 * connectors.number[n]
+        sample[first] = -(turn[0] * x + turn[1] * y + turn[2] * z)
+        sample[first + 1] = -(turn[3] * x + turn[4] * y + turn[5] * z)
+        sample[first + 2] = -(turn[6] * x + turn[7] * y + turn[8] * z)
 
 
 @kernel
 def observe_rolling(
-    q: Floats, v: Floats, n: int, bodies: Bodies, connectors: Connectors, work: Work, energy: Floats
+    q: Floats,
+    v: Floats,
+    n: int,
+    stride: int,
+    derivative: Floats,
+    bodies: Bodies,
+    connectors: Connectors,
+    work: Work,
+    energy: Floats,
 ) -> None:
-    """Add the rolling law of connector n to its force in `work.motion`, and energy and powers (see `observe`)."""
-    strain, rate, derivative = work.motion[STRAIN], work.motion[STRAIN_RATE], work.motion[TRUE_RATE]
+    """Add energy and powers of the rolling law of connector n (see `take_sample`)."""
+    strain, rate = work.supports[n, :BODY_SIZE], work.supports[n, BODY_SIZE:SUPPORT_LOAD]
     rolling_forces(n, strain, rate, turn_between(q, n, bodies, connectors), connectors.rolling, work.rolling)
     energy[ELASTIC] += work.rolling[STORED]
-    energy[DISSIPATED] += work.rolling[CAGE_DAMPING] * turn_between(v, n, bodies, connectors)
+    energy[DISSIPATED] += stride * work.rolling[CAGE_DAMPING] * turn_between(v, n, bodies, connectors)
     for i in range(BODY_SIZE):
         elastic, damped = work.rolling[ELASTIC_PART + i], work.rolling[DAMPED_PART + i]
-        work.motion[LOCAL_FORCE, i] += elastic + damped
-        energy[DISSIPATED] += damped * rate[i]
+        energy[DISSIPATED] += stride * damped * rate[i]
         # The potential knows no angle about z, whose moment but keeps the others from working on the spin.
-        energy[OF_BEARING_RATES] += elastic * (rate[i] - (derivative[i] if i < SPIN else 0.0))
+        energy[OF_BEARING_RATES] += stride * elastic * (rate[i] - (derivative[i] if i < SPIN else 0.0))
 
 
 @kernel
 def observe_connectors(
-    q: Floats,
-    v: Floats,
-    bodies: Bodies,
-    connectors: Connectors,
-    work: Work,
-    columns: Columns,
-    sample: Floats,
-    energy: Floats,
+    q: Floats, v: Floats, stride: int, bodies: Bodies, connectors: Connectors, work: Work, energy: Floats
 ) -> None:
-    """Fill the force of each bearing on its body (N), global axes; add energy and powers (see `observe`)."""
+    """Add energy and powers of all bearings, these for `stride` samples (see `take_sample`)."""
+    derivative = work.motion[TRUE_RATE]
     for n in range(connectors.ends.shape[0]):
-        move_connector(q, v, n, bodies, connectors, work)
-        turn = work.frames[connectors.ends[n, 0]]
-        true_rate(n, turn, work)
-        strain, rate = work.motion[STRAIN], work.motion[STRAIN_RATE]
-        derivative, force = work.motion[TRUE_RATE], work.motion[LOCAL_FORCE]
+        strain, rate = work.supports[n, :BODY_SIZE], work.supports[n, BODY_SIZE:SUPPORT_LOAD]
+        true_rate(strain, rate, work.frames[connectors.ends[n, 0]], derivative)
+        stored, lost, turned = 0.0, 0.0, 0.0
         for row in range(BODY_SIZE):
             elastic, damped = 0.0, 0.0
             for column in range(BODY_SIZE):
                 stiffness = connectors.stiffness[n, column, row]
                 elastic += stiffness * strain[column]
                 damped += (connectors.time[n] * stiffness + connectors.damping[n, column, row]) * rate[column]
-            force[row] = elastic + damped
-            energy[ELASTIC] += 0.5 * elastic * strain[row]
-            energy[DISSIPATED] += damped * rate[row]
-            energy[OF_BEARING_RATES] += elastic * (rate[row] - derivative[row])
+            stored += elastic * strain[row]
+            lost += damped * rate[row]
+            turned += elastic * (rate[row] - derivative[row])
+        energy[ELASTIC] += 0.5 * stored
+        energy[DISSIPATED] += stride * lost
+        energy[OF_BEARING_RATES] += stride * turned
         if connectors.rolling.first[n] < connectors.rolling.first[n + 1]:
-            observe_rolling(q, v, n, bodies, connectors, work, energy)
-        first = columns.support_force + 3 * connectors.number[n]
-        for i in range(3):
-            o = 3 * i
-            sample[first + i] = -(turn[o] * force[0] + turn[o + 1] * force[1] + turn[o + 2] * force[2])
+            observe_rolling(q, v, n, stride, derivative, bodies, connectors, work, energy)
 
 
 @kernel
@@ -235,7 +237,7 @@ def observe_joints(v: Floats, meshes: Meshes, joints: Joints, work: Work, column
 
 @kernel
 def observe_bodies(q: Floats, v: Floats, bodies: Bodies, work: Work, energy: Floats) -> None:
-    """Add the kinetic energy of all bodies (see `observe`)."""
+    """Add the kinetic energy of all bodies (see `take_sample`)."""
     for n in range(bodies.mass.size):
         o, sb, cb = bodies.start[n], work.frames[n, SIN_B], work.frames[n, COS_B]
         square = v[o] * v[o] + v[o + 1] * v[o + 1] + v[o + 2] * v[o + 2]
@@ -248,34 +250,65 @@ def observe_bodies(q: Floats, v: Floats, bodies: Bodies, work: Work, energy: Flo
 
 
 @kernel
-def observe_springs(q: Floats, v: Floats, springs: Springs, energy: Floats) -> None:
-    """Add elastic energy and damping power of the torsional springs (see `observe`)."""
+def observe_springs(q: Floats, v: Floats, stride: int, springs: Springs, energy: Floats) -> None:
+    """Add elastic energy and damping power of the torsional springs (see `take_sample`)."""
     for n in range(springs.ends.shape[0]):
         i, j = springs.ends[n, 0], springs.ends[n, 1]
         energy[ELASTIC] += 0.5 * springs.stiffness[n] * (q[j] - q[i]) ** 2
-        energy[DISSIPATED] += springs.damping[n] * (v[j] - v[i]) ** 2
+        energy[DISSIPATED] += stride * springs.damping[n] * (v[j] - v[i]) ** 2
 
 
 @kernel
-def observe_elastic_bodies(q: Floats, v: Floats, equations: Equations, work: Work, energy: Floats) -> None:
-    """Add energies and powers of elastic bodies, in fixed and in turning frames (see `observe`)."""
+def observe_elastic_bodies(q: Floats, v: Floats, stride: int, equations: Equations, work: Work, energy: Floats) -> None:
+    """Add energies and powers of elastic bodies, in fixed and in turning frames, these for `stride` samples."""
     kinetic, stored, damped = elastic_energies(q, v, equations.elastic, work.scratch)
     energy[KINETIC] += kinetic
     energy[ELASTIC] += stored
-    energy[DISSIPATED] += damped
+    energy[DISSIPATED] += stride * damped
     kinetic, stored, damped, weight = turning_energies(q, v, equations.turning, work.memory)
     energy[KINETIC] += kinetic
     energy[ELASTIC] += stored
-    energy[OF_LOADS] += weight
-    energy[DISSIPATED] += damped
+    energy[OF_LOADS] += stride * weight
+    energy[DISSIPATED] += stride * damped
 
 
 @kernel
-def observe_loads(t: float, q: Floats, v: Floats, loads: Loads, size: int, work: Work, energy: Floats) -> None:
-    """Add the power of what acts from outside on the first `size` coordinates at time t (s)."""
+def observe_loads(t: float, q: Floats, v: Floats, stride: int, loads: Loads, work: Work, energy: Floats) -> None:
+    """Add the power of what acts from outside at time t (s); nothing acts on travelling seats."""
     set_loads(t, q, v, loads, work.series, work.force)
-    for i in range(size):
-        energy[OF_LOADS] += work.force[i] * v[i]
+    for i in range(loads.steady.size):
+        energy[OF_LOADS] += stride * work.force[i] * v[i]
+
+
+@kernel
+def take_sample(
+    t: float,
+    q: Floats,
+    v: Floats,
+    equations: Equations,
+    work: Work,
+    columns: Columns,
+    stride: int,
+    sample: Floats,
+    energy: Floats,
+) -> None:
+    """Fill signals (columns,) and energies and powers (7,) of the state at time t (s) that was evaluated last.
+
+    Signals but those that `Observer.complete` takes from a state by itself; energies in the columns `KINETIC` and so
+    on. All powers but those of meshes stand for `stride` samples, none at 0, as they take longer than the signals.
+    """
+    for i in range(energy.size):
+        energy[i] = 0.0
+    observe_meshes(q, v, equations.meshes, work, columns, sample, energy)
+    observe_supports(equations.connectors, work, columns, sample)
+    if equations.joints.host.size > 0:
+        observe_joints(v, equations.meshes, equations.joints, work, columns, sample)
+    if stride > 0:
+        observe_bodies(q, v, equations.bodies, work, energy)
+        observe_connectors(q, v, stride, equations.bodies, equations.connectors, work, energy)
+        observe_springs(q, v, stride, equations.springs, energy)
+        observe_elastic_bodies(q, v, stride, equations, work, energy)
+        observe_loads(t, q, v, stride, equations.loads, work, energy)
 
 
 @kernel
@@ -289,27 +322,18 @@ def observe(
     signals: Floats,
     energies: Floats,
 ) -> None:
-    """Fill signals (samples, columns) and energies (samples, 7) of states q, v (samples, size).
-
-    Signals but those that `Observer` takes from a state by itself; energies in the columns `KINETIC` and so on.
-    """
-    size = q.shape[1]
+    """Fill signals (samples, columns) and energies (samples, 7) of states q, v (samples, size); see `take_sample`."""
     x, u = work.stage_q, work.stage_v
     for n in range(q.shape[0]):
-        sample, energy = signals[n], energies[n]
-        energy[:] = 0.0
-        for i in range(size):
+        for i in range(q.shape[1]):
             x[i], u[i] = q[n, i], v[n, i]
-        place_bodies(x, u, equations.bodies, work)
-        observe_bodies(x, u, equations.bodies, work, energy)
-        place_travelling(x, u, equations.travelling)
-        observe_meshes(x, u, equations.meshes, work, columns, sample, energy)
-        observe_connectors(x, u, equations.bodies, equations.connectors, work, columns, sample, energy)
-        if equations.joints.host.size > 0:
-            observe_joints(u, equations.meshes, equations.joints, work, columns, sample)
-        observe_springs(x, u, equations.springs, energy)
-        observe_elastic_bodies(x, u, equations, work, energy)
-        observe_loads(time[n], x, u, equations.loads, size, work, energy)
+        evaluate(time[n], x, u, equations, work)
+        take_sample(time[n], x, u, equations, work, columns, 1, signals[n], energies[n])
+
+
+def columns_of(layout: SignalLayout) -> Columns:
+    """Columns of a layout, as the kernels take them."""
+    return Columns._make(layout[name].start if name in layout else -1 for name in Columns._fields)
 
 
 class Observer:
@@ -332,9 +356,6 @@ class Observer:
         overall = assembly.gearbox.case.overall
         self._input = assembly.spin[overall.input]
         self._overall = overall_row(assembly) / self.layout.radius
-        self._columns = Columns._make(
-            self.layout[name].start if name in self.layout else -1 for name in Columns._fields
-        )
         self._equations = equations_of(assembly, loads)
         self._work = work_for(self._equations, np.zeros(assembly.size), np.zeros(assembly.size))
 
@@ -359,7 +380,11 @@ class Observer:
         """
         signals = np.empty((len(time), self.layout.count))
         energies = np.empty((len(time), len(ENERGIES) + len(POWERS)))
+        observe(time, q, v, self._equations, self._work, columns_of(self.layout), signals, energies)
+        self.complete(q, v, signals)
+        return signals, energies[:, : len(ENERGIES)], energies[:, len(ENERGIES) :]
+
+    def complete(self, q: Floats, v: Floats, signals: Floats) -> None:
+        """Fill those signals (samples, columns) that states q, v (samples, size) have by themselves."""
         signals[:, self.layout["input_speed"]] = v[:, [self._input]]
         signals[:, self.layout["overall_dte_angle"]] = (q @ self._overall)[:, None]
-        observe(time, q, v, self._equations, self._work, self._columns, signals, energies)
-        return signals, energies[:, : len(ENERGIES)], energies[:, len(ENERGIES) :]

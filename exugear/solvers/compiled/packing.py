@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from exugear.dynamics.assembly import Assembly
-from exugear.kernels.coordinates import BODY_SIZE, SPIN, TILT
+from exugear.kernels.coordinates import BODY_SIZE, PADDED, PADDED_TILT, SPIN, TILT
 from exugear.kernels.elastic import elastic_motion, scratch_for
-from exugear.kernels.fast_meshes import Meshes, MeshMemory
+from exugear.kernels.fast_meshes import STATES_SIZE, TURNING, Meshes, MeshMemory, padded_rows
 from exugear.kernels.meshes import FRAME, ROW_SIZE, SPIN_1, SPIN_2
 from exugear.kernels.rolling import rolling_memory
 from exugear.kernels.table_law import scratch_memory
@@ -16,17 +16,30 @@ from exugear.model.sections.entries import GROUND
 from exugear.solvers.compiled.arrays import (
     COS_A,
     COS_B,
+    DAMPED,
+    FIRST_ARM,
     FRAME_SIZE,
+    GAP,
+    LAG,
+    NODES,
+    OFF_AXIS,
+    PAIR_SIZE,
+    RELATIVE_SIZE,
+    SECOND_ARM,
+    SUPPORT_SIZE,
     Bodies,
     Connectors,
     Equations,
     Joints,
     Loads,
+    Pairs,
+    Places,
     Springs,
     Work,
 )
 from exugear.solvers.loads import LoadTable
 from exugear.tooth_mesh.laws.registry import LAWS
+from exugear.tooth_mesh.laws.table import TABLE_FORM
 from fe_ste.tools.arrays import Booleans, Floats, Integers
 
 ROUND_OFF = 1e-14
@@ -98,6 +111,52 @@ def _connectors(numbers: _Numbers) -> tuple[Connectors, Integers]:
     return connectors, slots
 
 
+def _pairs(connectors: Connectors, nodes: Floats) -> Pairs:
+    """Pairs of bodies of the connectors; nodes (c, 3): second node against the first at zero angles."""
+    count = len(connectors.number)
+    begins = np.flatnonzero(connectors.repeated == 0)
+    data = np.zeros((count, PAIR_SIZE))
+    columns = data[:, : PADDED * BODY_SIZE].reshape(count, BODY_SIZE, PADDED)
+    columns[:, :, :TILT], columns[:, :, PADDED_TILT : PADDED_TILT + TILT] = (
+        connectors.stiffness[:, :, :TILT],
+        connectors.stiffness[:, :, TILT:],
+    )
+    data[:, FIRST_ARM : FIRST_ARM + 3] = connectors.local[:, 0]
+    data[:, LAG] = connectors.time
+    data[:, SECOND_ARM : SECOND_ARM + 3] = connectors.local[:, 1]
+    data[:, OFF_AXIS] = connectors.local[:, 1, :2].any(axis=1)
+    data[:, GAP : GAP + 3] = connectors.gap
+    data[:, NODES : NODES + 3] = nodes
+    data[:, DAMPED] = connectors.damped
+    return Pairs(
+        ends=connectors.ends[begins],
+        first=np.append(begins, count).astype(np.int64),
+        twisting=connectors.twisting[begins],
+        data=data,
+    )
+
+
+def _places(numbers: _Numbers) -> tuple[Places, Integers]:
+    """Places of bodies, of seats that connectors or meshes act on and of single spins; (m, 2) those of each mesh."""
+    given = numbers.assembly.meshes.coordinates
+    starts = [*numbers.starts, numbers.size]
+    spins: list[int] = []
+    gears = given[:, :FRAME].reshape(-1, 2, BODY_SIZE)
+    for x, spin in gears[:, :, [0, SPIN]].reshape(-1, 2):
+        if x >= 0 and x not in starts:
+            starts.append(int(x))
+        if x < 0 <= spin and spin not in spins:
+            spins.append(int(spin))
+    ends = np.full(gears.shape[:2], len(numbers.starts), dtype=np.int64)
+    for (m, end), _ in np.ndenumerate(ends):
+        x, spin = gears[m, end, 0], gears[m, end, SPIN]
+        if x >= 0:
+            ends[m, end] = starts.index(int(x))
+        elif spin >= 0:
+            ends[m, end] = len(starts) + spins.index(int(spin))
+    return Places(np.array(starts, dtype=np.int64), np.array(spins, dtype=np.int64)), ends
+
+
 def _damping_time(stiffness: Floats, damping: Floats) -> float:
     """Damping over stiffness (s) if they are in proportion, else 0."""
     largest = np.unravel_index(np.argmax(np.abs(stiffness)), stiffness.shape)
@@ -114,11 +173,16 @@ def _without_round_off(matrix: Floats) -> Floats:
     return np.where(entries <= ROUND_OFF * np.outer(size, size), 0.0, matrix)
 
 
-def _meshes(numbers: _Numbers) -> Meshes:
+def _meshes(numbers: _Numbers, ends: Integers) -> Meshes:
     given = numbers.assembly.meshes
     axis = given.axis.copy()
     axis[given.coordinates[:, :FRAME].reshape(-1, 2, BODY_SIZE)[:, :, 0] < 0] = 0.0
     others = np.delete(given.coordinates[:, :FRAME], [SPIN_1, SPIN_2], axis=1)
+    table = given.table
+    kinds = [given.deflection, given.force]
+    if (given.form == TABLE_FORM).any():
+        kinds += [table.centre, table.misalignment, table.back, table.back_misalignment]
+    rows, offsets = padded_rows(np.stack(kinds, axis=1), axis)
     return Meshes(
         coordinates=np.where(given.coordinates < 0, numbers.size, given.coordinates),
         slot=np.array([numbers.slot(int(c)) for c in given.coordinates[:, FRAME]], dtype=np.int64),
@@ -128,6 +192,9 @@ def _meshes(numbers: _Numbers) -> Meshes:
         force=given.force,
         conjugate=np.all(given.deflection == given.force, axis=1).astype(np.int64),
         spinning=np.all(others < 0, axis=1).astype(np.int64),
+        ends=ends,
+        rows=rows,
+        offsets=offsets,
         cycles=given.cycles,
         phase=given.phase,
         pieces=given.pieces,
@@ -181,7 +248,9 @@ def equations_of(assembly: Assembly, loads: LoadTable) -> Equations:
     """Arrays of an assembly under loads, as the compiled loops read them."""
     numbers = _Numbers(assembly)
     connectors, slots = _connectors(numbers)
-    meshes, joints = _meshes(numbers), _joints(numbers)
+    places, ends = _places(numbers)
+    meshes, joints = _meshes(numbers, ends), _joints(numbers)
+    nodes = assembly.connectors.node[connectors.number]
     inertia, springs = assembly.inertia, assembly.springs
     bodies = Bodies(
         start=np.append(np.array(numbers.starts, dtype=np.int64), numbers.size),
@@ -196,7 +265,9 @@ def equations_of(assembly: Assembly, loads: LoadTable) -> Equations:
     )
     return Equations(
         bodies=bodies,
+        places=places,
         connectors=connectors,
+        pairs=_pairs(connectors, nodes[:, 1] - nodes[:, 0]),
         meshes=meshes,
         travelling=assembly.travelling,
         springs=Springs(springs.coordinates, springs.stiffness, springs.damping),
@@ -227,6 +298,7 @@ def work_for(equations: Equations, q: Floats, v: Floats) -> Work:
     """Memory for the compiled loops, at the state q, v (size,)."""
     size = equations.loads.steady.size + BODY_SIZE
     count = equations.meshes.slot.size
+    count_of_places = equations.places.start.size + equations.places.spin.size
     frames = np.zeros((equations.bodies.start.size, FRAME_SIZE))
     frames[-1, [0, 4, 8, COS_A, COS_B]] = 1.0  # the ground neither turns nor tilts
     return Work(
@@ -239,12 +311,17 @@ def work_for(equations: Equations, q: Floats, v: Floats) -> Work:
         total=np.zeros(size),
         turns=np.zeros((equations.bodies.turning.size, 2)),
         frames=frames,
-        wrench=np.zeros((equations.bodies.start.size, BODY_SIZE)),
+        places=np.zeros((count_of_places, 2 * PADDED)),
+        loads=np.zeros((count_of_places, 2 * PADDED)),
+        relative=np.zeros(RELATIVE_SIZE),
+        sums=np.zeros(9),
+        supports=np.zeros((equations.connectors.number.size, SUPPORT_SIZE)),
         motion=np.zeros((4, BODY_SIZE)),
         rolling=rolling_memory(equations.connectors.rolling),
         mesh=MeshMemory(
             gradient=np.zeros((3, ROW_SIZE)),
-            states=np.zeros((count, 4)),
+            gradients=np.zeros((4, TURNING + 1)),
+            states=np.zeros((count, STATES_SIZE)),
             pieces=np.zeros((count, 2), dtype=np.int64),
             law=scratch_memory(),
             row=np.zeros(FRAME),

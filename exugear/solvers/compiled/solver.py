@@ -1,16 +1,26 @@
-"""The compiled solver: an assembly's equations integrated by the classical Runge-Kutta method without Exudyn.
+"""The compiled solver: an assembly's equations integrated without Exudyn.
 
 Same coordinates and same laws as the Exudyn system built from the same assembly (see
-`exugear.solvers.compiled.equations`), so that the trajectories differ by round-off only, a hundred times faster.
+`exugear.solvers.compiled.equations`), so that by the same method the trajectories differ by round-off only.
 """
 
 from __future__ import annotations
 
+import numpy as np
+
 from exugear.dynamics.assembly import Assembly
-from exugear.solvers.compiled.equations import advance, evaluate
+from exugear.dynamics.signals import signal_layout
+from exugear.solvers.compiled.equations import evaluate
+from exugear.solvers.compiled.loop import advance
+from exugear.solvers.compiled.methods import RUNGE_KUTTA, Method, Past
+from exugear.solvers.compiled.observers import columns_of
 from exugear.solvers.compiled.packing import equations_of, work_for
 from exugear.solvers.loads import LoadTable
 from fe_ste.tools.arrays import Floats
+
+POWER_INTERVAL = 1.0 / 30e3
+"""Time between observations of powers, s: a sum over samples errs by what lies at the rate of the samples itself, and
+powers of motions up to 10 kHz reach up to twice that."""
 
 
 def unsupported_reason(assembly: Assembly) -> str:
@@ -37,26 +47,70 @@ class CompiledSystem:
         Initial coordinates and velocities.
     loads : LoadTable
     step : float
-        Time step, s; `unstable` tells whether it is stable.
+        Time step, s; see `exugear.solvers.compiled.step`.
+    method : Method
+        The classical Runge-Kutta method by default.
+    past : (n, size) array, optional
+        Accelerations at the steps before, the latest at the state itself. A multistep method goes on from them as if
+        it had not stopped; without them it starts anew.
     """
 
-    def __init__(self, assembly: Assembly, q: Floats, v: Floats, loads: LoadTable, step: float) -> None:
+    def __init__(
+        self,
+        assembly: Assembly,
+        q: Floats,
+        v: Floats,
+        loads: LoadTable,
+        step: float,
+        method: Method = RUNGE_KUTTA,
+        past: Floats | None = None,
+    ) -> None:
         self.step = step
         self.equations = equations_of(assembly, loads)
         self._size = assembly.size
         self._work = work_for(self.equations, q, v)
+        self._method = method
+        self._columns = columns_of(signal_layout(assembly))
+        self._past = Past.of(method, np.zeros((0, assembly.size)) if past is None else past)
+
+    @property
+    def past(self) -> Floats:
+        """Accelerations (n, size) to go on from."""
+        return self._past.in_order()
 
     def accelerations(self, time: float = 0.0) -> Floats:
         """Accelerations (size,) at the present state and a time (s)."""
         evaluate(time, self._work.q, self._work.v, self.equations, self._work)
         return self._work.rate[: self._size].copy()
 
-    def advance(self, first: int, q: Floats, v: Floats) -> int:
+    def advance(
+        self, first: int, q: Floats, v: Floats, signals: Floats | None = None, energies: Floats | None = None
+    ) -> int:
         """Fill q and v (steps, size) with the states after each step from step number `first` on.
+
+        Parameters
+        ----------
+        signals, energies : (steps, columns) and (steps, 7) arrays, optional
+            For what `exugear.solvers.compiled.observers.take_sample` fills. Powers but those of meshes stand for as
+            many steps as make up `POWER_INTERVAL`; energies are not whole.
 
         Returns
         -------
         int
             Number of steps that stayed finite.
         """
-        return advance(first, self.step, self.equations, self._work, q, v)
+        none = np.empty((0, 0))
+        return advance(
+            first,
+            self.step,
+            self._method,
+            self.equations,
+            self._work,
+            self._past,
+            self._columns,
+            max(1, int(POWER_INTERVAL / self.step + 1e-9)),
+            q,
+            v,
+            none if signals is None else signals,
+            none if energies is None else energies,
+        )

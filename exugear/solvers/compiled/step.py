@@ -1,6 +1,10 @@
-"""Time step of the compiled solver: stable, and accurate for what resonates."""
+"""Time step and method of the compiled solver: stable, and accurate for what resonates."""
 
 from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
@@ -8,14 +12,16 @@ import scipy.linalg
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.linearised import Linearised, linearise
 from exugear.dynamics.modes import coordinate_labels
+from exugear.solvers.compiled.methods import ORDERS, RUNGE_KUTTA, Method, adams, forced_error, growth
 from fe_ste.tools.arrays import Complexes, Floats
 
-STABILITY_LIMIT = 2.6
-"""Below this |lambda| h the method is stable for every damped motion, oscillating or creeping."""
-STABLE = 2.0
-"""Chosen |lambda| h at most: leaves room for k(PMC) at its peaks."""
-ACCURATE = 1.02
-"""Allowed w h at the top of the band: the response to an excitation there is then 0.15 % in error."""
+MARGIN = 1.2
+"""By this factor all motions may be faster before the step is not stable: stiffness by 1.44, room for teeth that carry
+more than their static load."""
+GROWTH_ALLOWED = 1e-9
+"""Growth in a step that counts as none: undamped motions gain 0.2 % in 30 s."""
+FORCED_ERROR = 7e-4
+"""Allowed error of amplitudes at the top of the band, for a free mass; with stiffness around it may be 1.4 times."""
 RESONANCE_ERROR = 1e-3
 """Allowed error on the slope of a resonance, as a share of its peak."""
 ACCURATE_BAND_FRACTION = 2.0 / 3.0
@@ -25,18 +31,71 @@ STIFFENING = 1.6
 radial and 1.6 times the tilt stiffness, as more of them and more of their length carry."""
 LIGHTEST_DAMPING = 2e-3
 """Damping ratio that lighter ones count as: an undamped resonance would ask for no error at all."""
+MOST_MARGIN = 3.0
+"""Margin up to which it is looked for."""
+INTEGRATORS = ("adams", "rk4")
+"""Kinds of methods that can be asked for."""
+SLOWEST = 1e-6
+"""Motions that turn by less than this in a step (rad) are the rolling of the train: no method has trouble with it."""
+FOLLOWED_CLOSELY = 1e-2
+"""Motions that turn by less than this in a step (rad) are followed to 1e-9 by all methods: round-off is larger."""
+MOST_DIVISIONS = 100_000
+"""Parts of a sampling interval that a step may be at least; finer ones are refused elsewhere, with the reason."""
+
+
+@dataclass(frozen=True, eq=False)
+class Integration:
+    """How a run is integrated.
+
+    Attributes
+    ----------
+    method : Method
+    step : float
+        s.
+    margin : float
+        Factor by which all motions may be faster before it is not stable, in tenths, at most `MOST_MARGIN`.
+    forced_error, resonance_error : float
+        Expected errors of amplitudes, relative: at the top of the band, and on the slope of the resonance where it is
+        largest.
+    fastest_rate : float
+        Magnitude of the fastest eigenvalue, rad/s.
+    """
+
+    method: Method
+    step: float
+    margin: float
+    forced_error: float
+    resonance_error: float
+    fastest_rate: float
+
+    @property
+    def error(self) -> float:
+        """Sum of both errors, relative."""
+        return abs(self.forced_error) + self.resonance_error
+
+    @property
+    def is_accurate(self) -> bool:
+        """Whether both errors are as small as a run that chooses its step asks for."""
+        return abs(self.forced_error) <= FORCED_ERROR and self.resonance_error <= RESONANCE_ERROR
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<Integration: {self.method.name}, step {1e6 * self.step:.4g} us, margin {self.margin:.2g}>"
 
 
 def eigenvalues(assembly: Assembly) -> Complexes:
-    """Eigenvalues (1/s) of the system linearised at rest, mean mesh stiffness, damping included."""
+    """Eigenvalues (1/s) of the system linearised at rest, mesh stiffness at its peaks, damping included."""
     linear = _at_rest(assembly)
     return scipy.linalg.eigvals(_free_motions(linear, assembly.motions)[1]).astype(np.complex128)
 
 
 def _at_rest(assembly: Assembly) -> Linearised:
-    """Linearised equations with all teeth in contact, non-linear bearings stiffer than under their static load."""
+    """Linearised equations with all teeth in contact, meshes and non-linear bearings as stiff as they become."""
     stiffest = assembly.with_linear_supports(STIFFENING)
-    return linearise(stiffest, np.zeros(assembly.size), stiffest.linear_meshes())
+    meshes = stiffest.linear_meshes()
+    peaks = np.array([np.max(np.abs(e.stiffness)) / np.abs(np.mean(e.stiffness)) for e in stiffest.elements])
+    meshes = meshes._replace(stiffness=meshes.stiffness * peaks.reshape(-1, 1, 1))
+    return linearise(stiffest, np.zeros(assembly.size), meshes)
 
 
 def _free_motions(linear: Linearised, free: Floats) -> tuple[Floats, Floats]:
@@ -80,13 +139,128 @@ def fastest_motion(assembly: Assembly) -> str:
     return f"the fastest motion, {rate:.3g} rad/s, is of {coordinate_labels(assembly)[moving]} against {holding}"
 
 
-def choose_step(assembly: Assembly, sample_rate: float, band: float) -> float:
-    """Longest step (s) that divides the sampling interval, is stable, and keeps amplitudes up to `band` (Hz).
+def _stable(method: Method, values: Complexes, step: float, factor: float) -> bool:
+    """Tell whether no free motion grows, all being faster by a factor."""
+    moving = factor * values[np.abs(values) * step > SLOWEST]
+    if not moving.size:
+        return True
+    # The motion itself may grow: a train that rolls has eigenvalues of either sign about zero.
+    own = np.maximum(1.0, np.exp(moving.real * step))
+    return bool((np.abs(growth(method, moving, step)).max(axis=1) <= own * (1.0 + GROWTH_ALLOWED)).all())
 
-    The method answers an excitation of frequency w with a relative error of about 0.0015 (w h)^4, and shifts an
-    eigenfrequency by (w h)^4 / 120, which on the slope of its resonance with the damping ratio zeta costs up to
-    0.5 / zeta of that. Resonances count where they are meant: with elastic bodies up to two thirds of the frequency to
-    which these are described exactly.
+
+def _margin(method: Method, values: Complexes, step: float) -> float:
+    """Largest factor on all eigenvalues with which the step is stable, in tenths; 0 if it is not stable."""
+    margin = 0.0
+    for tenths in range(10, round(10.0 * MOST_MARGIN) + 1):
+        if not _stable(method, values, step, tenths / 10.0):
+            break
+        margin = tenths / 10.0
+    return margin
+
+
+def _resonance_error(method: Method, resonances: Complexes, step: float) -> float:
+    """Largest error on the slope of a resonance, as a share of its peak.
+
+    A shift of the eigenfrequency by a share e costs up to e / (2 zeta) there, a change of the damping ratio by e as
+    much as e / zeta.
+    """
+    resonances = resonances[np.abs(resonances) * step > FOLLOWED_CLOSELY]
+    if not resonances.size:
+        return 0.0
+    rates = np.abs(resonances)
+    exact = resonances.real + 1j * np.abs(resonances.imag)
+    made = growth(method, resonances, step)[:, 0]
+    error = np.log(np.where(made.imag < 0.0, made.conj(), made)) / step - exact
+    damping = np.maximum(-resonances.real / rates, LIGHTEST_DAMPING)
+    return float((np.maximum(np.abs(error.real), 0.5 * np.abs(error.imag)) / (damping * rates)).max())
+
+
+class _Motions:
+    """Free motions of an assembly, and what a method makes of them."""
+
+    def __init__(self, assembly: Assembly, band: float) -> None:
+        self.band = band
+        self.values = eigenvalues(assembly)
+        self.fastest = float(np.abs(self.values).max(initial=0.0))
+        accurate_band = band
+        if assembly.elastic_bodies:
+            accurate_band = min(band, ACCURATE_BAND_FRACTION * assembly.gearbox.case.elasticity.band_Hz)
+        # Of a pair of conjugates one is enough; what does not oscillate has no resonance.
+        swinging = self.values[self.values.imag > 0.0]
+        self.resonances = swinging[np.abs(swinging) < 2.0 * np.pi * accurate_band]
+        self.values = self.values[self.values.imag >= 0.0]
+
+    def with_step(self, method: Method, step: float) -> Integration:
+        """Figures of a method with a step (s)."""
+        return Integration(
+            method,
+            step,
+            _margin(method, self.values, step),
+            forced_error(method, 2.0 * math.pi * self.band * step),
+            _resonance_error(method, self.resonances, step),
+            self.fastest,
+        )
+
+    def longest_step(self, method: Method, interval: float) -> float:
+        """Longest step (s) that divides a sampling interval (s), is stable with the margin, and accurate."""
+        divisions = 1
+        while divisions < MOST_DIVISIONS and not self._will_do(method, interval / divisions):
+            # One more part as long as they are few; many at once where a fast motion asks for thousands.
+            divisions += max(1, divisions // 20)
+        return interval / divisions
+
+    def _will_do(self, method: Method, step: float) -> bool:
+        # The cheapest test first: most steps fail in it.
+        return (
+            abs(forced_error(method, 2.0 * math.pi * self.band * step)) <= FORCED_ERROR
+            and _stable(method, self.values, step, MARGIN)
+            and _resonance_error(method, self.resonances, step) <= RESONANCE_ERROR
+        )
+
+
+def methods_of(integrator: str | None) -> tuple[Method, ...]:
+    """Return the methods to choose from: those of an integrator of `INTEGRATORS`, or all.
+
+    Examples
+    --------
+    >>> [method.name for method in methods_of("adams")]
+    ['Adams of order 4', 'Adams of order 5', 'Adams of order 6']
+    """
+    multistep = tuple(adams(order) for order in ORDERS)
+    return {"adams": multistep, "rk4": (RUNGE_KUTTA,), None: (*multistep, RUNGE_KUTTA)}[integrator]
+
+
+def choose_integration(
+    assembly: Assembly,
+    sample_rate: float,
+    band: float,
+    *,
+    step: float | None = None,
+    integrator: str | None = None,
+) -> Integration:
+    """Find the method and the step that take the fewest evaluations.
+
+    The step divides the sampling interval, is stable by `MARGIN` for all eigenvalues of the system at rest, meshes at
+    their stiffest, keeps amplitudes up to `band` within `FORCED_ERROR` and the slopes of resonances within
+    `RESONANCE_ERROR`. Resonances count where they are meant: with elastic bodies up to two thirds of the frequency to
+    which these are described exactly. Heavy damping shortens the steps of multistep methods: the Runge-Kutta method
+    takes over then.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    sample_rate, band : float
+        Hz.
+    step : float, optional
+        Take this step, s, whatever its accuracy; the method is then the stable one of least error.
+    integrator : {"adams", "rk4"}, optional
+        Kind of method; whichever is cheaper by default.
+
+    Returns
+    -------
+    Integration
+        Its margin is below 1 if the step asked for is not stable.
 
     Examples
     --------
@@ -95,32 +269,39 @@ def choose_step(assembly: Assembly, sample_rate: float, band: float) -> float:
     >>> from exugear.model.gearbox import Gearbox
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
     >>> stiffness = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
-    >>> choose_step(assemble(gearbox, Choice("rigid"), stiffness), sample_rate=20e3, band=6.4e3)
-    2.5e-05
+    >>> choose_integration(assemble(gearbox, Choice("rigid"), stiffness), sample_rate=20e3, band=6.4e3)
+    <Integration: Adams of order 5, step 16.67 us, margin 3>
     """
-    values = eigenvalues(assembly)
-    rates = np.maximum(np.abs(values), 1e-9)
-    ratio = np.maximum(-values.real / rates, LIGHTEST_DAMPING)
-    accurate_band = band
-    if assembly.elastic_bodies:
-        accurate_band = min(band, ACCURATE_BAND_FRACTION * assembly.gearbox.case.elasticity.band_Hz)
-    resonant = rates < 2.0 * np.pi * accurate_band
-    slopes = (240.0 * ratio[resonant] * RESONANCE_ERROR) ** 0.25 / rates[resonant]
-    longest = min(STABLE / rates.max(), ACCURATE / (2.0 * np.pi * band), slopes.min(initial=np.inf))
-    return float(1.0 / (sample_rate * np.ceil(1.0 / (sample_rate * longest) - 1e-9)))
+    motions, methods = _Motions(assembly, band), methods_of(integrator)
+    if step is not None:
+        return _best(motions.with_step(method, step) for method in methods)
+    steps = [motions.longest_step(method, 1.0 / sample_rate) for method in methods]
+    costs = [method.evaluations / longest for method, longest in zip(methods, steps, strict=True)]
+    cheapest = [n for n, cost in enumerate(costs) if cost <= min(costs) * (1.0 + 1e-9)]
+    return _best(motions.with_step(methods[n], steps[n]) for n in cheapest)
 
 
-def unstable(rate: float, step: float) -> str:
-    """Reason why a step (s) is not stable for a largest eigenvalue `rate` (rad/s), empty if it is.
+def _best(choices: Iterable[Integration]) -> Integration:
+    """Return the cheapest that is stable with the margin and accurate; else the stable one of least error."""
+    ranked = sorted(choices, key=lambda choice: (choice.margin < 1.0, choice.error))
+    good = [choice for choice in ranked if choice.margin >= MARGIN and choice.is_accurate]
+    return min(good, key=lambda choice: choice.method.evaluations) if good else ranked[0]
+
+
+def unstable(integration: Integration) -> str:
+    """Reason why a step is not stable, empty if it is.
 
     Examples
     --------
-    >>> unstable(1e4, 2.5e-5)
+    >>> unstable(Integration(RUNGE_KUTTA, 2.5e-5, 1.3, 0.0, 0.0, fastest_rate=8e4))
     ''
-    >>> unstable(2e5, 2.5e-5)
+    >>> unstable(Integration(RUNGE_KUTTA, 2.5e-5, 0.0, 0.0, 0.0, fastest_rate=2e5))
     'step = 2.5e-05 s is not stable: the fastest motion has 2e+05 rad/s; use 1e-05 s or less'
     """
-    if step * rate <= STABILITY_LIMIT:
+    if integration.margin >= 1.0:
         return ""
-    longest = STABLE / rate
-    return f"step = {step:g} s is not stable: the fastest motion has {rate:.4g} rad/s; use {longest:.2g} s or less"
+    rate = integration.fastest_rate
+    return (
+        f"step = {integration.step:g} s is not stable: the fastest motion has {rate:.4g} rad/s; "
+        f"use {2.0 / rate:.2g} s or less"
+    )

@@ -22,7 +22,7 @@ from exugear.kernels.springs import add_spring_forces
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.solvers.compiled.solver import CompiledSystem
-from exugear.solvers.compiled.step import choose_step
+from exugear.solvers.compiled.step import choose_integration
 from exugear.solvers.loads import LoadTable
 from exugear.tooth_mesh.laws.forms import add_mesh_forces, mesh_state
 
@@ -95,7 +95,7 @@ def simpson(values: np.ndarray, step: float) -> np.ndarray:
 def account_of(assembly: Assembly, start_speed: float, duration: float) -> Account:
     """Run by the compiled solver and integrate all powers over its raw steps, chunk by chunk."""
     start = accelerating_start(assembly, LOAD, start_speed)
-    step = choose_step(assembly, 20e3, 6.4e3)
+    step = choose_integration(assembly, 20e3, 6.4e3, integrator="rk4").step
     layout = signal_layout(assembly)
     meshes = [assembly.meshes.one(m) for m in range(len(assembly.elements))]
     bearings = [assembly.connectors.one(n) for n in range(len(assembly.connector_names))]

@@ -32,7 +32,7 @@ def test_every_signal_has_one_name_and_something_that_makes_it() -> None:
 
 
 def test_kernels_know_the_columns_of_all_signals_that_they_fill() -> None:
-    by_kernels = [s.name for s in SIGNALS if s.is_sampled and s.filled_by and s.filled_by != ("Observer.observe",)]
+    by_kernels = [s.name for s in SIGNALS if s.is_sampled and s.filled_by and s.filled_by != ("Observer.complete",)]
     assert list(observers.Columns._fields) == by_kernels
 
 

@@ -54,7 +54,7 @@ def shown() -> dict[str, object]:
         fe_ste.SteSurface.from_table(table.dataset),
         compliance,
         *compliance.flanks[:1],
-        *compliance.sliced[:1],
+        *compliance.regular[:1],
         StateAxes.checked(
             PAIR, np.linspace(10.0, 2000.0, 40).tolist(), misalignment=np.linspace(-1e-3, 1e-3, 9).tolist()
         ),

@@ -68,24 +68,24 @@ def grid(compliance: PairCompliance) -> xr.Dataset:
 
 
 def test_every_state_equals_the_one_solved_alone(compliance: PairCompliance, grid: xr.Dataset) -> None:
-    """Same cells and a problem with one solution: rounding is all that differs (0.1 % was asked)."""
+    """Same cells and a problem with one solution: rounding is all that differs."""
     cosine = math.cos(PAIR.pinion.base_helix_angle)
     for p, t, c, m in itertools.product(range(3), range(3), range(2), range(3)):
         placed = compliance.at_centre_distance(float(AXES.centre_distance[c]))
         alone = contact_state(placed, float(AXES.torque[t]), p / 3, float(AXES.misalignment[m]))
         state = grid.isel(pmc=p, torque=t, centre_distance=c, misalignment=m)
-        assert float(state.ste) == pytest.approx(alone.solution.approach / cosine, rel=1e-9)
+        assert float(state.ste) == pytest.approx(alone.solution.approach / cosine, rel=1e-10)
         shares = [
             alone.solution.force[alone.cells.tooth == tooth].sum() / alone.normal_load for tooth in grid.tooth.values
         ]
-        assert state.load_share.values == pytest.approx(np.array(shares), abs=1e-7)
+        assert state.load_share.values == pytest.approx(np.array(shares), abs=1e-10)
 
 
 def test_a_state_depends_on_no_other(compliance: PairCompliance, grid: xr.Dataset) -> None:
     """Axes the other way round: other neighbours, other starts, the same numbers."""
     turned = dataclasses.replace(AXES, torque=AXES.torque[::-1], misalignment=AXES.misalignment[::-1])
     again = solve_positions(compliance, turned, [2, 1, 0]).values["ste"]
-    assert again[::-1, ::-1, :, ::-1] == pytest.approx(grid.ste.values, rel=1e-9)
+    assert again[::-1, ::-1, :, ::-1] == pytest.approx(grid.ste.values, rel=1e-10)
 
 
 def test_transmission_error_falls_to_the_unloaded_one_with_the_load(compliance: PairCompliance) -> None:
@@ -111,13 +111,15 @@ def test_more_load_always_turns_the_gear_further(grid: xr.Dataset) -> None:
 
 @pytest.fixture
 def small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One position a block."""
-    monkeypatch.setattr(fe_ste.transmission_error.grid, "_BLOCK_STATES", 18)
+    """One position at one centre distance a block."""
+    monkeypatch.setattr(fe_ste.transmission_error.grid, "_BLOCK_STATES", 9)
 
 
 def same(one: xr.Dataset, other: xr.Dataset) -> None:
-    """All results but the iterations, which depend on where the search began."""
-    xr.testing.assert_allclose(one.drop_vars("iterations"), other.drop_vars("iterations"), rtol=1e-9, atol=1e-9)
+    """All results but the iterations, which depend on where the search began; loads against the largest."""
+    for name in one.drop_vars("iterations").data_vars:
+        values, others = one[name].to_numpy(), other[name].to_numpy()
+        assert values == pytest.approx(others, rel=1e-10, abs=1e-10 * float(np.nanmax(np.abs(others)))), name
 
 
 @pytest.mark.usefixtures("small_blocks")
@@ -164,14 +166,15 @@ def test_a_stopped_grid_keeps_what_is_finished_and_goes_on_from_there(
     with pytest.raises(Stopped):
         solve_grid(compliance, AXES, checkpoint=checkpoint, progress=stop_after(40))
     with xr.open_dataset(checkpoint.path, engine="h5netcdf") as partial:
-        assert partial["solved"].values.tolist() == [1, 1, 0]
-        assert np.array_equal(np.isfinite(partial["ste"]).all(("torque", "centre_distance", "misalignment")), [1, 1, 0])
+        assert partial["solved"].values.tolist() == [[1, 1], [1, 0], [1, 0]]
+        assert np.array_equal(np.isfinite(partial["ste"]).all(("torque", "misalignment")), partial["solved"])
     with pytest.raises(TableError):  # a part is never taken for a table
         MeshTable.open(checkpoint.path)
     counted: list[int] = []
     rest = solve_grid(compliance, AXES, checkpoint=checkpoint, progress=lambda done, of: counted.append(done))
     assert counted == list(range(37, 55))
     same(rest, grid)
+    xr.testing.assert_identical(rest, solve_grid(compliance, AXES))  # to the last bit: a block depends on no other
 
 
 def test_finished_positions_of_another_input_or_in_a_damaged_file_are_not_taken_up(
@@ -179,16 +182,17 @@ def test_finished_positions_of_another_input_or_in_a_damaged_file_are_not_taken_
 ) -> None:
     path = tmp_path / "helical.partial.nc"
     results = solve_positions(compliance, AXES, range(3))
-    Checkpoint(path, "another input").store(results, AXES, {0, 1, 2})
+    Checkpoint(path, "another input").store(results, AXES, np.ones((3, 2), dtype=bool))
     empty = StateResults.empty(compliance, AXES.shape)
-    assert Checkpoint(path, "this input").load(empty) == set()
+    assert not Checkpoint(path, "this input").load(empty).any()
     content = path.read_bytes()
     for damaged in damages(content, 60):
         path.write_bytes(damaged)
-        assert Checkpoint(path, "another input").load(empty) == set()
+        assert not Checkpoint(path, "another input").load(empty).any()
         assert "its positions are computed again" in caplog.messages[-1]
     path.write_bytes(content)
-    assert Checkpoint(path, "another input").load(empty) == {0, 1, 2}
+    assert Checkpoint(path, "another input").load(empty).all()
+    assert np.array_equal(empty.values["ste"], results.values["ste"])
 
 
 @pytest.mark.usefixtures("small_blocks")
@@ -202,7 +206,7 @@ def test_lost_workers_are_reported_and_finished_positions_kept(compliance: PairC
 
     with Workers(1) as pool, pytest.raises(GridError, match="finished positions are kept"):
         solve_grid(compliance, AXES, executor=pool, checkpoint=checkpoint, progress=kill)
-    assert 1 <= len(checkpoint.load(StateResults.empty(compliance, AXES.shape))) < 3
+    assert 1 <= checkpoint.load(StateResults.empty(compliance, AXES.shape)).sum() < 6
 
 
 def test_a_failed_state_says_where_and_leaves_the_others(compliance: PairCompliance, grid: xr.Dataset) -> None:
@@ -213,4 +217,4 @@ def test_a_failed_state_says_where_and_leaves_the_others(compliance: PairComplia
     assert len(results.failures) == 6
     for word in ("pmc 0.000", "torque 1e+07 N m", "centre distance 104.55 mm", "misalignment -1200 urad"):
         assert word in results.failures[0]
-    assert results.values["ste"][:, :2] == pytest.approx(grid.ste.values[:1, :2], rel=1e-9)
+    assert results.values["ste"][:, :2] == pytest.approx(grid.ste.values[:1, :2], rel=1e-10)

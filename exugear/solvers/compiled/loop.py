@@ -1,0 +1,179 @@
+"""The loop over time as one compiled piece that allocates nothing per step: states, their signals and powers.
+
+Methods stand in `exugear.solvers.compiled.methods`. Signals and powers come from the evaluation that each step makes
+at its new state anyway. A multistep method evaluates at the predicted state, which the correction then moves by less
+than it is in error itself.
+
+Numbers here become part of machine code: `fe_ste.tools.compilation` compiles anew when this file changes.
+"""
+
+from __future__ import annotations
+
+import math
+
+from exugear.solvers.compiled.arrays import Equations, Work
+from exugear.solvers.compiled.equations import evaluate
+from exugear.solvers.compiled.methods import (
+    CORRECT_POSITION,
+    CORRECT_VELOCITY,
+    EXTRAPOLATE,
+    KNOWN,
+    LATEST,
+    PREDICT_POSITION,
+    PREDICT_VELOCITY,
+    Method,
+    Past,
+)
+from exugear.solvers.compiled.observers import Columns, take_sample
+from fe_ste.tools.arrays import Floats
+from fe_ste.tools.compilation import kernel
+
+LAST_STAGE = 3
+"""Evaluations of a Runge-Kutta step are numbered 0 to 3; the last one, at the new state, serves the next step too."""
+START_PARTS = 4
+"""Runge-Kutta steps in place of one, while a multistep method has not enough of the past: their error is smaller."""
+
+
+@kernel
+def stay(work: Work, size: int) -> None:
+    """Take the state itself as that of the stage."""
+    for i in range(size):
+        work.stage_q[i], work.stage_v[i] = work.q[i], work.v[i]
+
+
+@kernel
+def predict(step: float, method: Method, past: Past, work: Work) -> None:
+    """Fill the stage's state with the one a step ahead and `past.sums[0]` with its acceleration, both extrapolated."""
+    x, u, ahead = work.stage_q, work.stage_v, past.sums[0]
+    rows, latest = past.accelerations.shape[0], past.counts[LATEST]
+    for i in range(ahead.size):
+        x[i], u[i], ahead[i] = 0.0, 0.0, 0.0
+    for k in range(method.weights.shape[1]):
+        a = past.accelerations[(latest + rows - k) % rows]
+        of_u, of_x = method.weights[PREDICT_VELOCITY, k], method.weights[PREDICT_POSITION, k]
+        of_a = method.weights[EXTRAPOLATE, k]
+        for i in range(ahead.size):
+            u[i] += of_u * a[i]
+            x[i] += of_x * a[i]
+            ahead[i] += of_a * a[i]
+    for i in range(ahead.size):
+        x[i] = work.q[i] + step * (work.v[i] + step * x[i])
+        u[i] = work.v[i] + step * u[i]
+
+
+@kernel
+def correct(step: float, method: Method, past: Past, work: Work) -> None:
+    """Take the predicted state over, corrected by how far the acceleration there is from the extrapolated one."""
+    of_v = step * method.correction[CORRECT_VELOCITY]
+    of_q = step * step * method.correction[CORRECT_POSITION]
+    for i in range(past.sums.shape[1]):
+        difference = work.rate[i] - past.sums[0, i]
+        work.q[i] = work.stage_q[i] + of_q * difference
+        work.v[i] = work.stage_v[i] + of_v * difference
+
+
+@kernel
+def runge_kutta_stage(stage: int, step: float, past: Past, work: Work) -> None:
+    """Fill the stage's state, after the first with the accelerations of the one before, which are in `work.rate`.
+
+    The first acceleration is that of the state itself, the latest of the past. In the last stage the step is over: the
+    stage's state is the new one, as `work.q` and `work.v` are. `past.sums` collects accelerations: for the positions,
+    which need the first three alone, and for the velocities.
+    """
+    q, v, x, u, a = work.q, work.v, work.stage_q, work.stage_v, work.rate
+    known, sums = past.accelerations[past.counts[LATEST]], past.sums
+    ahead = 0.5 * step if stage < 2 else step
+    for i in range(sums.shape[1]):
+        if stage == 0:
+            sums[0, i], sums[1, i] = known[i], known[i]
+            x[i], u[i] = q[i] + ahead * v[i], v[i] + ahead * known[i]
+        elif stage < LAST_STAGE:
+            sums[0, i] += a[i]
+            sums[1, i] += 2.0 * a[i]
+            x[i] = q[i] + ahead * u[i]
+            u[i] = v[i] + ahead * a[i]
+        else:
+            q[i] += step * (v[i] + step / 6.0 * sums[0, i])
+            v[i] += step / 6.0 * (sums[1, i] + a[i])
+            x[i], u[i] = q[i], v[i]
+
+
+@kernel
+def keep_acceleration(as_new: bool, work: Work, past: Past) -> None:
+    """Make the accelerations in `work.rate` the latest of the past, in place of the latest one if not as new."""
+    if as_new:
+        past.counts[LATEST] = (past.counts[LATEST] + 1) % past.accelerations.shape[0]
+    latest = past.accelerations[past.counts[LATEST]]
+    for i in range(latest.size):
+        latest[i] = work.rate[i]
+
+
+@kernel
+def copy_state(work: Work, q: Floats, v: Floats) -> bool:
+    """Copy the state into q, v (size,); tell whether it is finite."""
+    # A sum that is not finite shows any entry that is not, without a test for each.
+    check = 0.0
+    for i in range(q.size):
+        q[i], v[i] = work.q[i], work.v[i]
+        check += abs(q[i]) + abs(v[i])
+    return math.isfinite(check)
+
+
+@kernel
+def advance(
+    first: int,
+    step: float,
+    method: Method,
+    equations: Equations,
+    work: Work,
+    past: Past,
+    columns: Columns,
+    stride: int,
+    out_q: Floats,
+    out_v: Floats,
+    out_signals: Floats,
+    out_energies: Floats,
+) -> int:
+    """Fill out_q and out_v (steps, size) with the states after each step, from `work.q`, `work.v` on.
+
+    Also their signals and powers, see `exugear.solvers.compiled.observers.take_sample`, if there is room for them
+    (steps, columns) and (steps, 7); powers every `stride` steps, counted from the first of the run.
+    The first step begins at the time ``first * step``. Accelerations of the past are taken from `past` and left there.
+    A multistep method that has not enough of them takes Runge-Kutta steps, `START_PARTS` in place of each. Returns the
+    number of steps that stayed finite.
+    """
+    steps, size = out_q.shape
+    points = method.weights.shape[1]
+    # A state whose acceleration is not known takes a step of no length first: number -1.
+    for n in range(-1 if past.counts[KNOWN] == 0 else 0, steps):
+        multistep = points > 0 and past.counts[KNOWN] >= points
+        parts = START_PARTS if n >= 0 and points > 0 and not multistep else 1
+        h = step / parts
+        for part in range(parts):
+            begin = (first + n) * step + part * h
+            for stage in range(LAST_STAGE if n < 0 or multistep else 0, LAST_STAGE + 1):
+                at = begin + (0.5 * h if stage < 2 else h)
+                if stage == LAST_STAGE and part == parts - 1:
+                    at = (first + n + 1) * step
+                if n < 0:
+                    stay(work, size)
+                elif multistep:
+                    predict(step, method, past, work)
+                else:
+                    runge_kutta_stage(stage, h, past, work)
+                evaluate(at, work.stage_q, work.stage_v, equations, work)
+            if multistep:
+                correct(step, method, past, work)
+            # Of the parts of a starting step only the last acceleration is one of the past.
+            keep_acceleration(part == 0, work, past)
+        past.counts[KNOWN] += 1
+        if n < 0:
+            continue
+        if not copy_state(work, out_q[n], out_v[n]):
+            return n
+        if n < out_signals.shape[0]:
+            q, v, end = work.stage_q, work.stage_v, (first + n + 1) * step
+            due = stride if (first + n + 1) % stride == 0 else 0
+            take_sample(end, q, v, equations, work, columns, due, out_signals[n], out_energies[n])
+    done: int = steps
+    return done

@@ -1,0 +1,175 @@
+"""The regular part of a gear's compliance, on contact cells: that of tooth, rim and neighbours without the near field.
+
+Finite elements give it between the nodes of the flank grid (`fe_ste.elasticity.flank`). Here it is a function of two
+points of the flank, made of cubic splines over the profile and over the face width of each.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline, make_interp_spline
+
+from fe_ste.contact.cells import Cells
+from fe_ste.elasticity.flank import FlankCompliance
+from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.compilation import summing, summing_kernel
+
+#: Indices without a sign: one with a sign counts from the end if it is negative, which numba would ask at each use.
+Places: TypeAlias = NDArray[np.uintp]
+_ONE, _TWO, _THREE, _FOUR = np.uintp(1), np.uintp(2), np.uintp(3), np.uintp(4)
+
+
+@dataclass(frozen=True)
+class RegularCompliance:
+    """Regular compliance of one gear: coefficients of cubic splines over profile and face width.
+
+    Attributes
+    ----------
+    table : ndarray (blocks, f, l, l f)
+        Coefficients by profile and layer of the point that is read, and by layer and profile of the loaded one, m/N.
+    number : ndarray (t, t)
+        Block of (tooth pair read, tooth pair loaded); in a closed ring their difference decides.
+    first_tooth : int
+        Tooth pair of row and column 0 of `number`.
+    knots : ndarray
+        Knots over the arc length u = r_b roll^2 / 2, m: over it the flank's nodes are evenly spaced.
+    axial_knots : ndarray
+        Knots over the axial position, m.
+    base_radius : float
+        m.
+    """
+
+    table: Floats
+    number: Integers
+    first_tooth: int
+    knots: Floats
+    axial_knots: Floats
+    base_radius: float
+
+    @classmethod
+    def from_flank(cls, flank: FlankCompliance, sense: int, teeth: Integers, reach: int) -> RegularCompliance:
+        """Lay splines through the compliance between the nodes of `flank`.
+
+        Parameters
+        ----------
+        flank : FlankCompliance
+        sense : int
+            Sense in which this gear's tooth numbers run with the tooth pairs.
+        teeth : ndarray
+            Consecutive tooth pairs that may touch.
+        reach : int
+            Largest difference of tooth pairs in contact at once.
+        """
+        arc = flank.gear.base_radius * flank.roll**2 / 2.0
+        along_profile = make_interp_spline(arc, np.eye(len(arc)), k=3)
+        along_axis = make_interp_spline(flank.axial, np.eye(len(flank.axial)), k=3)
+        keys: list[tuple[int, int]] = []
+        number = np.full((len(teeth), len(teeth)), -1, dtype=np.int64)
+        for row, read in enumerate(teeth):
+            for column, loaded in enumerate(teeth):
+                if abs(read - loaded) <= reach:
+                    key = flank.key(int(sense * read), int(sense * loaded))
+                    if key not in keys:
+                        keys.append(key)
+                    number[row, column] = keys.index(key)
+        blocks = np.array([_coefficients(flank.regular[key], along_axis.c, along_profile.c) for key in keys])
+        return cls(blocks, number, int(teeth[0]), along_profile.t, along_axis.t, flank.gear.base_radius)
+
+    def add_to(self, matrix: Floats, groups: Integers, cells: Cells, roll: Floats, axial: Floats) -> None:
+        """Add the approach of this flank at each cell under unit forces on each cell, lower triangle.
+
+        Parameters
+        ----------
+        matrix : ndarray (n, n)
+            m/N; above the diagonal anything may be added.
+        groups : ndarray (g + 1,)
+            Bounds of the runs of cells of one tooth pair and slice.
+        cells : Cells
+        roll : ndarray (n,)
+            Roll angles of the cells on this gear, rad.
+        axial : ndarray (slices,)
+            Middle of the contact slices, m.
+        """
+        arc = np.clip(self.base_radius * roll**2 / 2.0, self.knots[0], self.knots[-1])
+        own = cells.tooth[groups[:-1]] - self.first_tooth, cells.layer[groups[:-1]], self.number
+        tooth, layer, number = (places.astype(np.uintp) for places in own)
+        profile, width = _first_and_weights(arc, self.knots), _first_and_weights(axial, self.axial_knots)
+        _add_regular(matrix, groups.astype(np.uintp), tooth, layer, *profile, *width, self.table, number)
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        blocks, splines, layers = self.table.shape[:3]
+        return f"<RegularCompliance: {blocks} blocks, {splines} splines over the profile, {layers} over the face width>"
+
+
+def _first_and_weights(at: Floats, knots: Floats) -> tuple[Places, Floats]:
+    """First spline and the four spline values at each place."""
+    rows = BSpline.design_matrix(at, knots, 3)
+    return rows.indices.reshape(-1, 4)[:, 0].astype(np.uintp), rows.data.reshape(-1, 4)
+
+
+def _coefficients(block: Floats, along_axis: Floats, along_profile: Floats) -> Floats:
+    """Turn nodal values on the flank grid (f l, f l) into spline coefficients (f, l, l f)."""
+    profile, layers = len(along_profile), len(along_axis)
+    read = np.kron(along_profile, along_axis)
+    loaded = np.einsum("kl,pf->flkp", along_axis, along_profile).reshape(profile * layers, layers * profile)
+    return np.asarray((read @ block @ loaded).reshape(profile, layers, layers * profile))
+
+
+@summing
+def _add_regular(
+    matrix: Floats,
+    groups: Places,
+    tooth: Places,
+    layer: Places,
+    first: Places,
+    weights: Floats,
+    axial_first: Places,
+    axial_weights: Floats,
+    table: Floats,
+    number: Places,
+) -> None:
+    """Add the regular compliance of one gear, see `RegularCompliance.add_to`; ``tooth``, ``layer`` are those of groups.
+
+    The splines of a row's layer are summed for its slice, those of its profile for its cell, and what is left, a
+    function of the loaded point, for each slice and at last for each cell of a tooth pair.
+    """
+    splines, layers = table.shape[1], table.shape[2]
+    of_slice, of_cell = np.empty((splines, layers * splines)), np.empty((layers, splines))
+    loaded = np.empty(splines)
+    for g in range(len(groups) - 1):
+        own = first[groups[g] : groups[g + 1]]
+        start = 0
+        while start <= g:
+            end = start  # the run of groups of one tooth pair up to this group
+            while end <= g and tooth[end] == tooth[start]:
+                end += 1
+            block = table[number[tooth[g], tooth[start]]]
+            for p in range(own.min(), own.max() + _FOUR):
+                _sum_four(of_slice[p], block[p], axial_first[layer[g]], axial_weights[layer[g]])
+            for i in range(groups[g], groups[g + 1]):
+                _sum_four(of_cell.reshape(of_cell.size), of_slice, first[i], weights[i])
+                for h in range(start, end):
+                    _sum_four(loaded, of_cell, axial_first[layer[h]], axial_weights[layer[h]])
+                    for j in range(groups[h], groups[h + 1]):
+                        at = first[j]
+                        matrix[i, j] += (
+                            weights[j, 0] * loaded[at]
+                            + weights[j, 1] * loaded[at + _ONE]
+                            + weights[j, 2] * loaded[at + _TWO]
+                            + weights[j, 3] * loaded[at + _THREE]
+                        )
+            start = end
+
+
+@summing_kernel
+def _sum_four(result: Floats, rows: Floats, first: np.uintp, weights: Floats) -> None:
+    """Weighted sum of four rows that follow each other."""
+    row_0, row_1, row_2, row_3 = rows[first], rows[first + _ONE], rows[first + _TWO], rows[first + _THREE]
+    weight_0, weight_1, weight_2, weight_3 = weights[0], weights[1], weights[2], weights[3]
+    for q in range(len(result)):
+        result[q] = weight_0 * row_0[q] + weight_1 * row_1[q] + weight_2 * row_2[q] + weight_3 * row_3[q]
