@@ -53,16 +53,30 @@ def stiffness_matrix(
     ----------
     R. L. Taylor, P. J. Beresford, E. L. Wilson, Int. J. Num. Meth. Eng. 10 (1976) 1211-1219.
     """
-    nodes, gradients, volumes = brick_gradients(points, hexahedra)
-    if incompatible_modes:
-        element_stiffness = _condense_bubbles(gradient_products(gradients, volumes, material))
-    else:
-        element_stiffness = gradient_products(gradients[:8], volumes, material)
+    nodes, element_matrices = element_stiffness(points, hexahedra, material, incompatible_modes)
     unknowns = (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), 24)
     rows = np.repeat(unknowns, 24, axis=1).ravel()
     columns = np.tile(unknowns, (1, 24)).ravel()
     size = 3 * len(points)
-    return scipy.sparse.csr_matrix((element_stiffness.ravel(), (rows, columns)), shape=(size, size))
+    return scipy.sparse.csr_matrix((element_matrices.ravel(), (rows, columns)), shape=(size, size))
+
+
+def element_stiffness(
+    points: Floats, hexahedra: Integers, material: Material, incompatible_modes: bool = True
+) -> tuple[Integers, Floats]:
+    """Stiffness of single elements; parameters, errors and source as `stiffness_matrix`.
+
+    Returns
+    -------
+    nodes : ndarray (m, 8)
+        Nodes of each element in the order of its matrix.
+    stiffness : ndarray (m, 24, 24)
+        N/m; unknown ``3 place of the node + direction``.
+    """
+    nodes, gradients, volumes = brick_gradients(points, hexahedra)
+    if incompatible_modes:
+        return nodes, _condense_bubbles(gradient_products(gradients, volumes, material))
+    return nodes, gradient_products(gradients[:8], volumes, material)
 
 
 def brick_gradients(points: Floats, hexahedra: Integers) -> tuple[Integers, Floats, Floats]:

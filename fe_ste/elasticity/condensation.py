@@ -11,56 +11,53 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse
 
-from fe_ste.elasticity.bricks import stiffness_matrix
+from fe_ste.elasticity.half_sector import sector_halves, turn_signs
 from fe_ste.elasticity.halfspace import tent_weights
 from fe_ste.elasticity.hexmesh import SectionMesh, SectorMesh
-from fe_ste.elasticity.ring import open_chain_faces, ring_faces, uniform_faces
+from fe_ste.elasticity.ring import Chain, open_chain_faces, ring_faces, uniform_faces
 from fe_ste.geometry.gears import Gear
 from fe_ste.tools.arrays import Floats, Integers
-from fe_ste.tools.sparse import Backend, factorise
 
 
 @dataclass(frozen=True)
 class CondensedSector:
     """One tooth sector condensed onto its cut faces, with loads and read-outs on its flank.
 
-    The unknowns of the +pi/z face are expressed in the frame of the next sector, so that joining two sectors means
-    equating the same numbers. Each face has m unknowns, the one at -pi/z (minus) comes first; the flank has n nodes.
-    What is ``fixed`` holds with the faces held, what is ``static`` is added by their displacements.
+    Each cut face has m unknowns, the same on both sides of it, so that joining two sectors means equating the same
+    numbers; the flank has n nodes. What is ``fixed`` holds with the faces held, to which is added what their
+    displacements do. Pairs hold an even and an odd part, see `fe_ste.elasticity.half_sector`.
 
     Attributes
     ----------
-    backend : str
-        Sparse solver.
-    stiffness : ndarray (2 m, 2 m)
-        Of the faces, N/m.
-    face_load : ndarray (2 m, n)
-        Forces on the faces under unit nodal loads on the flank.
-    fixed_depth, fixed_surface : ndarray (n, n)
-        Normal displacement at the depth and on the flank under unit nodal loads, m/N.
-    static_depth, static_surface : ndarray (n, 2 m)
-        The same by the displacements of the faces.
-    fixed_torque, static_torque : ndarray (n,), (2 m,)
-        Torque of the reaction at the held surface about the axis, per unit nodal load (m) and face displacement (N).
+    stiffness : Chain
+        Of the plus face, N/m.
+    signs : ndarray (m,)
+        What the half turn about the middle of a face does to its unknowns.
+    load : Chain
+        Forces (m, n) on the plus face under unit nodal loads on the flank.
+    fixed_depth : ndarray (n, n)
+        Normal displacement at the depth under unit nodal loads, m/N.
+    face_depth, face_surface : tuple of ndarray (n, m)
+        The same, and that on the flank, by the displacements of the plus face.
+    fixed_torque, face_torque : ndarray (n,), (m,)
+        Torque of the reaction at the held surface about the axis, per unit nodal load (m), and per displacement of the
+        plus face and the opposite one of the minus face (N).
     weights : ndarray (n, n)
         Nodal loads of the tent loads, see `fe_ste.elasticity.halfspace.tent_weights`.
     """
 
-    backend: str
-    stiffness: Floats
-    face_load: Floats
+    stiffness: Chain
+    signs: Floats
+    load: Chain
     fixed_depth: Floats
-    fixed_surface: Floats
-    static_depth: Floats
-    static_surface: Floats
+    face_depth: tuple[Floats, Floats]
+    face_surface: tuple[Floats, Floats]
     fixed_torque: Floats
-    static_torque: Floats
+    face_torque: Floats
     weights: Floats
 
     @classmethod
-    def from_mesh(
-        cls, mesh: SectorMesh, side: int, depth: float, incompatible_modes: bool, backend: Backend | None
-    ) -> CondensedSector:
+    def from_mesh(cls, mesh: SectorMesh, side: int, depth: float, incompatible_modes: bool) -> CondensedSector:
         """Condense the mesh of a sector.
 
         Parameters
@@ -72,62 +69,35 @@ class CondensedSector:
             Distance of the read-out points from the flank, m.
         incompatible_modes : bool
             See `fe_ste.elasticity.bricks.stiffness_matrix`.
-        backend : {"pardiso", "superlu"}, optional
         """
-        gear = mesh.gear
-        stiffness = stiffness_matrix(mesh.points, mesh.hexahedra, gear.material, incompatible_modes)
-        turn = _turned_face(mesh)
-        faces = np.concatenate([_unknowns(mesh.cut_nodes(-1)), _unknowns(mesh.cut_nodes(1))])
-        held = _unknowns(mesh.held_nodes)
-        inside = np.setdiff1d(np.arange(stiffness.shape[0]), np.concatenate([faces, held]))
-        # K in blocks: i inside, f faces, held ones zero. One factor of K_ii gives the condensed faces
-        # K_ff - K_fi K_ii^-1 K_if, what loads on the flank do to the faces, and what both do to the read-outs.
-        to_faces = stiffness[:, faces] @ turn
-        coupling = to_faces[inside].tocsc()
-        surface, depth_rows = flank_functionals(mesh, side, depth)
-        torque = _torque_functional(mesh)
-        # Reaction at the held surface is K_h u; its torque is a row like the read-outs.
-        held_torque = stiffness[held].T @ torque[held]
-        loads = scipy.sparse.hstack([coupling, -surface[inside]]).tocsc()
-        readings = scipy.sparse.hstack(
-            [
-                coupling,
-                -depth_rows[inside],
-                -surface[inside],
-                scipy.sparse.csc_matrix(held_torque[inside][:, None]),
-            ]
-        ).tocsc()
-        with factorise(stiffness[inside][:, inside], backend) as factor:
-            name = factor.name
-            response = factor.compliance(readings, loads)
-        count = len(faces)
-        nodes = surface.shape[1]
-        depth_part = slice(count, count + nodes)
-        surface_part = slice(count + nodes, count + 2 * nodes)
-        face_to_face = (turn.T @ to_faces[faces]).toarray()
-        condensed = face_to_face - response[:count, :count]
+        # Loads press into the flank, and displacements into it are read: both are against the outward normal.
+        surface, below = (-columns for columns in flank_functionals(mesh, side, depth))
+        halves = sector_halves(mesh, (surface, below), incompatible_modes)
+        even, odd = halves
+        count = surface.shape[1]
+        # A load alone is half of it with the same one turned, and half of it with the opposite one turned.
+        fixed = (even.fixed_reading + odd.fixed_reading) / 2
         return cls(
-            backend=name,
-            stiffness=(condensed + condensed.T) / 2,  # symmetric but for rounding
-            face_load=-response[:count, count:],
-            fixed_depth=response[depth_part, count:],
-            fixed_surface=response[surface_part, count:],
-            static_depth=-response[depth_part, :count],
-            static_surface=-response[surface_part, :count],
-            fixed_torque=response[-1, count:],
-            static_torque=np.asarray(turn.T @ held_torque[faces]) - response[-1, :count],
+            stiffness=Chain(even.stiffness, odd.stiffness),
+            signs=turn_signs(mesh),
+            load=Chain(*(half.face_reading[:count].T for half in halves)),
+            fixed_depth=fixed[count:, :count],
+            face_depth=(even.face_reading[count:], odd.face_reading[count:]),
+            face_surface=(even.face_reading[:count], odd.face_reading[:count]),
+            fixed_torque=odd.fixed_torque[:count],
+            face_torque=odd.face_torque,
             weights=tent_weights(mesh.section.flank_roll, mesh.axial_positions),
         )
 
     def ring_faces(self, teeth: int, reach: int) -> dict[tuple[int, int], tuple[Floats, Floats]]:
         """Displacement of the minus and plus face of the teeth within `reach` of the loaded one."""
-        faces = ring_faces(self.stiffness, self.face_load, teeth, reach)
+        faces = ring_faces(self.stiffness, self.load, self.signs, teeth, reach)
         return {(offset, 0): (faces[offset], faces[offset + 1]) for offset in range(-reach, reach + 1)}
 
     def ring_torque(self) -> Floats:
         """Torque of the reaction at the held surface of the whole ring per unit nodal load."""
-        minus, plus = np.split(self.static_torque, 2)
-        return np.asarray(self.fixed_torque + (minus + plus) @ uniform_faces(self.stiffness, self.face_load))
+        faces = uniform_faces(self.stiffness, self.load, self.signs)
+        return self.fixed_torque + self._torque(faces, faces)
 
     def open_faces(self, teeth: int) -> tuple[dict[tuple[int, int], tuple[Floats, Floats]], Floats]:
         """Face displacements of an open chain of sectors with free ends, for every loaded tooth.
@@ -135,40 +105,29 @@ class CondensedSector:
         Also the torque of the reaction at the held surface when the middle tooth is loaded.
         """
         middle = teeth // 2
-        by_load = open_chain_faces(self.stiffness, self.face_load, teeth)
+        even, odd = self.load
+        load = np.concatenate([self.signs[:, None] * (even - odd), even + odd]) / 2
+        by_load = open_chain_faces(self.stiffness.whole(self.signs), load, teeth)
         faces = {
             (read - middle, loaded - middle): (chain[read], chain[read + 1])
             for loaded, chain in enumerate(by_load)
             for read in range(teeth)
         }
-        minus, plus = np.split(self.static_torque, 2)
         torque = self.fixed_torque.copy()
         for read in range(teeth):
-            torque += minus @ by_load[middle][read] + plus @ by_load[middle][read + 1]
+            torque += self._torque(by_load[middle][read], by_load[middle][read + 1])
         return faces, torque
+
+    def _torque(self, minus: Floats, plus: Floats) -> Floats:
+        return np.asarray(self.face_torque @ (plus - self.signs[:, None] * minus))
 
     def displacement(self, loaded: bool, minus: Floats, plus: Floats) -> Floats:
         """Compliance (read node, loaded node): at depth under tent loads on the own tooth, on the surface elsewhere."""
-        half = len(minus)
-        if loaded:
-            # The displacement with fixed faces and what the faces add. Tent loads are spread over nodes: the half-space
-            # solution that is taken out has the same loads.
-            nodal = self.fixed_depth + self.static_depth[:, :half] @ minus + self.static_depth[:, half:] @ plus
-            return np.asarray(nodal @ self.weights)
-        return np.asarray(self.static_surface[:, :half] @ minus + self.static_surface[:, half:] @ plus)
-
-
-def _unknowns(nodes: Integers) -> Integers:
-    return np.asarray((3 * nodes[:, None] + np.arange(3)).ravel())
-
-
-def _turned_face(mesh: SectorMesh) -> scipy.sparse.csc_matrix:
-    """Face unknowns (minus, plus) from face unknowns with the plus face in the frame of the next sector."""
-    pitch = mesh.gear.angular_pitch
-    rotation = np.array([[np.cos(pitch), -np.sin(pitch), 0], [np.sin(pitch), np.cos(pitch), 0], [0, 0, 1]])
-    nodes = len(mesh.cut_nodes(1))
-    parts = [scipy.sparse.identity(3 * nodes), scipy.sparse.kron(scipy.sparse.identity(nodes), rotation)]
-    return scipy.sparse.csc_matrix(scipy.sparse.block_diag(parts))
+        turned = self.signs[:, None] * minus
+        even, odd = self.face_depth if loaded else self.face_surface
+        moved = even @ ((plus + turned) / 2) + odd @ ((plus - turned) / 2)
+        # Tent loads are spread over nodes: the half-space solution that is taken out has the same loads.
+        return np.asarray((self.fixed_depth + moved) @ self.weights if loaded else moved)
 
 
 def flank_functionals(
@@ -194,12 +153,6 @@ def flank_functionals(
         share = np.broadcast_to(weights[:, corner, None], nodes.shape)
         below = below + columns(section_nodes[:, corner, None] + layer, share)
     return surface, below
-
-
-def _torque_functional(mesh: SectorMesh) -> Floats:
-    """Displacements of a unit rotation about the axis: their product with forces is the torque."""
-    x, y, _ = mesh.points.T
-    return np.stack([-y, x, np.zeros_like(x)], axis=-1).ravel()
 
 
 def flank_normals(mesh: SectorMesh, side: int) -> Floats:

@@ -11,7 +11,7 @@ displacements of a flank are positive into the material, as a pressing load acts
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,7 +21,6 @@ from fe_ste.elasticity.hexmesh import MeshSettings, SectorMesh, sector_mesh
 from fe_ste.geometry.gears import Gear
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.notebook import html_table, value_range
-from fe_ste.tools.sparse import Backend
 from fe_ste.tools.threads import one_dense_thread
 
 #: Depth below the flank at which the half-space solution hands over to the finite elements, in normal modules.
@@ -53,7 +52,7 @@ class FlankCompliance:
     hub_torque : ndarray (f l,)
         Torque of the reaction at the held surface about the axis per unit load on each flank node, m.
     figures : dict
-        Unknowns, elements, least scaled Jacobian, back end.
+        Unknowns, elements, least scaled Jacobian.
     """
 
     gear: Gear
@@ -83,6 +82,24 @@ class FlankCompliance:
         if key not in self.regular:
             raise ValueError(f"gear {self.gear.name}: no compliance between teeth {read} and {loaded}")
         return key
+
+    def turned(self) -> FlankCompliance:
+        """Return the other flank of the same gear.
+
+        A gear is equal to itself turned by 180 degrees about the middle of a tooth: that brings one flank to the other,
+        reverses the axis and the order of the teeth, and the torque about the axis.
+        """
+        nodes = np.arange(len(self.hub_torque)).reshape(len(self.roll), -1)[:, ::-1].ravel()
+        return replace(
+            self,
+            side=-self.side,
+            axial=-self.axial[::-1],
+            regular={
+                (-read, -loaded): np.ascontiguousarray(block[np.ix_(nodes, nodes)])
+                for (read, loaded), block in self.regular.items()
+            },
+            hub_torque=-self.hub_torque[nodes],
+        )
 
     @property
     def tooth_reach(self) -> int:
@@ -132,7 +149,6 @@ def flank_compliance(
     incompatible_modes: bool = True,
     depth: float | None = None,
     mirror: float = 1.0,
-    backend: Backend | None = None,
 ) -> FlankCompliance:
     """Compute the compliance of one flank of `gear` by finite elements.
 
@@ -151,8 +167,6 @@ def flank_compliance(
         Hand-over depth, m; `HANDOVER_DEPTH` normal modules unless given.
     mirror : float
         Strength of the image loads at the free end faces in the near field.
-    backend : {"pardiso", "superlu"}, optional
-        Sparse solver.
 
     Returns
     -------
@@ -166,7 +180,7 @@ def flank_compliance(
     if open_teeth is not None and not (1 <= open_teeth <= gear.teeth and open_teeth % 2 == 1):
         raise ValueError(f"open_teeth = {open_teeth}: must be an odd number from 1 to {gear.teeth}")
     with one_dense_thread():
-        return _flank_compliance(gear, side, settings, open_teeth, incompatible_modes, depth, mirror, backend)
+        return _flank_compliance(gear, side, settings, open_teeth, incompatible_modes, depth, mirror)
 
 
 def _flank_compliance(
@@ -177,11 +191,10 @@ def _flank_compliance(
     incompatible_modes: bool,
     depth: float | None,
     mirror: float,
-    backend: Backend | None,
 ) -> FlankCompliance:
     mesh = sector_mesh(gear, settings)
     depth = HANDOVER_DEPTH * gear.normal_module if depth is None else depth
-    sector = CondensedSector.from_mesh(mesh, side, depth, incompatible_modes, backend)
+    sector = CondensedSector.from_mesh(mesh, side, depth, incompatible_modes)
     if open_teeth is None:
         faces, torque = sector.ring_faces(gear.teeth, min(TOOTH_REACH, (gear.teeth - 2) // 2)), sector.ring_torque()
     else:
@@ -209,7 +222,6 @@ def _flank_compliance(
             "unknowns": 3 * len(mesh.points),
             "elements": len(mesh.hexahedra),
             "least_scaled_jacobian": float(mesh.scaled_jacobian.min()),
-            "sparse_solver": sector.backend,
         },
     )
 

@@ -1,75 +1,125 @@
 """Joining equal tooth sectors to an open chain or to the closed ring.
 
-A sector is a symmetric stiffness matrix on its two cut faces, minus face first; the unknowns of the plus face are
-written in the frame of the next sector, so that joining two sectors means equating the same numbers. A chain of
-sectors is again such a matrix, made by doubling: a ring of z teeth takes some log2(z) eliminations of one face,
-where the discrete Fourier transform over the teeth takes z/2 complex ones.
+A sector, and any chain of sectors, turned by 180 degrees about the line through its middle is equal to itself. So it is
+two symmetric stiffness matrices on its plus face: one for even deformations, which that turn keeps, and one for odd
+ones, which it reverses; the minus face then moves as the plus face turned, or against it. The unknowns of a face are
+chosen so that the turn about the face's own middle keeps or reverses each: its signs, 1 or -1, ones first.
+
+A chain is made by doubling: a ring of z teeth takes some log2(z) eliminations of one face, where the discrete Fourier
+transform over the teeth takes z/2 complex ones.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
 
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.dense import divided_by_factor, eliminate, mirrored_lower
+from fe_ste.tools.threads import side_by_side
 
 
-def blocks(chain: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Split a chain's matrix (2 m, 2 m) into its blocks minus-minus, minus-plus, plus-minus, plus-plus."""
-    half = len(chain) // 2
-    return chain[:half, :half], chain[:half, half:], chain[half:, :half], chain[half:, half:]
+class Chain(NamedTuple):
+    """Equal sectors in a row, or one: stiffness (m, m) of the plus face in even and in odd deformations, N/m."""
+
+    even: Floats
+    odd: Floats
+
+    @property
+    def own(self) -> Floats:
+        """Force on the plus face by its own displacement, the minus face held."""
+        return (self.even + self.odd) / 2
+
+    @property
+    def across(self) -> Floats:
+        """Force on the plus face by the displacement of the minus face turned, the plus face held."""
+        return (self.even - self.odd) / 2
+
+    def whole(self, signs: Floats) -> Floats:
+        """Return the stiffness (2 m, 2 m) of both faces, minus face first."""
+        turned = self.own * signs * signs[:, None]
+        return np.block([[turned, signs[:, None] * self.across], [self.across * signs, self.own]])
 
 
-def joined(first: Floats, second: Floats) -> Floats:
-    """Join two chains and condense the face between them.
+def doubled(chain: Chain, signs: Floats) -> Chain:
+    """Join a chain to one like it.
 
     Parameters
     ----------
-    first, second : ndarray (2 m, 2 m)
-        The plus face of `first` is the minus face of `second`.
-
-    Returns
-    -------
-    ndarray (2 m, 2 m)
+    chain : Chain
+    signs : ndarray (m,)
+        Of the unknowns of a face.
 
     Examples
     --------
-    Two equal springs in series are half as stiff:
+    Two equal springs in series are half as stiff. Their ends move along the springs, which the turn reverses: even is
+    what stretches them, odd what moves them as a whole.
 
-    >>> spring = np.array([[2.0, -2.0], [-2.0, 2.0]])
-    >>> joined(spring, spring).tolist()
-    [[1.0, -1.0], [-1.0, 1.0]]
+    >>> spring = Chain(even=np.array([[2.0]]), odd=np.array([[0.0]]))
+    >>> doubled(spring, np.array([-1.0])).even.tolist()
+    [[1.0]]
     """
-    outer_minus, to_middle, _, middle_first = blocks(first)
-    middle_second, _, from_middle, outer_plus = blocks(second)
-    # Schur complement of the joined face: outer blocks less (coupling) (middle)^-1 (coupling)'. By the Cholesky factor
-    # it is a product with its own transpose, and so stays symmetric to the last bit.
-    coupling = np.concatenate([to_middle, from_middle])
-    factor = scipy.linalg.cholesky(middle_first + middle_second, lower=True, overwrite_a=True, check_finite=False)
-    reduced = scipy.linalg.solve_triangular(factor, coupling.T, lower=True, check_finite=False)
-    result = -reduced.T @ reduced
-    half = len(outer_minus)
-    result[:half, :half] += outer_minus
-    result[half:, half:] += outer_plus
-    return np.asarray(result)
+    own, across, ones = chain.own, chain.across, int(np.count_nonzero(signs > 0))
+
+    def half(parity: int) -> Floats:
+        # The joined face lies in the middle of the new chain: an even deformation moves only what its turn keeps.
+        moved = slice(None, ones) if parity > 0 else slice(ones, None)
+        return _condensed(own[moved, moved], across[:, moved], own)[0]
+
+    return Chain(*side_by_side(half, (1, -1)))
 
 
-def chain(sector: Floats, count: int) -> Floats:
+def enclosed(inner: Floats, outer: Chain, signs: Floats) -> tuple[Floats, Floats, Floats]:
+    """Join a chain to either end of another one.
+
+    Parameters
+    ----------
+    inner : ndarray (m, m)
+        The even or the odd stiffness of the chain in the middle.
+    outer : Chain
+    signs : ndarray (m,)
+
+    Returns
+    -------
+    stiffness : ndarray (m, m)
+        Of the whole, even or odd as `inner`.
+    factor, below : ndarray (m, m)
+        ``-(below @ inv(factor)).T`` is the displacement of the inner plus face by that of the outer one.
+    """
+    return _condensed(inner + outer.own * signs * signs[:, None], outer.across * signs, outer.own)
+
+
+def _condensed(gone: Floats, coupling: Floats, kept: Floats) -> tuple[Floats, Floats, Floats]:
+    """Schur complement of the unknowns that are gone, their Cholesky factor L, and the coupling times L^-T."""
+    size, count = len(kept), len(gone)
+    front = np.empty((count + size, count + size), order="F")
+    front[:count, :count], front[count:, :count], front[count:, count:] = gone, coupling, kept
+    eliminate(front, count)
+    return mirrored_lower(front[count:, count:]), front[:count, :count], front[count:, :count]
+
+
+def chain_of(sector: Chain, count: int, signs: Floats) -> Chain:
     """Join `count` equal sectors, by doubling."""
     if count == 1:
         return sector
-    twice = chain(joined(sector, sector), count // 2)
-    return joined(twice, sector) if count % 2 else twice
+    half = chain_of(sector, count // 2, signs)
+    if count % 2 == 0:
+        return doubled(half, signs)
+    return Chain(*side_by_side(lambda middle: enclosed(middle, half, signs)[0], sector))
 
 
-def ring_faces(sector: Floats, load: Floats, teeth: int, reach: int) -> dict[int, Floats]:
+def ring_faces(sector: Chain, load: Chain, signs: Floats, teeth: int, reach: int) -> dict[int, Floats]:
     """Face displacements of the closed ring under loads on one sector.
 
     Parameters
     ----------
-    sector : ndarray (2 m, 2 m)
-    load : ndarray (2 m, k)
-        Load columns on the minus and plus face of sector 0.
+    sector : Chain
+    load : Chain
+        Forces (m, k) on the plus face of sector 0 under even and odd loads: a load and the same turned, or reversed.
+    signs : ndarray (m,)
+        Of the unknowns of a face.
     teeth : int
         Sectors of the ring.
     reach : int
@@ -78,28 +128,33 @@ def ring_faces(sector: Floats, load: Floats, teeth: int, reach: int) -> dict[int
     Returns
     -------
     dict
-        Face number -> ndarray (m, k) for the faces ``-reach`` to ``reach + 1``; face j is the minus face of sector j.
+        Face number -> ndarray (m, k) for the faces ``-reach`` to ``reach + 1``, under the loads alone; face j is the
+        minus face of sector j.
     """
-    minus_minus, minus_plus, plus_minus, plus_plus = blocks(sector)
-    half = len(minus_minus)
-    # The ring is sector 0 and a chain of all others, condensed to its two ends. The chains that lack the sectors near
-    # sector 0 are kept on the way: they give the faces in between back.
-    rests = [chain(sector, teeth - 1 - reach)]
-    for _ in range(reach):
-        rests.append(joined(sector, rests[-1]))
-    rest = rests.pop()
-    # The rest's minus face is the plus face of sector 0 and the other way round, hence the exchanged blocks.
-    closed = sector + np.block([[blocks(rest)[3], blocks(rest)[2]], [blocks(rest)[1], blocks(rest)[0]]])
-    solution = scipy.linalg.solve(closed, load, assume_a="pos", check_finite=False)
-    faces = {0: solution[:half], 1: solution[half:]}
-    for step in range(1, reach + 1):
-        rest_mm, rest_mp, rest_pm, rest_pp = blocks(rests.pop())
-        # Equilibrium of the next face on either side, between the sector just solved and a chain one shorter.
-        ahead = plus_minus @ faces[step] + rest_mp @ faces[0]
-        faces[step + 1] = -scipy.linalg.solve(plus_plus + rest_mm, ahead, assume_a="pos", check_finite=False)
-        behind = minus_plus @ faces[1 - step] + rest_pm @ faces[1]
-        faces[-step] = -scipy.linalg.solve(minus_minus + rest_pp, behind, assume_a="pos", check_finite=False)
-    return faces
+    # The ring is sector 0 and a chain of all others. That grows from its middle, opposite to sector 0, by one sector on
+    # either side; on the way it tells how each face follows the next one.
+    rest = chain_of(sector, teeth - 1 - 2 * reach, signs)
+
+    def one_parity(parity: int) -> list[Floats]:
+        at = 0 if parity > 0 else 1
+        stiffness, follows = rest[at], []
+        for _ in range(reach):
+            stiffness, factor, below = enclosed(stiffness, sector, signs)
+            follows.append(-divided_by_factor(below, factor).T)
+        # The plus face of the rest is the minus face of sector 0, which moves as the plus face turned, or against that.
+        closed = sector[at] + stiffness * signs * signs[:, None]
+        first = scipy.linalg.solve(closed, load[at], assume_a="pos", check_finite=False)
+        faces = [parity * signs[:, None] * first]
+        for follow in reversed(follows):
+            faces.append(follow @ faces[-1])
+        return faces  # 0, -1, -2, ...
+
+    even, odd = side_by_side(one_parity, (1, -1))
+    result = {}
+    for step, (kept, reverse) in enumerate(zip(even, odd, strict=True)):
+        result[-step] = (kept + reverse) / 2
+        result[step + 1] = signs[:, None] * (kept - reverse) / 2
+    return result
 
 
 def open_chain_faces(sector: Floats, load: Floats, teeth: int) -> list[list[Floats]]:
@@ -108,6 +163,7 @@ def open_chain_faces(sector: Floats, load: Floats, teeth: int) -> list[list[Floa
     Parameters
     ----------
     sector : ndarray (2 m, 2 m)
+        Both faces, minus face first; see `Chain.whole`.
     load : ndarray (2 m, k)
         Load columns on the faces of the loaded sector.
     teeth : int
@@ -132,9 +188,13 @@ def open_chain_faces(sector: Floats, load: Floats, teeth: int) -> list[list[Floa
     return result
 
 
-def uniform_faces(sector: Floats, load: Floats) -> Floats:
-    """Sum over the ring's faces of their displacements under `load`: the harmonic of order zero, (m, k)."""
-    # In that harmonic both faces of a sector move alike, so all four blocks add up.
-    half = len(sector) // 2
-    matrix = sum(blocks(sector), np.zeros((half, half)))
-    return np.asarray(scipy.linalg.solve(matrix, load[:half] + load[half:], assume_a="pos", check_finite=False))
+def uniform_faces(sector: Chain, load: Chain, signs: Floats) -> Floats:
+    """Sum over the ring's faces of their displacements under loads as in `ring_faces`, (m, k)."""
+    # In this harmonic of order zero both faces of a sector move alike: what the turn of a face keeps is an even
+    # deformation of the sector, what it reverses an odd one.
+    ones = int(np.count_nonzero(signs > 0))
+    parts = (
+        scipy.linalg.solve(stiffness[part, part], forces[part], assume_a="pos", check_finite=False)
+        for stiffness, forces, part in zip(sector, load, (slice(None, ones), slice(ones, None)), strict=True)
+    )
+    return np.concatenate(list(parts)) / 2

@@ -1,7 +1,8 @@
 """Direct factorisation of sparse symmetric positive definite matrices, behind one interface.
 
 Two libraries do the work: MKL PARDISO where ``pypardiso`` is installed (extra ``fast``), else SuperLU, which
-comes with SciPy. Both give the same numbers to 1e-9; PARDISO is faster by about ten.
+comes with SciPy. Both give the same numbers to 1e-9; PARDISO is faster by about ten. Elastic bodies and the reference
+analysis are solved so; tooth sectors are condensed without either (`fe_ste.elasticity.dissection`).
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import numpy as np
 import scipy.sparse.linalg
 
 from fe_ste.tools.arrays import Floats, SparseMatrix
+from fe_ste.tools.dense import NotPositiveDefiniteError
 
 Backend: TypeAlias = Literal["pardiso", "superlu"]
 RIGHT_HAND_SIDES_AT_A_TIME = 128
@@ -29,7 +31,7 @@ LARGEST_PROBE_ERROR = 1e-6
 """Relative error of a recovered known solution above which a matrix counts as singular."""
 
 
-class FactorisationError(ValueError):
+class FactorisationError(NotPositiveDefiniteError):
     """The matrix is not symmetric positive definite, or too nearly singular to solve with."""
 
 
@@ -77,29 +79,6 @@ class Factorisation(ABC):
         for columns in _chunks(rhs.shape[1]):
             solution[:, columns] = self._solve_dense(_dense_columns(rhs[:, columns]))
         return solution
-
-    def compliance(self, left: Floats | SparseMatrix, right: Floats | SparseMatrix) -> Floats:
-        """Evaluate left^T A^-1 right without holding A^-1 right as a whole.
-
-        Parameters
-        ----------
-        left : (n, p) array or sparse matrix
-            Read-outs, one a column.
-        right : (n, k) array or sparse matrix
-            Loads, one a column.
-
-        Returns
-        -------
-        (p, k) array
-            Read-out of each load's solution.
-        """
-        self._check_usable(left)
-        self._check_usable(right)
-        read_out = left.T if isinstance(left, np.ndarray) else left.T.tocsr()
-        result = np.empty((left.shape[1], right.shape[1]))
-        for columns in _chunks(right.shape[1]):
-            result[:, columns] = read_out @ self._solve_dense(_dense_columns(right[:, columns]))
-        return result
 
     def close(self) -> None:
         """Release the factor's memory; harmless when repeated."""

@@ -14,13 +14,13 @@ import numpy as np
 
 from fe_ste.contact.cells import ContactSettings
 from fe_ste.contact.regular import RegularCompliance
-from fe_ste.elasticity.flank import FlankCompliance, flank_compliance
+from fe_ste.elasticity.flank import FlankCompliance
 from fe_ste.elasticity.hexmesh import MeshSettings
+from fe_ste.elasticity.known_flanks import known_flanks
 from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.notebook import html_table, value_range
-from fe_ste.tools.sparse import Backend
 
 
 @dataclass(frozen=True)
@@ -152,9 +152,8 @@ def pair_compliance(
     *,
     open_teeth: int | None = None,
     incompatible_modes: bool = True,
-    backend: Backend | None = None,
 ) -> PairCompliance:
-    """Compute the compliance of both gears of `pair` by finite elements.
+    """Compute the compliance of both gears of `pair` by finite elements, or take it from where it is kept.
 
     Parameters
     ----------
@@ -164,16 +163,15 @@ def pair_compliance(
     open_teeth : int, optional
         Odd number of teeth of open sectors; without it closed rings.
     incompatible_modes : bool
-    backend : {"pardiso", "superlu"}, optional
 
     Returns
     -------
     PairCompliance
+
+    See Also
+    --------
+    fe_ste.elasticity.known_flanks.known_flanks : Where computed gears are kept.
     """
-    pinion, gear = (
-        flank_compliance(
-            wheel, side, mesh, open_teeth=open_teeth, incompatible_modes=incompatible_modes, backend=backend
-        )
-        for wheel, side in ((pair.pinion, 1), (pair.gear, -1 if pair.gear.internal else 1))
-    )
+    sides = ((pair.pinion, 1), (pair.gear, -1 if pair.gear.internal else 1))
+    pinion, gear = known_flanks(sides, mesh, open_teeth=open_teeth, incompatible_modes=incompatible_modes)
     return PairCompliance.from_flanks(pair, (pinion, gear), contact)

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -21,16 +21,16 @@ import numpy as np
 import xarray as xr
 
 from fe_ste.contact.cells import ContactSettings
-from fe_ste.elasticity.flank import HANDOVER_DEPTH, FlankCompliance, flank_compliance
+from fe_ste.elasticity.flank import HANDOVER_DEPTH
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.flanks.modifications import FlankModification
-from fe_ste.geometry.gears import Gear, GearPair
+from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.files import FileError
 from fe_ste.tools.notebook import html_table, value_range
 from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
 from fe_ste.tools.versions import TABLE
 from fe_ste.tools.workers import Workers
-from fe_ste.transmission_error.compliance import PairCompliance
+from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance
 from fe_ste.transmission_error.grid import Checkpoint, Submits, solve_grid
 from fe_ste.transmission_error.search import unloaded_states
 from fe_ste.transmission_error.states import RESULTS, STATE_AXES, StateAxes
@@ -267,19 +267,9 @@ class MeshTable:
         return StateAxes(positions, *values).ranges()
 
 
-@lru_cache(maxsize=8)
-def _flank(gear: Gear, side: int, mesh: MeshSettings) -> FlankCompliance:
-    return flank_compliance(gear, side, mesh)
-
-
 def prepared_compliance(wanted: TableInput) -> PairCompliance:
-    """Prepare the pair of a table; flanks are kept, so a planet, which meshes twice on one flank, is computed once."""
-    pair = wanted.pair
-    flanks = (
-        _flank(pair.pinion, 1, wanted.mesh),
-        _flank(pair.gear, -1 if pair.gear.internal else 1, wanted.mesh),
-    )
-    prepared = PairCompliance.from_flanks(pair, flanks, wanted.contact)
+    """Prepare the pair of a table; a planet, which meshes twice, is computed once."""
+    prepared = pair_compliance(wanted.pair, wanted.mesh, wanted.contact)
     return prepared.with_modifications(wanted.pinion_modification, wanted.gear_modification)
 
 

@@ -11,7 +11,7 @@ from fe_ste.elasticity.condensation import flank_functionals
 from fe_ste.elasticity.flank import FlankCompliance, _near_field, flank_compliance
 from fe_ste.elasticity.halfspace import tent_weights
 from fe_ste.elasticity.hexmesh import MeshSettings, SectorMesh, sector_mesh
-from fe_ste.elasticity.ring import chain, joined, open_chain_faces, ring_faces, uniform_faces
+from fe_ste.elasticity.ring import Chain, chain_of, open_chain_faces, ring_faces, uniform_faces
 from fe_ste.geometry.gears import Gear
 from fe_ste.tools.sparse import factorise
 
@@ -65,8 +65,8 @@ def meshed_compliance(mesh: SectorMesh, sectors: int, closed: bool) -> dict[tupl
         loads.append((place @ turn @ surface)[free])
         depths.append((place @ turn @ below)[free])
     with factorise(stiffness[free][:, free]) as factor:
-        on_surface = factor.compliance(scipy.sparse.hstack(loads).tocsc(), scipy.sparse.hstack(loads).tocsc())
-        at_depth = factor.compliance(scipy.sparse.hstack(depths).tocsc(), scipy.sparse.hstack(loads).tocsc())
+        moved = factor.solve(scipy.sparse.hstack(loads).tocsc())
+    on_surface, at_depth = scipy.sparse.hstack(loads).T @ moved, scipy.sparse.hstack(depths).T @ moved
     return _as_stored(mesh, on_surface, at_depth, sectors)
 
 
@@ -105,11 +105,25 @@ def closed() -> FlankCompliance:
     return flank_compliance(GEAR, 1, COARSE)
 
 
-def random_sector(faces: int, loads: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """Positive definite stiffness of a sector on two faces, and loads on it."""
+def random_sector(loads: int, seed: int = 0) -> tuple[Chain, Chain, np.ndarray, np.ndarray, np.ndarray]:
+    """Positive definite halves of a sector with loads on them and signs; both faces, and the loads alone on them."""
     random = np.random.default_rng(seed)
-    root = random.normal(size=(2 * faces, 2 * faces))
-    return root @ root.T + 0.5 * np.eye(2 * faces), random.normal(size=(2 * faces, loads))
+    signs = np.array([1.0, 1.0, 1.0, -1.0, -1.0])
+    roots = random.normal(size=(2, 5, 5))
+    sector = Chain(*(root @ root.T + 0.5 * np.eye(5) for root in roots))
+    load = Chain(*random.normal(size=(2, 5, loads)))
+    minus, plus = signs[:, None] * (load.even - load.odd) / 2, (load.even + load.odd) / 2
+    return sector, load, signs, sector.whole(signs), np.concatenate([minus, plus])
+
+
+def joined(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Both faces of two chains, the face between them condensed."""
+    half = len(first) // 2
+    both = np.zeros((3 * half, 3 * half))
+    both[: 2 * half, : 2 * half] += first
+    both[half:, half:] += second
+    ends, middle = np.r_[:half, 2 * half : 3 * half], np.s_[half : 2 * half]
+    return both[np.ix_(ends, ends)] - both[ends, middle] @ np.linalg.solve(both[middle, middle], both[middle, ends])
 
 
 def assembled_ring(sector: np.ndarray, load: np.ndarray, teeth: int) -> np.ndarray:
@@ -148,10 +162,10 @@ def test_open_sector_equals_the_open_sector_meshed_as_a_whole(mesh: SectorMesh) 
 
 @pytest.mark.parametrize("teeth", [5, 6, 12, 17])
 def test_ring_of_random_sectors_equals_the_assembled_ring(teeth: int) -> None:
-    sector, load = random_sector(6, 3)
-    reference = assembled_ring(sector, load, teeth)
+    sector, load, signs, whole, forces = random_sector(3)
+    reference = assembled_ring(whole, forces, teeth)
     reach = min(4, (teeth - 2) // 2)
-    faces = ring_faces(sector, load, teeth, reach)
+    faces = ring_faces(sector, load, signs, teeth, reach)
     assert sorted(faces) == list(range(-reach, reach + 2))
     for number, face in faces.items():
         assert np.abs(face - reference[number % teeth]).max() < 1e-12 * np.abs(reference).max()
@@ -159,7 +173,7 @@ def test_ring_of_random_sectors_equals_the_assembled_ring(teeth: int) -> None:
 
 def test_ring_equals_the_fourier_transform_over_the_teeth() -> None:
     """Harmonic h of the faces: (S_mm + S_pp + S_mp e^iw + S_pm e^-iw) v_h = l_m + l_p e^-iw, w = 2 pi h / z."""
-    sector, load = random_sector(5, 4, seed=1)
+    halves, loads, signs, sector, load = random_sector(4, seed=1)
     teeth, half = 21, 5
     harmonics = []
     for order in range(teeth):
@@ -169,22 +183,23 @@ def test_ring_equals_the_fourier_transform_over_the_teeth() -> None:
         harmonics.append(np.linalg.solve(matrix, load[:half] + load[half:] / phase))
     transform = np.fft.ifft(np.array(harmonics), axis=0)
     assert np.abs(transform.imag).max() < 1e-12
-    for number, face in ring_faces(sector, load, teeth, 4).items():
+    for number, face in ring_faces(halves, loads, signs, teeth, 4).items():
         assert np.abs(face - transform.real[number % teeth]).max() < 1e-12 * np.abs(transform).max()
-    assert uniform_faces(sector, load) == pytest.approx(harmonics[0].real, rel=1e-10, abs=1e-12)
+    assert uniform_faces(halves, loads, signs) == pytest.approx(harmonics[0].real, rel=1e-10, abs=1e-12)
 
 
 def test_doubling_equals_joining_one_after_another() -> None:
-    sector, _ = random_sector(4, 1, seed=2)
+    halves, _, signs, sector, _ = random_sector(1, seed=2)
     one_by_one = sector
     for count in range(2, 12):
         one_by_one = joined(one_by_one, sector)
-        assert np.abs(chain(sector, count) - one_by_one).max() < 1e-12 * np.abs(sector).max()
+        whole = chain_of(halves, count, signs).whole(signs)
+        assert np.abs(whole - one_by_one).max() < 1e-12 * np.abs(sector).max()
 
 
 def test_open_chain_solves_the_assembled_equations() -> None:
-    sector, load = random_sector(4, 2, seed=4)
-    teeth, half = 5, 4
+    _, _, _, sector, load = random_sector(2, seed=4)
+    teeth, half = 5, 5
     matrix = np.zeros(((teeth + 1) * half, (teeth + 1) * half))
     for number in range(teeth):
         both = slice(number * half, (number + 2) * half)

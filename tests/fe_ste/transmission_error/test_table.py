@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import fe_ste.elasticity.known_flanks
 import fe_ste.transmission_error.table
 from fe_ste.contact.cells import ContactSettings
 from fe_ste.elasticity.hexmesh import MeshSettings
@@ -143,16 +144,18 @@ def test_netcdf_without_a_table_is_refused(tmp_path: Path) -> None:
         MeshTable.open(tmp_path / "other.nc")
 
 
-def test_a_flank_that_meshes_twice_is_computed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_gear_that_meshes_twice_is_computed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On either flank, under another name or not."""
     calls = []
-    compute = fe_ste.transmission_error.table.flank_compliance
+    compute = fe_ste.elasticity.known_flanks.flank_compliance
 
-    def counted(gear: Gear, *rest: Any) -> Any:
-        calls.append(gear.name)
-        return compute(gear, *rest)
+    def counted(gear: Gear, *rest: Any, **options: Any) -> Any:
+        calls.append(gear.face_width)
+        return compute(gear, *rest, **options)
 
-    monkeypatch.setattr(fe_ste.transmission_error.table, "flank_compliance", counted)
-    gear = dataclasses.replace(GEAR, name="meshes twice")
-    pair = GearPair(name="pair", pinion=gear, gear=gear, centre_distance=90e-3)
-    fe_ste.transmission_error.table.prepared_compliance(dataclasses.replace(WANTED, pair=pair))
-    assert calls == ["meshes twice"]
+    monkeypatch.setattr(fe_ste.elasticity.known_flanks, "flank_compliance", counted)
+    gear = dataclasses.replace(GEAR, face_width=1.01 * GEAR.face_width)
+    pair = GearPair(name="pair", pinion=gear, gear=dataclasses.replace(gear, name="other"), centre_distance=90e-3)
+    compliance = fe_ste.transmission_error.table.prepared_compliance(dataclasses.replace(WANTED, pair=pair))
+    assert calls == [gear.face_width]
+    assert [flank.gear.name for flank in compliance.flanks] == [gear.name, "other"]

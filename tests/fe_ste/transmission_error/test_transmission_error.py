@@ -19,7 +19,6 @@ from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.flanks.modifications import FlankModification, Relief, radius_at_roll_length_from_tip
 from fe_ste.geometry.checks import GeometryError
 from fe_ste.geometry.gears import Gear, GearPair
-from fe_ste.tools.sparse import available_backends
 from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance
 from fe_ste.transmission_error.search import contact_state, hertz_half_width, least_contact_length
 from fe_ste.transmission_error.states import ContactState
@@ -240,12 +239,6 @@ def test_handed_over_depth_does_not_matter() -> None:
     means = [mean(static_transmission_error(compliance, 250.0, 4)) for compliance in depths]
     assert means[0] == pytest.approx(means[1], rel=2e-3)
     assert means[2] == pytest.approx(means[1], rel=2e-3)
-
-
-@pytest.mark.skipif(len(available_backends()) < 2, reason="pypardiso is not installed")
-def test_sparse_solvers_give_the_same_transmission_error() -> None:
-    curves = [static_transmission_error(prepared(SPUR, backend=name), 300.0, 3) for name in available_backends()]
-    assert curves[1].ste.values == pytest.approx(curves[0].ste.values, rel=1e-9)
 
 
 def test_plain_bricks_are_too_stiff(spur: PairCompliance) -> None:
