@@ -21,7 +21,6 @@ import numpy as np
 import xarray as xr
 
 from fe_ste.contact.cells import ContactSettings
-from fe_ste.elasticity.flank import HANDOVER_DEPTH
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.gears import GearPair
@@ -93,7 +92,7 @@ class TableInput:
 
     def resolved(self) -> dict[str, Any]:
         """Return the input as plain data, with everything that has a default spelled out."""
-        return {"method_version": TABLE, "handover_depth": HANDOVER_DEPTH, **asdict(self)}
+        return {"method_version": TABLE, **asdict(self)}
 
     @cached_property
     def hash(self) -> str:
