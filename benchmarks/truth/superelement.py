@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from cases import LoadCase
-from fe_ste.contact.compliance import SlicedCompliance, compliance_matrix
+from fe_ste.contact.compliance import compliance_matrix
 from fe_ste.contact.kinematics import FlankPair
+from fe_ste.contact.regular import RegularCompliance
 from fe_ste.elasticity.flank import FlankCompliance
 from fe_ste.elasticity.halfspace import rectangle_integral
 from fe_ste.geometry.gears import Material
@@ -19,24 +20,20 @@ from fe_ste.tools.compilation import compiled
 RIGID = Material(youngs_modulus=1e30)
 
 
-def sliced(load: LoadCase, number: int, flank: FlankCompliance) -> SlicedCompliance:
-    sense = 1 if number == 0 or load.pair.gear.internal else -1
-    teeth = np.arange(load.cells.tooth.min(), load.cells.tooth.max() + 1)
-    return SlicedCompliance.from_flank(flank, load.axial, sense, teeth, int(np.ptp(teeth)))
-
-
-def cell_deflection(load: LoadCase, number: int, flank: FlankCompliance, part: SlicedCompliance | None = None) -> Floats:
+def cell_deflection(load: LoadCase, number: int, flank: FlankCompliance) -> Floats:
     """Displacement (n,) of the cells' middles on gear 0 or 1 under the forces of a load case, m."""
-    own = part or sliced(load, number, flank)
-    other = replace(own, table=np.zeros_like(own.table))
-    pair = load.pair
+    pair, cells = load.pair, load.cells
+    sense = 1 if number == 0 or pair.gear.internal else -1
+    teeth = np.arange(cells.tooth.min(), cells.tooth.max() + 1)
+    own = RegularCompliance.from_flank(flank, sense, teeth, int(np.ptp(teeth)))
+    # The other gear is rigid.
     rigid = replace(flank, gear=replace((pair.gear, pair.pinion)[number], material=RIGID))
-    both = [(flank, own), (rigid, other)]
+    both = [(flank, own), (rigid, replace(own, table=np.zeros_like(own.table)))]
     flanks, parts = zip(*(both if number == 0 else both[::-1]), strict=True)
-    form, tip = (math.sqrt((r / pair.pinion.base_radius) ** 2 - 1.0) for r in (pair.pinion.form_radius, pair.pinion.tip_radius))
-    kinematics = FlankPair.from_pair(pair, form, tip)
-    matrix = compliance_matrix(load.cells, kinematics, load.axial, flanks, parts)
-    return np.asarray(matrix @ load.force)
+    radii = pair.pinion.form_radius, pair.pinion.tip_radius
+    rolls = [math.sqrt((radius / pair.pinion.base_radius) ** 2 - 1.0) for radius in radii]
+    matrix = np.tril(compliance_matrix(cells, FlankPair.from_pair(pair, *rolls), load.axial, flanks, parts))
+    return np.asarray((matrix + np.tril(matrix, -1).T) @ load.force)
 
 
 @compiled

@@ -25,8 +25,8 @@ _MARGIN = 4
 #: Part of the tooth's elements that the block is deep.
 _DEPTH = 2.0 / 3.0
 
-#: Radius of a flank that is as good as flat, m.
-_FLAT = 1e3
+#: Radius of a flank that is as good as flat, in lengths of the flank.
+_FLAT = 1e5
 
 
 def brick_error(mesh: SectorMesh, side: int, incompatible_modes: bool = True) -> Floats:
@@ -173,7 +173,8 @@ def _on_surface(mesh: SectorMesh, side: int) -> Floats:
     material = mesh.gear.material
     layers = layer * np.arange(-ERROR_REACH - 1, ERROR_REACH + 2)
     # Flank coordinates of a cylinder so large that arc lengths are roll angles.
-    integrals = tent_integrals(1.0 + arc / _FLAT, layers, _FLAT, shear / _FLAT, cosine, 0.0)
+    radius = _FLAT * float(np.ptp(arc))
+    integrals = tent_integrals(1.0 + arc / radius, layers, radius, shear / radius, cosine, 0.0)
     shape = (len(arc), len(layers)) * 2
     read = integrals.reshape(shape)[:, 1:-1, :, len(layers) // 2]
     return np.asarray(read * (1.0 - material.poissons_ratio**2) / (np.pi * material.youngs_modulus))

@@ -52,8 +52,8 @@ class MeshSettings:
     layers: int = 12
     flank: int = 20
     thickness: int = 12
-    fillet: int = 5
-    root: int = 3
+    fillet: int = 8
+    root: int = 4
     rim: int = 14
     grading: float = 4.0
 
