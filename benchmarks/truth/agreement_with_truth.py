@@ -12,13 +12,13 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from superelement import cell_deflection
 
 from cases import PAIRS, TEETH, LoadCase
 from fe_ste.contact.cells import Cells
 from fe_ste.elasticity.flank import FlankCompliance, flank_compliance
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.geometry.gears import Gear
-from superelement import cell_deflection
 
 FOLDER = Path(__file__).parent
 MESH = MeshSettings(rim=24)
@@ -31,9 +31,9 @@ def stored_load(name: str) -> LoadCase:
     with np.load(FOLDER / "forces.npz") as file:
         stored = {key.split("/")[1]: file[key] for key in file.files if key.startswith(f"{name}/")}
     force, axial = stored.pop("force"), stored.pop("axial")
-    count = len(force)
+    nothing = np.zeros(len(force))
     whole = {key: stored[key].astype(np.int64) for key in ("tooth", "layer")}
-    cells = Cells(**(stored | whole), gap=np.zeros(count), cut=np.zeros(count, dtype=bool))
+    cells = Cells(**(stored | whole), gap=nothing, cut=nothing > 0.0, offset=nothing)
     return LoadCase(PAIRS[entry["pair"]][0](), entry["pmc"], cells, force, axial)
 
 
@@ -56,7 +56,9 @@ def main() -> None:
     for name, entry in stored.items():
         for gear, truth in entry["gears"].items():
             ours, true = superelement_um(name, int(gear)), truth["deflection_um"]
-            sys.stdout.write(f"{name} gear {int(gear) + 1}: {ours:.4f} um, truth {true:.4f}, {100 * (ours / true - 1):+.2f} %\n")
+            sys.stdout.write(
+                f"{name} gear {int(gear) + 1}: {ours:.4f} um, truth {true:.4f}, {100 * (ours / true - 1):+.2f} %\n"
+            )
             sys.stdout.flush()
 
 

@@ -72,9 +72,7 @@ def sun_planet() -> GearPair:
 
 def high_speed() -> GearPair:
     """High-speed stage of the GRC 750 gearbox (22/88), 110 mm wide."""
-    return GearPair(
-        name="high_speed", pinion=_grc_gear("hs_pinion"), gear=_grc_gear("hs_gear"), centre_distance=285e-3
-    )
+    return GearPair(name="high_speed", pinion=_grc_gear("hs_pinion"), gear=_grc_gear("hs_gear"), centre_distance=285e-3)
 
 
 PAIRS = {
@@ -125,7 +123,7 @@ class LoadCase:
 
 
 def solved(pair: GearPair, torque: float, pmc: float, compliance: PairCompliance | None = None) -> LoadCase:
-    """Forces of the closed rings at one position."""
+    """Solve one position of the closed rings for its forces."""
     compliance = compliance or pair_compliance(pair, MeshSettings())
     state = contact_state(compliance, torque, pmc)
     loaded = state.solution.force > 0.0

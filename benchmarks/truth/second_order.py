@@ -66,7 +66,9 @@ def layers(gear: Gear, fineness: Fineness) -> Floats:
     places = np.linspace(0.0, width, 4001)
     end = np.minimum(places, width - places)
     factor = fineness.factor
-    sizes = np.minimum(fineness.end * module / factor + fineness.end_growth / factor * end, fineness.layer * module / factor)
+    sizes = np.minimum(
+        fineness.end * module / factor + fineness.end_growth / factor * end, fineness.layer * module / factor
+    )
     return width * (graded(width, sizes) - 0.5)
 
 
@@ -160,9 +162,7 @@ def _line(load: LoadCase, number: int, tooth: int, z: Floats) -> Floats:
 
 def _cut(mesh: SectorMesh, side: int) -> Integers:
     section = mesh.section.plus_cut if side > 0 else mesh.section.minus_cut
-    return np.asarray(
-        (np.arange(len(mesh.axial_positions))[:, None] * len(mesh.section.points) + section).ravel()
-    )
+    return np.asarray((np.arange(len(mesh.axial_positions))[:, None] * len(mesh.section.points) + section).ravel())
 
 
 def _turned(points: Floats, angle: float) -> Floats:
@@ -187,7 +187,9 @@ def stiffness(basis: skfem.CellBasis, mesh: skfem.MeshHex, gear: Gear) -> Sparse
     return total
 
 
-def load_vector(sector: Sector, basis: skfem.CellBasis, mesh: skfem.MeshHex, load: LoadCase, number: int) -> list[scipy.sparse.csc_matrix]:
+def load_vector(
+    sector: Sector, basis: skfem.CellBasis, mesh: skfem.MeshHex, load: LoadCase, number: int
+) -> list[scipy.sparse.csc_matrix]:
     """Consistent forces (3 n, cells) of unit forces on the cells, positive into the material."""
     gear, side, cell_roll, tooth = load.on_gear(number)
     kappa = math.tan(gear.base_helix_angle) / gear.base_radius * side * (-1.0 if gear.internal else 1.0)
@@ -199,9 +201,8 @@ def load_vector(sector: Sector, basis: skfem.CellBasis, mesh: skfem.MeshHex, loa
     cosine = math.cos(gear.base_helix_angle)
     z = load.axial[load.cells.layer][:, None] + load.half_along * cosine * l
     roll = cell_roll[:, None] + kappa * (load.half_along * cosine * l)
-    half = load.cells.half_across * (1.0 if number == 0 else 1.0)
     # On either gear cells have the same width across the contact line: arc lengths of both flanks roll on one another.
-    across = half[:, None] * a * (1.0 if number == 0 else 1.0)
+    across = load.cells.half_across[:, None] * a
     arc = 0.5 * gear.base_radius * roll**2 + across * _sense(load, number)
     form, tip = ((radius / gear.base_radius) ** 2 - 1.0 for radius in (gear.form_radius, gear.tip_radius))
     fraction = (2.0 * arc / gear.base_radius - form) / (tip - form)
@@ -209,11 +210,7 @@ def load_vector(sector: Sector, basis: skfem.CellBasis, mesh: skfem.MeshHex, loa
     leans = ((fraction < 0.0) | (fraction > 1.0)).any(axis=1)
     upright = 0.5 * gear.base_radius * cell_roll[:, None] ** 2 + across * _sense(load, number)
     fraction[leans] = ((2.0 * upright / gear.base_radius - form) / (tip - form))[leans]
-    clipped = np.clip(fraction, 0.0, 1.0)
-    print(f"    load upright {load.force[leans].sum()/load.force.sum():.2e}")
-    print(f"    load off the flank: {np.sum((np.abs(clipped-fraction)>1e-9)*weight*load.force[:,None])/load.force.sum():.2e}")
-    fraction = clipped
-    print(f"    load off the ends: {np.sum((np.abs(z)>gear.face_width/2+1e-12)*weight*load.force[:,None])/load.force.sum():.2e}")
+    fraction = np.clip(fraction, 0.0, 1.0)
     element = skfem.ElementHexS2()
     corners = skfem.ElementHex1.doflocs
     rows, columns, values = [], [], []
@@ -249,8 +246,14 @@ def load_vector(sector: Sector, basis: skfem.CellBasis, mesh: skfem.MeshHex, loa
         ordered = hexa[:, vtk_to_skfem][brick]
         offset = len(sector_mesh.section.points)
         wanted = np.stack(
-            [first[strip] + layer * offset, second[strip] + layer * offset,
-             first[strip] + (layer + 1) * offset, second[strip] + (layer + 1) * offset], axis=1)
+            [
+                first[strip] + layer * offset,
+                second[strip] + layer * offset,
+                first[strip] + (layer + 1) * offset,
+                second[strip] + (layer + 1) * offset,
+            ],
+            axis=1,
+        )
         which = (ordered[:, None, :] == wanted[:, :, None]).argmax(axis=2)
         local = corners[which]  # points, 4, 3
         shape = np.stack([(1 - s) * (1 - t), s * (1 - t), (1 - s) * t, s * t], axis=1)
@@ -262,7 +265,8 @@ def load_vector(sector: Sector, basis: skfem.CellBasis, mesh: skfem.MeshHex, loa
         w = np.tile(weight, len(chosen))
         vals = (w[:, None] * functions)[:, :, None] * normal[:, None, :]
         unk = 3 * dofs[:, :, None] + np.arange(3)
-        rows.append(unk.ravel()); values.append(vals.ravel())
+        rows.append(unk.ravel())
+        values.append(vals.ravel())
         columns.append(np.broadcast_to(cell[:, None, None], unk.shape).ravel())
     return scipy.sparse.coo_matrix(
         (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(3 * basis.N, len(tooth))
@@ -301,8 +305,6 @@ class Deflection:
 
 def deflection(load: LoadCase, number: int, fineness: Fineness) -> Deflection:
     """Displacement of the cells of a load case on gear 0 or 1, averaged over each cell."""
-    import time
-    t0 = time.process_time()
     mesh3 = sector(load, number, fineness)
     mesh = skfem_mesh(mesh3.points, mesh3.hexahedra)
     basis = skfem.CellBasis(mesh, skfem.ElementHexS2(), intorder=1)
@@ -310,16 +312,12 @@ def deflection(load: LoadCase, number: int, fineness: Fineness) -> Deflection:
     cells = load_vector(mesh3, basis, mesh, load, number)
     is_held = np.zeros(mesh.p.shape[1], dtype=bool)
     is_held[mesh3.held] = True
-    held = np.concatenate(
-        [basis.dofs.nodal_dofs[0, is_held], basis.dofs.edge_dofs[0, is_held[mesh.edges].all(axis=0)]]
-    )
+    held = np.concatenate([basis.dofs.nodal_dofs[0, is_held], basis.dofs.edge_dofs[0, is_held[mesh.edges].all(axis=0)]])
     free = np.setdiff1d(np.arange(basis.N), held)
     unknowns = (3 * free[:, None] + np.arange(3)).ravel()
     matrix = stiffness(basis, mesh, gear)[unknowns][:, unknowns]
-    t1 = time.process_time()
     with factorise(matrix) as factor:
         free_cells = cells[unknowns]
         solution = factor.solve(free_cells @ load.force)
     mean = free_cells.T @ solution
-    print(f"    {len(unknowns)} unknowns, {mesh.t.shape[1]} elements, assembly {t1-t0:.1f} s, solve {time.process_time()-t1:.1f} s", flush=True)
     return Deflection(np.asarray(mean), len(unknowns))

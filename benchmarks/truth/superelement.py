@@ -50,8 +50,10 @@ def _middle_less_mean(
             value = rectangle_integral(across, along, half[j], half_along)
             for k in range(len(at)):
                 for m in range(len(at)):
-                    value -= share[k] * share[m] * rectangle_integral(
-                        across + at[k] * half[i], along + at[m] * half_along, half[j], half_along
+                    value -= (
+                        share[k]
+                        * share[m]
+                        * rectangle_integral(across + at[k] * half[i], along + at[m] * half_along, half[j], half_along)
                     )
             result[i] += value * force[j] / (4.0 * half[j] * half_along)
 

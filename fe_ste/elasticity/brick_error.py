@@ -87,7 +87,7 @@ def _block(mesh: SectorMesh, side: int) -> tuple[Floats, Integers]:
     """Nodes (n, 3) of the block and their numbers by depth, place along the profile and layer."""
     gear, section = mesh.gear, mesh.section
     arc, layer, shear, cosine = _spacing(mesh, side)
-    behind = section.between_flanks[:: -side]
+    behind = section.between_flanks[::-side]
     behind = behind[: 1 + max(2, round(_DEPTH * (len(behind) - 1)))]
     offset = section.points[behind] - section.points[behind[0]]
     # Directions of the section in the frame of the flank: its tangent, and its normal into the material.
@@ -102,9 +102,7 @@ def _block(mesh: SectorMesh, side: int) -> tuple[Floats, Integers]:
     ends = ((0, 0), (_MARGIN, _MARGIN))
     across, inward = np.pad(across, ends, mode="edge"), np.pad(inward, ends, mode="edge")
     step = arc[1] - arc[0]
-    arcs = np.concatenate(
-        [arc[0] - step * np.arange(_MARGIN, 0, -1), arc, arc[-1] + step * np.arange(1, _MARGIN + 1)]
-    )
+    arcs = np.concatenate([arc[0] - step * np.arange(_MARGIN, 0, -1), arc, arc[-1] + step * np.arange(1, _MARGIN + 1)])
     layers = layer * np.arange(-ERROR_REACH - 1, ERROR_REACH + 2)
     # In the section the normal of the flank leans by beta_b out of it.
     lean = side * np.sin(gear.base_helix_angle)
@@ -162,13 +160,11 @@ def _half_space(mesh: SectorMesh, side: int, places: Floats) -> Floats:
             moved[..., quad + 1] += s * field
             total[quad] += (1.0 - s) * of_s * 2.0 * shares.sum()
             total[quad + 1] += s * of_s * 2.0 * shares.sum()
-    return np.asarray(
-        moved / total * (1.0 + material.poissons_ratio) / (2.0 * np.pi * material.youngs_modulus)
-    )
+    return np.asarray(moved / total * (1.0 + material.poissons_ratio) / (2.0 * np.pi * material.youngs_modulus))
 
 
 def _on_surface(mesh: SectorMesh, side: int) -> Floats:
-    """Normal displacement of a half-space's surface at the flank nodes, as `brick_error` gives it, m/N."""
+    """Surface displacement of a half-space at the flank nodes, by node, layer and load as in `brick_error`, m/N."""
     arc, layer, shear, cosine = _spacing(mesh, side)
     material = mesh.gear.material
     layers = layer * np.arange(-ERROR_REACH - 1, ERROR_REACH + 2)

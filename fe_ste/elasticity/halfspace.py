@@ -24,7 +24,7 @@ from fe_ste.tools.compilation import compiled
 _PLACES = (0.5 - math.sqrt(0.15), 0.5, 0.5 + math.sqrt(0.15))
 _SHARES = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
 
-#: Part of a quadrilateral's sides below which it is not halved any more: what 1 / distance has left in it is 1e-3 of it.
+#: Part of a quadrilateral's sides below which it is not halved any more: 1e-3 of the integral is left in such a part.
 _LEAST_PART = 2e-3
 
 

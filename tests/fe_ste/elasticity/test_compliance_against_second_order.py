@@ -46,9 +46,9 @@ def test_every_stored_gear(agreement: ModuleType, name: str, gear: int) -> None:
 
 
 @pytest.mark.parametrize(("name", "gear"), CASES)
-def test_the_truth_is_known_to_three_per_mille(name: str, gear: int) -> None:
+def test_the_truth_is_known_to_six_per_mille(name: str, gear: int) -> None:
     entry = STORED[name]["gears"][str(gear)]
     coarse, fine = (mesh["deflection_um"] for mesh in entry["meshes"][-2:])
     low, high = entry["between_um"]
     assert coarse < fine < low <= entry["deflection_um"] <= high
-    assert high - low < 4.5e-3 * entry["deflection_um"]
+    assert high - low < 6e-3 * entry["deflection_um"]
