@@ -2,8 +2,9 @@
 
 The sector's stiffness matrix is condensed onto its two cut faces. The ring of z equal sectors is then closed exactly
 (`fe_ste.elasticity.ring`). What is stored per gear is the normal displacement of the flank of each tooth under unit
-normal loads on the flank of one tooth. The near field of the loaded tooth depends on the mesh, so it is taken out: the
-contact puts the half-space solution there (`fe_ste.contact.near_field`).
+normal loads on the flank of one tooth. The near field of the loaded tooth depends on the mesh, so it is taken out, as
+the bricks hold it (`fe_ste.elasticity.brick_error`): the contact puts the half-space solution there
+(`fe_ste.contact.near_field`).
 
 Each gear is described by itself: tooth 0 stands on the x axis, z = 0 is the middle of its face width. Loads and
 displacements of a flank are positive into the material, as a pressing load acts.
@@ -15,16 +16,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fe_ste.elasticity.brick_error import ERROR_REACH, brick_error
 from fe_ste.elasticity.condensation import CondensedSector
-from fe_ste.elasticity.halfspace import tent_displacements
+from fe_ste.elasticity.halfspace import tent_integrals
 from fe_ste.elasticity.hexmesh import MeshSettings, SectorMesh, sector_mesh
 from fe_ste.geometry.gears import Gear
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.notebook import html_table, value_range
+from fe_ste.tools.notebook import html_table
 from fe_ste.tools.threads import one_dense_thread
-
-#: Depth below the flank at which the half-space solution hands over to the finite elements, in normal modules.
-HANDOVER_DEPTH = 0.3
 
 #: Teeth on either side of the loaded one whose displacement is kept.
 TOOTH_REACH = 4
@@ -39,8 +38,6 @@ class FlankCompliance:
     gear : Gear
     side : int
         +1: the counter-clockwise flank of the teeth, -1: the clockwise one.
-    depth : float
-        Hand-over depth, m.
     mirror : float
         Strength of the image loads behind the free end faces taken out with the near field.
     roll, axial : ndarray (f,), (l,)
@@ -57,7 +54,6 @@ class FlankCompliance:
 
     gear: Gear
     side: int
-    depth: float
     mirror: float
     roll: Floats
     axial: Floats
@@ -128,7 +124,6 @@ class FlankCompliance:
                 "teeth": "closed ring" if self.closed else f"open sector of {2 * self.tooth_reach + 1}",
                 "nodes along the profile": str(len(self.roll)),
                 "nodes along the face": str(len(self.axial)),
-                "hand-over depth": value_range(self.depth, "mm", 1e3),
             }
             | {name.replace("_", " "): f"{value}" for name, value in self.figures.items()},
         )
@@ -147,7 +142,6 @@ def flank_compliance(
     *,
     open_teeth: int | None = None,
     incompatible_modes: bool = True,
-    depth: float | None = None,
     mirror: float = 1.0,
 ) -> FlankCompliance:
     """Compute the compliance of one flank of `gear` by finite elements.
@@ -163,8 +157,6 @@ def flank_compliance(
         Odd number of teeth of an open sector with free cut faces; without it the closed ring.
     incompatible_modes : bool
         See `fe_ste.elasticity.bricks.stiffness_matrix`.
-    depth : float, optional
-        Hand-over depth, m; `HANDOVER_DEPTH` normal modules unless given.
     mirror : float
         Strength of the image loads at the free end faces in the near field.
 
@@ -180,7 +172,7 @@ def flank_compliance(
     if open_teeth is not None and not (1 <= open_teeth <= gear.teeth and open_teeth % 2 == 1):
         raise ValueError(f"open_teeth = {open_teeth}: must be an odd number from 1 to {gear.teeth}")
     with one_dense_thread():
-        return _flank_compliance(gear, side, settings, open_teeth, incompatible_modes, depth, mirror)
+        return _flank_compliance(gear, side, settings, open_teeth, incompatible_modes, mirror)
 
 
 def _flank_compliance(
@@ -189,29 +181,26 @@ def _flank_compliance(
     settings: MeshSettings | None,
     open_teeth: int | None,
     incompatible_modes: bool,
-    depth: float | None,
     mirror: float,
 ) -> FlankCompliance:
     mesh = sector_mesh(gear, settings)
-    depth = HANDOVER_DEPTH * gear.normal_module if depth is None else depth
-    sector = CondensedSector.from_mesh(mesh, side, depth, incompatible_modes)
+    sector = CondensedSector.from_mesh(mesh, side, incompatible_modes)
     if open_teeth is None:
         faces, torque = sector.ring_faces(gear.teeth, min(TOOTH_REACH, (gear.teeth - 2) // 2)), sector.ring_torque()
     else:
         faces, torque = sector.open_faces(open_teeth)
     regular = {}
-    near = _near_field(mesh, side, depth, mirror)
+    near = flank_near_field(mesh, side, mirror, incompatible_modes)
     for (read, loaded), cut_faces in faces.items():
         regular[read, loaded] = sector.displacement(read == loaded, *cut_faces)
         if read == loaded:
-            # At the hand-over depth the half-space takes over the near field from the elements. What is left is smooth,
-            # and symmetric but for the discretisation (Maxwell and Betti).
+            # Without the near field, what is left is smooth, and symmetric but for the discretisation (Maxwell and
+            # Betti).
             remainder = regular[read, loaded] - near
             regular[read, loaded] = (remainder + remainder.T) / 2
     return FlankCompliance(
         gear=gear,
         side=side,
-        depth=depth,
         mirror=mirror,
         roll=mesh.section.flank_roll,
         axial=mesh.axial_positions,
@@ -226,20 +215,32 @@ def _flank_compliance(
     )
 
 
-def _near_field(mesh: SectorMesh, side: int, depth: float, mirror: float) -> Floats:
-    """Half-space displacement (m/N) at the hand-over depth under the tent loads."""
-    gear = mesh.gear
-    material = gear.material
-    shift = -depth * side * np.tan(gear.base_helix_angle)
-    field = tent_displacements(
-        mesh.section.flank_roll,
-        mesh.axial_positions,
-        gear.base_radius,
-        _flank_lead(gear, side),
-        float(np.cos(gear.base_helix_angle)),
-        depth,
-        float(shift),
-        material.poissons_ratio,
-        mirror,
-    )
-    return np.asarray(field * (1 + material.poissons_ratio) / (2 * np.pi * material.youngs_modulus))
+def flank_near_field(mesh: SectorMesh, side: int, mirror: float, incompatible_modes: bool = True) -> Floats:
+    """Near field of the flank's tent loads as the bricks hold it: half-space with images, and the bricks' own error.
+
+    Parameters
+    ----------
+    mesh : SectorMesh
+    side : int
+    mirror : float
+        Strength of the image loads behind the free end faces.
+    incompatible_modes : bool
+
+    Returns
+    -------
+    ndarray (f l, f l)
+        Normal displacement of the flank nodes per unit tent load, m/N.
+    """
+    gear, material = mesh.gear, mesh.gear.material
+    roll, axial = mesh.section.flank_roll, mesh.axial_positions
+    lead, cosine = _flank_lead(gear, side), float(np.cos(gear.base_helix_angle))
+    field = tent_integrals(roll, axial, gear.base_radius, lead, cosine, mirror)
+    field *= (1 - material.poissons_ratio**2) / (np.pi * material.youngs_modulus)
+    by_node = field.reshape(len(roll), len(axial), len(roll), len(axial))
+    error, last = brick_error(mesh, side, incompatible_modes), len(axial) - 1
+    for loaded in range(last + 1):
+        # The load itself and its images behind the end faces.
+        for place, strength in ((loaded, 1.0), (-loaded, mirror), (2 * last - loaded, mirror)):
+            for read in range(max(0, place - ERROR_REACH), min(last, place + ERROR_REACH) + 1):
+                by_node[:, read, :, loaded] += strength * error[:, read - place + ERROR_REACH]
+    return field

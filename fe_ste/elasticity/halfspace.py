@@ -1,4 +1,6 @@
-"""Elastic half-space: normal displacement under normal loads, inside (Boussinesq) and on the surface (Love).
+"""Elastic half-space under normal loads: displacement inside (Boussinesq) and on the surface (Love).
+
+Kernels are compiled by `fe_ste.tools.compilation`.
 
 Flank coordinates. An involute helicoid is a developable surface. With the roll angle phi = tan(alpha) and the
 axial position z of a point, the two directions along the generator (the contact line) and across it are
@@ -18,33 +20,40 @@ import numpy as np
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import compiled
 
+#: Gauss rule of three points over 0 to 1.
+_PLACES = (0.5 - math.sqrt(0.15), 0.5, 0.5 + math.sqrt(0.15))
+_SHARES = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
 
-@compiled
-def interior_normal_displacement(across: float, along: float, depth: float, poissons_ratio: float) -> float:
-    """Evaluate the normal displacement inside a half-space under a unit normal point load.
+#: Part of a quadrilateral's sides below which it is not halved any more: 1e-3 of the integral is left in such a part.
+_LEAST_PART = 2e-3
 
-    Boussinesq: w = (1 + nu) / (2 pi E) [depth^2 / R^3 + 2 (1 - nu) / R]; the factor (1 + nu) / (2 pi E) is left out.
+
+def interior_displacement(places: Floats, poissons_ratio: float) -> Floats:
+    """Evaluate the displacement inside a half-space under a unit normal point load at the origin.
+
+    Boussinesq: u = (1 + nu) / (2 pi E) [z/R^3 - (1 - 2 nu)/(R (R + z))] (x, y) in the surface and
+    w = (1 + nu) / (2 pi E) [z^2/R^3 + 2 (1 - nu)/R] into it; the factor (1 + nu) / (2 pi E) is left out.
 
     Parameters
     ----------
-    across, along : float
-        Distances in the surface from the load, m.
-    depth : float
-        Depth of the point, m.
+    places : ndarray (..., 3)
+        x and y in the surface, z into it, m; not the origin.
     poissons_ratio : float
 
     Returns
     -------
-    float
-        Bracket of the formula above, 1/m.
+    ndarray (..., 3)
+        1/m.
 
     References
     ----------
-    K. L. Johnson, Contact Mechanics, 1985, eq. (3.18c).
+    K. L. Johnson, Contact Mechanics, 1985, eq. (3.18).
     """
-    square = across * across + along * along + depth * depth
-    distance = math.sqrt(square)
-    return depth * depth / (square * distance) + 2.0 * (1.0 - poissons_ratio) / distance
+    depth = places[..., 2:]
+    distance = np.linalg.norm(places, axis=-1, keepdims=True)
+    outward = depth / distance**3 - (1.0 - 2.0 * poissons_ratio) / (distance * (distance + depth))
+    inward = depth**2 / distance**3 + 2.0 * (1.0 - poissons_ratio) / distance
+    return np.concatenate([outward * places[..., :2], inward], axis=-1)
 
 
 @compiled
@@ -95,18 +104,12 @@ def rectangle_integral(across: float, along: float, half_across: float, half_alo
 
 
 @compiled
-def tent_displacements(
-    roll: Floats,
-    axial: Floats,
-    base_radius: float,
-    lead: float,
-    base_helix_cosine: float,
-    depth: float,
-    depth_shift: float,
-    poissons_ratio: float,
-    mirror: float,
+def tent_integrals(
+    roll: Floats, axial: Floats, base_radius: float, lead: float, base_helix_cosine: float, mirror: float
 ) -> Floats:
-    """Evaluate the normal displacement at a depth below the flank nodes under bilinear ("tent") unit loads on them.
+    """Mean of 1 / distance over bilinear ("tent") loads on the flank nodes, seen from the flank nodes.
+
+    The surface displacement under a unit tent load is (1 - nu^2) / (pi E) times this.
 
     Parameters
     ----------
@@ -117,65 +120,92 @@ def tent_displacements(
         d phi / d z along a generator, rad/m.
     base_helix_cosine : float
         cos(beta_b).
-    depth : float
-        Depth of the read-out points, m.
-    depth_shift : float
-        Their distance along the generator from the flank node, m.
-    poissons_ratio : float
     mirror : float
         Strength of the image loads behind both free end faces; 0 for none.
 
     Returns
     -------
     ndarray (f l, f l)
-        Row: read-out node, column: load node, both numbered ``flank node * l + layer``; the factor
-        (1 + nu) / (2 pi E) is left out, 1/m.
+        Row: read-out node, column: load node, both numbered ``flank node * l + layer``, 1/m.
     """
     n_roll, n_axial = len(roll), len(axial)
     result = np.zeros((n_roll * n_axial, n_roll * n_axial))
     weight_sum = np.zeros(n_roll * n_axial)
-    gauss = 0.5 / math.sqrt(3.0)  # two-point Gauss rule, from the middle of a part of length 1
-    # The image of a load at z behind the face at z_end is at 2 z_end - z.
-    ends = (2.0 * axial[0], 2.0 * axial[-1])
-    for quad_roll in range(n_roll - 1):
-        roll_step = roll[quad_roll + 1] - roll[quad_roll]
-        roll_length = base_radius * 0.5 * (roll[quad_roll] + roll[quad_roll + 1]) * roll_step
-        # 1/R changes over the depth: parts of half of it are fine enough for two points each way.
-        cuts_roll = max(1, int(math.ceil(roll_length / (0.5 * depth))))
-        for quad_axial in range(n_axial - 1):
-            axial_step = axial[quad_axial + 1] - axial[quad_axial]
-            cuts_axial = max(1, int(math.ceil(axial_step / (0.5 * depth))))
-            for part_roll in range(2 * cuts_roll):
-                sign_roll = 1.0 if part_roll % 2 else -1.0
-                s = (part_roll // 2 + 0.5 + sign_roll * gauss) / cuts_roll
-                load_roll = roll[quad_roll] + s * roll_step
-                for part_axial in range(2 * cuts_axial):
-                    sign_axial = 1.0 if part_axial % 2 else -1.0
-                    t = (part_axial // 2 + 0.5 + sign_axial * gauss) / cuts_axial
-                    load_axial = axial[quad_axial] + t * axial_step
-                    # dA = r_b phi dphi dz / cos(beta_b); constant factors cancel against the sum of the weights.
-                    area = load_roll / (cuts_roll * cuts_axial) * roll_step * axial_step
-                    corner = quad_roll * n_axial + quad_axial
-                    # A load on the quadrilateral belongs to its four corners by their bilinear shape functions.
-                    columns = (corner, corner + 1, corner + n_axial, corner + n_axial + 1)
-                    weights = (area * (1 - s) * (1 - t), area * (1 - s) * t, area * s * (1 - t), area * s * t)
+    metric = (base_radius, lead, base_helix_cosine)
+    corners = np.empty(4)
+    for i in range(n_roll - 1):
+        for j in range(n_axial - 1):
+            quad = (roll[i], axial[j], roll[i + 1] - roll[i], axial[j + 1] - axial[j])
+            first = i * n_axial + j
+            columns = (first, first + 1, first + n_axial, first + n_axial + 1)
+            for read in range(n_roll * n_axial):
+                place = (roll[read // n_axial], axial[read % n_axial])
+                corners[:] = 0.0
+                _add_quadrilateral(corners, place, quad, metric, 1.0, 0.0)
+                for k in range(4):
+                    result[read, columns[k]] += corners[k]
+                if mirror != 0.0:
+                    corners[:] = 0.0
+                    # The image of a load at z behind the face at z_end is at 2 z_end - z.
+                    _add_quadrilateral(corners, place, quad, metric, -1.0, 2.0 * axial[0])
+                    _add_quadrilateral(corners, place, quad, metric, -1.0, 2.0 * axial[-1])
                     for k in range(4):
-                        weight_sum[columns[k]] += weights[k]
-                    for i in range(n_roll):
-                        mean_roll = 0.5 * (roll[i] + load_roll)
-                        for j in range(n_axial):
-                            apart = axial[j] - load_axial
-                            across = base_radius * mean_roll * (roll[i] - load_roll - lead * apart)
-                            along = apart / base_helix_cosine + depth_shift
-                            value = interior_normal_displacement(across, along, depth, poissons_ratio)
-                            if mirror != 0.0:
-                                for end in ends:
-                                    image = (axial[j] + load_axial - end) / base_helix_cosine + depth_shift
-                                    value += mirror * interior_normal_displacement(across, image, depth, poissons_ratio)
-                            row = i * n_axial + j
-                            for k in range(4):
-                                result[row, columns[k]] += weights[k] * value
+                        result[read, columns[k]] += mirror * corners[k]
+            # Areas of the tents: r_b phi dphi dz, constant factors left out; exact for a tent times phi.
+            near, far = quad[0] / 3.0 + (quad[0] + quad[2]) / 6.0, quad[0] / 6.0 + (quad[0] + quad[2]) / 3.0
+            for k in range(4):
+                weight_sum[columns[k]] += 0.5 * quad[2] * quad[3] * (near if k < 2 else far)
     return result / weight_sum
+
+
+@compiled
+def _add_quadrilateral(
+    corners: Floats,
+    place: tuple[float, float],
+    quad: tuple[float, float, float, float],
+    metric: tuple[float, float, float],
+    sense: float,
+    offset: float,
+) -> None:
+    """Add the integrals of the four bilinear shape functions over distance; the load is at ``sense * z + offset``.
+
+    The quadrilateral (first roll angle and axial position, their steps) is halved towards the place until its parts
+    are small against their distance, and each part integrated by three Gauss points each way.
+    """
+    base_radius, lead, cosine = metric
+    roll, axial, roll_step, axial_step = quad
+    stack = np.empty((256, 4))
+    stack[0] = np.array([0.0, 0.0, 1.0, 1.0])
+    held = 1
+    while held > 0:
+        held -= 1
+        s, t, width, height = stack[held]
+        phi, z = roll + (s + width / 2) * roll_step, axial + (t + height / 2) * axial_step
+        across = base_radius * 0.5 * (place[0] + phi) * (place[0] - phi - lead * (place[1] - z))
+        along = (place[1] - sense * z - offset) / cosine
+        breadth, length = abs(base_radius * phi * roll_step * width), axial_step * height / cosine
+        if max(breadth, length) > 0.5 * math.hypot(across, along) and max(width, height) > _LEAST_PART:
+            halves_roll = 1 if length > 2.0 * breadth else 2
+            halves_axial = 1 if breadth > 2.0 * length else 2
+            width, height = width / halves_roll, height / halves_axial
+            for k in range(halves_roll):
+                for m in range(halves_axial):
+                    stack[held, 0], stack[held, 1] = s + k * width, t + m * height
+                    stack[held, 2], stack[held, 3] = width, height
+                    held += 1
+            continue
+        for k in range(3):
+            for m in range(3):
+                p, q = s + _PLACES[k] * width, t + _PLACES[m] * height
+                phi, z = roll + p * roll_step, axial + q * axial_step
+                across = base_radius * 0.5 * (place[0] + phi) * (place[0] - phi - lead * (place[1] - z))
+                along = (place[1] - sense * z - offset) / cosine
+                area = _SHARES[k] * _SHARES[m] * width * height * phi * roll_step * axial_step
+                value = area / math.hypot(across, along)
+                corners[0] += value * (1 - p) * (1 - q)
+                corners[1] += value * (1 - p) * q
+                corners[2] += value * p * (1 - q)
+                corners[3] += value * p * q
 
 
 def tent_weights(roll: Floats, axial: Floats) -> Floats:

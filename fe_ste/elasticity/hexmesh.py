@@ -52,8 +52,8 @@ class MeshSettings:
     layers: int = 12
     flank: int = 20
     thickness: int = 12
-    fillet: int = 5
-    root: int = 3
+    fillet: int = 8
+    root: int = 4
     rim: int = 14
     grading: float = 4.0
 
@@ -97,8 +97,8 @@ class SectionMesh:
         Counter-clockwise connectivity.
     flank_roll : ndarray (f + 1,)
         Roll angle tan(alpha) of the flank nodes, rad, ascending.
-    plus_flank, minus_flank : ndarray (f + 1,)
-        Nodes of the counter-clockwise and the clockwise flank, by ascending roll angle.
+    between_flanks : ndarray (thickness + 1, f + 1)
+        Nodes of the tooth from the clockwise to the counter-clockwise flank, each row by ascending roll angle.
     plus_cut, minus_cut : ndarray (c,)
         Nodes of the cut faces at +pi/z and -pi/z, from the held surface to the root.
     held : ndarray
@@ -108,11 +108,20 @@ class SectionMesh:
     points: Floats
     quads: Integers
     flank_roll: Floats
-    plus_flank: Integers
-    minus_flank: Integers
+    between_flanks: Integers
     plus_cut: Integers
     minus_cut: Integers
     held: Integers
+
+    @property
+    def plus_flank(self) -> Integers:
+        """Nodes of the counter-clockwise flank, by ascending roll angle."""
+        return np.asarray(self.between_flanks[-1])
+
+    @property
+    def minus_flank(self) -> Integers:
+        """Nodes of the clockwise flank, by ascending roll angle."""
+        return np.asarray(self.between_flanks[0])
 
     def __repr__(self) -> str:
         """Return one short line."""
@@ -305,8 +314,7 @@ def _section_mesh(
         points=points,
         quads=quads,
         flank_roll=flank_roll[by_roll],
-        plus_flank=core_id[-1, flank_start:][by_roll],
-        minus_flank=core_id[0, flank_start:][by_roll],
+        between_flanks=core_id[:, flank_start:][:, by_roll],
         plus_cut=plus_id[-1],
         minus_cut=minus_id[0],
         held=np.unique(np.concatenate([centre_id[:, 0], plus_id[:, 0], minus_id[:, 0]])),

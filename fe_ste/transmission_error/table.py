@@ -95,9 +95,7 @@ class TableInput:
 
     def resolved(self) -> dict[str, Any]:
         """Return the input as plain data, with everything that has a default spelled out."""
-        from fe_ste.elasticity.flank import HANDOVER_DEPTH  # loads finite elements, which a table that is there spares
-
-        return {"method_version": TABLE, "handover_depth": HANDOVER_DEPTH, **asdict(self)}
+        return {"method_version": TABLE, **asdict(self)}
 
     @cached_property
     def hash(self) -> str:

@@ -47,14 +47,13 @@ class Reference:
 
     stiffness: np.ndarray
     load: np.ndarray
-    fixed_depth: np.ndarray
-    face_depth: np.ndarray
-    face_surface: np.ndarray
+    fixed: np.ndarray
+    by_face: np.ndarray
     fixed_torque: np.ndarray
     face_torque: np.ndarray
 
     @classmethod
-    def of(cls, mesh: SectorMesh, side: int, depth: float, incompatible_modes: bool) -> Reference:
+    def of(cls, mesh: SectorMesh, side: int, incompatible_modes: bool) -> Reference:
         stiffness = stiffness_matrix(mesh.points, mesh.hexahedra, mesh.gear.material, incompatible_modes)
         nodes = len(mesh.cut_nodes(1))
         frames = np.kron(np.eye(nodes), rotation(mesh.gear.angular_pitch))
@@ -66,19 +65,18 @@ class Reference:
         x, y, _ = mesh.points.T
         about_axis = np.stack([-y, x, np.zeros_like(x)], axis=-1).ravel()
         held_torque = stiffness[held].T @ about_axis[held]
-        surface, below = flank_functionals(mesh, side, depth)
-        columns = [to_faces[inside], -surface[inside], -below[inside], scipy.sparse.csr_matrix(held_torque[inside]).T]
+        surface = flank_functionals(mesh, side)
+        columns = [to_faces[inside], -surface[inside], scipy.sparse.csr_matrix(held_torque[inside]).T]
         everything = scipy.sparse.hstack(columns).tocsc()
         with factorise(stiffness[inside][:, inside]) as factor:
             response = everything.T @ factor.solve(everything)
-        ends = np.cumsum([columns[0].shape[1], surface.shape[1], surface.shape[1]])
-        face, load, depth_part = (slice(*part) for part in zip([0, *ends[:-1]], ends, strict=True))
+        ends = np.cumsum([columns[0].shape[1], surface.shape[1]])
+        face, load = (slice(*part) for part in zip([0, *ends[:-1]], ends, strict=True))
         return cls(
             stiffness=(turn.T @ to_faces[faces]).toarray() - response[face, face],
             load=-response[face, load],
-            fixed_depth=response[depth_part, load],
-            face_depth=-response[depth_part, face],
-            face_surface=-response[load, face],
+            fixed=response[load, load],
+            by_face=-response[load, face],
             fixed_torque=response[-1, load],
             face_torque=turn.T @ held_torque[faces] - response[-1, face],
         )
@@ -90,18 +88,19 @@ class Reference:
         for loaded, faces in enumerate(by_load):
             for read in range(teeth):
                 both = np.concatenate(faces[read : read + 2])
-                own = (self.fixed_depth + self.face_depth @ both) @ weights
-                blocks[read - middle, loaded - middle] = own if read == loaded else self.face_surface @ both
+                moved = self.by_face @ both
+                own = (self.fixed + moved) @ weights
+                blocks[read - middle, loaded - middle] = own if read == loaded else moved
         ends = (np.concatenate(by_load[middle][read : read + 2]) for read in range(teeth))
         return blocks, self.fixed_torque + sum(self.face_torque @ both for both in ends)
 
 
 def assert_equal_to_one_factorisation(gear: Gear, settings: MeshSettings, side: int) -> None:
     """Compared as an open chain of three teeth, where the choice of face unknowns drops out."""
-    mesh, depth = sector_mesh(gear, settings), 0.3 * gear.normal_module
-    own = CondensedSector.from_mesh(mesh, side, depth, True)
+    mesh = sector_mesh(gear, settings)
+    own = CondensedSector.from_mesh(mesh, side, True)
     faces, torque = own.open_faces(3)
-    blocks, reference_torque = Reference.of(mesh, side, depth, True).open_chain(3, own.weights)
+    blocks, reference_torque = Reference.of(mesh, side, True).open_chain(3, own.weights)
     # 1e-10: two eliminations of the same thousands of equations in different orders.
     assert np.abs(torque - reference_torque).max() < 1e-10 * np.abs(reference_torque).max()
     for (read, loaded), reference in blocks.items():
@@ -125,9 +124,9 @@ def test_layers_of_unequal_height_are_condensed() -> None:
     """Graded to both ends: two heights, with elements of their own each."""
     mesh = sector_mesh(HELICAL, EVEN_NUMBERS)
     graded = dataclasses.replace(mesh, axial_positions=np.array([-10.0, -7.0, 0.0, 7.0, 10.0]) * 1e-3)
-    own = CondensedSector.from_mesh(graded, 1, 1e-3, True)
+    own = CondensedSector.from_mesh(graded, 1, True)
     faces, _ = own.open_faces(3)
-    blocks, _ = Reference.of(graded, 1, 1e-3, True).open_chain(3, own.weights)
+    blocks, _ = Reference.of(graded, 1, True).open_chain(3, own.weights)
     found = own.displacement(True, *faces[0, 0])
     assert np.abs(found - blocks[0, 0]).max() < 1e-10 * np.abs(found).max()
 
@@ -136,4 +135,4 @@ def test_a_mesh_that_is_not_its_own_mirror_image_is_refused() -> None:
     mesh = sector_mesh(HELICAL, EVEN_NUMBERS)
     lopsided = dataclasses.replace(mesh, axial_positions=np.array([-10.0, -7.0, 0.0, 5.0, 10.0]) * 1e-3)
     with pytest.raises(ValueError, match="turned by 180 deg .* misses itself by 0.002 m"):
-        CondensedSector.from_mesh(lopsided, 1, 1e-3, True)
+        CondensedSector.from_mesh(lopsided, 1, True)

@@ -12,7 +12,7 @@ from skfem.helpers import dot
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from fe_ste.elasticity.bricks import skfem_mesh, stiffness_matrix
-from fe_ste.elasticity.condensation import depth_readout, flank_normals
+from fe_ste.elasticity.condensation import flank_normals
 from fe_ste.elasticity.flank import FlankCompliance, flank_compliance
 from fe_ste.elasticity.halfspace import tent_weights
 from fe_ste.elasticity.hexmesh import MeshSettings, sector_mesh
@@ -175,24 +175,6 @@ def test_flank_normals_are_unit_and_perpendicular_to_the_flank() -> None:
         # Out of the material: the tooth is on the other side of its flank than the neighbouring tooth space.
         outward = np.cross([0, 0, 1.0], nodes)[..., :2] * side
         assert (np.sum(outward * normals[..., :2], axis=-1) > 0).all()
-
-
-def test_read_out_points_lie_at_the_depth() -> None:
-    for gear, side in ((HELICAL, 1), (HELICAL, -1), (RING, -1)):
-        section, depth = sector_mesh(gear, COARSE).section, 0.3 * gear.normal_module
-        nodes, weights = depth_readout(section, gear, side, depth)
-        assert np.abs(weights.sum(axis=1) - 1).max() < 1e-12
-        assert (weights > -1e-5).all()
-        points = np.einsum("fk,fkd->fd", weights, section.points[nodes])
-        surface = section.points[section.plus_flank if side > 0 else section.minus_flank]
-        apart = np.hypot(*(points - surface).T)
-        # depth / cos(beta_b) in the section is `depth` along the normal.
-        assert np.abs(apart * np.cos(gear.base_helix_angle) - depth).max() < 1e-12
-
-
-def test_a_depth_beyond_the_tooth_is_refused() -> None:
-    with pytest.raises(ValueError, match="depth"):
-        flank_compliance(SPUR, 1, COARSE, depth=5 * SPUR.normal_module)
 
 
 @pytest.mark.parametrize("teeth", [0, 2, 21])

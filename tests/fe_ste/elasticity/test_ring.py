@@ -8,7 +8,7 @@ import scipy.sparse
 
 from fe_ste.elasticity.bricks import stiffness_matrix
 from fe_ste.elasticity.condensation import flank_functionals
-from fe_ste.elasticity.flank import FlankCompliance, _near_field, flank_compliance
+from fe_ste.elasticity.flank import FlankCompliance, flank_compliance, flank_near_field
 from fe_ste.elasticity.halfspace import tent_weights
 from fe_ste.elasticity.hexmesh import MeshSettings, SectorMesh, sector_mesh
 from fe_ste.elasticity.ring import Chain, chain_of, open_chain_faces, ring_faces, uniform_faces
@@ -25,7 +25,6 @@ GEAR = Gear(
     held_diameter=16e-3,
 )
 COARSE = MeshSettings(layers=3, flank=6, thickness=4, fillet=1, root=1, rim=3)
-DEPTH = 0.3 * GEAR.normal_module
 MIRROR = 1.0
 
 
@@ -54,8 +53,8 @@ def meshed_compliance(mesh: SectorMesh, sectors: int, closed: bool) -> dict[tupl
 
     held = np.unique(np.concatenate([number[mesh.held_nodes + sector * count] for sector in range(sectors)]))
     free = np.setdiff1d(np.arange(stiffness.shape[0]), (3 * held[:, None] + np.arange(3)).ravel())
-    surface, below = flank_functionals(mesh, 1, DEPTH)
-    loads, depths = [], []
+    surface = flank_functionals(mesh, 1)
+    loads = []
     for sector in range(sectors):
         turn = scipy.sparse.kron(scipy.sparse.identity(count), rotation(sector * pitch)).tocsr()
         unknowns = (3 * number[np.arange(count) + sector * count][:, None] + np.arange(3)).ravel()
@@ -63,27 +62,23 @@ def meshed_compliance(mesh: SectorMesh, sectors: int, closed: bool) -> dict[tupl
             (np.ones(3 * count), (unknowns, np.arange(3 * count))), shape=(stiffness.shape[0], 3 * count)
         )
         loads.append((place @ turn @ surface)[free])
-        depths.append((place @ turn @ below)[free])
     with factorise(stiffness[free][:, free]) as factor:
         moved = factor.solve(scipy.sparse.hstack(loads).tocsc())
-    on_surface, at_depth = scipy.sparse.hstack(loads).T @ moved, scipy.sparse.hstack(depths).T @ moved
-    return _as_stored(mesh, on_surface, at_depth, sectors)
+    return _as_stored(mesh, scipy.sparse.hstack(loads).T @ moved, sectors)
 
 
-def _as_stored(
-    mesh: SectorMesh, on_surface: np.ndarray, at_depth: np.ndarray, sectors: int
-) -> dict[tuple[int, int], np.ndarray]:
-    """Blocks by tooth; the loaded tooth's own under tent loads, at depth, without the near field."""
+def _as_stored(mesh: SectorMesh, on_surface: np.ndarray, sectors: int) -> dict[tuple[int, int], np.ndarray]:
+    """Blocks by tooth; the loaded tooth's own under tent loads, without the near field."""
     weights = tent_weights(mesh.section.flank_roll, mesh.axial_positions)
     size = len(weights)
-    near = _near_field(mesh, 1, DEPTH, MIRROR)
+    near = flank_near_field(mesh, 1, MIRROR)
     result = {}
     for read in range(sectors):
         for loaded in range(sectors):
             block = np.s_[read * size : (read + 1) * size, loaded * size : (loaded + 1) * size]
             result[read, loaded] = on_surface[block]  # displacement into the flank under loads into it
             if read == loaded:
-                own = at_depth[block] @ weights - near
+                own = on_surface[block] @ weights - near
                 result[read, loaded] = (own + own.T) / 2
     return result
 

@@ -1,0 +1,176 @@
+"""What bricks err by under the loads on a flank: the part that comes from the size of those next to the load.
+
+Near a load the elements cannot follow the field, and the displacement of the flank under a tent load departs from the
+true one. The departure depends on the elements within two or three of their sizes only. So it is found on a flat
+block: the bricks behind the flank, laid with their shapes on the surface of a half-space, where the truth is known.
+The block's other faces move as the half-space does (Boussinesq); what its surface then moves too far is the error.
+
+Frame of the block: x across the contact lines, y along them, z into the material.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fe_ste.elasticity.bricks import stiffness_matrix
+from fe_ste.elasticity.halfspace import interior_displacement, tent_integrals
+from fe_ste.elasticity.hexmesh import SectorMesh
+from fe_ste.elimination.sparse import factorise
+from fe_ste.tools.arrays import Floats, Integers
+
+#: Layers on either side of a load at which its error is read, and elements from a load to the faces of the block.
+ERROR_REACH = 3
+_MARGIN = 4
+
+#: Part of the tooth's elements that the block is deep.
+_DEPTH = 2.0 / 3.0
+
+#: Radius of a flank that is as good as flat, in lengths of the flank.
+_FLAT = 1e5
+
+
+def brick_error(mesh: SectorMesh, side: int, incompatible_modes: bool = True) -> Floats:
+    """Displacement of the flank nodes under tent loads by the bricks less the true one, on a half-space.
+
+    Parameters
+    ----------
+    mesh : SectorMesh
+        With layers of one thickness.
+    side : int
+        Loaded flank: +1 counter-clockwise, -1 clockwise.
+    incompatible_modes : bool
+        See `fe_ste.elasticity.bricks.stiffness_matrix`.
+
+    Returns
+    -------
+    ndarray (f, 2 r + 1, f)
+        By flank node read, layers from the load to it, -r to r with r = `ERROR_REACH`, and flank node loaded, m/N.
+
+    Raises
+    ------
+    ValueError
+        If the layers differ in thickness.
+    """
+    steps = np.diff(mesh.axial_positions)
+    if np.ptp(steps) > 1e-9 * steps.mean():
+        raise ValueError(f"gear {mesh.gear.name}: layers from {steps.min():.3g} to {steps.max():.3g} m; must be equal")
+    points, numbers = _block(mesh, side)
+    hexahedra = _bricks(points, numbers)
+    stiffness = stiffness_matrix(points, hexahedra, mesh.gear.material, incompatible_modes)
+    given = np.ones(numbers.shape, dtype=bool)
+    given[:-1, 1:-1, 1:-1] = False
+    fixed, free = (_unknowns(numbers[chosen]) for chosen in (given, ~given))
+    count = len(mesh.section.flank_roll)
+    moved = _half_space(mesh, side, points[numbers[given]]).reshape(len(fixed), count)
+    loads = np.zeros((stiffness.shape[0], count))
+    loads[3 * numbers[0] + 2] = _tent_loads(count, numbers.shape[1:])
+    with factorise(stiffness[free][:, free]) as factor:
+        found = factor.solve(loads[free] - stiffness[free][:, fixed] @ moved)
+    everywhere = np.empty((stiffness.shape[0], count))
+    everywhere[fixed], everywhere[free] = moved, found
+    middle = numbers.shape[2] // 2
+    read = numbers[0, _MARGIN:-_MARGIN, middle - ERROR_REACH : middle + ERROR_REACH + 1]
+    return everywhere[3 * read + 2] - _on_surface(mesh, side)
+
+
+def _spacing(mesh: SectorMesh, side: int) -> tuple[Floats, float, float, float]:
+    """Arc lengths of the flank nodes, thickness of a layer, shear of the layers, cos(beta_b)."""
+    gear, roll = mesh.gear, mesh.section.flank_roll
+    handed = side * (-1.0 if gear.internal else 1.0)
+    shear = handed * np.tan(gear.base_helix_angle) * roll.mean()
+    arc = gear.base_radius * roll**2 / 2.0
+    layer = mesh.axial_positions[1] - mesh.axial_positions[0]
+    return arc, float(layer), float(shear), float(np.cos(gear.base_helix_angle))
+
+
+def _block(mesh: SectorMesh, side: int) -> tuple[Floats, Integers]:
+    """Nodes (n, 3) of the block and their numbers by depth, place along the profile and layer."""
+    gear, section = mesh.gear, mesh.section
+    arc, layer, shear, cosine = _spacing(mesh, side)
+    behind = section.between_flanks[::-side]
+    behind = behind[: 1 + max(2, round(_DEPTH * (len(behind) - 1)))]
+    offset = section.points[behind] - section.points[behind[0]]
+    # Directions of the section in the frame of the flank: its tangent, and its normal into the material.
+    radius = np.hypot(*section.points[behind[0]].T)
+    radial = section.points[behind[0]] / radius[:, None]
+    tangential = np.stack([-radial[:, 1], radial[:, 0]], axis=-1)
+    angle = np.arctan(section.flank_roll)[:, None]
+    outward = (-1.0 if gear.internal else 1.0) * np.sin(angle) * radial + side * np.cos(angle) * tangential
+    tangent = np.stack([outward[:, 1], -outward[:, 0]], axis=-1)
+    tangent = tangent * np.sign(np.sum(tangent[0] * np.diff(section.points[behind[0]], axis=0)[0]))
+    across, inward = np.sum(offset * tangent, axis=-1), -np.sum(offset * outward, axis=-1)
+    ends = ((0, 0), (_MARGIN, _MARGIN))
+    across, inward = np.pad(across, ends, mode="edge"), np.pad(inward, ends, mode="edge")
+    step = arc[1] - arc[0]
+    arcs = np.concatenate([arc[0] - step * np.arange(_MARGIN, 0, -1), arc, arc[-1] + step * np.arange(1, _MARGIN + 1)])
+    layers = layer * np.arange(-ERROR_REACH - 1, ERROR_REACH + 2)
+    # In the section the normal of the flank leans by beta_b out of it.
+    lean = side * np.sin(gear.base_helix_angle)
+    numbers = np.arange(across.size * len(layers)).reshape(*across.shape, len(layers))
+    points = np.empty((*numbers.shape, 3))
+    points[..., 0] = (arcs + across)[..., None] - shear * layers
+    points[..., 1] = layers / cosine - lean * inward[..., None]
+    points[..., 2] = cosine * inward[..., None]
+    return points.reshape(-1, 3), numbers
+
+
+def _bricks(points: Floats, numbers: Integers) -> Integers:
+    """Hexahedra of the block in VTK order."""
+    square = ((0, 0), (1, 0), (1, 1), (0, 1))
+    deep, along, layers = (count - 1 for count in numbers.shape)
+    corners = [numbers[k : k + deep, i : i + along, j : j + layers].ravel() for k in (0, 1) for i, j in square]
+    hexahedra = np.stack(corners, axis=-1)
+    edges = points[hexahedra[0, [1, 3, 4]]] - points[hexahedra[0, 0]]
+    return hexahedra if np.linalg.det(edges) > 0.0 else hexahedra[:, [0, 3, 2, 1, 4, 7, 6, 5]]
+
+
+def _unknowns(nodes: Integers) -> Integers:
+    return np.asarray((3 * nodes[:, None] + np.arange(3)).ravel())
+
+
+def _tent_loads(count: int, surface: tuple[int, ...]) -> Floats:
+    """Consistent nodal loads (profile, layers, count) of unit tent loads in the middle layer."""
+    mass = np.zeros((count, count))
+    for left in range(count - 1):
+        mass[left : left + 2, left : left + 2] += np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0
+    loads = np.zeros((*surface, count))
+    middle = surface[1] // 2
+    for layer, share in ((middle - 1, 1.0 / 6.0), (middle, 4.0 / 6.0), (middle + 1, 1.0 / 6.0)):
+        loads[_MARGIN:-_MARGIN, layer] = share * mass / mass.sum(axis=0)
+    return loads
+
+
+def _half_space(mesh: SectorMesh, side: int, places: Floats) -> Floats:
+    """Displacement (n, 3, f) of a half-space at places away from the loads, under the tent loads, m/N."""
+    arc, layer, shear, cosine = _spacing(mesh, side)
+    material = mesh.gear.material
+    gauss, weight = np.polynomial.legendre.leggauss(3)
+    step = arc[1] - arc[0]
+    parts = max(2, int(np.ceil(layer / step)))  # along the layer about as fine as along the profile
+    along = ((np.arange(parts)[:, None] + (gauss + 1.0) / 2.0) / parts).ravel()
+    shares = np.tile(weight, parts) * (1.0 - along)
+    moved, total = np.zeros((*places.shape, len(arc))), np.zeros(len(arc))
+    for quad in range(len(arc) - 1):
+        for s, of_s in zip((gauss + 1.0) / 2.0, weight, strict=True):
+            z = layer * np.concatenate([-along, along])
+            loads = np.stack([arc[quad] + s * step - shear * z, z / cosine, np.zeros_like(z)], axis=-1)
+            fields = interior_displacement(places[:, None] - loads, material.poissons_ratio)
+            field = np.einsum("nld,l->nd", fields, of_s * np.tile(shares, 2))
+            moved[..., quad] += (1.0 - s) * field
+            moved[..., quad + 1] += s * field
+            total[quad] += (1.0 - s) * of_s * 2.0 * shares.sum()
+            total[quad + 1] += s * of_s * 2.0 * shares.sum()
+    return np.asarray(moved / total * (1.0 + material.poissons_ratio) / (2.0 * np.pi * material.youngs_modulus))
+
+
+def _on_surface(mesh: SectorMesh, side: int) -> Floats:
+    """Surface displacement of a half-space at the flank nodes, by node, layer and load as in `brick_error`, m/N."""
+    arc, layer, shear, cosine = _spacing(mesh, side)
+    material = mesh.gear.material
+    layers = layer * np.arange(-ERROR_REACH - 1, ERROR_REACH + 2)
+    # Flank coordinates of a cylinder so large that arc lengths are roll angles.
+    radius = _FLAT * float(np.ptp(arc))
+    integrals = tent_integrals(1.0 + arc / radius, layers, radius, shear / radius, cosine, 0.0)
+    shape = (len(arc), len(layers)) * 2
+    read = integrals.reshape(shape)[:, 1:-1, :, len(layers) // 2]
+    return np.asarray(read * (1.0 - material.poissons_ratio**2) / (np.pi * material.youngs_modulus))
