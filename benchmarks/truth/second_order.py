@@ -196,11 +196,11 @@ def load_vector(
     nodes, weights = np.polynomial.legendre.leggauss(4)
     part = np.concatenate([nodes / 2 - 0.5, nodes / 2 + 0.5])
     share = np.concatenate([weights, weights]) / 4.0
-    a, l = (x.ravel() for x in np.meshgrid(part, part, indexing="ij"))
+    a, b = (x.ravel() for x in np.meshgrid(part, part, indexing="ij"))
     weight = np.outer(share, share).ravel()
     cosine = math.cos(gear.base_helix_angle)
-    z = load.axial[load.cells.layer][:, None] + load.half_along * cosine * l
-    roll = cell_roll[:, None] + kappa * (load.half_along * cosine * l)
+    z = load.axial[load.cells.layer][:, None] + load.half_along * cosine * b
+    roll = cell_roll[:, None] + kappa * (load.half_along * cosine * b)
     # On either gear cells have the same width across the contact line: arc lengths of both flanks roll on one another.
     across = load.cells.half_across[:, None] * a
     arc = 0.5 * gear.base_radius * roll**2 + across * _sense(load, number)
