@@ -12,9 +12,9 @@ import skfem
 from cases import TEETH, LoadCase
 from fe_ste.elasticity.bricks import gradient_products, skfem_mesh
 from fe_ste.elasticity.hexmesh import MeshSettings, SectorMesh, refined_sector_mesh
-from fe_ste.elimination.sparse import factorise
 from fe_ste.geometry.gears import Gear
 from fe_ste.tools.arrays import Floats, Integers, SparseMatrix
+from fe_ste.elimination.sparse import factorise
 
 CHUNK = 1000
 """Elements assembled at a time."""
@@ -196,13 +196,13 @@ def load_vector(
     nodes, weights = np.polynomial.legendre.leggauss(4)
     part = np.concatenate([nodes / 2 - 0.5, nodes / 2 + 0.5])
     share = np.concatenate([weights, weights]) / 4.0
-    part_across, part_along = (x.ravel() for x in np.meshgrid(part, part, indexing="ij"))
+    a, b = (x.ravel() for x in np.meshgrid(part, part, indexing="ij"))
     weight = np.outer(share, share).ravel()
     cosine = math.cos(gear.base_helix_angle)
-    z = load.axial[load.cells.layer][:, None] + load.half_along * cosine * part_along
-    roll = cell_roll[:, None] + kappa * (load.half_along * cosine * part_along)
+    z = load.axial[load.cells.layer][:, None] + load.half_along * cosine * b
+    roll = cell_roll[:, None] + kappa * (load.half_along * cosine * b)
     # On either gear cells have the same width across the contact line: arc lengths of both flanks roll on one another.
-    across = load.cells.half_across[:, None] * part_across
+    across = load.cells.half_across[:, None] * a
     arc = 0.5 * gear.base_radius * roll**2 + across * _sense(load, number)
     form, tip = ((radius / gear.base_radius) ** 2 - 1.0 for radius in (gear.form_radius, gear.tip_radius))
     fraction = (2.0 * arc / gear.base_radius - form) / (tip - form)

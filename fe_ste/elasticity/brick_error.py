@@ -167,7 +167,7 @@ def _on_surface(mesh: SectorMesh, side: int) -> Floats:
     """Surface displacement of a half-space at the flank nodes, by node, layer and load as in `brick_error`, m/N."""
     arc, layer, shear, cosine = _spacing(mesh, side)
     material = mesh.gear.material
-    layers = layer * np.arange(-ERROR_REACH - 1, ERROR_REACH + 2)
+    layers = layer * np.arange(-ERROR_REACH - 1.0, ERROR_REACH + 2.0, dtype=np.float64)
     # Flank coordinates of a cylinder so large that arc lengths are roll angles.
     radius = _FLAT * float(np.ptp(arc))
     integrals = tent_integrals(1.0 + arc / radius, layers, radius, shear / radius, cosine, 0.0)
