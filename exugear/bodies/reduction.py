@@ -33,7 +33,7 @@ from exugear.bodies.reduced_body import Frame, ReducedBody, ReductionError, Rigi
 from fe_ste.tools.arrays import Floats, SparseMatrix
 
 if TYPE_CHECKING:
-    from fe_ste.tools.sparse import Backend, Factorisation
+    from fe_ste.elimination.sparse import Backend, Factorisation
 
 MOST_LANCZOS_STEPS = 150
 """Lanczos steps after which the search for normal modes is given up."""
@@ -121,7 +121,7 @@ def constraint_and_inertia_relief_modes(
     held_at = scipy.linalg.qr(rigid.T, mode="r", pivoting=True)[1][: rigid.shape[1]]
     springs = np.zeros(len(rigid))
     springs[held_at] = stiffness.diagonal().mean()
-    from fe_ste.tools.sparse import factorise
+    from fe_ste.elimination.sparse import factorise
 
     with factorise(scipy.sparse.csr_array(stiffness + scipy.sparse.diags_array(springs)), backend) as held:
         deflections = held.solve(np.hstack([seats.T, mass @ rigid]))
@@ -169,7 +169,7 @@ def free_interface_modes(
     known = rigid @ np.linalg.inv(np.linalg.cholesky(rigid.T @ (mass @ rigid))).T
     frequencies: list[float] = []
     random = np.random.default_rng(1)
-    from fe_ste.tools.sparse import factorise
+    from fe_ste.elimination.sparse import factorise
 
     with factorise(scipy.sparse.csr_array(stiffness + shift * mass), backend) as shifted:
         while True:

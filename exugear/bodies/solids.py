@@ -50,7 +50,7 @@ from fe_ste.tools.arrays import Floats
 if TYPE_CHECKING:
     import skfem
 
-    from fe_ste.tools.sparse import Backend
+    from fe_ste.elimination.sparse import Backend
 else:
     skfem = at_first_use("skfem")
 

@@ -45,8 +45,8 @@ def compute_tables(requests: list[TableRequest]) -> dict[str, MeshTable]:
 
 
 def _compute_table(request: TableRequest, bar: Progress, task: TaskID) -> MeshTable:
+    from fe_ste.elimination.sparse import FactorisationError
     from fe_ste.geometry.checks import GeometryError
-    from fe_ste.tools.sparse import FactorisationError
     from fe_ste.transmission_error.grid import GridError
 
     before = bar.tasks[task].completed

@@ -124,13 +124,22 @@ def load_run(path: str | Path, names: Iterable[str] | None = None) -> xr.Dataset
 
 
 def read_run(path: Path, names: Iterable[str]) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-    """Read some variables and the attributes of a complete run, without labels: xarray's start costs more than that.
+    """Read some variables and the attributes of a run, without labels: xarray's start costs more than that.
+
+    Parameters
+    ----------
+    path : path
+        ``run.nc``, or the folder ``run.partial`` of a run that was stopped.
+    names : iterable of str
 
     Raises
     ------
     FileError
         The run is missing or damaged, or has no such variable.
     """
+    if path.is_dir():
+        stopped = load_run(path, names)
+        return {str(name): stopped[name].to_numpy() for name in stopped.variables}, dict(stopped.attrs)
     with open_sealed(path) as (file, _), h5netcdf.File(file, "r") as run:
         unknown = sorted(set(names) - set(run.variables))
         if unknown:

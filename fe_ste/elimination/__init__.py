@@ -1,1 +1,1 @@
-"""Elimination of the unknowns of stiffness matrices: dense and in place, along a nested dissection."""
+"""Elimination of the unknowns of stiffness matrices: sparse, dense and in place, along a nested dissection."""

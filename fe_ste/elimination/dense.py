@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from fe_ste.elimination.sparse import FactorisationError
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.sparse import FactorisationError
 
 #: Columns eliminated at a time: the triangular solves, three to five times slower than products, stay a small part.
 _PANEL = 64

@@ -178,7 +178,7 @@ def schur_complement(
 
     Raises
     ------
-    fe_ste.tools.sparse.FactorisationError
+    fe_ste.elimination.sparse.FactorisationError
         A front is not positive definite.
     """
     if known and front in known:

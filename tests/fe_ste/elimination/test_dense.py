@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fe_ste.elimination.dense import divided_by_factor, eliminate, mirrored_lower
-from fe_ste.tools.sparse import FactorisationError
+from fe_ste.elimination.sparse import FactorisationError
 
 
 def random_matrix(size: int) -> np.ndarray:
