@@ -6,6 +6,7 @@ import json
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -17,7 +18,7 @@ from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
 from exugear.model.versions import MODES as METHOD
 from exugear.results.folder import kept_case, times_spent
-from exugear.results.run_file import load_run
+from exugear.results.run_file import load_run, read_run
 from fe_ste.tools.files import FileError
 from fe_ste.tools.sealed import write_dataset
 
@@ -139,6 +140,15 @@ def test_a_file_of_an_earlier_version_says_so(out: Path) -> None:
     load_run(out / RUN).to_netcdf(out / RUN, engine="h5netcdf")  # as earlier versions wrote it
     with pytest.raises(FileError, match="written by an earlier version"):
         load_run(out / RUN)
+
+
+def test_a_run_read_without_labels_has_the_same_numbers(out: Path) -> None:
+    labelled = load_run(out / RUN)
+    arrays, attributes = read_run(out / RUN, ("time", "overall_dte", "kinetic_energy"))
+    assert all(np.array_equal(values, labelled[name]) for name, values in arrays.items())
+    assert {key: attributes[key] for key in labelled.attrs} == labelled.attrs
+    with pytest.raises(FileError, match="holds no heat"):
+        read_run(out / RUN, ("heat",))
 
 
 def test_the_hashes_of_runs_and_modes_differ_by_their_methods(monkeypatch: pytest.MonkeyPatch) -> None:
