@@ -95,7 +95,8 @@ def _kept(function: Function, **options: Any) -> Function:
     """Compile with numba's options and keep the machine code."""
     if _settings.DISABLE_JIT:
         return function
-    made = Kernel(function, {"nopython": True, **options})
+    # Nobody calls these functions from C.
+    made = Kernel(function, {"nopython": True, "no_cfunc_wrapper": True, **options})
     if kernel_folder(_source_of(function)):
         cast(Any, made)._cache = _KernelCache(function)  # type: ignore[no-untyped-call]
     return cast(Function, made)

@@ -20,18 +20,23 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
-from numba.core.typing import signature
-from numba.core.typing.templates import ConcreteTemplate, infer_global
+from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
 from numba.extending import lower_builtin, models, register_model, type_callable
 
 from fe_ste.tools.arrays import Floats
 
 SIZE = 8
+#: numba's ways to be extended, which have no types.
+_type: Any = type_callable
+_lower: Any = lower_builtin
+_register: Any = register_model
+_infer: Any = infer_global
+_signature: Any = signature
 _VECTOR = ir.VectorType(ir.DoubleType(), SIZE)
 _FLAGS = ("contract", "nsz")
 
 
-class _OctetType(types.Type):  # type: ignore[misc]
+class _OctetType(types.Type):
     def __init__(self) -> None:
         super().__init__(name="Octet")
 
@@ -39,10 +44,12 @@ class _OctetType(types.Type):  # type: ignore[misc]
 octet = _OctetType()
 
 
-@register_model(_OctetType)
-class _OctetModel(models.PrimitiveModel):  # type: ignore[misc]
+class _OctetModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, _VECTOR)
+        super().__init__(manager, kind, _VECTOR)  # type: ignore[no-untyped-call]
+
+
+_register(_OctetType)(_OctetModel)
 
 
 def eight(array: Floats, start: int) -> Floats:
@@ -65,22 +72,18 @@ def sum_of(values: Floats) -> float:
     return float(np.sum(values))
 
 
-@type_callable(eight)
 def _type_eight(context: Any) -> Any:
     return lambda array, start: octet if _is_flat(array) else None
 
 
-@type_callable(put)
 def _type_put(context: Any) -> Any:
     return lambda array, start, values: types.none if _is_flat(array) and values == octet else None
 
 
-@type_callable(all_eight)
 def _type_all(context: Any) -> Any:
     return lambda number: octet
 
 
-@type_callable(sum_of)
 def _type_sum(context: Any) -> Any:
     return lambda values: types.float64 if values == octet else None
 
@@ -91,24 +94,22 @@ def _is_flat(array: Any) -> bool:
 
 def _place(context: Any, builder: Any, kind: Any, array: Any, start: Any) -> Any:
     """Address of eight entries."""
-    data = cgutils.create_struct_proxy(kind)(context, builder, array).data
+    proxy: Any = cgutils.create_struct_proxy
+    data = proxy(kind)(context, builder, array).data
     return builder.bitcast(builder.gep(data, [start]), _VECTOR.as_pointer())
 
 
-@lower_builtin(eight, types.Array, types.Integer)
 def _lower_eight(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     loaded = builder.load(_place(context, builder, sig.args[0], *args))
     loaded.align = SIZE  # bytes of one number: rows may begin anywhere
     return loaded
 
 
-@lower_builtin(put, types.Array, types.Integer, _OctetType)
 def _lower_put(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     builder.store(args[2], _place(context, builder, sig.args[0], *args[:2]), align=SIZE)
     return context.get_dummy_value()
 
 
-@lower_builtin(all_eight, types.Float)
 def _lower_all(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return _spread(builder, args[0])
 
@@ -118,7 +119,6 @@ def _spread(builder: Any, number: Any) -> Any:
     return builder.shuffle_vector(one, one, ir.Constant(ir.VectorType(ir.IntType(32), SIZE), [0] * SIZE))
 
 
-@lower_builtin(sum_of, _OctetType)
 def _lower_sum(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     values, size = args[0], SIZE
     while size > 1:  # halves onto each other
@@ -136,18 +136,27 @@ def _define(operation: Any, build: str) -> None:
     """Make an operator work on two octets, and on an octet and a number."""
     pairs = [(octet, octet), (octet, types.float64), (types.float64, octet)]
 
-    @infer_global(operation)
-    class Template(ConcreteTemplate):  # type: ignore[misc]
-        cases = [signature(octet, *pair) for pair in pairs]
+    class Template(ConcreteTemplate):
+        cases = [_signature(octet, *pair) for pair in pairs]
+
+    _infer(operation)(Template)
 
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         both = [value if kind == octet else _spread(builder, value) for kind, value in zip(sig.args, args, strict=True)]
         return getattr(builder, build)(*both, flags=_FLAGS)
 
     for pair in ((_OctetType, _OctetType), (_OctetType, types.Float), (types.Float, _OctetType)):
-        lower_builtin(operation, *pair)(lower)
+        _lower(operation, *pair)(lower)
 
 
+_type(eight)(_type_eight)
+_type(put)(_type_put)
+_type(all_eight)(_type_all)
+_type(sum_of)(_type_sum)
+_lower(eight, types.Array, types.Integer)(_lower_eight)
+_lower(put, types.Array, types.Integer, _OctetType)(_lower_put)
+_lower(all_eight, types.Float)(_lower_all)
+_lower(sum_of, _OctetType)(_lower_sum)
 _define(operator.add, "fadd")
 _define(operator.sub, "fsub")
 _define(operator.mul, "fmul")
