@@ -25,9 +25,11 @@ from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.runs.extent import SAMPLE_RATE
 from exugear.runs.runup import BAND, simulate
+from exugear.solvers.compiled.methods import ORDERS, Method, adams
+from exugear.solvers.compiled.methods import RUNGE_KUTTA as RK4
 from exugear.solvers.compiled.observers import Observer
 from exugear.solvers.compiled.solver import CompiledSystem
-from exugear.solvers.compiled.step import choose_step
+from exugear.solvers.compiled.step import choose_integration
 from exugear.solvers.loads import LoadTable
 
 LOAD = {"carrier": 240e3, "hss": -3000.0}
@@ -38,6 +40,9 @@ FREQUENCIES = (1e3, 3e3, 6.4e3)
 FULL_NEWTON = "generalized-alpha, full Newton"
 MODIFIED_NEWTON = "generalized-alpha, modified Newton"
 RUNGE_KUTTA = "RK44 of Exudyn"
+ADAMS = adams(5)
+OWN_METHODS = {method.name: method for method in (RK4, *map(adams, ORDERS))}
+"""Methods of the compiled solver by name."""
 
 
 def stiffness_of(gearbox: Gearbox) -> dict[str, np.ndarray]:
@@ -81,12 +86,12 @@ def in_exudyn(
     return cost
 
 
-def by_compiled_solver(assembly: Assembly) -> Callable[[int], Cost]:
-    """Cost of steps of the compiled solver, states kept."""
+def by_compiled_solver(assembly: Assembly, method: Method) -> Callable[[int], Cost]:
+    """Cost of steps of the compiled solver by a method, states kept."""
     begin = accelerating_start(assembly, LOAD, START_SPEED)
 
     def cost(steps: int) -> Cost:
-        system = CompiledSystem(assembly, begin.q, begin.v, LoadTable(LOAD), STEP)
+        system = CompiledSystem(assembly, begin.q, begin.v, LoadTable(LOAD), STEP, method)
         q, v = np.zeros((2, steps, assembly.size))
         return timed(lambda: system.advance(0, q, v))
 
@@ -96,7 +101,7 @@ def by_compiled_solver(assembly: Assembly) -> Callable[[int], Cost]:
 def ways(assembly: Assembly, quick: bool) -> list[Way]:
     """All ways, slowest first."""
     share = 4 if quick else 1
-    full, modified, runge = FULL_NEWTON, MODIFIED_NEWTON, "RK4"
+    full, modified, runge = FULL_NEWTON, MODIFIED_NEWTON, RK4.name
     python = "Python function per mesh, numerical jacobian, generalized-alpha"
     return [
         Way(f"{python}, full Newton", in_exudyn(assembly, "full", "python"), 80 // share, full),
@@ -110,7 +115,8 @@ def ways(assembly: Assembly, quick: bool) -> list[Way]:
         ),
         Way("one GenericODE2, compiled, RK44", in_exudyn(assembly, "RK44", "element"), 2000 // share, runge),
         Way("no meshes at all, Exudyn RK44", in_exudyn(assembly, "RK44", "bare"), 2000 // share, ""),
-        Way("compiled solver, RK4", by_compiled_solver(assembly), 60000 // share, runge),
+        Way("compiled solver, RK4", by_compiled_solver(assembly, RK4), 60000 // share, runge),
+        Way(f"compiled solver, {ADAMS.name}", by_compiled_solver(assembly, ADAMS), 60000 // share, ADAMS.name),
     ]
 
 
@@ -156,7 +162,7 @@ def shares_of_a_step(assembly: Assembly, rounds: int) -> dict[str, float]:
     costs: dict[str, list[float]] = {name: [] for name in bare}
     for _ in range(rounds):
         for name, one in bare.items():
-            system = CompiledSystem(one, q, v, LoadTable(), STEP)
+            system = CompiledSystem(one, q, v, LoadTable(), STEP, ADAMS)
             out_q, out_v = np.zeros((2, 20000, one.size))
             costs[name].append(timed(lambda s=system, a=out_q, b=out_v: s.advance(0, a, b)).processor)
     return {
@@ -172,9 +178,9 @@ def states(assembly: Assembly, rpm: float, step: float, method: str) -> tuple[np
     """States over 0.4 s at constant speed (rpm); None where Exudyn cut the step."""
     begin = accelerating_start(assembly, RATED, rpm * math.pi / 30.0)
     steps = round(0.4 / step)
-    if method == "RK4":
+    if method in OWN_METHODS:
         q, v = np.empty((2, steps, assembly.size))
-        CompiledSystem(assembly, begin.q, begin.v, LoadTable(RATED), step).advance(0, q, v)
+        CompiledSystem(assembly, begin.q, begin.v, LoadTable(RATED), step, OWN_METHODS[method]).advance(0, q, v)
         return q, v
     import exudyn_ways
 
@@ -207,8 +213,10 @@ def amplitude_errors(gearbox: Gearbox) -> list[dict[str, Any]]:
     rows = []
     for variant in ("rigid", "bushing"):
         assembly = assemble(gearbox, Choice(variant), stiffness_of(gearbox))
-        exact = {f: excitation_amplitudes(assembly, f / order, 2.5e-6, "RK4") for f in FREQUENCIES}
-        kinds = [("RK4", step) for step in (5e-5, 2.5e-5, STEP, 1.25e-5)]
+        exact = {f: excitation_amplitudes(assembly, f / order, 2.5e-6, RK4.name) for f in FREQUENCIES}
+        chosen = choose_integration(assembly, SAMPLE_RATE, BAND)
+        kinds = [(RK4.name, step) for step in (5e-5, 2.5e-5, STEP, 1.25e-5)]
+        kinds += [(method.name, step) for method in map(adams, ORDERS) for step in (2.5e-5, STEP, 1.25e-5)]
         others = [(method, STEP) for method in (RUNGE_KUTTA, FULL_NEWTON, MODIFIED_NEWTON)]
         for method, step in [*kinds, *others]:
             errors = [excitation_amplitudes(assembly, f / order, step, method) / exact[f] - 1.0 for f in FREQUENCIES]
@@ -218,7 +226,7 @@ def amplitude_errors(gearbox: Gearbox) -> list[dict[str, Any]]:
                     "variant": variant,
                     "method": method,
                     "step": step,
-                    "chosen": method == "RK4" and math.isclose(step, choose_step(assembly, SAMPLE_RATE, BAND)),
+                    "chosen": method == chosen.method.name and math.isclose(step, chosen.step),
                     "overall": [None if np.isnan(e[0]) else float(e[0]) for e in errors],
                     "high_speed": [None if np.isnan(e[1]) else float(e[1]) for e in errors],
                 }
@@ -321,10 +329,11 @@ def growth(rounds: int) -> list[dict[str, Any]]:
         gearbox = synthetic(planets, stages)
         assembly = assemble(gearbox, Choice("bushing"), stiffness_of(gearbox))
         begin = accelerating_start(assembly, load)
+        method = choose_integration(assembly, SAMPLE_RATE, BAND, step=STEP).method
         q, v = np.zeros((2, 10000, assembly.size))
         own, others = [], []
         for _ in range(rounds):
-            system = CompiledSystem(assembly, begin.q, begin.v, LoadTable(load), STEP)
+            system = CompiledSystem(assembly, begin.q, begin.v, LoadTable(load), STEP, method)
             own.append(1e2 * timed(lambda s=system, q=q, v=v: s.advance(0, q, v)).processor)
             other = exudyn_ways.system_of(assembly, begin.q, begin.v, load)
             others.append(5e3 * exudyn_ways.integrate(other, 200, STEP, "RK44").processor)
@@ -365,9 +374,11 @@ def run_up(variant: str, duration: float) -> dict[str, Any]:
             lambda: runs.append(simulate(gearbox, Choice(variant), stiffness_of(gearbox), directory, duration=duration))
         )
         assembly = assemble(gearbox, Choice(variant), stiffness_of(gearbox))
-        step = choose_step(assembly, SAMPLE_RATE, BAND)
+        chosen = choose_integration(assembly, SAMPLE_RATE, BAND)
+        step = chosen.step
         return {
             "variant": variant,
+            "method": chosen.method.name,
             **size_of(assembly),
             "simulated_s": runs[0].end,
             "wall_s": cost.wall,

@@ -19,14 +19,14 @@ from timing import CASE, median, say, timed
 from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.signals import ENERGIES, POWERS, signal_layout
 from exugear.dynamics.statics import accelerating_start
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.runs.extent import SAMPLE_RATE
 from exugear.runs.runup import BAND
-from exugear.solvers.compiled.observers import Observer
 from exugear.solvers.compiled.solver import CompiledSystem
-from exugear.solvers.compiled.step import choose_step
+from exugear.solvers.compiled.step import Integration, choose_integration
 from exugear.solvers.loads import LoadTable
 
 SHAFTS = ("lss", "ims", "hss")
@@ -74,20 +74,20 @@ def reductions(gearbox: Gearbox) -> list[dict[str, Any]]:
 class _Steps:
     """An assembly that takes steps, with and without signals."""
 
-    def __init__(self, assembly: Assembly, step: float) -> None:
+    def __init__(self, assembly: Assembly, chosen: Integration) -> None:
         start = accelerating_start(assembly, LOAD)
         loads = LoadTable(LOAD)
         self.number = 2000
         self.q, self.v = np.zeros((2, self.number, assembly.size))
-        self.times = step * np.arange(self.number)
-        self._system = CompiledSystem(assembly, start.q, start.v, loads, step)
-        self._observer = Observer(assembly, loads)
+        self.signals = np.zeros((self.number, signal_layout(assembly).count))
+        self.energies = np.zeros((self.number, len(ENERGIES) + len(POWERS)))
+        self._system = CompiledSystem(assembly, start.q, start.v, loads, chosen.step, chosen.method)
 
     def costs(self) -> tuple[float, float]:
-        """Microseconds of processor time for a step, and for a step with its signals and energies."""
+        """Microseconds of processor time for a step, and for a step with its signals and powers."""
         steps = timed(lambda: self._system.advance(0, self.q, self.v)).processor
-        signals = timed(lambda: self._observer.observe(self.times, self.q, self.v)).processor
-        return 1e6 * steps / self.number, 1e6 * (steps + signals) / self.number
+        whole = timed(lambda: self._system.advance(0, self.q, self.v, self.signals, self.energies)).processor
+        return 1e6 * steps / self.number, 1e6 * whole / self.number
 
 
 def steps(gearbox: Gearbox, rounds: int) -> list[dict[str, Any]]:
@@ -101,9 +101,9 @@ def steps(gearbox: Gearbox, rounds: int) -> list[dict[str, Any]]:
     rows, systems = [], []
     for name, (case, variant) in cases.items():
         assembly = assembled(case, variant)
-        step = choose_step(assembly, SAMPLE_RATE, BAND)
-        systems.append(_Steps(assembly, step))
-        rows.append({"elastic": name, "coordinates": assembly.size, "step": step})
+        chosen = choose_integration(assembly, SAMPLE_RATE, BAND)
+        systems.append(_Steps(assembly, chosen))
+        rows.append({"elastic": name, "coordinates": assembly.size, "step": chosen.step, "method": chosen.method.name})
     found = [[system.costs() for system in systems] for _ in range(rounds + 1)][1:]
     for n, row in enumerate(rows):
         row["microseconds_per_step"] = median(one[n][0] for one in found)

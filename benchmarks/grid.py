@@ -17,7 +17,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from timing import say
+from timing import environment, say
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -92,7 +92,7 @@ def measure_all(quick: bool) -> dict[str, Any]:
     pairs = []
     for name in PAIRS[:1] if quick else PAIRS:
         say(f"grid of {name}")
-        run = subprocess.run([*command, name], check=True, capture_output=True, text=True)
+        run = subprocess.run([*command, name], check=True, capture_output=True, text=True, env=environment())
         pairs.append(json.loads(run.stdout))
     return {"pairs": pairs}
 

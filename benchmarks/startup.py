@@ -22,12 +22,15 @@ def cost_of(arguments: list[str], cache: str) -> Cost:
     command = [sys.executable, "-c", "from exugear.cli.app import main; main()", *arguments]
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     cost = timed(
-        lambda: subprocess.run(
-            command, check=True, capture_output=True, cwd=ROOT, env=environment(NUMBA_CACHE_DIR=cache)
-        )
+        lambda: subprocess.run(command, check=True, capture_output=True, cwd=ROOT, env=environment(**kept_in(cache)))
     )
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return Cost(cost.wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+
+
+def kept_in(cache: str) -> dict[str, str]:
+    """Environment in which compiled kernels and Python's own byte code are kept in a folder, as after installation."""
+    return {"NUMBA_CACHE_DIR": cache, "PYTHONPYCACHEPREFIX": cache, "PYTHONDONTWRITEBYTECODE": ""}
 
 
 def measure(quick: bool) -> dict[str, Any]:

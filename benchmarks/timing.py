@@ -107,14 +107,18 @@ def _version(name: str) -> str:
 
 
 def environment(**more: str) -> dict[str, str]:
-    """Environment of a process of this copy of the program, with one BLAS thread as the command line sets it."""
-    return {**os.environ, "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1", **more}
+    """Environment of a process of this copy of the program, with one BLAS thread as the command line sets it.
+
+    Gears that are known from before are not taken from their files: what is measured begins from nothing.
+    """
+    own = {"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1", "EXUGEAR_FLANKS": "off"}
+    return {**os.environ, **own, **more}
 
 
-def start(script: str, *arguments: str) -> subprocess.Popen[str]:
-    """Start one of these scripts in a process of its own; it prints JSON."""
+def start(script: str, *arguments: str, **more: str) -> subprocess.Popen[str]:
+    """Start one of these scripts in a process of its own, with `more` in its environment; it prints JSON."""
     command = [sys.executable, str(Path(__file__).with_name(script)), *arguments]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment())
+    return subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment(**more))
 
 
 def result(process: subprocess.Popen[str]) -> Any:

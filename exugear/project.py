@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 
 from exugear.bearings.duty import BearingDuty
 from exugear.bodies.elastic_body import ElasticBody
-from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.bearing_duties import bearing_duties
@@ -196,6 +195,8 @@ class Project:
         if self.choice.variant != "flexible":
             return {}
         inertias = self.choice.inertia_set(self.gearbox)
+        from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies  # loads finite elements
+
         return reduced_bodies(self.gearbox, inertias, bodies_folder(self.folder), begin)
 
     def assembly(self) -> Assembly:

@@ -12,9 +12,9 @@ import skfem
 from cases import TEETH, LoadCase
 from fe_ste.elasticity.bricks import gradient_products, skfem_mesh
 from fe_ste.elasticity.hexmesh import MeshSettings, SectorMesh, refined_sector_mesh
+from fe_ste.elimination.sparse import factorise
 from fe_ste.geometry.gears import Gear
 from fe_ste.tools.arrays import Floats, Integers, SparseMatrix
-from fe_ste.tools.sparse import factorise
 
 CHUNK = 1000
 """Elements assembled at a time."""

@@ -9,7 +9,6 @@ from typing import Literal
 
 import numpy as np
 import scipy.linalg
-import scipy.sparse.csgraph
 from numpy.typing import NDArray
 
 from exugear.kernels.coordinates import AXIAL, BODY_SIZE, TILT
@@ -155,6 +154,8 @@ class ReducedBody:
     @cached_property
     def blocks(self) -> tuple[Integers, ...]:
         """Coordinates that neither mass nor stiffness couples to others: both bending planes, torsion, stretching."""
+        import scipy.sparse.csgraph  # a tenth of a second that a gearbox without elastic bodies need not wait
+
         joined = scipy.sparse.csr_array((self.mass != 0.0) | (self.stiffness != 0.0))
         count, label = scipy.sparse.csgraph.connected_components(joined, directed=False)
         return tuple(np.flatnonzero(label == n) for n in range(count))

@@ -24,14 +24,16 @@ the seats' turning about z is the spin, with Omega = r' M q' / (r' M r) for the 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.linalg
-import scipy.sparse
+import scipy
 
 from exugear.bodies.reduced_body import Frame, ReducedBody, ReductionError, RigidInertia
 from fe_ste.tools.arrays import Floats, SparseMatrix
-from fe_ste.tools.sparse import Backend, Factorisation, factorise
+
+if TYPE_CHECKING:
+    from fe_ste.elimination.sparse import Backend, Factorisation
 
 MOST_LANCZOS_STEPS = 150
 """Lanczos steps after which the search for normal modes is given up."""
@@ -119,6 +121,8 @@ def constraint_and_inertia_relief_modes(
     held_at = scipy.linalg.qr(rigid.T, mode="r", pivoting=True)[1][: rigid.shape[1]]
     springs = np.zeros(len(rigid))
     springs[held_at] = stiffness.diagonal().mean()
+    from fe_ste.elimination.sparse import factorise
+
     with factorise(scipy.sparse.csr_array(stiffness + scipy.sparse.diags_array(springs)), backend) as held:
         deflections = held.solve(np.hstack([seats.T, mass @ rigid]))
     by_force, by_acceleration = deflections[:, : len(seats)], deflections[:, len(seats) :]
@@ -165,6 +169,8 @@ def free_interface_modes(
     known = rigid @ np.linalg.inv(np.linalg.cholesky(rigid.T @ (mass @ rigid))).T
     frequencies: list[float] = []
     random = np.random.default_rng(1)
+    from fe_ste.elimination.sparse import factorise
+
     with factorise(scipy.sparse.csr_array(stiffness + shift * mass), backend) as shifted:
         while True:
             start = random.standard_normal(len(rigid))

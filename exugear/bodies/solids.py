@@ -21,11 +21,11 @@ import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import skfem
 
+from exugear.bodies.finite_elements.lazy import at_first_use
 from exugear.bodies.finite_elements.solid_facets import ordered_corners
 from exugear.bodies.finite_elements.solid_files import SolidFile
 from exugear.bodies.finite_elements.solid_matrices import Solid, assemble, in_each_direction, shape_gradients
@@ -46,7 +46,14 @@ from exugear.kernels.coordinates import SPIN
 from exugear.model.versions import REDUCTION
 from fe_ste.geometry.gears import Material
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.sparse import Backend
+
+if TYPE_CHECKING:
+    import skfem
+
+    from fe_ste.elimination.sparse import Backend
+else:
+    skfem = at_first_use("skfem")
+
 
 ASYMMETRY_TOLERANCE = 5e-3
 """Relative change of the seats' mass or stiffness by a quarter turn above which a body is none of revolution."""

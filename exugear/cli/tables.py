@@ -45,8 +45,8 @@ def compute_tables(requests: list[TableRequest]) -> dict[str, MeshTable]:
 
 
 def _compute_table(request: TableRequest, bar: Progress, task: TaskID) -> MeshTable:
+    from fe_ste.elimination.sparse import FactorisationError
     from fe_ste.geometry.checks import GeometryError
-    from fe_ste.tools.dense import NotPositiveDefiniteError
     from fe_ste.transmission_error.grid import GridError
 
     before = bar.tasks[task].completed
@@ -63,7 +63,7 @@ def _compute_table(request: TableRequest, bar: Progress, task: TaskID) -> MeshTa
         return request.compute(at_state)
     except GeometryError as error:
         raise BadInputError(f"pairs.{request.name}: {error}") from error
-    except (NotPositiveDefiniteError, GridError) as error:
+    except (FactorisationError, GridError) as error:
         raise FailedError(f"{request.name}: {error}") from error
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.optimize
+import scipy.linalg
 
 from exugear.bodies.turning_frame import TurningBody
 from exugear.dynamics.assembly import Assembly

@@ -10,11 +10,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import scipy.optimize
-import xarray as xr
 from numpy.typing import NDArray
 
 from exugear.bodies.elastic_body import ElasticBody
@@ -32,6 +30,10 @@ from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.notebook import html_table
 from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+
 
 RIGID_COORDINATES = ("x", "y", "z", "tilt_x", "tilt_y", "spin")
 FREE_ROTATION = "free rotation of the train"
@@ -94,6 +96,8 @@ class Modes:
 
     def to_dataset(self) -> xr.Dataset:
         """Labelled arrays with units, what `save` writes."""
+        import xarray as xr
+
         assembly = self.assembly
         coordinate_names = coordinate_labels(assembly)
         variables: dict[str, tuple[tuple[str, ...], Any, dict[str, str]]] = {
@@ -316,5 +320,7 @@ def counterparts(before: Modes, after: Modes) -> tuple[NDArray[np.int64], Floats
         else:
             carried[[i for i in target.coordinates[body.name] if i >= 0], index] = 1.0
     share = (after.shapes.T @ target.mass_matrix @ carried @ before.shapes) ** 2
+    import scipy.optimize  # a quarter of a second that a run need not wait
+
     _, place = scipy.optimize.linear_sum_assignment(share.T, maximize=True)
     return np.asarray(place, dtype=np.int64), share[place, np.arange(len(place))]

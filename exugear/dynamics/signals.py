@@ -10,14 +10,17 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import xarray as xr
 
 from exugear.dynamics.assembly import Assembly
 from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Booleans, Floats
+
+if TYPE_CHECKING:
+    import xarray as xr
+
 
 COMPONENTS = {"axis": 3}
 """Entries along a dimension that needs no names: x, y, z in global axes."""
@@ -64,8 +67,8 @@ class Signal(Variable):
     Attributes
     ----------
     filled_by : tuple of str
-        Functions and methods of `exugear.solvers.compiled.observers` that fill its columns, or its part of the
-        account. Empty where `formula` gives it, or where it is a time itself.
+        Functions of `exugear.solvers.compiled.sampling` that fill its columns, or its part of the account; or
+        methods of `exugear.solvers.compiled.observers`. Empty where `formula` gives it, or where it is a time itself.
     formula : callable, optional
         Makes it of the columns of samples: (layout, rows) to an array of rows and its further dimensions. Of a time
         that is added up: in which samples it passes.
@@ -144,7 +147,7 @@ SIGNALS = (
         "N",
         sign_convention="on the body, along the global axis",
         kind="f4",
-        filled_by=("observe_connectors", "observe_joints"),
+        filled_by=("observe_supports", "observe_joints"),
     ),
     Signal(
         "pulling_time",
@@ -392,7 +395,7 @@ def signal_layout(assembly: Assembly) -> SignalLayout:
     )
 
 
-def energy_residual(data: xr.Dataset) -> float:
+def energy_residual(data: xr.Dataset | Mapping[str, Floats]) -> float:
     """Part of the change of kinetic energy that the account of a run does not explain; NaN without a change."""
     change = {term: float(data[term][-1] - data[term][0]) for term in BALANCE_TERMS}
     explained = sum(value for term, value in change.items() if term != "work_of_loads")

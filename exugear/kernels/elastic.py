@@ -16,6 +16,7 @@ import numpy as np
 
 from fe_ste.tools.arrays import Booleans, Floats, Integers
 from fe_ste.tools.compilation import kernel, summing_kernel
+from fe_ste.tools.octets import all_eight, eight, sum_of
 
 
 class ElasticArrays(NamedTuple):
@@ -75,7 +76,7 @@ class ElasticMotion(NamedTuple):
     columns : (b,) columns of each block's matrix, filled up with zeros to a multiple of `LANES`
     begin : (b,) first entry of each block in `matrix`
     matrix : blocks row by row: M^-1 (its first columns), -M^-1 K, -M^-1 G, which act on outer forces, q + time v and
-        Omega v of the partner
+        Omega v of the partner; filled up with zeros to a multiple of `ROWS` rows
     """
 
     first: Integers
@@ -91,8 +92,8 @@ class ElasticMotion(NamedTuple):
     matrix: Floats
 
 
-LANES = 8
-"""Products taken together: what two registers of a processor hold."""
+LANES, ROWS = 8, 4
+"""Products taken together: what two registers of a processor hold, and of as many rows."""
 
 
 def elastic_motion(elastic: ElasticArrays, acted: Booleans) -> ElasticMotion:
@@ -117,9 +118,9 @@ def elastic_motion(elastic: ElasticArrays, acted: Booleans) -> ElasticMotion:
         )
         begin = elastic.across[b]
         gyroscopic = elastic.gyroscopic[begin : begin + size * across[b]].reshape(across[b], size).T
-        whole = np.zeros((size, columns[b]))
+        whole = np.zeros((-(-size // ROWS) * ROWS, columns[b]))
         known = np.hstack([inverse[:, : forces[b]], -inverse @ stiffness, -inverse @ gyroscopic])
-        whole[:, : known.shape[1]] = known
+        whole[:size, : known.shape[1]] = known
         blocks.append(whole.ravel())
     return ElasticMotion(
         first=elastic.first,
@@ -148,6 +149,51 @@ def row_product(matrix: Floats, begin: int | np.uint64, given: Floats, count: in
     for j in range(np.uint64(count)):
         total += matrix[start + j] * given[j]
     return total
+
+
+@kernel
+def four_rows(matrix: Floats, begin: int, given: Floats, count: int) -> tuple[float, float, float, float]:
+    """Scalar products of four neighbouring rows of a flat matrix, from `begin` on, with a vector (count,).
+
+    Four at a time: the vector is read once for them, and four sums wait for each other less than one. The count is a
+    multiple of `LANES`.
+    """
+    a = all_eight(0.0)
+    b, c, d = a, a, a
+    second, third, fourth = begin + count, begin + 2 * count, begin + 3 * count
+    for j in range(0, count, LANES):
+        x = eight(given, j)
+        a = a + eight(matrix, begin + j) * x
+        b = b + eight(matrix, second + j) * x
+        c = c + eight(matrix, third + j) * x
+        d = d + eight(matrix, fourth + j) * x
+    return sum_of(a), sum_of(b), sum_of(c), sum_of(d)
+
+
+@kernel
+def set_rows(b: int, given: Floats, elastic: ElasticMotion, out: Floats) -> None:
+    """Set the accelerations of block b to the products of its matrix with a vector."""
+    begin, end, columns = elastic.first[b], elastic.first[b + 1], elastic.columns[b]
+    row = elastic.begin[b]
+    for i in range(begin, end, ROWS):
+        first, second, third, fourth = four_rows(elastic.matrix, row, given, columns)
+        out[elastic.coordinate[i]] = first
+        if i + 1 < end:
+            out[elastic.coordinate[i + 1]] = second
+        if i + 2 < end:
+            out[elastic.coordinate[i + 2]] = third
+        if i + 3 < end:
+            out[elastic.coordinate[i + 3]] = fourth
+        row += ROWS * columns
+
+
+@kernel
+def lane_product(matrix: Floats, begin: int, given: Floats, count: int) -> float:
+    """Scalar product of a row of a flat matrix, from `begin` on, with a vector (count,), a multiple of `LANES`."""
+    total = all_eight(0.0)
+    for j in range(0, count, LANES):
+        total = total + eight(matrix, begin + j) * eight(given, j)
+    return sum_of(total)
 
 
 @kernel
@@ -183,10 +229,7 @@ def set_elastic_motion(q: Floats, v: Floats, f: Floats, elastic: ElasticMotion, 
         columns = at(elastic.columns[b])
         for i in range(known, columns):
             given[i] = 0.0
-        row = at(elastic.begin[b])
-        for i in range(size):
-            out[at(elastic.coordinate[first + i])] = row_product(elastic.matrix, row, given, columns)
-            row += columns
+        set_rows(b, given, elastic, out)
 
 
 @kernel

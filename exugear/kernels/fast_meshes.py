@@ -16,7 +16,8 @@ from exugear.kernels.coordinates import AXIAL, BODY_SIZE, PADDED, PADDED_SPIN, P
 from exugear.kernels.meshes import FRAME
 from exugear.kernels.table_law import Scratch, TableArrays, piece_at
 from fe_ste.tools.arrays import Floats, Integers
-from fe_ste.tools.compilation import kernel, summing_kernel
+from fe_ste.tools.compilation import kernel
+from fe_ste.tools.octets import eight, put, sum_of
 
 ALONG_DEFLECTION, ALONG_FORCE, TABLE_FORCE = range(3)
 """Rows of `MeshMemory.gradient`."""
@@ -29,12 +30,12 @@ DEFLECTION_ROW, FORCE_ROW, CENTRE_ROW, MISALIGNMENT_ROW, BACK_ROW, BACK_MISALIGN
 """Rows of `Meshes.rows`."""
 PLAIN_ROWS = 2
 """Number of rows of meshes without a table."""
-FIXED, ALONG_COSINE, ALONG_SINE = range(3)
-"""Parts of each of them."""
+FIXED, ALONG_COSINE, ALONG_SINE, SECOND = range(0, 4 * PADDED, PADDED)
+"""First columns of the parts of each of them, and of those of the second gear."""
 TURNING = 2 * PADDED
 """Place of the frame's angle in a gradient of `MeshMemory.gradients`, behind two padded gears."""
 KINETIC, ELASTIC, OF_LOADS, DISSIPATED, OF_VARYING_STIFFNESS, NON_CONSERVATIVE, OF_BEARING_RATES = range(7)
-"""Columns of an account of energy, as runs take it (`exugear.solvers.compiled.observers`).
+"""Columns of an account of energy, as runs take it (`exugear.solvers.compiled.sampling`).
 
 Kinetic and elastic energy (J); powers (W): of the loads, damped, of the stiffness that changes with pmc, of mesh forces
 that are not conjugate to their deflection, of bearings whose rate is not the derivative of their displacement.
@@ -52,7 +53,8 @@ class Meshes(NamedTuple):
     conjugate : (m,) 1 where the force row is the deflection row
     spinning : (m,) 1 where the gears have their spins alone
     ends : (m, 2) numbers of the two gears' places
-    rows : (m, r, 2, 3, 8) rows over both gears' padded places, W = W0 + W1 cos psi + W2 sin psi; psi: the frame's angle
+    rows : (m, r, 48) rows over both gears' padded places: parts W0, W1, W2 of the first, then of the second gear, whose
+        row is W0 + W1 cos psi + W2 sin psi at the angle psi of the frame
     offsets : (m, r, 3) of each row: what cos psi, sin psi and psi itself add to its value
     """
 
@@ -111,41 +113,22 @@ def padded_rows(rows: Floats, axis: Floats) -> tuple[Floats, Floats]:
 
     Returns
     -------
-    rows : (m, r, 2, 3, 8) array
+    rows : (m, r, 48) array
     offsets : (m, r, 3) array
     """
     count, kinds = rows.shape[:2]
     gears = rows.reshape(count, kinds, 2, BODY_SIZE)
-    parts = np.zeros((count, kinds, 2, 3, PADDED))
-    parts[..., FIXED, AXIAL], parts[..., FIXED, PADDED_SPIN] = gears[..., AXIAL], gears[..., SPIN]
+    parts = np.zeros((count, kinds, 2, SECOND))
+    parts[..., FIXED + AXIAL], parts[..., FIXED + PADDED_SPIN] = gears[..., AXIAL], gears[..., SPIN]
     for i, o in ((0, 0), (TILT, PADDED_TILT)):
         # Turned forward by psi: (c x - s y, s x + c y).
-        parts[..., ALONG_COSINE, o : o + 2] = gears[..., i : i + 2]
-        parts[..., ALONG_SINE, o], parts[..., ALONG_SINE, o + 1] = -gears[..., i + 1], gears[..., i]
+        parts[..., ALONG_COSINE + o], parts[..., ALONG_COSINE + o + 1] = gears[..., i], gears[..., i + 1]
+        parts[..., ALONG_SINE + o], parts[..., ALONG_SINE + o + 1] = -gears[..., i + 1], gears[..., i]
     offsets = np.zeros((count, kinds, 3))
     x, y, px, py = gears[..., 0], gears[..., 1], axis[:, None, :, 0], axis[:, None, :, 1]
     offsets[..., 0], offsets[..., 1] = (x * px + y * py).sum(axis=2), (x * py - y * px).sum(axis=2)
     offsets[..., 2] = -gears[..., SPIN].sum(axis=2)
-    return parts, offsets
-
-
-@summing_kernel
-def end_motion(
-    row: Floats, place: Floats, c: float, s: float, width: int, gradient: Floats, begin: int
-) -> tuple[float, float, float]:
-    """Share of one gear in value, rate and turning of a row; fills its gradient (8 from `begin` on).
-
-    The width is handed over, because the loop is only made of vectors if it is not known.
-    """
-    value, rate, turning = 0.0, 0.0, 0.0
-    for k in range(width):
-        along, across = row[ALONG_COSINE, k], row[ALONG_SINE, k]
-        entry = row[FIXED, k] + c * along + s * across
-        gradient[begin + k] = entry
-        value += entry * place[k]
-        rate += entry * place[PADDED + k]
-        turning += (c * across - s * along) * place[k]
-    return value, rate, turning
+    return parts.reshape(count, kinds, 2 * SECOND), offsets
 
 
 @kernel
@@ -153,22 +136,22 @@ def row_motion(
     m: int, kind: int, psi: float, psi_rate: float, c: float, s: float, meshes: Meshes, places: Floats, gradient: Floats
 ) -> tuple[float, float]:
     """Value and rate of a row of mesh m; fills its gradient (17,). c and s are those of the frame's angle psi."""
-    rows, offsets, width = meshes.rows[m, kind], meshes.offsets[m, kind], meshes.rows.shape[4]
+    row, offsets = meshes.rows[m, kind], meshes.offsets[m, kind]
+    first, second = places[meshes.ends[m, 0]], places[meshes.ends[m, 1]]
+    along, across = eight(row, ALONG_COSINE), eight(row, ALONG_SINE)
+    gradient_1, turning_1 = eight(row, FIXED) + along * c + across * s, across * c - along * s
+    along, across = eight(row, SECOND + ALONG_COSINE), eight(row, SECOND + ALONG_SINE)
+    gradient_2, turning_2 = eight(row, SECOND + FIXED) + along * c + across * s, across * c - along * s
+    place_1, place_2 = eight(first, 0), eight(second, 0)
     level, lever, spins = offsets[0], offsets[1], offsets[2]
-    first = end_motion(rows[0], places[meshes.ends[m, 0]], c, s, width, gradient, 0)
-    second = end_motion(rows[1], places[meshes.ends[m, 1]], c, s, width, gradient, PADDED)
     # What the frame's turning does to all of the above at once.
-    turning = (first[2] + second[2]) + (c * lever - s * level) + spins
+    turning = sum_of(turning_1 * place_1 + turning_2 * place_2) + (c * lever - s * level) + spins
+    value = sum_of(gradient_1 * place_1 + gradient_2 * place_2) + ((c * level + s * lever - level) + spins * psi)
+    rate = sum_of(gradient_1 * eight(first, PADDED) + gradient_2 * eight(second, PADDED)) + turning * psi_rate
+    put(gradient, 0, gradient_1)
+    put(gradient, PADDED, gradient_2)
     gradient[TURNING] = turning
-    value = (first[0] + second[0]) + ((c * level + s * lever - level) + spins * psi)
-    return value, first[1] + second[1] + turning * psi_rate
-
-
-@kernel
-def add_gradient(factor: float, gradient: Floats, width: int, total: Floats) -> None:
-    """Add a multiple of the first `width` entries of a gradient to a sum."""
-    for k in range(width):
-        total[k] += factor * gradient[k]
+    return value, rate
 
 
 @kernel
@@ -236,9 +219,7 @@ def subtract_wheel_errors(
 
 
 @kernel
-def subtract_errors(
-    q: Floats, v: Floats, m: int, side: float, meshes: Meshes, gradient: Floats
-) -> tuple[float, float]:
+def subtract_errors(q: Floats, v: Floats, m: int, side: float, meshes: Meshes, gradient: Floats) -> tuple[float, float]:
     """Change of a deflection and its rate by the gears' errors; changes its padded gradient too."""
     delta, rate = 0.0, 0.0
     index = meshes.coordinates[m]

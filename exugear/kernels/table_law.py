@@ -21,6 +21,7 @@ import numpy as np
 
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import compiled, kernel
+from fe_ste.tools.octets import all_eight, eight, put
 
 ORDERS = np.array(
     [[0, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 0], [0, 2, 0], [0, 1, 1], [0, 0, 2], [1, 1, 0], [1, 0, 1]],
@@ -40,7 +41,8 @@ AXIS_PMC, AXIS_DISTANCE, AXIS_MISALIGNMENT = range(3)
 """Axes of `Scratch.basis` and `Scratch.node`."""
 NOMINAL_DEFLECTION, NOMINAL_DISTANCE, NOMINAL_MISALIGNMENT = range(3)
 """Columns of `TableArrays.nominal`."""
-CUBIC_SIZE = 5
+CUBIC_SIZE, NODE_SIZE = 5, 8
+"""Numbers of a load piece, and the room that they have: filled up with zeros for the processor's vectors."""
 ENERGY_BELOW = 4
 """Behind the four coefficients of s over a load piece: the integral of s over the force up to the piece's start."""
 LAW_FORCE, LAW_STIFFNESS, LAW_POTENTIAL, LAW_BY_DISTANCE, LAW_BY_MISALIGNMENT, LAW_BY_PMC, LAW_OUTSIDE = range(7)
@@ -55,7 +57,7 @@ class TableArrays(NamedTuple):
     ----------
     shape : (m, 4) positions, centre distances, values and slopes along misalignment, load pieces
     axes : (m, 2) number of knots of centre distance and misalignment
-    values : (m, n) `fe_ste.transmission_error.surface.SteSurface.coefficients`, flat
+    values : (m, n) `fe_ste.transmission_error.surface.SteSurface.coefficients`, flat, the last axis filled up to 8
     root : (m, l + 1) knots of the root of F_bt, sqrt(N)
     knots : (m, 2, k) knots of centre distance (m) and misalignment (rad)
     first_node : (m, 2, k) first node that acts in each interval
@@ -96,15 +98,13 @@ class Scratch(NamedTuple):
     ----------
     basis : (3, 3, 4) weights of the nodes by axis and order of derivative
     node : (3,) first node on each axis
-    part : (2, 5) sums over one axis
-    cubic : (9, 5) the surface's derivatives in the order of `ORDERS`, over one load piece
+    cubic : (9, 8) the surface's derivatives in the order of `ORDERS`, over one load piece, filled up
     law : (7,) force (N), tangent stiffness (N/m), potential (J), its derivatives by centre distance (N), by
         misalignment (N m) and by pmc (J), 1 where an axis was left
     """
 
     basis: Floats
     node: Integers
-    part: Floats
     cubic: Floats
     law: Floats
 
@@ -115,8 +115,7 @@ def scratch_memory() -> Scratch:
     return Scratch(
         np.zeros((3, 3, 4)),
         np.zeros(3, dtype=np.int64),
-        np.zeros((2, CUBIC_SIZE)),
-        np.zeros((9, CUBIC_SIZE)),
+        np.zeros((9, NODE_SIZE)),
         np.zeros(LAW_SIZE),
     )
 
@@ -182,43 +181,41 @@ def weigh_nodes(x: float, count: int, knots: Floats, weights: Floats, basis: Flo
 
 @kernel
 def contract_for_force(values: Floats, shape: Integers, piece: int, memory: Scratch) -> None:
-    """Fill `cubic` with the surface and its slopes over centre distance and misalignment, one axis after the other."""
-    basis, node, cubic, part = memory.basis, memory.node, memory.cubic, memory.part
-    stride = CUBIC_SIZE * shape[LOAD_PIECES]
-    for d in range(FORCE_DERIVATIVES):
-        for j in range(CUBIC_SIZE):
-            cubic[d, j] = 0.0
+    """Fill `cubic` with the surface and its three slopes over one load piece, one axis after the other."""
+    basis, node, cubic = memory.basis, memory.node, memory.cubic
+    stride = NODE_SIZE * shape[LOAD_PIECES]
+    level = all_eight(0.0)
+    by_distance, by_misalignment, by_pmc = level, level, level
     for p in range(4 if shape[POSITIONS] > 1 else 1):
         # The mesh cycle closes: behind the last position comes the first.
         position = node[AXIS_PMC] + p
         while position >= shape[POSITIONS]:
             position -= shape[POSITIONS]
-        position_weight = basis[AXIS_PMC, 0, p]
         for c in range(min(4, shape[DISTANCES])):
             row = (position * shape[DISTANCES] + node[AXIS_DISTANCE] + c) * shape[MISALIGNMENTS]
-            start = CUBIC_SIZE * ((row + node[AXIS_MISALIGNMENT]) * shape[LOAD_PIECES] + piece)
-            for j in range(CUBIC_SIZE):
-                part[0, j], part[1, j] = 0.0, 0.0
+            start = NODE_SIZE * ((row + node[AXIS_MISALIGNMENT]) * shape[LOAD_PIECES] + piece)
             # The innermost axis is summed once for value and slope: half the products of a sum over all three axes.
+            part, slope = all_eight(0.0), all_eight(0.0)
             for a in range(min(4, shape[MISALIGNMENTS])):
-                value_weight, slope_weight = basis[AXIS_MISALIGNMENT, 0, a], basis[AXIS_MISALIGNMENT, 1, a]
-                for j in range(CUBIC_SIZE):
-                    value = values[start + j]
-                    part[0, j] += value_weight * value
-                    part[1, j] += slope_weight * value
+                entries = eight(values, start)
+                part = part + entries * basis[AXIS_MISALIGNMENT, 0, a]
+                slope = slope + entries * basis[AXIS_MISALIGNMENT, 1, a]
                 start += stride
-            value_weight = position_weight * basis[AXIS_DISTANCE, 0, c]
-            slope_weight = position_weight * basis[AXIS_DISTANCE, 1, c]
-            for j in range(CUBIC_SIZE):
-                cubic[0, j] += value_weight * part[0, j]
-                cubic[1, j] += slope_weight * part[0, j]
-                cubic[2, j] += value_weight * part[1, j]
+            of_position, of_distance = basis[AXIS_PMC, 0, p], basis[AXIS_DISTANCE, 0, c]
+            level = level + part * (of_position * of_distance)
+            by_distance = by_distance + part * (of_position * basis[AXIS_DISTANCE, 1, c])
+            by_misalignment = by_misalignment + slope * (of_position * of_distance)
+            by_pmc = by_pmc + part * (basis[AXIS_PMC, 1, p] * of_distance)
+    put(cubic[0], 0, level)
+    put(cubic[1], 0, by_distance)
+    put(cubic[2], 0, by_misalignment)
+    put(cubic[3], 0, by_pmc)
 
 
 @kernel
 def contract(values: Floats, shape: Integers, piece: int, count: int, memory: Scratch) -> None:
     """Fill `cubic` with the first `count` derivatives of the surface over one load piece."""
-    if count == FORCE_DERIVATIVES:
+    if count <= ENERGY_DERIVATIVES:
         contract_for_force(values, shape, piece, memory)
         return
     cubic, basis, node = memory.cubic, memory.basis, memory.node
@@ -234,7 +231,7 @@ def contract(values: Floats, shape: Integers, piece: int, count: int, memory: Sc
             row = (position * shape[DISTANCES] + node[AXIS_DISTANCE] + c) * shape[MISALIGNMENTS]
             start = (row + node[AXIS_MISALIGNMENT]) * shape[LOAD_PIECES] + piece
             for a in range(misalignments):
-                o = CUBIC_SIZE * (start + a * shape[LOAD_PIECES])
+                o = NODE_SIZE * (start + a * shape[LOAD_PIECES])
                 for d in range(count):
                     # The surface is a product of one-dimensional weights; so is each of its derivatives.
                     weight = (

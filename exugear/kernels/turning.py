@@ -32,7 +32,7 @@ from typing import NamedTuple
 import numpy as np
 
 from exugear.kernels.coordinates import AXIAL, BODY_SIZE, SPIN, TILT
-from exugear.kernels.elastic import LANES, row_product
+from exugear.kernels.elastic import LANES, lane_product
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import kernel
 
@@ -133,8 +133,8 @@ def set_turning_motion(q: Floats, v: Floats, f: Floats, turning: TurningArrays, 
         reaction = 0.0
         row = turning.square[b]
         for i in range(size):
-            elastic[i] = -row_product(turning.stiffness, row, given, columns)
-            apparent = speed * turning.pull[first + i] - row_product(turning.coriolis, row, rates, columns)
+            elastic[i] = -lane_product(turning.stiffness, row, given, columns)
+            apparent = speed * turning.pull[first + i] - lane_product(turning.coriolis, row, rates, columns)
             total[i] = f[begin + i] + elastic[i] + speed * apparent
             reaction -= (rates[i] + speed * turning.spin[first + i]) * apparent
             row += columns
@@ -152,7 +152,7 @@ def set_turning_motion(q: Floats, v: Floats, f: Floats, turning: TurningArrays, 
             total[i] = 0.0
         row = turning.square[b]
         for i in range(size):
-            out[begin + i] = row_product(turning.inverse, row, total, columns)
+            out[begin + i] = lane_product(turning.inverse, row, total, columns)
             row += columns
         for n in range(turning.seats[b]):
             for i in (BODY_SIZE * n, BODY_SIZE * n + TILT):
@@ -169,7 +169,7 @@ def square_form(matrix: Floats, row: int, size: int, columns: int, x: Floats) ->
     """Scalar x' A x of a body's matrix that begins at an entry."""
     total = 0.0
     for i in range(size):
-        total += x[i] * row_product(matrix, row, x, columns)
+        total += x[i] * lane_product(matrix, row, x, columns)
         row += columns
     return total
 
@@ -196,6 +196,6 @@ def turning_energies(q: Floats, v: Floats, turning: TurningArrays, memory: Float
             rates[i] += speed * turning.spin[first + i]
         kinetic += 0.5 * square_form(turning.mass, row, size, columns, rates)
         for i in range(size):
-            weight += rates[i] * row_product(turning.mass, row, falling, columns)
+            weight += rates[i] * lane_product(turning.mass, row, falling, columns)
             row += columns
     return kinetic, stored, damped, weight

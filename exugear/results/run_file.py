@@ -8,18 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5netcdf
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from exugear.model.versions import RUN
 from exugear.results.pieces import Piece, RunPieces, discard_pieces, whole_pieces
 from exugear.results.variables import GROWING, VARIABLES
 from fe_ste.tools.files import FileError, replacement
-from fe_ste.tools.sealed import ErrorKeeper, Layout, load_dataset, seal
+from fe_ste.tools.sealed import ErrorKeeper, Layout, load_dataset, open_sealed, seal
+
+if TYPE_CHECKING:
+    import xarray as xr
+
 
 FINAL_NAME = "run.nc"
 PARTIAL_NAME = "run.partial"
@@ -120,6 +123,30 @@ def load_run(path: str | Path, names: Iterable[str] | None = None) -> xr.Dataset
     return _load_pieces(path, wanted) if path.is_dir() else load_dataset(path, _LAYOUT, wanted)
 
 
+def read_run(path: Path, names: Iterable[str]) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+    """Read some variables and the attributes of a run, without labels: xarray's start costs more than that.
+
+    Parameters
+    ----------
+    path : path
+        ``run.nc``, or the folder ``run.partial`` of a run that was stopped.
+    names : iterable of str
+
+    Raises
+    ------
+    FileError
+        The run is missing or damaged, or has no such variable.
+    """
+    if path.is_dir():
+        stopped = load_run(path, names)
+        return {str(name): stopped[name].to_numpy() for name in stopped.variables}, dict(stopped.attrs)
+    with open_sealed(path) as (file, _), h5netcdf.File(file, "r") as run:
+        unknown = sorted(set(names) - set(run.variables))
+        if unknown:
+            raise FileError(f"{path}: holds no {unknown[0]}")
+        return {name: np.asarray(run.variables[name][...]) for name in names}, dict(run.attrs)
+
+
 def _load_pieces(folder: Path, wanted: list[str] | None) -> xr.Dataset:
     """Read the run that the pieces in a folder make."""
     asked = set(VARIABLES) if wanted is None else {*wanted, *_LAYOUT.variables}
@@ -129,6 +156,8 @@ def _load_pieces(folder: Path, wanted: list[str] | None) -> xr.Dataset:
             parts.setdefault(name, []).append(piece.arrays[name])
     if not parts:
         raise FileError(f"{folder}: holds no piece of a run")
+    import xarray as xr
+
     data = xr.Dataset(coords=piece.names, attrs=piece.attributes)
     for name, variable in VARIABLES.items():
         if name in parts:

@@ -28,7 +28,7 @@ from exugear.runs.recorder import Recorder
 from exugear.runs.run_folder import held, run_directory
 from exugear.runs.start import RunStart, prepare_start
 from exugear.solvers.compiled.solver import unsupported_reason
-from exugear.solvers.compiled.step import choose_integration, fastest_motion
+from exugear.solvers.compiled.step import INTEGRATORS, choose_integration, fastest_motion
 from exugear.tooth_mesh.law import Angles, MeshData
 
 if TYPE_CHECKING:
@@ -121,6 +121,8 @@ def simulate(
     assembly = assemble(gearbox, choice, stiffness, bodies, angles=angles)
     directory = run_directory(out, choice)
     total = case.duration if duration is None else duration
+    if integrator is not None and integrator not in INTEGRATORS:
+        raise RunError(f"integrator {integrator!r} is unknown; integrators are {', '.join(INTEGRATORS)}")
     chosen = _solver(solver, assembly, mesh_route)
     kind = integrator if chosen == "compiled" else "rk4"  # Exudyn's explicit method is the same
     integration = choose_integration(assembly, sample_rate, band, step=step, integrator=kind)

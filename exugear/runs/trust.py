@@ -178,6 +178,10 @@ class Judge:
         """Remember the largest of values (n, bodies or meshes), and when and where one first lies beyond a limit."""
         if not values.size:
             return
+        most = values.max()
+        if most <= limit:  # not so if any is no number
+            self.figures[row, LARGEST] = max(self.figures[row, LARGEST], most)
+            return
         known = np.where(np.isnan(values), np.inf, values)
         largest, since, _ = self.figures[row]
         self.figures[row, LARGEST] = max(largest, known.max())

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
-
-import xarray as xr
+from typing import TYPE_CHECKING, Any
 
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
 from fe_ste.transmission_error.table import MeshTable, TableError, TableInput
+
+if TYPE_CHECKING:
+    import xarray as xr
+
 
 TABLE_FOLDER = "tables"
 

@@ -7,14 +7,18 @@ what finite elements give for the tooth, the rim and the neighbouring teeth, wit
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from fe_ste.contact.cells import Cells
 from fe_ste.contact.kinematics import FlankPair
 from fe_ste.contact.near_field import add_near_field
 from fe_ste.contact.regular import RegularCompliance
-from fe_ste.elasticity.flank import FlankCompliance
 from fe_ste.tools.arrays import Floats
+
+if TYPE_CHECKING:
+    from fe_ste.elasticity.flank import FlankCompliance
 
 
 def compliance_matrix(

@@ -7,15 +7,19 @@ The kernels take distances across and along the contact lines, see `fe_ste.elast
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fe_ste.contact.cells import Cells
 from fe_ste.contact.kinematics import FlankPair
-from fe_ste.elasticity.flank import FlankCompliance
 from fe_ste.elasticity.halfspace import rectangle_integral
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import compiled, summing
+
+if TYPE_CHECKING:
+    from fe_ste.elasticity.flank import FlankCompliance
+
 
 #: Beyond this many half sides a cell acts as its resultant with its second moments (error below 2e-3 of its part).
 #: Slices are two half sides apart, so that rounding never decides which formula holds.

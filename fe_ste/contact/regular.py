@@ -7,16 +7,18 @@ points of the flank, made of cubic splines over the profile and over the face wi
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline, make_interp_spline
 
 from fe_ste.contact.cells import Cells
-from fe_ste.elasticity.flank import FlankCompliance
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import summing, summing_kernel
+
+if TYPE_CHECKING:
+    from fe_ste.elasticity.flank import FlankCompliance
+
 
 #: Indices without a sign: one with a sign counts from the end if it is negative, which numba would ask at each use.
 Places: TypeAlias = NDArray[np.uintp]
@@ -64,6 +66,8 @@ class RegularCompliance:
         reach : int
             Largest difference of tooth pairs in contact at once.
         """
+        from scipy.interpolate import make_interp_spline  # a quarter of a second that who reads tables need not wait
+
         arc = flank.gear.base_radius * flank.roll**2 / 2.0
         along_profile = make_interp_spline(arc, np.eye(len(arc)), k=3)
         along_axis = make_interp_spline(flank.axial, np.eye(len(flank.axial)), k=3)
@@ -108,6 +112,8 @@ class RegularCompliance:
 
 def _first_and_weights(at: Floats, knots: Floats) -> tuple[Places, Floats]:
     """First spline and the four spline values at each place."""
+    from scipy.interpolate import BSpline
+
     rows = BSpline.design_matrix(at, knots, 3)
     return rows.indices.reshape(-1, 4)[:, 0].astype(np.uintp), rows.data.reshape(-1, 4)
 

@@ -15,8 +15,8 @@ import numpy as np
 from fe_ste.elasticity.bricks import stiffness_matrix
 from fe_ste.elasticity.halfspace import interior_displacement, tent_integrals
 from fe_ste.elasticity.hexmesh import SectorMesh
+from fe_ste.elimination.sparse import factorise
 from fe_ste.tools.arrays import Floats, Integers
-from fe_ste.tools.sparse import factorise
 
 #: Layers on either side of a load at which its error is read, and elements from a load to the faces of the block.
 ERROR_REACH = 3

@@ -12,16 +12,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
+from typing import TypeAlias
 
 import numpy as np
 import scipy.sparse
 
-from fe_ste.elasticity.dissection import Front, dissected, parts_without, schur_complement
 from fe_ste.elasticity.hexmesh import SectorMesh
 from fe_ste.elasticity.layers import LayeredElements
+from fe_ste.elimination.dense import mirrored_lower
+from fe_ste.elimination.dissection import Front, dissected, parts_without, schur_complement
 from fe_ste.tools.arrays import Floats, Integers, SparseMatrix
-from fe_ste.tools.dense import mirrored_lower
 from fe_ste.tools.threads import side_by_side
 
 #: Blocks of a set of cells that is not dissected any more.
@@ -33,6 +34,9 @@ _ROUNDING = 1e-9
 #: What the half turn does to the components of a vector.
 _HALF_TURN = np.array([1.0, -1.0, -1.0])
 EVEN, ODD = 1, -1
+
+#: Section node -> its block, and its unknowns by those of the block; what is not here is a block of its own.
+_Maps: TypeAlias = dict[int, tuple[int, Floats]]
 
 
 @dataclass(frozen=True)
@@ -163,9 +167,9 @@ class _Halving:
             fixed_torque=torque[readings],
         )
 
-    def _condensed(self, front: Front, maps: dict[int, tuple[int, Floats]], known: dict[Front, Floats]) -> Floats:
+    def _condensed(self, front: Front, maps: _Maps, known: dict[Front, Floats]) -> Floats:
         sizes = self._sizes(maps)
-        return schur_complement(front, sizes, lambda *part: self._leaf(maps, sizes, *part), known)
+        return schur_complement(front, sizes, partial(self._add_cells, maps, sizes), known)
 
     @cached_property
     def _face(self) -> Integers:
@@ -191,7 +195,7 @@ class _Halving:
                 found[node, group] = by_group[:, group]
         return found
 
-    def _maps(self, parity: int) -> dict[int, tuple[int, Floats]]:
+    def _maps(self, parity: int) -> _Maps:
         """Block, and the node's unknowns by those of the block, of all nodes that are no plain block of their own."""
         section, layers = self._mesh.section, self._layers
         turn, (basis, signs) = _line_turn(layers), _turn_basis(layers)
@@ -213,7 +217,7 @@ class _Halving:
             maps[node] = block, parity * turn @ image
         return maps
 
-    def _sizes(self, maps: dict[int, tuple[int, Floats]]) -> Integers:
+    def _sizes(self, maps: _Maps) -> Integers:
         sizes = np.full(self._nodes + 1 + self._groups, 3 * self._layers)
         sizes[self._nodes + 1 :] = self._layers
         for block, image in maps.values():
@@ -231,11 +235,10 @@ class _Halving:
         kept = np.concatenate([self._face, np.arange(self._nodes, self._nodes + 1 + self._groups)])
         return dissected(np.concatenate([middles, places]), cells, self._sizes(maps), kept, _LEAF_BLOCKS)
 
-    def _leaf(self, maps: dict[int, tuple[int, Floats]], sizes: Integers, cells: Integers, blocks: Integers) -> Floats:
-        """Sum of the matrices of some cells over the unknowns of some blocks."""
+    def _add_cells(self, maps: _Maps, sizes: Integers, matrix: Floats, cells: Integers, blocks: Integers) -> None:
+        """Add the matrices of some cells over the unknowns of some blocks."""
         ends = np.cumsum(sizes[blocks])
         parts = {block: slice(end - sizes[block], end) for block, end in zip(blocks.tolist(), ends, strict=True)}
-        matrix = np.zeros((ends[-1], ends[-1]), order="F")
         bricks = cells[cells < len(self._elements.corners)]
         if bricks.size:
             nodes, stack = self._elements.stack(bricks)
@@ -252,18 +255,19 @@ class _Halving:
             coefficients = self._columns[node, group]
             force = coefficients if image is None else image.T @ coefficients
             matrix[parts[self._nodes + 1 + group], parts[block]] -= force.T
-        return matrix
 
 
 def _mirror_images(mesh: SectorMesh) -> Integers:
     """Section node that each node of a section becomes by the half turn."""
     points, axial = mesh.section.points, mesh.axial_positions
-    away = np.abs(points[:, None] - points * [1.0, -1.0]).max(axis=-1)
-    images = away.argmin(axis=1)
-    worst = max(away.min(axis=1).max(), np.abs(axial + axial[::-1]).max())
-    if worst > _ROUNDING * np.abs(points).max():
+    images, missed = np.empty(len(points), dtype=np.int64), np.abs(axial + axial[::-1]).max()
+    for some in np.array_split(np.arange(len(points)), len(points) // 256 + 1):  # all at once would be a gigabyte
+        away = np.abs(points[some, None] - points * [1.0, -1.0]).max(axis=-1)
+        images[some] = away.argmin(axis=1)
+        missed = max(missed, away.min(axis=1).max())
+    if missed > _ROUNDING * np.abs(points).max():
         raise ValueError(
             f"gear {mesh.gear.name}: the mesh turned by 180 deg about the middle of the tooth misses itself by "
-            f"{worst:.3g} m; it must be the same"
+            f"{missed:.3g} m; it must be the same"
         )
-    return np.asarray(images)
+    return images

@@ -37,7 +37,7 @@ _IN_MEMORY = 16
 _BYTES = 300_000_000
 
 #: Rooms whose sources make the numbers.
-_ROOMS = ("geometry", "elasticity", "tools")
+_ROOMS = ("tools", "geometry", "elimination", "elasticity")
 
 _log = logging.getLogger(__name__)
 _memory: OrderedDict[str, FlankCompliance] = OrderedDict()

@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 import scipy.linalg
 
+from fe_ste.elimination.dense import divided_by_factor, eliminate, mirrored_lower
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.dense import divided_by_factor, eliminate, mirrored_lower
 from fe_ste.tools.threads import side_by_side
 
 
@@ -140,13 +140,14 @@ def ring_faces(sector: Chain, load: Chain, signs: Floats, teeth: int, reach: int
         stiffness, follows = rest[at], []
         for _ in range(reach):
             stiffness, factor, below = enclosed(stiffness, sector, signs)
-            follows.append(-divided_by_factor(below, factor).T)
+            follows.append((factor, below))
         # The plus face of the rest is the minus face of sector 0, which moves as the plus face turned, or against that.
         closed = sector[at] + stiffness * signs * signs[:, None]
-        first = scipy.linalg.solve(closed, load[at], assume_a="pos", check_finite=False)
+        held = scipy.linalg.cho_factor(closed, lower=True, overwrite_a=True, check_finite=False)
+        first = scipy.linalg.cho_solve(held, load[at], check_finite=False)
         faces = [parity * signs[:, None] * first]
-        for follow in reversed(follows):
-            faces.append(follow @ faces[-1])
+        for factor, below in reversed(follows):
+            faces.append(-divided_by_factor(faces[-1].T @ below, factor).T)
         return faces  # 0, -1, -2, ...
 
     even, odd = side_by_side(one_parity, (1, -1))

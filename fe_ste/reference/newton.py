@@ -15,11 +15,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import scipy.sparse
 
+from fe_ste.elimination.sparse import FactorisationError, factorise
 from fe_ste.reference.contact_model import ContactModel, Equilibrium, Iteration
 from fe_ste.reference.finite_deformation import BrickTangent, InvertedElementError
 from fe_ste.reference.mortar import WeightedGap, facing_pairs, summed, weighted_gap
 from fe_ste.tools.arrays import Booleans, Floats, Integers, SparseMatrix
-from fe_ste.tools.sparse import FactorisationError, factorise
 from fe_ste.tools.threads import one_dense_thread
 
 #: Stiffness added on active gaps, in Young's moduli times the node's width: what is left falls by it per solve.

@@ -1,1 +1,1 @@
-"""General things: arrays, files, compilation, sparse factors, threads, workers, drawing, rendering."""
+"""General things: arrays, files, compilation, threads, workers, drawing, rendering."""

@@ -37,6 +37,12 @@ _FOLDER = "kernels-"
 #: Folders of kernels that stay beside the one in use: of branches and versions that one goes back to.
 _FOLDERS_KEPT = 4
 
+#: What the kernels of a package do, and the processor time of all that a first verb compiles of them.
+_COMPILED = {
+    "fe_ste": " of teeth and their contact, about 10 s",
+    "exugear": " of the equations of motion, about 45 s",
+}
+
 #: numba's settings, which have no types.
 _settings: Any = config
 _log = logging.getLogger(__name__)
@@ -66,6 +72,7 @@ def summing_kernel(function: Function) -> Function:
     return _kept(function, **_WITHOUT_MEMORY, fastmath=_IN_PARTS)
 
 
+@cache
 def kernel_folder(source: Path) -> Path | None:
     """Folder that keeps the machine code of a source file's package; made if need be.
 
@@ -138,7 +145,7 @@ class _KernelCache(FunctionCache):
                 self.flush()  # type: ignore[no-untyped-call]
             kernel = None
         if kernel is None:
-            _tell_of_compiling()
+            _tell_of_compiling(self._py_func.__module__.partition(".")[0])
         return kernel
 
     def save_overload(self, sig: Any, data: Any) -> None:
@@ -149,8 +156,9 @@ class _KernelCache(FunctionCache):
 
 
 @cache
-def _tell_of_compiling() -> None:
-    _log.info("Compiling kernels, once per installation or update: about a minute in all")
+def _tell_of_compiling(package: str) -> None:
+    """Say what is compiled and for how long, before the first kernel of a package is."""
+    _log.info("Compiling kernels%s; once per installation or update", _COMPILED.get(package, ""))
 
 
 @cache

@@ -9,18 +9,20 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fe_ste.contact.cells import ContactSettings
 from fe_ste.contact.regular import RegularCompliance
-from fe_ste.elasticity.flank import FlankCompliance
 from fe_ste.elasticity.hexmesh import MeshSettings
-from fe_ste.elasticity.known_flanks import known_flanks
 from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.notebook import html_table, value_range
+
+if TYPE_CHECKING:
+    from fe_ste.elasticity.flank import FlankCompliance
 
 
 @dataclass(frozen=True)
@@ -172,6 +174,8 @@ def pair_compliance(
     --------
     fe_ste.elasticity.known_flanks.known_flanks : Where computed gears are kept.
     """
+    from fe_ste.elasticity.known_flanks import known_flanks  # finite elements, which a table that is there spares
+
     sides = ((pair.pinion, 1), (pair.gear, -1 if pair.gear.internal else 1))
     pinion, gear = known_flanks(sides, mesh, open_teeth=open_teeth, incompatible_modes=incompatible_modes)
     return PairCompliance.from_flanks(pair, (pinion, gear), contact)

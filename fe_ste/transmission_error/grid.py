@@ -18,10 +18,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-import xarray as xr
 
 from fe_ste.tools.arrays import Booleans
 from fe_ste.tools.files import FileError
@@ -31,6 +30,10 @@ from fe_ste.tools.workers import Workers, stop_if_asked
 from fe_ste.transmission_error.compliance import PairCompliance
 from fe_ste.transmission_error.states import RESULTS, STATE_AXES, StateAxes, StateResults
 from fe_ste.transmission_error.transmission_error import solve_positions
+
+if TYPE_CHECKING:
+    import xarray as xr
+
 
 #: States of a block: some seconds of work, so that little is lost and the time left is known, and a run that is long
 #: enough for its first position, which begins from nothing, not to count.

@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from fe_ste.contact.cells import Cells, lay_cells
 from fe_ste.contact.complementarity import ContactSolution, solve_complementarity
@@ -22,6 +22,10 @@ from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.tools.arrays import Booleans, Floats, Integers
 from fe_ste.transmission_error.compliance import PairCompliance
 from fe_ste.transmission_error.states import ContactState, SearchStart, StateAxes
+
+if TYPE_CHECKING:
+    import xarray as xr
+
 
 #: Cells further apart than this many approaches in the unloaded position cannot touch.
 _GAP_REACH = 1.3
@@ -307,6 +311,8 @@ def unloaded_states(compliance: PairCompliance, axes: StateAxes) -> xr.Dataset:
     xarray.Dataset
         Over (pmc, centre_distance, misalignment): unloaded_ste (m) and unloaded_centre (m, axial position).
     """
+    import xarray as xr
+
     shape = (axes.positions, len(axes.centre_distance), len(axes.misalignment))
     ste, centre = np.empty(shape), np.empty(shape)
     pair, roll = compliance.pair, compliance.flanks[0].roll

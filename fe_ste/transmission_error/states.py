@@ -9,10 +9,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from fe_ste.contact.cells import Cells
@@ -22,6 +21,9 @@ from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Booleans, Floats, Integers
 from fe_ste.tools.notebook import html_table, value_range
 from fe_ste.transmission_error.compliance import PairCompliance
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True)
@@ -294,6 +296,8 @@ class StateResults:
 
     def dataset(self, axes: StateAxes, all_teeth: bool = False) -> xr.Dataset:
         """Label the results; tooth pairs that never carry load are left out unless `all_teeth` asks for them."""
+        import xarray as xr
+
         coordinates = axes.coordinates()
         names = tuple(coordinates)
         force = np.broadcast_to(axes.torque[:, None, None] / self.base_radius, self.iterations.shape)

@@ -11,13 +11,17 @@ what s changes by; the other axes take their slopes from parabolas through three
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.notebook import html_table, value_range
+
+if TYPE_CHECKING:
+    import xarray as xr
+
 
 STENCIL = 4
 """Nodes of an axis that act between two of them."""

@@ -15,10 +15,9 @@ from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from fe_ste.contact.cells import ContactSettings
 from fe_ste.elasticity.hexmesh import MeshSettings
@@ -33,6 +32,10 @@ from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance
 from fe_ste.transmission_error.grid import Checkpoint, Submits, solve_grid
 from fe_ste.transmission_error.search import unloaded_states
 from fe_ste.transmission_error.states import RESULTS, STATE_AXES, StateAxes
+
+if TYPE_CHECKING:
+    import xarray as xr
+
 
 #: Beyond this many states the start of processes is repaid.
 _STATES_IN_PROCESS = 1000

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from fe_ste.contact.cells import ContactSettings
 from fe_ste.elasticity.hexmesh import MeshSettings
@@ -20,6 +20,9 @@ from fe_ste.tools.threads import one_dense_thread
 from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance
 from fe_ste.transmission_error.search import contact_states, new_start
 from fe_ste.transmission_error.states import StateAxes, StateResults
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def static_transmission_error(

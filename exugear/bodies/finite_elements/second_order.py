@@ -6,13 +6,18 @@ straight edges and get nodes in the middle; the displacement is of second order 
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import skfem
 
-from fe_ste.elasticity.bricks import skfem_mesh
+from exugear.bodies.finite_elements.lazy import at_first_use
 from fe_ste.tools.arrays import Floats, Integers
+
+if TYPE_CHECKING:
+    import skfem
+else:
+    skfem = at_first_use("skfem")
+
 
 TET_EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
 HEX_EDGES = np.array([[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]])
@@ -39,6 +44,8 @@ def second_order(points: Floats, cells: Integers, kind: str) -> Any:
     used, numbers = np.unique(corners, return_inverse=True)
     numbers = numbers.reshape(corners.shape)
     tetrahedral = kind.startswith("tetra")
+    from fe_ste.elasticity.bricks import skfem_mesh
+
     straight = _linear_tetrahedra(points[used], numbers) if tetrahedral else skfem_mesh(points[used], numbers)
     mesh = (skfem.MeshTet2 if tetrahedral else skfem.MeshHex2).from_mesh(straight)
     places = np.array(mesh.doflocs)

@@ -9,15 +9,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import scipy.sparse
-import skfem
+import scipy
 
-from fe_ste.elasticity.bricks import gradient_products
+from exugear.bodies.finite_elements.lazy import at_first_use
 from fe_ste.geometry.gears import Material
 from fe_ste.tools.arrays import Floats, SparseMatrix
+
+if TYPE_CHECKING:
+    import skfem
+else:
+    skfem = at_first_use("skfem")
+
 
 ELEMENTS_AT_A_TIME = 1000
 """Elements whose matrices are held together."""
@@ -81,6 +86,8 @@ def assemble(mesh: Any, material: Material, axis: tuple[float, float] = (0.0, 0.
     >>> round(float(solid.scalar_mass.sum()), 9)
     8.0
     """
+    from fe_ste.elasticity.bricks import gradient_products
+
     numbering = skfem.assembly.Dofs(mesh, mesh.elem())
     dofs = np.asarray(numbering.element_dofs).T.astype(np.int64)
     count, nodes = mesh.doflocs.shape[1], dofs.shape[1]

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import skfem
 
+from exugear.bodies.finite_elements.lazy import at_first_use
 from exugear.bodies.finite_elements.second_order import SolidError, entity_numbers
 from exugear.bodies.finite_elements.solid_facets import ordered_corners
 from exugear.bodies.finite_elements.solid_matrices import Solid
 from fe_ste.tools.arrays import Floats, Integers
+
+if TYPE_CHECKING:
+    import skfem
+else:
+    skfem = at_first_use("skfem")
+
 
 SURFACE_TOLERANCE = 1e-3
 """Distance from a seat's surface, as a share of its radius, up to which a corner lies on it."""

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import skfem
 
+from exugear.bodies.finite_elements.lazy import at_first_use
 from exugear.bodies.finite_elements.second_order import SolidError
 from exugear.bodies.finite_elements.shaft_sections import SAME
 from exugear.bodies.finite_elements.turned_section import Shaft
-from fe_ste.elasticity.bricks import skfem_mesh
 from fe_ste.tools.arrays import Floats, Integers
+
+if TYPE_CHECKING:
+    import skfem
+else:
+    skfem = at_first_use("skfem")
+
 
 CORE = 0.5
 """Radius of the square core of a solid section over that of its first ring of lines."""
@@ -58,6 +63,8 @@ def turned_hexahedra(shaft: Shaft, around: int = 8) -> Any:
     ]
     used, numbers = np.unique(np.concatenate(bricks), return_inverse=True)
     logical = np.column_stack([points[used % count], heights[used // count]])
+    from fe_ste.elasticity.bricks import skfem_mesh
+
     mesh = skfem.MeshHex2.from_mesh(skfem_mesh(logical, numbers.reshape(-1, 8)))
     circles = np.concatenate([[0.0], radii[1:]]) if on_axis else np.concatenate([[0.0], radii])
     return skfem.MeshHex2(_to_circles(np.asarray(mesh.doflocs), circles), mesh.t)

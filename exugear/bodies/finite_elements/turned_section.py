@@ -20,12 +20,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import scipy.sparse
-import skfem
+import scipy
 
+from exugear.bodies.finite_elements.lazy import at_first_use
 from exugear.bodies.finite_elements.shaft_sections import (
     SAME,
     STANDARD_SIZE,
@@ -37,6 +37,12 @@ from exugear.bodies.finite_elements.shaft_sections import (
 )
 from fe_ste.geometry.gears import Material
 from fe_ste.tools.arrays import Booleans, Floats, Integers, SparseMatrix
+
+if TYPE_CHECKING:
+    import skfem
+else:
+    skfem = at_first_use("skfem")
+
 
 HarmonicName = Literal["bending", "torsion", "stretching"]
 FIELDS: dict[HarmonicName, int] = {"bending": 3, "torsion": 1, "stretching": 2}

@@ -48,6 +48,13 @@ class Solver(StrEnum):
     exudyn = "exudyn"
 
 
+class Integrator(StrEnum):
+    """Methods of the compiled solver: multistep with one evaluation a step, or Runge-Kutta with four, the reference."""
+
+    adams = "adams"
+    rk4 = "rk4"
+
+
 class MeshRoute(StrEnum):
     """How forces of meshes enter Exudyn: by one element for all, or by a load with a user function on each gear."""
 
@@ -64,6 +71,10 @@ def run(
         str | None, typer.Option("--load-case", metavar="NAME", help="Load case. (default: the first of the file)")
     ] = None,
     solver: Annotated[Solver, typer.Option(help="What integrates.")] = Solver.compiled,
+    integrator: Annotated[
+        Integrator | None,
+        typer.Option(help="Method of the compiled solver. (default: whichever takes fewer evaluations)"),
+    ] = None,
     mesh_route: Annotated[
         MeshRoute,
         typer.Option(
@@ -94,13 +105,16 @@ def run(
         _check_extent(project, duration, out or Path("results"))
         _check_solver(project.gearbox, variant, solver)
         _check_mesh_route(mesh_route, variant, solver)
+        if integrator and solver is Solver.exudyn:
+            raise BadInputError(f"--integrator {integrator}: is a method of the compiled solver; leave it out")
         if not resume:
             make_results_folder(project.folder)
         _check_run_directory(project.run_directory, resume)
         _tell_doubts(project)
         compute_missing_tables(project)
         with time_noted(project.folder, _label_of(project, solver, mesh_route)):
-            finished = _simulate(project, resume, solver=solver.value, mesh_route=mesh_route.value, duration=duration)
+            how = {"solver": solver.value, "mesh_route": mesh_route.value, "integrator": integrator}
+            finished = _simulate(project, resume, duration=duration, **how)
         _tell_run(case, finished, as_json)
 
 
@@ -190,11 +204,12 @@ def _tell_doubts(project: Project) -> None:
 
 def _simulate(project: Project, resume: bool, **options: Any) -> Run:
     """Run the load case behind a progress bar; options as those of `exugear.runs.runup.simulate`."""
+    from exugear.results.pieces import has_pieces
+    from exugear.results.run_file import PARTIAL_NAME
     from exugear.runs.outcome import LimitError, RunError
-    from exugear.runs.run_folder import refuse_to_resume
 
     directory, variant = project.run_directory, project.choice.variant
-    if not resume and not refuse_to_resume(directory):
+    if not resume and has_pieces(directory / PARTIAL_NAME):
         note(f"{directory}: a stopped run is begun anew; --resume would have gone on from it")
     reduce_elastic_bodies(project)
     with progress_bar() as bar:
@@ -213,7 +228,7 @@ def _simulate(project: Project, resume: bool, **options: Any) -> Run:
         except RunError as error:
             raise FailedError(error) from error
         except KeyboardInterrupt:
-            if refuse_to_resume(directory):
+            if not has_pieces(directory / PARTIAL_NAME):
                 raise
             raise StoppedError(f"kept in {directory}, --resume goes on from there") from None
 
@@ -225,13 +240,13 @@ def _tell_run(case: Path, finished: Run, as_json: bool) -> None:
         raise StoppedError(f"at {finished.end:.3f} s; kept in {finished.path}, --resume goes on from there{so_far}")
     from exugear.dynamics.signals import BALANCE_TERMS, MESH_TIMES, energy_residual
     from exugear.model.parts import RPM
-    from exugear.results.run_file import load_run
+    from exugear.results.run_file import read_run
 
-    data = load_run(finished.path, ("input_speed", *MESH_TIMES, *BALANCE_TERMS))
+    data, attributes = read_run(finished.path, ("input_speed", *MESH_TIMES, *BALANCE_TERMS))
     outside = float(data["outside_time"].max())
     summary = {
         "case": str(case),
-        **{key: str(data.attrs[key]) for key in ("variant", "load_case", "mesh_law", "inertias", "solver")},
+        **{key: str(attributes[key]) for key in ("variant", "load_case", "mesh_law", "inertias", "solver")},
         "file": str(finished.path),
         "simulated_s": finished.end,
         "wall_s": round(finished.wall, 2),

@@ -44,6 +44,7 @@ class Bodies(NamedTuple):
     start : (b + e + 1,) first coordinate, of the rigid ones, then of seats, then one that stays zero for the ground
     slot : (b + e + 1,) where `Work.turns` has the sine of the spin, 0 where no law needs it
     mass, transverse, axial : (b,) kg, kg m2
+    shares : (b, 3) one over each of them: to multiply by is cheaper
     spin, spin_inertia : (s,) coordinate and kg m2 of bodies with their spin alone
     inverse : (s, s) inverse mass matrix of these spins where gears only roll, else (0, 0)
     turning : (k,) coordinates whose sine is needed; the first is one that stays zero
@@ -54,6 +55,7 @@ class Bodies(NamedTuple):
     mass: Floats
     transverse: Floats
     axial: Floats
+    shares: Floats
     spin: Integers
     spin_inertia: Floats
     inverse: Floats
@@ -113,8 +115,8 @@ class Pairs(NamedTuple):
     first : (p + 1,) first connector of each pair
     twisting : (p,) 1 where the angle about z acts, else 0
     data : (c, 64) stiffness by column, rows padded to x y z 0 a b c 0; then attachment in the first body's axes,
-        damping over stiffness (s), attachment in the second one's axes, 1 where that is off its z axis, the second attachment
-        against the first and the second node against the first at zero angles, 1 where damping has a matrix of its own
+        damping over stiffness (s), attachment in the second one's axes, 1 where that is off its z axis, the second
+        attachment and the second node against the first at zero angles, 1 where damping has a matrix of its own
     """
 
     ends: Integers

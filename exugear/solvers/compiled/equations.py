@@ -74,14 +74,15 @@ def set_accelerations(v: Floats, bodies: Bodies, work: Work) -> None:
     for n in range(bodies.mass.size):
         o, jt, ja = bodies.start[n], bodies.transverse[n], bodies.axial[n]
         sb, cb = work.frames[n, SIN_B], work.frames[n, COS_B]
+        per_mass, per_jt, per_ja = bodies.shares[n, 0], bodies.shares[n, 1], bodies.shares[n, 2]
         for i in range(3):
-            out[o + i] = f[o + i] / bodies.mass[n]
+            out[o + i] = f[o + i] * per_mass
         a, b, spin = o + TILT, o + TILT + 1, o + SPIN
         da, db = v[a], v[b]
         p = ja * (v[spin] + da * sb)  # angular momentum about the body's axis
-        out[a] = (f[a] - f[spin] * sb - p * db * cb + 2.0 * jt * da * db * sb * cb) / (jt * cb * cb)
-        out[b] = (f[b] - jt * da * da * sb * cb + p * da * cb) / jt
-        out[spin] = f[spin] / ja - out[a] * sb - da * db * cb
+        out[a] = (f[a] - f[spin] * sb - p * db * cb + 2.0 * jt * da * db * sb * cb) * (per_jt / (cb * cb))
+        out[b] = (f[b] - jt * da * da * sb * cb + p * da * cb) * per_jt
+        out[spin] = f[spin] * per_ja - out[a] * sb - da * db * cb
     for n in range(bodies.spin.size):
         out[bodies.spin[n]] = f[bodies.spin[n]] / bodies.spin_inertia[n]
     # Gears that only roll share their inertia: one dense product instead of the above.

@@ -24,7 +24,7 @@ from exugear.solvers.compiled.methods import (
     Method,
     Past,
 )
-from exugear.solvers.compiled.observers import Columns, take_sample
+from exugear.solvers.compiled.sampling import Columns, take_sample
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import kernel
 
@@ -35,10 +35,10 @@ START_PARTS = 4
 
 
 @kernel
-def stay(work: Work, size: int) -> None:
-    """Take the state itself as that of the stage."""
-    for i in range(size):
-        work.stage_q[i], work.stage_v[i] = work.q[i], work.v[i]
+def take(q: Floats, v: Floats, work: Work) -> None:
+    """Take a state (size,) as that of the stage."""
+    for i in range(q.size):
+        work.stage_q[i], work.stage_v[i] = q[i], v[i]
 
 
 @kernel
@@ -121,6 +121,7 @@ def copy_state(work: Work, q: Floats, v: Floats) -> bool:
 
 @kernel
 def advance(
+    times: Floats,
     first: int,
     step: float,
     method: Method,
@@ -136,44 +137,52 @@ def advance(
 ) -> int:
     """Fill out_q and out_v (steps, size) with the states after each step, from `work.q`, `work.v` on.
 
-    Also their signals and powers, see `exugear.solvers.compiled.observers.take_sample`, if there is room for them
-    (steps, columns) and (steps, 7); powers every `stride` steps, counted from the first of the run.
-    The first step begins at the time ``first * step``. Accelerations of the past are taken from `past` and left there.
-    A multistep method that has not enough of them takes Runge-Kutta steps, `START_PARTS` in place of each. Returns the
-    number of steps that stayed finite.
+    The first step begins at the time ``first * step``. Accelerations of the past are taken from `past` and left there;
+    a multistep method that has not enough of them takes Runge-Kutta steps, `START_PARTS` in place of each. Signals and
+    powers are filled if there is room for them, (steps, columns) and (steps, 7), powers every `stride` steps, counted
+    from the first of the run: see `exugear.solvers.compiled.sampling.take_sample`.
+
+    With ``times`` (steps,) the states are given: they are sampled only, and the system stays where it is. One function
+    does both, so that the equations are compiled once. Returns the number of states that are finite.
     """
     steps, size = out_q.shape
     points = method.weights.shape[1]
+    given = times.size > 0
     # A state whose acceleration is not known takes a step of no length first: number -1.
-    for n in range(-1 if past.counts[KNOWN] == 0 else 0, steps):
+    for n in range(-1 if past.counts[KNOWN] == 0 and not given else 0, steps):
         multistep = points > 0 and past.counts[KNOWN] >= points
-        parts = START_PARTS if n >= 0 and points > 0 and not multistep else 1
-        h = step / parts
+        at_once = given or n < 0 or multistep
+        parts = START_PARTS if points > 0 and not at_once else 1
+        h, end = step / parts, times[n] if given else (first + n + 1) * step
         for part in range(parts):
             begin = (first + n) * step + part * h
-            for stage in range(LAST_STAGE if n < 0 or multistep else 0, LAST_STAGE + 1):
+            for stage in range(LAST_STAGE if at_once else 0, LAST_STAGE + 1):
                 at = begin + (0.5 * h if stage < 2 else h)
                 if stage == LAST_STAGE and part == parts - 1:
-                    at = (first + n + 1) * step
-                if n < 0:
-                    stay(work, size)
+                    at = end
+                if given:
+                    take(out_q[n], out_v[n], work)
+                elif n < 0:
+                    take(work.q[:size], work.v[:size], work)
                 elif multistep:
                     predict(step, method, past, work)
                 else:
                     runge_kutta_stage(stage, h, past, work)
                 evaluate(at, work.stage_q, work.stage_v, equations, work)
+            if given:
+                continue
             if multistep:
                 correct(step, method, past, work)
             # Of the parts of a starting step only the last acceleration is one of the past.
             keep_acceleration(part == 0, work, past)
-        past.counts[KNOWN] += 1
-        if n < 0:
-            continue
-        if not copy_state(work, out_q[n], out_v[n]):
-            return n
+        if not given:
+            past.counts[KNOWN] += 1
+            if n < 0:
+                continue
+            if not copy_state(work, out_q[n], out_v[n]):
+                return n
         if n < out_signals.shape[0]:
-            q, v, end = work.stage_q, work.stage_v, (first + n + 1) * step
-            due = stride if (first + n + 1) % stride == 0 else 0
+            q, v, due = work.stage_q, work.stage_v, stride if (first + n + 1) % stride == 0 else 0
             take_sample(end, q, v, equations, work, columns, due, out_signals[n], out_energies[n])
     done: int = steps
     return done

@@ -34,6 +34,7 @@ from exugear.tooth_mesh.laws.forms import row_law
 from exugear.tooth_mesh.laws.table import TABLE_FORM, fast_table_force
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import kernel
+from fe_ste.tools.octets import eight, put
 
 
 @kernel
@@ -113,9 +114,8 @@ def keep_state(
 def push_apart(m: int, force: float, gradient: Floats, meshes: Meshes, work: Work) -> None:
     """Subtract a scalar force times its gradient from what acts on the gears of mesh m and on its frame."""
     first, second = work.loads[meshes.ends[m, 0]], work.loads[meshes.ends[m, 1]]
-    for k in range(meshes.rows.shape[4]):
-        first[k] -= force * gradient[k]
-        second[k] -= force * gradient[PADDED + k]
+    put(first, 0, eight(first, 0) - eight(gradient, 0) * force)
+    put(second, 0, eight(second, 0) - eight(gradient, PADDED) * force)
     work.force[meshes.coordinates[m, FRAME]] -= force * gradient[TURNING]
 
 

@@ -9,18 +9,21 @@ from __future__ import annotations
 import numpy as np
 
 from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.signals import signal_layout
+from exugear.dynamics.signals import ENERGIES, POWERS, signal_layout
 from exugear.solvers.compiled.equations import evaluate
 from exugear.solvers.compiled.loop import advance
 from exugear.solvers.compiled.methods import RUNGE_KUTTA, Method, Past
-from exugear.solvers.compiled.observers import columns_of
 from exugear.solvers.compiled.packing import equations_of, work_for
+from exugear.solvers.compiled.sampling import columns_of
 from exugear.solvers.loads import LoadTable
+from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
 
 POWER_INTERVAL = 1.0 / 30e3
 """Time between observations of powers, s: a sum over samples errs by what lies at the rate of the samples itself, and
 powers of motions up to 10 kHz reach up to twice that."""
+POWER_INTERVAL_PARTING = 1.0 / 60e3
+"""The same where teeth may part: powers then change from one step to the next."""
 
 
 def unsupported_reason(assembly: Assembly) -> str:
@@ -70,7 +73,11 @@ class CompiledSystem:
         self._size = assembly.size
         self._work = work_for(self.equations, q, v)
         self._method = method
-        self._columns = columns_of(signal_layout(assembly))
+        self._layout = signal_layout(assembly)
+        self._columns = columns_of(self._layout)
+        parting = LAWS[assembly.mesh_law].signals_positions
+        interval = POWER_INTERVAL_PARTING if parting else POWER_INTERVAL
+        self._stride = max(1, int(interval / step + 1e-9))
         self._past = Past.of(method, np.zeros((0, assembly.size)) if past is None else past)
 
     @property
@@ -91,8 +98,8 @@ class CompiledSystem:
         Parameters
         ----------
         signals, energies : (steps, columns) and (steps, 7) arrays, optional
-            For what `exugear.solvers.compiled.observers.take_sample` fills. Powers but those of meshes stand for as
-            many steps as make up `POWER_INTERVAL`; energies are not whole.
+            For what `exugear.solvers.compiled.sampling.take_sample` fills. Powers but those of meshes stand for as
+            many steps as make up the interval of powers; energies are not whole.
 
         Returns
         -------
@@ -100,17 +107,20 @@ class CompiledSystem:
             Number of steps that stayed finite.
         """
         none = np.empty((0, 0))
-        return advance(
-            first,
-            self.step,
-            self._method,
-            self.equations,
-            self._work,
-            self._past,
-            self._columns,
-            max(1, int(POWER_INTERVAL / self.step + 1e-9)),
-            q,
-            v,
-            none if signals is None else signals,
-            none if energies is None else energies,
-        )
+        outcome = q, v, none if signals is None else signals, none if energies is None else energies
+        return self._pass(np.empty(0), first, self._stride, *outcome)
+
+    def observe(self, times: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """Signals (n, columns) and energies (n, 7) of given states q, v (n, size) at times (n,), s.
+
+        See `exugear.solvers.compiled.sampling.take_sample`. The system itself stays where it is.
+        """
+        signals = np.empty((len(times), self._layout.count))
+        energies = np.empty((len(times), len(ENERGIES) + len(POWERS)))
+        self._pass(times, 0, 1, q, v, signals, energies)
+        return signals, energies
+
+    def _pass(self, times: Floats, first: int, stride: int, *rows: Floats) -> int:
+        """Pass through states, see `exugear.solvers.compiled.loop.advance`."""
+        how = first, self.step, self._method
+        return advance(times, *how, self.equations, self._work, self._past, self._columns, stride, *rows)

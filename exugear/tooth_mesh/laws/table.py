@@ -57,6 +57,7 @@ from exugear.kernels.meshes import (
     turn_rows,
 )
 from exugear.kernels.table_law import (
+    CUBIC_SIZE,
     FORCE_DERIVATIVES,
     LAW_BY_DISTANCE,
     LAW_BY_MISALIGNMENT,
@@ -65,6 +66,7 @@ from exugear.kernels.table_law import (
     LAW_OUTSIDE,
     LAW_POTENTIAL,
     LAW_STIFFNESS,
+    NODE_SIZE,
     NOMINAL_DEFLECTION,
     NOMINAL_DISTANCE,
     NOMINAL_MISALIGNMENT,
@@ -338,7 +340,7 @@ def pack_tables(elements: tuple[MeshElement, ...], index: Integers, averaged: bo
     ]
     surfaces = [surface for surface in by_mesh if surface is not None]
     count = len(elements)
-    size = max((s.coefficients.size for s in surfaces), default=0)
+    size = max((s.coefficients.size // CUBIC_SIZE * NODE_SIZE for s in surfaces), default=0)
     loads = max((s.root_force.size for s in surfaces), default=0)
     longest = max((len(knots) for s in surfaces for knots in (s.centre_distance, s.misalignment)), default=0)
     arrays = TableArrays(
@@ -376,7 +378,8 @@ def _surface(element: MeshElement, row: Integers, averaged: bool) -> SteSurface 
 
 
 def _fill_table(arrays: TableArrays, m: int, flanks: TableFlanks, surface: SteSurface) -> None:
-    flat = np.ascontiguousarray(surface.coefficients).ravel()
+    filled = [(0, 0)] * (surface.coefficients.ndim - 1) + [(0, NODE_SIZE - CUBIC_SIZE)]
+    flat = np.pad(surface.coefficients, filled).ravel()
     arrays.shape[m] = surface.coefficients.shape[:4]
     arrays.values[m, : flat.size] = flat
     arrays.root[m, : surface.root_force.size] = surface.root_force

@@ -31,7 +31,7 @@ from exugear.pictures.elastic_scene import elastic_scene
 from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.exudyn_model.system import ExudynSystem
 from exugear.solvers.loads import Loading, LoadTable
-from fe_ste.tools.sparse import factorise
+from fe_ste.elimination.sparse import factorise
 
 from ..assembled import assembled, bodies_of, modes_with_bodies, simulated
 from ..box_case import box_content

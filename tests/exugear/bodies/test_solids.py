@@ -29,8 +29,8 @@ from exugear.bodies.finite_elements.turned_section import Shaft
 from exugear.bodies.reduced_body import Blank, ReducedBody, ReductionError
 from exugear.bodies.solids import SolidModel, gyroscopic_matrix, load_or_reduce_solid, reduce_matrices, reduce_solid
 from exugear.bodies.turned_shaft import ShaftModel, reduce_shaft
+from fe_ste.elimination.sparse import factorise
 from fe_ste.geometry.gears import Material
-from fe_ste.tools.sparse import factorise
 
 STEEL = Material(210e9, 0.3, 7850.0)
 SECTIONS = (ShaftSection(0.2, 0.06), ShaftSection(0.2, 0.1), ShaftSection(0.2, 0.08, 0.04))

@@ -273,3 +273,20 @@ def test_what_the_library_logs_is_said_on_standard_error(capsys):
         for logger in loggers:
             logger.handlers.clear()
             logger.setLevel(logging.NOTSET)
+
+
+def test_what_is_compiled_is_told_before_it_is_and_ctrl_c_ends_it(tmp_path):
+    """The first verb of an installation: nothing is left of a run that did not begin."""
+    verb = ["run", str(CASE), "--variant", "rigid", "--mesh-law", "iso6336", "--duration", "0.01"]
+    command = [sys.executable, "-c", PROGRAM, *verb, "--out", str(tmp_path / "out")]
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
+    with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True) as process:
+        told = ""
+        while "update" not in told:  # the console may wrap the line
+            told += process.stderr.readline()
+        process.send_signal(signal.SIGINT)
+        said = process.stderr.read()
+    assert "of the equations of motion, about 45 s; once per installation" in " ".join(told.split())
+    assert process.returncode == 130, said
+    assert "Stopped" in said
+    assert not list((tmp_path / "out").rglob("run*"))

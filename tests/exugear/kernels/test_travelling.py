@@ -14,8 +14,8 @@ from exugear.bodies.finite_elements.solid_seats import SolidSeat, seat_rows
 from exugear.bodies.finite_elements.turned_hexahedra import turned_hexahedra
 from exugear.bodies.finite_elements.turned_section import Shaft
 from exugear.kernels.travelling import TravellingArrays, follow, share_travelling_forces, travelling_tangent
+from fe_ste.elimination.sparse import factorise
 from fe_ste.geometry.gears import Material
-from fe_ste.tools.sparse import factorise
 
 NUMBER = 9
 SIZE = 6 * NUMBER + 1

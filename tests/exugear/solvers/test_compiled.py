@@ -329,6 +329,13 @@ def test_file_tells_solver_step_and_what_it_follows_from(grc: Gearbox, stiffness
     assert 0.0 < attributes["expected_error_of_resonances"] < 1e-3
 
 
+def test_the_reference_method_can_be_asked_for(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
+    run = simulate(grc, Choice("rigid"), stiffness, tmp_path, duration=0.01, integrator="rk4")
+    assert opened(run.path).attrs["solver"] == "compiled, RK4"
+    with pytest.raises(RunError, match="integrator 'euler' is unknown; integrators are adams, rk4"):
+        simulate(grc, Choice("rigid"), stiffness, tmp_path, duration=0.01, integrator="euler")  # type: ignore[arg-type]
+
+
 def test_unstable_step_is_refused(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
     with pytest.raises(RunError, match=r"step = 0.0005 s is not stable.*use 0.00017 s or less"):
         simulate(grc, Choice("bushing"), stiffness, tmp_path, duration=0.03, step=5e-4, sample_rate=2e3)

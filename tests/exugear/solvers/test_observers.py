@@ -9,14 +9,14 @@ from exugear.dynamics.assemble import assemble
 from exugear.dynamics.signals import BALANCE_TERMS, ENERGIES, MESH_TIMES, POWERS, SIGNALS, signal_layout, signals_of
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
-from exugear.solvers.compiled import observers
+from exugear.solvers.compiled import observers, sampling
 
 from ..table_case import surfaces
 
 
 def function_named(name: str) -> object:
-    """Function or method of `exugear.solvers.compiled.observers`."""
-    function: object = observers
+    """Function of `exugear.solvers.compiled.sampling`, or method of `exugear.solvers.compiled.observers`."""
+    function: object = observers if "." in name else sampling
     for part in name.split("."):
         function = getattr(function, part)
     return function
@@ -33,18 +33,18 @@ def test_every_signal_has_one_name_and_something_that_makes_it() -> None:
 
 def test_kernels_know_the_columns_of_all_signals_that_they_fill() -> None:
     by_kernels = [s.name for s in SIGNALS if s.is_sampled and s.filled_by and s.filled_by != ("Observer.complete",)]
-    assert list(observers.Columns._fields) == by_kernels
+    assert list(sampling.Columns._fields) == by_kernels
 
 
 def test_columns_of_energy_are_the_observed_terms_of_the_account() -> None:
     names = {
-        "kinetic_energy": observers.KINETIC,
-        "elastic_energy": observers.ELASTIC,
-        "work_of_loads": observers.OF_LOADS,
-        "dissipated_energy": observers.DISSIPATED,
-        "work_of_varying_stiffness": observers.OF_VARYING_STIFFNESS,
-        "non_conservative_work": observers.NON_CONSERVATIVE,
-        "bearing_rate_work": observers.OF_BEARING_RATES,
+        "kinetic_energy": sampling.KINETIC,
+        "elastic_energy": sampling.ELASTIC,
+        "work_of_loads": sampling.OF_LOADS,
+        "dissipated_energy": sampling.DISSIPATED,
+        "work_of_varying_stiffness": sampling.OF_VARYING_STIFFNESS,
+        "non_conservative_work": sampling.NON_CONSERVATIVE,
+        "bearing_rate_work": sampling.OF_BEARING_RATES,
     }
     assert names == {name: column for column, name in enumerate((*ENERGIES, *POWERS))}
     assert set(names) == set(BALANCE_TERMS)

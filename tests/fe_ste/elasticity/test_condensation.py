@@ -12,8 +12,8 @@ from fe_ste.elasticity.bricks import stiffness_matrix
 from fe_ste.elasticity.condensation import CondensedSector, flank_functionals
 from fe_ste.elasticity.hexmesh import MeshSettings, SectorMesh, sector_mesh
 from fe_ste.elasticity.ring import open_chain_faces
+from fe_ste.elimination.sparse import factorise
 from fe_ste.geometry.gears import Gear
-from fe_ste.tools.sparse import factorise
 
 SPUR = Gear(name="spur", teeth=20, normal_module=3e-3, face_width=20e-3, held_diameter=30e-3, profile_shift=0.2)
 HELICAL = dataclasses.replace(SPUR, name="helical", helix_angle=np.radians(-15.0))
@@ -95,11 +95,8 @@ class Reference:
         return blocks, self.fixed_torque + sum(self.face_torque @ both for both in ends)
 
 
-@pytest.mark.parametrize("side", [1, -1])
-@pytest.mark.parametrize("settings", [EVEN_NUMBERS, ODD_NUMBERS], ids=["even", "odd"])
-@pytest.mark.parametrize("gear", [SPUR, HELICAL, RING], ids=lambda gear: gear.name)
-def test_dissection_equals_one_sparse_factorisation(gear: Gear, settings: MeshSettings, side: int) -> None:
-    """The former condensation, by PARDISO or SuperLU; compared where the choice of face unknowns drops out."""
+def assert_equal_to_one_factorisation(gear: Gear, settings: MeshSettings, side: int) -> None:
+    """Compared as an open chain of three teeth, where the choice of face unknowns drops out."""
     mesh = sector_mesh(gear, settings)
     own = CondensedSector.from_mesh(mesh, side, True)
     faces, torque = own.open_faces(3)
@@ -109,6 +106,18 @@ def test_dissection_equals_one_sparse_factorisation(gear: Gear, settings: MeshSe
     for (read, loaded), reference in blocks.items():
         found = own.displacement(read == loaded, *faces[read, loaded])
         assert np.abs(found - reference).max() < 1e-10 * np.abs(blocks[0, 0]).max()
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("settings", [EVEN_NUMBERS, ODD_NUMBERS], ids=["even", "odd"])
+@pytest.mark.parametrize("gear", [SPUR, HELICAL, RING], ids=lambda gear: gear.name)
+def test_dissection_equals_one_sparse_factorisation(gear: Gear, settings: MeshSettings, side: int) -> None:
+    assert_equal_to_one_factorisation(gear, settings, side)
+
+
+@pytest.mark.validation
+def test_dissection_equals_one_sparse_factorisation_on_the_default_mesh(any_grc_gear: Gear) -> None:
+    assert_equal_to_one_factorisation(any_grc_gear, MeshSettings(), 1)
 
 
 def test_layers_of_unequal_height_are_condensed() -> None:

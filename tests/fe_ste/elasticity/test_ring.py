@@ -12,8 +12,8 @@ from fe_ste.elasticity.flank import FlankCompliance, flank_compliance, flank_nea
 from fe_ste.elasticity.halfspace import tent_weights
 from fe_ste.elasticity.hexmesh import MeshSettings, SectorMesh, sector_mesh
 from fe_ste.elasticity.ring import Chain, chain_of, open_chain_faces, ring_faces, uniform_faces
+from fe_ste.elimination.sparse import factorise
 from fe_ste.geometry.gears import Gear
-from fe_ste.tools.sparse import factorise
 
 GEAR = Gear(
     name="helical",

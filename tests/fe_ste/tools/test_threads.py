@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import threading
 import time
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 import fe_ste.tools.threads
-from fe_ste.tools.dense import add_product
+from fe_ste.elimination.dense import add_product
 from fe_ste.tools.threads import one_dense_thread, side_by_side
 
 
@@ -35,11 +36,14 @@ def test_two_work_at_a_time(two_cores: None) -> None:
     side_by_side(lambda _: both.wait(), range(2))
 
 
-def test_one_core_one_item_and_what_is_beside_another_take_no_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_core_one_item_a_worker_and_what_is_beside_another_take_no_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fe_ste.tools.threads, "available_cores", lambda: 2)
     assert threads_of(1) == {threading.get_ident()}
     inner = side_by_side(lambda _: threads_of(2) == {threading.get_ident()}, range(2))
     assert inner == [True, True]
+    with monkeypatch.context() as in_worker:
+        in_worker.setattr(multiprocessing, "parent_process", lambda: object())
+        assert threads_of(2) == {threading.get_ident()}
     monkeypatch.setattr(fe_ste.tools.threads, "available_cores", lambda: 1)
     assert threads_of(2) == {threading.get_ident()}
 

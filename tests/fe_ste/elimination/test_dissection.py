@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fe_ste.elasticity.dissection import Front, dissected, parts_without, schur_complement
+from fe_ste.elimination.dissection import Front, dissected, parts_without, schur_complement
 from fe_ste.tools.arrays import Floats, Integers
 
 
@@ -38,14 +38,14 @@ def test_what_is_left_is_the_schur_complement(leaf_blocks: int) -> None:
         matrices.append(root @ root.T + np.eye(len(root)))
         whole[np.ix_(unknowns(blocks), unknowns(blocks))] += matrices[-1]
 
-    def leaf(of: Integers, blocks: Integers) -> Floats:
+    def add_cells(matrix: Floats, of: Integers, blocks: Integers) -> None:
         mine = np.zeros_like(whole)
         for cell in of:
             mine[np.ix_(unknowns(cells[cell]), unknowns(cells[cell]))] += matrices[cell]
-        return np.asfortranarray(mine[np.ix_(unknowns(blocks), unknowns(blocks))])
+        matrix += mine[np.ix_(unknowns(blocks), unknowns(blocks))]
 
     plan = dissected(middles, cells, sizes, kept, leaf_blocks)
-    found = schur_complement(plan, sizes, leaf)
+    found = schur_complement(plan, sizes, add_cells)
     keep = unknowns(kept)
     gone = np.setdiff1d(np.arange(len(whole)), keep)
     expected = whole[np.ix_(keep, keep)] - whole[np.ix_(keep, gone)] @ np.linalg.solve(
@@ -55,8 +55,8 @@ def test_what_is_left_is_the_schur_complement(leaf_blocks: int) -> None:
     assert np.abs(np.tril(found - expected)).max() < 1e-12 * np.abs(expected).max()
 
     # Parts that couple none of some blocks may be known before.
-    known = {part: schur_complement(part, sizes, leaf) for part in parts_without(plan, np.array([5, 33]))}
-    assert (np.tril(schur_complement(plan, sizes, leaf, known)) == np.tril(found)).all()
+    known = {part: schur_complement(part, sizes, add_cells) for part in parts_without(plan, np.array([5, 33]))}
+    assert (np.tril(schur_complement(plan, sizes, add_cells, known)) == np.tril(found)).all()
 
 
 def test_each_block_is_eliminated_once_and_each_cell_is_in_one_leaf() -> None:

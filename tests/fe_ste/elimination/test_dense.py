@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fe_ste.tools.dense import NotPositiveDefiniteError, divided_by_factor, eliminate, mirrored_lower
+from fe_ste.elimination.dense import divided_by_factor, eliminate, mirrored_lower
+from fe_ste.elimination.sparse import FactorisationError
 
 
 def random_matrix(size: int) -> np.ndarray:
@@ -35,7 +36,7 @@ def test_lower_triangle_is_mirrored() -> None:
 
 
 def test_a_matrix_that_is_not_positive_definite_is_refused() -> None:
-    with pytest.raises(NotPositiveDefiniteError, match="pivot 2 of 2"):
+    with pytest.raises(FactorisationError, match="pivot 2 of 2"):
         eliminate(np.asfortranarray([[1.0, 2.0], [2.0, 1.0]]), 2)
 
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fe_ste.elimination.dense import eliminate
 from fe_ste.tools.arrays import Booleans, Floats, Integers
-from fe_ste.tools.dense import eliminate
 
 #: Directions in which a set of cells may be cut, and where, as parts of its cells.
 _DIRECTIONS = 8
@@ -154,7 +154,7 @@ def _parts_without(front: Front, blocks: set[int]) -> tuple[list[Front], bool]:
 def schur_complement(
     front: Front,
     sizes: Integers,
-    leaf: Callable[[Integers, Integers], Floats],
+    add_cells: Callable[[Floats, Integers, Integers], None],
     known: Mapping[Front, Floats] | None = None,
 ) -> Floats:
     """Eliminate all blocks but those that are kept.
@@ -165,9 +165,9 @@ def schur_complement(
         The last front of a dissection, or of a part of it.
     sizes : ndarray
         Unknowns of each block.
-    leaf : callable
-        Of cells and blocks: the sum of the cells' symmetric matrices over the unknowns of these blocks, stored by
-        columns; its lower triangle counts.
+    add_cells : callable
+        Adds to a matrix the symmetric matrices of cells, over the unknowns of blocks: given are the matrix, stored by
+        columns, of which the lower triangle counts, cells and blocks.
     known : mapping of Front to ndarray, optional
         Results for parts of the dissection.
 
@@ -178,19 +178,18 @@ def schur_complement(
 
     Raises
     ------
-    fe_ste.tools.dense.NotPositiveDefiniteError
+    fe_ste.elimination.sparse.FactorisationError
+        A front is not positive definite.
     """
     if known and front in known:
         return known[front]
     blocks = np.concatenate([front.eliminated, front.border])
-    if front.children:
-        count = int(sizes[blocks].sum())
-        matrix = np.zeros((count, count), order="F")
-        for child in front.children:
-            _add(matrix, blocks, sizes, child.border, schur_complement(child, sizes, leaf, known))
-    else:
-        matrix = leaf(front.cells, blocks)
-    gone = int(sizes[front.eliminated].sum())
+    count, gone = int(sizes[blocks].sum()), int(sizes[front.eliminated].sum())
+    matrix = np.zeros((count, count), order="F")
+    for child in front.children:
+        _add(matrix, blocks, sizes, child.border, schur_complement(child, sizes, add_cells, known))
+    if not front.children:
+        add_cells(matrix, front.cells, blocks)
     eliminate(matrix, gone)
     return matrix[gone:, gone:]
 

@@ -12,14 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from fe_ste.elimination.sparse import FactorisationError
 from fe_ste.tools.arrays import Floats
 
 #: Columns eliminated at a time: the triangular solves, three to five times slower than products, stay a small part.
 _PANEL = 64
-
-
-class NotPositiveDefiniteError(ValueError):
-    """A matrix is not positive definite."""
 
 
 @cache
@@ -68,12 +65,14 @@ def factorise_lower(matrix: Floats) -> None:
 
     Raises
     ------
-    NotPositiveDefiniteError
+    FactorisationError
     """
     found = ctypes.c_int()
     _function("lapack", "dpotrf")(b"L", _integer(len(matrix)), *_place(matrix), ctypes.byref(found))
     if found.value:
-        raise NotPositiveDefiniteError(f"the matrix is not positive definite (pivot {found.value} of {len(matrix)})")
+        raise FactorisationError(
+            f"the matrix of a front is not positive definite (pivot {found.value} of {len(matrix)})"
+        )
 
 
 def _divide(rows: Floats, factor: Floats, transposed: bytes) -> None:
@@ -97,7 +96,7 @@ def eliminate(matrix: Floats, count: int) -> None:
 
     Raises
     ------
-    NotPositiveDefiniteError
+    FactorisationError
         In the unknowns that are eliminated.
 
     Examples

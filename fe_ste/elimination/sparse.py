@@ -2,7 +2,7 @@
 
 Two libraries do the work: MKL PARDISO where ``pypardiso`` is installed (extra ``fast``), else SuperLU, which
 comes with SciPy. Both give the same numbers to 1e-9; PARDISO is faster by about ten. Elastic bodies and the reference
-analysis are solved so; tooth sectors are condensed without either (`fe_ste.elasticity.dissection`).
+analysis are solved so; tooth sectors are condensed without either (`fe_ste.elimination.dissection`).
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ import numpy as np
 import scipy.sparse.linalg
 
 from fe_ste.tools.arrays import Floats, SparseMatrix
-from fe_ste.tools.dense import NotPositiveDefiniteError
 
 Backend: TypeAlias = Literal["pardiso", "superlu"]
 RIGHT_HAND_SIDES_AT_A_TIME = 128
@@ -31,7 +30,7 @@ LARGEST_PROBE_ERROR = 1e-6
 """Relative error of a recovered known solution above which a matrix counts as singular."""
 
 
-class FactorisationError(NotPositiveDefiniteError):
+class FactorisationError(ValueError):
     """The matrix is not symmetric positive definite, or too nearly singular to solve with."""
 
 

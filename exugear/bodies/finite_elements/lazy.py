@@ -1,0 +1,33 @@
+"""Libraries that are loaded when they are used: a start does not wait for what it may never need."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+
+class _AtFirstUse(ModuleType):
+    """Stands for a module and loads it for the first attribute that is asked for."""
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(import_module(self.__name__), name)
+
+
+def at_first_use(name: str) -> Any:
+    """Return what stands for a library and loads it when it is used.
+
+    For type checkers the library is imported beside it, under ``TYPE_CHECKING``.
+
+    Parameters
+    ----------
+    name : str
+        Of a module that is installed.
+
+    Examples
+    --------
+    >>> fractions = at_first_use("fractions")
+    >>> fractions.Fraction(2, 4)
+    Fraction(1, 2)
+    """
+    return _AtFirstUse(name)

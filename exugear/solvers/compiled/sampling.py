@@ -1,0 +1,311 @@
+"""Signals, energies and powers of the state that was evaluated last, compiled.
+
+What there is to observe stands in `exugear.dynamics.signals.SIGNALS`, with the kernel here that fills it. Where a
+signal stands among the columns of a sample is handed over as `Columns`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from exugear.dynamics.signals import SignalLayout
+from exugear.kernels.coordinates import AXIAL, BODY_SIZE, SPIN, TILT
+from exugear.kernels.elastic import elastic_energies
+from exugear.kernels.fast_meshes import (
+    ALONG_FORCE,
+    DISSIPATED,
+    ELASTIC,
+    KINETIC,
+    LAST_CYCLE,
+    LAST_DAMPED,
+    LAST_DEFLECTION,
+    LAST_ENERGY,
+    LAST_FORCE,
+    LAST_OTHER,
+    LAST_OUTSIDE,
+    NON_CONSERVATIVE,
+    OF_BEARING_RATES,
+    OF_LOADS,
+    OF_VARYING_STIFFNESS,
+    Meshes,
+    mesh_row,
+)
+from exugear.kernels.rolling import CAGE_DAMPING, DAMPED_PART, ELASTIC_PART, STORED, rolling_forces
+from exugear.kernels.table_law import ENERGY_DERIVATIVES, NOMINAL_MISALIGNMENT
+from exugear.kernels.turning import turning_energies
+from exugear.solvers.compiled.arrays import (
+    COS_B,
+    COSINE,
+    SIN_B,
+    SINE,
+    SUPPORT_LOAD,
+    TRUE_RATE,
+    W_X,
+    W_Y,
+    W_Z,
+    Bodies,
+    Connectors,
+    Equations,
+    Joints,
+    Loads,
+    Springs,
+    Work,
+)
+from exugear.solvers.compiled.connectors import turn_between
+from exugear.solvers.compiled.equations import set_loads
+from exugear.solvers.compiled.places import tilt_sines
+from exugear.tooth_mesh.laws.table import TABLE_FORM, fast_table_force
+from fe_ste.tools.arrays import Floats
+from fe_ste.tools.compilation import kernel
+
+
+class Columns(NamedTuple):
+    """First column of each signal that a kernel here fills; -1 where a run does not hold it.
+
+    The fields have the names of the signals. Signals of each mesh take one column a mesh, forces of supports three.
+    """
+
+    mesh_dte: int
+    mesh_force: int
+    support_force: int
+    centre_distance_change: int
+    misalignment: int
+    outside_table: int
+
+
+@kernel
+def observe_gear_positions(
+    q: Floats, v: Floats, m: int, meshes: Meshes, work: Work, columns: Columns, sample: Floats
+) -> None:
+    """Fill change of centre distance (m) and misalignment (rad) of mesh m with a table; after `observe_meshes`."""
+    table, index, axis = meshes.table, meshes.coordinates[m], meshes.axis[m]
+    c, s = work.turns[meshes.slot[m], COSINE], work.turns[meshes.slot[m], SINE]
+    centre, _ = mesh_row(q, v, index, axis, table.centre[m], c, s, work.mesh.gradient[ALONG_FORCE])
+    tilted, _ = mesh_row(q, v, index, axis, table.misalignment[m], c, s, work.mesh.gradient[ALONG_FORCE])
+    sample[columns.centre_distance_change + m] = centre
+    sample[columns.misalignment + m] = table.nominal[m, NOMINAL_MISALIGNMENT] + tilted
+
+
+@kernel
+def observe_table(
+    q: Floats, v: Floats, m: int, meshes: Meshes, work: Work, columns: Columns, sample: Floats, energy: Floats
+) -> None:
+    """Fill the signals of mesh m with a table and add its energy and powers: see `observe_meshes`."""
+    c, s = work.turns[meshes.slot[m], COSINE], work.turns[meshes.slot[m], SINE]
+    force = fast_table_force(q, v, m, ENERGY_DERIVATIVES, meshes, c, s, work.mesh, energy)
+    work.mesh.states[m, LAST_FORCE] = force
+    sample[columns.mesh_dte + m] = work.mesh.states[m, LAST_DEFLECTION]
+    sample[columns.mesh_force + m] = force
+    sample[columns.outside_table + m] = work.mesh.states[m, LAST_OUTSIDE]
+    if meshes.spinning[m] == 0:
+        observe_gear_positions(q, v, m, meshes, work, columns, sample)
+    else:  # gears that only turn stay where they are
+        sample[columns.centre_distance_change + m] = 0.0
+        sample[columns.misalignment + m] = meshes.table.nominal[m, NOMINAL_MISALIGNMENT]
+
+
+@kernel
+def observe_meshes(
+    q: Floats, v: Floats, meshes: Meshes, work: Work, columns: Columns, sample: Floats, energy: Floats
+) -> None:
+    """Fill the signals of each mesh into a sample; add energy and powers (see `take_sample`)."""
+    for m in range(meshes.coordinates.shape[0]):
+        if meshes.form[m] == TABLE_FORM:
+            observe_table(q, v, m, meshes, work, columns, sample, energy)
+            continue
+        state = work.mesh.states[m]
+        sample[columns.mesh_dte + m] = state[LAST_DEFLECTION]
+        sample[columns.mesh_force + m] = state[LAST_FORCE] * meshes.line_of_action[m]
+        energy[ELASTIC] += state[LAST_ENERGY]
+        energy[DISSIPATED] += state[LAST_DAMPED]
+        energy[OF_VARYING_STIFFNESS] += state[LAST_CYCLE]
+        energy[NON_CONSERVATIVE] += state[LAST_OTHER]
+
+
+@kernel
+def true_rate(strain: Floats, rate: Floats, first_body: Floats, out: Floats) -> None:
+    """Fill the derivative of a connector's strain: see `exugear.kernels.connectors.connector_motion`."""
+    d, w = strain, rate
+    x = first_body[0] * first_body[W_X] + first_body[3] * first_body[W_Y] + first_body[6] * first_body[W_Z]
+    y = first_body[1] * first_body[W_X] + first_body[4] * first_body[W_Y] + first_body[7] * first_body[W_Z]
+    z = first_body[2] * first_body[W_X] + first_body[5] * first_body[W_Y] + first_body[8] * first_body[W_Z]
+    out[0] = w[0] - y * d[2] + z * d[1]
+    out[1] = w[1] - z * d[0] + x * d[2]
+    out[2] = w[2] - x * d[1] + y * d[0]
+    (ca, sa), (cb, sb) = tilt_sines(d[TILT]), tilt_sines(d[TILT + 1])
+    out[SPIN] = (ca * w[SPIN] - sa * w[TILT + 1]) / cb
+    out[TILT + 1] = ca * w[TILT + 1] + sa * w[SPIN]
+    out[TILT] = w[TILT] - sb * out[SPIN]
+
+
+@kernel
+def observe_supports(connectors: Connectors, work: Work, columns: Columns, sample: Floats) -> None:
+    """Fill the force of each bearing on its body (N), global axes."""
+    for n in range(connectors.ends.shape[0]):
+        turn, support = work.frames[connectors.ends[n, 0]], work.supports[n]
+        x, y, z = support[SUPPORT_LOAD], support[SUPPORT_LOAD + 1], support[SUPPORT_LOAD + 2]
+        first = columns.support_force + 3 * connectors.number[n]
+        sample[first] = -(turn[0] * x + turn[1] * y + turn[2] * z)
+        sample[first + 1] = -(turn[3] * x + turn[4] * y + turn[5] * z)
+        sample[first + 2] = -(turn[6] * x + turn[7] * y + turn[8] * z)
+
+
+@kernel
+def observe_rolling(
+    q: Floats,
+    v: Floats,
+    n: int,
+    stride: int,
+    derivative: Floats,
+    bodies: Bodies,
+    connectors: Connectors,
+    work: Work,
+    energy: Floats,
+) -> None:
+    """Add energy and powers of the rolling law of connector n (see `take_sample`)."""
+    strain, rate = work.supports[n, :BODY_SIZE], work.supports[n, BODY_SIZE:SUPPORT_LOAD]
+    rolling_forces(n, strain, rate, turn_between(q, n, bodies, connectors), connectors.rolling, work.rolling)
+    energy[ELASTIC] += work.rolling[STORED]
+    energy[DISSIPATED] += stride * work.rolling[CAGE_DAMPING] * turn_between(v, n, bodies, connectors)
+    for i in range(BODY_SIZE):
+        elastic, damped = work.rolling[ELASTIC_PART + i], work.rolling[DAMPED_PART + i]
+        energy[DISSIPATED] += stride * damped * rate[i]
+        # The potential knows no angle about z, whose moment but keeps the others from working on the spin.
+        energy[OF_BEARING_RATES] += stride * elastic * (rate[i] - (derivative[i] if i < SPIN else 0.0))
+
+
+@kernel
+def observe_connectors(
+    q: Floats, v: Floats, stride: int, bodies: Bodies, connectors: Connectors, work: Work, energy: Floats
+) -> None:
+    """Add energy and powers of all bearings, these for `stride` samples (see `take_sample`)."""
+    derivative = work.motion[TRUE_RATE]
+    for n in range(connectors.ends.shape[0]):
+        strain, rate = work.supports[n, :BODY_SIZE], work.supports[n, BODY_SIZE:SUPPORT_LOAD]
+        true_rate(strain, rate, work.frames[connectors.ends[n, 0]], derivative)
+        stored, lost, turned = 0.0, 0.0, 0.0
+        for row in range(BODY_SIZE):
+            elastic, damped = 0.0, 0.0
+            for column in range(BODY_SIZE):
+                stiffness = connectors.stiffness[n, column, row]
+                elastic += stiffness * strain[column]
+                damped += (connectors.time[n] * stiffness + connectors.damping[n, column, row]) * rate[column]
+            stored += elastic * strain[row]
+            lost += damped * rate[row]
+            turned += elastic * (rate[row] - derivative[row])
+        energy[ELASTIC] += 0.5 * stored
+        energy[DISSIPATED] += stride * lost
+        energy[OF_BEARING_RATES] += stride * turned
+        if connectors.rolling.first[n] < connectors.rolling.first[n + 1]:
+            observe_rolling(q, v, n, stride, derivative, bodies, connectors, work, energy)
+
+
+@kernel
+def observe_joints(v: Floats, meshes: Meshes, joints: Joints, work: Work, columns: Columns, sample: Floats) -> None:
+    """Fill the force of each ideal joint on its body (N), global axes; after `observe_meshes`."""
+    forces = sample[columns.support_force : columns.support_force + 3 * joints.host.size]
+    forces[:] = 0.0
+    for m in range(meshes.coordinates.shape[0]):
+        c, s = work.turns[meshes.slot[m], COSINE], work.turns[meshes.slot[m], SINE]
+        for end in range(2):
+            j = joints.ends[m, end]
+            if j >= 0:
+                force = work.mesh.states[m, LAST_FORCE]
+                row = meshes.force[m]
+                if force < 0.0 and meshes.form[m] == TABLE_FORM:  # the other flank pushes
+                    force, row = -force, meshes.table.back[m]
+                x, y, z = row[BODY_SIZE * end], row[BODY_SIZE * end + 1], row[BODY_SIZE * end + AXIAL]
+                forces[3 * j] += force * (c * x - s * y)
+                forces[3 * j + 1] += force * (s * x + c * y)
+                forces[3 * j + 2] += force * z
+    for j in range(joints.host.size):
+        if joints.planet[j, 0] > 0.0:  # held on its orbit
+            c, s = work.turns[joints.slot[j], COSINE], work.turns[joints.slot[j], SINE]
+            pull = joints.planet[j, 0] * v[joints.carrier[j]] ** 2
+            forces[3 * j] -= pull * (c * joints.planet[j, 1] - s * joints.planet[j, 2])
+            forces[3 * j + 1] -= pull * (s * joints.planet[j, 1] + c * joints.planet[j, 2])
+        if joints.host[j] >= 0:  # hands its force on to the joint of the body that it sits on
+            for i in range(3):
+                forces[3 * joints.host[j] + i] += forces[3 * j + i]
+
+
+@kernel
+def observe_bodies(q: Floats, v: Floats, bodies: Bodies, work: Work, energy: Floats) -> None:
+    """Add the kinetic energy of all bodies (see `take_sample`)."""
+    for n in range(bodies.mass.size):
+        o, sb, cb = bodies.start[n], work.frames[n, SIN_B], work.frames[n, COS_B]
+        square = v[o] * v[o] + v[o + 1] * v[o + 1] + v[o + 2] * v[o + 2]
+        tilting = (v[o + TILT] * cb) ** 2 + v[o + TILT + 1] * v[o + TILT + 1]
+        spin = v[o + SPIN] + v[o + TILT] * sb
+        twice = bodies.mass[n] * square + bodies.transverse[n] * tilting + bodies.axial[n] * spin * spin
+        energy[KINETIC] += 0.5 * twice
+    for n in range(bodies.spin.size):
+        energy[KINETIC] += 0.5 * bodies.spin_inertia[n] * v[bodies.spin[n]] ** 2
+
+
+@kernel
+def observe_springs(q: Floats, v: Floats, stride: int, springs: Springs, energy: Floats) -> None:
+    """Add elastic energy and damping power of the torsional springs (see `take_sample`)."""
+    for n in range(springs.ends.shape[0]):
+        i, j = springs.ends[n, 0], springs.ends[n, 1]
+        energy[ELASTIC] += 0.5 * springs.stiffness[n] * (q[j] - q[i]) ** 2
+        energy[DISSIPATED] += stride * springs.damping[n] * (v[j] - v[i]) ** 2
+
+
+@kernel
+def observe_elastic_bodies(q: Floats, v: Floats, stride: int, equations: Equations, work: Work, energy: Floats) -> None:
+    """Add energies and powers of elastic bodies, in fixed and in turning frames, these for `stride` samples."""
+    kinetic, stored, damped = elastic_energies(q, v, equations.elastic, work.scratch)
+    energy[KINETIC] += kinetic
+    energy[ELASTIC] += stored
+    energy[DISSIPATED] += stride * damped
+    kinetic, stored, damped, weight = turning_energies(q, v, equations.turning, work.memory)
+    energy[KINETIC] += kinetic
+    energy[ELASTIC] += stored
+    energy[OF_LOADS] += stride * weight
+    energy[DISSIPATED] += stride * damped
+
+
+@kernel
+def observe_loads(t: float, q: Floats, v: Floats, stride: int, loads: Loads, work: Work, energy: Floats) -> None:
+    """Add the power of what acts from outside at time t (s); nothing acts on travelling seats."""
+    set_loads(t, q, v, loads, work.series, work.force)
+    for i in range(loads.steady.size):
+        energy[OF_LOADS] += stride * work.force[i] * v[i]
+
+
+@kernel
+def take_sample(
+    t: float,
+    q: Floats,
+    v: Floats,
+    equations: Equations,
+    work: Work,
+    columns: Columns,
+    stride: int,
+    sample: Floats,
+    energy: Floats,
+) -> None:
+    """Fill signals (columns,) and energies and powers (7,) of the state at time t (s) that was evaluated last.
+
+    Signals but those that a state has by itself (`exugear.solvers.compiled.observers`); energies in the columns
+    `KINETIC` and so on. All powers but those of meshes stand for `stride` samples, none at 0: they take longer than the
+    signals.
+    """
+    for i in range(energy.size):
+        energy[i] = 0.0
+    observe_meshes(q, v, equations.meshes, work, columns, sample, energy)
+    observe_supports(equations.connectors, work, columns, sample)
+    if equations.joints.host.size > 0:
+        observe_joints(v, equations.meshes, equations.joints, work, columns, sample)
+    if stride > 0:
+        observe_bodies(q, v, equations.bodies, work, energy)
+        observe_connectors(q, v, stride, equations.bodies, equations.connectors, work, energy)
+        observe_springs(q, v, stride, equations.springs, energy)
+        observe_elastic_bodies(q, v, stride, equations, work, energy)
+        observe_loads(t, q, v, stride, equations.loads, work, energy)
+
+
+def columns_of(layout: SignalLayout) -> Columns:
+    """Columns of a layout, as the kernels take them."""
+    return Columns._make(layout[name].start if name in layout else -1 for name in Columns._fields)

@@ -1,0 +1,83 @@
+"""Stored runs by one evaluation a step against the Runge-Kutta method at a fine step; energy with teeth that part."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from exugear.dynamics.signals import BALANCE_TERMS
+from exugear.model.choice import Choice
+from exugear.model.gearbox import Gearbox
+from exugear.runs.runup import simulate
+
+from ..table_case import surfaces
+
+SIGNALS = ("overall_dte", "mesh_dte", "mesh_force", "support_force")
+FINE = 2.5e-6
+"""Step of the reference, s."""
+
+
+def opened(path: Path) -> xr.Dataset:
+    with xr.open_dataset(path) as data:
+        return data.load()
+
+
+def deviation(found: xr.Dataset, exact: xr.Dataset, name: str) -> float:
+    """Largest rms of a signal's deviation over that of its fluctuation, of the second half of a run."""
+    a, b = (data[name].to_numpy().reshape(len(data.time), -1).astype(np.float64) for data in (found, exact))
+    a, b = a[len(a) // 2 :], b[len(b) // 2 :]
+    fluctuation = (b - b.mean(axis=0)).std(axis=0)
+    # Columns without a fluctuation to speak of: forces along axes that nothing pushes along.
+    counts = fluctuation > 1e-5 * np.abs(b).max()
+    assert counts.any()
+    return float((np.sqrt(np.mean((a - b) ** 2, axis=0)) / fluctuation)[counts].max())
+
+
+@pytest.mark.validation
+@pytest.mark.parametrize("variant", ["rigid", "bushing"])
+@pytest.mark.parametrize("rpm", [-60.0, -205.0])
+def test_stored_signals_are_those_of_the_runge_kutta_method_at_a_fine_step(
+    grc: Gearbox, stiffness: dict, tmp_path: Path, variant: str, rpm: float
+) -> None:
+    gearbox = grc.varied({"load_cases.reference.start_speed_rpm": rpm})
+    chosen, fine = (
+        opened(simulate(gearbox, Choice(variant), stiffness, tmp_path / name, duration=0.6, **options).path)
+        for name, options in {"chosen": {}, "fine": {"integrator": "rk4", "step": FINE}}.items()
+    )
+    assert chosen.attrs["solver"].startswith("compiled, Adams")
+    for name in SIGNALS:
+        assert deviation(chosen, fine, name) < 1e-3, name
+
+
+def unexplained(data: xr.Dataset) -> float:
+    """Energy that the account does not explain, as a share of what is damped."""
+    change = {term: float(data[term][-1] - data[term][0]) for term in BALANCE_TERMS}
+    left = change["work_of_loads"] - sum(value for term, value in change.items() if term != "work_of_loads")
+    return abs(left) / abs(change["dissipated_energy"])
+
+
+@pytest.mark.validation
+def test_account_of_energy_with_teeth_that_part_is_as_good_as_by_the_runge_kutta_method(
+    grc: Gearbox, tmp_path: Path
+) -> None:
+    """The law table at 30 % of the load, whose brake swings through zero: teeth part and meet again all the time."""
+    carrier = 72e3
+    times = np.arange(0.0, 0.5, 0.005)
+    swing = 1.0 + 4.0 * np.sin(2.0 * np.pi * 30.0 * times)
+    lines = [f"{t:.4f},{carrier},{-carrier / grc.train.ratio * s:.6f}" for t, s in zip(times, swing, strict=True)]
+    (tmp_path / "swing.csv").write_text("\n".join(["time_s,carrier_N_m,hss_N_m", *lines]) + "\n", encoding="utf-8")
+    near = replace(grc, source=str(tmp_path / "gearbox.toml"))
+    gearbox = near.varied({"load_cases.reference": {"torque_series": "swing.csv", "start_speed_rpm": -60.0}})
+    residuals = {}
+    for integrator in ("adams", "rk4"):
+        options = {"duration": 0.45, "step": 1.0 / 60e3, "integrator": integrator}
+        run = simulate(gearbox, Choice("bushing", "table"), surfaces(grc), tmp_path / integrator, **options)
+        data = opened(run.path)
+        assert float(data.apart_time.max()) > 0.02 * run.end
+        residuals[integrator] = unexplained(data)
+    assert residuals["rk4"] < 1e-3
+    assert residuals["adams"] < max(residuals["rk4"], 1e-3)
