@@ -180,7 +180,7 @@ SIGNALS = (
         "m",
         sign_convention="axes further apart than nominal",
         kind="f4",
-        filled_by=("observe_gear_positions", "observe_table"),
+        filled_by=("observe_meshes",),
         laws="table",
     ),
     Signal(
@@ -189,7 +189,7 @@ SIGNALS = (
         "rad",
         sign_convention="the gap opens at the +z end",
         kind="f4",
-        filled_by=("observe_gear_positions", "observe_table"),
+        filled_by=("observe_meshes",),
         laws="table",
     ),
     Signal(
@@ -197,7 +197,7 @@ SIGNALS = (
         ("time", "mesh"),
         "1",
         "1 where load, centre distance or misalignment lies outside the table, else 0",
-        filled_by=("observe_table",),
+        filled_by=("observe_meshes",),
         laws="table",
         stored=False,
     ),

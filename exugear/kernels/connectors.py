@@ -172,7 +172,12 @@ def connector_load(q: Floats, v: Floats, n: int, connectors: ConnectorArrays, ar
     turn, motion = np.empty((3, 3)), np.empty((3, BODY_SIZE))
     connector_motion(q, v, n, connectors, turn, arms, motion)
     # Force and moment in the first body's axes, then turned into global ones.
-    local = connectors.stiffness[n] @ motion[DISPLACEMENT] + connectors.damping[n] @ motion[RATE]
+    # Loops, because a product of arrays takes numba two seconds to compile.
+    local = np.zeros(BODY_SIZE)
+    for i in range(BODY_SIZE):
+        for j in range(BODY_SIZE):
+            local[i] += connectors.stiffness[n, i, j] * motion[DISPLACEMENT, j]
+            local[i] += connectors.damping[n, i, j] * motion[RATE, j]
     torque = 0.0
     if connectors.rolling.first[n] < connectors.rolling.first[n + 1]:
         forces = rolling_memory(connectors.rolling)

@@ -197,12 +197,16 @@ def lane_product(matrix: Floats, begin: int, given: Floats, count: int) -> float
 
 
 @kernel
-def set_elastic_motion(q: Floats, v: Floats, f: Floats, elastic: ElasticMotion, given: Floats, out: Floats) -> None:
+def set_elastic_motion(
+    q: Floats, v: Floats, f: Floats, elastic: ElasticMotion | None, given: Floats, out: Floats
+) -> None:
     """Fill the accelerations of all elastic bodies under generalized forces f, their own forces left out, into out.
 
     As `add_elastic_forces` and `set_elastic_accelerations` together, in one pass over one matrix for each block.
-    `given` has room for three times the largest block and `LANES`.
+    `given` has room for three times the largest block and `LANES`. Nothing is done without elastic bodies (None).
     """
+    if elastic is None:
+        return
     at = np.uint64  # places without a sign spare the question whether they count from the end: a third of the time
     for b in range(at(elastic.turning.size)):
         first, size, acted = at(elastic.first[b]), at(elastic.first[b + 1] - elastic.first[b]), at(elastic.acted[b])
@@ -318,9 +322,13 @@ def block_energy(b: int, x: Floats, matrix: Floats, elastic: ElasticArrays) -> f
 
 
 @kernel
-def elastic_energies(q: Floats, v: Floats, elastic: ElasticArrays, scratch: Floats) -> tuple[float, float, float]:
-    """Kinetic and elastic energy (J) of all elastic bodies, and the power that they damp (W)."""
+def elastic_energies(
+    q: Floats, v: Floats, elastic: ElasticArrays | None, scratch: Floats
+) -> tuple[float, float, float]:
+    """Kinetic and elastic energy (J) of all elastic bodies, and the power that they damp (W); None: no such bodies."""
     kinetic, stored, damped = 0.0, 0.0, 0.0
+    if elastic is None:
+        return kinetic, stored, damped
     given = scratch[0]
     for b in range(elastic.turning.size):
         for i in range(elastic.first[b], elastic.first[b + 1]):

@@ -22,10 +22,12 @@ from fe_ste.tools.octets import eight, put, sum_of
 ALONG_DEFLECTION, ALONG_FORCE, TABLE_FORCE = range(3)
 """Rows of `MeshMemory.gradient`."""
 LAST_DEFLECTION, LAST_RATE, LAST_OUTSIDE, LAST_FORCE, LAST_ENERGY, LAST_DAMPED, LAST_CYCLE, LAST_OTHER = range(8)
+LAST_CENTRE, LAST_MISALIGNMENT = range(8, 10)
 """Columns of `MeshMemory.states`: deflection (m), rate (m/s), 1 outside a table, scalar force (N; of a table F_bt), and
 what an account of energy takes of the mesh: elastic energy (J); power damped, of the stiffness that changes with pmc,
-and of a force that is not conjugate to its deflection (W)."""
-STATES_SIZE = 8
+and of a force that is not conjugate to its deflection (W); of a table change of centre distance (m) and
+misalignment (rad)."""
+STATES_SIZE = 10
 DEFLECTION_ROW, FORCE_ROW, CENTRE_ROW, MISALIGNMENT_ROW, BACK_ROW, BACK_MISALIGNMENT_ROW = range(6)
 """Rows of `Meshes.rows`."""
 PLAIN_ROWS = 2
@@ -56,6 +58,8 @@ class Meshes(NamedTuple):
     rows : (m, r, 48) rows over both gears' padded places: parts W0, W1, W2 of the first, then of the second gear, whose
         row is W0 + W1 cos psi + W2 sin psi at the angle psi of the frame
     offsets : (m, r, 3) of each row: what cos psi, sin psi and psi itself add to its value
+    nominal : (m,) deflection of gears in their nominal place, m
+    table : None where no mesh follows one
     """
 
     coordinates: Integers
@@ -77,7 +81,8 @@ class Meshes(NamedTuple):
     line_of_action: Floats
     error_pieces: Integers
     error: Floats
-    table: TableArrays
+    nominal: Floats
+    table: TableArrays | None
 
 
 class MeshMemory(NamedTuple):
@@ -87,9 +92,9 @@ class MeshMemory(NamedTuple):
     ----------
     gradient : (3, 13) gradients of the deflection and of the force row, and the force of a mesh with a table
     gradients : (4, 17) gradients over two padded places and the frame's angle; the last one is a sum
-    states : (m, 8) what each mesh does, columns as named in this module
+    states : (m, 10) what each mesh does, columns as named in this module
     pieces : (m, 2) load piece of each flank's table that was used last
-    law : memory of the law `table`
+    law : memory of the law `table`; None where no mesh has it
     row : (12,) row of the push between the axes and the moment of misalignment
     """
 
@@ -97,7 +102,7 @@ class MeshMemory(NamedTuple):
     gradients: Floats
     states: Floats
     pieces: Integers
-    law: Scratch
+    law: Scratch | None
     row: Floats
 
 

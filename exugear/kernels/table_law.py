@@ -28,10 +28,8 @@ ORDERS = np.array(
     dtype=np.int64,
 )
 """Derivatives of the surface in this order: times by pmc, by centre distance, by misalignment."""
-FORCE_DERIVATIVES = 3
-"""Number of them that a force needs: value and both slopes."""
-ENERGY_DERIVATIVES = FORCE_DERIVATIVES + 1
-"""One more for the power of the turning cycle; a tangent needs all."""
+ENERGY_DERIVATIVES = 4
+"""Number of them that force, energy and power need: value and all slopes; a tangent needs all."""
 ROUNDS = 60
 """Newton and bisection steps at most: bisection alone would reach round-off."""
 
@@ -300,7 +298,7 @@ def surface_law(
     Parameters
     ----------
     guess : load piece where the search begins; it does not change the result
-    count : derivatives wanted, at least `FORCE_DERIVATIVES`
+    count : derivatives wanted, at least `ENERGY_DERIVATIVES`
 
     Returns
     -------

@@ -74,8 +74,10 @@ def sector_weight(cosine: float, sine: float, count: int) -> tuple[float, float]
 
 
 @kernel
-def place_travelling(q: Floats, v: Floats, seats: TravellingArrays) -> None:
-    """Fill coordinates and rates of all travelling seats from those of the sectors."""
+def place_travelling(q: Floats, v: Floats, seats: TravellingArrays | None) -> None:
+    """Fill coordinates and rates of all travelling seats, if any, from those of the sectors."""
+    if seats is None:
+        return
     for t in range(seats.first.size):
         o, frame = seats.first[t], seats.frame[t]
         angle, speed = seats.angle[t] + q[frame], v[frame]
@@ -102,8 +104,10 @@ def place_travelling(q: Floats, v: Floats, seats: TravellingArrays) -> None:
 
 
 @kernel
-def share_travelling_forces(q: Floats, seats: TravellingArrays, f: Floats) -> None:
+def share_travelling_forces(q: Floats, seats: TravellingArrays | None, f: Floats) -> None:
     """Move the generalized forces on all travelling seats to their sectors and to the angle they travel with."""
+    if seats is None:
+        return
     for t in range(seats.first.size):
         o, frame = seats.first[t], seats.frame[t]
         angle = seats.angle[t] + q[frame]

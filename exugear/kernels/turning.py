@@ -120,8 +120,15 @@ def deformation_rates(b: int, moved: Floats, rates: Floats, speed: float, turnin
 
 
 @kernel
-def set_turning_motion(q: Floats, v: Floats, f: Floats, turning: TurningArrays, memory: Floats, out: Floats) -> None:
-    """Fill the accelerations of all bodies under generalized forces f, their own forces left out, into out."""
+def set_turning_motion(
+    q: Floats, v: Floats, f: Floats, turning: TurningArrays | None, memory: Floats, out: Floats
+) -> None:
+    """Fill the accelerations of all bodies under generalized forces f, their own forces left out, into out.
+
+    Nothing without such bodies (None).
+    """
+    if turning is None:
+        return
     moved, rates, given, elastic, total = memory[0], memory[1], memory[2], memory[3], memory[4]
     for b in range(turning.begin.size):
         begin, first, size, columns = turning.begin[b], turning.first[b], turning.size[b], turning.columns[b]
@@ -175,10 +182,14 @@ def square_form(matrix: Floats, row: int, size: int, columns: int, x: Floats) ->
 
 
 @kernel
-def turning_energies(q: Floats, v: Floats, turning: TurningArrays, memory: Floats) -> tuple[float, float, float, float]:
+def turning_energies(
+    q: Floats, v: Floats, turning: TurningArrays | None, memory: Floats
+) -> tuple[float, float, float, float]:
     """Kinetic and elastic energy (J) of all bodies, the power that they damp, and that of their weight (W)."""
-    moved, rates, given, falling = memory[0], memory[1], memory[2], memory[3]
     kinetic, stored, damped, weight = 0.0, 0.0, 0.0, 0.0
+    if turning is None:
+        return kinetic, stored, damped, weight
+    moved, rates, given, falling = memory[0], memory[1], memory[2], memory[3]
     for b in range(turning.begin.size):
         first, size, columns = turning.first[b], turning.size[b], turning.columns[b]
         row = turning.square[b]

@@ -77,7 +77,7 @@ class Connectors(NamedTuple):
     time : (c,) damping over stiffness where the two are in proportion, s
     damping : (c, 6, 6) by column and row where they are not
     damped : (c,) 1 where they are not, else 0
-    rolling : rolling laws, in parallel to these
+    rolling : rolling laws, in parallel to these; None where there are none
     """
 
     number: Integers
@@ -90,7 +90,7 @@ class Connectors(NamedTuple):
     time: Floats
     damping: Floats
     damped: Integers
-    rolling: RollingArrays
+    rolling: RollingArrays | None
 
 
 class Places(NamedTuple):
@@ -174,20 +174,23 @@ class Springs(NamedTuple):
 
 
 class Equations(NamedTuple):
-    """All that the right-hand side reads."""
+    """All that the right-hand side reads.
+
+    Parts that a system does not have are None: their laws are then not compiled.
+    """
 
     bodies: Bodies
     places: Places
     connectors: Connectors
     pairs: Pairs
     meshes: Meshes
-    travelling: TravellingArrays
+    travelling: TravellingArrays | None
     springs: Springs
     loads: Loads
-    joints: Joints
-    elastic: ElasticArrays
-    motion: ElasticMotion
-    turning: TurningArrays
+    joints: Joints | None
+    elastic: ElasticArrays | None
+    motion: ElasticMotion | None
+    turning: TurningArrays | None
 
 
 class Work(NamedTuple):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from exugear.kernels.coordinates import BODY_SIZE, PADDED, PADDED_TILT, SPIN, TILT
-from exugear.kernels.rolling import CAGE_TORQUE, ELASTIC_PART, rolling_force
+from exugear.kernels.rolling import CAGE_TORQUE, ELASTIC_PART, RollingArrays, rolling_force
 from exugear.solvers.compiled.arrays import (
     DAMPED,
     FIRST_ARM,
@@ -236,10 +236,22 @@ def load_connector(n: int, one: Floats, damping: Floats, support: Floats) -> Non
 
 
 @kernel
-def add_rolling(q: Floats, n: int, bodies: Bodies, connectors: Connectors, support: Floats, work: Work) -> None:
-    """Add the rolling law of connector n to its force, its cage's torque to the spins."""
+def add_rolling(
+    q: Floats,
+    n: int,
+    bodies: Bodies,
+    connectors: Connectors,
+    rolling: RollingArrays | None,
+    support: Floats,
+    work: Work,
+) -> None:
+    """Add the rolling law of connector n, if it has one, to its force, its cage's torque to the spins."""
+    if rolling is None:
+        return
+    if rolling.first[n] == rolling.first[n + 1]:
+        return
     turn = turn_between(q, n, bodies, connectors)
-    rolling_force(n, support[:BODY_SIZE], support[BODY_SIZE:SUPPORT_LOAD], turn, connectors.rolling, work.rolling)
+    rolling_force(n, support[:BODY_SIZE], support[BODY_SIZE:SUPPORT_LOAD], turn, rolling, work.rolling)
     for i in range(BODY_SIZE):
         support[SUPPORT_LOAD + i] += work.rolling[ELASTIC_PART + i]
     ground = bodies.start.size - 1
@@ -295,8 +307,7 @@ def add_connectors(q: Floats, bodies: Bodies, connectors: Connectors, pairs: Pai
             bx, by, bz = second_arm(i, j, one, work)
             strain_connector(one, i == ground, bx, by, bz, work.relative, support)
             load_connector(n, one, connectors.damping, support)
-            if connectors.rolling.first[n] < connectors.rolling.first[n + 1]:
-                add_rolling(q, n, bodies, connectors, support, work)
+            add_rolling(q, n, bodies, connectors, connectors.rolling, support, work)
             fx, fy, fz = support[SUPPORT_LOAD], support[SUPPORT_LOAD + 1], support[SUPPORT_LOAD + 2]
             ax, ay, az = one[FIRST_ARM], one[FIRST_ARM + 1], one[FIRST_ARM + 2]
             mx, my, mz = support[SUPPORT_LOAD + 3], support[SUPPORT_LOAD + 4], support[SUPPORT_LOAD + 5]

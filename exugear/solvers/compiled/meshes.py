@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from exugear.kernels.coordinates import PADDED
 from exugear.kernels.fast_meshes import (
-    ALONG_DEFLECTION,
-    ALONG_FORCE,
     DEFLECTION_ROW,
     FORCE_ROW,
     LAST_CYCLE,
@@ -22,13 +20,11 @@ from exugear.kernels.fast_meshes import (
     TABLE_FORCE,
     TURNING,
     Meshes,
-    mesh_row,
     row_motion,
     subtract_errors,
-    subtract_wheel_errors,
 )
 from exugear.kernels.meshes import FRAME, ROW_SIZE, SPIN_1, SPIN_2
-from exugear.kernels.table_law import FORCE_DERIVATIVES, NOMINAL_DEFLECTION
+from exugear.kernels.table_law import Scratch, TableArrays
 from exugear.solvers.compiled.arrays import COSINE, SINE, Work
 from exugear.tooth_mesh.laws.forms import row_law
 from exugear.tooth_mesh.laws.table import TABLE_FORM, fast_table_force
@@ -38,34 +34,17 @@ from fe_ste.tools.octets import eight, put
 
 
 @kernel
-def mesh_motion(q: Floats, v: Floats, m: int, meshes: Meshes, work: Work) -> tuple[float, float, float]:
-    """Deflection of mesh m, its rate, and the rate along the force row; fills `work.mesh.gradient`."""
-    index, gradient = meshes.coordinates[m], work.mesh.gradient
-    clean = meshes.error_pieces[m, 0] + meshes.error_pieces[m, 1] == 0
-    # Gears that only spin, without errors: two products instead of a row of thirteen, and no gradient is needed.
-    if meshes.spinning[m] == 1 and clean:
-        lever_1, lever_2 = meshes.deflection[m, SPIN_1], meshes.deflection[m, SPIN_2]
-        i, j, k = index[SPIN_1], index[SPIN_2], index[FRAME]
-        delta = meshes.table.nominal[m, NOMINAL_DEFLECTION] + lever_1 * (q[i] - q[k]) + lever_2 * (q[j] - q[k])
-        rate = lever_1 * (v[i] - v[k]) + lever_2 * (v[j] - v[k])
-        if meshes.conjugate[m] == 1:
-            return delta, rate, rate
-        lever_1, lever_2 = meshes.force[m, SPIN_1], meshes.force[m, SPIN_2]
-        return delta, rate, lever_1 * (v[i] - v[k]) + lever_2 * (v[j] - v[k])
-    c, s = work.turns[meshes.slot[m], COSINE], work.turns[meshes.slot[m], SINE]
-    delta, rate = mesh_row(q, v, index, meshes.axis[m], meshes.deflection[m], c, s, gradient[ALONG_DEFLECTION])
-    delta += meshes.table.nominal[m, NOMINAL_DEFLECTION]
-    if not clean:
-        less, slower = subtract_wheel_errors(q, v, m, 1.0, meshes, gradient[ALONG_DEFLECTION])
-        delta, rate = delta + less, rate + slower
-    # A law that pushes along its deflection has one row; it is not turned twice.
+def spinning_motion(q: Floats, v: Floats, m: int, meshes: Meshes) -> tuple[float, float, float]:
+    """Deflection of mesh m of gears that only spin, without errors; its rate, and the rate along the force row."""
+    index = meshes.coordinates[m]
+    lever_1, lever_2 = meshes.deflection[m, SPIN_1], meshes.deflection[m, SPIN_2]
+    i, j, k = index[SPIN_1], index[SPIN_2], index[FRAME]
+    delta = meshes.nominal[m] + lever_1 * (q[i] - q[k]) + lever_2 * (q[j] - q[k])
+    rate = lever_1 * (v[i] - v[k]) + lever_2 * (v[j] - v[k])
     if meshes.conjugate[m] == 1:
         return delta, rate, rate
-    _, acting = mesh_row(q, v, index, meshes.axis[m], meshes.force[m], c, s, gradient[ALONG_FORCE])
-    if not clean:
-        _, slower = subtract_wheel_errors(q, v, m, 1.0, meshes, gradient[ALONG_FORCE])
-        acting += slower
-    return delta, rate, acting
+    lever_1, lever_2 = meshes.force[m, SPIN_1], meshes.force[m, SPIN_2]
+    return delta, rate, lever_1 * (v[i] - v[k]) + lever_2 * (v[j] - v[k])
 
 
 @kernel
@@ -81,7 +60,7 @@ def mesh_law(q: Floats, v: Floats, m: int, delta: float, meshes: Meshes) -> tupl
 def add_spinning_mesh(q: Floats, v: Floats, m: int, meshes: Meshes, work: Work) -> None:
     """Add the force of a mesh along a row between gears that only spin: two products instead of a whole row."""
     index, state = meshes.coordinates[m], work.mesh.states[m]
-    delta, rate, acting = mesh_motion(q, v, m, meshes, work)
+    delta, rate, acting = spinning_motion(q, v, m, meshes)
     elastic, _, _, energy, cycle_power = mesh_law(q, v, m, delta, meshes)
     force = elastic + meshes.damping[m] * rate
     torque_1, torque_2 = force * meshes.force[m, SPIN_1], force * meshes.force[m, SPIN_2]
@@ -127,7 +106,7 @@ def add_row_mesh(q: Floats, v: Floats, m: int, meshes: Meshes, work: Work) -> No
     c, s = work.turns[meshes.slot[m], COSINE], work.turns[meshes.slot[m], SINE]
     clean = meshes.error_pieces[m, 0] + meshes.error_pieces[m, 1] == 0
     delta, rate = row_motion(m, DEFLECTION_ROW, psi, psi_rate, c, s, meshes, work.places, gradient)
-    delta += meshes.table.nominal[m, NOMINAL_DEFLECTION]
+    delta += meshes.nominal[m]
     if not clean:
         less, slower = subtract_errors(q, v, m, 1.0, meshes, gradient)
         delta, rate = delta + less, rate + slower
@@ -144,14 +123,26 @@ def add_row_mesh(q: Floats, v: Floats, m: int, meshes: Meshes, work: Work) -> No
 
 
 @kernel
+def add_table_mesh(
+    q: Floats, v: Floats, m: int, meshes: Meshes, table: TableArrays | None, law: Scratch | None, work: Work
+) -> None:
+    """Add the force of a mesh with a table; without tables (None) nothing, and nothing of their law is compiled."""
+    if table is None:
+        return
+    if law is None:
+        return
+    c, s = work.turns[meshes.slot[m], COSINE], work.turns[meshes.slot[m], SINE]
+    fast_table_force(q, v, m, meshes, table, c, s, law, work.mesh)
+    for i in range(ROW_SIZE):
+        work.force[meshes.coordinates[m, i]] -= work.mesh.gradient[TABLE_FORCE, i]
+
+
+@kernel
 def add_meshes(q: Floats, v: Floats, meshes: Meshes, work: Work) -> None:
     """Add the forces of all meshes to `work.loads` and `work.force`; leave what they do in `work.mesh.states`."""
     for m in range(meshes.coordinates.shape[0]):
         if meshes.form[m] == TABLE_FORM:
-            c, s = work.turns[meshes.slot[m], COSINE], work.turns[meshes.slot[m], SINE]
-            fast_table_force(q, v, m, FORCE_DERIVATIVES, meshes, c, s, work.mesh, work.total)
-            for i in range(ROW_SIZE):
-                work.force[meshes.coordinates[m, i]] -= work.mesh.gradient[TABLE_FORCE, i]
+            add_table_mesh(q, v, m, meshes, meshes.table, work.mesh.law, work)
         elif meshes.spinning[m] == 1 and meshes.error_pieces[m, 0] + meshes.error_pieces[m, 1] == 0:
             add_spinning_mesh(q, v, m, meshes, work)
         else:

@@ -10,7 +10,7 @@ from exugear.kernels.elastic import elastic_motion, scratch_for
 from exugear.kernels.fast_meshes import STATES_SIZE, TURNING, Meshes, MeshMemory, padded_rows
 from exugear.kernels.meshes import FRAME, ROW_SIZE, SPIN_1, SPIN_2
 from exugear.kernels.rolling import rolling_memory
-from exugear.kernels.table_law import scratch_memory
+from exugear.kernels.table_law import NOMINAL_DEFLECTION, scratch_memory
 from exugear.kernels.turning import turning_memory
 from exugear.model.sections.entries import GROUND
 from exugear.solvers.compiled.arrays import (
@@ -106,7 +106,7 @@ def _connectors(numbers: _Numbers) -> tuple[Connectors, Integers]:
         time=time,
         damping=matrices[1],
         damped=matrices[1].any(axis=(1, 2)).astype(np.int64),
-        rolling=given.rolling,
+        rolling=given.rolling if given.rolling.layout.size else None,
     )
     return connectors, slots
 
@@ -203,11 +203,12 @@ def _meshes(numbers: _Numbers, ends: Integers) -> Meshes:
         line_of_action=given.line_of_action,
         error_pieces=given.error_pieces,
         error=given.error,
-        table=given.table,
+        nominal=table.nominal[:, NOMINAL_DEFLECTION].copy(),
+        table=table if (given.form == TABLE_FORM).any() else None,
     )
 
 
-def _joints(numbers: _Numbers) -> Joints:
+def _joints(numbers: _Numbers) -> Joints | None:
     assembly = numbers.assembly
     joints = assembly.gearbox.joints if assembly.variant == "rigid" else ()
     bodies = {body.name: body for body in assembly.gearbox.bodies(assembly.inertias)}
@@ -220,6 +221,8 @@ def _joints(numbers: _Numbers) -> Joints:
             axis = np.array(body.axis) - np.array(bodies[body.carrier].axis)
             planet[n] = body.mass, axis[0], axis[1]
             carrier[n] = assembly.spin[body.carrier]
+    if not joints:
+        return None
     return Joints(
         ends=np.array(ends, dtype=np.int64).reshape(-1, 2),
         host=np.array([-1 if j.on == GROUND else number.get(j.on, -1) for j in joints], dtype=np.int64),
@@ -252,6 +255,8 @@ def equations_of(assembly: Assembly, loads: LoadTable) -> Equations:
     meshes, joints = _meshes(numbers, ends), _joints(numbers)
     nodes = assembly.connectors.node[connectors.number]
     inertia, springs = assembly.inertia, assembly.springs
+    # All sorts of elastic bodies together, so that few sorts of systems are compiled.
+    elastic = bool(assembly.elastic_bodies)
     bodies = Bodies(
         start=np.append(np.array(numbers.starts, dtype=np.int64), numbers.size),
         slot=slots,
@@ -270,13 +275,13 @@ def equations_of(assembly: Assembly, loads: LoadTable) -> Equations:
         connectors=connectors,
         pairs=_pairs(connectors, nodes[:, 1] - nodes[:, 0]),
         meshes=meshes,
-        travelling=assembly.travelling,
+        travelling=assembly.travelling if elastic else None,
         springs=Springs(springs.coordinates, springs.stiffness, springs.damping),
         loads=_loads(assembly, loads),
         joints=joints,
-        elastic=assembly.elastic,
-        motion=elastic_motion(assembly.elastic, _acted(assembly)),
-        turning=assembly.turning_arrays,
+        elastic=assembly.elastic if elastic else None,
+        motion=elastic_motion(assembly.elastic, _acted(assembly)) if elastic else None,
+        turning=assembly.turning_arrays if elastic else None,
     )
 
 
@@ -300,6 +305,7 @@ def work_for(equations: Equations, q: Floats, v: Floats) -> Work:
     size = equations.loads.steady.size + BODY_SIZE
     count = equations.meshes.slot.size
     count_of_places = equations.places.start.size + equations.places.spin.size
+    rolling = equations.connectors.rolling
     frames = np.zeros((equations.bodies.start.size, FRAME_SIZE))
     frames[-1, [0, 4, 8, COS_A, COS_B]] = 1.0  # the ground neither turns nor tilts
     return Work(
@@ -318,16 +324,16 @@ def work_for(equations: Equations, q: Floats, v: Floats) -> Work:
         sums=np.zeros(9),
         supports=np.zeros((equations.connectors.number.size, SUPPORT_SIZE)),
         motion=np.zeros((4, BODY_SIZE)),
-        rolling=rolling_memory(equations.connectors.rolling),
+        rolling=np.zeros(0) if rolling is None else rolling_memory(rolling),
         mesh=MeshMemory(
             gradient=np.zeros((3, ROW_SIZE)),
             gradients=np.zeros((4, TURNING + 1)),
             states=np.zeros((count, STATES_SIZE)),
             pieces=np.zeros((count, 2), dtype=np.int64),
-            law=scratch_memory(),
+            law=None if equations.meshes.table is None else scratch_memory(),
             row=np.zeros(FRAME),
         ),
         series=equations.loads.first[:-1].copy(),
-        scratch=scratch_for(equations.elastic),
-        memory=turning_memory(equations.turning),
+        scratch=np.zeros((2, 0)) if equations.elastic is None else scratch_for(equations.elastic),
+        memory=np.zeros((5, 0)) if equations.turning is None else turning_memory(equations.turning),
     )

@@ -12,15 +12,16 @@ from exugear.dynamics.signals import SignalLayout
 from exugear.kernels.coordinates import AXIAL, BODY_SIZE, SPIN, TILT
 from exugear.kernels.elastic import elastic_energies
 from exugear.kernels.fast_meshes import (
-    ALONG_FORCE,
     DISSIPATED,
     ELASTIC,
     KINETIC,
+    LAST_CENTRE,
     LAST_CYCLE,
     LAST_DAMPED,
     LAST_DEFLECTION,
     LAST_ENERGY,
     LAST_FORCE,
+    LAST_MISALIGNMENT,
     LAST_OTHER,
     LAST_OUTSIDE,
     NON_CONSERVATIVE,
@@ -28,10 +29,9 @@ from exugear.kernels.fast_meshes import (
     OF_LOADS,
     OF_VARYING_STIFFNESS,
     Meshes,
-    mesh_row,
 )
-from exugear.kernels.rolling import CAGE_DAMPING, DAMPED_PART, ELASTIC_PART, STORED, rolling_forces
-from exugear.kernels.table_law import ENERGY_DERIVATIVES, NOMINAL_MISALIGNMENT
+from exugear.kernels.rolling import CAGE_DAMPING, DAMPED_PART, ELASTIC_PART, STORED, RollingArrays, rolling_forces
+from exugear.kernels.table_law import TableArrays
 from exugear.kernels.turning import turning_energies
 from exugear.solvers.compiled.arrays import (
     COS_B,
@@ -54,7 +54,7 @@ from exugear.solvers.compiled.arrays import (
 from exugear.solvers.compiled.connectors import turn_between
 from exugear.solvers.compiled.equations import set_loads
 from exugear.solvers.compiled.places import tilt_sines
-from exugear.tooth_mesh.laws.table import TABLE_FORM, fast_table_force
+from exugear.tooth_mesh.laws.table import TABLE_FORM
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import kernel
 
@@ -74,45 +74,9 @@ class Columns(NamedTuple):
 
 
 @kernel
-def observe_gear_positions(
-    q: Floats, v: Floats, m: int, meshes: Meshes, work: Work, columns: Columns, sample: Floats
-) -> None:
-    """Fill change of centre distance (m) and misalignment (rad) of mesh m with a table; after `observe_meshes`."""
-    table, index, axis = meshes.table, meshes.coordinates[m], meshes.axis[m]
-    c, s = work.turns[meshes.slot[m], COSINE], work.turns[meshes.slot[m], SINE]
-    centre, _ = mesh_row(q, v, index, axis, table.centre[m], c, s, work.mesh.gradient[ALONG_FORCE])
-    tilted, _ = mesh_row(q, v, index, axis, table.misalignment[m], c, s, work.mesh.gradient[ALONG_FORCE])
-    sample[columns.centre_distance_change + m] = centre
-    sample[columns.misalignment + m] = table.nominal[m, NOMINAL_MISALIGNMENT] + tilted
-
-
-@kernel
-def observe_table(
-    q: Floats, v: Floats, m: int, meshes: Meshes, work: Work, columns: Columns, sample: Floats, energy: Floats
-) -> None:
-    """Fill the signals of mesh m with a table and add its energy and powers: see `observe_meshes`."""
-    c, s = work.turns[meshes.slot[m], COSINE], work.turns[meshes.slot[m], SINE]
-    force = fast_table_force(q, v, m, ENERGY_DERIVATIVES, meshes, c, s, work.mesh, energy)
-    work.mesh.states[m, LAST_FORCE] = force
-    sample[columns.mesh_dte + m] = work.mesh.states[m, LAST_DEFLECTION]
-    sample[columns.mesh_force + m] = force
-    sample[columns.outside_table + m] = work.mesh.states[m, LAST_OUTSIDE]
-    if meshes.spinning[m] == 0:
-        observe_gear_positions(q, v, m, meshes, work, columns, sample)
-    else:  # gears that only turn stay where they are
-        sample[columns.centre_distance_change + m] = 0.0
-        sample[columns.misalignment + m] = meshes.table.nominal[m, NOMINAL_MISALIGNMENT]
-
-
-@kernel
-def observe_meshes(
-    q: Floats, v: Floats, meshes: Meshes, work: Work, columns: Columns, sample: Floats, energy: Floats
-) -> None:
+def observe_meshes(meshes: Meshes, work: Work, columns: Columns, sample: Floats, energy: Floats) -> None:
     """Fill the signals of each mesh into a sample; add energy and powers (see `take_sample`)."""
     for m in range(meshes.coordinates.shape[0]):
-        if meshes.form[m] == TABLE_FORM:
-            observe_table(q, v, m, meshes, work, columns, sample, energy)
-            continue
         state = work.mesh.states[m]
         sample[columns.mesh_dte + m] = state[LAST_DEFLECTION]
         sample[columns.mesh_force + m] = state[LAST_FORCE] * meshes.line_of_action[m]
@@ -120,6 +84,10 @@ def observe_meshes(
         energy[DISSIPATED] += state[LAST_DAMPED]
         energy[OF_VARYING_STIFFNESS] += state[LAST_CYCLE]
         energy[NON_CONSERVATIVE] += state[LAST_OTHER]
+        if meshes.form[m] == TABLE_FORM:
+            sample[columns.outside_table + m] = state[LAST_OUTSIDE]
+            sample[columns.centre_distance_change + m] = state[LAST_CENTRE]
+            sample[columns.misalignment + m] = state[LAST_MISALIGNMENT]
 
 
 @kernel
@@ -159,12 +127,17 @@ def observe_rolling(
     derivative: Floats,
     bodies: Bodies,
     connectors: Connectors,
+    rolling: RollingArrays | None,
     work: Work,
     energy: Floats,
 ) -> None:
-    """Add energy and powers of the rolling law of connector n (see `take_sample`)."""
+    """Add energy and powers of the rolling law of connector n, if it has one (see `take_sample`)."""
+    if rolling is None:
+        return
+    if rolling.first[n] == rolling.first[n + 1]:
+        return
     strain, rate = work.supports[n, :BODY_SIZE], work.supports[n, BODY_SIZE:SUPPORT_LOAD]
-    rolling_forces(n, strain, rate, turn_between(q, n, bodies, connectors), connectors.rolling, work.rolling)
+    rolling_forces(n, strain, rate, turn_between(q, n, bodies, connectors), rolling, work.rolling)
     energy[ELASTIC] += work.rolling[STORED]
     energy[DISSIPATED] += stride * work.rolling[CAGE_DAMPING] * turn_between(v, n, bodies, connectors)
     for i in range(BODY_SIZE):
@@ -196,13 +169,33 @@ def observe_connectors(
         energy[ELASTIC] += 0.5 * stored
         energy[DISSIPATED] += stride * lost
         energy[OF_BEARING_RATES] += stride * turned
-        if connectors.rolling.first[n] < connectors.rolling.first[n + 1]:
-            observe_rolling(q, v, n, stride, derivative, bodies, connectors, work, energy)
+        observe_rolling(q, v, n, stride, derivative, bodies, connectors, connectors.rolling, work, energy)
 
 
 @kernel
-def observe_joints(v: Floats, meshes: Meshes, joints: Joints, work: Work, columns: Columns, sample: Floats) -> None:
-    """Fill the force of each ideal joint on its body (N), global axes; after `observe_meshes`."""
+def acting_row(m: int, meshes: Meshes, table: TableArrays | None, work: Work) -> tuple[float, Floats]:
+    """Scalar force of mesh m (N) and the row that it acts along."""
+    force, row = work.mesh.states[m, LAST_FORCE], meshes.force[m]
+    if table is None:
+        return force, row
+    if force < 0.0 and meshes.form[m] == TABLE_FORM:  # the other flank pushes
+        return -force, table.back[m]
+    return force, row
+
+
+@kernel
+def observe_joints(
+    v: Floats,
+    meshes: Meshes,
+    table: TableArrays | None,
+    joints: Joints | None,
+    work: Work,
+    columns: Columns,
+    sample: Floats,
+) -> None:
+    """Fill the force of each ideal joint, if any, on its body (N), global axes."""
+    if joints is None:
+        return
     forces = sample[columns.support_force : columns.support_force + 3 * joints.host.size]
     forces[:] = 0.0
     for m in range(meshes.coordinates.shape[0]):
@@ -210,10 +203,7 @@ def observe_joints(v: Floats, meshes: Meshes, joints: Joints, work: Work, column
         for end in range(2):
             j = joints.ends[m, end]
             if j >= 0:
-                force = work.mesh.states[m, LAST_FORCE]
-                row = meshes.force[m]
-                if force < 0.0 and meshes.form[m] == TABLE_FORM:  # the other flank pushes
-                    force, row = -force, meshes.table.back[m]
+                force, row = acting_row(m, meshes, table, work)
                 x, y, z = row[BODY_SIZE * end], row[BODY_SIZE * end + 1], row[BODY_SIZE * end + AXIAL]
                 forces[3 * j] += force * (c * x - s * y)
                 forces[3 * j + 1] += force * (s * x + c * y)
@@ -294,10 +284,9 @@ def take_sample(
     """
     for i in range(energy.size):
         energy[i] = 0.0
-    observe_meshes(q, v, equations.meshes, work, columns, sample, energy)
+    observe_meshes(equations.meshes, work, columns, sample, energy)
     observe_supports(equations.connectors, work, columns, sample)
-    if equations.joints.host.size > 0:
-        observe_joints(v, equations.meshes, equations.joints, work, columns, sample)
+    observe_joints(v, equations.meshes, equations.meshes.table, equations.joints, work, columns, sample)
     if stride > 0:
         observe_bodies(q, v, equations.bodies, work, energy)
         observe_connectors(q, v, stride, equations.bodies, equations.connectors, work, energy)

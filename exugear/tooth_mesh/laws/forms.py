@@ -33,7 +33,7 @@ from exugear.kernels.meshes import (
     row_dot,
     turn_rows,
 )
-from exugear.kernels.table_law import NOMINAL_DEFLECTION
+from exugear.kernels.table_law import NOMINAL_DEFLECTION, TableArrays
 from exugear.tooth_mesh.laws.line_of_action import stiffness_law
 from exugear.tooth_mesh.laws.table import TABLE_FORM, add_table_tangent, table_force
 from fe_ste.tools.arrays import Floats
@@ -105,13 +105,23 @@ def add_row_tangent(q: Floats, v: Floats, m: int, meshes: MeshArrays, jq: Floats
     turn_rows(acting_turning, bend, force, jq)
 
 
-@compiled
+def acting_table(meshes: MeshArrays) -> TableArrays | None:
+    """Tables of meshes, None if none of them follows one."""
+    return meshes.table if (meshes.form == TABLE_FORM).any() else None
+
+
 def add_mesh_forces(q: Floats, v: Floats, meshes: MeshArrays, f: Floats) -> None:
     """Add the generalized forces of all meshes to f, shape of q."""
+    add_forces(q, v, meshes, acting_table(meshes), f)
+
+
+@compiled
+def add_forces(q: Floats, v: Floats, meshes: MeshArrays, table: TableArrays | None, f: Floats) -> None:
+    """Add the generalized forces of all meshes to f; `table` is that of `acting_table`."""
     state, acting = np.empty(STATE_SIZE), np.empty(ROW_SIZE)
     for m in range(meshes.coordinates.shape[0]):
         if meshes.form[m] == TABLE_FORM:
-            table_force(q, v, m, meshes, state, acting)
+            table_force(q, v, m, meshes, table, state, acting)
         else:
             row_force(q, v, m, meshes, state, acting)
         index = meshes.coordinates[m]
@@ -120,16 +130,21 @@ def add_mesh_forces(q: Floats, v: Floats, meshes: MeshArrays, f: Floats) -> None
                 f[index[i]] -= acting[i]
 
 
-@compiled
 def add_mesh_jacobian(q: Floats, v: Floats, meshes: MeshArrays, jq: Floats, jv: Floats) -> None:
     """Add d f/dq and d f/dv of `add_mesh_forces` to jq and jv, each (n, n)."""
+    add_jacobian(q, v, meshes, acting_table(meshes), jq, jv)
+
+
+@compiled
+def add_jacobian(q: Floats, v: Floats, meshes: MeshArrays, table: TableArrays | None, jq: Floats, jv: Floats) -> None:
+    """Do what `add_mesh_jacobian` does; `table` is that of `acting_table`."""
     local_q, local_v = np.empty((ROW_SIZE, ROW_SIZE)), np.empty((ROW_SIZE, ROW_SIZE))
     for m in range(meshes.coordinates.shape[0]):
         local_q[:] = 0.0
         local_v[:] = 0.0
         if meshes.form[m] == TABLE_FORM:
             for side in (1, -1):
-                add_table_tangent(q, v, m, side, meshes, local_q, local_v)
+                add_table_tangent(q, v, m, side, meshes, table, local_q, local_v)
         else:
             add_row_tangent(q, v, m, meshes, local_q, local_v)
         index = meshes.coordinates[m]
@@ -140,12 +155,17 @@ def add_mesh_jacobian(q: Floats, v: Floats, meshes: MeshArrays, jq: Floats, jv: 
                     jv[index[i], index[j]] -= local_v[i, j]
 
 
-@compiled
 def mesh_state(q: Floats, v: Floats, meshes: MeshArrays, out: Floats) -> None:
     """Fill (m, 10): what each mesh does; columns as named in `exugear.kernels.meshes`."""
+    set_states(q, v, meshes, acting_table(meshes), out)
+
+
+@compiled
+def set_states(q: Floats, v: Floats, meshes: MeshArrays, table: TableArrays | None, out: Floats) -> None:
+    """Do what `mesh_state` does; `table` is that of `acting_table`."""
     acting = np.empty(ROW_SIZE)
     for m in range(meshes.coordinates.shape[0]):
         if meshes.form[m] == TABLE_FORM:
-            table_force(q, v, m, meshes, out[m], acting)
+            table_force(q, v, m, meshes, table, out[m], acting)
         else:
             row_force(q, v, m, meshes, out[m], acting)

@@ -20,12 +20,15 @@ import numpy as np
 from exugear.kernels.fast_meshes import (
     ALONG_DEFLECTION,
     ALONG_FORCE,
-    DISSIPATED,
-    ELASTIC,
+    LAST_CENTRE,
+    LAST_CYCLE,
+    LAST_DAMPED,
     LAST_DEFLECTION,
+    LAST_ENERGY,
+    LAST_FORCE,
+    LAST_MISALIGNMENT,
     LAST_OUTSIDE,
     LAST_RATE,
-    OF_VARYING_STIFFNESS,
     TABLE_FORCE,
     Meshes,
     MeshMemory,
@@ -58,7 +61,7 @@ from exugear.kernels.meshes import (
 )
 from exugear.kernels.table_law import (
     CUBIC_SIZE,
-    FORCE_DERIVATIVES,
+    ENERGY_DERIVATIVES,
     LAW_BY_DISTANCE,
     LAW_BY_MISALIGNMENT,
     LAW_BY_PMC,
@@ -71,6 +74,7 @@ from exugear.kernels.table_law import (
     NOMINAL_DISTANCE,
     NOMINAL_MISALIGNMENT,
     ORDERS,
+    Scratch,
     TableArrays,
     scratch_memory,
     surface_law,
@@ -132,9 +136,8 @@ def _surface_of(mesh: Mesh, data: MeshData) -> SteSurface:
 
 
 @compiled
-def flank_of(side: int, m: int, meshes: MeshArrays) -> tuple[Floats, Floats, float, float, float]:
+def flank_of(side: int, m: int, meshes: MeshArrays, table: TableArrays) -> tuple[Floats, Floats, float, float, float]:
     """Rows of deflection and misalignment, deflection at zero coordinates, phase and cycles of one flank (1, -1)."""
-    table = meshes.table
     deflection = table.nominal[m, NOMINAL_DEFLECTION]
     if side > 0:
         return meshes.deflection[m], table.misalignment[m], deflection, meshes.phase[m], meshes.cycles[m]
@@ -144,9 +147,16 @@ def flank_of(side: int, m: int, meshes: MeshArrays) -> tuple[Floats, Floats, flo
 
 
 @compiled
-def table_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, out: Floats, acting: Floats) -> None:
-    """Fill the state of a mesh with a table, as in `mesh_state`, and its generalized force, negative (13,)."""
-    table, memory = meshes.table, scratch_memory()
+def table_force(
+    q: Floats, v: Floats, m: int, meshes: MeshArrays, table: TableArrays | None, out: Floats, acting: Floats
+) -> None:
+    """Fill the state of a mesh with a table, as in `mesh_state`, and its generalized force, negative (13,).
+
+    `table` is None in a system without tables: nothing of their law is compiled then.
+    """
+    if table is None:
+        return
+    memory = scratch_memory()
     gradient, turning, bend = np.empty(ROW_SIZE), np.empty(ROW_SIZE), np.empty(2)
     index, axis = meshes.coordinates[m], meshes.axis[m]
     centre = gear_position(q, m, meshes, table.centre[m], table.nominal[m, NOMINAL_DISTANCE])
@@ -156,7 +166,7 @@ def table_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, out: Floats, a
     acting[:] = 0.0
     out[PMC] = pmc - math.floor(pmc)
     for side in (1, -1):
-        row, misalignment_row, offset, phase, cycles = flank_of(side, m, meshes)
+        row, misalignment_row, offset, phase, cycles = flank_of(side, m, meshes, table)
         delta = offset + net_deflection(q, m, meshes, row, float(side), gradient, turning, bend)
         rate = row_dot(index, gradient, v)
         if side > 0:
@@ -189,11 +199,15 @@ def table_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, out: Floats, a
 
 
 @compiled
-def add_table_tangent(q: Floats, v: Floats, m: int, side: int, meshes: MeshArrays, jq: Floats, jv: Floats) -> None:
-    """Add the derivatives of the negative force of one flank of a mesh with a table, (13, 13)."""
-    table, memory = meshes.table, scratch_memory()
+def add_table_tangent(
+    q: Floats, v: Floats, m: int, side: int, meshes: MeshArrays, table: TableArrays | None, jq: Floats, jv: Floats
+) -> None:
+    """Add the derivatives of the negative force of one flank of a mesh with a table, (13, 13); None as there."""
+    if table is None:
+        return
+    memory = scratch_memory()
     index, axis = meshes.coordinates[m], meshes.axis[m]
-    row, misalignment_row, offset, phase, cycles = flank_of(side, m, meshes)
+    row, misalignment_row, offset, phase, cycles = flank_of(side, m, meshes, table)
     # Gradients of the four arguments of the law: delta, centre distance, misalignment, pmc.
     gradients, slopes = np.zeros((4, ROW_SIZE)), np.zeros((4, ROW_SIZE))
     turning, bend, changing = np.empty(ROW_SIZE), np.empty(2), np.empty(ROW_SIZE)
@@ -243,20 +257,19 @@ def fast_flank_force(
     v: Floats,
     m: int,
     side: int,
-    centre: float,
-    count: int,
     meshes: Meshes,
+    table: TableArrays,
     c: float,
     s: float,
+    law_memory: Scratch,
     memory: MeshMemory,
-    energy: Floats,
-) -> float:
-    """Add the negative generalized force of one flank (1, -1) of a mesh with a table to `memory.gradient`.
+) -> None:
+    """Add what one flank (1, -1) of a mesh with a table does to `memory.states`, to `memory.gradient` its force.
 
-    Its scalar force is returned; with more derivatives asked for (`count`) than a force needs, energy and powers are
-    added to `energy`, columns as in `exugear.kernels.fast_meshes`. c and s are those of the frame's angle.
+    That is the negative generalized force. The change of centre distance stands in the states already; the loaded flank
+    leaves deflection, rate and misalignment there. c and s are those of the frame's angle.
     """
-    table, index, axis = meshes.table, meshes.coordinates[m], meshes.axis[m]
+    index, axis, state = meshes.coordinates[m], meshes.axis[m], memory.states[m]
     gradient, total = memory.gradient[ALONG_DEFLECTION], memory.gradient[TABLE_FORCE]
     deflection = table.nominal[m, NOMINAL_DEFLECTION]
     if side > 0:
@@ -268,24 +281,25 @@ def fast_flank_force(
     delta, rate = mesh_row(q, v, index, axis, row, c, s, gradient)
     less, slower = subtract_wheel_errors(q, v, m, float(side), meshes, gradient)
     delta, rate = delta + offset + less, rate + slower
-    if side > 0:
-        memory.states[m, LAST_DEFLECTION], memory.states[m, LAST_RATE] = delta, rate
-    if delta <= table.lowest[m]:
-        return 0.0
-    sense = side * table.sense[m]
-    misalignment = sense * table.nominal[m, NOMINAL_MISALIGNMENT]
-    # Gears with their spin alone neither move apart nor tilt.
+    misalignment = table.nominal[m, NOMINAL_MISALIGNMENT]
+    # Gears with their spin alone neither move apart nor tilt; of the other flank one is told only where it touches.
     spinning = meshes.spinning[m] == 1
-    if not spinning:
-        misalignment += sense * mesh_row(q, v, index, axis, misalignment_row, c, s, memory.gradient[ALONG_FORCE])[0]
+    if not spinning and (side > 0 or delta > table.lowest[m]):
+        misalignment += mesh_row(q, v, index, axis, misalignment_row, c, s, memory.gradient[ALONG_FORCE])[0]
+    if side > 0:
+        state[LAST_DEFLECTION], state[LAST_RATE], state[LAST_MISALIGNMENT] = delta, rate, misalignment
+    if delta <= table.lowest[m]:
+        return
+    sense = side * table.sense[m]
     pmc = phase + cycles * (q[index[SPIN_1]] - q[index[FRAME]])
+    centre = table.nominal[m, NOMINAL_DISTANCE] + state[LAST_CENTRE]
     # From step to step the load stays on a piece: the search begins where it ended.
     guess = memory.pieces[m, number]
-    piece, _ = surface_law(delta, pmc, centre, misalignment, m, table, guess, count, memory.law)
+    piece, _ = surface_law(delta, pmc, centre, sense * misalignment, m, table, guess, ENERGY_DERIVATIVES, law_memory)
     memory.pieces[m, number] = piece
-    law = memory.law.law
+    law = law_memory.law
     damping = table.damping_time[m] * law[LAW_STIFFNESS]
-    force: float = law[LAW_FORCE] + damping * rate
+    force = law[LAW_FORCE] + damping * rate
     for i in range(ROW_SIZE):
         total[i] += force * gradient[i]
     if not spinning:
@@ -296,12 +310,11 @@ def fast_flank_force(
         mesh_row(q, v, index, axis, memory.row, c, s, memory.gradient[ALONG_FORCE])
         for i in range(ROW_SIZE):
             total[i] += memory.gradient[ALONG_FORCE, i]
-    memory.states[m, LAST_OUTSIDE] = max(memory.states[m, LAST_OUTSIDE], law[LAW_OUTSIDE])
-    if count > FORCE_DERIVATIVES:
-        energy[ELASTIC] += law[LAW_POTENTIAL]
-        energy[DISSIPATED] += damping * rate * rate
-        energy[OF_VARYING_STIFFNESS] -= law[LAW_BY_PMC] * cycles * (v[index[SPIN_1]] - v[index[FRAME]])
-    return force
+    state[LAST_FORCE] += side * force
+    state[LAST_OUTSIDE] = max(state[LAST_OUTSIDE], law[LAW_OUTSIDE])
+    state[LAST_ENERGY] += law[LAW_POTENTIAL]
+    state[LAST_DAMPED] += damping * rate * rate
+    state[LAST_CYCLE] -= law[LAW_BY_PMC] * cycles * (v[index[SPIN_1]] - v[index[FRAME]])
 
 
 @kernel
@@ -309,28 +322,24 @@ def fast_table_force(
     q: Floats,
     v: Floats,
     m: int,
-    count: int,
     meshes: Meshes,
+    table: TableArrays,
     c: float,
     s: float,
+    law_memory: Scratch,
     memory: MeshMemory,
-    energy: Floats,
-) -> float:
-    """Fill `memory.gradient` with the negative generalized force of a mesh with a table; F_bt is returned.
+) -> None:
+    """Fill `memory.gradient` with the negative generalized force of a mesh with a table, its row of `memory.states`.
 
     Parameters as of `fast_flank_force`.
     """
-    table = meshes.table
     memory.gradient[TABLE_FORCE, :] = 0.0
-    memory.states[m, LAST_OUTSIDE] = 0.0
-    centre = table.nominal[m, NOMINAL_DISTANCE]
+    memory.states[m, :] = 0.0
     if meshes.spinning[m] == 0:
         index, gradient = meshes.coordinates[m], memory.gradient[ALONG_FORCE]
-        centre += mesh_row(q, v, index, meshes.axis[m], table.centre[m], c, s, gradient)[0]
-    force = 0.0
+        memory.states[m, LAST_CENTRE] = mesh_row(q, v, index, meshes.axis[m], table.centre[m], c, s, gradient)[0]
     for side in (1, -1):
-        force += side * fast_flank_force(q, v, m, side, centre, count, meshes, c, s, memory, energy)
-    return force
+        fast_flank_force(q, v, m, side, meshes, table, c, s, law_memory, memory)
 
 
 def pack_tables(elements: tuple[MeshElement, ...], index: Integers, averaged: bool, linear: bool) -> TableArrays:
