@@ -238,7 +238,8 @@ class Assembly:
         f = self.mesh_forces(q, v, self.meshes if meshes is None else meshes)
         add_connector_forces(q, v, self.connectors, f)
         add_spring_forces(q, v, self.springs, f)
-        add_elastic_forces(q, v, self.elastic, scratch_for(self.elastic), f)
+        if self.elastic_bodies:
+            add_elastic_forces(q, v, self.elastic, scratch_for(self.elastic), f)
         for name, body in self.turning.items():
             place = self.elastic_slices[name]
             f[place] += body.forces(q[place], v[place])
@@ -273,7 +274,8 @@ class Assembly:
         out = np.zeros(self.size)
         forces = self.forces(q, v) + applied
         accelerations(q, v, self.inertia, forces, out)
-        set_elastic_accelerations(forces, self.elastic, scratch_for(self.elastic), out)
+        if self.elastic_bodies:
+            set_elastic_accelerations(forces, self.elastic, scratch_for(self.elastic), out)
         for name, body in self.turning.items():
             place = self.elastic_slices[name]
             out[place] = body.accelerations(q[place], v[place], forces[place])
@@ -291,7 +293,8 @@ class Assembly:
         x, u = self.with_travelling(q, v)
         f = np.zeros(x.size)
         add_mesh_forces(x, u, meshes, f)
-        share_travelling_forces(x, self.travelling, f)
+        if self.travelling.first.size:
+            share_travelling_forces(x, self.travelling, f)
         return f[: self.size]
 
     def mesh_jacobians(self, q: Floats, v: Floats, meshes: MeshArrays | None = None) -> tuple[Floats, Floats]:

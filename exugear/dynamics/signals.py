@@ -131,7 +131,7 @@ SIGNALS = (
         "m",
         sign_convention="the loaded flanks approach",
         kind="f4",
-        filled_by=("observe_meshes", "observe_table"),
+        filled_by=("observe_meshes",),
     ),
     Signal(
         "mesh_force",
@@ -139,7 +139,7 @@ SIGNALS = (
         "N",
         sign_convention="the loaded flank pushes",
         kind="f4",
-        filled_by=("observe_meshes", "observe_table"),
+        filled_by=("observe_meshes",),
     ),
     Signal(
         "support_force",
@@ -217,7 +217,6 @@ SIGNALS = (
         "J",
         filled_by=(
             "observe_meshes",
-            "observe_table",
             "observe_connectors",
             "observe_springs",
             "observe_elastic_bodies",
@@ -230,7 +229,6 @@ SIGNALS = (
         sign_convention="taken from the motion",
         filled_by=(
             "observe_meshes",
-            "observe_table",
             "observe_connectors",
             "observe_springs",
             "observe_elastic_bodies",
@@ -242,7 +240,7 @@ SIGNALS = (
         ("balance_time",),
         "J",
         sign_convention="taken from the motion",
-        filled_by=("observe_meshes", "observe_table"),
+        filled_by=("observe_meshes",),
         is_power=True,
     ),
     Signal(

@@ -155,17 +155,12 @@ def add_jacobian(q: Floats, v: Floats, meshes: MeshArrays, table: TableArrays | 
                     jv[index[i], index[j]] -= local_v[i, j]
 
 
+@compiled
 def mesh_state(q: Floats, v: Floats, meshes: MeshArrays, out: Floats) -> None:
     """Fill (m, 10): what each mesh does; columns as named in `exugear.kernels.meshes`."""
-    set_states(q, v, meshes, acting_table(meshes), out)
-
-
-@compiled
-def set_states(q: Floats, v: Floats, meshes: MeshArrays, table: TableArrays | None, out: Floats) -> None:
-    """Do what `mesh_state` does; `table` is that of `acting_table`."""
     acting = np.empty(ROW_SIZE)
     for m in range(meshes.coordinates.shape[0]):
         if meshes.form[m] == TABLE_FORM:
-            table_force(q, v, m, meshes, table, out[m], acting)
+            table_force(q, v, m, meshes, meshes.table, out[m], acting)
         else:
             row_force(q, v, m, meshes, out[m], acting)

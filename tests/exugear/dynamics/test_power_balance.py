@@ -24,7 +24,7 @@ from exugear.model.gearbox import Gearbox
 from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.compiled.step import choose_integration
 from exugear.solvers.loads import LoadTable
-from exugear.tooth_mesh.laws.forms import add_mesh_forces, mesh_state
+from exugear.tooth_mesh.laws.forms import add_forces, mesh_state
 
 from ..assembled import assembled
 from ..plain_signals import energies_of, sampled
@@ -44,7 +44,7 @@ def mesh_powers(q, v, mesh, damping, out):
     f, state = np.empty(q.shape[1]), np.empty((1, STATE_SIZE))
     for n in range(q.shape[0]):
         f[:] = 0.0
-        add_mesh_forces(q[n], v[n], mesh, f)
+        add_forces(q[n], v[n], mesh, mesh.table, f)
         mesh_state(q[n], v[n], mesh, state)
         out[n, 0] = np.dot(f, v[n])
         out[n, 1] = damping * state[0, 1] ** 2
