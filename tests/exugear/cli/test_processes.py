@@ -286,7 +286,8 @@ def test_what_is_compiled_is_told_before_it_is_and_ctrl_c_ends_it(tmp_path):
             told += process.stderr.readline()
         process.send_signal(signal.SIGINT)
         said = process.stderr.read()
-    assert "of the equations of motion, 20 to 40 s for each sort of model; once per installation" in " ".join(told.split())
+    told = " ".join(told.split())
+    assert "of the equations of motion, 20 to 40 s for each sort of model; once per installation" in told
     assert process.returncode == 130, said
     assert "Stopped" in said
     assert not list((tmp_path / "out").rglob("run*"))
