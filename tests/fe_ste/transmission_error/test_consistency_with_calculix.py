@@ -2,7 +2,9 @@
 
 CalculiX touches with the chords of its flank meshes, which closes convex flanks late and concave ones early, and its
 incompatible brick is too stiff: 75.8 um on its finest mesh where the truth is 77.3 (helical 0). So nothing below 2 %
-follows from agreement; what is tested is that nothing gross is wrong and that the chords' error falls. The results of CalculiX are stored with their version, meshes and settings in benchmarks/calculix/results.json, whose
+follows from agreement; what is tested is that nothing gross is wrong and that the chords' error falls.
+
+The results of CalculiX are stored with their version, meshes and settings in benchmarks/calculix/results.json, whose
 README tells how they came about and what parts the two.
 """
 
