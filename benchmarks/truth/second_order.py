@@ -19,6 +19,9 @@ from fe_ste.tools.arrays import Floats, Integers, SparseMatrix
 CHUNK = 1000
 """Elements assembled at a time."""
 
+VTK_TO_SKFEM = [6, 2, 5, 7, 1, 3, 4, 0]
+"""Corners of a hexahedron in the order of scikit-fem."""
+
 
 @dataclass(frozen=True)
 class Fineness:
@@ -187,90 +190,106 @@ def stiffness(basis: skfem.CellBasis, mesh: skfem.MeshHex, gear: Gear) -> Sparse
     return total
 
 
-def load_vector(
-    sector: Sector, basis: skfem.CellBasis, mesh: skfem.MeshHex, load: LoadCase, number: int
-) -> list[scipy.sparse.csc_matrix]:
-    """Consistent forces (3 n, cells) of unit forces on the cells, positive into the material."""
-    gear, side, cell_roll, tooth = load.on_gear(number)
+@dataclass(frozen=True)
+class CellPoints:
+    """Quadrature points of the cells on their flank.
+
+    Attributes
+    ----------
+    roll, z, fraction : ndarray (cells, points)
+        Roll angle, place along the axis (m), and place between form and tip circle by arc length.
+    weight : ndarray (points,)
+        Adds up to 1.
+    """
+
+    roll: Floats
+    z: Floats
+    fraction: Floats
+    weight: Floats
+
+
+def _cell_points(load: LoadCase, number: int) -> CellPoints:
+    gear, side, cell_roll, _ = load.on_gear(number)
     kappa = math.tan(gear.base_helix_angle) / gear.base_radius * side * (-1.0 if gear.internal else 1.0)
     nodes, weights = np.polynomial.legendre.leggauss(4)
     part = np.concatenate([nodes / 2 - 0.5, nodes / 2 + 0.5])
     share = np.concatenate([weights, weights]) / 4.0
     a, b = (x.ravel() for x in np.meshgrid(part, part, indexing="ij"))
-    weight = np.outer(share, share).ravel()
-    cosine = math.cos(gear.base_helix_angle)
-    z = load.axial[load.cells.layer][:, None] + load.half_along * cosine * b
-    roll = cell_roll[:, None] + kappa * (load.half_along * cosine * b)
+    along = load.half_along * math.cos(gear.base_helix_angle) * b
+    z = load.axial[load.cells.layer][:, None] + along
+    roll = cell_roll[:, None] + kappa * along
     # On either gear cells have the same width across the contact line: arc lengths of both flanks roll on one another.
-    across = load.cells.half_across[:, None] * a
-    arc = 0.5 * gear.base_radius * roll**2 + across * _sense(load, number)
-    form, tip = ((radius / gear.base_radius) ** 2 - 1.0 for radius in (gear.form_radius, gear.tip_radius))
-    fraction = (2.0 * arc / gear.base_radius - form) / (tip - form)
+    across = load.cells.half_across[:, None] * a * _sense(load, number)
+    fraction = _fraction(gear, 0.5 * gear.base_radius * roll**2 + across)
     # A cell whose rectangle leans beyond the tip edge stands upright instead, on the flank.
     leans = ((fraction < 0.0) | (fraction > 1.0)).any(axis=1)
-    upright = 0.5 * gear.base_radius * cell_roll[:, None] ** 2 + across * _sense(load, number)
-    fraction[leans] = ((2.0 * upright / gear.base_radius - form) / (tip - form))[leans]
-    fraction = np.clip(fraction, 0.0, 1.0)
-    element = skfem.ElementHexS2()
-    corners = skfem.ElementHex1.doflocs
+    fraction[leans] = _fraction(gear, 0.5 * gear.base_radius * cell_roll[:, None] ** 2 + across)[leans]
+    return CellPoints(roll, z, np.clip(fraction, 0.0, 1.0), np.outer(share, share).ravel())
+
+
+def _fraction(gear: Gear, arc: Floats) -> Floats:
+    """Place between form and tip circle, 0..1, of arc lengths of the involute."""
+    form, tip = ((radius / gear.base_radius) ** 2 - 1.0 for radius in (gear.form_radius, gear.tip_radius))
+    return np.asarray((2.0 * arc / gear.base_radius - form) / (tip - form))
+
+
+def _within(places: Floats, bounds: Floats) -> tuple[Integers, Floats]:
+    """Interval of increasing bounds (n, k), by row, that holds each of the places (n,), and where in it, 0..1."""
+    strip = np.clip((bounds < places[:, None]).sum(axis=1) - 1, 0, bounds.shape[1] - 2)
+    row = np.arange(len(places))
+    low, high = bounds[row, strip], bounds[row, strip + 1]
+    return strip, (places - low) / (high - low)
+
+
+def _shape_functions(mesh: SectorMesh, side: int, z: Floats, fraction: Floats) -> tuple[Integers, Floats]:
+    """Bricks (n,) of a tooth behind points of its flank, and their 20 shape functions (n, 20) there."""
+    flank = mesh.section.plus_flank if side > 0 else mesh.section.minus_flank
+    layer = np.clip(np.searchsorted(mesh.axial_positions, z) - 1, 0, len(mesh.axial_positions) - 2)
+    start = mesh.axial_positions[layer]
+    t = (z - start) / (mesh.axial_positions[layer + 1] - start)
+    nodes = mesh.layer_points[:, flank]
+    arcs = 0.5 * mesh.gear.base_radius * (np.sum(nodes[..., :2] ** 2, axis=-1) / mesh.gear.base_radius**2 - 1.0)
+    node_fraction = _fraction(mesh.gear, arcs)
+    bounds = (1 - t)[:, None] * node_fraction[layer] + t[:, None] * node_fraction[layer + 1]
+    upwards = bounds[0, -1] > bounds[0, 0]
+    strip, s = _within(*((fraction, bounds) if upwards else (1.0 - fraction, 1.0 - bounds)))
+    # Elements with an edge on the flank, by their strip.
+    quads, first, second = mesh.section.quads, flank[:-1], flank[1:]
+    edges = zip(first, second, strict=True)
+    element = np.array([np.flatnonzero((quads == a).any(1) & (quads == b).any(1))[0] for a, b in edges])
+    brick = layer * len(quads) + element[strip]
+    corners = mesh.hexahedra[:, VTK_TO_SKFEM][brick]
+    below = layer * len(mesh.section.points)
+    above = below + len(mesh.section.points)
+    wanted = np.stack(
+        [first[strip] + below, second[strip] + below, first[strip] + above, second[strip] + above], axis=1
+    )
+    local = skfem.ElementHex1.doflocs[(corners[:, None, :] == wanted[:, :, None]).argmax(axis=2)]
+    part = np.stack([(1 - s) * (1 - t), s * (1 - t), (1 - s) * t, s * t], axis=1)
+    places = np.einsum("pk,pkd->dp", part, local)
+    return brick, np.stack([skfem.ElementHexS2().lbasis(places, i)[0] for i in range(20)], axis=1)
+
+
+def load_vector(sector: Sector, basis: skfem.CellBasis, load: LoadCase, number: int) -> scipy.sparse.csc_matrix:
+    """Consistent forces (3 n, cells) of unit forces on the cells, positive into the material."""
+    gear, side, _, tooth = load.on_gear(number)
+    points = _cell_points(load, number)
     rows, columns, values = [], [], []
-    for k, sector_mesh in enumerate(sector.meshes):
+    for k, mesh in enumerate(sector.meshes):
         chosen = np.flatnonzero(tooth == k - TEETH // 2)
         if not len(chosen):
             continue
-        layer_z = sector_mesh.axial_positions
-        at_z, at_f = z[chosen].ravel(), fraction[chosen].ravel()
-        layer = np.clip(np.searchsorted(layer_z, at_z) - 1, 0, len(layer_z) - 2)
-        t = (at_z - layer_z[layer]) / (layer_z[layer + 1] - layer_z[layer])
-        flank = sector_mesh.section.plus_flank if side > 0 else sector_mesh.section.minus_flank
-        section_points = sector_mesh.layer_points[:, flank]
-        radius = np.hypot(section_points[..., 0], section_points[..., 1])
-        node_fraction = ((radius / gear.base_radius) ** 2 - 1.0 - form) / (tip - form)
-        bound = (1 - t)[:, None] * node_fraction[layer] + t[:, None] * node_fraction[layer + 1]
-        increasing = bound if bound[0, -1] > bound[0, 0] else 1.0 - bound
-        at = at_f if bound[0, -1] > bound[0, 0] else 1.0 - at_f
-        strip = np.clip((increasing < at[:, None]).sum(axis=1) - 1, 0, increasing.shape[1] - 2)
-        index = np.arange(len(at))
-        low, high = increasing[index, strip], increasing[index, strip + 1]
-        s = (at - low) / (high - low)
-        # Elements with an edge on the flank, by their strip.
-        hexa = sector_mesh.hexahedra
-        count = len(sector_mesh.section.quads)
-        quads = sector_mesh.section.quads
-        first, second = flank[:-1], flank[1:]
-        element_of = np.empty(len(first), dtype=int)
-        for number_of, (one, other) in enumerate(zip(first, second, strict=True)):
-            element_of[number_of] = np.flatnonzero((quads == one).any(axis=1) & (quads == other).any(axis=1))[0]
-        brick = layer * count + element_of[strip]
-        vtk_to_skfem = [6, 2, 5, 7, 1, 3, 4, 0]
-        ordered = hexa[:, vtk_to_skfem][brick]
-        offset = len(sector_mesh.section.points)
-        wanted = np.stack(
-            [
-                first[strip] + layer * offset,
-                second[strip] + layer * offset,
-                first[strip] + (layer + 1) * offset,
-                second[strip] + (layer + 1) * offset,
-            ],
-            axis=1,
-        )
-        which = (ordered[:, None, :] == wanted[:, :, None]).argmax(axis=2)
-        local = corners[which]  # points, 4, 3
-        shape = np.stack([(1 - s) * (1 - t), s * (1 - t), (1 - s) * t, s * t], axis=1)
-        X = np.einsum("pk,pkd->dp", shape, local)
-        functions = np.stack([element.lbasis(X, i)[0] for i in range(20)], axis=1)
-        dofs = basis.element_dofs[:, brick + sector.first_brick[k]].T
-        normal = _inward(gear, side, roll[chosen].ravel(), at_z, (k - TEETH // 2) * gear.angular_pitch)
-        cell = np.repeat(chosen, len(weight))
-        w = np.tile(weight, len(chosen))
-        vals = (w[:, None] * functions)[:, :, None] * normal[:, None, :]
-        unk = 3 * dofs[:, :, None] + np.arange(3)
-        rows.append(unk.ravel())
-        values.append(vals.ravel())
-        columns.append(np.broadcast_to(cell[:, None, None], unk.shape).ravel())
-    return scipy.sparse.coo_matrix(
-        (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(3 * basis.N, len(tooth))
-    ).tocsc()
+        z = points.z[chosen].ravel()
+        brick, functions = _shape_functions(mesh, side, z, points.fraction[chosen].ravel())
+        normal = _inward(gear, side, points.roll[chosen].ravel(), z, (k - TEETH // 2) * gear.angular_pitch)
+        weighted = np.tile(points.weight, len(chosen))[:, None] * functions
+        unknowns = 3 * basis.element_dofs[:, brick + sector.first_brick[k]].T[:, :, None] + np.arange(3)
+        cell = np.repeat(chosen, len(points.weight))
+        rows.append(unknowns.ravel())
+        values.append((weighted[:, :, None] * normal[:, None, :]).ravel())
+        columns.append(np.broadcast_to(cell[:, None, None], unknowns.shape).ravel())
+    entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
+    return scipy.sparse.coo_matrix(entries, shape=(3 * basis.N, len(tooth))).tocsc()
 
 
 def _sense(load: LoadCase, number: int) -> float:
@@ -309,7 +328,7 @@ def deflection(load: LoadCase, number: int, fineness: Fineness) -> Deflection:
     mesh = skfem_mesh(mesh3.points, mesh3.hexahedra)
     basis = skfem.CellBasis(mesh, skfem.ElementHexS2(), intorder=1)
     gear = load.on_gear(number)[0]
-    cells = load_vector(mesh3, basis, mesh, load, number)
+    cells = load_vector(mesh3, basis, load, number)
     is_held = np.zeros(mesh.p.shape[1], dtype=bool)
     is_held[mesh3.held] = True
     held = np.concatenate([basis.dofs.nodal_dofs[0, is_held], basis.dofs.edge_dofs[0, is_held[mesh.edges].all(axis=0)]])

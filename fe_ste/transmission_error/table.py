@@ -76,6 +76,7 @@ class TableInput:
 
     Examples
     --------
+    >>> from fe_ste.geometry.gears import Gear
     >>> gear = Gear(name="gear", teeth=30, normal_module=3e-3, face_width=20e-3, held_diameter=50e-3)
     >>> pair = GearPair(name="pair", pinion=gear, gear=gear, centre_distance=90e-3)
     >>> len(TableInput(pair=pair, torque=(100.0,)).hash)

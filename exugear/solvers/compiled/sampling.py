@@ -257,11 +257,11 @@ def observe_elastic_bodies(q: Floats, v: Floats, stride: int, equations: Equatio
 
 
 @kernel
-def observe_loads(t: float, q: Floats, v: Floats, stride: int, loads: Loads, work: Work, energy: Floats) -> None:
+def observe_loads(t: float, q: Floats, v: Floats, loads: Loads, work: Work, energy: Floats) -> None:
     """Add the power of what acts from outside at time t (s); nothing acts on travelling seats."""
     set_loads(t, q, v, loads, work.series, work.force)
     for i in range(loads.steady.size):
-        energy[OF_LOADS] += stride * work.force[i] * v[i]
+        energy[OF_LOADS] += work.force[i] * v[i]
 
 
 @kernel
@@ -279,20 +279,20 @@ def take_sample(
     """Fill signals (columns,) and energies and powers (7,) of the state at time t (s) that was evaluated last.
 
     Signals but those that a state has by itself (`exugear.solvers.compiled.observers`); energies in the columns
-    `KINETIC` and so on. All powers but those of meshes stand for `stride` samples, none at 0: they take longer than the
-    signals.
+    `KINETIC` and so on. Powers but those of meshes and loads stand for `stride` samples, none at 0: they take longer
+    than the signals.
     """
     for i in range(energy.size):
         energy[i] = 0.0
     observe_meshes(equations.meshes, work, columns, sample, energy)
     observe_supports(equations.connectors, work, columns, sample)
     observe_joints(v, equations.meshes, equations.meshes.table, equations.joints, work, columns, sample)
+    observe_loads(t, q, v, equations.loads, work, energy)
     if stride > 0:
         observe_bodies(q, v, equations.bodies, work, energy)
         observe_connectors(q, v, stride, equations.bodies, equations.connectors, work, energy)
         observe_springs(q, v, stride, equations.springs, energy)
         observe_elastic_bodies(q, v, stride, equations, work, energy)
-        observe_loads(t, q, v, stride, equations.loads, work, energy)
 
 
 def columns_of(layout: SignalLayout) -> Columns:

@@ -57,8 +57,9 @@ def test_spur_pair_shows_its_curve() -> None:
     spec = gearbox.pairs["spur"]
     wanted = COARSE_INPUT(pair=spec.pair, torque=tuple(spec.static_torque * f for f in FACTORS), positions=10)
     table = MeshTable.compute(wanted).dataset
-    # At the nodes; between ten positions of a spur pair two interpolations differ.
-    assert largest_error(gearbox, {"spur": table}, 10) < 1e-3
+    # Deflection turns gear 1 on, off the nodes: between ten positions of a spur pair two interpolations differ by a
+    # thousandth, where those of fifty agree (below).
+    assert largest_error(gearbox, {"spur": table}, 10) < 1.5e-3
 
 
 @pytest.mark.validation

