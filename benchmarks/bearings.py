@@ -22,9 +22,10 @@ from exugear.kernels.rolling import RollingArrays, rolling_force, rolling_memory
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.solvers.compiled.arrays import Equations, Work
-from exugear.solvers.compiled.connectors import connector_force, move_connector
+from exugear.solvers.compiled.connectors import add_connectors
 from exugear.solvers.compiled.methods import adams
 from exugear.solvers.compiled.packing import equations_of, work_for
+from exugear.solvers.compiled.places import gather_places, place_bodies
 from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.loads import LoadTable
 from fe_ste.tools.arrays import Floats
@@ -51,10 +52,10 @@ ROWS: dict[str, RollingRow] = {
 @kernel
 def linear_connectors(count: int, q: Floats, v: Floats, equations: Equations, work: Work) -> None:
     """Move all connectors and take their forces, so many times."""
+    place_bodies(q, v, equations.bodies, work)
+    gather_places(q, v, equations.places, work)
     for _ in range(count):
-        for n in range(equations.connectors.ends.shape[0]):
-            move_connector(q, v, n, equations.bodies, equations.connectors, work)
-            connector_force(n, equations.connectors, work)
+        add_connectors(q, equations.bodies, equations.connectors, equations.pairs, work)
 
 
 @kernel

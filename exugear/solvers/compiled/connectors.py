@@ -23,8 +23,6 @@ from exugear.solvers.compiled.arrays import (
     RELATIVE_VELOCITY,
     SECOND_ARM,
     SECOND_TURNING,
-    STRAIN,
-    STRAIN_RATE,
     SUPPORT_LOAD,
     W_X,
     W_Y,
@@ -38,76 +36,6 @@ from exugear.solvers.compiled.arrays import (
 from exugear.solvers.compiled.places import tilts_of_axis
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import kernel
-
-
-@kernel
-def move_connector(
-    q: Floats, v: Floats, n: int, bodies: Bodies, connectors: Connectors, work: Work
-) -> tuple[float, float, float, float, float, float]:
-    """Fill strain and rate of connector n into `work.motion`; return the two arms, global axes (m).
-
-    As Exudyn's RigidBodySpringDamper: second attachment against the first in the first body's axes, the rate not
-    corrected for the turning of these axes.
-    """
-    i, j = connectors.ends[n, 0], connectors.ends[n, 1]
-    o, p = bodies.start[i], bodies.start[j]
-    frame_1, frame_2 = work.frames[i], work.frames[j]
-    # Second attachment: its arm turned into global axes, its place and velocity there.
-    x, y, z = connectors.local[n, 1]
-    bx = frame_2[0] * x + frame_2[1] * y + frame_2[2] * z
-    by = frame_2[3] * x + frame_2[4] * y + frame_2[5] * z
-    bz = frame_2[6] * x + frame_2[7] * y + frame_2[8] * z
-    wx, wy, wz = frame_2[W_X], frame_2[W_Y], frame_2[W_Z]
-    dx = connectors.gap[n, 0] + q[p] + (bx - x)
-    dy = connectors.gap[n, 1] + q[p + 1] + (by - y)
-    dz = connectors.gap[n, 2] + q[p + 2] + (bz - z)
-    ux = v[p] + (wy * bz - wz * by)
-    uy = v[p + 1] + (wz * bx - wx * bz)
-    uz = v[p + 2] + (wx * by - wy * bx)
-    ax, ay, az = connectors.local[n, 0]
-    strain, rate = work.motion[STRAIN], work.motion[STRAIN_RATE]
-    # On the ground the first body's axes are the global ones: nothing has to be turned.
-    if i == bodies.start.size - 1:
-        strain[0], strain[1], strain[2] = dx, dy, dz
-        rate[0], rate[1], rate[2] = ux, uy, uz
-        if connectors.repeated[n] == 1:
-            return ax, ay, az, bx, by, bz
-        rate[TILT], rate[TILT + 1], rate[SPIN] = wx, wy, wz
-        strain[TILT], strain[TILT + 1] = q[p + TILT], q[p + TILT + 1]
-    else:
-        # First attachment likewise; the difference of both is then seen in the first body's axes.
-        x, y, z = ax, ay, az
-        ax = frame_1[0] * x + frame_1[1] * y + frame_1[2] * z
-        ay = frame_1[3] * x + frame_1[4] * y + frame_1[5] * z
-        az = frame_1[6] * x + frame_1[7] * y + frame_1[8] * z
-        ox, oy, oz = frame_1[W_X], frame_1[W_Y], frame_1[W_Z]
-        dx += (x - ax) - q[o]
-        dy += (y - ay) - q[o + 1]
-        dz += (z - az) - q[o + 2]
-        ux -= v[o] + (oy * az - oz * ay)
-        uy -= v[o + 1] + (oz * ax - ox * az)
-        uz -= v[o + 2] + (ox * ay - oy * ax)
-        for k in range(3):
-            strain[k] = frame_1[k] * dx + frame_1[3 + k] * dy + frame_1[6 + k] * dz
-            rate[k] = frame_1[k] * ux + frame_1[3 + k] * uy + frame_1[6 + k] * uz
-        if connectors.repeated[n] == 1:
-            return ax, ay, az, bx, by, bz
-        wx, wy, wz = wx - ox, wy - oy, wz - oz
-        for k in range(3):
-            rate[TILT + k] = frame_1[k] * wx + frame_1[3 + k] * wy + frame_1[6 + k] * wz
-        # Tilts from the second body's z axis as the first body sees it.
-        axis_x = frame_1[0] * frame_2[2] + frame_1[3] * frame_2[5] + frame_1[6] * frame_2[8]
-        axis_y = frame_1[1] * frame_2[2] + frame_1[4] * frame_2[5] + frame_1[7] * frame_2[8]
-        axis_z = frame_1[2] * frame_2[2] + frame_1[5] * frame_2[5] + frame_1[8] * frame_2[8]
-        strain[TILT] = math.atan2(-axis_y, axis_z)
-        strain[TILT + 1] = math.asin(min(1.0, max(-1.0, axis_x)))
-    # The angle about z costs an arc tangent, and bearings rarely resist it.
-    strain[SPIN] = 0.0
-    if connectors.twisting[n] == 1:
-        cosine = frame_1[0] * frame_2[0] + frame_1[3] * frame_2[3] + frame_1[6] * frame_2[6]
-        sine = frame_1[0] * frame_2[1] + frame_1[3] * frame_2[4] + frame_1[6] * frame_2[7]
-        strain[SPIN] = math.atan2(-sine, cosine)
-    return ax, ay, az, bx, by, bz
 
 
 @kernel
