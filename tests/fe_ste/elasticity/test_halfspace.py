@@ -105,7 +105,7 @@ ROLL, AXIAL, BASE = np.array([0.30, 0.34, 0.38, 0.42]), np.linspace(-6e-3, 6e-3,
 
 
 def tents(mirror: float = 0.0, lead: float = 3.0) -> np.ndarray:
-    return tent_integrals(ROLL, AXIAL, BASE, lead, 0.96, mirror)
+    return tent_integrals(ROLL, AXIAL, BASE, lead, 0.96, np.array([[[mirror, 1.0, 2.0]]] * 2))
 
 
 @pytest.mark.parametrize(("node", "layer"), [(1, 2), (0, 0)])
@@ -133,7 +133,7 @@ def test_mirror_adds_the_loads_imaged_at_both_ends() -> None:
     """Without lead, images at both ends are the tents of a face three times as long, folded."""
     mirrored = tents(mirror=1.0, lead=0.0)
     long_axial = np.linspace(-18e-3, 18e-3, 10)
-    long = tent_integrals(ROLL, long_axial, BASE, 0.0, 0.96, 0.0).reshape(4, 10, 4, 10)
+    long = tent_integrals(ROLL, long_axial, BASE, 0.0, 0.96, np.zeros((2, 0, 3))).reshape(4, 10, 4, 10)
     # Inner layer 1 of the face is layer 4 of the long one; its images are layers 2 and 8.
     folded = long[:, 3:7, :, 4] + long[:, 3:7, :, 2] + long[:, 3:7, :, 8]
     own = mirrored.reshape(4, 4, 4, 4)[:, :, :, 1]
