@@ -13,12 +13,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import scipy.linalg
+import scipy.sparse
 
 from fe_ste.elasticity.bricks import stiffness_matrix
 from fe_ste.elasticity.halfspace import interior_displacement, tent_integrals
 from fe_ste.elasticity.hexmesh import SectorMesh
-from fe_ste.elimination.sparse import factorise
-from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.arrays import Floats, Integers, SparseMatrix
 
 #: Layers on either side of a load at which its error is read, and elements from a load to the faces of the block.
 ERROR_REACH = 3
@@ -61,13 +62,15 @@ def brick_error(mesh: SectorMesh, side: int, incompatible_modes: bool = True) ->
     stiffness = stiffness_matrix(points, hexahedra, mesh.gear.material, incompatible_modes)
     given = np.ones(numbers.shape, dtype=bool)
     given[:-1, 1:-1, 1:-1] = False
-    fixed, free = (unknowns_of(numbers[chosen]) for chosen in (given, ~given))
+    # Node by node along the profile, so that the free ones couple in a narrow band.
+    by_profile = numbers.swapaxes(0, 1)
+    fixed = unknowns_of(numbers[given])
+    free = unknowns_of(by_profile[~given.swapaxes(0, 1)])
     count = len(mesh.section.flank_roll)
     moved = _half_space(mesh, side, points[numbers[given]]).reshape(len(fixed), count)
     loads = np.zeros((stiffness.shape[0], count))
     loads[3 * numbers[0] + 2] = _tent_loads(count, numbers.shape[1:])
-    with factorise(stiffness[free][:, free]) as factor:
-        found = factor.solve(loads[free] - stiffness[free][:, fixed] @ moved)
+    found = _solved(stiffness[free][:, free], loads[free] - stiffness[free][:, fixed] @ moved)
     everywhere = np.empty((stiffness.shape[0], count))
     everywhere[fixed], everywhere[free] = moved, found
     middle = numbers.shape[2] // 2
@@ -82,6 +85,15 @@ class FlankSpacing(NamedTuple):
     layer: float
     shear: float
     cosine: float
+
+
+def _solved(matrix: SparseMatrix, right: Floats) -> Floats:
+    """Solve a positive definite system whose matrix has a narrow band: a sparse solver takes longer to load."""
+    entries = scipy.sparse.tril(matrix, format="coo")
+    below = entries.row - entries.col
+    band = np.zeros((below.max() + 1, len(right)))
+    band[below, entries.col] = entries.data
+    return np.asarray(scipy.linalg.solveh_banded(band, right, overwrite_ab=True, lower=True, check_finite=False))
 
 
 def flank_spacing(mesh: SectorMesh, side: int) -> FlankSpacing:
@@ -161,21 +173,19 @@ def _half_space(mesh: SectorMesh, side: int, places: Floats) -> Floats:
     arc, layer, shear, cosine = flank_spacing(mesh, side)
     material = mesh.gear.material
     gauss, weight = np.polynomial.legendre.leggauss(3)
-    step = arc[1] - arc[0]
+    step, within = arc[1] - arc[0], (gauss + 1.0) / 2.0
     parts = max(2, int(np.ceil(layer / step)))  # along the layer about as fine as along the profile
-    along = ((np.arange(parts)[:, None] + (gauss + 1.0) / 2.0) / parts).ravel()
-    shares = np.tile(weight, parts) * (1.0 - along)
-    moved, total = np.zeros((*places.shape, len(arc))), np.zeros(len(arc))
-    for quad in range(len(arc) - 1):
-        for s, of_s in zip((gauss + 1.0) / 2.0, weight, strict=True):
-            z = layer * np.concatenate([-along, along])
-            loads = np.stack([arc[quad] + s * step - shear * z, z / cosine, np.zeros_like(z)], axis=-1)
-            fields = interior_displacement(places[:, None] - loads, material.poissons_ratio)
-            field = np.einsum("nld,l->nd", fields, of_s * np.tile(shares, 2))
-            moved[..., quad] += (1.0 - s) * field
-            moved[..., quad + 1] += s * field
-            total[quad] += (1.0 - s) * of_s * 2.0 * shares.sum()
-            total[quad + 1] += s * of_s * 2.0 * shares.sum()
+    along = ((np.arange(parts)[:, None] + within) / parts).ravel()
+    z, height = layer * np.concatenate([-along, along]), np.tile(np.tile(weight, parts) * (1.0 - along), 2)
+    # Loads by interval of the profile, point in it, and point along the layers; each has a part in two tents.
+    shape = (len(arc) - 1, len(within), len(z))
+    interval = np.repeat(np.arange(shape[0]), shape[1] * shape[2])
+    s, at = (np.broadcast_to(part, shape).ravel() for part in (within[:, None], z))
+    strength = np.broadcast_to(weight[:, None] * height, shape).ravel()
+    shares = np.stack([(1.0 - s) * strength, s * strength], axis=-1)
+    loads = np.stack([arc[interval] + s * step - shear * at, at / cosine], axis=-1)
+    moved = interior_displacement(places, loads, interval, shares, len(arc), material.poissons_ratio)
+    total = np.bincount(interval, shares[:, 0], len(arc)) + np.bincount(interval + 1, shares[:, 1], len(arc))
     return np.asarray(moved / total * (1.0 + material.poissons_ratio) / (2.0 * np.pi * material.youngs_modulus))
 
 

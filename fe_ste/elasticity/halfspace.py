@@ -17,7 +17,8 @@ import math
 
 import numpy as np
 
-from fe_ste.tools.arrays import Floats
+from fe_ste.geometry.splines import cubic_coefficients, cubic_knots, cubic_matrix
+from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import compiled
 
 #: Gauss rule of three points over 0 to 1.
@@ -42,32 +43,52 @@ _WEDGE = np.array(
 _LEAST_PART = 2e-3
 
 
-def interior_displacement(places: Floats, poissons_ratio: float) -> Floats:
-    """Evaluate the displacement inside a half-space under a unit normal point load at the origin.
+@compiled
+def interior_displacement(
+    places: Floats, loads: Floats, columns: Integers, shares: Floats, count: int, poissons_ratio: float
+) -> Floats:
+    """Evaluate the displacement inside a half-space under normal point loads.
 
     Boussinesq: u = (1 + nu) / (2 pi E) [z/R^3 - (1 - 2 nu)/(R (R + z))] (x, y) in the surface and
     w = (1 + nu) / (2 pi E) [z^2/R^3 + 2 (1 - nu)/R] into it; the factor (1 + nu) / (2 pi E) is left out.
 
     Parameters
     ----------
-    places : ndarray (..., 3)
-        x and y in the surface, z into it, m; not the origin.
+    places : ndarray (n, 3)
+        x and y in the surface, z into it, m; no load's own place.
+    loads : ndarray (m, 2)
+        Places of the loads in the surface, m.
+    columns : ndarray (m,)
+        Load case of each load; it has a part in the one after that, too.
+    shares : ndarray (m, 2)
+        Force of the load in either.
+    count : int
+        Load cases.
     poissons_ratio : float
 
     Returns
     -------
-    ndarray (..., 3)
+    ndarray (n, 3, count)
         1/m.
 
     References
     ----------
     K. L. Johnson, Contact Mechanics, 1985, eq. (3.18).
     """
-    depth = places[..., 2:]
-    distance = np.linalg.norm(places, axis=-1, keepdims=True)
-    outward = depth / distance**3 - (1.0 - 2.0 * poissons_ratio) / (distance * (distance + depth))
-    inward = depth**2 / distance**3 + 2.0 * (1.0 - poissons_ratio) / distance
-    return np.concatenate([outward * places[..., :2], inward], axis=-1)
+    result = np.zeros((len(places), 3, count))
+    for n in range(len(places)):
+        depth = places[n, 2]
+        for m in range(len(loads)):
+            x, y = places[n, 0] - loads[m, 0], places[n, 1] - loads[m, 1]
+            distance = math.sqrt(x * x + y * y + depth * depth)
+            outward = depth / distance**3 - (1.0 - 2.0 * poissons_ratio) / (distance * (distance + depth))
+            inward = depth * depth / distance**3 + 2.0 * (1.0 - poissons_ratio) / distance
+            for k in range(2):
+                column, share = columns[m] + k, shares[m, k]
+                result[n, 0, column] += share * outward * x
+                result[n, 1, column] += share * outward * y
+                result[n, 2, column] += share * inward
+    return result
 
 
 def wedge_images(angle: float, poissons_ratio: float) -> Floats:
@@ -311,15 +332,14 @@ def tent_means(nodes: Floats, places: Floats) -> Floats:
     >>> bool(roll @ tent_means(roll, roll**2)[:, 0] > 1.05)
     True
     """
-    from scipy.interpolate import make_interp_spline  # a quarter of a second that who reads tables need not wait
-
-    splines = make_interp_spline(places, np.eye(len(nodes)), k=3)
+    knots = cubic_knots(places)
+    splines = cubic_coefficients(places, knots)
     points, shares = np.polynomial.legendre.leggauss(4)
     means, total = np.zeros((len(nodes), len(nodes))), np.zeros(len(nodes))
     for left in range(len(nodes) - 1):
         within = (points + 1.0) / 2.0
         at = nodes[left] + within * (nodes[left + 1] - nodes[left])
-        values = splines(np.interp(at**2, nodes**2, places))
+        values = cubic_matrix(np.interp(at**2, nodes**2, places), knots) @ splines
         for tent, part in ((left, 1.0 - within), (left + 1, within)):
             weight = shares * part * at * (nodes[left + 1] - nodes[left])
             means[:, tent] += weight @ values

@@ -7,7 +7,9 @@ import pytest
 from scipy.integrate import dblquad, quad
 
 from fe_ste.elasticity.halfspace import (
-    interior_displacement,
+    interior_displacement as displacement_of_loads,
+)
+from fe_ste.elasticity.halfspace import (
     rectangle_integral,
     tent_integrals,
     tent_weights,
@@ -44,6 +46,13 @@ def test_rectangle_is_even_additive_and_far_away_a_point_load() -> None:
     parts = sum(rectangle_integral(0.4 - x, 0.3, 0.5, 0.5) for x in (-0.5, 0.5))
     assert rectangle_integral(0.4, 0.3, 1.0, 0.5) == pytest.approx(parts, rel=1e-13)
     assert rectangle_integral(400.0, 300.0, 1.0, 0.5) == pytest.approx(2.0 / 500.0, rel=1e-5)
+
+
+def interior_displacement(places: np.ndarray, poissons_ratio: float) -> np.ndarray:
+    """Under a unit load at the origin."""
+    at, one = places.reshape(-1, 3), np.array([[1.0, 0.0]])
+    found = displacement_of_loads(at, np.zeros((1, 2)), np.array([0]), one, 2, poissons_ratio)
+    return np.asarray(found[..., 0].reshape(places.shape))
 
 
 def into_the_surface(x: float, y: float, z: float) -> float:
