@@ -87,7 +87,7 @@ class CompiledSystem:
     @property
     def past(self) -> Floats:
         """Accelerations (n, size) to go on from."""
-        return self._past.in_order()
+        return self._past.in_order()[:, : self._size]
 
     def accelerations(self, time: float = 0.0) -> Floats:
         """Accelerations (size,) at the present state and a time (s)."""
