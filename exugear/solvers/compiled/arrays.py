@@ -196,7 +196,7 @@ class Equations(NamedTuple):
 class Work(NamedTuple):
     """Memory of the right-hand side.
 
-    State vectors have e entries, a multiple of eight: the system's own, those of travelling seats, and at least six that
+    State vectors have e entries, a multiple of eight: the system's own, those of travelling seats, and six or more that
     stay zero.
 
     Attributes
