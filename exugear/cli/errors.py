@@ -134,7 +134,7 @@ def model_errors() -> Iterator[None]:
     from exugear.dynamics.statics import BalanceError
     from exugear.harmonics.krylov import HarmonicBalanceError
     from exugear.model.reading import CaseError
-    from exugear.steady.rotating_frame import SteadyError
+    from exugear.rotating.rotating_frame import SteadyError
     from exugear.tooth_mesh.placement import MeshError
 
     try:

@@ -1,1 +1,1 @@
-"""Steady response of a gearbox over speed: rotating frame, mean system, harmonic balance of its meshes."""
+"""Steady response of a gearbox over speed: balance of all mesh lines, resonances, file."""

@@ -10,9 +10,9 @@ import numpy as np
 
 from exugear.harmonics.lines import LineSet
 from exugear.harmonics.products import Product
-from exugear.steady.mean_system import MeanSystem
-from exugear.steady.mesh_waves import MeshWaves
-from exugear.steady.signals import SignalName, SignalRows, mesh_signal_names, signal_rows
+from exugear.rotating.mean_system import MeanSystem
+from exugear.rotating.mesh_waves import MeshWaves
+from exugear.rotating.signals import SignalName, SignalRows, mesh_signal_names, signal_rows
 from fe_ste.tools.arrays import Complexes, Floats, SparseMatrix
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from exugear.steady.rotating_frame import SteadyError
+from exugear.rotating.rotating_frame import SteadyError
 from fe_ste.tools.arrays import Floats
 
 if TYPE_CHECKING:

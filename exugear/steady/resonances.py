@@ -13,8 +13,8 @@ import numpy as np
 import scipy.linalg
 
 from exugear.dynamics.linearised import RIGID_BODY_LIMIT
+from exugear.rotating.mean_system import MeanSystem
 from exugear.steady.excitation import Gearset
-from exugear.steady.mean_system import MeanSystem
 from fe_ste.tools.arrays import Complexes, Floats
 
 HARMONICS = 3

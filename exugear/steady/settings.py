@@ -16,7 +16,7 @@ from exugear.loads.summary import summarise_loads
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import RPM
 from exugear.model.versions import STEADY
-from exugear.steady.rotating_frame import SteadyError
+from exugear.rotating.rotating_frame import SteadyError
 from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
 

@@ -15,14 +15,14 @@ from exugear.harmonics.lines import LineSet, line_set
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import RPM
+from exugear.rotating.mean_system import mean_system
+from exugear.rotating.mesh_waves import mesh_waves
+from exugear.rotating.rotating_frame import SteadyError
+from exugear.rotating.signals import SignalName
 from exugear.steady.excitation import Gearset
-from exugear.steady.mean_system import mean_system
-from exugear.steady.mesh_waves import mesh_waves
 from exugear.steady.resonances import Crossing, crossings, growth_rate, refined
 from exugear.steady.response import Response, dissipated_and_given, linear_response, parametric_response, signals
-from exugear.steady.rotating_frame import SteadyError
 from exugear.steady.settings import SteadySettings, check_law, usual_speeds
-from exugear.steady.signals import SignalName
 from exugear.tooth_mesh.law import MeshData
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.notebook import html_table, value_range

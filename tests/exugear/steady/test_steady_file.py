@@ -9,8 +9,8 @@ import pytest
 
 from exugear.dynamics.assemble import assemble
 from exugear.model.choice import Choice
+from exugear.rotating.rotating_frame import SteadyError
 from exugear.steady.peaks import line_name, peaks
-from exugear.steady.rotating_frame import SteadyError
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import keep_points, kept_points, load_response, partial_path, stored_or_computed
 from exugear.steady.steady_response import response_of

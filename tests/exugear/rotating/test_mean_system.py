@@ -9,10 +9,10 @@ from exugear.dynamics.assemble import assemble
 from exugear.dynamics.linearised import linearise
 from exugear.dynamics.modes import eigenmodes
 from exugear.model.choice import Choice
-from exugear.steady.equal_planets import with_equal_planets
-from exugear.steady.mean_system import mean_system, tangents
-from exugear.steady.mesh_waves import mesh_waves
-from exugear.steady.rotating_frame import RotatingFrame, SteadyError, planet_sets
+from exugear.rotating.equal_planets import with_equal_planets
+from exugear.rotating.mean_system import mean_system, tangents
+from exugear.rotating.mesh_waves import mesh_waves
+from exugear.rotating.rotating_frame import RotatingFrame, SteadyError, planet_sets
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_response import response_of
 

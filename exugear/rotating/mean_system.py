@@ -17,8 +17,8 @@ import scipy.linalg
 
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.statics import BalanceError, static_state
-from exugear.steady.equal_planets import with_equal_planets
-from exugear.steady.rotating_frame import RotatingFrame, SteadyError, planet_sets
+from exugear.rotating.equal_planets import with_equal_planets
+from exugear.rotating.rotating_frame import RotatingFrame, SteadyError, planet_sets
 from fe_ste.tools.arrays import Complexes, Floats
 
 PLACE_STEP, RATE_STEP = 1e-6, 1e-3

@@ -13,9 +13,9 @@ import numpy as np
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.modes import overall_row
 from exugear.kernels.coordinates import TILT
-from exugear.steady.mean_system import MeanSystem
-from exugear.steady.mesh_waves import WAVES, MeshWaves
-from exugear.steady.rotating_frame import PlanetSet
+from exugear.rotating.mean_system import MeanSystem
+from exugear.rotating.mesh_waves import WAVES, MeshWaves
+from exugear.rotating.rotating_frame import PlanetSet
 from fe_ste.tools.arrays import Complexes, Floats
 
 AXES = ("x", "y", "z")

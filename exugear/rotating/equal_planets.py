@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from exugear.dynamics.assembly import Assembly
-from exugear.steady.rotating_frame import PlanetSet
+from exugear.rotating.rotating_frame import PlanetSet
 from fe_ste.tools.arrays import Floats
 
 

@@ -21,8 +21,8 @@ from exugear.dynamics.assembly import Assembly
 from exugear.harmonics.products import fourier_coefficients
 from exugear.kernels.coordinates import BODY_SIZE, SPIN
 from exugear.kernels.meshes import DEFLECTION, FRAME, ROW_SIZE, frame_row
-from exugear.steady.mean_system import MeanSystem
-from exugear.steady.rotating_frame import PlanetSet, RotatingFrame, SteadyError
+from exugear.rotating.mean_system import MeanSystem
+from exugear.rotating.rotating_frame import PlanetSet, RotatingFrame, SteadyError
 from fe_ste.tools.arrays import Complexes, Floats
 
 SAMPLES = 64
