@@ -47,7 +47,9 @@ class Lattice:
     @cached_property
     def angles(self) -> Floats:
         """Angles (samples, bases) of the bases, rad."""
-        return np.asarray(2.0 * np.pi * (np.outer(np.arange(self.samples), self.generator) % self.samples) / self.samples)
+        return np.asarray(
+            2.0 * np.pi * (np.outer(np.arange(self.samples), self.generator) % self.samples) / self.samples
+        )
 
     @cached_property
     def _slots(self) -> tuple[Integers, Booleans]:
@@ -57,7 +59,7 @@ class Lattice:
         return np.where(mirrored, self.samples - slot, slot), mirrored
 
     def values(self, coefficients: Complexes) -> Floats:
-        """Samples (samples, ...) of signals with coefficients (lines, ...)."""
+        """Sample (samples, ...) signals with coefficients (lines, ...)."""
         slot, mirrored = self._slots
         spectrum = np.zeros((self.samples // 2 + 1, *coefficients.shape[1:]), dtype=complex)
         spectrum[slot[~mirrored]] = coefficients[~mirrored]
@@ -65,7 +67,7 @@ class Lattice:
         return np.asarray(np.fft.irfft(spectrum, self.samples, axis=0) * self.samples)
 
     def coefficients(self, values: Floats) -> Complexes:
-        """Coefficients (lines, ...) of the lines in samples (samples, ...)."""
+        """Find the coefficients (lines, ...) of the lines in samples (samples, ...)."""
         slot, mirrored = self._slots
         found = np.fft.rfft(values, axis=0)[slot] / self.samples
         found[mirrored] = found[mirrored].conj()

@@ -231,7 +231,7 @@ def _residual(
     """Generalized forces (size,) in the frame that inertia needs, less those that elements give."""
     assembly = frame.assembly
     q, v, a = frame.state(psi, speed, u, du, ddu)
-    missing = assembly.inertia_forces(q, v, a) - assembly.forces(q, v, assembly.mean_meshes)
+    missing = assembly.inertia_forces(q, v, a) - assembly.forces(q, v, frame.mean_meshes)
     return np.asarray(frame.matrices(psi)[0].T @ missing)
 
 

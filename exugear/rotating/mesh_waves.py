@@ -20,7 +20,7 @@ import numpy as np
 from exugear.dynamics.assembly import Assembly
 from exugear.harmonics.products import fourier_coefficients
 from exugear.kernels.coordinates import BODY_SIZE, SPIN
-from exugear.kernels.meshes import DEFLECTION, FRAME, ROW_SIZE, frame_row
+from exugear.kernels.meshes import FRAME, ROW_SIZE, frame_row
 from exugear.rotating.mean_system import MeanSystem
 from exugear.rotating.rotating_frame import PlanetSet, RotatingFrame, SteadyError
 from fe_ste.tools.arrays import Complexes, Floats
@@ -128,22 +128,18 @@ class MeshWaves:
                 rates[n, n + 1], rates[n + 1, n] = wave.carrier, -wave.carrier
         return rates
 
-    def rows(self, speed: float) -> tuple[Floats, Floats]:
-        """Rows of deflection and of force by the frame's coordinates at a speed (rad/s), each (m, size)."""
+    def gradients(self, rows: Floats, speed: float) -> Floats:
+        """Waves (m, size) of the gradients of rows (meshes, 12) by the frame's coordinates, at a speed (rad/s)."""
         frame = self.system.frame
         q, _, _ = frame.state(0.0, speed, self.system.static_at(speed))
-        t0, meshes = frame.matrices(0.0)[0], self.assembly.meshes
-        found = []
-        for rows in (meshes.deflection, meshes.force):
-            gradients = np.array([_gradient(self.assembly, m, q, rows) for m in range(len(rows))]) @ t0
-            found.append(self._waves_of(gradients))
-        return found[0], found[1]
+        found = np.array([_row(self.assembly, m, q, own)[1] for m, own in enumerate(rows)])
+        return self._waves_of(found @ frame.matrices(0.0)[0])
 
-    def static_deflections(self, speed: float) -> Floats:
-        """Deflection of each wave in the static state at a speed (rad/s), (m,), m."""
+    def values(self, rows: Floats, speed: float) -> Floats:
+        """Waves (m,) of the values of rows (meshes, 12) in the static state at a speed (rad/s)."""
         frame = self.system.frame
-        q, v, _ = frame.state(0.0, speed, self.system.static_at(speed))
-        return self._waves_of(self.assembly.mesh_states(q, v, self.assembly.mean_meshes)[:, DEFLECTION])
+        q, _, _ = frame.state(0.0, speed, self.system.static_at(speed))
+        return self._waves_of(np.array([_row(self.assembly, m, q, own)[0] for m, own in enumerate(rows)]))
 
     def position_rows(self) -> Floats:
         """Rows of the position in the mesh cycle by the frame's coordinates, (m, size), cycles."""
@@ -271,13 +267,13 @@ def _check_phases(assembly: Assembly, meshes: tuple[int, ...]) -> None:
         )
 
 
-def _gradient(assembly: Assembly, mesh: int, q: Floats, rows: Floats) -> Floats:
-    """Gradient (size,) of a row of a mesh by the coordinates."""
+def _row(assembly: Assembly, mesh: int, q: Floats, row: Floats) -> tuple[float, Floats]:
+    """Value of a row (12,) of a mesh, and its gradient (size,) by the coordinates."""
     meshes = assembly.meshes
     index, out = meshes.coordinates[mesh], np.zeros(assembly.size)
     local, turning = np.empty(ROW_SIZE), np.empty(ROW_SIZE)
-    frame_row(q, index, meshes.axis[mesh], rows[mesh], local, turning)
+    value = frame_row(q, index, meshes.axis[mesh], row, local, turning)
     for at in range(2 * BODY_SIZE + 1):
         if index[at] >= 0:
             out[index[at]] += local[at]
-    return out
+    return float(value), out

@@ -21,7 +21,9 @@ import numpy as np
 
 from exugear.dynamics.assembly import Assembly
 from exugear.kernels.coordinates import TILT
+from exugear.kernels.meshes import MeshArrays
 from exugear.model.parts import Body
+from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats, Integers
 
 SPACING = 1e-6
@@ -139,6 +141,16 @@ class RotatingFrame:
 
     assembly: Assembly
     sets: tuple[PlanetSet, ...]
+
+    @cached_property
+    def mean_meshes(self) -> MeshArrays:
+        """Meshes of the mean system: linear, their stiffness that of the mean over the mesh cycle.
+
+        Tables become their stiffness at the static load: as they are, stiffness would change with each planet's
+        misalignment.
+        """
+        parting = LAWS[self.assembly.mesh_law].loses_contact
+        return self.assembly.linear_meshes() if parting else self.assembly.mean_meshes
 
     @cached_property
     def speeds(self) -> dict[str, float]:

@@ -6,6 +6,7 @@ of one mode tells which crossings matter.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,9 +15,11 @@ import scipy.linalg
 
 from exugear.dynamics.linearised import RIGID_BODY_LIMIT
 from exugear.rotating.mean_system import MeanSystem
-from exugear.steady.excitation import Gearset
+from exugear.rotating.mesh_ports import DEFLECTION
+from exugear.steady.excitation import Gearset, Interface
 from fe_ste.tools.arrays import Complexes, Floats
 
+Forcing = Callable[[Interface], Complexes]
 HARMONICS = 3
 """Lines of each base that are looked at."""
 LEAST_SHARE = 0.01
@@ -87,10 +90,13 @@ def growth_rate(system: MeanSystem) -> float:
     return max(rates)
 
 
-def crossings(gearset: Gearset, low: float, high: float) -> tuple[Crossing, ...]:
-    """Crossings of lines of single bases with modes between two speeds of the input (rad/s), the strongest first."""
+def crossings(gearset: Gearset, low: float, high: float, forcing: Forcing) -> tuple[Crossing, ...]:
+    """Crossings of lines of single bases with modes between two speeds of the input (rad/s), the strongest first.
+
+    `forcing` gives the forces of the meshes (lines, m, f), N, that vary in the static state.
+    """
     middle = 0.5 * (low + high)
-    values, peaks = _peaks(gearset, middle)
+    values, peaks = _peaks(gearset, middle, forcing)
     strongest = peaks.max(axis=(0, 1))
     found = []
     lines = _looked_at(gearset)
@@ -122,7 +128,7 @@ def _looked_at(gearset: Gearset) -> list[int]:
     return [int(line) for line in np.flatnonzero(alone)]
 
 
-def _peaks(gearset: Gearset, speed: float) -> tuple[Complexes, Floats]:
+def _peaks(gearset: Gearset, speed: float, forcing: Forcing) -> tuple[Complexes, Floats]:
     """Eigenvalues, and what each mode makes of each line at resonance (modes, lines, signals).
 
     Signals are the overall transmission error and the deflections of the meshes.
@@ -130,18 +136,12 @@ def _peaks(gearset: Gearset, speed: float) -> tuple[Complexes, Floats]:
     interface = gearset.at(speed)
     values, right, left = mean_modes(gearset.system, speed)
     size = gearset.system.size
-    waves = gearset.waves
-    loads = np.linalg.solve(gearset.system.mass, (gearset.force_rows(speed).T * waves.weights).astype(complex))
-    felt = left[:, size:] @ loads
-    seen = np.hstack([right[:, :size] @ interface.rows.by_place[:1].T, right[:, :size] @ interface.deflection.T])
-    compliances, out = gearset.compliances(speed), []
-    for line in _looked_at(gearset):
-        base = int(np.flatnonzero(gearset.lines.index[line])[0])
-        harmonic = abs(int(gearset.lines.index[line, base]))
-        own = np.array([wave.base == base for wave in waves.waves])
-        force = own * interface.mean_stiffness**2 * interface.static * compliances[:, harmonic]
-        out.append(np.abs(seen) * (np.abs(felt @ force) / np.abs(values.real))[:, None])
-    return values, np.array(out).transpose(1, 0, 2)
+    felt = left[:, size:] @ np.linalg.solve(gearset.system.mass, gearset.loads(interface.ports).astype(complex))
+    rows = np.vstack([interface.rows.by_place[:1], interface.ports.readings[:, DEFLECTION]])
+    seen = np.abs(right[:, :size] @ rows.T)
+    force = forcing(interface)
+    pushed = [np.abs(felt @ force[line].ravel()) / np.abs(values.real) for line in _looked_at(gearset)]
+    return values, np.array([seen * own[:, None] for own in pushed]).transpose(1, 0, 2)
 
 
 def _met(gearset: Gearset, crossing: Crossing) -> Crossing:

@@ -20,7 +20,7 @@ from exugear.rotating.rotating_frame import SteadyError
 from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
 
-Level = Literal["linear", "parametric"]
+Level = Literal["linear", "parametric", "nonlinear"]
 LEVELS: tuple[Level, ...] = get_args(Level)
 USUAL_COUNT = 400
 MOST_COUNT = 20000
@@ -105,21 +105,21 @@ def usual_speeds(gearbox: Gearbox) -> SpeedRange:
     raise SteadyError("speeds: no load case turns the train; name them, as 0:215:400 in rpm of the input")
 
 
-def check_law(name: str) -> None:
-    """Refuse mesh laws by which teeth do not push in proportion to their deflection.
+def check_law(name: str, level: Level) -> None:
+    """Refuse a mesh law that a level cannot take.
 
     Raises
     ------
     SteadyError
-        The gears only roll, or the teeth part.
+        The gears only roll, or the teeth part and the level is linear in the deflections.
     """
     law = LAWS[name]
     if not law.has_force:
         raise SteadyError(f"mesh law {name}: its gears only roll, so that nothing vibrates; take another law")
-    if law.loses_contact:
+    if law.loses_contact and level != "nonlinear":
         raise SteadyError(
-            f"mesh law {name}: teeth that may part do not push in proportion to their deflection, which the levels "
-            f"{' and '.join(LEVELS)} take them to; take the law line_of_action, or run the load case in time"
+            f"mesh law {name}: its teeth may part, which the level {level} cannot tell; take the level nonlinear, or "
+            "the law line_of_action"
         )
 
 
@@ -130,8 +130,9 @@ class SteadySettings:
     Attributes
     ----------
     speeds : SpeedRange
-    level : {"linear", "parametric"}
-        The static transmission error as excitation, or stiffness that varies with the mesh cycle.
+    level : {"linear", "parametric", "nonlinear"}
+        The static transmission error as excitation, stiffness that varies with the mesh cycle, or laws evaluated in
+        time, the position in the cycle moving with the vibration.
     harmonics : int
         Harmonics of each mesh frequency.
     combinations : int

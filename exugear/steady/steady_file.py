@@ -36,8 +36,9 @@ _LAYOUT = Layout(
         "units": ("signal",),
         "drive_torque": ("point",),
         "energy_error": ("point",),
+        "apart_share": ("point", "mesh_wave"),
     }
-    | {name: (name,) for name in ("base", "signal")},
+    | {name: (name,) for name in ("base", "signal", "mesh_wave")},
     ("gearbox", "variant", "mesh_law", "inertias", "level", "input_hash", "growth_rate"),
 )
 
@@ -70,8 +71,10 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
         "units": (("signal",), np.array([own.units for own in response.signals], dtype=object), {}),
         "drive_torque": (("point",), solved.drive_torque, {"units": "N m"}),
         "energy_error": (("point",), solved.energy_error, {"units": "1"}),
+        "apart_share": (("point", "mesh_wave"), solved.apart, {"units": "1", "long_name": "share of time apart"}),
     }
     coordinates: dict[str, Any] = {
+        "mesh_wave": np.array(response.wave_names, dtype=object),
         "base": np.array(response.base_names, dtype=object),
         "signal": np.array([own.name for own in response.signals], dtype=object),
     }

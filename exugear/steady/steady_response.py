@@ -5,12 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from exugear.bodies.elastic_body import ElasticBody
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
+from exugear.harmonics.krylov import HarmonicBalanceError
+from exugear.harmonics.lattice import Lattice, lattice
 from exugear.harmonics.lines import LineSet, line_set
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
@@ -19,9 +22,17 @@ from exugear.rotating.mean_system import mean_system
 from exugear.rotating.mesh_waves import mesh_waves
 from exugear.rotating.rotating_frame import SteadyError
 from exugear.rotating.signals import SignalName
-from exugear.steady.excitation import Gearset
+from exugear.steady.excitation import Gearset, Interface
+from exugear.steady.nonlinear import Balance, nonlinear_response
 from exugear.steady.resonances import Crossing, crossings, growth_rate, refined
-from exugear.steady.response import Response, dissipated_and_given, linear_response, parametric_response, signals
+from exugear.steady.response import (
+    Response,
+    dissipated_and_given,
+    linear_response,
+    parametric_response,
+    signals,
+    transmission_errors,
+)
 from exugear.steady.settings import SteadySettings, check_law, usual_speeds
 from exugear.tooth_mesh.law import MeshData
 from fe_ste.tools.arrays import Complexes, Floats
@@ -42,8 +53,10 @@ class Solved:
         N m.
     energy_error : (points,) array
         Power that damping takes less that given by the meshes, over the larger of both.
-    products : (points,) array of int
+    products : (points,) array
         Products with the operator of the balance.
+    apart : (points, waves) array
+        Share of time in which the teeth of each mesh wave are apart.
     """
 
     speed: Floats
@@ -51,6 +64,7 @@ class Solved:
     drive_torque: Floats
     energy_error: Floats
     products: Floats
+    apart: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +79,8 @@ class SteadyResponse:
     input_hash : str
         Of gearbox, choices and settings.
     lines : LineSet
-    base_names : tuple of str
-        Meshes of each base.
+    base_names, wave_names : tuple of str
+        Meshes of each base, and mesh waves.
     signals : tuple of SignalName
     solved : Solved
         Points in ascending order of speed.
@@ -83,6 +97,7 @@ class SteadyResponse:
     input_hash: str
     lines: LineSet
     base_names: tuple[str, ...]
+    wave_names: tuple[str, ...]
     signals: tuple[SignalName, ...]
     solved: Solved
     crossings: tuple[Crossing, ...]
@@ -197,18 +212,20 @@ def response_of(
     keep_every : float
         Seconds between them.
     """
-    check_law(assembly.mesh_law)
+    check_law(assembly.mesh_law, settings.level)
     even = settings.speeds.values
     gearset = gearset_of(assembly, even, settings.harmonics, settings.combinations)
-    found = crossings(gearset, float(even.min()), float(even.max())) if settings.at_resonances else ()
+    solver = PointSolver(gearset, settings)
+    found = crossings(gearset, float(even.min()), float(even.max()), solver.forcing) if settings.at_resonances else ()
     speeds = refined(even, found)
-    solved = _solve(gearset, settings, speeds, known, progress or (lambda done, total: None), keep, keep_every)
+    solved = _solve(solver, speeds, known, progress or (lambda done, total: None), keep, keep_every)
     return SteadyResponse(
         assembly=gearset.waves.assembly,
         settings=settings,
         input_hash=settings.hash_with(assembly),
         lines=gearset.lines,
         base_names=gearset.waves.base_names,
+        wave_names=tuple(wave.name for wave in gearset.waves.waves),
         signals=gearset.signal_names,
         solved=solved,
         crossings=found,
@@ -223,15 +240,56 @@ def gearset_of(assembly: Assembly, speeds: Floats, harmonics: int = 10, combinat
     return Gearset(waves, line_set(waves.base_orders.tolist(), harmonics, combinations), 2 * harmonics)
 
 
-def point_of(gearset: Gearset, settings: SteadySettings, speed: float) -> Response:
-    """Response at one speed of the input, rad/s."""
-    interface = gearset.at(speed)
-    return (linear_response if settings.level == "linear" else parametric_response)(gearset, interface)
+class PointSolver:
+    """Solves one speed after the other; at the level `nonlinear` each starts from the one before.
+
+    Parameters
+    ----------
+    gearset : Gearset
+    settings : SteadySettings
+    """
+
+    def __init__(self, gearset: Gearset, settings: SteadySettings) -> None:
+        self.gearset, self._level = gearset, settings.level
+        self._guard = 2 * settings.harmonics, 2 * settings.combinations
+        self._last: Complexes | None = None
+
+    @cached_property
+    def lattice(self) -> Lattice:
+        """Samples of the level `nonlinear`."""
+        return lattice(self.gearset.lines, *self._guard)
+
+    def forcing(self, interface: Interface) -> Complexes:
+        """Find the forces of the meshes (lines, m, f) that vary in the static state, N."""
+        if not self.gearset.parting:
+            return transmission_errors(self.gearset, interface)
+        balance = Balance(self.gearset, interface, self.lattice)
+        return balance.forces(balance.static)[0]
+
+    def response(self, speed: float) -> Response:
+        """Response at a speed of the input, rad/s.
+
+        Raises
+        ------
+        HarmonicBalanceError
+            No steady state was found.
+        """
+        interface = self.gearset.at(speed)
+        if self._level == "linear":
+            return linear_response(self.gearset, interface)
+        if self._level == "parametric":
+            return parametric_response(self.gearset, interface)
+        try:
+            found, self._last = nonlinear_response(self.gearset, interface, self.lattice, self._last)
+        except HarmonicBalanceError:
+            if self._last is None:
+                raise
+            found, self._last = nonlinear_response(self.gearset, interface, self.lattice, None)
+        return found
 
 
 def _solve(
-    gearset: Gearset,
-    settings: SteadySettings,
+    solver: PointSolver,
     speeds: Floats,
     known: Solved | None,
     progress: Callable[[int, int], None],
@@ -240,15 +298,24 @@ def _solve(
 ) -> Solved:
     """Solve all speeds, beginning with what is known of them."""
     count = 0 if known is None else _same_beginning(known.speed, speeds)
+    gearset = solver.gearset
     shape = (len(speeds), len(gearset.lines.orders), len(gearset.signal_names))
-    out = Solved(speeds, np.zeros(shape, dtype=complex), *(np.zeros(len(speeds)) for _ in range(3)))
+    points, waves = len(speeds), len(gearset.waves.waves)
+    out = Solved(
+        speed=speeds,
+        amplitude=np.zeros(shape, dtype=complex),
+        drive_torque=np.zeros(points),
+        energy_error=np.zeros(points),
+        products=np.zeros(points),
+        apart=np.zeros((points, waves)),
+    )
     if known is not None:
-        for name in ("amplitude", "drive_torque", "energy_error", "products"):
+        for name in ("amplitude", "drive_torque", "energy_error", "products", "apart"):
             getattr(out, name)[:count] = getattr(known, name)[:count]
     kept, done = time.monotonic(), count
     try:
         for n in range(count, len(speeds)):
-            _fill(out, n, gearset, point_of(gearset, settings, float(speeds[n])))
+            _fill(out, n, gearset, solver.response(float(speeds[n])))
             done = n + 1
             progress(done, len(speeds))
             if keep is not None and time.monotonic() - kept > keep_every:
@@ -267,6 +334,7 @@ def _fill(out: Solved, n: int, gearset: Gearset, response: Response) -> None:
     out.amplitude[n, 1:] *= 2.0
     taken, given = dissipated_and_given(gearset, response)
     out.drive_torque[n], out.products[n] = response.torque, response.products
+    out.apart[n] = response.apart
     out.energy_error[n] = (taken - given) / max(abs(taken), abs(given), 1e-300)
 
 
@@ -283,4 +351,5 @@ def _first(solved: Solved, count: int) -> Solved:
         solved.drive_torque[:count],
         solved.energy_error[:count],
         solved.products[:count],
+        solved.apart[:count],
     )

@@ -35,10 +35,11 @@ SHOWN_PEAKS = 15
 
 
 class Level(StrEnum):
-    """What varies: the static transmission error as excitation, or the stiffness over the mesh cycle itself."""
+    """What varies: the transmission error as excitation, the stiffness over the mesh cycle, or laws in time."""
 
     linear = "linear"
     parametric = "parametric"
+    nonlinear = "nonlinear"
 
 
 def steady(
@@ -49,7 +50,8 @@ def steady(
     level: Annotated[
         Level,
         typer.Option(
-            help="linear: the transmission error as excitation; parametric: stiffness that varies, all meshes together."
+            help="linear: the transmission error as excitation; parametric: stiffness that varies, all meshes at once; "
+            "nonlinear: laws in time, such as table with teeth that part."
         ),
     ] = Level.parametric,
     speeds: Annotated[
@@ -85,7 +87,7 @@ def steady(
 def _settings(project: Project, level: Level, speeds: str | None) -> SteadySettings:
     from exugear.steady.settings import SpeedRange, SteadySettings, check_law, usual_speeds
 
-    check_law(project.choice.mesh_law)
+    check_law(project.choice.mesh_law, level.value)
     asked = usual_speeds(project.gearbox) if speeds is None else SpeedRange.from_text(speeds)
     return SteadySettings(asked, level.value)
 

@@ -63,7 +63,7 @@ def test_the_range_of_the_load_case_is_the_usual_one(case):
         (("--variant", "rigid", "--speeds", "5"), "must be FIRST:LAST:COUNT"),
         (("--variant", "rigid", "--speeds", "-5:5:10"), "change their sense"),
         (("--variant", "rigid", "--mesh-law", "rigid"), "nothing vibrates"),
-        (("--variant", "rigid", "--mesh-law", "table"), "teeth that may part"),
+        (("--variant", "rigid", "--mesh-law", "table"), "its teeth may part"),
     ],
 )
 def test_what_cannot_be_answered_is_one_sentence_and_code_2(case, options, said):

@@ -28,7 +28,7 @@ def test_a_file_gives_back_the_response_with_units_and_origin(assembly, tmp_path
     response, path = response_of(assembly, SETTINGS), tmp_path / "steady.nc"
     data = stored_or_computed(path, assembly, SETTINGS)
     assert data.attrs["input_hash"] == response.input_hash
-    assert dict(data.sizes) == {"point": 20, "line": 53, "base": 3, "signal": len(response.signals)}
+    assert dict(data.sizes) == {"point": 20, "line": 53, "base": 3, "signal": len(response.signals), "mesh_wave": 8}
     assert str(data["units"][0].item()) == "m"
     line = int(np.argmin(abs(data["order"].to_numpy() - 99.0)))
     known = response.amplitude("overall_dte", (1, 0, 0))

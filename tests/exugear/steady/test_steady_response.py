@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import tomllib
-
 import numpy as np
 import pytest
 
 from exugear.dynamics.assemble import assemble
-from exugear.dynamics.modes import overall_row
 from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.solvers.compiled.solver import CompiledSystem
-from exugear.solvers.loads import LoadTable
 from exugear.steady.resonances import crossings, refined
-from exugear.steady.response import dissipated_and_given, linear_response, parametric_response, signals
+from exugear.steady.response import (
+    dissipated_and_given,
+    linear_response,
+    parametric_response,
+    signals,
+    transmission_errors,
+)
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_response import gearset_of, response_of
-
-from ..spur_case import SPUR_CASE
 
 RANGE = np.array([1.0, 22.5])
 
@@ -62,68 +60,8 @@ def test_more_lines_hardly_change_the_response(gearset, speed, change):
     assert np.linalg.norm(coarse - fine[places - 1]) < change * np.linalg.norm(fine)
 
 
-def spur() -> tuple[Gearbox, dict[str, np.ndarray]]:
-    cycle = 2.0 * np.pi * np.arange(50) / 50
-    return Gearbox.from_dict(tomllib.loads(SPUR_CASE)), {
-        "spur": 3e8 * (1.0 + 0.08 * np.cos(cycle) + 0.03 * np.sin(2 * cycle))
-    }
-
-
-def fitted(gearset, response, duration, step, last):
-    """Lines of the overall transmission error of a run in time that starts on a response, at its mean speed."""
-    interface, system = response.interface, gearset.system
-    assembly, motion = gearset.waves.assembly, response.motion
-    w = interface.frequencies[1:, None]
-    u = system.static_at(interface.speed) + motion[0].real + 2.0 * motion[1:].sum(axis=0).real
-    q, v, _ = system.frame.state(0.0, interface.speed, u, 2.0 * (1j * w * motion[1:]).sum(axis=0).real)
-    load = assembly.gearbox.case.static_load
-    torques = {**load.torques_N_m, load.locked[0]: response.torque}
-    solver = CompiledSystem(assembly, q, v, LoadTable(torques), step)
-    steps = round(duration / step)
-    states, rates = np.empty((steps, assembly.size)), np.empty((steps, assembly.size))
-    assert solver.advance(0, states, rates) == steps
-    time = step * np.arange(1, steps + 1)
-    late = time > duration - last
-    time, states = time[late][::8], states[late][::8]
-    speed, start = np.polyfit(time, states[:, system.pinned], 1)
-    angles = np.outer(np.copysign(1.0, speed) * (speed * time + start), gearset.lines.orders)
-    columns = np.hstack([np.cos(angles), -np.sin(angles[:, 1:])])
-    found = np.linalg.lstsq(columns, states @ overall_row(assembly), rcond=None)[0]
-    count = len(gearset.lines.orders)
-    return float(speed), found[1:count] + 1j * found[count:]
-
-
-def apart(gearset, speed, duration, step, last):
-    """Differences of lines and of their amplitudes between response and run, over the size of all lines."""
-    measured, lines = fitted(gearset, parametric_response(gearset, gearset.at(speed)), duration, step, last)
-    response = parametric_response(gearset, gearset.at(measured))
-    known = 2.0 * signals(gearset, response)[1:, 0]
-    size = np.linalg.norm(known)
-    return np.linalg.norm(lines - known) / size, np.linalg.norm(abs(lines) - abs(known)) / size
-
-
-@pytest.mark.parametrize("speed", [60.0, 100.0])
-def test_a_spur_pair_started_on_its_steady_state_stays_there(speed):
-    """RK4 at 1/60 kHz and lines of ten harmonics; what remains is the mesh cycle that moves with the vibration."""
-    gearbox, stiffness = spur()
-    gearset = gearset_of(assemble(gearbox, Choice("bushing"), stiffness), np.array([50.0, 150.0]))
-    whole, _ = apart(gearset, speed, 0.3, 1.0 / 60e3, 0.2)
-    assert whole < 1e-3
-
-
-@pytest.mark.validation
-@pytest.mark.parametrize(
-    ("speed", "whole", "amplitude"), [(8.0, 1e-3, 1e-3), (14.6, 2e-3, 1e-3), (-12.0, 1e-3, 1e-3), (3.1, 2e-3, 1e-3)]
-)
-def test_the_gearbox_started_on_its_steady_state_stays_there(gearset, speed, whole, amplitude):
-    """RK4 at 1/120 kHz, the last 2 of 3 s; what remains is the mesh cycle that moves with the vibration."""
-    of_lines, of_amplitudes = apart(gearset, speed, 3.0, 1.0 / 120e3, 2.0)
-    assert of_lines < whole
-    assert of_amplitudes < amplitude
-
-
 def test_speeds_are_added_where_a_line_meets_a_mode(gearset):
-    found = crossings(gearset, *RANGE)
+    found = crossings(gearset, *RANGE, lambda interface: transmission_errors(gearset, interface))
     even = np.linspace(*RANGE, 20)
     speeds = refined(even, found)
     strongest = found[0]
@@ -138,7 +76,7 @@ def test_speeds_are_added_where_a_line_meets_a_mode(gearset):
 
 def test_a_peak_is_a_maximum_of_the_response(gearset):
     """At the crossing of the strongest line the response is above that two half-widths beside it."""
-    strongest = crossings(gearset, *RANGE)[0]
+    strongest = crossings(gearset, *RANGE, lambda interface: transmission_errors(gearset, interface))[0]
     offsets = np.array([-2.0, 0.0, 2.0]) * strongest.damping
     levels = [
         abs(signals(gearset, parametric_response(gearset, gearset.at(strongest.speed * (1.0 + o))))[strongest.line, 0])
