@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fe_ste.tools.arrays import Complexes, Floats, Integers
+from fe_ste.tools.octets import SIZE
 
 PREDICT_VELOCITY, PREDICT_POSITION, EXTRAPOLATE = range(3)
 """Rows of `Method.weights`."""
@@ -28,13 +29,19 @@ LATEST, KNOWN = range(2)
 """Entries of `Past.counts`."""
 
 
+def filled_up(size: int) -> int:
+    """Length of a row that holds a number of entries and is a multiple of eight."""
+    return -(-size // SIZE) * SIZE
+
+
 class Past(NamedTuple):
     """Accelerations that a run has passed, as the compiled loop keeps them.
 
     Attributes
     ----------
-    accelerations : (rows, size) the latest ones, one row after the other, round and round
-    sums : (2, size) memory of a step
+    accelerations : (rows, s) the latest ones, one row after the other, round and round; s is the size, filled up with
+        zeros to a multiple of eight, as the loop takes them
+    sums : (2, s) memory of a step
     counts : (2,) row of the latest, and how many are known
     """
 
@@ -47,12 +54,12 @@ class Past(NamedTuple):
         """Memory for a method; accelerations (n, size) that are known at the steps before, the latest last."""
         rows = max(1, method.weights.shape[1])
         known = accelerations[-rows:]
-        kept = np.zeros((rows, accelerations.shape[1]))
-        kept[: len(known)] = known
-        return cls(kept, np.zeros((2, accelerations.shape[1])), np.array([max(0, len(known) - 1), len(known)]))
+        kept = np.zeros((rows, filled_up(accelerations.shape[1])))
+        kept[: len(known), : accelerations.shape[1]] = known
+        return cls(kept, np.zeros((2, kept.shape[1])), np.array([max(0, len(known) - 1), len(known)]))
 
     def in_order(self) -> Floats:
-        """Accelerations (n, size) that are known, the latest last."""
+        """Accelerations (n, s) that are known, the latest last."""
         latest, known = self.counts
         rows = len(self.accelerations)
         return np.asarray(self.accelerations[(latest - np.arange(min(known, rows))[::-1]) % rows])

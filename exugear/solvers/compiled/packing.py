@@ -37,6 +37,7 @@ from exugear.solvers.compiled.arrays import (
     Springs,
     Work,
 )
+from exugear.solvers.compiled.methods import filled_up
 from exugear.solvers.loads import LoadTable
 from exugear.tooth_mesh.laws.registry import LAWS
 from exugear.tooth_mesh.laws.table import TABLE_FORM
@@ -302,7 +303,7 @@ def _rolling_inverse(assembly: Assembly) -> Floats:
 
 def work_for(equations: Equations, q: Floats, v: Floats) -> Work:
     """Memory for the compiled loops, at the state q, v (size,)."""
-    size = equations.loads.steady.size + BODY_SIZE
+    size = filled_up(equations.loads.steady.size + BODY_SIZE)
     count = equations.meshes.slot.size
     count_of_places = equations.places.start.size + equations.places.spin.size
     rolling = equations.connectors.rolling
@@ -315,7 +316,6 @@ def work_for(equations: Equations, q: Floats, v: Floats) -> Work:
         stage_v=np.zeros(size),
         force=np.zeros(size),
         rate=np.zeros(size),
-        total=np.zeros(size),
         turns=np.zeros((equations.bodies.turning.size, 2)),
         frames=frames,
         places=np.zeros((count_of_places, 2 * PADDED)),
