@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from exugear.kernels.coordinates import PADDED
-from exugear.kernels.elastic import ElasticArrays, ElasticMotion
+from exugear.kernels.elastic import ElasticMotion
 from exugear.kernels.fast_meshes import Meshes, MeshMemory
 from exugear.kernels.rolling import RollingArrays
 from exugear.kernels.travelling import TravellingArrays
@@ -188,15 +188,14 @@ class Equations(NamedTuple):
     springs: Springs
     loads: Loads
     joints: Joints | None
-    elastic: ElasticArrays | None
-    motion: ElasticMotion | None
+    elastic: ElasticMotion | None
     turning: TurningArrays | None
 
 
 class Work(NamedTuple):
     """Memory of the right-hand side.
 
-    State vectors have e entries, a multiple of eight: the system's own, those of travelling seats, and at least six that
+    State vectors have e entries, a multiple of eight: the system's own, those of travelling seats, and six or more that
     stay zero.
 
     Attributes

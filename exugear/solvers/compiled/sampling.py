@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from exugear.dynamics.signals import SignalLayout
 from exugear.kernels.coordinates import AXIAL, BODY_SIZE, SPIN, TILT
-from exugear.kernels.elastic import elastic_energies
+from exugear.kernels.elastic import motion_energies
 from exugear.kernels.fast_meshes import (
     DISSIPATED,
     ELASTIC,
@@ -245,7 +245,7 @@ def observe_springs(q: Floats, v: Floats, stride: int, springs: Springs, energy:
 @kernel
 def observe_elastic_bodies(q: Floats, v: Floats, stride: int, equations: Equations, work: Work, energy: Floats) -> None:
     """Add energies and powers of elastic bodies, in fixed and in turning frames, these for `stride` samples."""
-    kinetic, stored, damped = elastic_energies(q, v, equations.elastic, work.scratch)
+    kinetic, stored, damped = motion_energies(q, v, equations.elastic, work.scratch)
     energy[KINETIC] += kinetic
     energy[ELASTIC] += stored
     energy[DISSIPATED] += stride * damped
