@@ -109,10 +109,12 @@ def _version(name: str) -> str:
 def environment(**more: str) -> dict[str, str]:
     """Environment of a process of this copy of the program, with one BLAS thread as the command line sets it.
 
-    Gears that are known from before are not taken from their files: what is measured begins from nothing.
+    Gears that are known from before are not taken from their files: what is measured begins from nothing. Python
+    keeps its bytecode, as it does wherever nobody forbids it.
     """
     own = {"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1", "EXUGEAR_FLANKS": "off"}
-    return {**os.environ, **own, **more}
+    inherited = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    return {**inherited, **own, **more}
 
 
 def start(script: str, *arguments: str, **more: str) -> subprocess.Popen[str]:

@@ -14,7 +14,7 @@ import typer
 from exugear.cli.console import say, say_what_is_logged
 from exugear.cli.streams import standard_streams
 
-VERBS = ("check", "ste", "bearings", "modes", "run", "view", "report")
+VERBS = ("new", "schema", "check", "ste", "bearings", "modes", "steady", "run", "view", "report")
 """In the order of the help. Each is a function of this name in the module of this name in `exugear.cli.verbs`."""
 
 app = typer.Typer(

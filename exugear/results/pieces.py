@@ -14,7 +14,7 @@ import logging
 import os
 import re
 import zipfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -104,8 +104,8 @@ class Piece:
         return write_sealed(path, content.getvalue())
 
     @classmethod
-    def read(cls, path: Path) -> tuple[Piece, str]:
-        """Read it, and its checksum.
+    def read(cls, path: Path, names: Collection[str] | None = None) -> tuple[Piece, str]:
+        """Read it, or only the arrays of these names, and its checksum.
 
         Raises
         ------
@@ -115,8 +115,9 @@ class Piece:
         with open_sealed(path) as (file, checksum):
             try:
                 with np.load(file, allow_pickle=False) as stored:
-                    arrays = {name: stored[name] for name in stored.files}
-                words = json.loads(str(arrays.pop("words")))
+                    words = json.loads(str(stored["words"]))
+                    held = [name for name in stored.files if name != "words"]
+                    arrays = {name: stored[name] for name in held if names is None or name in names}
                 return cls(arrays, words["attributes"], words["names"], words["follows"]), checksum
             except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
                 raise FileError(f"{path}: is no piece of a run ({error})") from error

@@ -6,7 +6,7 @@ complete the pieces are joined into ``run.nc``. `load_run` reads both.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +29,8 @@ PARTIAL_NAME = "run.partial"
 """Folder with the pieces of a run that is not complete."""
 EARLIER_PARTIAL_NAME = "run.partial.nc"
 """What an earlier version wrote instead; it can be neither trusted nor gone on with."""
+STRETCH_BYTES = 32_000_000
+"""What is read of pieces before it is written to the whole: writing costs by the call, not by the byte."""
 TEXT = np.dtype("O", metadata={"vlen": str})
 """Text of any length, as HDF5 stores it."""
 _LAYOUT = Layout(
@@ -40,7 +42,7 @@ _LAYOUT = Layout(
 
 
 def join_pieces(pieces: RunPieces, path: Path) -> None:
-    """Join the pieces of a run into one file, a piece in memory at a time, and remove them.
+    """Join the pieces of a run into one file, a few in memory at a time, and remove them.
 
     Raises
     ------
@@ -57,21 +59,35 @@ def join_pieces(pieces: RunPieces, path: Path) -> None:
 
 
 def _copy_pieces(pieces: RunPieces, whole: h5netcdf.File, target: ErrorKeeper) -> None:
+    last, _ = Piece.read(pieces.paths[-1])
+    _define(whole, last, pieces.attributes, pieces.lengths)
+    for name, values in last.arrays.items():
+        if values.size and VARIABLES[name].dimensions[0] not in GROWING:
+            whole.variables[name][:] = values
+    growing = [name for name in last.arrays if VARIABLES[name].dimensions[0] in GROWING]
     done = dict.fromkeys(GROWING, 0)
-    for path in pieces.paths:
-        piece, _ = Piece.read(path)
-        if path == pieces.paths[0]:
-            _define(whole, piece, pieces.attributes, pieces.lengths)
-        for name, values in piece.arrays.items():
-            growing = VARIABLES[name].dimensions[0]
-            if not values.size:
-                continue
-            if growing in done:
-                whole.variables[name][done[growing] : done[growing] + len(values)] = values
-            elif path == pieces.paths[-1]:
-                whole.variables[name][:] = values
-        done = {name: done[name] + len(piece.arrays[name]) for name in GROWING}
+    for stretch in _stretches(pieces.paths, growing):
+        for name, values in stretch.items():
+            start = done[VARIABLES[name].dimensions[0]]
+            if values.size:
+                whole.variables[name][start : start + len(values)] = values
+        done = {name: done[name] + len(stretch[name]) for name in GROWING}
         target.check()
+
+
+def _stretches(paths: Iterable[Path], names: Sequence[str]) -> Iterator[dict[str, NDArray[Any]]]:
+    """Join some variables of pieces, as many pieces at a time as fit into the memory set aside for it."""
+    together: list[Mapping[str, NDArray[Any]]] = []
+    size = 0
+    for path in paths:
+        piece, _ = Piece.read(path, names)
+        together.append(piece.arrays)
+        size += sum(values.nbytes for values in piece.arrays.values())
+        if size >= STRETCH_BYTES:
+            yield {name: np.concatenate([arrays[name] for arrays in together]) for name in names}
+            together, size = [], 0
+    if together:
+        yield {name: np.concatenate([arrays[name] for arrays in together]) for name in names}
 
 
 def _define(file: h5netcdf.File, piece: Piece, attributes: Mapping[str, Any], lengths: Mapping[str, int]) -> None:

@@ -1,8 +1,13 @@
-"""What a run leaves behind: its states turned into signals, filtered, judged and written piece by piece."""
+"""What a run leaves behind: its states turned into signals, filtered, judged and written piece by piece.
+
+Two buffers take turns: while a solver fills one, a second thread filters, judges and writes the other. Its verdict is
+heard when the next buffer is full, whichever thread is faster, so that a run depends on no clock.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +25,7 @@ from fe_ste.tools.arrays import Floats, Integers
 
 FLUSH_INTERVAL = 0.25
 """Simulated time between writes to disk, s."""
-FLUSH_FACTOR = {"compiled": 4, "exudyn": 1}
+FLUSH_FACTOR = {"compiled": 2, "exudyn": 1}
 """How many times this interval each solver goes without: a piece costs as much as 2000 compiled steps."""
 
 
@@ -72,19 +77,23 @@ class StateBuffer:
         """Return times (n,) and rows of the states in it, from a number on."""
         return self._times[first : self.filled], self._between(first, self.filled)
 
+    def clear(self) -> None:
+        """Forget all states."""
+        self.filled = self.observed = 0
+
     def _between(self, first: int, end: int) -> Room:
         return Room._make(rows[first:end] for rows in self._rows)
 
 
 class Recorder:
-    """Keeper of a run in progress.
+    """Keeper of a run in progress; as a context manager it waits for what is being written.
 
     Parameters
     ----------
     plan : RunPlan
     start : RunStart
     progress : callable, optional
-        Called after each write with the time reached, s.
+        Called after each write, in the caller's thread, with the time that is on the disk, s.
 
     Attributes
     ----------
@@ -114,12 +123,24 @@ class Recorder:
         self.past = start.state.past
         wanted = FLUSH_FACTOR[plan.solver] * FLUSH_INTERVAL / plan.step
         size = plan.assembly.size
-        self.buffer = StateBuffer(buffer_rows(wanted, size, self._layout.count), size, self._layout.count)
+        rows = buffer_rows(wanted, size, self._layout.count)
+        self.buffer, self._spare = (StateBuffer(rows, size, self._layout.count) for _ in range(2))
+        self._stopped = self._judge.stop
+        self._writer = ThreadPoolExecutor(1)
+        self._writing: Future[float] | None = None
+
+    def __enter__(self) -> Recorder:
+        """Nothing is to be prepared."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Wait for the second thread."""
+        self._writer.shutdown()
 
     @property
     def halted(self) -> bool:
-        """Whether the run is beyond a limit that no run may pass, or has a fault."""
-        return bool(self.fault) or self._judge.stop
+        """Whether the run is known to be beyond a limit that no run may pass, or has a fault."""
+        return bool(self.fault) or self._stopped
 
     def begin(self, time: float, q: Floats, v: Floats) -> None:
         """Take the state that the run starts from, at a time (s); a resumed run has it in its pieces already."""
@@ -128,7 +149,7 @@ class Recorder:
             return
         self.keep(time, q, v)
         if not self.fault:
-            self._observe_rest()
+            self._observe_rest(self.buffer)
             self._account.begin(self.buffer.states()[1].energies[0, len(ENERGIES) :])
 
     def keep(self, time: float, q: Floats, v: Floats) -> None:
@@ -150,24 +171,50 @@ class Recorder:
         if len(times):
             self.last_time = float(times[-1])
         if self.buffer.full:
-            self.flush()
+            self._hand_over()
 
-    def _observe_rest(self) -> None:
+    def _observe_rest(self, buffer: StateBuffer) -> None:
         """Observe the states that a solver left without signals: they follow those that have them."""
-        times, rows = self.buffer.states(self.buffer.observed)
+        times, rows = buffer.states(buffer.observed)
         if not len(times):
             return
         rows.signals[:], energies, powers = self._observer.observe(times, rows.q, rows.v)
         rows.energies[:, : len(ENERGIES)], rows.energies[:, len(ENERGIES) :] = energies, powers
-        self.buffer.observed = self.buffer.filled
+        buffer.observed = buffer.filled
 
-    def flush(self) -> None:
-        """Turn the buffered states into signals, write them and the state to go on from."""
-        if not self.buffer.filled:
+    def finish(self) -> None:
+        """Write all that was taken; who ended the run hears no more of its progress."""
+        self._progress = None
+        self._hand_over()
+        self._await_writing()
+
+    def _hand_over(self) -> None:
+        """Have the buffer written and go on with the other, unless what was written before ends the run there."""
+        self._await_writing()
+        if self._stopped:
+            self.buffer.clear()
+            self.fault = ""  # of a state beyond the end
+        elif self.buffer.filled:
+            against = (self.fault,) if self.fault else ()
+            self._writing = self._writer.submit(self._write, self.buffer, self.past, against)
+            self.buffer, self._spare = self._spare, self.buffer
+
+    def _await_writing(self) -> None:
+        """Wait for the buffer that is being written, and hear the verdict on it."""
+        if self._writing is None:
             return
+        written, self._writing = self._writing.result(), None
+        self._stopped = self._judge.stop
+        if self._stopped:
+            self.last_time = written
+        if self._progress is not None:
+            self._progress(written)
+
+    def _write(self, buffer: StateBuffer, past: Floats, against: tuple[str, ...]) -> float:
+        """Turn the states of a buffer into signals, write them and the state to go on from; return its time (s)."""
         with np.errstate(over="ignore", invalid="ignore"):  # a run that diverges ends in numbers too large to add up
-            self._observe_rest()
-            times, rows = self.buffer.states()
+            self._observe_rest(buffer)
+            times, rows = buffer.states()
             self._observer.complete(rows.q, rows.v, rows.signals)
             written = self._lines_to_write(len(times))
             # A solver that observes its steps leaves out the energies, which are asked for seldom.
@@ -177,25 +224,25 @@ class Recorder:
         self._mesh_times = self._mesh_times + self._plan.step * self._layout.mesh_times(rows.signals)
         centre, samples = self._decimator.push(rows.signals)
         numbers = centre + self._decimator.factor * np.arange(len(samples), dtype=np.float64)
-        self.note_verdict()
-        self._start.pieces.append(self._plan.step * numbers, samples, times[written], balances, self._checkpoint())
-        self.buffer.filled = self.buffer.observed = 0
-        if self._progress is not None:
-            self._progress(self.last_time)
+        end = float(times[-1])
+        self._note_verdict(against + self._reasons(end))
+        state = self._checkpoint(end, rows, past)
+        self._start.pieces.append(self._plan.step * numbers, samples, times[written], balances, state)
+        buffer.clear()
+        return end
 
     def _lines_to_write(self, count: int) -> Integers:
         """Numbers of the lines of the account that are written, of so many: each interval's first, and the last."""
         stride = max(1, round(FLUSH_INTERVAL / self._plan.step))
         return np.unique(np.append(np.arange(0, count, stride), count - 1))
 
-    def _checkpoint(self) -> Checkpoint:
-        """State to go on from: the last in the buffer."""
-        times, rows = self.buffer.states()
+    def _checkpoint(self, time: float, rows: Room, past: Floats) -> Checkpoint:
+        """State to go on from: the last of these rows, at a time (s)."""
         return Checkpoint(
-            step=round(float(times[-1]) / self._plan.step),
+            step=round(time / self._plan.step),
             q=rows.q[-1],
             v=rows.v[-1],
-            past=self.past,
+            past=past,
             pending=self._decimator.pending,
             pending_first=self._decimator.pending_first,
             balance=self._account.balance,
@@ -207,11 +254,16 @@ class Recorder:
 
     def reasons(self) -> tuple[str, ...]:
         """Reasons why the run is not to be trusted so far."""
-        return self._judge.reasons(self._mesh_times[PULLING], self.last_time)
+        return self._reasons(self.last_time)
+
+    def _reasons(self, time: float) -> tuple[str, ...]:
+        return self._judge.reasons(self._mesh_times[PULLING], time)
 
     def note_verdict(self) -> None:
         """Add to the pieces that follow what the run may claim so far, and what speaks against it."""
-        against = ((self.fault,) if self.fault else ()) + self.reasons()
+        self._note_verdict(((self.fault,) if self.fault else ()) + self.reasons())
+
+    def _note_verdict(self, against: tuple[str, ...]) -> None:
         pieces = self._start.pieces
         pieces.note("limits", self._judge.limits.to_json())
         pieces.note("verdict", "; ".join(against) or "within all limits")

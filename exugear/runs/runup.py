@@ -139,10 +139,9 @@ def simulate(
 def _carry_out(plan: RunPlan, start: RunStart, progress: Callable[[Progress], None] | None) -> Run:
     """Integrate to the end, or to the first fault or interruption, and join the pieces of a complete run."""
     meter = ProgressMeter(start.state.step * plan.step, plan.duration, progress)
-    recorder = Recorder(plan, start, meter.reach)
-    with interruptible() as interruption:
+    with interruptible() as interruption, Recorder(plan, start, meter.reach) as recorder:
         integrate(plan, start, recorder, interruption)
-        recorder.flush()
+        recorder.finish()
         if recorder.fault:
             recorder.note_verdict()
             start.pieces.mark()
@@ -155,6 +154,7 @@ def _carry_out(plan: RunPlan, start: RunStart, progress: Callable[[Progress], No
     if run.halted:
         raise LimitError(f"{'; '.join(reasons)}; what was reached is in {plan.partial_path}", run)
     if complete:
+        meter.reach(recorder.last_time)
         start.pieces.note("complete", 1)
         join_pieces(start.pieces, plan.final_path)
     return run

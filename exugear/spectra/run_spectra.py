@@ -30,6 +30,9 @@ from fe_ste.tools.notebook import html_table
 LEAST_SHARE = 1e-5
 """Modes with a smaller share of the overall transmission error's mobility are no match for a resonance of it."""
 
+WATERFALL_NAMES = ("time", "input_speed", "overall_dte")
+"""Variables of a run that its waterfall is made of."""
+
 
 def run_waterfall(path: str | Path, window_length: float | None = None) -> Waterfall:
     """Waterfall of the overall DTE of a run-up.
@@ -48,7 +51,10 @@ def run_waterfall(path: str | Path, window_length: float | None = None) -> Water
     FileError
         The run is missing or damaged.
     """
-    data = load_run(path, ("time", "input_speed", "overall_dte"))
+    return _waterfall_of(load_run(path, WATERFALL_NAMES), path, window_length)
+
+
+def _waterfall_of(data: xr.Dataset, path: str | Path, window_length: float | None) -> Waterfall:
     time = data["time"].to_numpy()
     speed = data["input_speed"].to_numpy()
     values = data["overall_dte"].to_numpy()
@@ -176,6 +182,6 @@ def read_run(
     FileError
         The run is missing or damaged.
     """
-    attributes = load_run(path, ()).attrs
-    spectra = run_waterfall(path, window_length)
-    return VariantRun(Path(path), attributes, spectra, pick_resonances(spectra, lines), modes)
+    data = load_run(path, WATERFALL_NAMES)
+    spectra = _waterfall_of(data, path, window_length)
+    return VariantRun(Path(path), data.attrs, spectra, pick_resonances(spectra, lines), modes)

@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -170,15 +171,26 @@ def row_contacts(rows: Sequence[RollingRow], first_roller_angle: float = 0.0) ->
     -------
     RowContacts
     """
+    return _placed(tuple(rows), float(first_roller_angle))
+
+
+@lru_cache(maxsize=128)
+def _placed(rows: tuple[RollingRow, ...], first_roller_angle: float) -> RowContacts:
+    """Place all rolling elements; kept, because a search for balance or a sensitivity asks for the same ones anew."""
     first = (0, *np.cumsum([row.element_count for row in rows]).tolist())
     rollers = [(row, start) for row, start in zip(rows, first, strict=False) if isinstance(row, RollerRow)]
     balls = [(row, start) for row, start in zip(rows, first, strict=False) if isinstance(row, BallRow)]
     return RowContacts(
-        rows=tuple(rows),
+        rows=rows,
         first=first,
         laminae=lamina_arrays(rollers, first_roller_angle) if rollers else None,
         balls=ball_arrays(balls, first_roller_angle) if balls else None,
     )
+
+
+def is_preloaded(rows: Sequence[RollingRow]) -> bool:
+    """Tell whether rolling elements carry before anything loads the bearing."""
+    return elastic_energy(row_contacts(rows), np.zeros(6)) > 0.0
 
 
 def elastic_energy(contacts: RowContacts, displacement: Floats) -> float:

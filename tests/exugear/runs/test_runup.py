@@ -99,13 +99,13 @@ def test_stopped_run_resumes_where_it_was(
     whole = opened(simulate(grc, Choice("rigid"), stiffness, tmp_path / "whole", duration=0.05).path)
 
     def press_ctrl_c(progress: Progress) -> None:
-        if progress.simulated > 0.019:
+        if 0.019 < progress.simulated < 0.021:  # once: what was in memory then is written as well
             os.kill(os.getpid(), signal.SIGINT)
 
     stopped = simulate(grc, Choice("rigid"), stiffness, tmp_path, duration=0.05, progress=press_ctrl_c)
     assert not stopped.complete
     assert stopped.path.name == "run.partial"
-    assert 0.015 < float(opened(stopped.path).time[-1]) < 0.025
+    assert 0.019 < float(opened(stopped.path).time[-1]) < 0.03
     resumed = simulate(grc, Choice("rigid"), stiffness, tmp_path, duration=0.05, resume=True)
     assert resumed.complete
     assert not stopped.path.exists()
