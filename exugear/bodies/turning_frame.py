@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from exugear.bodies.reduced_body import TILT_X, TILT_Y, UX, UY, UZ, ReducedBody
-from exugear.kernels.coordinates import SPIN
+from exugear.kernels.coordinates import BODY_SIZE, SPIN
 from exugear.kernels.products import filled_up, laid_out, rectangular_tiles, symmetric_tiles
 from exugear.kernels.turning import TurningArrays
 from fe_ste.tools.arrays import Floats
@@ -151,6 +151,13 @@ def turning_arrays(bodies: Iterable[tuple[int, TurningBody]]) -> TurningArrays:
     """Arrays of bodies, each with its first coordinate in the state."""
     given = list(bodies)
     sizes = np.array([body.reduced.size for _, body in given], dtype=np.int64)
+    def moved(body: TurningBody) -> Floats:
+        """Mass matrix times a motion of all seats along each axis by one, (3, size)."""
+        motion = np.zeros((3, body.reduced.size))
+        for axis in range(3):
+            motion[axis, axis : BODY_SIZE * body.seat_count : BODY_SIZE] = 1.0
+        return np.asarray(motion @ body.reduced.mass)
+
     inverses = [np.asarray(np.linalg.inv(body.reduced.mass), dtype=np.float64) for _, body in given]
     stiffness, square = laid_out(symmetric_tiles(-body.reduced.stiffness) for _, body in given)
     coriolis, across = laid_out(rectangular_tiles(-body.coriolis) for _, body in given)
@@ -175,4 +182,5 @@ def turning_arrays(bodies: Iterable[tuple[int, TurningBody]]) -> TurningArrays:
         coriolis=coriolis,
         damping_time=np.array([body.damping_time for _, body in given], dtype=np.float64),
         gravity=np.array([body.gravity for _, body in given], dtype=np.float64).reshape(-1, 3),
+        moving=np.concatenate([np.zeros((3, 0)), *(moved(body) for _, body in given)], axis=1),
     )

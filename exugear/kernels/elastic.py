@@ -213,23 +213,34 @@ def set_elastic_motion(
 
 
 @kernel
-def motion_energies(q: Floats, v: Floats, elastic: ElasticMotion | None, scratch: Floats) -> tuple[float, float, float]:
-    """Energies and power as `elastic_energies`, from the blocks as they are arranged for speed; None: no bodies."""
-    kinetic, stored, damped = 0.0, 0.0, 0.0
+def motion_energies(q: Floats, v: Floats, elastic: ElasticMotion | None, scratch: Floats) -> tuple[float, float]:
+    """Kinetic and elastic energy as of `elastic_energies`, from blocks arranged for speed; None: no such bodies."""
+    kinetic, stored = 0.0, 0.0
     if elastic is None:
-        return kinetic, stored, damped
+        return kinetic, stored
     given, sums = scratch[0], scratch[1]
     for b in range(elastic.turning.size):
         begin = elastic.square[b]
         size = gather_deformation(b, q, v, 0.0, elastic, given)
         stored -= 0.5 * square_form(elastic.stiffness, begin, size, given, sums)
-        # Damping is a time times the stiffness: its power is that of the rates, without the common turning.
-        gather_deformation(b, v, v, 0.0, elastic, given)
-        damped -= elastic.damping_time[b] * square_form(elastic.stiffness, begin, size, given, sums)
         for i in range(elastic.first[b], elastic.first[b + 1]):
             given[i - elastic.first[b]] = v[elastic.coordinate[i]]
         kinetic += 0.5 * square_form(elastic.mass, begin, size, given, sums)
-    return kinetic, stored, damped
+    return kinetic, stored
+
+
+@kernel
+def damped_power(v: Floats, elastic: ElasticMotion | None, scratch: Floats) -> float:
+    """Power that all elastic bodies damp (W), as of `elastic_energies`; None: no such bodies."""
+    damped = 0.0
+    if elastic is None:
+        return damped
+    for b in range(elastic.turning.size):
+        # Damping is a time times the stiffness: its power is that of the rates, without the common turning.
+        size = gather_deformation(b, v, v, 0.0, elastic, scratch[0])
+        form = square_form(elastic.stiffness, elastic.square[b], size, scratch[0], scratch[1])
+        damped -= elastic.damping_time[b] * form
+    return damped
 
 
 @kernel

@@ -51,6 +51,7 @@ class TurningArrays(NamedTuple):
     coriolis : tiles of M S - 2 C
     damping_time : (b,) s
     gravity : (b, 3) m/s2
+    moving : (3, n) of all bodies M times a motion of all seats along x, y and z by one
     """
 
     begin: Integers
@@ -69,6 +70,7 @@ class TurningArrays(NamedTuple):
     coriolis: Floats
     damping_time: Floats
     gravity: Floats
+    moving: Floats
 
 
 def turning_memory(turning: TurningArrays) -> Floats:
@@ -181,26 +183,38 @@ def turning_energies(
     q: Floats, v: Floats, turning: TurningArrays | None, memory: Floats
 ) -> tuple[float, float, float, float]:
     """Kinetic and elastic energy (J) of all bodies, the power that they damp, and that of their weight (W)."""
-    kinetic, stored, damped, weight = 0.0, 0.0, 0.0, 0.0
+    kinetic, stored = 0.0, 0.0
     if turning is None:
-        return kinetic, stored, damped, weight
-    moved, rates, given, falling, product = memory[0], memory[1], memory[2], memory[3], memory[4]
+        return kinetic, stored, 0.0, 0.0
+    moved, rates, product = memory[0], memory[1], memory[4]
     for b in range(turning.begin.size):
-        first, size, columns = turning.first[b], turning.size[b], turning.columns[b]
-        square = turning.square[b]
-        c, s, speed = to_body_frame(b, q, v, turning, moved, rates)
+        first, columns, square = turning.first[b], turning.columns[b], turning.square[b]
+        _, _, speed = to_body_frame(b, q, v, turning, moved, rates)
         stored -= 0.5 * square_form(turning.stiffness, square, columns, moved, product)
-        deformation_rates(b, moved, rates, speed, turning, given)
-        damped -= turning.damping_time[b] * square_form(turning.stiffness, square, columns, given, product)
-        # Power of the weight: gravity as an acceleration of all seats, times the momentum.
-        falling[:] = 0.0
-        for n in range(turning.seats[b]):
-            x, y = turning.gravity[b, 0], turning.gravity[b, 1]
-            falling[BODY_SIZE * n], falling[BODY_SIZE * n + 1] = c * x + s * y, c * y - s * x
-            falling[BODY_SIZE * n + AXIAL] = turning.gravity[b, 2]
-        for i in range(size):
+        for i in range(turning.size[b]):
             rates[i] += speed * turning.spin[first + i]
         kinetic += 0.5 * square_form(turning.mass, square, columns, rates, product)
-        for i in range(size):
-            weight += falling[i] * product[i]
+    damped, weight = turning_powers(q, v, turning, memory)
     return kinetic, stored, damped, weight
+
+
+@kernel
+def turning_powers(q: Floats, v: Floats, turning: TurningArrays | None, memory: Floats) -> tuple[float, float]:
+    """Power that all bodies damp, and that of their weight (W)."""
+    damped, weight = 0.0, 0.0
+    if turning is None:
+        return damped, weight
+    moved, rates, given, product = memory[0], memory[1], memory[2], memory[4]
+    for b in range(turning.begin.size):
+        first, columns, square = turning.first[b], turning.columns[b], turning.square[b]
+        c, s, speed = to_body_frame(b, q, v, turning, moved, rates)
+        deformation_rates(b, moved, rates, speed, turning, given)
+        damped -= turning.damping_time[b] * square_form(turning.stiffness, square, columns, given, product)
+        # Power of the weight: gravity in the frame times the momentum along its axes.
+        gx, gy, gz = turning.gravity[b, 0], turning.gravity[b, 1], turning.gravity[b, 2]
+        x, y = c * gx + s * gy, c * gy - s * gx
+        for i in range(turning.size[b]):
+            momentum = x * turning.moving[0, first + i] + y * turning.moving[1, first + i]
+            momentum += gz * turning.moving[2, first + i]
+            weight += (rates[i] + speed * turning.spin[first + i]) * momentum
+    return damped, weight

@@ -80,7 +80,7 @@ class Method(NamedTuple):
     @property
     def points(self) -> int:
         """Accelerations of the past that a step takes."""
-        return self.weights.shape[1]
+        return int(self.weights.shape[1])
 
     @property
     def order(self) -> int:
@@ -159,7 +159,7 @@ def _at_nodes(points: int) -> Floats:
 
 
 def _integrals(powers: Integers) -> Floats:
-    """What the three sums are to be for powers of time, (3, powers)."""
+    """Integrate powers of time as the three sums are to, (3, powers)."""
     return np.stack([1.0 / (powers + 1.0), 1.0 / ((powers + 1.0) * (powers + 2.0)), np.ones(powers.size)])
 
 
