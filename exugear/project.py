@@ -237,7 +237,7 @@ class Project:
 
     def steady_path(self, settings: SteadySettings) -> Path:
         """File of the steady response."""
-        return steady_path(self.folder, self.choice, settings.level)
+        return steady_path(self.folder, self.choice, settings)
 
     def bearings(self) -> tuple[BearingDuty, ...]:
         """Find what catalogue bearings bear at the static load, written to `bearings_path`."""

@@ -16,9 +16,9 @@ import numpy as np
 from exugear.harmonics.krylov import HarmonicBalanceError, solve_lines
 from exugear.harmonics.lattice import Lattice
 from exugear.rotating.mesh_ports import BACK, DEFLECTION, FRONT, POSITION
+from exugear.rotating.sampled_laws import LawSamples, sample_stiffness, sample_table
 from exugear.steady.excitation import Gearset, Interface
 from exugear.steady.response import Response, rates_of
-from exugear.steady.sampled_laws import LawSamples, sample_stiffness, sample_table
 from fe_ste.tools.arrays import Complexes, Floats
 
 BALANCED = 1e-8
@@ -83,37 +83,41 @@ class Balance:
         found[:, DEFLECTION] = self.gearset.waves.mean_stiffness * self.interface.ports.static[:, DEFLECTION]
         return found
 
-    @cached_property
-    def _turned(self) -> Floats:
-        """Position in the mesh cycle (s, m) that the mean speed brings, cycles."""
+    def _turned(self, angles: Floats) -> Floats:
+        """Position in the mesh cycle (s, m) that the mean speed brings, cycles, at angles (s, bases) of the bases."""
         waves = self.gearset.waves.waves
         sense = np.where(self.gearset.forward(self.interface.speed), 1.0, -1.0)
-        angles = self.lattice.angles[:, [wave.base for wave in waves]]
-        return np.asarray(self.interface.ports.positions + sense * angles / (2.0 * np.pi))
+        own = angles[:, [wave.base for wave in waves]]
+        return np.asarray(self.interface.ports.positions + sense * own / (2.0 * np.pi))
 
-    @cached_property
-    def _stiffness(self) -> Floats:
-        """Stiffness (3, s, m) of the waves' meshes there, N/m, and two derivatives per cycle.
+    def _stiffness(self, turned: Floats) -> Floats:
+        """Stiffness (3, s, m) of the waves' meshes at positions (s, m), N/m, and two derivatives per cycle.
 
         No harmonics stand in it but those of the level `parametric`: others would alias.
         """
         own = self.gearset.cycle_coefficients
         rate = 2j * np.pi * np.arange(own.shape[1])
         twice = np.where(np.arange(own.shape[1]) > 0, 2.0, 1.0)
-        out = np.empty((3, *self._turned.shape))
+        out = np.empty((3, *turned.shape))
         for n in range(len(own)):
-            waves = np.exp(self._turned[:, [n]] * rate)
+            waves = np.exp(turned[:, [n]] * rate)
             out[:, :, n] = np.real([waves @ (twice * own[n] * rate**order) for order in range(3)])
         return out
 
-    def _sample(self, readings: Floats, rates: Floats) -> LawSamples:
-        """Sample the laws in all places: readings and rates (s, u, r), results (s, u, ...)."""
+    @cached_property
+    def _on_lattice(self) -> tuple[Floats, Floats]:
+        """Positions (s, m) on the lattice, and stiffness (3, s, m) there, of laws along a row."""
+        turned = self._turned(self.lattice.angles)
+        return turned, np.zeros((3, 0, 0)) if self.gearset.parting else self._stiffness(turned)
+
+    def _sample(self, readings: Floats, rates: Floats, at: tuple[Floats, Floats]) -> LawSamples:
+        """Sample the laws in all places: readings and rates (s, u, r), `at` as `_on_lattice`; results (s, u, ...)."""
         means, waves = self.places[0], self.gearset.waves
         if not self.gearset.parting:
-            found = [sample_stiffness(self._stiffness[:, :, n], readings[:, u]) for u, n in enumerate(means)]
+            found = [sample_stiffness(at[1][:, :, n], readings[:, u]) for u, n in enumerate(means)]
         else:
             whole, meshes = readings.copy(), waves.assembly.meshes
-            whole[..., POSITION] += self._turned[:, means]
+            whole[..., POSITION] += at[0][:, means]
             found = [sample_table(meshes, waves.waves[n].first, whole[:, u], rates[:, u]) for u, n in enumerate(means)]
         return LawSamples(*(np.stack(own, axis=1) for own in zip(*found, strict=True)))
 
@@ -130,7 +134,8 @@ class Balance:
         The last result is the whole forces (s, u, f) in time, in all places.
         """
         _, there, back = self.places
-        sampled = self._sample(*(there @ values for values in self._in_time(readings)))
+        values, rates = self._in_time(readings)
+        sampled = self._sample(there @ values, there @ rates, self._on_lattice)
 
         def change(step: Complexes) -> Complexes:
             moved, moving = self._in_time(step)
@@ -141,6 +146,43 @@ class Balance:
 
         whole = back @ sampled.force
         return self.lattice.coefficients(whole) - self._mean_part(readings), change, sampled.force
+
+    def tangents_along(self, readings: Complexes, base: int, samples: int) -> Floats:
+        """Slopes of the forces beyond the mean system along the angle of one base, the meshes of others at their mean.
+
+        Parameters
+        ----------
+        readings : (n, m, r) complex array
+        base : int
+        samples : int
+
+        Returns
+        -------
+        (samples, m f, 2 m r) array
+            By the readings, then by their rates.
+        """
+        _, there, back = self.places
+        waves, lines = self.gearset.waves, self.lattice.lines
+        alone = np.abs(np.delete(lines.index, base, axis=1)).sum(axis=1) == 0
+        angles = np.zeros((samples, lines.index.shape[1]))
+        angles[:, base] = 2.0 * np.pi * np.arange(samples) / samples
+        turned = self._turned(angles)
+        at = turned, np.zeros((3, 0, 0)) if self.gearset.parting else self._stiffness(turned)
+        own = np.where(alone[:, None, None], readings, 0.0)
+        rates = rates_of(self.gearset, self.interface, own)
+        along = self._sample(there @ lines.values(own, angles), there @ lines.values(rates, angles), at)
+        values, moving = self._in_time(readings)
+        everywhere = self._sample(there @ values, there @ moving, self._on_lattice)
+        varies = np.array([waves.waves[n].base == base for n in self.places[0]])[:, None, None]
+        parts = []
+        for name, mean in (("slope", waves.mean_stiffness), ("damping", waves.damping)):
+            found = np.where(varies, getattr(along, name), getattr(everywhere, name).mean(axis=0))
+            whole = np.einsum("mu,sufr,uw->smfwr", back, found, there)
+            if name == "slope" or self.gearset.parting:
+                diagonal = np.arange(len(mean))
+                whole[:, diagonal, DEFLECTION, diagonal, DEFLECTION] -= mean
+            parts.append(whole.reshape(samples, back.shape[0] * found.shape[2], -1))
+        return np.concatenate(parts, axis=2)
 
     def _mean_slopes(self, change: Complexes) -> Complexes:
         """Find the forces (n, m, f) of the mean stiffness under changes of the readings (n, m, r)."""
@@ -176,10 +218,8 @@ def nonlinear_response(
         Newton's method found no balance from this start.
     """
     balance = Balance(gearset, interface, lattice)
-    readings = balance.static if start is None else start
-    readings, products = solve_balance(balance, readings)
-    excess, _, whole = balance.forces(readings)
-    return _response(balance, readings, excess, whole, products), readings
+    readings, products = solve_balance(balance, balance.static if start is None else start)
+    return response_of_readings(balance, readings, products), readings
 
 
 def solve_balance(balance: Balance, readings: Complexes) -> tuple[Complexes, int]:
@@ -213,8 +253,10 @@ def solve_balance(balance: Balance, readings: Complexes) -> tuple[Complexes, int
     )
 
 
-def _response(balance: Balance, readings: Complexes, excess: Complexes, whole: Floats, products: int) -> Response:
+def response_of_readings(balance: Balance, readings: Complexes, products: int = 0) -> Response:
+    """Response of a steady state whose readings (n, m, r) are known."""
     gearset, interface = balance.gearset, balance.interface
+    excess, _, whole = balance.forces(readings)
     waves = gearset.waves
     deflection = readings[..., DEFLECTION]
     apart = np.zeros(len(waves.waves))

@@ -80,16 +80,6 @@ def _eig(matrix: Floats) -> tuple[Complexes, Complexes, Complexes]:
     return values, left, right
 
 
-def growth_rate(system: MeanSystem) -> float:
-    """Largest real part of the mean system's eigenvalues over its speeds, 1/s; free rolling left out."""
-    rates = []
-    for speed in system.speeds:
-        values = system.eigenvalues(float(speed))
-        elastic = np.abs(values.imag) > 2.0 * np.pi * RIGID_BODY_LIMIT
-        rates.append(float(values.real[elastic].max(initial=-np.inf)))
-    return max(rates)
-
-
 def crossings(gearset: Gearset, low: float, high: float, forcing: Forcing) -> tuple[Crossing, ...]:
     """Crossings of lines of single bases with modes between two speeds of the input (rad/s), the strongest first.
 

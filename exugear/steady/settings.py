@@ -139,6 +139,9 @@ class SteadySettings:
         Largest sum of multiples of several mesh frequencies.
     at_resonances : bool
         Whether speeds are added where lines cross modes.
+    branches : bool
+        Whether the states are followed by arc length from the first speed to the last, through folds, with the
+        stability of each; the count of speeds and `at_resonances` then play no part.
     """
 
     speeds: SpeedRange
@@ -146,11 +149,14 @@ class SteadySettings:
     harmonics: int = 10
     combinations: int = 3
     at_resonances: bool = True
+    branches: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse what is no level."""
+        """Refuse what is no level, and branches where there are none."""
         if self.level not in LEVELS:
             raise SteadyError(f"level {self.level!r} is unknown; levels are {', '.join(LEVELS)}")
+        if self.branches and self.level != "nonlinear":
+            raise SteadyError(f"branches: the level {self.level} has one state at each speed; take the level nonlinear")
 
     def hash_with(self, assembly: Assembly) -> str:
         """SHA-256 of all that a response depends on."""

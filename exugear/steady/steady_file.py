@@ -36,6 +36,7 @@ _LAYOUT = Layout(
         "units": ("signal",),
         "drive_torque": ("point",),
         "energy_error": ("point",),
+        "growth": ("point",),
         "apart_share": ("point", "mesh_wave"),
     }
     | {name: (name,) for name in ("base", "signal", "mesh_wave")},
@@ -43,9 +44,9 @@ _LAYOUT = Layout(
 )
 
 
-def steady_path(folder: str | Path, choice: Choice, level: str) -> Path:
+def steady_path(folder: str | Path, choice: Choice, settings: SteadySettings) -> Path:
     """Place of the steady response of a choice that names its inertia set: beside its modes."""
-    return modes_path(folder, choice).with_name(f"steady-{level}.nc")
+    return modes_path(folder, choice).with_name(f"steady-{'branch' if settings.branches else settings.level}.nc")
 
 
 def to_dataset(response: SteadyResponse) -> xr.Dataset:
@@ -71,6 +72,7 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
         "units": (("signal",), np.array([own.units for own in response.signals], dtype=object), {}),
         "drive_torque": (("point",), solved.drive_torque, {"units": "N m"}),
         "energy_error": (("point",), solved.energy_error, {"units": "1"}),
+        "growth": (("point",), solved.growth, {"units": "1/s", "long_name": "fastest growth along a branch"}),
         "apart_share": (("point", "mesh_wave"), solved.apart, {"units": "1", "long_name": "share of time apart"}),
     }
     coordinates: dict[str, Any] = {
@@ -91,6 +93,7 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
         "bearing_laws": assembly.bearing_laws,
         "growth_rate": response.growth_rate,
         "planet_spread": response.planet_spread,
+        "folds": json.dumps(response.folds),
         "crossings": json.dumps([asdict(crossing) for crossing in response.crossings]),
     }
     return xr.Dataset(variables, coordinates, attributes)

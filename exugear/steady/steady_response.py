@@ -5,34 +5,23 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from exugear.bodies.elastic_body import ElasticBody
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
-from exugear.harmonics.krylov import HarmonicBalanceError
-from exugear.harmonics.lattice import Lattice, lattice
-from exugear.harmonics.lines import LineSet, line_set
+from exugear.harmonics.lines import LineSet
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import RPM
-from exugear.rotating.mean_system import mean_system
-from exugear.rotating.mesh_waves import mesh_waves
 from exugear.rotating.rotating_frame import SteadyError
 from exugear.rotating.signals import SignalName
-from exugear.steady.excitation import Gearset, Interface
-from exugear.steady.nonlinear import Balance, nonlinear_response
-from exugear.steady.resonances import Crossing, crossings, growth_rate, refined
-from exugear.steady.response import (
-    Response,
-    dissipated_and_given,
-    linear_response,
-    parametric_response,
-    signals,
-    transmission_errors,
-)
+from exugear.steady.excitation import Gearset
+from exugear.steady.gearbox_branches import follow_branch
+from exugear.steady.point_solver import PointSolver, gearset_of
+from exugear.steady.resonances import Crossing, crossings, refined
+from exugear.steady.response import Response, dissipated_and_given, signals
 from exugear.steady.settings import SteadySettings, check_law, usual_speeds
 from exugear.tooth_mesh.law import MeshData
 from fe_ste.tools.arrays import Complexes, Floats
@@ -57,6 +46,8 @@ class Solved:
         Products with the operator of the balance.
     apart : (points, waves) array
         Share of time in which the teeth of each mesh wave are apart.
+    growth : (points,) array
+        Fastest growth of a disturbance along a branch, 1/s; NaN elsewhere.
     """
 
     speed: Floats
@@ -65,6 +56,7 @@ class Solved:
     energy_error: Floats
     products: Floats
     apart: Floats
+    growth: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,11 +75,14 @@ class SteadyResponse:
         Meshes of each base, and mesh waves.
     signals : tuple of SignalName
     solved : Solved
-        Points in ascending order of speed.
+        Points in ascending order of speed, or along a branch.
     crossings : tuple of Crossing
         Where lines meet modes, the strongest first.
+    folds : tuple of float
+        Speeds at which a branch turns back, rad/s.
     growth_rate : float
-        Fastest growth of any disturbance of the mean system over the speeds, 1/s.
+        Fastest growth of any disturbance over the speeds, 1/s: of the mean system, and where two modes and a mesh
+        frequency work together.
     planet_spread : float
         Largest change of planet bearings' stiffness that made the planets equal, over that stiffness.
     """
@@ -101,6 +96,7 @@ class SteadyResponse:
     signals: tuple[SignalName, ...]
     solved: Solved
     crossings: tuple[Crossing, ...]
+    folds: tuple[float, ...]
     growth_rate: float
     planet_spread: float
 
@@ -142,6 +138,8 @@ class SteadyResponse:
         return np.conj(found) if mirrored else found
 
 
+SLOWEST_BRANCH = 0.01
+"""Share of the fastest speed at which a branch from standstill begins."""
 Kept = Callable[[Solved], None]
 
 
@@ -175,7 +173,7 @@ def steady_response(
 
     Examples
     --------
-    >>> from exugear.steady.settings import SpeedRange
+    >>>     from exugear.steady.settings import SpeedRange
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
     >>> shape = 1.0 + 0.05 * np.cos(2.0 * np.pi * np.arange(50) / 50)
     >>> mean = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
@@ -216,9 +214,13 @@ def response_of(
     even = settings.speeds.values
     gearset = gearset_of(assembly, even, settings.harmonics, settings.combinations)
     solver = PointSolver(gearset, settings)
+    told = progress or (lambda done, total: None)
     found = crossings(gearset, float(even.min()), float(even.max()), solver.forcing) if settings.at_resonances else ()
-    speeds = refined(even, found)
-    solved = _solve(solver, speeds, known, progress or (lambda done, total: None), keep, keep_every)
+    folds: tuple[float, ...] = ()
+    if settings.branches:
+        solved, folds = _along_branch(solver, settings.speeds.first, settings.speeds.last, told)
+    else:
+        solved = _solve(solver, refined(even, found), known, told, keep, keep_every)
     return SteadyResponse(
         assembly=gearset.waves.assembly,
         settings=settings,
@@ -229,63 +231,10 @@ def response_of(
         signals=gearset.signal_names,
         solved=solved,
         crossings=found,
-        growth_rate=growth_rate(gearset.system),
+        folds=folds,
+        growth_rate=solver.growth(float(even.min()), float(even.max())),
         planet_spread=gearset.system.planet_spread,
     )
-
-
-def gearset_of(assembly: Assembly, speeds: Floats, harmonics: int = 10, combinations: int = 3) -> Gearset:
-    """Gearset of an assembly for speeds of the input (rad/s), with lines as `SteadySettings` says."""
-    waves = mesh_waves(mean_system(assembly, speeds))
-    return Gearset(waves, line_set(waves.base_orders.tolist(), harmonics, combinations), 2 * harmonics)
-
-
-class PointSolver:
-    """Solves one speed after the other; at the level `nonlinear` each starts from the one before.
-
-    Parameters
-    ----------
-    gearset : Gearset
-    settings : SteadySettings
-    """
-
-    def __init__(self, gearset: Gearset, settings: SteadySettings) -> None:
-        self.gearset, self._level = gearset, settings.level
-        self._guard = 2 * settings.harmonics, 2 * settings.combinations
-        self._last: Complexes | None = None
-
-    @cached_property
-    def lattice(self) -> Lattice:
-        """Samples of the level `nonlinear`."""
-        return lattice(self.gearset.lines, *self._guard)
-
-    def forcing(self, interface: Interface) -> Complexes:
-        """Find the forces of the meshes (lines, m, f) that vary in the static state, N."""
-        if not self.gearset.parting:
-            return transmission_errors(self.gearset, interface)
-        balance = Balance(self.gearset, interface, self.lattice)
-        return balance.forces(balance.static)[0]
-
-    def response(self, speed: float) -> Response:
-        """Response at a speed of the input, rad/s.
-
-        Raises
-        ------
-        HarmonicBalanceError
-            No steady state was found.
-        """
-        interface = self.gearset.at(speed)
-        if self._level == "linear":
-            return linear_response(self.gearset, interface)
-        if self._level == "parametric":
-            return parametric_response(self.gearset, interface)
-        try:
-            found, self._last = nonlinear_response(self.gearset, interface, self.lattice, self._last)
-        except HarmonicBalanceError:
-            if self._last is None:
-                raise
-            found, self._last = nonlinear_response(self.gearset, interface, self.lattice, None)
-        return found
 
 
 def _solve(
@@ -299,18 +248,9 @@ def _solve(
     """Solve all speeds, beginning with what is known of them."""
     count = 0 if known is None else _same_beginning(known.speed, speeds)
     gearset = solver.gearset
-    shape = (len(speeds), len(gearset.lines.orders), len(gearset.signal_names))
-    points, waves = len(speeds), len(gearset.waves.waves)
-    out = Solved(
-        speed=speeds,
-        amplitude=np.zeros(shape, dtype=complex),
-        drive_torque=np.zeros(points),
-        energy_error=np.zeros(points),
-        products=np.zeros(points),
-        apart=np.zeros((points, waves)),
-    )
+    out = _empty(gearset, speeds)
     if known is not None:
-        for name in ("amplitude", "drive_torque", "energy_error", "products", "apart"):
+        for name in ("amplitude", "drive_torque", "energy_error", "products", "apart", "growth"):
             getattr(out, name)[:count] = getattr(known, name)[:count]
     kept, done = time.monotonic(), count
     try:
@@ -326,6 +266,36 @@ def _solve(
             keep(_first(out, done))
         raise
     return out
+
+
+def _along_branch(
+    solver: PointSolver, first: float, last: float, progress: Callable[[int, int], None]
+) -> tuple[Solved, tuple[float, ...]]:
+    """Points along a branch between two speeds (rad/s), and its folds; progress counts in hundredths of the range."""
+    fastest = max(abs(first), abs(last))
+    first, last = (np.copysign(SLOWEST_BRANCH * fastest, first + last) if s == 0.0 else s for s in (first, last))
+    branch = follow_branch(
+        solver, first, last, lambda s: progress(int(100.0 * abs(s - first) / abs(last - first)), 100)
+    )
+    out = _empty(solver.gearset, branch.speed)
+    for n, (speed, readings) in enumerate(zip(branch.speed, branch.readings, strict=True)):
+        _fill(out, n, solver.gearset, solver.response_to(readings, float(speed)))
+    out.growth[:] = branch.growth
+    return out, branch.folds
+
+
+def _empty(gearset: Gearset, speeds: Floats) -> Solved:
+    points = len(speeds)
+    shape = (points, len(gearset.lines.orders), len(gearset.signal_names))
+    return Solved(
+        speed=speeds,
+        amplitude=np.zeros(shape, dtype=complex),
+        drive_torque=np.zeros(points),
+        energy_error=np.zeros(points),
+        products=np.zeros(points),
+        apart=np.zeros((points, len(gearset.waves.waves))),
+        growth=np.full(points, np.nan),
+    )
 
 
 def _fill(out: Solved, n: int, gearset: Gearset, response: Response) -> None:
@@ -352,4 +322,5 @@ def _first(solved: Solved, count: int) -> Solved:
         solved.energy_error[:count],
         solved.products[:count],
         solved.apart[:count],
+        solved.growth[:count],
     )

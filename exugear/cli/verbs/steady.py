@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -62,6 +63,12 @@ def steady(
             show_default=False,
         ),
     ] = None,
+    branches: Annotated[
+        bool,
+        typer.Option(
+            "--branches", help="Follow the states from the first speed to the last through folds (level nonlinear)."
+        ),
+    ] = False,
     out: OutOption = None,
     files_below: FilesBelowOption = None,
     scripts: ScriptsOption = False,
@@ -76,7 +83,7 @@ def steady(
 
         project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
         with model_errors():
-            settings = _settings(project, level, speeds)
+            settings = _settings(project, level, speeds, branches)
         make_results_folder(project.folder)
         compute_missing_tables(project)
         reduce_elastic_bodies(project)
@@ -84,12 +91,12 @@ def steady(
         _tell(project, settings, data, as_json)
 
 
-def _settings(project: Project, level: Level, speeds: str | None) -> SteadySettings:
+def _settings(project: Project, level: Level, speeds: str | None, branches: bool) -> SteadySettings:
     from exugear.steady.settings import SpeedRange, SteadySettings, check_law, usual_speeds
 
     check_law(project.choice.mesh_law, level.value)
     asked = usual_speeds(project.gearbox) if speeds is None else SpeedRange.from_text(speeds)
-    return SteadySettings(asked, level.value)
+    return SteadySettings(asked, level.value, branches=branches)
 
 
 def _respond(project: Project, settings: SteadySettings) -> xr.Dataset:
@@ -122,6 +129,7 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
                 "lines": int(data.sizes["line"]),
                 "growth_rate_1_per_s": growth,
                 "largest_energy_error": float(abs(data["energy_error"]).max()),
+                "folds_rpm": [fold / RPM for fold in json.loads(data.attrs["folds"])],
                 "planet_spread": float(data.attrs["planet_spread"]),
                 "peaks_of_overall_dte": [_summary(peak) for peak in found],
                 "file": str(path),

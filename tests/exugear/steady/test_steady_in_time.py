@@ -14,9 +14,9 @@ from exugear.model.gearbox import Gearbox
 from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.loads import LoadTable
 from exugear.steady.nonlinear import Balance
+from exugear.steady.point_solver import PointSolver, gearset_of
 from exugear.steady.response import dissipated_and_given, signals
 from exugear.steady.settings import SpeedRange, SteadySettings
-from exugear.steady.steady_response import PointSolver, gearset_of
 
 from .. import table_case
 from ..spur_case import SPUR_CASE

@@ -7,6 +7,7 @@ import pytest
 
 from exugear.dynamics.assemble import assemble
 from exugear.model.choice import Choice
+from exugear.steady.point_solver import gearset_of
 from exugear.steady.resonances import crossings, refined
 from exugear.steady.response import (
     dissipated_and_given,
@@ -16,7 +17,7 @@ from exugear.steady.response import (
     transmission_errors,
 )
 from exugear.steady.settings import SpeedRange, SteadySettings
-from exugear.steady.steady_response import gearset_of, response_of
+from exugear.steady.steady_response import response_of
 
 RANGE = np.array([1.0, 22.5])
 
