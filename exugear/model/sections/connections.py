@@ -205,7 +205,8 @@ class CatalogueSection(Section):
 class BearingSection(Section):
     """Compliant support (variants `bushing` and `flexible`): given 6x6 or from catalogue dimensions.
 
-    Beside a `catalogue`, `stiffness` is a floor: it holds the directions that the rollers leave free.
+    Beside a `catalogue`, `stiffness` is a floor: it holds the directions that the rollers leave free. One of which
+    only the `designation` is known waits for either of them; until then the variant `rigid` alone runs.
     """
 
     body: Name
@@ -215,15 +216,21 @@ class BearingSection(Section):
     law: Literal["stiffness", "iso16281"] = "stiffness"
     cage: Literal["averaged", "turning"] = "averaged"
     outer_ring: Literal["body", "on"] | None = None
+    designation: Text = ""
     stiffness: StiffnessSection | None = None
     catalogue: CatalogueSection | None = None
     damping: StiffnessSection | None = None
 
     @model_validator(mode="after")
     def _source(self) -> BearingSection:
-        if self.stiffness is None and self.catalogue is None:
+        if not self.is_known and not self.designation:
             raise ValueError("give a [.stiffness] table or a [.catalogue] table")
         return self
+
+    @property
+    def is_known(self) -> bool:
+        """Whether more than its designation is known."""
+        return self.stiffness is not None or self.catalogue is not None
 
     @model_validator(mode="after")
     def _law(self) -> BearingSection:
