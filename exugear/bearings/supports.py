@@ -25,6 +25,9 @@ def unsupported(gearbox: Gearbox, variant: str) -> str:
         held = {joint.body for joint in gearbox.joints}
         missing = [b.name for b in gearbox.bodies() if not (b.fixed or b.spin_only or b.name in held)]
         return f"no joint holds {', '.join(missing)}; add one under [joints]" if missing else ""
+    if gearbox.unknown_bearings:
+        names = ", ".join(f"bearings.{name} ({text})" for name, text in gearbox.unknown_bearings.items())
+        return f"only the designation is known of {names}; give each a [.catalogue] or a [.stiffness] table"
     if not gearbox.bearings:
         return "the gearbox file has no [bearings]"
     if variant == "flexible" and not elastic:

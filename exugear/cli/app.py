@@ -14,8 +14,9 @@ import typer
 from exugear.cli.console import say, say_what_is_logged
 from exugear.cli.streams import standard_streams
 
-VERBS = ("new", "check", "ste", "bearings", "modes", "steady", "run", "view", "report")
-"""In the order of the help. Each is a function of this name in the module of this name in `exugear.cli.verbs`."""
+VERBS = ("new", "import_", "schema", "check", "ste", "bearings", "modes", "steady", "run", "view", "report")
+"""In the order of the help. Each is a function of this name in the module of this name in `exugear.cli.verbs`; what
+Python reserves has a line after it, which the command line leaves out."""
 
 app = typer.Typer(
     help="Transmission error of gear pairs by finite elements, and gearbox dynamics in Exudyn.",
@@ -54,4 +55,4 @@ def _program(
 
 
 for verb in VERBS:
-    app.command()(getattr(importlib.import_module(f"exugear.cli.verbs.{verb}"), verb))
+    app.command(verb.rstrip("_"))(getattr(importlib.import_module(f"exugear.cli.verbs.{verb}"), verb))

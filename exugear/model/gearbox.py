@@ -249,6 +249,11 @@ class Gearbox:
         return support_parts.bearings(self._origin, self.named_bodies)
 
     @cached_property
+    def unknown_bearings(self) -> dict[str, str]:
+        """Designations of bearings of which nothing else is known, by name; variants on bearings wait for the rest."""
+        return support_parts.unknown_bearings(self._origin)
+
+    @cached_property
     def mounts(self) -> tuple[Bearing, ...]:
         """Supports of the gearbox on the ground, at work where a fixed body is elastic."""
         return support_parts.mounts(self._origin)

@@ -36,6 +36,8 @@ def joints(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Joint, ...]:
 def bearings(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Bearing, ...]:
     """Compliant supports of the variants `bushing` and `flexible`, one for each planet of a set.
 
+    A bearing of which only the designation is known is none yet: see `unknown_bearings`.
+
     Raises
     ------
     CaseError
@@ -46,7 +48,7 @@ def bearings(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Bearing, ...]:
         key = f"bearings.{name}"
         if section.body == GROUND:
             raise origin.fault(f"{key}.body = {GROUND!r}: name the body that is held; the ground is what it sits on")
-        if not origin.are_enabled(key, section.body, section.on):
+        if not origin.are_enabled(key, section.body, section.on) or not section.is_known:
             return ()
         return tuple(
             Bearing(
@@ -70,6 +72,15 @@ def bearings(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Bearing, ...]:
         )
 
     return parts_of_each(of_section, origin.case.bearings)
+
+
+def unknown_bearings(origin: Origin) -> dict[str, str]:
+    """Designations of the bearings at work of which nothing else is known, by name."""
+    return {
+        name: section.designation
+        for name, section in origin.case.bearings.items()
+        if not section.is_known and origin.are_enabled(f"bearings.{name}", section.body, section.on)
+    }
 
 
 def mounts(origin: Origin) -> tuple[Bearing, ...]:

@@ -238,7 +238,8 @@ class CatalogueSection(Section):
 class BearingSection(Section):
     """Compliant support (variants `bushing` and `flexible`): given 6x6 or from catalogue dimensions.
 
-    Beside a `catalogue`, `stiffness` is a floor: it holds the directions that the rollers leave free.
+    Beside a `catalogue`, `stiffness` is a floor: it holds the directions that the rollers leave free. One of which
+    only the `designation` is known waits for either of them; until then the variant `rigid` alone runs.
     """
 
     body: Name
@@ -255,6 +256,8 @@ class BearingSection(Section):
     """Whether the elements of a non-linear bearing stand at the mean stiffness, or pass as the rings turn."""
     outer_ring: Literal["body", "on"] | None = None
     """Which of the two carries the outer ring; planets do by default, other bodies do not."""
+    designation: Text = ""
+    """Words for people; a bearing with nothing else holds only in the variant `rigid`, until it gets its data."""
     stiffness: StiffnessSection | None = None
     """Stiffness given, or floor beside a catalogue."""
     catalogue: CatalogueSection | None = None
@@ -264,9 +267,14 @@ class BearingSection(Section):
 
     @model_validator(mode="after")
     def _source(self) -> BearingSection:
-        if self.stiffness is None and self.catalogue is None:
+        if not self.is_known and not self.designation:
             raise ValueError("give a [.stiffness] table or a [.catalogue] table")
         return self
+
+    @property
+    def is_known(self) -> bool:
+        """Whether more than its designation is known."""
+        return self.stiffness is not None or self.catalogue is not None
 
     @model_validator(mode="after")
     def _law(self) -> BearingSection:

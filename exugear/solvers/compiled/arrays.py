@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from exugear.kernels.coordinates import PADDED
-from exugear.kernels.elastic import ElasticArrays, ElasticMotion
+from exugear.kernels.elastic import ElasticMotion
 from exugear.kernels.fast_meshes import Meshes, MeshMemory
 from exugear.kernels.rolling import RollingArrays
 from exugear.kernels.travelling import TravellingArrays
@@ -188,8 +188,7 @@ class Equations(NamedTuple):
     springs: Springs
     loads: Loads
     joints: Joints | None
-    elastic: ElasticArrays | None
-    motion: ElasticMotion | None
+    elastic: ElasticMotion | None
     turning: TurningArrays | None
 
 

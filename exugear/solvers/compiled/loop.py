@@ -189,6 +189,6 @@ def advance(
                 return n
         if n < out_signals.shape[0]:
             q, v, due = work.stage_q, work.stage_v, stride if (first + n + 1) % stride == 0 else 0
-            take_sample(end, q, v, equations, work, columns, due, out_signals[n], out_energies[n])
+            take_sample(end, q, v, equations, work, columns, due, given, out_signals[n], out_energies[n])
     done: int = steps
     return done

@@ -28,7 +28,7 @@ from exugear.tooth_mesh.tables import wanted_table
 
 from ..case_mutations import bases, toml_text
 
-FOR_PEOPLE = {"LoadCaseSection.description", "CatalogueSection.designation"}
+FOR_PEOPLE = {"LoadCaseSection.description", "BearingSection.designation", "CatalogueSection.designation"}
 """Keys that stand in the file and its copy in the results for people to read."""
 
 

@@ -1,0 +1,74 @@
+"""The verb `import`: a gearbox file from an industry file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from exugear.cli.console import note, print_json, say
+from exugear.cli.errors import BadInputError, exit_codes
+from exugear.cli.options import JsonOption
+
+if TYPE_CHECKING:
+    from exugear.rexs.to_case.conversion import Imported
+
+NAME = "gearbox.toml"
+"""Name of the file that is written."""
+
+
+def import_(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE.rexs", help="A REXS file: XML, JSON or zip.", show_default=False)
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FOLDER", help="Folder for gearbox.toml. (default: the file's name without end)"),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Make a gearbox file of a REXS file (1.0 to 2.0): each value with its source, each assumption marked."""
+    with exit_codes():
+        from fe_ste.tools.files import write_file
+
+        target = (out or Path(_stem(file))) / NAME
+        if target.exists():
+            raise BadInputError(f"{target}: is there already, and may have been edited; name another folder with --out")
+        imported = _imported(file, target)
+        write_file(target, imported.text.encode("utf-8"))
+        if as_json:
+            print_json(
+                {
+                    "file": str(target),
+                    "name": imported.gearbox.name,
+                    "ratio": imported.gearbox.train.ratio,
+                    "changed": list(imported.changed),
+                    "checked": list(imported.checked),
+                    "ignored": list(imported.ignored),
+                }
+            )
+            return
+        for line in imported.changed:
+            note(line, style="yellow")
+        say(
+            f"{target}: ratio {imported.gearbox.train.ratio:.6f}, {len(imported.gearbox.pairs)} gear pairs, "
+            f"{len(imported.gearbox.bearings)} bearings"
+        )
+        say(f"Values marked A are assumed: look them over, then: exugear check {target}")
+
+
+def _stem(file: Path) -> str:
+    """Name of a file without its ends: a REXS file may have two."""
+    return file.name.removesuffix(".zip").removesuffix(".xml").removesuffix(".json").rsplit(".rexs", 1)[0] or "imported"
+
+
+def _imported(file: Path, target: Path) -> Imported:
+    from exugear.rexs.containers import read_rexs
+    from exugear.rexs.faults import RexsError
+    from exugear.rexs.to_case.conversion import to_case
+
+    try:
+        return to_case(read_rexs(file), file.name, target)
+    except RexsError as error:
+        raise BadInputError(error) from error

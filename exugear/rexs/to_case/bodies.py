@@ -1,0 +1,298 @@
+"""Which components turn as one body, which of these are planets of a set, and what each is called."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from exugear.rexs.faults import RexsError
+from exugear.rexs.to_case.notes import Notes
+from exugear.rexs.to_case.places import Places
+from exugear.rexs.tree import Component, Model
+
+GEARS = ("cylindrical_gear", "ring_gear")
+JOINING = (
+    "coupling",
+    "switchable_coupling",
+    "cylindrical_interference_fit",
+    "tapered_interference_fit",
+    "feather_key_connection",
+    "involute_spline_connection",
+)
+"""Types that can join their inner and outer part."""
+RIGID_TORSION = 1e12
+"""Torsional stiffness (N m/rad) from which on a connection is one piece; the files mean rigid by 1e17."""
+COAXIAL = 2e-3
+"""Largest distance of axes that count as one, mm."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """Components that move as one.
+
+    Attributes
+    ----------
+    name : str
+        In the gearbox file.
+    parts : tuple of Component
+        Shafts, plates and gears.
+    axis : (float, float)
+        mm.
+    fixed : bool
+    others : tuple of tuple of Component
+        Parts of the other planets of a set, in the order of their angles.
+    angles : tuple of float
+        Angles of the planets on the carrier, deg; empty for what is no planet.
+    orbit : float
+        Their distance from the carrier's axis, mm.
+    carrier : str
+        Empty for what is no planet.
+    """
+
+    name: str
+    parts: tuple[Component, ...]
+    axis: tuple[float, float]
+    fixed: bool = False
+    others: tuple[tuple[Component, ...], ...] = ()
+    angles: tuple[float, ...] = ()
+    orbit: float = 0.0
+    carrier: str = ""
+
+    def of_type(self, *types: str) -> tuple[Component, ...]:
+        """Parts of some types."""
+        return tuple(part for part in self.parts if part.type in types)
+
+    @property
+    def gears(self) -> tuple[Component, ...]:
+        """Gears of the body, of planets those of the first."""
+        return self.of_type(*GEARS)
+
+
+class Bodies:
+    """All bodies of a gearbox, by name and by component."""
+
+    def __init__(self, members: Sequence[Body]) -> None:
+        self.members = tuple(members)
+        self._of_part = {part.number: body for body in members for part in body.parts}
+        self._of_other = {part.number: body for body in members for each in body.others for part in each}
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<Bodies: {', '.join(body.name for body in self.members)}>"
+
+    def of(self, part: Component) -> Body | None:
+        """Body of a component; None for what is idle, or a planet that is not the first of its set."""
+        return self._of_part.get(part.number)
+
+    def of_any(self, part: Component) -> Body | None:
+        """Body of a component, whichever planet of a set it belongs to."""
+        return self._of_part.get(part.number) or self._of_other.get(part.number)
+
+
+class _Union:
+    """Disjoint sets of components."""
+
+    def __init__(self, numbers: Iterable[int]) -> None:
+        self._parent = {number: number for number in numbers}
+
+    def __contains__(self, number: int) -> bool:
+        return number in self._parent
+
+    def root(self, number: int) -> int:
+        while self._parent[number] != number:
+            self._parent[number] = number = self._parent[self._parent[number]]
+        return number
+
+    def join(self, first: int, second: int) -> None:
+        self._parent[self.root(second)] = self.root(first)
+
+
+def torsional_stiffness(connection: Component) -> float | None:
+    """Torsional stiffness of a coupling or fit, N m/rad; None where the file gives none."""
+    value = connection.quantity("rotational_stiffness", "N mm / rad")
+    return None if value is None else 1e-3 * value
+
+
+def is_engaged(model: Model, connection: Component) -> bool:
+    """Tell whether a switchable coupling is closed in the gear that the file stands in."""
+    unit = model.of_type("gear_unit")
+    shift = (unit[0].whole("gear_shift_index") if unit else None) or 1
+    return connection.type != "switchable_coupling" or connection.flag("is_engaged", shift - 1) is not False
+
+
+def ends(model: Model, connection: Component) -> tuple[Component, Component] | None:
+    """Inner and outer part of a bearing, coupling or fit; None if the file does not say both."""
+    inner = model.related("side", "assembly", connection.number, "inner_part")
+    outer = model.related("side", "assembly", connection.number, "outer_part")
+    return (inner[0], outer[0]) if inner and outer else None
+
+
+def find_bodies(model: Model, places: Places, notes: Notes) -> Bodies:
+    """Gather components into bodies.
+
+    Raises
+    ------
+    RexsError
+        Planets that are not equal, or whose carrier cannot be told.
+    """
+    union = _joined(model)
+    groups: dict[int, list[Component]] = {}
+    for part in model.of_type("shaft", "side_plate", "gear_casing", *GEARS):
+        groups.setdefault(union.root(part.number), []).append(part)
+    meshing = {number for one in model.relations_of("stage") for role, number in one.roles.items() if role != "stage"}
+    sets = _planet_sets(model, places, union, groups)
+    planets = {root for members in sets for root, _ in members}
+    pins = {one.roles["shaft"] for one in model.relations_of("planet_pin") if "shaft" in one.roles}
+    names = _names(model, groups, planets, meshing, union)
+    found: list[Body] = []
+    for root, parts in groups.items():
+        fixed = any(part.type == "gear_casing" for part in parts)
+        at_work = meshing & {part.number for part in parts}
+        if root in planets or (fixed and not at_work):
+            continue
+        if not at_work and root not in _carriers(model, union):
+            notes.ignored.append(f"{', '.join(str(part) for part in parts)}: in no mesh, turns idly")
+            continue
+        found.append(Body(names[root], tuple(_axial(parts)), _axis(places, parts, pins), fixed))
+    by_root = {union.root(part.number): body for body in found for part in body.parts}
+    for number, members in enumerate(sets):
+        name = _lettered("planet", number, len(sets))
+        found.append(_planet_body(model, places, union, by_root, members, name, groups))
+    return Bodies(found)
+
+
+def _joined(model: Model) -> _Union:
+    parts = model.of_type("shaft", "side_plate", "gear_casing", *GEARS)
+    union = _Union(part.number for part in parts)
+    casings = [part.number for part in parts if part.type == "gear_casing"]
+    for casing in casings[1:]:
+        union.join(casings[0], casing)
+    carriers: dict[int, int] = {}
+    for relation in model.relations_of("assembly", "ordered_assembly"):
+        owner, part = relation.roles.get("assembly", -1), relation.roles.get("part", -1)
+        if owner in union and part in union and model.components[owner].type == "shaft":
+            union.join(owner, part)
+        elif part in union and owner in model.components and model.components[owner].type == "planet_carrier":
+            union.join(carriers.setdefault(owner, part), part)
+    for connection in model.of_type(*JOINING):
+        both = ends(model, connection)
+        torsion = torsional_stiffness(connection)
+        rigid = torsion is None or torsion >= RIGID_TORSION
+        if both and rigid and is_engaged(model, connection) and all(end.number in union for end in both):
+            union.join(both[0].number, both[1].number)
+    return union
+
+
+def _carriers(model: Model, union: _Union) -> set[int]:
+    relations = model.relations_of("planet_carrier_shaft", "planet_pin")
+    return {union.root(one.roles["shaft"]) for one in relations if one.roles.get("shaft", -1) in union}
+
+
+def _axial(parts: Iterable[Component]) -> list[Component]:
+    return [part for part in parts if part.type != "gear_casing"]
+
+
+def _axis(places: Places, parts: Sequence[Component], pins: set[int]) -> tuple[float, float]:
+    """Axis of a body, mm: that of its gears, else of its shafts and plates, pins of planets left out."""
+    rank = {"cylindrical_gear": 0, "ring_gear": 0, "shaft": 1, "side_plate": 2}
+    own = sorted((p for p in parts if p.type in rank and p.number not in pins), key=lambda part: rank[part.type])
+    own = [part for part in own if part.given("support_vector")]
+    if not own:
+        raise RexsError(f"{parts[0]}: nothing tells where its axis lies")
+    x, y, _ = places.position(own[0])
+    for part in own[1:]:
+        if math.dist((x, y), places.position(part)[:2]) > COAXIAL:
+            raise RexsError(f"{part}: is joined rigidly to {own[0]} and does not share its axis")
+    return x, y
+
+
+def _planet_sets(
+    model: Model, places: Places, union: _Union, groups: Mapping[int, list[Component]]
+) -> list[list[tuple[int, Component]]]:
+    """Gather sets of equal planets: (root, shaft) of each."""
+    sets: dict[tuple[object, ...], list[tuple[int, Component]]] = {}
+    for relation in model.relations_of("planet_shaft"):
+        shaft = model.components[relation.roles["shaft"]]
+        root = union.root(shaft.number)
+        gears = sorted(
+            (part.whole("number_of_teeth") or 0, part.quantity("normal_module", "mm") or 0.0)
+            for part in groups[root]
+            if part.type in GEARS
+        )
+        if not gears:
+            continue
+        key = (relation.roles.get("planetary_stage"), *gears, places.position(shaft)[2])
+        sets.setdefault(key, []).append((root, shaft))
+    return list(sets.values())
+
+
+def _planet_body(
+    model: Model,
+    places: Places,
+    union: _Union,
+    by_root: Mapping[int, Body],
+    members: list[tuple[int, Component]],
+    name: str,
+    groups: Mapping[int, list[Component]],
+) -> Body:
+    shaft = members[0][1]
+    stage = next(
+        one.roles["planetary_stage"] for one in model.relations_of("planet_shaft") if one.roles["shaft"] == shaft.number
+    )
+    held = [
+        one
+        for kind in ("planet_carrier_shaft", "planet_pin")
+        for one in model.related(kind, "planetary_stage", stage, "shaft")
+    ]
+    carriers = [by_root[root] for root in dict.fromkeys(union.root(one.number) for one in held) if root in by_root]
+    if not carriers:
+        raise RexsError(
+            f"{model.components[stage]}: the carrier of {shaft} is missing or does not turn; a held carrier cannot be "
+            "imported yet"
+        )
+    carrier = carriers[0]
+    placed = []
+    for root, one in members:
+        x, y, _ = places.position(one)
+        dx, dy = x - carrier.axis[0], y - carrier.axis[1]
+        placed.append((round(math.degrees(math.atan2(dy, dx)) % 360.0, 9) % 360.0, math.hypot(dx, dy), root))
+    placed.sort()
+    if max(radius for _, radius, _ in placed) - min(radius for _, radius, _ in placed) > COAXIAL:
+        raise RexsError(f"{model.components[stage]}: its planets are not equally far from the carrier's axis")
+    parts = [tuple(_axial(groups[root])) for _, _, root in placed]
+    x, y, _ = places.position(next(one for root, one in members if root == placed[0][2]))
+    return Body(
+        name,
+        parts[0],
+        (x, y),
+        others=tuple(parts[1:]),
+        angles=tuple(angle for angle, _, _ in placed),
+        orbit=round(placed[0][1], 6),
+        carrier=carrier.name,
+    )
+
+
+def _names(
+    model: Model, groups: Mapping[int, list[Component]], planets: set[int], meshing: set[int], union: _Union
+) -> dict[int, str]:
+    """Names of the bodies that are no planets, by role, numbered in the order of the file."""
+    carriers = _carriers(model, union)
+    roles: dict[str, list[int]] = {}
+    for root, parts in groups.items():
+        if root in planets or not (meshing & {part.number for part in parts} or root in carriers):
+            continue
+        if any(part.type == "gear_casing" for part in parts):
+            role = "housing"
+        elif root in carriers:
+            role = "carrier"
+        else:
+            role = "shaft"
+        roles.setdefault(role, []).append(root)
+    names = {root: _lettered("carrier", n, len(roles["carrier"])) for n, root in enumerate(roles.get("carrier", []))}
+    names |= {root: "housing" for root in roles.get("housing", [])}
+    return names | {root: f"shaft_{number}" for number, root in enumerate(roles.get("shaft", []), 1)}
+
+
+def _lettered(name: str, number: int, count: int) -> str:
+    return name if count == 1 else f"{name}_{chr(ord('a') + number % 26)}"

@@ -1,0 +1,282 @@
+"""A REXS file as a gearbox file: what cannot be imported is said all at once, what is assumed is marked."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from exugear.checks.readiness import check_parts
+from exugear.model.gearbox import Gearbox
+from exugear.model.reading import CaseError
+from exugear.rexs.faults import RexsError, plain
+from exugear.rexs.to_case.bodies import GEARS, JOINING, find_bodies
+from exugear.rexs.to_case.body_blocks import (
+    INERTIAS,
+    body_blocks,
+    gear_places,
+    levelled_under_seats,
+    meshes_of_bodies,
+    sections_of_bodies,
+)
+from exugear.rexs.to_case.gear_blocks import gear_blocks, mesh_blocks, pair_blocks, teeth_of
+from exugear.rexs.to_case.loads import Ends, Loads, ends_of, load_case_blocks, loads_of, static_load
+from exugear.rexs.to_case.notes import Block, Entry, Notes, assumed, derived, read, tidy
+from exugear.rexs.to_case.places import Places
+from exugear.rexs.to_case.supports import BEARINGS, PLAIN_BEARINGS, bearing_blocks, coupling_blocks, joint_blocks
+from exugear.rexs.to_case.text import toml_text
+from exugear.rexs.to_case.toothing import modified_flanks
+from exugear.rexs.tree import Model
+
+OTHER_GEARS = {"bevel": "bevel gears", "worm": "worm gears", "hypoid": "hypoid gears"}
+"""Beginnings of the types of gears that are not cylindrical."""
+SPEED_TOLERANCE = 1e-3
+"""Largest difference of a speed in the file from the one at which the train rolls, relative."""
+_SHAPE_FAULT = re.compile(r"bodies\.(\w+)\.shape: (.*)")
+READ_TYPES = frozenset(
+    (
+        *GEARS,
+        *BEARINGS,
+        *PLAIN_BEARINGS,
+        *JOINING,
+        "gear_unit",
+        "gear_casing",
+        "shaft",
+        "shaft_section",
+        "side_plate",
+        "planet_carrier",
+        "planetary_stage",
+        "cylindrical_stage",
+        "cylindrical_gear_flank",
+        "rack_shaped_tool",
+        "cutter_wheel_tool",
+        "material",
+        "rolling_bearing_row",
+        "rolling_element",
+        "external_load",
+    )
+)
+"""Types of components of which something is read."""
+
+
+@dataclass(frozen=True)
+class Imported:
+    """Outcome of an import.
+
+    Attributes
+    ----------
+    text : str
+        The gearbox file with its comments.
+    gearbox : Gearbox
+        What it gives.
+    changed : tuple of str
+        What was replaced or assumed and matters.
+    ignored : tuple of str
+        What was left out.
+    checked : tuple of str
+        What the file says twice, compared.
+    """
+
+    text: str
+    gearbox: Gearbox
+    changed: tuple[str, ...]
+    ignored: tuple[str, ...]
+    checked: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<Imported {self.gearbox!r}: {len(self.changed)} assumptions, {len(self.ignored)} left out>"
+
+
+def to_case(model: Model, source: str, path: str | Path = "gearbox.toml") -> Imported:
+    """Make a gearbox file of a REXS model, and check it as one.
+
+    Parameters
+    ----------
+    model : Model
+    source : str
+        Name of the REXS file, for the comments.
+    path : path-like
+        Where the gearbox file is going to be, for messages.
+
+    Raises
+    ------
+    RexsError
+        Why the model cannot be imported, a sentence each.
+    """
+    notes = Notes()
+    _refuse_types(model, notes)
+    notes.faults.tell()
+    places = Places(model)
+    draft = _Draft(model, places, notes)
+    notes.faults.tell()
+    static = draft.static.value[draft.ends.input]
+    draft.leave_stiff(path, source)
+    gearbox = _checked(draft.text(source, {}), path)
+    ratio = gearbox.train.ratio
+    cases = load_case_blocks(draft.loads, draft.ends, static, ratio)
+    _compare_speeds(gearbox, draft.loads, draft.ends, notes)
+    notes.faults.tell()
+    _note_ignored(model, notes)
+    text = draft.text(source, cases)
+    gearbox = _checked(text, path)
+    return Imported(text, gearbox, tuple(notes.changed), tuple(notes.ignored), tuple(notes.checked))
+
+
+def _refuse_types(model: Model, notes: Notes) -> None:
+    """Refuse what is not a gearbox of cylindrical gears."""
+    for begin, words in OTHER_GEARS.items():
+        parts = [part for part in model.components.values() if part.type.startswith(f"{begin}_")]
+        parts = [part for part in parts if part.type.endswith(("_gear", "_wheel", "_stage"))]
+        if parts:
+            names = ", ".join(str(part) for part in parts)
+            notes.faults.add(f"{names}: {words} cannot be imported, only cylindrical gears on parallel axes")
+    notes.faults.tell()
+    if not any(True for _ in model.relations_of("stage")) or not model.of_type(*GEARS):
+        notes.faults.add("the file holds no stage of two cylindrical gears: there is no gearbox to import")
+
+
+class _Draft:
+    """All tables of the gearbox file but the load cases."""
+
+    def __init__(self, model: Model, places: Places, notes: Notes) -> None:
+        self.model, self.notes = model, notes
+        bodies = find_bodies(model, places, notes)
+        self.teeth = teeth_of(model, places, bodies, notes)
+        bearings = bearing_blocks(model, places, bodies, notes)
+        sections = sections_of_bodies(model, places, bodies, notes)
+        sections = levelled_under_seats(sections, self.teeth, bearings, notes)
+        self.loads = loads_of(model, places, bodies, notes)
+        self.ends = ends_of(model, bodies, self.loads, meshes_of_bodies(self.teeth))
+        self.static = static_load(self.loads, self.ends)
+        self.groups = [
+            ("gears", _named("gears", gear_blocks(model, self.teeth, sections, notes))),
+            ("pairs", _named("pairs", pair_blocks(self.teeth))),
+            ("bodies", _named("bodies", body_blocks(model, places, bodies, self.teeth, sections, notes))),
+            ("meshes", _named("meshes", mesh_blocks(self.teeth))),
+            ("couplings", _named("couplings", coupling_blocks(model, bodies))),
+            (
+                "variant `rigid`: ideal joints",
+                _named("joints", joint_blocks(bodies, bearings, gear_places(self.teeth, bodies))),
+            ),
+            ("variants `bushing` and `flexible`: bearings", _named("bearings", bearings)),
+        ]
+        self.settings = _settings(model, places, self.ends, self.static, self._output_gear())
+
+    def leave_stiff(self, path: str | Path, source: str) -> None:
+        """Take bodies as rigid in all variants whose shape has no place for its seats, and say why."""
+        try:
+            _checked(self.text(source, {}), path)
+        except RexsError as error:
+            found = (_SHAPE_FAULT.search(fault) for fault in error.faults)
+            reasons = {match[1]: match[2] for match in found if match}
+        else:
+            return
+        blocks = dict(self.groups)["bodies"]
+        for body, reason in reasons.items():
+            self.notes.changed.append(f"bodies.{body}: rigid in the variant flexible, too: {reason}")
+            blocks[f"bodies.{body}"].entries["flexibility"] = assumed("none", "its sections give no seats, see above")
+
+    def _output_gear(self) -> str:
+        for number, body in self.teeth.bodies.items():
+            if body.name == self.ends.output:
+                return self.teeth.names[number]
+        return next(iter(self.teeth.names.values()))
+
+    def text(self, source: str, cases: Mapping[str, Block]) -> str:
+        if not cases:
+            torque = {self.ends.input: self.static.value[self.ends.input]}
+            cases = {"draft": Block("", {"torques_N_m": Entry(torque)})}
+        units = self.model.of_type("gear_unit")
+        name = plain(units[0].name) if units and units[0].name else ""
+        title = f"{Path(source).stem}" + (f": {name}" if name else "")
+        top = {"name": Entry(plain(title, 200)), "default_inertias": Entry(INERTIAS)}
+        groups = [("", self.settings), *self.groups, ("load cases", _named("load_cases", cases))]
+        return toml_text(_head(self.model, source, self.notes), top, groups)
+
+
+def _named(table: str, blocks: Mapping[str, Block]) -> dict[str, Block]:
+    return {f"{table}.{name}": block for name, block in blocks.items()}
+
+
+def _settings(model: Model, places: Places, ends: Ends, static: Entry, gear: str) -> dict[str, Block]:
+    blocks = {
+        "overall": Block(
+            "", {"input": derived(ends.input, ends.reason), "output": Entry(ends.output), "output_gear": Entry(gear)}
+        ),
+        "static_load": Block(
+            "the state that tables are computed for",
+            {"torques_N_m": static, "locked": derived([ends.output], "the output holds what the input gives")},
+        ),
+    }
+    for unit in model.of_type("gear_unit")[:1]:
+        keys = [f"direction_vector_gravity_{axis}" for axis in "uvw"]
+        direction = np.array([unit.quantity(key) or 0.0 for key in keys])
+        if unit.flag("account_for_gravity") and np.linalg.norm(direction) > 0.0:
+            size = unit.quantity("gravitational_acceleration", "m / s^2") or 9.81
+            vector = places.turned(direction / np.linalg.norm(direction)) * size
+            entry = read([tidy(round(value, 9)) for value in vector.tolist()], "direction_vector_gravity")
+            blocks["gravity"] = Block("", {"acceleration_m_per_s2": entry})
+    return blocks
+
+
+def _head(model: Model, source: str, notes: Notes) -> list[str]:
+    """Comment at the beginning: origin, what marks mean, and all that a reader must know."""
+    lines = [
+        f"Imported from {plain(Path(source).name)}: REXS {model.version}, written by {plain(model.program)}.",
+        "After each value stands the attribute that gives it, after each table the component.",
+        "D is computed here from what the file gives, A is assumed: the file does not give it. Check all A.",
+        "Axes: z along the shafts, x and y are v and w of the gear unit; mm.",
+    ]
+    for title, found in (
+        ("Replaced or assumed", notes.changed),
+        ("Said twice, compared", notes.checked),
+        ("Left out", notes.ignored),
+    ):
+        if found:
+            lines += ["", f"{title}:", *(f"- {plain(line, 400)}" for line in dict.fromkeys(found))]
+    return lines
+
+
+def _note_ignored(model: Model, notes: Notes) -> None:
+    """List the types of components of which nothing was read."""
+    notes.changed += modified_flanks(model)
+    counts: dict[str, int] = {}
+    for part in model.components.values():
+        if part.type not in READ_TYPES:
+            counts[part.type] = counts.get(part.type, 0) + 1
+    notes.ignored += [f"{plain(kind)}, {count} of them" for kind, count in sorted(counts.items())]
+
+
+def _compare_speeds(gearbox: Gearbox, loads: Sequence[Loads], ends: Ends, notes: Notes) -> None:
+    """Compare speeds that the file gives for several bodies with those at which the train rolls."""
+    if gearbox.train.degrees_of_freedom != 1:
+        return
+    mode = dict(zip(gearbox.spinning, gearbox.train.kinematic_modes[:, 0].tolist(), strict=True))
+    for one in loads:
+        base = one.speeds.get(ends.input)
+        for body, speed in one.speeds.items():
+            if not base or body == ends.input or body not in mode:
+                continue
+            rolls = base * mode[body] / mode[ends.input]
+            notes.checked.append(f"{one.name}: {body} turns at {speed:.6g} rpm, the train rolls at {rolls:.6g} rpm")
+            if abs(rolls - speed) > SPEED_TOLERANCE * max(abs(rolls), abs(speed)):
+                notes.faults.add(
+                    f"{one.name}: the file turns {body} at {speed:g} rpm, but with {ends.input} at {base:g} rpm the "
+                    f"train rolls at {rolls:g} rpm"
+                )
+
+
+def _checked(text: str, path: str | Path) -> Gearbox:
+    content: dict[str, Any] = tomllib.loads(text)
+    try:
+        gearbox = Gearbox.from_dict(content, str(path))
+        check_parts(gearbox)
+    except CaseError as error:
+        raise RexsError(*(f"as a gearbox file: {fault}" for fault in error.faults)) from None
+    return gearbox

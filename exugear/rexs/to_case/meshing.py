@@ -1,0 +1,216 @@
+"""Stages of a REXS file as gear pairs: profile shifts that follow from centre distances, and what must fit."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from exugear.rexs.faults import RexsError
+from exugear.rexs.to_case.notes import Entry, Notes, assumed, derived, tidy
+from exugear.rexs.to_case.toothing import Toothing
+from exugear.rexs.tree import Component
+from fe_ste.geometry.gear_relations import BasicRack, UncheckedGear
+from fe_ste.geometry.involute import involute
+from fe_ste.geometry.pair_relations import UncheckedPair
+
+SHIFT_TOLERANCE = 1e-3
+"""Largest difference of the sum of profile shifts from what the centre distance asks for: digits of a file."""
+PLACE_TOLERANCE = 0.02
+"""Largest difference of a centre distance and the positions of the gears, mm."""
+MARGIN = 1e-4
+"""Distance that a replaced tip keeps from the form circle of its mate, in normal modules."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Two gears in mesh: the pinion is the smaller, against a ring the external one.
+
+    Attributes
+    ----------
+    part : Component
+        The first of the stages that are alike, one for each planet.
+    pinion, gear : int
+        Numbers of the gears' components.
+    distance : Entry
+        Centre distance, mm.
+    """
+
+    part: Component
+    pinion: int
+    gear: int
+    distance: Entry
+
+
+def centre_distance(stage: Component, apart: float, notes: Notes) -> Entry:
+    """Centre distance of a stage whose gears stand so far apart (mm).
+
+    Raises
+    ------
+    RexsError
+        The file says two different distances.
+    """
+    stated = stage.quantity("center_distance", "mm")
+    if stated is None:
+        return derived(tidy(round(apart, 9)), "distance of the gears' positions")
+    notes.checked.append(f"{stage}: centre distance {abs(stated):.6g} mm, positions {apart:.6f} mm")
+    if abs(abs(stated) - apart) > PLACE_TOLERANCE:
+        raise RexsError(
+            f"{stage}: center_distance = {stated:g} mm, but its gears stand {apart:.4f} mm apart; correct one of them"
+        )
+    return Entry(tidy(abs(stated)), "center_distance")
+
+
+def shift_sum(pinion: Toothing, gear: Toothing, distance: float) -> float:
+    """Profile shifts that leave no backlash at a centre distance (mm): x1 + x2, of an internal pair x1 - x2.
+
+    ISO 21771: sum = (z1 + z2) (inv alpha_wt - inv alpha_t) / (2 tan alpha_n), teeth of a ring negative.
+
+    Raises
+    ------
+    RexsError
+        No working pressure angle belongs to the distance.
+    """
+    module, normal = pinion.module.value, math.radians(pinion.pressure_angle.value)
+    helix = math.radians(pinion.helix_angle.value)
+    transverse = math.atan(math.tan(normal) / math.cos(helix))
+    teeth = pinion.teeth - gear.teeth if gear.internal else pinion.teeth + gear.teeth
+    cosine = abs(teeth) * module / math.cos(helix) * math.cos(transverse) / (2.0 * distance)
+    if not 0.0 < cosine < 1.0:
+        raise RexsError(
+            f"{pinion.part}, {gear.part}: no line of action touches both base circles at a distance of {distance:g} mm"
+        )
+    return teeth * (involute(math.acos(cosine)) - involute(transverse)) / (2.0 * math.tan(normal))
+
+
+def with_shifts(gears: Mapping[int, Toothing], stages: Sequence[Stage], notes: Notes) -> dict[int, Toothing]:
+    """Complete the profile shifts: a file may give one of a pair, or none, and leave the rest to the centre distance.
+
+    Raises
+    ------
+    RexsError
+        Shifts and centre distance contradict each other.
+    """
+    solved, open_stages = dict(gears), list(stages)
+    while open_stages:
+        ready = [one for one in open_stages if _given(solved, one)] or open_stages[:1]
+        for stage in ready:
+            open_stages.remove(stage)
+            _complete(solved, stage)
+    for stage in stages:
+        with notes.faults.gathered():
+            _check_shifts(solved, stage, notes)
+    notes.faults.tell()
+    return solved
+
+
+def _given(gears: Mapping[int, Toothing], stage: Stage) -> bool:
+    return gears[stage.pinion].shift is not None or gears[stage.gear].shift is not None
+
+
+def _complete(gears: dict[int, Toothing], stage: Stage) -> None:
+    """Give both gears of a stage a shift; where neither has one the gear gets none and the pinion all."""
+    pinion, gear = gears[stage.pinion], gears[stage.gear]
+    sign = -1.0 if gear.internal else 1.0
+    total = shift_sum(pinion, gear, stage.distance.value)
+    if pinion.shift is None and gear.shift is None:
+        gear = dataclasses.replace(gear, shift=assumed(0.0, "the file gives none for either gear of the stage"))
+        gears[stage.gear] = gear
+    if pinion.shift is None and gear.shift is not None:
+        shift = derived(tidy(round(total - sign * gear.shift.value, 9)), "from the centre distance, without backlash")
+        gears[stage.pinion] = dataclasses.replace(pinion, shift=shift)
+    elif gear.shift is None and pinion.shift is not None:
+        missing = tidy(round(sign * (total - pinion.shift.value), 9))
+        shift = derived(missing, "from the centre distance, without backlash")
+        gears[stage.gear] = dataclasses.replace(gear, shift=shift)
+
+
+def _check_shifts(gears: Mapping[int, Toothing], stage: Stage, notes: Notes) -> None:
+    pinion, gear = gears[stage.pinion], gears[stage.gear]
+    if pinion.shift is None or gear.shift is None:
+        return
+    total = shift_sum(pinion, gear, stage.distance.value)
+    stated = pinion.shift.value + (-gear.shift.value if gear.internal else gear.shift.value)
+    notes.checked.append(f"{stage.part}: sum of profile shifts {stated:.6f}, centre distance asks for {total:.6f}")
+    if abs(stated - total) > SHIFT_TOLERANCE:
+        raise RexsError(
+            f"{stage.part}: the profile shifts sum to {stated:.5f}, but its centre distance of "
+            f"{stage.distance.value:g} mm asks for {total:.5f}; correct addendum_modification_coefficient "
+            "or center_distance"
+        )
+
+
+def unchecked(name: str, gear: Toothing) -> UncheckedGear:
+    """Build the gear with the relations of its geometry."""
+    return UncheckedGear(
+        name=name,
+        teeth=gear.teeth,
+        normal_module=1e-3 * gear.module.value,
+        normal_pressure_angle=math.radians(gear.pressure_angle.value),
+        helix_angle=math.radians(gear.helix_angle.value),
+        profile_shift=gear.shift.value if gear.shift else 0.0,
+        face_width=1e-3 * gear.face_width.value,
+        held_diameter=1e-3,
+        internal=gear.internal,
+        rack=BasicRack(1.0, gear.dedendum.value, gear.tip_radius.value),
+        tip_diameter=1e-3 * gear.tip.value if gear.tip else None,
+        root_diameter=1e-3 * gear.root.value if gear.root else None,
+        tooth_thinning=1e-3 * gear.thinning.value,
+    )
+
+
+def without_undercut(gear: Toothing, notes: Notes) -> Toothing:
+    """Round the tool's corner further where the gear would be undercut, which the tooth model cannot have.
+
+    A rounder corner ends its straight flank higher and leaves the root circle as it is.
+    """
+    trial = unchecked("", gear)
+    if gear.internal or trial.form_roll_length >= 0.0:
+        return gear
+    # The straight flank ends rho (1 - sin alpha) above the tool's tip, and may reach down to the interference point.
+    angle, transverse = trial.normal_pressure_angle, trial.transverse_pressure_angle
+    reach = trial.profile_shift + trial.reference_radius / trial.normal_module * math.sin(transverse) ** 2
+    radius = (trial.dedendum_factor - reach) / (1.0 - math.sin(angle)) + MARGIN
+    radius = math.ceil(1e4 * radius) / 1e4
+    notes.changed.append(
+        f"{gear.part}: undercut by its tool of tip radius {gear.tip_radius.value:g}; a radius of {radius:g} normal "
+        "modules is taken, with which the involute is whole"
+    )
+    changed = assumed(radius, f"the file says {gear.tip_radius.value:g}, which undercuts the tooth")
+    return dataclasses.replace(gear, tip_radius=changed)
+
+
+def with_clear_tips(gears: dict[int, Toothing], stages: Sequence[Stage], notes: Notes) -> dict[int, Toothing]:
+    """Move back tips that would touch their mate below its form circle, where it has no involute."""
+    cleared = dict(gears)
+    for stage in stages:
+        for tip, mate in ((stage.gear, stage.pinion), (stage.pinion, stage.gear)):
+            bound = _tip_bound(cleared, stage, tip)
+            if bound is None:
+                continue
+            own = 2e3 * unchecked("", cleared[tip]).tip_radius
+            notes.changed.append(
+                f"{cleared[tip].part}: tip diameter {bound:g} mm instead of {own:.4f} mm, which touches "
+                f"{cleared[mate].part} below its form circle"
+            )
+            entry = assumed(bound, f"{own:.4f} would touch {cleared[mate].part} below its form circle")
+            cleared[tip] = dataclasses.replace(cleared[tip], tip=entry)
+    return cleared
+
+
+def _tip_bound(gears: Mapping[int, Toothing], stage: Stage, which: int) -> float | None:
+    """Tip diameter (mm) at which a gear reaches just to its mate's form circle; None if it does not reach there."""
+    pinion, gear = unchecked("pinion", gears[stage.pinion]), unchecked("gear", gears[stage.gear])
+    pair = UncheckedPair(name="", pinion=pinion, gear=gear, centre_distance=1e-3 * stage.distance.value)
+    tip = gear if which == stage.gear else pinion
+    if tip is gear:
+        excess = pinion.form_roll_length - pair.pinion_roll_length(gear.tip_roll_length)
+    else:
+        excess = pinion.tip_roll_length - pair.pinion_roll_length(gear.form_roll_length)
+    if excess <= 0.0:
+        return None
+    roll = tip.tip_roll_length - tip.outward * (excess + MARGIN * tip.normal_module)
+    diameter = 2e3 * math.hypot(tip.base_radius, roll)
+    # Rounded to the side that clears.
+    return round((math.floor if tip.outward > 0 else math.ceil)(1e4 * diameter) / 1e4, 4)

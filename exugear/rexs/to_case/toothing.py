@@ -1,0 +1,226 @@
+"""Gears as a REXS file gives them: one set of numbers for each gear, flanks and tool included."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from exugear.rexs.faults import RexsError
+from exugear.rexs.to_case.notes import Entry, Notes, assumed, needed, read, tidy
+from exugear.rexs.tree import Component, Model
+
+PLAUSIBLE_TIP = (0.5, 2.0)
+"""Tip diameters over the reference diameter beyond which a tip diameter is taken as a placeholder."""
+THINNING = 0.02
+"""Tooth thinning assumed where the file gives none, in normal modules: half of a usual backlash."""
+EQUAL = 1e-6
+"""Largest difference of numbers on equal flanks or planets."""
+RIGID_MODULUS = 1e6
+"""Young's modulus (MPa) above which a material stands for 'rigid'; the stiffest there are have less."""
+MODIFICATIONS = (
+    "tip_relief",
+    "root_relief",
+    "triangular_tip_relief",
+    "triangular_root_relief",
+    "profile_crowning",
+    "profile_slope",
+    "profile_twist",
+    "helix_crowning",
+    "helix_slope",
+    "end_relief_datum_face",
+    "end_relief_non_datum_face",
+    "topographical_modification",
+)
+
+
+@dataclass(frozen=True)
+class Toothing:
+    """A gear in the units and signs of the gearbox file: mm, deg, the shift of a ring positive for a larger ring.
+
+    Attributes
+    ----------
+    part : Component
+    teeth : int
+    module, pressure_angle, helix_angle, face_width : Entry
+    shift : Entry, optional
+        None where the file gives none: it follows from the centre distance.
+    tip, root : Entry, optional
+        Diameters as far as they are given.
+    dedendum, tip_radius, thinning : Entry
+    chamfer : float
+        Radial, mm.
+    internal : bool
+    """
+
+    part: Component
+    teeth: int
+    module: Entry
+    pressure_angle: Entry
+    helix_angle: Entry
+    face_width: Entry
+    shift: Entry | None
+    tip: Entry | None
+    root: Entry | None
+    dedendum: Entry
+    tip_radius: Entry
+    thinning: Entry
+    chamfer: float
+    internal: bool
+
+
+def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes: Notes) -> Toothing:
+    """Gather the numbers of a gear; `mates` are the gears that it meshes with.
+
+    Raises
+    ------
+    RexsError
+        A number is missing, or left and right flanks differ.
+    """
+    internal = gear.type == "ring_gear"
+    module = needed(gear.quantity("normal_module", "mm"), gear, "normal_module")
+    flank = _flank(model, gear)
+    tool = _tool(model, gear)
+    chamfer = (flank.quantity("tooth_tip_chamfer", "mm") if flank else None) or 0.0
+    teeth = abs(gear.whole("number_of_teeth") or 0)
+    if not teeth:
+        raise RexsError(f"{gear}: number_of_teeth is missing")
+    if chamfer:
+        notes.changed.append(f"{gear}: tooth_tip_chamfer of {chamfer:g} mm left out, the flank runs up to the tip")
+    return Toothing(
+        part=gear,
+        teeth=teeth,
+        module=read(tidy(module), "normal_module"),
+        pressure_angle=_pressure_angle(gear, flank),
+        helix_angle=_helix_angle(gear, mates),
+        face_width=read(needed(gear.quantity("face_width", "mm"), gear, "face_width"), "face_width"),
+        shift=_shift(flank, internal),
+        tip=_tip(gear, teeth * module, notes),
+        root=_diameter(gear, "root_diameter"),
+        dedendum=_of_tool(tool, internal, "addendum_coefficient_reference_profile", 1.25),
+        tip_radius=_of_tool(tool, internal, "tip_corner_radius_factor_reference_profile", 0.25 if tool else 0.38),
+        thinning=_thinning(gear, module),
+        chamfer=chamfer,
+        internal=internal,
+    )
+
+
+def _flank(model: Model, gear: Component) -> Component | None:
+    """Left flank of a gear, equal to the right one."""
+    left, right = (model.related("flank", "gear", gear.number, side) for side in ("left", "right"))
+    if not left or not right:
+        return (left or right or (None,))[0]
+    for key, unit in (
+        ("addendum_modification_coefficient", "none"),
+        ("normal_pressure_angle", "deg"),
+        ("tooth_tip_chamfer", "mm"),
+    ):
+        one, other = left[0].quantity(key, unit), right[0].quantity(key, unit)
+        if one != other and (one is None or other is None or abs(one - other) > EQUAL):
+            raise RexsError(
+                f"{gear}: left and right flank differ in {key} ({one} and {other}); only equal flanks can be imported"
+            )
+    return left[0]
+
+
+def modified_flanks(model: Model) -> list[str]:
+    """Lines on flank modifications, which are not imported yet."""
+    return [
+        f"{part}: flank modification not imported, give it in [gears.NAME.modification]"
+        for part in model.of_type(*MODIFICATIONS)
+    ]
+
+
+def _tool(model: Model, gear: Component) -> Component | None:
+    """Last tool of a gear: by a manufacturing step of the gear or its flank (1.3 on), or by a reference."""
+    workpieces = [gear, *model.related("flank", "gear", gear.number, "left")]
+    for part in workpieces:
+        tools = model.related("manufacturing_step", "workpiece", part.number, "tool")
+        tools = tools or model.related("ordered_reference", "origin", part.number, "referenced")
+        tools = tools or model.related("reference", "origin", part.number, "referenced")
+        tools = tuple(one for one in tools if one.type in ("rack_shaped_tool", "cutter_wheel_tool"))
+        if tools:
+            return tools[-1]
+    return None
+
+
+def _pressure_angle(gear: Component, flank: Component | None) -> Entry:
+    for part in (flank, gear):
+        value = part.quantity("normal_pressure_angle", "deg") if part else None
+        if value is not None:
+            return read(tidy(value), "normal_pressure_angle of the flank")
+    return assumed(20.0, "the file gives none")
+
+
+def _helix_angle(gear: Component, mates: Sequence[Component]) -> Entry:
+    """Helix angle, right hand positive; of a ring that of its mates, as programs differ in its sign."""
+    key = "helix_angle_reference_diameter"
+    if gear.type == "ring_gear" and mates:
+        angle = needed(mates[0].quantity(key, "deg"), mates[0], key)
+        return read(tidy(angle), f"{key}, with the hand of {mates[0]}, as internal pairs have")
+    return read(tidy(needed(gear.quantity(key, "deg"), gear, key)), key)
+
+
+def _shift(flank: Component | None, internal: bool) -> Entry | None:
+    value = flank.quantity("addendum_modification_coefficient") if flank else None
+    if value is None:
+        return None
+    source = "addendum_modification_coefficient of the flanks"
+    return read(tidy(-value if internal else value), source + (", positive for a larger ring" if internal else ""))
+
+
+def _diameter(gear: Component, key: str) -> Entry | None:
+    value = gear.quantity(key, "mm")
+    return read(tidy(abs(value)), key) if value else None
+
+
+def _tip(gear: Component, reference: float, notes: Notes) -> Entry | None:
+    """Tip diameter, unless it is a placeholder; `reference` is teeth times normal module, mm."""
+    tip = _diameter(gear, "tip_diameter")
+    if tip is None or PLAUSIBLE_TIP[0] <= tip.value / reference <= PLAUSIBLE_TIP[1]:
+        return tip
+    notes.changed.append(f"{gear}: tip_diameter of {tip.value:g} mm cannot be meant, replaced by that of the rack")
+    return None
+
+
+def _of_tool(tool: Component | None, internal: bool, key: str, usual: float) -> Entry:
+    """Factor of the tool that makes the root: of a rack, which an internal gear has none of."""
+    value = tool.quantity(key) if tool else None
+    if tool is None or value is None or value < 0.0:
+        return assumed(usual, "the file gives no tool")
+    if internal:
+        return assumed(tidy(value), f"{key} of {tool}: the fillet is an arc instead of that cut by the wheel")
+    return read(tidy(value), f"{key} of {tool}")
+
+
+def _thinning(gear: Component, module: float) -> Entry:
+    ends = [gear.quantity(f"chordal_transverse_tooth_thickness_{end}_deviation", "mm") for end in ("upper", "lower")]
+    if ends[0] is not None and ends[1] is not None:
+        return read(tidy(max(0.0, -0.5 * (ends[0] + ends[1]))), "mean of the tooth thickness deviations")
+    series = gear.text("tooth_thickness_deviation_tolerance_series_din_3967_1978")
+    why = f"the file gives only the tolerance {series}" if series not in ("", "False") else "the file gives none"
+    return assumed(tidy(round(THINNING * module, 6)), f"{THINNING:g} normal modules; {why}")
+
+
+def material_of(model: Model, part: Component) -> Component | None:
+    """Material that a component refers to."""
+    found = model.related("reference", "origin", part.number, "referenced")
+    return next((one for one in found if one.type == "material"), None)
+
+
+def is_rigid(material: Component | None) -> bool:
+    """Tell whether a material stands for 'rigid'."""
+    modulus = material.quantity("elastic_modulus", "MPa") if material else None
+    return modulus is not None and modulus > RIGID_MODULUS
+
+
+def material_table(material: Component | None) -> Entry | None:
+    """Inline table of a material, as far as it says anything and is none that stands for 'rigid'."""
+    if material is None or is_rigid(material):
+        return None
+    values = {
+        "youngs_modulus_GPa": (material.quantity("elastic_modulus", "MPa"), 1e-3),
+        "poissons_ratio": (material.quantity("poisson_ratio"), 1.0),
+        "density_kg_per_m3": (material.quantity("density", "kg / m^3"), 1.0),
+    }
+    given = {key: tidy(value * factor) for key, (value, factor) in values.items() if value is not None}
+    return read(given, str(material)) if given else None
