@@ -64,8 +64,8 @@ def contributions(gearset: Gearset, speed: float, line: int) -> Contributions:
     forces, loads = _excitation(gearset, speed, line)
     dynamic = _dynamic(gearset, speed, frequency)
     # One solution from either side: what the signal sees of any load, and what moves under these loads.
-    adjoint: Complexes = np.linalg.solve(dynamic.T, row.astype(np.complex128))
-    motion: Complexes = np.linalg.solve(dynamic, loads)
+    adjoint = np.linalg.solve(dynamic.T, row.astype(np.complex128)).astype(np.complex128)
+    motion = np.linalg.solve(dynamic, loads).astype(np.complex128)
     total = complex(row @ motion)
     meshes: dict[str, float] = {}
     for wave, part in zip(gearset.waves.waves, adjoint @ forces, strict=True):
