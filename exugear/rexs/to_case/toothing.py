@@ -15,6 +15,8 @@ THINNING = 0.02
 """Tooth thinning assumed where the file gives none, in normal modules: half of a usual backlash."""
 EQUAL = 1e-6
 """Largest difference of numbers on equal flanks or planets."""
+LEAST_RADIUS = 0.2
+"""Least radius of a tool's corner that the tooth model can have in all cases, in normal modules."""
 RIGID_MODULUS = 1e6
 """Young's modulus (MPa) above which a material stands for 'rigid'; the stiffest there are have less."""
 MODIFICATIONS = (
@@ -97,7 +99,7 @@ def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes
         tip=_tip(gear, teeth * module, notes),
         root=_diameter(gear, "root_diameter"),
         dedendum=_of_tool(tool, internal, "addendum_coefficient_reference_profile", 1.25),
-        tip_radius=_of_tool(tool, internal, "tip_corner_radius_factor_reference_profile", 0.25 if tool else 0.38),
+        tip_radius=_rounded(_of_tool(tool, internal, "tip_corner_radius_factor_reference_profile", 0.38)),
         thinning=_thinning(gear, module),
         chamfer=chamfer,
         internal=internal,
@@ -190,6 +192,13 @@ def _of_tool(tool: Component | None, internal: bool, key: str, usual: float) -> 
     if internal:
         return assumed(tidy(value), f"{key} of {tool}: the fillet is an arc instead of that cut by the wheel")
     return read(tidy(value), f"{key} of {tool}")
+
+
+def _rounded(radius: Entry) -> Entry:
+    """Return the radius of the tool's corner; a sharp one gets a radius, as the tooth model wants a fillet."""
+    if radius.value >= LEAST_RADIUS:
+        return radius
+    return assumed(LEAST_RADIUS, f"the file says {radius.value:g}, a corner too sharp for the tooth model")
 
 
 def _thinning(gear: Component, module: float) -> Entry:
