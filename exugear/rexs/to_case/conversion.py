@@ -26,11 +26,10 @@ from exugear.rexs.to_case.body_blocks import (
 )
 from exugear.rexs.to_case.gear_blocks import gear_blocks, mesh_blocks, pair_blocks, teeth_of
 from exugear.rexs.to_case.loads import Ends, Loads, ends_of, load_case_blocks, loads_of, static_load
-from exugear.rexs.to_case.notes import Block, Entry, Notes, assumed, derived, read, tidy
+from exugear.rexs.to_case.modifications import MODIFICATIONS
+from exugear.rexs.to_case.notes import Block, Entry, Notes, assumed, derived, read, tidy, toml_text
 from exugear.rexs.to_case.places import Places
 from exugear.rexs.to_case.supports import BEARINGS, PLAIN_BEARINGS, bearing_blocks, coupling_blocks, joint_blocks
-from exugear.rexs.to_case.text import toml_text
-from exugear.rexs.to_case.toothing import modified_flanks
 from exugear.rexs.tree import Model
 
 OTHER_GEARS = {"bevel": "bevel gears", "worm": "worm gears", "hypoid": "hypoid gears"}
@@ -55,6 +54,7 @@ READ_TYPES = frozenset(
         "cylindrical_gear_flank",
         "rack_shaped_tool",
         "cutter_wheel_tool",
+        *MODIFICATIONS,
         "material",
         "rolling_bearing_row",
         "rolling_element",
@@ -245,7 +245,6 @@ def _head(model: Model, source: str, notes: Notes) -> list[str]:
 
 def _note_ignored(model: Model, notes: Notes) -> None:
     """List the types of components of which nothing was read."""
-    notes.changed += modified_flanks(model)
     counts: dict[str, int] = {}
     for part in model.components.values():
         if part.type not in READ_TYPES:

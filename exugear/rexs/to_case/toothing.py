@@ -19,20 +19,6 @@ LEAST_RADIUS = 0.2
 """Least radius of a tool's corner that the tooth model can have in all cases, in normal modules."""
 RIGID_MODULUS = 1e6
 """Young's modulus (MPa) above which a material stands for 'rigid'; the stiffest there are have less."""
-MODIFICATIONS = (
-    "tip_relief",
-    "root_relief",
-    "triangular_tip_relief",
-    "triangular_root_relief",
-    "profile_crowning",
-    "profile_slope",
-    "profile_twist",
-    "helix_crowning",
-    "helix_slope",
-    "end_relief_datum_face",
-    "end_relief_non_datum_face",
-    "topographical_modification",
-)
 
 
 @dataclass(frozen=True)
@@ -122,14 +108,6 @@ def _flank(model: Model, gear: Component) -> Component | None:
                 f"{gear}: left and right flank differ in {key} ({one} and {other}); only equal flanks can be imported"
             )
     return left[0]
-
-
-def modified_flanks(model: Model) -> list[str]:
-    """Lines on flank modifications, which are not imported yet."""
-    return [
-        f"{part}: flank modification not imported, give it in [gears.NAME.modification]"
-        for part in model.of_type(*MODIFICATIONS)
-    ]
 
 
 def _tool(model: Model, gear: Component) -> Component | None:
