@@ -248,8 +248,8 @@ def _entries(model: Model, gear: Toothing, z: float, sections: Sequence[Cylinder
     if gear.root is not None:
         entries["root_diameter_mm"] = gear.root
     rack = {"addendum": 1.0, "dedendum": gear.dedendum.value, "tip_radius": gear.tip_radius.value}
-    tip = "given" if gear.tip is not None else "assumed (A)"
-    parts = (f"addendum {tip}", f"dedendum: {gear.dedendum.comment}", f"tip radius: {gear.tip_radius.comment}")
+    tip = "addendum: tip_diameter_mm counts" if gear.tip is not None else "addendum: A"
+    parts = (tip, f"dedendum: {gear.dedendum.comment}", f"tip radius: {gear.tip_radius.comment}")
     entries["rack"] = Entry(rack, "; ".join(" ".join(part.split()) for part in parts))
     material = material_of(model, gear.part)
     table = material_table(material)

@@ -148,6 +148,9 @@ def _table(name: str, block: Block) -> Iterator[str]:
 
 
 def _line(key: str, entry: Entry) -> str:
+    if isinstance(entry.value, list) and any(isinstance(one, Mapping) for one in entry.value):
+        rows = "".join(f"    {toml_value(one)},\n" for one in entry.value)
+        return f"{_with_comment(f'{key} = [', entry.comment)}\n{rows}]"
     return _with_comment(f"{key} = {toml_value(entry.value)}", entry.comment)
 
 

@@ -234,6 +234,18 @@ def test_every_number_has_its_source_or_a_mark(name, imported):
     assert any(re.search(r"# A ", line) for line in lines)
 
 
+def test_what_is_left_out_is_listed_by_type_and_attribute(imported):
+    ignored = "\n".join(imported(PLANETARY).ignored)
+    assert "cylindrical_stage_gear_data, 12 of them" in ignored
+    assert re.search(r"^material: .*thermal_capacity", ignored, re.M)
+    assert not re.search(
+        r"^(shaft|cylindrical_gear|side_plate): .*(support_vector|number_of_teeth|length)", ignored, re.M
+    )
+    head = imported(PLANETARY).text.split("\nname = ")[0]
+    assert all(line.startswith("#") for line in head.splitlines() if line)
+    assert "cylindrical_stage_gear_data, 12 of them" in head
+
+
 CONTRADICTIONS = {
     "centre distance": (
         'unit="mm">53.0<',

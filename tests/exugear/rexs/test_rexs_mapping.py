@@ -253,3 +253,8 @@ def test_a_file_without_torque_gets_one_that_is_marked():
     line = next(line for line in made.text.splitlines() if line.startswith("torques_N_m"))
     assert "# A" in line
     assert "SET IT" in line
+
+
+def test_a_fault_of_the_gearbox_file_names_the_components_it_is_about():
+    with pytest.raises(RexsError, match="^pairs.stage_1: .*pairs.stage_1 is cylindrical_stage 6 'Stirnradstufe'"):
+        gearbox_of(with_values(SEW, {34: {"root_diameter": 79.0}}))
