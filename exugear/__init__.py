@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from exugear.report.writer import write_report
     from exugear.runs.outcome import Run
     from exugear.runs.runup import simulate
+    from exugear.steady.steady_response import steady_response
 
 #: Public names and the modules they stand in.
 _HOMES = {
@@ -30,6 +31,7 @@ _HOMES = {
     "eigenmodes": "exugear.dynamics.modes",
     "simulate": "exugear.runs.runup",
     "static_state": "exugear.dynamics.statics",
+    "steady_response": "exugear.steady.steady_response",
     "write_report": "exugear.report.writer",
 }
 
@@ -44,6 +46,7 @@ __all__ = [
     "eigenmodes",
     "simulate",
     "static_state",
+    "steady_response",
     "write_report",
 ]
 

@@ -28,6 +28,8 @@ from exugear.results.run_file import FINAL_NAME
 from exugear.runs.outcome import Run
 from exugear.runs.run_folder import run_directory
 from exugear.runs.runup import simulate
+from exugear.steady.settings import SteadySettings, usual_speeds
+from exugear.steady.steady_file import steady_path, stored_or_computed
 from exugear.tooth_mesh.law import MeshData
 from exugear.tooth_mesh.laws.registry import LAWS
 from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
@@ -36,6 +38,8 @@ from exugear.tooth_mesh.tables import TableRequest, missing_tables, requested_ta
 from fe_ste.transmission_error.table import MeshTable
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from exugear.report.writer import Report
 
 
@@ -212,6 +216,28 @@ class Project:
             modes = eigenmodes(self.gearbox, choice, stiffness, bodies)
             modes.save(self.modes_path)
         return modes
+
+    def steady(
+        self, settings: SteadySettings | None = None, progress: Callable[[int, int], None] | None = None
+    ) -> xr.Dataset:
+        """Steady response over speed, written to `steady_path`; one that is there and fits is taken as it is.
+
+        Parameters
+        ----------
+        settings : SteadySettings, optional
+            Speeds and level; those that the first load case passes, and `parametric`, by default.
+        progress : callable, optional
+            Called with the number of speeds that are solved, and of all.
+        """
+        settings = settings or SteadySettings(usual_speeds(self.gearbox))
+        assembly, choice = self.assembly(), self.choice
+        self.keep_case()
+        with time_noted(self.folder, f"steady, {choice.variant}, {choice.inertias}, {choice.mesh_law}"):
+            return stored_or_computed(self.steady_path(settings), assembly, settings, progress)
+
+    def steady_path(self, settings: SteadySettings) -> Path:
+        """File of the steady response."""
+        return steady_path(self.folder, self.choice, settings)
 
     def bearings(self) -> tuple[BearingDuty, ...]:
         """Find what catalogue bearings bear at the static load, written to `bearings_path`."""

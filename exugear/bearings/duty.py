@@ -9,7 +9,14 @@ import numpy as np
 
 from exugear.bearings.operating_point import OperatingPoint, cage_angles
 from exugear.bearings.rolling.catalogue import catalogue_rows, estimates, with_estimate
-from exugear.bearings.rolling.contact import BearingState, bearing_state, equilibrium, row_contacts, tangent_stiffness
+from exugear.bearings.rolling.contact import (
+    BearingState,
+    bearing_state,
+    equilibrium,
+    is_preloaded,
+    row_contacts,
+    tangent_stiffness,
+)
 from exugear.bearings.rolling.life import basic_rating_life, minimum_load, reference_life
 from exugear.bearings.rolling.ratings import (
     basic_dynamic_rating,
@@ -172,7 +179,9 @@ def _remarks(point: OperatingPoint, ratings: Ratings, reaction: Floats | None) -
     remarks = []
     if point.is_unloaded:
         remarks.append("carries hardly anything: stiffness at a hundredth of its dynamic rating")
-    elif math.hypot(point.radial_load, float(point.load[2])) < minimum_load(ratings.dynamic, section.type):
+    elif not is_preloaded(rows) and math.hypot(point.radial_load, float(point.load[2])) < minimum_load(
+        ratings.dynamic, section.type
+    ):
         remarks.append("carries less than what rolling elements need to roll, by the usual rule: they may slide")
     if reaction is not None:
         found = math.hypot(reaction[0], reaction[1])

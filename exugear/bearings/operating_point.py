@@ -12,7 +12,7 @@ from exugear.bearings import matrices
 from exugear.bearings.rolling.catalogue import catalogue_rows
 from exugear.bearings.rolling.contact import (
     bearing_load,
-    elastic_energy,
+    is_preloaded,
     pitch_averaged_tangent,
     row_contacts,
     tangent_stiffness,
@@ -118,8 +118,7 @@ def operating_point(
         contacts = row_contacts(rows, angle)
         stiffness += tangent_stiffness(contacts, displacement) / CAGE_POSITIONS
     least = LEAST_LOAD * basic_dynamic_rating(rows, bearing.catalogue.type)
-    is_preloaded = elastic_energy(row_contacts(rows), np.zeros(6)) > 0.0
-    is_unloaded = not is_preloaded and float(np.linalg.norm(load[:3])) < least
+    is_unloaded = not is_preloaded(rows) and float(np.linalg.norm(load[:3])) < least
     if is_unloaded:
         stiffness = pitch_averaged_tangent(BearingOfRows(rows), holding_force(rows, least))
     if is_unloaded or not load_stands_still:

@@ -10,8 +10,8 @@ from functools import cached_property
 import numpy as np
 
 from exugear.bodies.reduced_body import TILT_X, TILT_Y, UX, UY, UZ, ReducedBody
-from exugear.kernels.coordinates import SPIN
-from exugear.kernels.elastic import LANES
+from exugear.kernels.coordinates import BODY_SIZE, SPIN
+from exugear.kernels.products import filled_up, laid_out, rectangular_tiles, symmetric_tiles
 from exugear.kernels.turning import TurningArrays
 from fe_ste.tools.arrays import Floats
 
@@ -151,11 +151,16 @@ def turning_arrays(bodies: Iterable[tuple[int, TurningBody]]) -> TurningArrays:
     """Arrays of bodies, each with its first coordinate in the state."""
     given = list(bodies)
     sizes = np.array([body.reduced.size for _, body in given], dtype=np.int64)
-    columns = -(-sizes // LANES) * LANES
+    def moved(body: TurningBody) -> Floats:
+        """Mass matrix times a motion of all seats along each axis by one, (3, size)."""
+        motion = np.zeros((3, body.reduced.size))
+        for axis in range(3):
+            motion[axis, axis : BODY_SIZE * body.seat_count : BODY_SIZE] = 1.0
+        return np.asarray(motion @ body.reduced.mass)
 
-    def row_by_row(matrices: Iterable[Floats]) -> Floats:
-        padded = [np.pad(matrix, ((0, 0), (0, -len(matrix) % LANES))).ravel() for matrix in matrices]
-        return np.concatenate([np.zeros(0), *padded])
+    inverses = [np.asarray(np.linalg.inv(body.reduced.mass), dtype=np.float64) for _, body in given]
+    stiffness, square = laid_out(symmetric_tiles(-body.reduced.stiffness) for _, body in given)
+    coriolis, across = laid_out(rectangular_tiles(-body.coriolis) for _, body in given)
 
     def joined(vectors: Iterable[Floats]) -> Floats:
         return np.concatenate([np.zeros(0), *vectors])
@@ -164,16 +169,18 @@ def turning_arrays(bodies: Iterable[tuple[int, TurningBody]]) -> TurningArrays:
         begin=np.array([begin for begin, _ in given], dtype=np.int64),
         size=sizes,
         seats=np.array([body.seat_count for _, body in given], dtype=np.int64),
-        columns=columns,
+        columns=np.array([filled_up(int(size)) for size in sizes], dtype=np.int64),
         first=np.cumsum(sizes) - sizes,
         spin=joined(body.reduced.spin for _, body in given),
         weight=joined(body.angle_weights for _, body in given),
         pull=joined(body.centrifugal for _, body in given),
-        square=np.cumsum(sizes * columns) - sizes * columns,
-        stiffness=row_by_row(body.reduced.stiffness for _, body in given),
-        coriolis=row_by_row(body.coriolis for _, body in given),
-        mass=row_by_row(body.reduced.mass for _, body in given),
-        inverse=row_by_row(np.asarray(np.linalg.inv(body.reduced.mass), dtype=np.float64) for _, body in given),
+        square=square,
+        stiffness=stiffness,
+        mass=laid_out(symmetric_tiles(body.reduced.mass) for _, body in given)[0],
+        inverse=laid_out(symmetric_tiles(inverse) for inverse in inverses)[0],
+        across=across,
+        coriolis=coriolis,
         damping_time=np.array([body.damping_time for _, body in given], dtype=np.float64),
         gravity=np.array([body.gravity for _, body in given], dtype=np.float64).reshape(-1, 3),
+        moving=np.concatenate([np.zeros((3, 0)), *(moved(body) for _, body in given)], axis=1),
     )

@@ -132,12 +132,14 @@ def model_errors() -> Iterator[None]:
     from exugear.bearings.rolling.rows import BearingError
     from exugear.dynamics.assembly import VariantError
     from exugear.dynamics.statics import BalanceError
+    from exugear.harmonics.krylov import HarmonicBalanceError
     from exugear.model.reading import CaseError
+    from exugear.rotating.rotating_frame import SteadyError
     from exugear.tooth_mesh.placement import MeshError
 
     try:
         yield
-    except (CaseError, VariantError, MeshError, BearingError) as error:
+    except (CaseError, VariantError, MeshError, BearingError, SteadyError) as error:
         raise BadInputError(error) from error
-    except BalanceError as error:
+    except (BalanceError, HarmonicBalanceError) as error:
         raise FailedError(error) from error

@@ -25,14 +25,7 @@ from exugear.bearings.support_laws import law_in_words
 from exugear.bodies.elastic_body import ElasticBody
 from exugear.bodies.floating_body import FloatingBody
 from exugear.bodies.turning_frame import TurningBody, turning_arrays
-from exugear.kernels.connectors import (
-    DISPLACEMENT,
-    ConnectorArrays,
-    add_connector_forces,
-    connector_load,
-    connector_motion,
-)
-from exugear.kernels.coordinates import BODY_SIZE
+from exugear.kernels.connectors import ConnectorArrays, add_connector_forces, connector_loads, connector_strains
 from exugear.kernels.elastic import ElasticArrays, add_elastic_forces, scratch_for, set_elastic_accelerations
 from exugear.kernels.inertia import InertiaArrays, accelerations
 from exugear.kernels.meshes import STATE_SIZE, MeshArrays, gear_positions
@@ -371,19 +364,11 @@ class Assembly:
 
     def bearing_loads(self, q: Floats, v: Floats) -> Floats:
         """Force and moment that each bearing takes from its body, (bearings, 6), global axes, N and N m."""
-        loads, arms = np.zeros((len(self.connector_names), 6)), np.zeros((2, 3))
-        for n, load in enumerate(loads):
-            connector_load(q, v, n, self.connectors, arms, load)
-        return loads
+        return connector_loads(q, v, self.connectors)
 
     def support_strains(self, q: Floats) -> Floats:
         """Displacement of each support's body against what it sits on, (supports, 6), in the axes of the latter."""
-        strains, rest = np.zeros((len(self.connector_names), BODY_SIZE)), np.zeros_like(q)
-        turn, arms, motion = np.empty((3, 3)), np.empty((2, 3)), np.empty((3, BODY_SIZE))
-        for n in range(len(strains)):
-            connector_motion(q, rest, n, self.connectors, turn, arms, motion)
-            strains[n] = motion[DISPLACEMENT]
-        return strains
+        return connector_strains(q, self.connectors)
 
     def mesh_states(self, q: Floats, v: Floats, meshes: MeshArrays | None = None) -> Floats:
         """State of each mesh, (meshes, 10): columns as named in `exugear.kernels.meshes`."""

@@ -11,7 +11,7 @@ import scipy.linalg
 
 from exugear.bodies.turning_frame import TurningBody
 from exugear.dynamics.assembly import Assembly
-from exugear.kernels.connector_tangents import add_connector_tangents
+from exugear.kernels.connectors import add_connector_tangents
 from exugear.kernels.meshes import MeshArrays
 from exugear.kernels.springs import SpringArrays, add_spring_forces
 from fe_ste.tools.arrays import Floats
@@ -62,10 +62,10 @@ def linearise(assembly: Assembly, q: Floats, meshes: MeshArrays | None = None) -
     for n, name in enumerate(assembly.mesh_names):
         jq, jv = assembly.mesh_jacobians(q, rest, averaged.one(n))
         stiffness[name], damping[name] = -jq, -jv
+    steps, number = _connector_steps(assembly), np.arange(len(assembly.connector_names))
     for n, name in enumerate(assembly.connector_names):
         stiffness[name], damping[name] = np.zeros((assembly.size,) * 2), np.zeros((assembly.size,) * 2)
-        step = _connector_step(assembly, n)
-        add_connector_tangents(q, n, step, assembly.connectors, stiffness[name], damping[name])
+        add_connector_tangents(q, steps * (number == n), assembly.connectors, stiffness[name], damping[name])
     for n, name in enumerate(assembly.spring_names):
         spring = SpringArrays._make(values[n : n + 1] for values in assembly.springs)
         stiffness[name], damping[name] = _tangents(assembly.size, q, spring, add_spring_forces)
@@ -90,8 +90,7 @@ def tangent_stiffness(assembly: Assembly, q: Floats, meshes: MeshArrays) -> Floa
     """
     size, rest = assembly.size, np.zeros(assembly.size)
     stiffness, damping = -assembly.mesh_jacobians(q, rest, meshes)[0], np.zeros((size, size))
-    for n in range(len(assembly.connector_names)):
-        add_connector_tangents(q, n, _connector_step(assembly, n), assembly.connectors, stiffness, damping)
+    add_connector_tangents(q, _connector_steps(assembly), assembly.connectors, stiffness, damping)
     for i, (first, second) in enumerate(assembly.springs.coordinates):
         for one, other in ((first, second), (second, first)):
             stiffness[one, one] += assembly.springs.stiffness[i]
@@ -107,10 +106,10 @@ def tangent_stiffness(assembly: Assembly, q: Floats, meshes: MeshArrays) -> Floa
     return np.asarray(stiffness)
 
 
-def _connector_step(assembly: Assembly, n: int) -> float:
-    """Step of the differences that fits connector n."""
-    first = assembly.connectors.rolling.first
-    return ROLLING_STEP if first[n + 1] > first[n] else DIFFERENCE_STEP
+def _connector_steps(assembly: Assembly) -> Floats:
+    """Step of the differences that fits each connector."""
+    rows = np.diff(assembly.connectors.rolling.first)
+    return np.where(rows > 0, ROLLING_STEP, DIFFERENCE_STEP)
 
 
 def _add_turning_forces(q: Floats, v: Floats, element: tuple[slice, TurningBody], f: Floats) -> None:

@@ -28,6 +28,9 @@ ARM, POSITION, VELOCITY, ANGULAR_VELOCITY = range(4)
 """Rows of `body_point`."""
 DISPLACEMENT, RATE, TRUE_RATE = range(3)
 """Rows of `connector_motion`."""
+_NONE = np.zeros(0)
+_ROOMS = {"strains": np.zeros((0, 0)), "loads": np.zeros((0, 0)), "f": _NONE, "tangents": np.zeros((0, 0, 0))}
+"""What `pass_connectors` fills, without room for it."""
 
 
 class ConnectorArrays(NamedTuple):
@@ -212,18 +215,110 @@ def add_wrench(q: Floats, start: int, sign: float, load: Floats, arm: Floats, f:
 
 
 @compiled
+def add_differences(
+    q: Floats, n: int, step: float, connectors: ConnectorArrays, state: Floats, tangents: Floats
+) -> None:
+    """Add minus the derivatives of connector n's forces to tangents (2, size, size), at rest; a cage's torque left out.
+
+    Central differences with `step` by each coordinate, a row, and by its rate; the state (2, size) is q at rest, and is
+    so again. Differences, because axes, arms and angles depend on the coordinates, too.
+    """
+    load, arms = np.empty(BODY_SIZE), np.empty((2, 3))
+    ends = connectors.bodies[n]
+    for k in range(2 * BODY_SIZE):
+        c = ends[k // BODY_SIZE] + k % BODY_SIZE
+        if ends[k // BODY_SIZE] < 0:
+            continue
+        for of_rate in range(2):
+            before = state[of_rate, c]
+            for sign in (-1.0, 1.0):
+                state[of_rate, c] = before + sign * step
+                connector_load(state[0], state[1], n, connectors, arms, load)
+                for i in range(BODY_SIZE):
+                    load[i] *= -sign / (2.0 * step)
+                add_wrench(state[0], ends[0], 1.0, load, arms[0], tangents[of_rate, c])
+                add_wrench(state[0], ends[1], -1.0, load, arms[1], tangents[of_rate, c])
+            state[of_rate, c] = before
+
+
+@compiled
+def pass_connectors(
+    q: Floats,
+    v: Floats,
+    steps: Floats,
+    connectors: ConnectorArrays,
+    strains: Floats,
+    loads: Floats,
+    f: Floats,
+    tangents: Floats,
+) -> None:
+    """Do for all connectors what the functions below say, where there is room for it.
+
+    One function does all, so that the law is compiled once.
+    """
+    turn, motion, arms, load = np.empty((3, 3)), np.empty((3, BODY_SIZE)), np.empty((2, 3)), np.empty(BODY_SIZE)
+    state = np.zeros((2, q.size))
+    for i in range(q.size):
+        state[0, i] = q[i]
+    for n in range(connectors.bodies.shape[0]):
+        if strains.size > 0:
+            connector_motion(q, v, n, connectors, turn, arms, motion)
+            for i in range(BODY_SIZE):
+                strains[n, i] = motion[DISPLACEMENT, i]
+        if f.size > 0 or loads.size > 0:
+            torque = connector_load(q, v, n, connectors, arms, load)
+            for i in range(BODY_SIZE if loads.size > 0 else 0):
+                loads[n, i] = load[i]
+            if f.size > 0:
+                first, second = connectors.bodies[n]
+                add_wrench(q, first, 1.0, load, arms[0], f)
+                add_wrench(q, second, -1.0, load, arms[1], f)
+                if first >= 0:
+                    f[first + SPIN] += torque
+                if second >= 0:
+                    f[second + SPIN] -= torque
+        if tangents.size > 0 and steps[n] > 0.0:
+            add_differences(q, n, steps[n], connectors, state, tangents)
+
+
+def _pass(q: Floats, v: Floats, connectors: ConnectorArrays, steps: Floats = _NONE, **rooms: Floats) -> None:
+    places = (rooms.get(name, none) for name, none in _ROOMS.items())
+    pass_connectors(q, v, steps, connectors, *places)
+
+
 def add_connector_forces(q: Floats, v: Floats, connectors: ConnectorArrays, f: Floats) -> None:
     """Add the generalized forces of all connectors to f."""
-    load, arms = np.empty(BODY_SIZE), np.empty((2, 3))
-    for n in range(connectors.bodies.shape[0]):
-        torque = connector_load(q, v, n, connectors, arms, load)
-        first, second = connectors.bodies[n]
-        add_wrench(q, first, 1.0, load, arms[0], f)
-        add_wrench(q, second, -1.0, load, arms[1], f)
-        if first >= 0:
-            f[first + SPIN] += torque
-        if second >= 0:
-            f[second + SPIN] -= torque
+    _pass(q, v, connectors, f=f)
+
+
+def connector_loads(q: Floats, v: Floats, connectors: ConnectorArrays) -> Floats:
+    """Force and moment (c, 6) that each connector takes from its second body, global axes, N and N m."""
+    loads = np.zeros((len(connectors.bodies), BODY_SIZE))
+    _pass(q, v, connectors, loads=loads)
+    return loads
+
+
+def connector_strains(q: Floats, connectors: ConnectorArrays) -> Floats:
+    """Displacement (c, 6) of each connector's second body against the first, in the axes of that, m and rad."""
+    strains = np.zeros((len(connectors.bodies), BODY_SIZE))
+    _pass(q, np.zeros_like(q), connectors, strains=strains)
+    return strains
+
+
+def add_connector_tangents(
+    q: Floats, steps: Floats, connectors: ConnectorArrays, stiffness: Floats, damping: Floats
+) -> None:
+    """Add minus the derivatives (size, size) of the connectors' forces to coordinates q and to velocities, at rest.
+
+    Parameters
+    ----------
+    steps : (c,) array
+        Of the central differences, m or rad, and per second; connectors with 0 are left out.
+    """
+    tangents = np.zeros((2, q.size, q.size))
+    _pass(q, np.zeros_like(q), connectors, steps, tangents=tangents)
+    stiffness += tangents[0].T
+    damping += tangents[1].T
 
 
 def no_connectors() -> ConnectorArrays:

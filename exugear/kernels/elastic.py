@@ -9,14 +9,22 @@ Seats have the coordinates of `exugear.kernels.coordinates`; what vibrates betwe
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from fe_ste.tools.arrays import Booleans, Floats, Integers
+from exugear.kernels.products import (
+    add_rows,
+    add_symmetric,
+    filled_up,
+    laid_out,
+    rectangular_tiles,
+    square_form,
+    symmetric_tiles,
+)
+from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import kernel, summing_kernel
-from fe_ste.tools.octets import all_eight, eight, sum_of
+from fe_ste.tools.octets import SIZE, aligned_zeros, all_eight, put
 
 
 class ElasticArrays(NamedTuple):
@@ -61,22 +69,22 @@ def no_elastic() -> ElasticArrays:
     )
 
 
-def scratch_for(elastic: ElasticArrays) -> Floats:
-    """Memory that the functions below work in."""
-    return np.zeros((2, 3 * int(np.diff(elastic.first).max(initial=1)) + LANES))
+def scratch_for(elastic: ElasticArrays | ElasticMotion) -> Floats:
+    """Memory (3, n) that the functions below work in, for the largest block."""
+    size = filled_up(int(np.diff(elastic.first).max(initial=1)))
+    return aligned_zeros(3 * size).reshape(3, size)
 
 
 class ElasticMotion(NamedTuple):
-    """The same blocks solved for their accelerations, arranged for speed.
+    """The same blocks arranged for speed.
 
     Attributes
     ----------
     first, coordinate, spin, momentum, turning, partner, damping_time : as in `ElasticArrays`
-    acted : (b,) number of each block's first coordinates beyond which no outer force acts
-    columns : (b,) columns of each block's matrix, filled up with zeros to a multiple of `LANES`
-    begin : (b,) first entry of each block in `matrix`
-    matrix : blocks row by row: M^-1 (its first columns), -M^-1 K, -M^-1 G, which act on outer forces, q + time v and
-        Omega v of the partner; filled up with zeros to a multiple of `ROWS` rows
+    square : (b,) first entry of each block in `stiffness`, `mass` and `inverse`
+    stiffness, mass, inverse : tiles of -K, M and the inverse of M, see `exugear.kernels.products`
+    across : (b,) first entry of each block in `gyroscopic`
+    gyroscopic : tiles of -G
     """
 
     first: Integers
@@ -86,42 +94,29 @@ class ElasticMotion(NamedTuple):
     turning: Integers
     partner: Integers
     damping_time: Floats
-    acted: Integers
-    columns: Integers
-    begin: Integers
-    matrix: Floats
+    square: Integers
+    stiffness: Floats
+    mass: Floats
+    inverse: Floats
+    across: Integers
+    gyroscopic: Floats
 
 
-LANES, ROWS = 8, 4
-"""Products taken together: what two registers of a processor hold, and of as many rows."""
-
-
-def elastic_motion(elastic: ElasticArrays, acted: Booleans) -> ElasticMotion:
-    """Solve all blocks for their accelerations.
-
-    Parameters
-    ----------
-    elastic : ElasticArrays
-    acted : (size,) array of bool
-        Coordinates of the system that forces act on from outside: seats, not what goes on between them.
-    """
+def elastic_motion(elastic: ElasticArrays) -> ElasticMotion:
+    """Arrange all blocks for `set_elastic_motion`."""
     sizes = np.diff(elastic.first)
     across = np.where(elastic.partner >= 0, sizes[elastic.partner], 0)
-    seats = [np.flatnonzero(acted[elastic.coordinate[begin:end]]) for begin, end in pairwise(elastic.first)]
-    forces = np.array([seat.max(initial=-1) + 1 for seat in seats], dtype=np.int64)
-    columns = -(-(forces + sizes + across) // LANES) * LANES
-    blocks: list[Floats] = [np.zeros(0)]
-    for b, size in enumerate(sizes):
-        inverse, stiffness = (
-            matrix[elastic.square[b] : elastic.square[b] + size**2].reshape(size, size).T
-            for matrix in (elastic.inverse, elastic.stiffness)
-        )
-        begin = elastic.across[b]
-        gyroscopic = elastic.gyroscopic[begin : begin + size * across[b]].reshape(across[b], size).T
-        whole = np.zeros((-(-size // ROWS) * ROWS, columns[b]))
-        known = np.hstack([inverse[:, : forces[b]], -inverse @ stiffness, -inverse @ gyroscopic])
-        whole[:size, : known.shape[1]] = known
-        blocks.append(whole.ravel())
+
+    def squares(matrices: Floats, sign: float) -> tuple[Floats, Integers]:
+        blocks = (matrices[begin : begin + n**2].reshape(n, n) for begin, n in zip(elastic.square, sizes, strict=True))
+        return laid_out(symmetric_tiles(sign * block) for block in blocks)
+
+    def rectangle(b: int) -> Floats:
+        begin, shape = elastic.across[b], (across[b], sizes[b])
+        return -elastic.gyroscopic[begin : begin + sizes[b] * across[b]].reshape(shape).T
+
+    stiffness, square = squares(elastic.stiffness, -1.0)
+    gyroscopic, begins = laid_out(rectangular_tiles(rectangle(b)) for b in range(sizes.size))
     return ElasticMotion(
         first=elastic.first,
         coordinate=elastic.coordinate,
@@ -130,10 +125,12 @@ def elastic_motion(elastic: ElasticArrays, acted: Booleans) -> ElasticMotion:
         turning=elastic.turning,
         partner=elastic.partner,
         damping_time=elastic.damping_time,
-        acted=forces,
-        columns=columns.astype(np.int64),
-        begin=np.cumsum([block.size for block in blocks])[:-1].astype(np.int64),
-        matrix=np.concatenate(blocks),
+        square=square,
+        stiffness=stiffness,
+        mass=squares(elastic.mass, 1.0)[0],
+        inverse=squares(elastic.inverse, 1.0)[0],
+        across=begins,
+        gyroscopic=gyroscopic,
     )
 
 
@@ -152,88 +149,98 @@ def row_product(matrix: Floats, begin: int | np.uint64, given: Floats, count: in
 
 
 @kernel
-def four_rows(matrix: Floats, begin: int, given: Floats, count: int) -> tuple[float, float, float, float]:
-    """Scalar products of four neighbouring rows of a flat matrix, from `begin` on, with a vector (count,).
-
-    Four at a time: the vector is read once for them, and four sums wait for each other less than one. The count is a
-    multiple of `LANES`.
-    """
-    a = all_eight(0.0)
-    b, c, d = a, a, a
-    second, third, fourth = begin + count, begin + 2 * count, begin + 3 * count
-    for j in range(0, count, LANES):
-        x = eight(given, j)
-        a = a + eight(matrix, begin + j) * x
-        b = b + eight(matrix, second + j) * x
-        c = c + eight(matrix, third + j) * x
-        d = d + eight(matrix, fourth + j) * x
-    return sum_of(a), sum_of(b), sum_of(c), sum_of(d)
+def gather_deformation(b: int, q: Floats, v: Floats, time: float, elastic: ElasticMotion, out: Floats) -> int:
+    """Fill q + time v of block b without the common turning, as `deformation`, and zeros behind; return the size."""
+    at = np.uint64  # places without a sign spare the question whether they count from the end: a third of the time
+    first, count = at(elastic.first[b]), at(elastic.first[b + 1] - elastic.first[b])
+    size = (count + at(SIZE - 1)) // at(SIZE) * at(SIZE)
+    common = q[at(elastic.coordinate[first])] * elastic.spin[first]
+    for i in range(count):
+        j = at(elastic.coordinate[first + i])
+        out[i] = (q[j] - common * elastic.spin[first + i]) + time * v[j]
+    for i in range(count, size):
+        out[i] = 0.0
+    return int(size)
 
 
 @kernel
-def set_rows(b: int, given: Floats, elastic: ElasticMotion, out: Floats) -> None:
-    """Set the accelerations of block b to the products of its matrix with a vector."""
-    begin, end, columns = elastic.first[b], elastic.first[b + 1], elastic.columns[b]
-    row = elastic.begin[b]
-    for i in range(begin, end, ROWS):
-        first, second, third, fourth = four_rows(elastic.matrix, row, given, columns)
-        out[elastic.coordinate[i]] = first
-        if i + 1 < end:
-            out[elastic.coordinate[i + 1]] = second
-        if i + 2 < end:
-            out[elastic.coordinate[i + 2]] = third
-        if i + 3 < end:
-            out[elastic.coordinate[i + 3]] = fourth
-        row += ROWS * columns
-
-
-@kernel
-def lane_product(matrix: Floats, begin: int, given: Floats, count: int) -> float:
-    """Scalar product of a row of a flat matrix, from `begin` on, with a vector (count,), a multiple of `LANES`."""
-    total = all_eight(0.0)
-    for j in range(0, count, LANES):
-        total = total + eight(matrix, begin + j) * eight(given, j)
-    return sum_of(total)
+def add_gyroscopic(b: int, size: int, v: Floats, elastic: ElasticMotion, given: Floats, sums: Floats) -> None:
+    """Add the gyroscopic forces of block b, if any, to sums; they come from the other plane's velocities."""
+    partner = elastic.partner[b]
+    if partner < 0:
+        return
+    block = elastic.turning[b]
+    speed = 0.0
+    for i in range(elastic.first[block], elastic.first[block + 1]):
+        speed += elastic.momentum[i] * v[elastic.coordinate[i]]
+    first = elastic.first[partner]
+    count = elastic.first[partner + 1] - first
+    across = (count + SIZE - 1) // SIZE * SIZE
+    for i in range(count):
+        given[i] = speed * v[elastic.coordinate[first + i]]
+    for i in range(count, across):
+        given[i] = 0.0
+    add_rows(elastic.gyroscopic, elastic.across[b], size, across, given, sums)
 
 
 @kernel
 def set_elastic_motion(
-    q: Floats, v: Floats, f: Floats, elastic: ElasticMotion | None, given: Floats, out: Floats
+    q: Floats, v: Floats, f: Floats, elastic: ElasticMotion | None, scratch: Floats, out: Floats
 ) -> None:
     """Fill the accelerations of all elastic bodies under generalized forces f, their own forces left out, into out.
 
-    As `add_elastic_forces` and `set_elastic_accelerations` together, in one pass over one matrix for each block.
-    `given` has room for three times the largest block and `LANES`. Nothing is done without elastic bodies (None).
+    As `add_elastic_forces` and `set_elastic_accelerations` together. `scratch` is that of `scratch_for`. Nothing is
+    done without elastic bodies (None).
     """
     if elastic is None:
         return
-    at = np.uint64  # places without a sign spare the question whether they count from the end: a third of the time
-    for b in range(at(elastic.turning.size)):
-        first, size, acted = at(elastic.first[b]), at(elastic.first[b + 1] - elastic.first[b]), at(elastic.acted[b])
-        # What the matrix acts on: outer forces, q + time v without the common turning, Omega v of the partner, zeros.
-        common = q[at(elastic.coordinate[first])] * elastic.spin[first]
-        time = elastic.damping_time[b]
-        for i in range(acted):
-            given[i] = f[at(elastic.coordinate[first + i])]
-        for i in range(size):
-            j = at(elastic.coordinate[first + i])
-            given[acted + i] = (q[j] - common * elastic.spin[first + i]) + time * v[j]
-        known = acted + size
-        if elastic.partner[b] >= 0:
-            speed = 0.0
-            block = at(elastic.turning[b])
-            for i in range(at(elastic.first[block]), at(elastic.first[block + at(1)])):
-                speed += elastic.momentum[i] * v[at(elastic.coordinate[i])]
-            partner = at(elastic.partner[b])
-            begin = at(elastic.first[partner])
-            across = at(elastic.first[partner + at(1)]) - begin
-            for i in range(across):
-                given[known + i] = speed * v[at(elastic.coordinate[begin + i])]
-            known += across
-        columns = at(elastic.columns[b])
-        for i in range(known, columns):
-            given[i] = 0.0
-        set_rows(b, given, elastic, out)
+    at = np.uint64
+    given, sums, found = scratch[0], scratch[1], scratch[2]
+    for b in range(elastic.turning.size):
+        first, count = at(elastic.first[b]), at(elastic.first[b + 1] - elastic.first[b])
+        size = gather_deformation(b, q, v, elastic.damping_time[b], elastic, given)
+        for i in range(count):
+            sums[i] = f[at(elastic.coordinate[first + i])]
+        for i in range(count, at(size)):
+            sums[i] = 0.0
+        add_symmetric(elastic.stiffness, elastic.square[b], size, given, sums)
+        add_gyroscopic(b, size, v, elastic, given, sums)
+        for i in range(0, size, SIZE):
+            put(found, i, all_eight(0.0))
+        add_symmetric(elastic.inverse, elastic.square[b], size, sums, found)
+        for i in range(count):
+            out[at(elastic.coordinate[first + i])] = found[i]
+
+
+@kernel
+def motion_energies(q: Floats, v: Floats, elastic: ElasticMotion | None, scratch: Floats) -> tuple[float, float]:
+    """Kinetic and elastic energy as of `elastic_energies`, from blocks arranged for speed; None: no such bodies."""
+    kinetic, stored = 0.0, 0.0
+    if elastic is None:
+        return kinetic, stored
+    given, sums = scratch[0], scratch[1]
+    for b in range(elastic.turning.size):
+        begin = elastic.square[b]
+        size = gather_deformation(b, q, v, 0.0, elastic, given)
+        stored -= 0.5 * square_form(elastic.stiffness, begin, size, given, sums)
+        for i in range(elastic.first[b], elastic.first[b + 1]):
+            given[i - elastic.first[b]] = v[elastic.coordinate[i]]
+        kinetic += 0.5 * square_form(elastic.mass, begin, size, given, sums)
+    return kinetic, stored
+
+
+@kernel
+def damped_power(v: Floats, elastic: ElasticMotion | None, scratch: Floats) -> float:
+    """Power that all elastic bodies damp (W), as of `elastic_energies`; None: no such bodies."""
+    damped = 0.0
+    if elastic is None:
+        return damped
+    for b in range(elastic.turning.size):
+        # Damping is a time times the stiffness: its power is that of the rates, without the common turning.
+        size = gather_deformation(b, v, v, 0.0, elastic, scratch[0])
+        form = square_form(elastic.stiffness, elastic.square[b], size, scratch[0], scratch[1])
+        damped -= elastic.damping_time[b] * form
+    return damped
 
 
 @kernel
@@ -322,13 +329,9 @@ def block_energy(b: int, x: Floats, matrix: Floats, elastic: ElasticArrays) -> f
 
 
 @kernel
-def elastic_energies(
-    q: Floats, v: Floats, elastic: ElasticArrays | None, scratch: Floats
-) -> tuple[float, float, float]:
-    """Kinetic and elastic energy (J) of all elastic bodies, and the power that they damp (W); None: no such bodies."""
+def elastic_energies(q: Floats, v: Floats, elastic: ElasticArrays, scratch: Floats) -> tuple[float, float, float]:
+    """Kinetic and elastic energy (J) of all elastic bodies, and the power that they damp (W)."""
     kinetic, stored, damped = 0.0, 0.0, 0.0
-    if elastic is None:
-        return kinetic, stored, damped
     given = scratch[0]
     for b in range(elastic.turning.size):
         for i in range(elastic.first[b], elastic.first[b + 1]):

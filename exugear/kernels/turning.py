@@ -29,27 +29,29 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from exugear.kernels.coordinates import AXIAL, BODY_SIZE, SPIN, TILT
-from exugear.kernels.elastic import LANES, lane_product
+from exugear.kernels.products import add_rows, add_symmetric, square_form
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import kernel
+from fe_ste.tools.octets import SIZE, aligned_zeros
 
 
 class TurningArrays(NamedTuple):
-    """Bodies in turning frames as b bodies, arranged for speed; rows are filled up with zeros to `LANES`.
+    """Bodies in turning frames as b bodies, arranged for speed.
 
     Attributes
     ----------
     begin, size, seats : (b,) first coordinate in the state, number of coordinates and seats
-    columns : (b,) length of the rows of the matrices
+    columns : (b,) that number filled up to a multiple of eight
     first : (b,) first entry of each body in the vectors
     spin, weight, pull : r, s and -C r of all bodies
-    square : (b,) first entry of each body in the matrices
-    stiffness, coriolis, mass, inverse : K, 2 C - M S, M and its inverse, row by row
+    square : (b,) first entry of each body in `stiffness`, `mass` and `inverse`
+    stiffness, mass, inverse : tiles of -K, M and its inverse, see `exugear.kernels.products`
+    across : (b,) first entry of each body in `coriolis`
+    coriolis : tiles of M S - 2 C
     damping_time : (b,) s
     gravity : (b, 3) m/s2
+    moving : (3, n) of all bodies M times a motion of all seats along x, y and z by one
     """
 
     begin: Integers
@@ -62,16 +64,19 @@ class TurningArrays(NamedTuple):
     pull: Floats
     square: Integers
     stiffness: Floats
-    coriolis: Floats
     mass: Floats
     inverse: Floats
+    across: Integers
+    coriolis: Floats
     damping_time: Floats
     gravity: Floats
+    moving: Floats
 
 
 def turning_memory(turning: TurningArrays) -> Floats:
-    """Memory that the functions below work in."""
-    return np.zeros((5, int(turning.columns.max(initial=LANES))))
+    """Memory (6, n) that the functions below work in, for the largest body."""
+    size = int(turning.columns.max(initial=SIZE))
+    return aligned_zeros(6 * size).reshape(6, size)
 
 
 @kernel
@@ -100,7 +105,7 @@ def to_body_frame(
         rates[k], rates[k + 1] = c * v[m] + s * v[m + 1], c * v[m + 1] - s * v[m]
         moved[i + AXIAL], rates[i + AXIAL] = q[j + AXIAL], v[j + AXIAL]
         moved[i + SPIN], rates[i + SPIN] = q[j + SPIN] - angle, v[j + SPIN] - speed
-    # Modal coordinates turn with the frame as they are; what fills up the rows for `LANES` is zero.
+    # Modal coordinates turn with the frame as they are; what fills up the rows is zero.
     for i in range(BODY_SIZE * turning.seats[b], size):
         moved[i], rates[i] = q[begin + i], v[begin + i]
     for i in range(size, turning.columns[b]):
@@ -129,22 +134,25 @@ def set_turning_motion(
     """
     if turning is None:
         return
-    moved, rates, given, elastic, total = memory[0], memory[1], memory[2], memory[3], memory[4]
+    moved, rates, given = memory[0], memory[1], memory[2]
+    elastic, apparent, total = memory[3], memory[4], memory[5]
     for b in range(turning.begin.size):
         begin, first, size, columns = turning.begin[b], turning.first[b], turning.size[b], turning.columns[b]
         c, s, speed = to_body_frame(b, q, v, turning, moved, rates)
         deformation_rates(b, moved, rates, speed, turning, given)
         for i in range(size):
             given[i] = moved[i] + turning.damping_time[b] * given[i]
-        # Elastic and apparent forces by rows; the reaction on the frame's angle gathers what they take from its power.
+        # Elastic and apparent forces; the reaction on the frame's angle gathers what they take from its power.
+        for i in range(columns):
+            elastic[i] = 0.0
+            apparent[i] = speed * turning.pull[first + i] if i < size else 0.0
+            total[i] = 0.0
+        add_symmetric(turning.stiffness, turning.square[b], columns, given, elastic)
+        add_rows(turning.coriolis, turning.across[b], columns, columns, rates, apparent)
         reaction = 0.0
-        row = turning.square[b]
         for i in range(size):
-            elastic[i] = -lane_product(turning.stiffness, row, given, columns)
-            apparent = speed * turning.pull[first + i] - lane_product(turning.coriolis, row, rates, columns)
-            total[i] = f[begin + i] + elastic[i] + speed * apparent
-            reaction -= (rates[i] + speed * turning.spin[first + i]) * apparent
-            row += columns
+            total[i] = f[begin + i] + elastic[i] + speed * apparent[i]
+            reaction -= (rates[i] + speed * turning.spin[first + i]) * apparent[i]
         for n in range(turning.seats[b]):
             for i in (BODY_SIZE * n, BODY_SIZE * n + TILT):
                 x, y = f[begin + i], f[begin + i + 1]
@@ -155,12 +163,11 @@ def set_turning_motion(
         for n in range(turning.seats[b]):
             total[BODY_SIZE * n + SPIN] += reaction * turning.weight[first + BODY_SIZE * n + SPIN]
         # Accelerations along the frame's axes, then in global ones: R (dw/dt + Omega S w).
-        for i in range(size, columns):
-            total[i] = 0.0
-        row = turning.square[b]
+        for i in range(columns):
+            given[i] = 0.0
+        add_symmetric(turning.inverse, turning.square[b], columns, total, given)
         for i in range(size):
-            out[begin + i] = lane_product(turning.inverse, row, total, columns)
-            row += columns
+            out[begin + i] = given[i]
         for n in range(turning.seats[b]):
             for i in (BODY_SIZE * n, BODY_SIZE * n + TILT):
                 spin_x, spin_y = turning.spin[first + i], turning.spin[first + i + 1]
@@ -172,41 +179,42 @@ def set_turning_motion(
 
 
 @kernel
-def square_form(matrix: Floats, row: int, size: int, columns: int, x: Floats) -> float:
-    """Scalar x' A x of a body's matrix that begins at an entry."""
-    total = 0.0
-    for i in range(size):
-        total += x[i] * lane_product(matrix, row, x, columns)
-        row += columns
-    return total
-
-
-@kernel
 def turning_energies(
     q: Floats, v: Floats, turning: TurningArrays | None, memory: Floats
 ) -> tuple[float, float, float, float]:
     """Kinetic and elastic energy (J) of all bodies, the power that they damp, and that of their weight (W)."""
-    kinetic, stored, damped, weight = 0.0, 0.0, 0.0, 0.0
+    kinetic, stored = 0.0, 0.0
     if turning is None:
-        return kinetic, stored, damped, weight
-    moved, rates, given, falling = memory[0], memory[1], memory[2], memory[3]
+        return kinetic, stored, 0.0, 0.0
+    moved, rates, product = memory[0], memory[1], memory[4]
     for b in range(turning.begin.size):
-        first, size, columns = turning.first[b], turning.size[b], turning.columns[b]
-        row = turning.square[b]
-        c, s, speed = to_body_frame(b, q, v, turning, moved, rates)
-        stored += 0.5 * square_form(turning.stiffness, row, size, columns, moved)
-        deformation_rates(b, moved, rates, speed, turning, given)
-        damped += turning.damping_time[b] * square_form(turning.stiffness, row, size, columns, given)
-        # Power of the weight: gravity as an acceleration of all seats, times the momentum.
-        falling[:] = 0.0
-        for n in range(turning.seats[b]):
-            x, y = turning.gravity[b, 0], turning.gravity[b, 1]
-            falling[BODY_SIZE * n], falling[BODY_SIZE * n + 1] = c * x + s * y, c * y - s * x
-            falling[BODY_SIZE * n + AXIAL] = turning.gravity[b, 2]
-        for i in range(size):
+        first, columns, square = turning.first[b], turning.columns[b], turning.square[b]
+        _, _, speed = to_body_frame(b, q, v, turning, moved, rates)
+        stored -= 0.5 * square_form(turning.stiffness, square, columns, moved, product)
+        for i in range(turning.size[b]):
             rates[i] += speed * turning.spin[first + i]
-        kinetic += 0.5 * square_form(turning.mass, row, size, columns, rates)
-        for i in range(size):
-            weight += rates[i] * lane_product(turning.mass, row, falling, columns)
-            row += columns
+        kinetic += 0.5 * square_form(turning.mass, square, columns, rates, product)
+    damped, weight = turning_powers(q, v, turning, memory)
     return kinetic, stored, damped, weight
+
+
+@kernel
+def turning_powers(q: Floats, v: Floats, turning: TurningArrays | None, memory: Floats) -> tuple[float, float]:
+    """Power that all bodies damp, and that of their weight (W)."""
+    damped, weight = 0.0, 0.0
+    if turning is None:
+        return damped, weight
+    moved, rates, given, product = memory[0], memory[1], memory[2], memory[4]
+    for b in range(turning.begin.size):
+        first, columns, square = turning.first[b], turning.columns[b], turning.square[b]
+        c, s, speed = to_body_frame(b, q, v, turning, moved, rates)
+        deformation_rates(b, moved, rates, speed, turning, given)
+        damped -= turning.damping_time[b] * square_form(turning.stiffness, square, columns, given, product)
+        # Power of the weight: gravity in the frame times the momentum along its axes.
+        gx, gy, gz = turning.gravity[b, 0], turning.gravity[b, 1], turning.gravity[b, 2]
+        x, y = c * gx + s * gy, c * gy - s * gx
+        for i in range(turning.size[b]):
+            momentum = x * turning.moving[0, first + i] + y * turning.moving[1, first + i]
+            momentum += gz * turning.moving[2, first + i]
+            weight += (rates[i] + speed * turning.spin[first + i]) * momentum
+    return damped, weight

@@ -83,7 +83,7 @@ def plot_campbell(
                     name, (end_speed, 1e-3 * mode), (4, 0), textcoords="offset points", va="center", fontsize=7.0
                 )
         panel.set(xlim=(0.0, end_speed), ylim=(0.0, 1e-3 * top))
-        panel.set(xlabel="Carrier speed / rpm", ylabel="Frequency / kHz")
+        panel.set(xlabel="Input speed / rpm", ylabel="Frequency / kHz")
         panel.set_title(title, loc="left")
         figure.legend(loc="outside upper center", ncols=4)
         return finish_figure(figure, path)

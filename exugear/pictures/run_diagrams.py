@@ -88,7 +88,7 @@ def plot_waterfalls(
                 clim=(highest - dynamic_range, highest),
             )
             panel.grid(False)
-            panel.set(xlim=(0.0, fastest), ylim=(0.0, 1e-3 * top), xlabel="Carrier speed / rpm")
+            panel.set(xlim=(0.0, fastest), ylim=(0.0, 1e-3 * top), xlabel="Input speed / rpm")
             panel.set_title(name, loc="left", pad=24.0)
             _draw_order_lines(panel, order_lines, fastest, top, "white")
             _draw_marks(panel, (marks or {}).get(name, ()))

@@ -106,7 +106,7 @@ def add_near_field(
         pair,
         surface,
         np.array([flank.gear.face_width / 2 for flank in flanks]),
-        np.array([flank.mirror for flank in flanks]),
+        np.array([flank.images for flank in flanks]),
     )
 
 
@@ -122,25 +122,27 @@ def _add_half_spaces(
     pair: FlankPair,
     surface: Floats,
     ends: Floats,
-    mirror: Floats,
+    images: Floats,
 ) -> None:
     """Add the displacement of both half-spaces; ``tooth`` and ``axial`` are those of groups.
 
     ``surface`` is (1 - nu^2) / (pi E) of each gear, ``ends`` the axial position of its free end faces (+-), and
-    ``mirror`` the strength of the image loads behind them. Distances along the contact line are common to two groups,
-    and so is the series of the loads that are far.
+    ``images`` the image loads behind them, by gear and end, see
+    `fe_ste.elasticity.halfspace.wedge_images`. Distances along the contact
+    line are common to two groups, and so is the series of the loads that are far.
     """
-    from_afar = _FAR * max(half_along, half_across.max())
-    widest = (groups[1:] - groups[:-1]).max()
+    widest, widest_half = (groups[1:] - groups[:-1]).max(), half_across.max()
     across, half, sums = np.empty(widest**2), np.empty(widest**2), np.empty(widest**2)
     series = np.empty((2, _TERMS))
-    along, strength = np.empty(5), np.empty(5)
+    loads = 1 + images.shape[0] * images.shape[1] * images.shape[2]
+    along, strength, half_length = np.empty(loads), np.empty(loads), np.empty(loads)
+    _stretch(half_length, half_along, images)
     for g in range(len(groups) - 1):
         for h in range(g + 1):
             if tooth[g] != tooth[h]:
                 continue  # a near field ends at its tooth; others feel it through the regular part
             apart, together = axial[g] - axial[h], axial[g] + axial[h]
-            _place_loads(along, strength, apart, together, pair.base_helix_cosine, surface, ends, mirror)
+            _place_loads(along, strength, apart, together, pair.base_helix_cosine, surface, ends, images)
             count, square = 0, 0.0
             for i in range(groups[g], groups[g + 1]):
                 for j in range(groups[h], groups[h + 1]):
@@ -152,14 +154,15 @@ def _add_half_spaces(
                     count += 1
             sums[:count] = 0.0
             series[:] = 0.0
-            for load in range(5):
+            for load in range(loads):
                 if strength[load] == 0.0:
                     continue
+                from_afar = _FAR * max(half_length[load], widest_half)
                 if abs(along[load]) >= from_afar and square <= _SERIES_REACH * along[load] ** 2:
-                    _add_series(series, strength[load], along[load], half_along)
+                    _add_series(series, strength[load], along[load], half_length[load])
                 else:
                     for n in range(count):
-                        mean = mean_inverse_distance(across[n], along[load], half[n], half_along)
+                        mean = mean_inverse_distance(across[n], along[load], half[n], half_length[load])
                         sums[n] += strength[load] * mean
             _evaluate(sums, series, across, half, count)
             count = 0
@@ -170,20 +173,36 @@ def _add_half_spaces(
 
 
 @summing
+def _stretch(half_length: Floats, half_along: float, images: Floats) -> None:
+    """Half lengths of a load and of its images in the distances along that `_place_loads` gives."""
+    half_length[0] = half_along
+    load = 1
+    for body in range(len(images)):
+        for end in range(2):
+            for image in images[body, end]:
+                half_length[load] = half_along * math.sqrt(0.5 * image[1] + 0.25 * image[2])
+                load += 1
+
+
+@summing
 def _place_loads(
     along: Floats, strength: Floats, apart: float, together: float, cosine: float, surface: Floats, ends: Floats,
-    mirror: Floats,
+    images: Floats,
 ) -> None:  # fmt: skip
     """Distances along the contact line and strengths of a load and of its images.
 
-    Load 0 is the cell's own, on both half-spaces. Loads 1 to 4 are its images behind the end faces of gear 1 and gear
-    2: load and image together leave no shear stress on these free faces.
+    Load 0 is the cell's own, on both half-spaces. The others are its images behind the end faces of gear 1 and gear 2.
     """
     along[0], strength[0] = apart / cosine, surface[0] + surface[1]
-    for image in range(4):
-        body, sign = image // 2, 2.0 * (image % 2) - 1.0
-        along[image + 1] = (together - 2.0 * sign * ends[body]) / cosine
-        strength[image + 1] = mirror[body] * surface[body]
+    load = 1
+    for body in range(len(images)):
+        for end in range(2):
+            face = (2.0 * end - 1.0) * ends[body]
+            read, loaded = 0.5 * (together + apart) - face, 0.5 * (together - apart) - face
+            for image in images[body, end]:
+                square = image[1] * (read * read + loaded * loaded) + image[2] * read * loaded
+                along[load], strength[load] = math.sqrt(square) / cosine, image[0] * surface[body]
+                load += 1
 
 
 @summing

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fe_ste.contact.cells import Cells
+from fe_ste.geometry.splines import cubic_coefficients, cubic_knots, cubic_values
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import summing, summing_kernel
 
@@ -66,11 +67,9 @@ class RegularCompliance:
         reach : int
             Largest difference of tooth pairs in contact at once.
         """
-        from scipy.interpolate import make_interp_spline  # a quarter of a second that who reads tables need not wait
-
         arc = flank.gear.base_radius * flank.roll**2 / 2.0
-        along_profile = make_interp_spline(arc, np.eye(len(arc)), k=3)
-        along_axis = make_interp_spline(flank.axial, np.eye(len(flank.axial)), k=3)
+        knots, axial_knots = cubic_knots(arc), cubic_knots(flank.axial)
+        along_profile, along_axis = cubic_coefficients(arc, knots), cubic_coefficients(flank.axial, axial_knots)
         keys: list[tuple[int, int]] = []
         number = np.full((len(teeth), len(teeth)), -1, dtype=np.int64)
         for row, read in enumerate(teeth):
@@ -80,8 +79,8 @@ class RegularCompliance:
                     if key not in keys:
                         keys.append(key)
                     number[row, column] = keys.index(key)
-        blocks = np.array([_coefficients(flank.regular[key], along_axis.c, along_profile.c) for key in keys])
-        return cls(blocks, number, int(teeth[0]), along_profile.t, along_axis.t, flank.gear.base_radius)
+        blocks = np.array([_coefficients(flank.regular[key], along_axis, along_profile) for key in keys])
+        return cls(blocks, number, int(teeth[0]), knots, axial_knots, flank.gear.base_radius)
 
     def add_to(self, matrix: Floats, groups: Integers, cells: Cells, roll: Floats, axial: Floats) -> None:
         """Add the approach of this flank at each cell under unit forces on each cell, lower triangle.
@@ -112,10 +111,8 @@ class RegularCompliance:
 
 def _first_and_weights(at: Floats, knots: Floats) -> tuple[Places, Floats]:
     """First spline and the four spline values at each place."""
-    from scipy.interpolate import BSpline
-
-    rows = BSpline.design_matrix(at, knots, 3)
-    return rows.indices.reshape(-1, 4)[:, 0].astype(np.uintp), rows.data.reshape(-1, 4)
+    first, values = cubic_values(at, knots)
+    return first.astype(np.uintp), values
 
 
 def _coefficients(block: Floats, along_axis: Floats, along_profile: Floats) -> Floats:

@@ -18,7 +18,8 @@ import numpy as np
 
 from fe_ste.elasticity.brick_error import ERROR_REACH, brick_error
 from fe_ste.elasticity.condensation import CondensedSector
-from fe_ste.elasticity.halfspace import tent_integrals
+from fe_ste.elasticity.end_error import END_LAYERS, WAVES, end_errors
+from fe_ste.elasticity.halfspace import tent_integrals, tent_means, wedge_images
 from fe_ste.elasticity.hexmesh import MeshSettings, SectorMesh, sector_mesh
 from fe_ste.geometry.gears import Gear
 from fe_ste.tools.arrays import Floats
@@ -54,7 +55,7 @@ class FlankCompliance:
 
     gear: Gear
     side: int
-    mirror: float
+    images: Floats
     roll: Floats
     axial: Floats
     regular: dict[tuple[int, int], Floats]
@@ -90,6 +91,7 @@ class FlankCompliance:
             self,
             side=-self.side,
             axial=-self.axial[::-1],
+            images=self.images[::-1],
             regular={
                 (-read, -loaded): np.ascontiguousarray(block[np.ix_(nodes, nodes)])
                 for (read, loaded), block in self.regular.items()
@@ -142,7 +144,6 @@ def flank_compliance(
     *,
     open_teeth: int | None = None,
     incompatible_modes: bool = True,
-    mirror: float = 1.0,
 ) -> FlankCompliance:
     """Compute the compliance of one flank of `gear` by finite elements.
 
@@ -157,8 +158,6 @@ def flank_compliance(
         Odd number of teeth of an open sector with free cut faces; without it the closed ring.
     incompatible_modes : bool
         See `fe_ste.elasticity.bricks.stiffness_matrix`.
-    mirror : float
-        Strength of the image loads at the free end faces in the near field.
 
     Returns
     -------
@@ -172,7 +171,7 @@ def flank_compliance(
     if open_teeth is not None and not (1 <= open_teeth <= gear.teeth and open_teeth % 2 == 1):
         raise ValueError(f"open_teeth = {open_teeth}: must be an odd number from 1 to {gear.teeth}")
     with one_dense_thread():
-        return _flank_compliance(gear, side, settings, open_teeth, incompatible_modes, mirror)
+        return _flank_compliance(gear, side, settings, open_teeth, incompatible_modes)
 
 
 def _flank_compliance(
@@ -181,7 +180,6 @@ def _flank_compliance(
     settings: MeshSettings | None,
     open_teeth: int | None,
     incompatible_modes: bool,
-    mirror: float,
 ) -> FlankCompliance:
     mesh = sector_mesh(gear, settings)
     sector = CondensedSector.from_mesh(mesh, side, incompatible_modes)
@@ -190,18 +188,16 @@ def _flank_compliance(
     else:
         faces, torque = sector.open_faces(open_teeth)
     regular = {}
-    near = flank_near_field(mesh, side, mirror, incompatible_modes)
+    images = flank_images(gear, side)
+    near = flank_near_field(mesh, side, images, incompatible_modes)
     for (read, loaded), cut_faces in faces.items():
         regular[read, loaded] = sector.displacement(read == loaded, *cut_faces)
         if read == loaded:
-            # Without the near field, what is left is smooth, and symmetric but for the discretisation (Maxwell and
-            # Betti).
-            remainder = regular[read, loaded] - near
-            regular[read, loaded] = (remainder + remainder.T) / 2
+            regular[read, loaded] = regular_part(mesh, regular[read, loaded], near)
     return FlankCompliance(
         gear=gear,
         side=side,
-        mirror=mirror,
+        images=images,
         roll=mesh.section.flank_roll,
         axial=mesh.axial_positions,
         regular=regular,
@@ -215,15 +211,42 @@ def _flank_compliance(
     )
 
 
-def flank_near_field(mesh: SectorMesh, side: int, mirror: float, incompatible_modes: bool = True) -> Floats:
+def regular_part(mesh: SectorMesh, displacement: Floats, near: Floats) -> Floats:
+    """Take the near field out of the loaded tooth's displacement.
+
+    What is left is smooth, and symmetric but for the discretisation (Maxwell and Betti). It is a mean over tents, which
+    along the profile is turned to values at the nodes: a tent at the tip or the form circle lies inwards of its node.
+    Along the face width the tents stay: layers of a wide gear are too few for as much.
+
+    Parameters
+    ----------
+    mesh : SectorMesh
+    displacement : ndarray (f l, f l)
+        Of the flank nodes under tent loads, m/N.
+    near : ndarray (f l, f l)
+        See `flank_near_field`.
+
+    Returns
+    -------
+    ndarray (f l, f l)
+        Of the flank nodes under loads at the flank nodes, m/N.
+    """
+    roll = mesh.section.flank_roll
+    means = tent_means(roll, mesh.gear.base_radius * roll**2 / 2.0)
+    by_profile = (displacement - near).reshape(len(near), len(roll), -1)
+    at_nodes = (np.linalg.inv(means).T @ by_profile).reshape(near.shape)
+    return np.asarray((at_nodes + at_nodes.T) / 2)
+
+
+def flank_near_field(mesh: SectorMesh, side: int, images: Floats, incompatible_modes: bool = True) -> Floats:
     """Near field of the flank's tent loads as the bricks hold it: half-space with images, and the bricks' own error.
 
     Parameters
     ----------
     mesh : SectorMesh
     side : int
-    mirror : float
-        Strength of the image loads behind the free end faces.
+    images : ndarray (2, n, 3)
+        Image loads behind the lower and the upper end face, see `fe_ste.elasticity.halfspace.wedge_images`.
     incompatible_modes : bool
 
     Returns
@@ -234,13 +257,24 @@ def flank_near_field(mesh: SectorMesh, side: int, mirror: float, incompatible_mo
     gear, material = mesh.gear, mesh.gear.material
     roll, axial = mesh.section.flank_roll, mesh.axial_positions
     lead, cosine = _flank_lead(gear, side), float(np.cos(gear.base_helix_angle))
-    field = tent_integrals(roll, axial, gear.base_radius, lead, cosine, mirror)
+    field = tent_integrals(roll, axial, gear.base_radius, lead, cosine, images)
     field *= (1 - material.poissons_ratio**2) / (np.pi * material.youngs_modulus)
     by_node = field.reshape(len(roll), len(axial), len(roll), len(axial))
     error, last = brick_error(mesh, side, incompatible_modes), len(axial) - 1
     for loaded in range(last + 1):
-        # The load itself and its images behind the end faces.
-        for place, strength in ((loaded, 1.0), (-loaded, mirror), (2 * last - loaded, mirror)):
-            for read in range(max(0, place - ERROR_REACH), min(last, place + ERROR_REACH) + 1):
-                by_node[:, read, :, loaded] += strength * error[:, read - place + ERROR_REACH]
+        for read in range(max(0, loaded - ERROR_REACH), min(last, loaded + ERROR_REACH) + 1):
+            by_node[:, read, :, loaded] += error[:, read - loaded + ERROR_REACH]
+    away = np.subtract.outer(np.arange(len(roll)), np.arange(len(roll)))
+    near_by = np.abs(away) < WAVES
+    count = min(END_LAYERS, len(axial))
+    for end, at_end in zip((0, last), end_errors(mesh, side, images, incompatible_modes), strict=True):
+        for read, loaded in np.ndindex(count, count):
+            added = np.where(near_by, at_end[np.clip(away, 1 - WAVES, WAVES - 1) + WAVES - 1, read, loaded], 0.0)
+            by_node[:, abs(end - read), :, abs(end - loaded)] += added
     return field
+
+
+def flank_images(gear: Gear, side: int) -> Floats:
+    """Return the image loads (2, n, 3) behind both ends: a helical flank meets one under an acute angle."""
+    lean, ratio = side * gear.base_helix_angle, gear.material.poissons_ratio
+    return np.stack([wedge_images(np.pi / 2 + lean, ratio), wedge_images(np.pi / 2 - lean, ratio)])

@@ -17,43 +17,113 @@ import math
 
 import numpy as np
 
-from fe_ste.tools.arrays import Floats
+from fe_ste.geometry.splines import cubic_coefficients, cubic_knots, cubic_matrix
+from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import compiled
 
 #: Gauss rule of three points over 0 to 1.
 _PLACES = (0.5 - math.sqrt(0.15), 0.5, 0.5 + math.sqrt(0.15))
 _SHARES = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
 
+#: Image loads of a wedge: for each of two the logarithms of its strength and of the number before the squares, and half
+#: the number before the product over that before the squares; each as powers 0 to 4 of the angle less 90 degrees, in
+#: 35 degrees, and 0.05 of Poisson's ratio beyond 0.3 times powers 0 to 2 of it.
+_WEDGE = np.array(
+    [
+        [0.3459, -1.9248, -0.2535, -0.1835, -0.0365, 0.1261, 0.0760, 0.0506],
+        [0.3119, 0.2286, 0.0129, -0.0746, -0.0537, -0.0808, 0.0149, 0.0719],
+        [0.1877, 0.1984, -0.1252, -0.0464, -0.0143, 0.0882, 0.0616, 0.0214],
+        [-0.1880, -1.7776, 0.3032, -0.1381, -0.0409, -0.1914, -0.0507, 0.0491],
+        [2.2036, 0.5111, -0.5515, 0.0215, 0.1441, 0.0294, 0.0952, -0.1208],
+        [0.8966, 0.0273, 0.5297, -0.0243, -0.1599, -0.0567, -0.0601, 0.1681],
+    ]
+)
+
 #: Part of a quadrilateral's sides below which it is not halved any more: 1e-3 of the integral is left in such a part.
 _LEAST_PART = 2e-3
 
 
-def interior_displacement(places: Floats, poissons_ratio: float) -> Floats:
-    """Evaluate the displacement inside a half-space under a unit normal point load at the origin.
+@compiled
+def interior_displacement(
+    places: Floats, loads: Floats, columns: Integers, shares: Floats, count: int, poissons_ratio: float
+) -> Floats:
+    """Evaluate the displacement inside a half-space under normal point loads.
 
     Boussinesq: u = (1 + nu) / (2 pi E) [z/R^3 - (1 - 2 nu)/(R (R + z))] (x, y) in the surface and
     w = (1 + nu) / (2 pi E) [z^2/R^3 + 2 (1 - nu)/R] into it; the factor (1 + nu) / (2 pi E) is left out.
 
     Parameters
     ----------
-    places : ndarray (..., 3)
-        x and y in the surface, z into it, m; not the origin.
+    places : ndarray (n, 3)
+        x and y in the surface, z into it, m; no load's own place.
+    loads : ndarray (m, 2)
+        Places of the loads in the surface, m.
+    columns : ndarray (m,)
+        Load case of each load; it has a part in the one after that, too.
+    shares : ndarray (m, 2)
+        Force of the load in either.
+    count : int
+        Load cases.
     poissons_ratio : float
 
     Returns
     -------
-    ndarray (..., 3)
+    ndarray (n, 3, count)
         1/m.
 
     References
     ----------
     K. L. Johnson, Contact Mechanics, 1985, eq. (3.18).
     """
-    depth = places[..., 2:]
-    distance = np.linalg.norm(places, axis=-1, keepdims=True)
-    outward = depth / distance**3 - (1.0 - 2.0 * poissons_ratio) / (distance * (distance + depth))
-    inward = depth**2 / distance**3 + 2.0 * (1.0 - poissons_ratio) / distance
-    return np.concatenate([outward * places[..., :2], inward], axis=-1)
+    result = np.zeros((len(places), 3, count))
+    for n in range(len(places)):
+        depth = places[n, 2]
+        for m in range(len(loads)):
+            x, y = places[n, 0] - loads[m, 0], places[n, 1] - loads[m, 1]
+            distance = math.sqrt(x * x + y * y + depth * depth)
+            outward = depth / distance**3 - (1.0 - 2.0 * poissons_ratio) / (distance * (distance + depth))
+            inward = depth * depth / distance**3 + 2.0 * (1.0 - poissons_ratio) / distance
+            for k in range(2):
+                column, share = columns[m] + k, shares[m, k]
+                result[n, 0, column] += share * outward * x
+                result[n, 1, column] += share * outward * y
+                result[n, 2, column] += share * inward
+    return result
+
+
+def wedge_images(angle: float, poissons_ratio: float) -> Floats:
+    """Image loads that make of a half-space a wedge, loaded on one face and free on the other.
+
+    The face of the wedge moves under a unit normal load by (1 - nu^2) / (pi E) times 1 / R and, for each image, its
+    strength over sqrt(s^2 + b (d^2 + d'^2) + c d d'): s is the distance along the edge, d and d' are those of the two
+    points from it. Two images are fitted to the wedge's displacement by quadratic finite elements
+    (``benchmarks/truth/wedge.py``), within 2 % of what the end adds. Beyond 55 to 125 degrees and Poisson's ratios of
+    0.25 to 0.35 the images are those at these bounds.
+
+    Parameters
+    ----------
+    angle : float
+        Between the faces, rad.
+    poissons_ratio : float
+
+    Returns
+    -------
+    ndarray (2, 3)
+        Of each image its strength, b and c.
+
+    Examples
+    --------
+    An acute edge is softer than an obtuse one, where loads have the weaker images.
+
+    >>> acute, obtuse = (wedge_images(np.radians(angle), 0.3) for angle in (70.0, 110.0))
+    >>> bool((acute[:, 0] > 5.0 * obtuse[:, 0]).all())
+    True
+    """
+    beyond = np.clip((np.degrees(angle) - 90.0) / 35.0, -1.0, 1.0)
+    ratio = np.clip((poissons_ratio - 0.3) / 0.05, -1.0, 1.0)
+    found = (_WEDGE @ np.concatenate([beyond ** np.arange(5), ratio * beyond ** np.arange(3)])).reshape(2, 3)
+    strength, squares = np.exp(found[:, 0]), np.exp(found[:, 1])
+    return np.stack([strength, squares, 2.0 * squares * found[:, 2]], axis=-1)
 
 
 @compiled
@@ -105,7 +175,7 @@ def rectangle_integral(across: float, along: float, half_across: float, half_alo
 
 @compiled
 def tent_integrals(
-    roll: Floats, axial: Floats, base_radius: float, lead: float, base_helix_cosine: float, mirror: float
+    roll: Floats, axial: Floats, base_radius: float, lead: float, base_helix_cosine: float, images: Floats
 ) -> Floats:
     """Mean of 1 / distance over bilinear ("tent") loads on the flank nodes, seen from the flank nodes.
 
@@ -120,8 +190,8 @@ def tent_integrals(
         d phi / d z along a generator, rad/m.
     base_helix_cosine : float
         cos(beta_b).
-    mirror : float
-        Strength of the image loads behind both free end faces; 0 for none.
+    images : ndarray (2, n, 3)
+        Of the lower and the upper end: strength and place of each image load, see `wedge_images`.
 
     Returns
     -------
@@ -141,16 +211,16 @@ def tent_integrals(
             for read in range(n_roll * n_axial):
                 place = (roll[read // n_axial], axial[read % n_axial])
                 corners[:] = 0.0
-                _add_quadrilateral(corners, place, quad, metric, 1.0, 0.0)
+                _add_quadrilateral(corners, place, quad, metric, place[1], 1.0, 0.0)
                 for k in range(4):
                     result[read, columns[k]] += corners[k]
-                if mirror != 0.0:
-                    corners[:] = 0.0
-                    # The image of a load at z behind the face at z_end is at 2 z_end - z.
-                    _add_quadrilateral(corners, place, quad, metric, -1.0, 2.0 * axial[0])
-                    _add_quadrilateral(corners, place, quad, metric, -1.0, 2.0 * axial[-1])
-                    for k in range(4):
-                        result[read, columns[k]] += mirror * corners[k]
+                for end in range(2):
+                    for image in images[end]:
+                        if image[0] != 0.0:
+                            corners[:] = 0.0
+                            _add_quadrilateral(corners, place, quad, metric, axial[-end], image[1], image[2])
+                            for k in range(4):
+                                result[read, columns[k]] += image[0] * corners[k]
             # Areas of the tents: r_b phi dphi dz, constant factors left out; exact for a tent times phi.
             near, far = quad[0] / 3.0 + (quad[0] + quad[2]) / 6.0, quad[0] / 6.0 + (quad[0] + quad[2]) / 3.0
             for k in range(4):
@@ -164,16 +234,21 @@ def _add_quadrilateral(
     place: tuple[float, float],
     quad: tuple[float, float, float, float],
     metric: tuple[float, float, float],
-    sense: float,
-    offset: float,
+    end: float,
+    squares: float,
+    product: float,
 ) -> None:
-    """Add the integrals of the four bilinear shape functions over distance; the load is at ``sense * z + offset``.
+    """Add the integrals of the four bilinear shape functions over distance.
 
-    The quadrilateral (first roll angle and axial position, their steps) is halved towards the place until its parts
-    are small against their distance, and each part integrated by three Gauss points each way.
+    The square of the distance along is ``squares`` (d^2 + d'^2) + ``product`` d d', d and d' being the distances of the
+    place and the load from the end. The quadrilateral (first roll angle and axial position, their steps) is halved
+    towards the place until its parts are small against their distance, and each part integrated by three Gauss points
+    each way.
     """
     base_radius, lead, cosine = metric
     roll, axial, roll_step, axial_step = quad
+    own = place[1] - end
+    stretch = math.sqrt(max(squares, 0.5 * squares + 0.25 * product))
     stack = np.empty((256, 4))
     stack[0] = np.array([0.0, 0.0, 1.0, 1.0])
     held = 1
@@ -182,8 +257,8 @@ def _add_quadrilateral(
         s, t, width, height = stack[held]
         phi, z = roll + (s + width / 2) * roll_step, axial + (t + height / 2) * axial_step
         across = base_radius * 0.5 * (place[0] + phi) * (place[0] - phi - lead * (place[1] - z))
-        along = (place[1] - sense * z - offset) / cosine
-        breadth, length = abs(base_radius * phi * roll_step * width), axial_step * height / cosine
+        along = math.sqrt(squares * (own * own + (z - end) ** 2) + product * own * (z - end)) / cosine
+        breadth, length = abs(base_radius * phi * roll_step * width), stretch * axial_step * height / cosine
         if max(breadth, length) > 0.5 * math.hypot(across, along) and max(width, height) > _LEAST_PART:
             halves_roll = 1 if length > 2.0 * breadth else 2
             halves_axial = 1 if breadth > 2.0 * length else 2
@@ -199,9 +274,9 @@ def _add_quadrilateral(
                 p, q = s + _PLACES[k] * width, t + _PLACES[m] * height
                 phi, z = roll + p * roll_step, axial + q * axial_step
                 across = base_radius * 0.5 * (place[0] + phi) * (place[0] - phi - lead * (place[1] - z))
-                along = (place[1] - sense * z - offset) / cosine
+                square = (squares * (own * own + (z - end) ** 2) + product * own * (z - end)) / (cosine * cosine)
                 area = _SHARES[k] * _SHARES[m] * width * height * phi * roll_step * axial_step
-                value = area / math.hypot(across, along)
+                value = area / math.sqrt(across * across + square)
                 corners[0] += value * (1 - p) * (1 - q)
                 corners[1] += value * (1 - p) * q
                 corners[2] += value * p * (1 - q)
@@ -232,6 +307,44 @@ def tent_weights(roll: Floats, axial: Floats) -> Floats:
     along_axis = _line_mass(axial, weight=np.ones_like(axial))
     mass = np.kron(along_roll, along_axis)
     return np.asarray(mass / mass.sum(axis=0))
+
+
+def tent_means(nodes: Floats, places: Floats) -> Floats:
+    """Means over tent loads along the profile of the cubic splines that are 1 at one node and 0 at the others.
+
+    Parameters
+    ----------
+    nodes : ndarray (f,)
+        Roll angles.
+    places : ndarray (f,)
+        Arc lengths of the nodes, over which the splines are laid; squares of the roll angles but for a factor.
+
+    Returns
+    -------
+    ndarray (f, f)
+        Row: node of the spline, column: tent.
+
+    Examples
+    --------
+    Tents at the two ends of the profile lie inwards of their nodes.
+
+    >>> roll = np.linspace(1.0, 2.0, 6)
+    >>> bool(roll @ tent_means(roll, roll**2)[:, 0] > 1.05)
+    True
+    """
+    knots = cubic_knots(places)
+    splines = cubic_coefficients(places, knots)
+    points, shares = np.polynomial.legendre.leggauss(4)
+    means, total = np.zeros((len(nodes), len(nodes))), np.zeros(len(nodes))
+    for left in range(len(nodes) - 1):
+        within = (points + 1.0) / 2.0
+        at = nodes[left] + within * (nodes[left + 1] - nodes[left])
+        values = cubic_matrix(np.interp(at**2, nodes**2, places), knots) @ splines
+        for tent, part in ((left, 1.0 - within), (left + 1, within)):
+            weight = shares * part * at * (nodes[left + 1] - nodes[left])
+            means[:, tent] += weight @ values
+            total[tent] += weight.sum()
+    return np.asarray(means / total)
 
 
 def _line_mass(nodes: Floats, weight: Floats) -> Floats:

@@ -415,13 +415,11 @@ def _geometric(count: int, first: float) -> Floats:
     if first * count >= 1.0 or count == 1:
         return np.linspace(0.0, 1.0, count + 1)
 
-    from scipy.optimize import brentq  # a quarter of a second that a check of the gearbox file need not wait
-
-    def excess(ratio: float) -> float:
-        return first * float(np.sum(ratio ** np.arange(count))) - 1.0
-
-    size = first * brentq(excess, 1.0, 50.0) ** np.arange(count)
-    return _fractions(np.asarray(size, dtype=np.float64))
+    powers, low, high = np.arange(count), 1.0, 50.0
+    while high - low > 4.0 * np.finfo(float).eps * high:  # scipy.optimize would take a quarter of a second to load
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if first * np.sum(middle**powers) < 1.0 else (low, middle)
+    return _fractions(np.asarray(first * low**powers, dtype=np.float64))
 
 
 def _fractions(sizes: Floats) -> Floats:

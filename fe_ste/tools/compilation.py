@@ -40,8 +40,8 @@ _FOLDERS_KEPT = 4
 #: What the kernels of a package do, and the processor time of all that a first verb compiles of them: the laws that its
 #: model has.
 _COMPILED = {
-    "fe_ste": " of teeth and their contact, about 10 s",
-    "exugear": " of the equations of motion, 20 to 40 s for each sort of model",
+    "fe_ste": " of teeth and their contact, about 8 s",
+    "exugear": " of the equations of motion, 10 to 25 s for each sort of model",
 }
 
 #: numba's settings, which have no types.

@@ -72,6 +72,13 @@ def sum_of(values: Floats) -> float:
     return float(np.sum(values))
 
 
+def aligned_zeros(size: int) -> Floats:
+    """Zeros (size,) that begin where a line of the processor's memory does: octets of it are read at once."""
+    room = np.zeros(size + SIZE)
+    begin = -(room.ctypes.data // room.itemsize) % SIZE
+    return room[begin : begin + size]
+
+
 def _type_eight(context: Any) -> Any:
     return lambda array, start: octet if _is_flat(array) else None
 

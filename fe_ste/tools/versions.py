@@ -7,7 +7,7 @@ version are then computed again or refused. A change that leaves all numbers as 
 from __future__ import annotations
 
 #: Table of the static transmission error by the superelement (`fe_ste.transmission_error`).
-TABLE = 5
+TABLE = 6
 
 #: Table by the reference analysis (`fe_ste.reference.table`, and what it is computed by).
 NONLINEAR_TABLE = 1

@@ -169,7 +169,7 @@ def solve_grid(
             else _solved_by_workers(compliance, axes, blocks, executor)
         )
         for block, part in done:
-            results.insert(block.positions, block.distance, part)
+            results.insert(block.positions, slice(block.distance, block.distance + 1), part)
             finished[list(block.positions), block.distance] = True
             if executor is not None:
                 tell()

@@ -287,11 +287,11 @@ class StateResults:
         self.tangent_load_share[index] = np.bincount(pair_number, solution.force_per_load, len(self.teeth))
         self.iterations[index] = solution.iterations
 
-    def insert(self, positions: Sequence[int], distance: int, part: StateResults) -> None:
-        """Take over the results of some positions at one centre distance, of which `part` has no other."""
+    def insert(self, positions: Sequence[int], distances: slice, part: StateResults) -> None:
+        """Take over the results of some positions at some centre distances, of which `part` has no others."""
         mine = self._arrays()
         for name, values in part._arrays().items():
-            mine[name][list(positions), :, distance] = values[:, :, 0]
+            mine[name][list(positions), :, distances] = values
         self.failures += part.failures
 
     def dataset(self, axes: StateAxes, all_teeth: bool = False) -> xr.Dataset:

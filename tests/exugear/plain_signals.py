@@ -29,7 +29,7 @@ from exugear.kernels.rolling import (
 )
 from exugear.kernels.turning import turning_energies, turning_memory
 from exugear.model.sections.entries import GROUND
-from exugear.tooth_mesh.laws.forms import mesh_state
+from exugear.tooth_mesh.laws.forms import pass_meshes
 
 
 def sampled(assembly: Assembly, q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -67,12 +67,19 @@ def energies_of(assembly: Assembly, q: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 
 @numba.njit
+def mesh_states(q, v, meshes, out) -> None:
+    """Fill (m, 10): what each mesh does, by the readable laws."""
+    none = np.empty((0, 0))
+    pass_meshes(q, v, meshes, meshes.table, out, np.empty(0), none, none)
+
+
+@numba.njit
 def mesh_signals(q, v, meshes, out) -> None:
     """Fill (samples, 2 m): deflection (m), then F_bt (N) of each mesh; q and v (samples, size)."""
     count = meshes.cycles.size
     state = np.empty((count, STATE_SIZE))
     for n in range(q.shape[0]):
-        mesh_state(q[n], v[n], meshes, state)
+        mesh_states(q[n], v[n], meshes, state)
         for m in range(count):
             out[n, m] = state[m, DEFLECTION]
             out[n, count + m] = state[m, FORCE]
@@ -101,7 +108,7 @@ def joint_signals(q, v, meshes, ends, hosts, planets, out) -> None:
     """
     state = np.empty((meshes.cycles.size, STATE_SIZE))
     for n in range(q.shape[0]):
-        mesh_state(q[n], v[n], meshes, state)
+        mesh_states(q[n], v[n], meshes, state)
         out[n, :] = 0.0
         for m in range(meshes.cycles.size):
             psi = q[n, meshes.coordinates[m, 12]] if meshes.coordinates[m, 12] >= 0 else 0.0
@@ -131,7 +138,7 @@ def joint_signals(q, v, meshes, ends, hosts, planets, out) -> None:
 @numba.njit
 def mesh_energies(q, v, meshes, state, out) -> None:
     """Add elastic energy (J) and the powers (W) damped, of k(PMC), non-conservative to out (5,)."""
-    mesh_state(q, v, meshes, state)
+    mesh_states(q, v, meshes, state)
     for m in range(meshes.cycles.size):
         for i in range(4):
             out[i] += state[m, ENERGY + i]

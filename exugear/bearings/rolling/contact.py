@@ -188,6 +188,11 @@ def _placed(rows: tuple[RollingRow, ...], first_roller_angle: float) -> RowConta
     )
 
 
+def is_preloaded(rows: Sequence[RollingRow]) -> bool:
+    """Tell whether rolling elements carry before anything loads the bearing."""
+    return elastic_energy(row_contacts(rows), np.zeros(6)) > 0.0
+
+
 def elastic_energy(contacts: RowContacts, displacement: Floats) -> float:
     """Energy stored in all contacts, J; its gradient is `bearing_load`."""
     energy = 0.0

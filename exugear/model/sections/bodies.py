@@ -15,9 +15,13 @@ class InertiaSection(Section):
     """Mass properties of a body in one inertia set; moments about its centre of mass."""
 
     mass_kg: q.MassKg | None = None
+    """Mass; a body that only spins needs none."""
     axial_kg_m2: q.InertiaKgM2
+    """Moment of inertia about the axis."""
     transverse_kg_m2: q.InertiaKgM2 | None = None
+    """Moment of inertia across the axis, about the centre of mass."""
     centre_of_mass_z_mm: q.PlaceMm | None = None
+    """Place of the centre of mass."""
 
     @model_validator(mode="after")
     def _triangle(self) -> InertiaSection:
@@ -33,8 +37,11 @@ class ShaftSectionSection(Section):
     """A cylindrical piece of a shaft."""
 
     length_mm: q.LengthMm
+    """Length."""
     outer_diameter_mm: q.LengthMm
+    """Outer diameter."""
     inner_diameter_mm: q.BoreMm = 0.0
+    """Bore."""
 
     @model_validator(mode="after")
     def _has_wall(self) -> ShaftSectionSection:
@@ -46,8 +53,11 @@ class BlankSection(Section):
     """What a gear or bearing puts on its seat beyond the shaft itself: a rigid ring about the seat's centre."""
 
     mass_kg: q.MassKg
+    """Mass."""
     axial_kg_m2: q.InertiaKgM2
+    """Moment of inertia about the axis."""
     transverse_kg_m2: q.InertiaKgM2
+    """Moment of inertia across the axis."""
 
     @model_validator(mode="after")
     def _triangle(self) -> BlankSection:
@@ -66,10 +76,15 @@ class ShapeSection(Section):
     """
 
     start_z_mm: q.PlaceMm
+    """Where the first piece begins."""
     sections: Annotated[tuple[ShaftSectionSection, ...], Field(strict=False, min_length=1, max_length=200)]
+    """Pieces from there on, towards +z."""
     torque_z_mm: q.PlaceMm | None = None
+    """Place where torques act, and couplings without a seat."""
     material: MaterialSection = MaterialSection()
+    """Elastic material, steel by default."""
     blanks: dict[Name, BlankSection] = {}
+    """Rigid rings on its seats, by gear or bearing; `torque` for the place where torques act."""
 
 
 class SolidSeatSection(Section):
@@ -81,11 +96,17 @@ class SolidSeatSection(Section):
     """
 
     diameter_mm: q.LengthMm | None = None
+    """Diameter of the cylinder, outer diameter of a flat ring."""
     width_mm: q.LengthMm | None = None
+    """Width of the cylinder along z."""
     inner_diameter_mm: q.BoreMm | None = None
+    """Inner diameter: makes it a flat ring across z."""
     position_mm: Point | None = None
+    """Middle of the seat; that of the gear, bearing or mount by default."""
     sectors: q.Sectors | None = None
+    """Equal seats that the cylinder is divided into, an odd number."""
     same_as: Name | None = None
+    """Seat of another bearing in the same bore; stands alone."""
 
     @model_validator(mode="after")
     def _kind(self) -> SolidSeatSection:
@@ -110,14 +131,23 @@ class SolidSection(Section):
     """
 
     file: FileName
+    """Geometry or mesh beside the gearbox file."""
     length_unit_mm: q.LengthUnitMm = 1.0
+    """Unit of length of the file."""
     element_size_mm: q.ElementSizeMm | None = None
+    """Largest element of the mesh that is made."""
     elements_around: q.ElementsAround = 12
+    """Elements around a full circle."""
     band_Hz: q.FrequencyHz | None = None
+    """Own vibrations are exact up to here; `elasticity.band_Hz` by default."""
     torque_seat: Name | None = None
+    """Seat where torques act."""
     material: MaterialSection = MaterialSection()
+    """Elastic material, steel by default."""
     seats: dict[Name, SolidSeatSection] = {}
+    """Seats by gear, bearing or mount."""
     blanks: dict[Name, BlankSection] = {}
+    """Rigid rings on its seats, by seat."""
 
 
 class BodySection(Section):
@@ -130,17 +160,29 @@ class BodySection(Section):
     """
 
     axis_position_mm: Annotated[tuple[q.PlaceMm, q.PlaceMm], Field(strict=False)] | None = None
+    """Place of the axis, x and y; planets have the three keys that follow instead."""
     carrier: Name | None = None
+    """Body that carries the planets."""
     orbit_radius_mm: q.LengthMm | None = None
+    """Distance of the planets' axes from the carrier's."""
     planet_angles_deg: Annotated[tuple[q.AngleDeg, ...], Field(strict=False, max_length=MOST_PLANETS)] = ()
+    """Places of the planets at zero angle of the carrier; one body for each."""
     wheels_z_mm: dict[Name, q.PlaceMm] = {}
+    """Gears on the body, by name: place of the middle of the face."""
     fixed: bool = False
+    """Whether it stands still: the housing."""
     spin_only: bool = False
+    """Whether it only spins, without a place in space: a brake disc, a generator."""
     enabled: bool = True
+    """Whether it takes part; what is joined to it alone steps aside with it."""
     inertia: dict[Name, InertiaSection] = {}
+    """Mass properties by inertia set."""
     flexibility: Literal["none", "elastic", "nonrotating", "ffrf"] = "none"
+    """What the variant `flexible` makes of it."""
     shape: ShapeSection | None = None
+    """Stepped shaft, for elasticity."""
     solid: SolidSection | None = None
+    """Body of any shape, for elasticity."""
 
     @model_validator(mode="after")
     def _place(self) -> BodySection:

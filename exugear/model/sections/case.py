@@ -22,13 +22,21 @@ class LoadCaseSection(Section):
     """Torques on the gearbox and, when speed-driven, the prescribed speed of one body."""
 
     torques_N_m: dict[Name, q.TorqueNm] = {}
+    """Constant torques on the gearbox by body, positive about +z."""
     torque_series: FileName | None = None
+    """CSV file of torques over time, beside the gearbox file."""
     duration_s: q.DurationS = 30.0
+    """Simulated time."""
     start_speed_rpm: q.SpeedRpm = 0.0
+    """Speed of the overall input at the start."""
     driven_body: Name | None = None
+    """Body whose speed is prescribed; with the two keys that follow."""
     end_speed_rpm: q.SpeedRpm | None = None
+    """Speed of that body at the end; it changes evenly."""
     drive_stiffness_N_m_per_rad: q.CouplingStiffness | None = None
+    """Torsional spring between the drive and that body."""
     description: Text = ""
+    """Words for people."""
 
     @model_validator(mode="after")
     def _drive(self) -> LoadCaseSection:
@@ -48,24 +56,33 @@ class OverallSection(Section):
     """Which spins the overall transmission error compares, and where its length is taken."""
 
     input: Name
+    """Body whose angle counts as the input."""
     output: Name
+    """Body whose angle counts as the output."""
     output_gear: Name
+    """Gear whose base circle turns the angle into a length."""
 
 
 class StaticLoadSection(Section):
     """The static state that fixes loaded flanks and the load of the STE tables."""
 
     torques_N_m: dict[Name, q.TorqueNm]
+    """Torques on the gearbox by body, positive about +z."""
     locked: Annotated[tuple[Name, ...], Field(strict=False, max_length=MOST_ENTRIES)]
+    """Bodies that are held against these torques: as many as the train has degrees of freedom."""
 
 
 class DampingSection(Section):
     """Stiffness-proportional damping times: c = time * k."""
 
     bearing_time_s: q.DampingTimeS = 4e-6
+    """Damping of bearings over their stiffness."""
     mesh_time_s: q.DampingTimeS = 4e-6
+    """Damping of meshes over their stiffness."""
     coupling_time_s: q.DampingTimeS = 4e-6
+    """Damping of couplings over their stiffness."""
     body_time_s: q.DampingTimeS = 1e-6
+    """Damping of elastic bodies over their stiffness."""
 
 
 class ElasticitySection(Section):
@@ -76,7 +93,9 @@ class ElasticitySection(Section):
     """
 
     band_Hz: q.FrequencyHz = 4500.0
+    """Own vibrations of each elastic body are exact up to here."""
     limit_Hz: q.FrequencyHz = 9000.0
+    """No own vibration is faster: what was above is slowed down to it by added mass."""
 
     @model_validator(mode="after")
     def _order(self) -> ElasticitySection:
@@ -89,6 +108,7 @@ class HousingSection(Section):
     """Factor on bearing stiffness that stands for the housing seat in series; not where the housing is elastic."""
 
     factor: q.SeatFactor = 1.0
+    """Share of a deflection that the bearing takes; the rest is the seat's."""
 
 
 _Vector = Annotated[tuple[q.Acceleration, q.Acceleration, q.Acceleration], Field(strict=False)]
@@ -98,12 +118,14 @@ class GravitySection(Section):
     """Weight as an acceleration vector in the model's axes; off by default."""
 
     acceleration_m_per_s2: _Vector = (0.0, 0.0, 0.0)
+    """Vector in the axes of the gearbox."""
 
 
 class ReportSection(Section):
     """What a report looks for: modes near a frequency that was measured or published."""
 
     reference_frequency_Hz: q.FrequencyHz | None = None
+    """Frequency near which modes are shown, such as a measured one."""
 
 
 _Factors = Annotated[tuple[q.LoadFactor, ...], Field(strict=False, max_length=50)]
@@ -114,11 +136,17 @@ class SteSection(Section):
     """Settings of the finite-element tables; the axes are those of a table with ``grid``."""
 
     positions: q.Positions = 50
+    """Positions over the mesh cycle."""
     method: Literal["superelement", "nonlinear"] = "superelement"
+    """Method of `exugear ste` without `--method`."""
     grid: bool = False
+    """Whether tables go over load, centre distance and misalignment."""
     torque_factors: _Factors = (0.05, 0.2, 0.5, 1.0, 2.0, 3.0)
+    """Loads of a grid over the static torque of the pair; 1 among them."""
     centre_distance_offsets_um: _Offsets = (-100.0, -50.0, 0.0, 50.0, 100.0)
+    """Centre distances of a grid less that of the pair; 0 among them."""
     misalignment_um: _Offsets = (-60.0, -30.0, 0.0, 30.0, 60.0)
+    """Openings of a grid at the +z end over the common face width; 0 among them."""
 
     @model_validator(mode="after")
     def _axes(self) -> SteSection:
@@ -138,26 +166,47 @@ class CaseFile(Section):
     """The whole gearbox file."""
 
     name: Annotated[Text, Field(max_length=200)]
+    """Title of the gearbox, for pages and pictures."""
     default_inertias: Name
+    """Inertia set that verbs take unless another is asked for; one of those under the bodies."""
     overall: OverallSection
+    """What the overall transmission error compares."""
     static_load: StaticLoadSection
+    """Static state that fixes loaded flanks, tables and operating points of bearings."""
     gears: Entries[GearSection]
+    """Toothed wheels by name."""
     pairs: Entries[PairSection]
+    """Pairs of gears that mesh, by name; each gets a table."""
     bodies: Entries[BodySection]
+    """Bodies by name."""
     meshes: Entries[MeshSection]
+    """Pairs at work between bodies, by name."""
     load_cases: Entries[LoadCaseSection]
+    """Load cases in time, by name; the first is the default."""
     joints: Entries[JointSection] = {}
+    """Ideal joints of the variant `rigid`, by name."""
     bearings: Entries[BearingSection] = {}
+    """Bearings of the variants `bushing` and `flexible`, by name."""
     mounts: Entries[MountSection] = {}
+    """Elastic supports on the ground, by name."""
     couplings: Entries[CouplingSection] = {}
+    """Torsional springs between bodies, by name."""
     deviations: Entries[DeviationSection] = {}
+    """Errors of wheels, by name."""
     pins: Entries[PinSection] = {}
+    """Errors of planets' pins, by name."""
     damping: DampingSection = DampingSection()
+    """Damping in proportion to stiffness."""
     elasticity: ElasticitySection = ElasticitySection()
+    """How finely elastic bodies are described."""
     housing: HousingSection = HousingSection()
+    """Seats of bearings where the housing is not elastic."""
     gravity: GravitySection = GravitySection()
+    """Weight."""
     report: ReportSection = ReportSection()
+    """What a report looks for."""
     ste: SteSection = SteSection()
+    """Tables of the transmission error."""
 
     def __repr__(self) -> str:
         """Return one short line: the title, and how many entries the tables have."""

@@ -15,8 +15,11 @@ class JointSection(Section):
     """Ideal joint that leaves the spin about z free (used by the variant `rigid`)."""
 
     body: Name
+    """Body that turns."""
     on: Name = GROUND
+    """What it turns on: `ground`, a fixed body, a planet's carrier."""
     z_mm: q.PlaceMm
+    """Place along the axis."""
 
 
 _MatrixRow = Annotated[tuple[q.StiffnessEntry, ...], Field(strict=False, max_length=6)]
@@ -26,10 +29,15 @@ class StiffnessSection(Section):
     """6x6 stiffness (or damping) of a bearing, about its place: isotropic entries or the full matrix."""
 
     radial_N_per_m: q.Stiffness = 0.0
+    """Against displacement across the axis."""
     axial_N_per_m: q.Stiffness = 0.0
+    """Against displacement along the axis."""
     tilt_N_m_per_rad: q.Stiffness = 0.0
+    """Against tilting."""
     torsion_N_m_per_rad: q.Stiffness = 0.0
+    """Against rotation about the axis."""
     matrix: Annotated[tuple[_MatrixRow, ...], Field(strict=False, max_length=6)] | None = None
+    """Full 6x6 matrix instead, rows x y z rx ry rz, N/m, N and N m/rad."""
 
     @model_validator(mode="after")
     def _shape(self) -> StiffnessSection:
@@ -97,30 +105,55 @@ class CatalogueSection(Section):
     """
 
     type: BearingType
+    """Type of the bearing."""
     designation: Text = ""
+    """Words for people; nothing is looked up."""
     bore_mm: q.LengthMm
+    """Bore."""
     outer_diameter_mm: q.LengthMm
+    """Outer diameter."""
     width_mm: q.LengthMm
+    """Width of one bearing."""
     contact_angle_deg: q.ContactAngleDeg | None = None
+    """Contact angle; that of the type by default."""
     arrangement: Literal["single", "X", "O", "tandem"] = "single"
+    """How two bearings of a pair stand to each other."""
     holds_towards: Literal["+z", "-z"] = "+z"
+    """Which way of the inner ring a single bearing, or a tandem, holds."""
     row_count: q.RollingRows | None = None
+    """Rows of one bearing."""
     row_distance_mm: q.BoreMm | None = None
+    """Distance of the middles of two rows; by type and arrangement by default."""
     full_complement: bool = False
+    """Whether it has no cage."""
     element_count: q.RollingElements | None = None
+    """Balls or rollers of one row; as many as usual by default."""
     element_diameter_mm: q.LengthMm | None = None
+    """Diameter of balls or rollers, of cones and barrels in their middle."""
     element_length_mm: q.LengthMm | None = None
+    """Effective length of rollers."""
     pitch_diameter_mm: q.LengthMm | None = None
+    """Diameter of the circle of their centres."""
     inner_groove_ratio: q.GrooveRatio | None = None
+    """Radius of the inner groove over the ball's diameter."""
     outer_groove_ratio: q.GrooveRatio | None = None
+    """Radius of the outer groove over the ball's diameter."""
     osculation: q.Osculation | None = None
+    """Radius of a barrel's outline over that of the raceway."""
     profile: Profile = "standard"
+    """Profile of rollers: that of ISO/TS 16281, straight, or a table of drops."""
     radial_clearance_mm: q.ClearanceMm = 0.0
+    """Clearance on the diameter, as mounted and warm; negative for preload."""
     axial_preload_um: q.AxialPreloadUm = 0.0
+    """Approach of both rows against line-to-line contact; negative for play."""
     dynamic_rating_kN: q.RatingKN | None = None
+    """Dynamic load rating as the catalogue prints it, of a pair that of both; by ISO 281 by default."""
     static_rating_kN: q.RatingKN | None = None
+    """Static load rating as the catalogue prints it, of a pair that of both; by ISO 76 by default."""
     radial_load_kN: q.RadialLoadKN | None = None
+    """Load that the stiffness belongs to; that of the statics by default."""
     axial_load_kN: q.AxialLoadKN | None = None
+    """Axial load beside it."""
 
     @model_validator(mode="after")
     def _keys_of_the_type(self) -> CatalogueSection:
@@ -210,16 +243,27 @@ class BearingSection(Section):
     """
 
     body: Name
+    """Body on its inner ring, or outer (`outer_ring`)."""
     on: Name = GROUND
+    """The other body; `ground`, a fixed body, a carrier, another shaft."""
     z_mm: q.PlaceMm
+    """Place of the middle along the axis."""
     housing_factor_applies: bool = True
+    """Whether its seat yields by `housing.factor`."""
     law: Literal["stiffness", "iso16281"] = "stiffness"
+    """Whether it is linear at its load, or follows its rows."""
     cage: Literal["averaged", "turning"] = "averaged"
+    """Whether the elements of a non-linear bearing stand at the mean stiffness, or pass as the rings turn."""
     outer_ring: Literal["body", "on"] | None = None
+    """Which of the two carries the outer ring; planets do by default, other bodies do not."""
     designation: Text = ""
+    """Words for people; a bearing with nothing else holds only in the variant `rigid`, until it gets its data."""
     stiffness: StiffnessSection | None = None
+    """Stiffness given, or floor beside a catalogue."""
     catalogue: CatalogueSection | None = None
+    """Catalogue data."""
     damping: StiffnessSection | None = None
+    """Damping; in proportion to the stiffness by default."""
 
     @model_validator(mode="after")
     def _source(self) -> BearingSection:
@@ -250,10 +294,15 @@ class MountSection(Section):
     """
 
     body: Name
+    """Body that is held."""
     instead_of: Name | None = None
+    """Body for which it stands while that is not enabled."""
     position_mm: Point
+    """Place."""
     stiffness: StiffnessSection
+    """Stiffness."""
     damping: StiffnessSection | None = None
+    """Damping; in proportion to the stiffness by default."""
 
 
 class CouplingSection(Section):
@@ -264,10 +313,15 @@ class CouplingSection(Section):
     """
 
     bodies: Annotated[tuple[Name, Name], Field(strict=False)]
+    """The two bodies."""
     seat: Name | None = None
+    """Bearing on whose seat of elastic bodies it acts."""
     instead_of: Name | None = None
+    """Body for which it stands while that is not enabled."""
     stiffness_N_m_per_rad: q.CouplingStiffness
+    """Torsional stiffness."""
     damping_N_m_s_per_rad: q.CouplingDamping | None = None
+    """Torsional damping; in proportion to the stiffness by default."""
 
 
 Phases = Annotated[
@@ -282,8 +336,14 @@ class MeshSection(Section):
     """A gear pair at work between two bodies; a planet set gives one mesh per planet."""
 
     pair: Name
+    """Pair of gears."""
     pinion_body: Name
+    """Body of the pinion."""
     gear_body: Name
+    """Body of the gear."""
     frame: Name | None = None
+    """Body in whose axes the line of centres stands still; follows from the bodies by default."""
     position_angle_deg: q.AngleDeg | None = None
+    """Direction from pinion to gear in that frame; follows from the bodies by default."""
     phase: Phases | None = None
+    """Position in the mesh cycle at zero angles; follows from teeth and places by default."""

@@ -14,35 +14,55 @@ class RackSection(Section):
     """Basic rack of one gear, as factors of the normal module (ISO 53)."""
 
     addendum: q.RackHeight = 1.0
+    """Height of the gear's tooth above the reference line, in normal modules."""
     dedendum: q.RackHeight = 1.25
+    """Depth of the gear's tooth below the reference line, in normal modules."""
     tip_radius: q.RackRadius = 0.38
+    """Radius at the tip of the tool's tooth, in normal modules: it makes the root fillet."""
 
 
 class MaterialSection(Section):
     """Elastic material of a gear."""
 
     youngs_modulus_GPa: q.YoungsModulusGPa = 206.0
+    """Young's modulus."""
     poissons_ratio: q.PoissonsRatio = 0.3
+    """Poisson's ratio."""
     density_kg_per_m3: q.Density = 7850.0
+    """Density."""
 
 
 class ModificationSection(Section):
     """Material removed from both flanks of every tooth; lengths in roll length, +z as in the gearbox."""
 
     tip_relief_um: q.RemovedUm = 0.0
+    """Material removed at the tip."""
     tip_relief_length_mm: q.RollLengthMm | None = None
+    """Roll length from the tip over which it is removed; or the next key."""
     tip_relief_start_roll_deg: q.RollAngleDeg | None = None
+    """Roll angle at which the tip relief begins."""
     tip_relief_shape: Literal["linear", "parabolic"] = "linear"
+    """How it grows towards the tip."""
     root_relief_um: q.RemovedUm = 0.0
+    """Material removed at the root."""
     root_relief_length_mm: q.RollLengthMm | None = None
+    """Roll length from the root form circle over which it is removed; or the next key."""
     root_relief_start_roll_deg: q.RollAngleDeg | None = None
+    """Roll angle at which the root relief begins."""
     root_relief_shape: Literal["linear", "parabolic"] = "linear"
+    """How it grows towards the root."""
     profile_crowning_um: q.RemovedUm = 0.0
+    """Material removed at tip and root by a parabola over the roll length."""
     lead_crowning_um: q.RemovedUm = 0.0
+    """Material removed at both ends by a parabola over the face."""
     profile_slope_um: q.SlopeUm = 0.0
+    """Material removed at the tip by a straight line over the roll length; negative: at the root."""
     helix_slope_um: q.SlopeUm = 0.0
+    """Material removed at the +z end by a straight line over the face; negative: at the -z end."""
     twist_um: q.SlopeUm = 0.0
+    """Helix slope at the tip less that at the root."""
     topography: FileName | None = None
+    """CSV file of material removed over radius and face, beside the gearbox file."""
 
     @model_validator(mode="after")
     def _starts(self) -> ModificationSection:
@@ -61,38 +81,61 @@ class GearSection(Section):
     """One toothed wheel; helix angle signed, right hand positive."""
 
     teeth: q.Teeth
+    """Number of teeth, positive for rings, too."""
     normal_module_mm: q.ModuleMm
+    """Normal module."""
     normal_pressure_angle_deg: q.PressureAngleDeg = 20.0
+    """Normal pressure angle."""
     helix_angle_deg: q.HelixAngleDeg = 0.0
+    """Helix angle at the reference circle; right hand positive, a ring as the planet that it meshes with."""
     profile_shift: q.ProfileShift = 0.0
+    """Profile shift in normal modules; positive for a larger gear, of a ring as well."""
     face_width_mm: q.FaceWidthMm
+    """Width of the teeth."""
     held_diameter_mm: q.LengthMm
+    """Where the finite-element model is held: bore of a gear, outside of a ring's rim."""
     internal: bool = False
+    """Whether it is a ring with teeth inside."""
     tooth_thinning_mm: q.ThinningMm = 0.0
+    """Tooth thickness taken off on the reference circle, for backlash."""
     tip_diameter_mm: q.LengthMm | None = None
+    """Tip diameter; from rack and profile shift by default."""
     root_diameter_mm: q.LengthMm | None = None
+    """Root diameter; from rack and profile shift by default."""
     rack: RackSection = RackSection()
+    """Basic rack, ISO 53 A by default."""
     material: MaterialSection = MaterialSection()
+    """Elastic material, steel by default."""
     modification: ModificationSection | None = None
+    """Material removed from both flanks of every tooth."""
 
 
 class PairSection(Section):
     """Two gears that mesh: `pinion` is the smaller one (the planet against a ring)."""
 
     pinion: Name
+    """The smaller gear; the planet against a ring."""
     gear: Name
+    """The larger gear."""
     centre_distance_mm: q.LengthMm
+    """Distance of the axes, positive for rings, too."""
     table: bool = True
+    """Whether it gets a table of the transmission error."""
 
 
 class DeviationSection(Section):
     """Errors of one wheel that return with each of its revolutions."""
 
     body: Name
+    """Body that the wheel is on."""
     gear: Name | None = None
+    """Wheel; may be left out where the body has one."""
     cumulative_pitch_um: Annotated[tuple[q.PitchUm, ...], Field(strict=False, max_length=2000)] = ()
+    """Cumulative pitch deviation of each tooth (ISO 1328-1), positive into the tooth."""
     runout_um: q.RunoutUm = 0.0
+    """Radial run-out, twice the eccentricity."""
     runout_angle_deg: q.AngleDeg = 0.0
+    """Where the eccentricity points at zero angle."""
 
     @model_validator(mode="after")
     def _something(self) -> DeviationSection:
@@ -105,5 +148,8 @@ class PinSection(Section):
     """Position error of a planet's pin in its carrier."""
 
     body: Name
+    """The planet, by its number: `planet_1`."""
     radial_um: q.PlaceErrorUm = 0.0
+    """Displacement away from the carrier's axis."""
     tangential_um: q.PlaceErrorUm = 0.0
+    """Displacement in the sense of +z rotation."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from exugear.kernels.coordinates import PADDED
-from exugear.kernels.elastic import ElasticArrays, ElasticMotion
+from exugear.kernels.elastic import ElasticMotion
 from exugear.kernels.fast_meshes import Meshes, MeshMemory
 from exugear.kernels.rolling import RollingArrays
 from exugear.kernels.travelling import TravellingArrays
@@ -188,20 +188,20 @@ class Equations(NamedTuple):
     springs: Springs
     loads: Loads
     joints: Joints | None
-    elastic: ElasticArrays | None
-    motion: ElasticMotion | None
+    elastic: ElasticMotion | None
     turning: TurningArrays | None
 
 
 class Work(NamedTuple):
     """Memory of the right-hand side.
 
-    State vectors have e entries: the system's own, those of travelling seats, and six that stay zero.
+    State vectors have e entries, a multiple of eight: the system's own, those of travelling seats, and six or more that
+    stay zero.
 
     Attributes
     ----------
     q, v : (e,) state at the present step
-    stage_q, stage_v, force, rate, total : (e,) stage, generalized forces, accelerations and their sum
+    stage_q, stage_v, force, rate : (e,) stage, generalized forces and accelerations
     turns : (k, 2) cosine and sine of `Bodies.turning`
     frames : (b + e + 1, 16) rotation matrix, angular velocity, sine and cosine of the tilts
     places : (p + s, 16) padded coordinates and rates of all places
@@ -222,7 +222,6 @@ class Work(NamedTuple):
     stage_v: Floats
     force: Floats
     rate: Floats
-    total: Floats
     turns: Floats
     frames: Floats
     places: Floats

@@ -109,5 +109,5 @@ def evaluate(t: float, q: Floats, v: Floats, equations: Equations, work: Work) -
     add_loads_of_places(bodies, places, work)
     share_travelling_forces(q, equations.travelling, force)
     set_accelerations(v, bodies, work)
-    set_elastic_motion(q, v, force, equations.motion, work.scratch[0], work.rate)
+    set_elastic_motion(q, v, force, equations.elastic, work.scratch, work.rate)
     set_turning_motion(q, v, force, equations.turning, work.memory, work.rate)

@@ -27,6 +27,7 @@ from exugear.solvers.compiled.methods import (
 from exugear.solvers.compiled.sampling import Columns, take_sample
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import kernel
+from fe_ste.tools.octets import SIZE, all_eight, eight, put, sum_of
 
 LAST_STAGE = 3
 """Evaluations of a Runge-Kutta step are numbered 0 to 3; the last one, at the new state, serves the next step too."""
@@ -44,21 +45,20 @@ def take(q: Floats, v: Floats, work: Work) -> None:
 @kernel
 def predict(step: float, method: Method, past: Past, work: Work) -> None:
     """Fill the stage's state with the one a step ahead and `past.sums[0]` with its acceleration, both extrapolated."""
-    x, u, ahead = work.stage_q, work.stage_v, past.sums[0]
-    rows, latest = past.accelerations.shape[0], past.counts[LATEST]
-    for i in range(ahead.size):
-        x[i], u[i], ahead[i] = 0.0, 0.0, 0.0
-    for k in range(method.weights.shape[1]):
-        a = past.accelerations[(latest + rows - k) % rows]
-        of_u, of_x = method.weights[PREDICT_VELOCITY, k], method.weights[PREDICT_POSITION, k]
-        of_a = method.weights[EXTRAPOLATE, k]
-        for i in range(ahead.size):
-            u[i] += of_u * a[i]
-            x[i] += of_x * a[i]
-            ahead[i] += of_a * a[i]
-    for i in range(ahead.size):
-        x[i] = work.q[i] + step * (work.v[i] + step * x[i])
-        u[i] = work.v[i] + step * u[i]
+    weights, ahead, none = method.weights, past.sums[0], all_eight(0.0)
+    for i in range(0, ahead.size, SIZE):
+        of_x, of_u, of_a = none, none, none
+        row = past.counts[LATEST]
+        for k in range(weights.shape[1]):
+            known = eight(past.accelerations[row], i)
+            of_u = of_u + known * weights[PREDICT_VELOCITY, k]
+            of_x = of_x + known * weights[PREDICT_POSITION, k]
+            of_a = of_a + known * weights[EXTRAPOLATE, k]
+            row = row - 1 if row > 0 else past.accelerations.shape[0] - 1
+        v = eight(work.v, i)
+        put(work.stage_q, i, eight(work.q, i) + (v + of_x * step) * step)
+        put(work.stage_v, i, v + of_u * step)
+        put(ahead, i, of_a)
 
 
 @kernel
@@ -66,10 +66,10 @@ def correct(step: float, method: Method, past: Past, work: Work) -> None:
     """Take the predicted state over, corrected by how far the acceleration there is from the extrapolated one."""
     of_v = step * method.correction[CORRECT_VELOCITY]
     of_q = step * step * method.correction[CORRECT_POSITION]
-    for i in range(past.sums.shape[1]):
-        difference = work.rate[i] - past.sums[0, i]
-        work.q[i] = work.stage_q[i] + of_q * difference
-        work.v[i] = work.stage_v[i] + of_v * difference
+    for i in range(0, past.sums.shape[1], SIZE):
+        difference = eight(work.rate, i) - eight(past.sums[0], i)
+        put(work.q, i, eight(work.stage_q, i) + difference * of_q)
+        put(work.v, i, eight(work.stage_v, i) + difference * of_v)
 
 
 @kernel
@@ -104,19 +104,25 @@ def keep_acceleration(as_new: bool, work: Work, past: Past) -> None:
     if as_new:
         past.counts[LATEST] = (past.counts[LATEST] + 1) % past.accelerations.shape[0]
     latest = past.accelerations[past.counts[LATEST]]
-    for i in range(latest.size):
-        latest[i] = work.rate[i]
+    for i in range(0, latest.size, SIZE):
+        put(latest, i, eight(work.rate, i))
 
 
 @kernel
 def copy_state(work: Work, q: Floats, v: Floats) -> bool:
     """Copy the state into q, v (size,); tell whether it is finite."""
-    # A sum that is not finite shows any entry that is not, without a test for each.
-    check = 0.0
-    for i in range(q.size):
+    # Nothing is left of a number times zero, but of one that is not finite.
+    check, filled = all_eight(0.0), q.size - q.size % SIZE
+    for i in range(0, filled, SIZE):
+        place, rate = eight(work.q, i), eight(work.v, i)
+        put(q, i, place)
+        put(v, i, rate)
+        check = check + (place + rate) * 0.0
+    rest = sum_of(check)
+    for i in range(filled, q.size):
         q[i], v[i] = work.q[i], work.v[i]
-        check += abs(q[i]) + abs(v[i])
-    return math.isfinite(check)
+        rest += (q[i] + v[i]) * 0.0
+    return math.isfinite(rest)
 
 
 @kernel
@@ -183,6 +189,6 @@ def advance(
                 return n
         if n < out_signals.shape[0]:
             q, v, due = work.stage_q, work.stage_v, stride if (first + n + 1) % stride == 0 else 0
-            take_sample(end, q, v, equations, work, columns, due, out_signals[n], out_energies[n])
+            take_sample(end, q, v, equations, work, columns, due, given, out_signals[n], out_energies[n])
     done: int = steps
     return done

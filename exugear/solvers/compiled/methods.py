@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from exugear.kernels.products import filled_up
 from fe_ste.tools.arrays import Complexes, Floats, Integers
 
 PREDICT_VELOCITY, PREDICT_POSITION, EXTRAPOLATE = range(3)
@@ -24,6 +25,10 @@ CORRECT_VELOCITY, CORRECT_POSITION = range(2)
 """Entries of `Method.correction`."""
 ORDERS = (4, 5, 6)
 """Orders of the multistep method to choose from: 3 makes negative damping, 7 and more are hardly ever stable."""
+_FREE_SHARES, _CORRECTED_SHARES = np.array([-0.11, 0.035, -0.55]), np.array([0.84, 0.70])
+"""Of the fourth difference in each sum of `stabilised`, and of both corrections of Adams' method."""
+_EXACT = 1e-9
+"""Sums that miss by less are exact but for round-off."""
 LATEST, KNOWN = range(2)
 """Entries of `Past.counts`."""
 
@@ -33,8 +38,9 @@ class Past(NamedTuple):
 
     Attributes
     ----------
-    accelerations : (rows, size) the latest ones, one row after the other, round and round
-    sums : (2, size) memory of a step
+    accelerations : (rows, s) the latest ones, one row after the other, round and round; s is the size, filled up with
+        zeros to a multiple of eight, as the loop takes them
+    sums : (2, s) memory of a step
     counts : (2,) row of the latest, and how many are known
     """
 
@@ -45,14 +51,14 @@ class Past(NamedTuple):
     @classmethod
     def of(cls, method: Method, accelerations: Floats) -> Past:
         """Memory for a method; accelerations (n, size) that are known at the steps before, the latest last."""
-        rows = max(1, method.weights.shape[1])
+        rows = max(1, method.points)
         known = accelerations[-rows:]
-        kept = np.zeros((rows, accelerations.shape[1]))
-        kept[: len(known)] = known
-        return cls(kept, np.zeros((2, accelerations.shape[1])), np.array([max(0, len(known) - 1), len(known)]))
+        kept = np.zeros((rows, filled_up(accelerations.shape[1])))
+        kept[: len(known), : accelerations.shape[1]] = known
+        return cls(kept, np.zeros((2, kept.shape[1])), np.array([max(0, len(known) - 1), len(known)]))
 
     def in_order(self) -> Floats:
-        """Accelerations (n, size) that are known, the latest last."""
+        """Accelerations (n, s) that are known, the latest last."""
         latest, known = self.counts
         rows = len(self.accelerations)
         return np.asarray(self.accelerations[(latest - np.arange(min(known, rows))[::-1]) % rows])
@@ -72,14 +78,22 @@ class Method(NamedTuple):
     correction: Floats
 
     @property
+    def points(self) -> int:
+        """Accelerations of the past that a step takes."""
+        return int(self.weights.shape[1])
+
+    @property
     def order(self) -> int:
-        """Order of the error of a step, less one."""
-        return self.weights.shape[1] or 4
+        """Order of the error of a step, less one: the powers of time that the sums are exact for."""
+        if not self.points:
+            return 4
+        misses = np.abs(self.weights @ _at_nodes(self.points).T - _integrals(np.arange(self.points))).max(axis=0)
+        return int(np.argmax(misses > _EXACT)) or self.points
 
     @property
     def is_multistep(self) -> bool:
         """Whether it goes on from several accelerations of the past."""
-        return bool(self.weights.shape[1])
+        return self.points > 0
 
     @property
     def evaluations(self) -> int:
@@ -89,7 +103,10 @@ class Method(NamedTuple):
     @property
     def name(self) -> str:
         """Name in files and messages."""
-        return f"Adams of order {self.order}" if self.is_multistep else "RK4"
+        if not self.is_multistep:
+            return "RK4"
+        kept = "" if self.order == self.points else ", stabilised"
+        return f"Adams of order {self.order}{kept}"
 
 
 RUNGE_KUTTA = Method(np.zeros((3, 0)), np.zeros(2))
@@ -107,14 +124,43 @@ def adams(order: int) -> Method:
     [1.5, -0.5]
     """
     powers = np.arange(order)
-    # A polynomial through the accelerations at 0, -1, -2 ...: the sums are exact for each power of time.
-    at_nodes = (-powers[None, :].astype(np.float64)) ** powers[:, None]
-    integrals = np.stack([1.0 / (powers + 1.0), 1.0 / ((powers + 1.0) * (powers + 2.0)), np.ones(order)], axis=1)
     # One more node at 1 adds a term that vanishes at all the others.
     term = np.poly1d(-powers, r=True) / math.factorial(order)
     once = np.polyint(term)(1.0)
     twice = np.polyint(np.polymul(term, [-1.0, 1.0]))(1.0)
-    return Method(np.ascontiguousarray(np.linalg.solve(at_nodes, integrals).T), np.array([once, twice]))
+    # The sums are exact for each power of time up to the order, less one.
+    weights = np.linalg.solve(_at_nodes(order), _integrals(powers).T).T
+    return Method(np.ascontiguousarray(weights), np.array([once, twice]))
+
+
+def stabilised() -> Method:
+    """Multistep method of order 4 from five accelerations, stable at longer steps than that of Adams.
+
+    One acceleration more than order 4 needs leaves a multiple of its fourth difference free in each sum; with the two
+    corrections that makes five numbers. They are those found by a search for the longest stable step of motions with
+    damping ratios of 2 to 5 %, as elastic bodies have at their highest frequencies (that of Adams: w h = 0.62), while
+    errors at the top of the band stay below those of Adams' method at the same step.
+
+    Examples
+    --------
+    >>> stabilised().name, stabilised().order
+    ('Adams of order 4, stabilised', 4)
+    """
+    four = adams(4)
+    difference = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
+    weights = np.pad(four.weights, ((0, 0), (0, 1))) + np.outer(_FREE_SHARES, difference)
+    return Method(weights, four.correction * _CORRECTED_SHARES)
+
+
+def _at_nodes(points: int) -> Floats:
+    """Powers 0, 1, ... of time, by row, at the accelerations at 0, -1, -2 ..."""
+    powers = np.arange(points)
+    return np.asarray((-powers[None, :].astype(np.float64)) ** powers[:, None])
+
+
+def _integrals(powers: Integers) -> Floats:
+    """Integrate powers of time as the three sums are to, (3, powers)."""
+    return np.stack([1.0 / (powers + 1.0), 1.0 / ((powers + 1.0) * (powers + 2.0)), np.ones(powers.size)])
 
 
 def growth(method: Method, eigenvalues: Complexes, step: float) -> Complexes:
@@ -150,7 +196,7 @@ def _recurrences(method: Method, angle: Floats, decay: Floats) -> Floats:
 
     The acceleration is -w^2 q - 2 d v; ``angle`` is w h, ``decay`` d h.
     """
-    count = method.order
+    count = method.points
     velocity, position = np.zeros(count + 2), np.zeros(count + 2)
     velocity[0], velocity[2:] = 1.0, method.weights[PREDICT_VELOCITY]
     position[:2], position[2:] = 1.0, method.weights[PREDICT_POSITION]
@@ -184,7 +230,7 @@ def forced_error(method: Method, angle: float) -> float:
         velocity = (1.0 + 4.0 * np.sqrt(turn) + turn) / 6.0 / (turn - 1.0)
         position = (velocity + (1.0 + 2.0 * np.sqrt(turn)) / 6.0) / (turn - 1.0)
     else:
-        past = turn ** -np.arange(method.order)
+        past = turn ** -np.arange(method.points)
         predicted_velocity, predicted_position, extrapolated = method.weights @ past
         difference = turn - extrapolated
         velocity = (predicted_velocity + method.correction[CORRECT_VELOCITY] * difference) / (turn - 1.0)

@@ -9,6 +9,7 @@ from exugear.kernels.coordinates import BODY_SIZE, PADDED, PADDED_TILT, SPIN, TI
 from exugear.kernels.elastic import elastic_motion, scratch_for
 from exugear.kernels.fast_meshes import STATES_SIZE, TURNING, Meshes, MeshMemory, padded_rows
 from exugear.kernels.meshes import FRAME, ROW_SIZE, SPIN_1, SPIN_2
+from exugear.kernels.products import filled_up
 from exugear.kernels.rolling import rolling_memory
 from exugear.kernels.table_law import NOMINAL_DEFLECTION, scratch_memory
 from exugear.kernels.turning import turning_memory
@@ -40,7 +41,7 @@ from exugear.solvers.compiled.arrays import (
 from exugear.solvers.loads import LoadTable
 from exugear.tooth_mesh.laws.registry import LAWS
 from exugear.tooth_mesh.laws.table import TABLE_FORM
-from fe_ste.tools.arrays import Booleans, Floats, Integers
+from fe_ste.tools.arrays import Floats, Integers
 
 ROUND_OFF = 1e-14
 """Entries of a bearing's matrix this small beside its diagonal are left-overs of rotating it, and left out."""
@@ -279,18 +280,9 @@ def equations_of(assembly: Assembly, loads: LoadTable) -> Equations:
         springs=Springs(springs.coordinates, springs.stiffness, springs.damping),
         loads=_loads(assembly, loads),
         joints=joints,
-        elastic=assembly.elastic if elastic else None,
-        motion=elastic_motion(assembly.elastic, _acted(assembly)) if elastic else None,
+        elastic=elastic_motion(assembly.elastic) if elastic else None,
         turning=assembly.turning_arrays if elastic else None,
     )
-
-
-def _acted(assembly: Assembly) -> Booleans:
-    """Coordinates that forces act on: of what goes on between an elastic body's seats only its weight."""
-    acted = assembly.weight != 0.0
-    for name, whole in assembly.elastic_slices.items():
-        acted[whole.start : whole.start + BODY_SIZE * len(assembly.elastic_bodies[name].reduced.seats)] = True
-    return np.asarray(acted)
 
 
 def _rolling_inverse(assembly: Assembly) -> Floats:
@@ -302,7 +294,7 @@ def _rolling_inverse(assembly: Assembly) -> Floats:
 
 def work_for(equations: Equations, q: Floats, v: Floats) -> Work:
     """Memory for the compiled loops, at the state q, v (size,)."""
-    size = equations.loads.steady.size + BODY_SIZE
+    size = filled_up(equations.loads.steady.size + BODY_SIZE)
     count = equations.meshes.slot.size
     count_of_places = equations.places.start.size + equations.places.spin.size
     rolling = equations.connectors.rolling
@@ -315,7 +307,6 @@ def work_for(equations: Equations, q: Floats, v: Floats) -> Work:
         stage_v=np.zeros(size),
         force=np.zeros(size),
         rate=np.zeros(size),
-        total=np.zeros(size),
         turns=np.zeros((equations.bodies.turning.size, 2)),
         frames=frames,
         places=np.zeros((count_of_places, 2 * PADDED)),
@@ -334,6 +325,6 @@ def work_for(equations: Equations, q: Floats, v: Floats) -> Work:
             row=np.zeros(FRAME),
         ),
         series=equations.loads.first[:-1].copy(),
-        scratch=np.zeros((2, 0)) if equations.elastic is None else scratch_for(equations.elastic),
-        memory=np.zeros((5, 0)) if equations.turning is None else turning_memory(equations.turning),
+        scratch=np.zeros((3, 0)) if equations.elastic is None else scratch_for(equations.elastic),
+        memory=np.zeros((6, 0)) if equations.turning is None else turning_memory(equations.turning),
     )

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from exugear.dynamics.signals import SignalLayout
 from exugear.kernels.coordinates import AXIAL, BODY_SIZE, SPIN, TILT
-from exugear.kernels.elastic import elastic_energies
+from exugear.kernels.elastic import damped_power, motion_energies
 from exugear.kernels.fast_meshes import (
     DISSIPATED,
     ELASTIC,
@@ -32,7 +32,7 @@ from exugear.kernels.fast_meshes import (
 )
 from exugear.kernels.rolling import CAGE_DAMPING, DAMPED_PART, ELASTIC_PART, STORED, RollingArrays, rolling_forces
 from exugear.kernels.table_law import TableArrays
-from exugear.kernels.turning import turning_energies
+from exugear.kernels.turning import turning_energies, turning_powers
 from exugear.solvers.compiled.arrays import (
     COS_B,
     COSINE,
@@ -243,17 +243,20 @@ def observe_springs(q: Floats, v: Floats, stride: int, springs: Springs, energy:
 
 
 @kernel
-def observe_elastic_bodies(q: Floats, v: Floats, stride: int, equations: Equations, work: Work, energy: Floats) -> None:
-    """Add energies and powers of elastic bodies, in fixed and in turning frames, these for `stride` samples."""
-    kinetic, stored, damped = elastic_energies(q, v, equations.elastic, work.scratch)
-    energy[KINETIC] += kinetic
-    energy[ELASTIC] += stored
-    energy[DISSIPATED] += stride * damped
-    kinetic, stored, damped, weight = turning_energies(q, v, equations.turning, work.memory)
-    energy[KINETIC] += kinetic
-    energy[ELASTIC] += stored
+def observe_elastic_bodies(
+    q: Floats, v: Floats, stride: int, whole: bool, equations: Equations, work: Work, energy: Floats
+) -> None:
+    """Add powers of elastic bodies, in fixed and in turning frames, for `stride` samples; if `whole`, energies too."""
+    if whole:
+        kinetic, stored = motion_energies(q, v, equations.elastic, work.scratch)
+        energy[KINETIC] += kinetic
+        energy[ELASTIC] += stored
+        kinetic, stored, _, _ = turning_energies(q, v, equations.turning, work.memory)
+        energy[KINETIC] += kinetic
+        energy[ELASTIC] += stored
+    damped, weight = turning_powers(q, v, equations.turning, work.memory)
     energy[OF_LOADS] += stride * weight
-    energy[DISSIPATED] += stride * damped
+    energy[DISSIPATED] += stride * (damped + damped_power(v, equations.elastic, work.scratch))
 
 
 @kernel
@@ -273,6 +276,7 @@ def take_sample(
     work: Work,
     columns: Columns,
     stride: int,
+    whole: bool,
     sample: Floats,
     energy: Floats,
 ) -> None:
@@ -280,7 +284,7 @@ def take_sample(
 
     Signals but those that a state has by itself (`exugear.solvers.compiled.observers`); energies in the columns
     `KINETIC` and so on. Powers but those of meshes and loads stand for `stride` samples, none at 0: they take longer
-    than the signals.
+    than the signals. Energies of bodies are left out unless it is `whole`.
     """
     for i in range(energy.size):
         energy[i] = 0.0
@@ -288,11 +292,12 @@ def take_sample(
     observe_supports(equations.connectors, work, columns, sample)
     observe_joints(v, equations.meshes, equations.meshes.table, equations.joints, work, columns, sample)
     observe_loads(t, q, v, equations.loads, work, energy)
-    if stride > 0:
+    if stride > 0 and whole:
         observe_bodies(q, v, equations.bodies, work, energy)
+    if stride > 0:
         observe_connectors(q, v, stride, equations.bodies, equations.connectors, work, energy)
         observe_springs(q, v, stride, equations.springs, energy)
-        observe_elastic_bodies(q, v, stride, equations, work, energy)
+        observe_elastic_bodies(q, v, stride, whole, equations, work, energy)
 
 
 def columns_of(layout: SignalLayout) -> Columns:

@@ -18,6 +18,7 @@ from exugear.solvers.compiled.sampling import columns_of
 from exugear.solvers.loads import LoadTable
 from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.inner_kernels import bundle
 
 POWER_INTERVAL = 1.0 / 30e3
 """Time between observations of powers, s: a sum over samples errs by what lies at the rate of the samples itself, and
@@ -70,24 +71,27 @@ class CompiledSystem:
     ) -> None:
         self.step = step
         self.equations = equations_of(assembly, loads)
+        self._bundle = bundle(self.equations)
         self._size = assembly.size
         self._work = work_for(self.equations, q, v)
+        self._memory = bundle(self._work)
         self._method = method
         self._layout = signal_layout(assembly)
-        self._columns = columns_of(self._layout)
+        self._columns = bundle(columns_of(self._layout))
         parting = LAWS[assembly.mesh_law].signals_positions
         interval = POWER_INTERVAL_PARTING if parting else POWER_INTERVAL
         self._stride = max(1, int(interval / step + 1e-9))
         self._past = Past.of(method, np.zeros((0, assembly.size)) if past is None else past)
+        self._past_b, self._method_b = bundle(self._past), bundle(method)
 
     @property
     def past(self) -> Floats:
         """Accelerations (n, size) to go on from."""
-        return self._past.in_order()
+        return self._past.in_order()[:, : self._size]
 
     def accelerations(self, time: float = 0.0) -> Floats:
         """Accelerations (size,) at the present state and a time (s)."""
-        evaluate(time, self._work.q, self._work.v, self.equations, self._work)
+        evaluate(time, self._work.q, self._work.v, self._bundle, self._memory)
         return self._work.rate[: self._size].copy()
 
     def advance(
@@ -122,5 +126,5 @@ class CompiledSystem:
 
     def _pass(self, times: Floats, first: int, stride: int, *rows: Floats) -> int:
         """Pass through states, see `exugear.solvers.compiled.loop.advance`."""
-        how = first, self.step, self._method
-        return advance(times, *how, self.equations, self._work, self._past, self._columns, stride, *rows)
+        how = first, self.step, self._method_b
+        return advance(times, *how, self._bundle, self._memory, self._past_b, self._columns, stride, *rows)

@@ -12,7 +12,15 @@ import scipy.linalg
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.linearised import Linearised, linearise
 from exugear.dynamics.modes import coordinate_labels
-from exugear.solvers.compiled.methods import ORDERS, RUNGE_KUTTA, Method, adams, forced_error, growth
+from exugear.solvers.compiled.methods import (
+    ORDERS,
+    RUNGE_KUTTA,
+    Method,
+    adams,
+    forced_error,
+    growth,
+    stabilised,
+)
 from fe_ste.tools.arrays import Complexes, Floats
 
 MARGIN = 1.2
@@ -225,9 +233,9 @@ def methods_of(integrator: str | None) -> tuple[Method, ...]:
     Examples
     --------
     >>> [method.name for method in methods_of("adams")]
-    ['Adams of order 4', 'Adams of order 5', 'Adams of order 6']
+    ['Adams of order 4, stabilised', 'Adams of order 4', 'Adams of order 5', 'Adams of order 6']
     """
-    multistep = tuple(adams(order) for order in ORDERS)
+    multistep = stabilised(), *map(adams, ORDERS)
     return {"adams": multistep, "rk4": (RUNGE_KUTTA,), None: (*multistep, RUNGE_KUTTA)}[integrator]
 
 

@@ -39,6 +39,9 @@ from exugear.tooth_mesh.laws.table import TABLE_FORM, add_table_tangent, table_f
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import compiled, kernel
 
+_NOTHING, _NO_ROWS = np.zeros(0), np.zeros((0, 0))
+"""No room for what `pass_meshes` fills."""
+
 
 @kernel
 def row_law(
@@ -105,62 +108,66 @@ def add_row_tangent(q: Floats, v: Floats, m: int, meshes: MeshArrays, jq: Floats
     turn_rows(acting_turning, bend, force, jq)
 
 
+@compiled
+def pass_meshes(
+    q: Floats,
+    v: Floats,
+    meshes: MeshArrays,
+    table: TableArrays | None,
+    states: Floats,
+    f: Floats,
+    jq: Floats,
+    jv: Floats,
+) -> None:
+    """Do for all meshes what the functions below say, where there is room for it.
+
+    One function does all, so that the laws are compiled once. `table` is that of `acting_table`.
+    """
+    state, acting = np.empty(STATE_SIZE), np.empty(ROW_SIZE)
+    local_q, local_v = np.empty((ROW_SIZE, ROW_SIZE)), np.empty((ROW_SIZE, ROW_SIZE))
+    for m in range(meshes.coordinates.shape[0]):
+        index = meshes.coordinates[m]
+        if f.size > 0 or states.size > 0:
+            if meshes.form[m] == TABLE_FORM:
+                table_force(q, v, m, meshes, table, state, acting)
+            else:
+                row_force(q, v, m, meshes, state, acting)
+            for i in range(STATE_SIZE if states.size > 0 else 0):
+                states[m, i] = state[i]
+            for i in range(ROW_SIZE):
+                if f.size > 0 and index[i] >= 0:
+                    f[index[i]] -= acting[i]
+        if jq.size > 0:
+            for i in range(ROW_SIZE):
+                for j in range(ROW_SIZE):
+                    local_q[i, j], local_v[i, j] = 0.0, 0.0
+            if meshes.form[m] == TABLE_FORM:
+                for side in (1, -1):
+                    add_table_tangent(q, v, m, side, meshes, table, local_q, local_v)
+            else:
+                add_row_tangent(q, v, m, meshes, local_q, local_v)
+            for i in range(ROW_SIZE):
+                for j in range(ROW_SIZE):
+                    if index[i] >= 0 and index[j] >= 0:
+                        jq[index[i], index[j]] -= local_q[i, j]
+                        jv[index[i], index[j]] -= local_v[i, j]
+
+
 def acting_table(meshes: MeshArrays) -> TableArrays | None:
-    """Tables of meshes, None if none of them follows one."""
+    """Tables of meshes, None if none of them follows one: nothing of their law is compiled then."""
     return meshes.table if (meshes.form == TABLE_FORM).any() else None
 
 
 def add_mesh_forces(q: Floats, v: Floats, meshes: MeshArrays, f: Floats) -> None:
     """Add the generalized forces of all meshes to f, shape of q."""
-    add_forces(q, v, meshes, acting_table(meshes), f)
-
-
-@compiled
-def add_forces(q: Floats, v: Floats, meshes: MeshArrays, table: TableArrays | None, f: Floats) -> None:
-    """Add the generalized forces of all meshes to f; `table` is that of `acting_table`."""
-    state, acting = np.empty(STATE_SIZE), np.empty(ROW_SIZE)
-    for m in range(meshes.coordinates.shape[0]):
-        if meshes.form[m] == TABLE_FORM:
-            table_force(q, v, m, meshes, table, state, acting)
-        else:
-            row_force(q, v, m, meshes, state, acting)
-        index = meshes.coordinates[m]
-        for i in range(ROW_SIZE):
-            if index[i] >= 0:
-                f[index[i]] -= acting[i]
+    pass_meshes(q, v, meshes, acting_table(meshes), _NO_ROWS, f, _NO_ROWS, _NO_ROWS)
 
 
 def add_mesh_jacobian(q: Floats, v: Floats, meshes: MeshArrays, jq: Floats, jv: Floats) -> None:
     """Add d f/dq and d f/dv of `add_mesh_forces` to jq and jv, each (n, n)."""
-    add_jacobian(q, v, meshes, acting_table(meshes), jq, jv)
+    pass_meshes(q, v, meshes, acting_table(meshes), _NO_ROWS, _NOTHING, jq, jv)
 
 
-@compiled
-def add_jacobian(q: Floats, v: Floats, meshes: MeshArrays, table: TableArrays | None, jq: Floats, jv: Floats) -> None:
-    """Do what `add_mesh_jacobian` does; `table` is that of `acting_table`."""
-    local_q, local_v = np.empty((ROW_SIZE, ROW_SIZE)), np.empty((ROW_SIZE, ROW_SIZE))
-    for m in range(meshes.coordinates.shape[0]):
-        local_q[:] = 0.0
-        local_v[:] = 0.0
-        if meshes.form[m] == TABLE_FORM:
-            for side in (1, -1):
-                add_table_tangent(q, v, m, side, meshes, table, local_q, local_v)
-        else:
-            add_row_tangent(q, v, m, meshes, local_q, local_v)
-        index = meshes.coordinates[m]
-        for i in range(ROW_SIZE):
-            for j in range(ROW_SIZE):
-                if index[i] >= 0 and index[j] >= 0:
-                    jq[index[i], index[j]] -= local_q[i, j]
-                    jv[index[i], index[j]] -= local_v[i, j]
-
-
-@compiled
 def mesh_state(q: Floats, v: Floats, meshes: MeshArrays, out: Floats) -> None:
     """Fill (m, 10): what each mesh does; columns as named in `exugear.kernels.meshes`."""
-    acting = np.empty(ROW_SIZE)
-    for m in range(meshes.coordinates.shape[0]):
-        if meshes.form[m] == TABLE_FORM:
-            table_force(q, v, m, meshes, meshes.table, out[m], acting)
-        else:
-            row_force(q, v, m, meshes, out[m], acting)
+    pass_meshes(q, v, meshes, acting_table(meshes), out, _NOTHING, _NO_ROWS, _NO_ROWS)

@@ -16,7 +16,7 @@ import pytest
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.signals import signal_layout
 from exugear.dynamics.statics import accelerating_start
-from exugear.kernels.connectors import add_connector_forces
+from exugear.kernels.connectors import pass_connectors
 from exugear.kernels.meshes import STATE_SIZE
 from exugear.kernels.springs import add_spring_forces
 from exugear.model.choice import Choice
@@ -24,7 +24,7 @@ from exugear.model.gearbox import Gearbox
 from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.compiled.step import choose_integration
 from exugear.solvers.loads import LoadTable
-from exugear.tooth_mesh.laws.forms import add_forces, mesh_state
+from exugear.tooth_mesh.laws.forms import pass_meshes
 
 from ..assembled import assembled
 from ..plain_signals import energies_of, sampled
@@ -41,11 +41,10 @@ passes through; so the limit is lower, and the law's account has one in terms of
 @numba.njit
 def mesh_powers(q, v, mesh, damping, out):
     """Fill (samples, 4) of one mesh: power into the bodies, damped, that of k(PMC) (W); elastic energy (J)."""
-    f, state = np.empty(q.shape[1]), np.empty((1, STATE_SIZE))
+    f, state, none = np.empty(q.shape[1]), np.empty((1, STATE_SIZE)), np.empty((0, 0))
     for n in range(q.shape[0]):
         f[:] = 0.0
-        add_forces(q[n], v[n], mesh, mesh.table, f)
-        mesh_state(q[n], v[n], mesh, state)
+        pass_meshes(q[n], v[n], mesh, mesh.table, state, f, none, none)
         out[n, 0] = np.dot(f, v[n])
         out[n, 1] = damping * state[0, 1] ** 2
         out[n, 2] = -state[0, 7]
@@ -55,14 +54,13 @@ def mesh_powers(q, v, mesh, damping, out):
 @numba.njit
 def bearing_powers(q, v, bearing, out):
     """Fill (samples,): power of one bearing into its bodies, W."""
-    f = np.empty(q.shape[1])
+    f, none, no_tangents = np.empty(q.shape[1]), np.empty((0, 0)), np.empty((0, 0, 0))
     for n in range(q.shape[0]):
         f[:] = 0.0
-        add_connector_forces(q[n], v[n], bearing, f)
+        pass_connectors(q[n], v[n], np.empty(0), bearing, none, none, f, no_tangents)
         out[n] = np.dot(f, v[n])
 
 
-@numba.njit
 def spring_powers(q, v, springs, out):
     """Fill (samples,): power of the couplings into their bodies, W."""
     f = np.empty(q.shape[1])

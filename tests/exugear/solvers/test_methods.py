@@ -26,6 +26,7 @@ from exugear.solvers.compiled.methods import (
     adams,
     forced_error,
     growth,
+    stabilised,
 )
 from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.compiled.step import MARGIN, choose_integration, eigenvalues
@@ -49,7 +50,7 @@ def test_predictor_of_velocities_is_that_of_adams_and_bashforth() -> None:
 def oscillation(method: Method, angle: float, turns: int) -> float:
     """Error of an undamped oscillator after whole turns, steps of an angle (rad), begun on the exact solution."""
     matrix = whole_recurrence(method, np.eye(1), np.zeros((1, 1)), np.ones((1, 1)), angle)
-    past = np.arange(method.order)
+    past = np.arange(method.points)
     state = np.concatenate([[0.0], [1.0], -(angle**2) * np.cos(angle * past)])
     for _ in range(round(2.0 * np.pi * turns / angle)):
         state = matrix @ state
@@ -58,7 +59,7 @@ def oscillation(method: Method, angle: float, turns: int) -> float:
 
 def whole_recurrence(method: Method, mass: NDArray, damping: NDArray, stiffness: NDArray, step: float) -> NDArray:
     """Matrix that a step applies to all of h v, q and h^2 times the last accelerations of a linear system."""
-    size, count = len(mass), method.order
+    size, count = len(mass), method.points
     one = np.eye(size)
     velocity = np.hstack([one, 0.0 * one, *(w * one for w in method.weights[PREDICT_VELOCITY])])
     position = np.hstack([one, one, *(w * one for w in method.weights[PREDICT_POSITION])])
@@ -81,6 +82,20 @@ def test_errors_fall_with_the_order_of_the_method(order: int) -> None:
     coarse, fine = (oscillation(adams(order), 2.0 * np.pi / n, turns=1) for n in (80, 160))
     # Order k + 1 at least: velocities are corrected by one more node than they are predicted with.
     assert coarse / fine > 0.8 * 2.0 ** (order + 1)
+
+
+def test_stabilised_method_is_of_order_4_and_stable_at_steps_longer_by_a_fifth() -> None:
+    """For damping ratios of 2 to 5 %; the limit of Adams' method is the first angle at which a motion grows."""
+    coarse, fine = (oscillation(stabilised(), 2.0 * np.pi / n, turns=1) for n in (80, 160))
+    assert 0.8 * 2.0**4 < coarse / fine < 1.2 * 2.0**5
+    angles = np.linspace(0.1, 1.0, 91)
+    for damping in (0.02, 0.033, 0.05):
+        motion = -damping + 1j * np.sqrt(1.0 - damping**2)
+        limits = []
+        for method in (adams(4), stabilised()):
+            grows = np.abs(growth(method, angles * motion, 1.0)).max(axis=1) > 1.0
+            limits.append(angles[np.argmax(grows)])
+        assert limits[1] > 1.18 * limits[0]
 
 
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
@@ -129,15 +144,15 @@ def test_a_step_that_is_asked_for_is_taken_by_the_method_that_is_accurate_with_i
 
 
 @pytest.mark.parametrize("frequency", [1e3, 3e3, 6.4e3])
-@pytest.mark.parametrize("method", [RUNGE_KUTTA, *map(adams, ORDERS)], ids=lambda method: method.name)
+@pytest.mark.parametrize("method", [RUNGE_KUTTA, stabilised(), *map(adams, ORDERS)], ids=lambda method: method.name)
 def test_expected_error_of_a_forced_mass_is_the_one_it_makes(method: Method, frequency: float) -> None:
     """A mass under a force alone, integrated step by step."""
     angle, steps = 2.0 * np.pi * frequency * STEP, 4000
-    time = angle * np.arange(-method.order, steps + 1)
+    time = angle * np.arange(-method.points - 1, steps + 1)
     force = np.exp(1j * time)
     q, v = -force.copy(), -1j * force  # h v and q in units of the square of the step over that of the angle
-    for n in range(method.order, len(time) - 1):
-        a, h = force[n - np.arange(method.order)], angle
+    for n in range(method.points + 1, len(time) - 1):
+        a, h = force[n - np.arange(method.points)], angle
         if method.is_multistep:
             difference = force[n + 1] - method.weights[EXTRAPOLATE] @ a
             v[n + 1] = v[n] + h * (method.weights[PREDICT_VELOCITY] @ a + method.correction[0] * difference)

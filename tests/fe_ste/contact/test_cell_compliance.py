@@ -82,10 +82,13 @@ def near_field(compliance: PairCompliance, cells: Cells) -> Floats:
         for flank in flanks:
             material, end = flank.gear.material, flank.gear.face_width / 2
             surface = (1 - material.poissons_ratio**2) / (np.pi * material.youngs_modulus)
-            places = [(1.0, axial[j]), (flank.mirror, 2 * end - axial[j]), (flank.mirror, -2 * end - axial[j])]
-            for strength, place in places:
-                along = (axial[i] - place) / cosine
-                result[i, j] += surface * strength * mean_inverse_distance(across, along, half, half_along)
+            result[i, j] += surface * mean_inverse_distance(across, apart / cosine, half, half_along)
+            for face, images in zip((-end, end), flank.images, strict=True):
+                read, loaded = axial[i] - face, axial[j] - face
+                for strength, squares, product in images:
+                    along = np.sqrt(squares * (read**2 + loaded**2) + product * read * loaded) / cosine
+                    length = half_along * np.sqrt(squares / 2 + product / 4)  # as for a load as far from the face
+                    result[i, j] += surface * strength * mean_inverse_distance(across, along, half, length)
     return result
 
 

@@ -7,7 +7,9 @@ import pytest
 from scipy.integrate import dblquad, quad
 
 from fe_ste.elasticity.halfspace import (
-    interior_displacement,
+    interior_displacement as displacement_of_loads,
+)
+from fe_ste.elasticity.halfspace import (
     rectangle_integral,
     tent_integrals,
     tent_weights,
@@ -44,6 +46,13 @@ def test_rectangle_is_even_additive_and_far_away_a_point_load() -> None:
     parts = sum(rectangle_integral(0.4 - x, 0.3, 0.5, 0.5) for x in (-0.5, 0.5))
     assert rectangle_integral(0.4, 0.3, 1.0, 0.5) == pytest.approx(parts, rel=1e-13)
     assert rectangle_integral(400.0, 300.0, 1.0, 0.5) == pytest.approx(2.0 / 500.0, rel=1e-5)
+
+
+def interior_displacement(places: np.ndarray, poissons_ratio: float) -> np.ndarray:
+    """Under a unit load at the origin."""
+    at, one = places.reshape(-1, 3), np.array([[1.0, 0.0]])
+    found = displacement_of_loads(at, np.zeros((1, 2)), np.array([0]), one, 2, poissons_ratio)
+    return np.asarray(found[..., 0].reshape(places.shape))
 
 
 def into_the_surface(x: float, y: float, z: float) -> float:
@@ -105,7 +114,7 @@ ROLL, AXIAL, BASE = np.array([0.30, 0.34, 0.38, 0.42]), np.linspace(-6e-3, 6e-3,
 
 
 def tents(mirror: float = 0.0, lead: float = 3.0) -> np.ndarray:
-    return tent_integrals(ROLL, AXIAL, BASE, lead, 0.96, mirror)
+    return tent_integrals(ROLL, AXIAL, BASE, lead, 0.96, np.array([[[mirror, 1.0, 2.0]]] * 2))
 
 
 @pytest.mark.parametrize(("node", "layer"), [(1, 2), (0, 0)])
@@ -133,7 +142,7 @@ def test_mirror_adds_the_loads_imaged_at_both_ends() -> None:
     """Without lead, images at both ends are the tents of a face three times as long, folded."""
     mirrored = tents(mirror=1.0, lead=0.0)
     long_axial = np.linspace(-18e-3, 18e-3, 10)
-    long = tent_integrals(ROLL, long_axial, BASE, 0.0, 0.96, 0.0).reshape(4, 10, 4, 10)
+    long = tent_integrals(ROLL, long_axial, BASE, 0.0, 0.96, np.zeros((2, 0, 3))).reshape(4, 10, 4, 10)
     # Inner layer 1 of the face is layer 4 of the long one; its images are layers 2 and 8.
     folded = long[:, 3:7, :, 4] + long[:, 3:7, :, 2] + long[:, 3:7, :, 8]
     own = mirrored.reshape(4, 4, 4, 4)[:, :, :, 1]

@@ -8,7 +8,7 @@ import scipy.sparse
 
 from fe_ste.elasticity.bricks import stiffness_matrix
 from fe_ste.elasticity.condensation import flank_functionals
-from fe_ste.elasticity.flank import FlankCompliance, flank_compliance, flank_near_field
+from fe_ste.elasticity.flank import FlankCompliance, flank_compliance, flank_images, flank_near_field, regular_part
 from fe_ste.elasticity.halfspace import tent_weights
 from fe_ste.elasticity.hexmesh import MeshSettings, SectorMesh, sector_mesh
 from fe_ste.elasticity.ring import Chain, chain_of, open_chain_faces, ring_faces, uniform_faces
@@ -25,7 +25,6 @@ GEAR = Gear(
     held_diameter=16e-3,
 )
 COARSE = MeshSettings(layers=3, flank=6, thickness=4, fillet=1, root=1, rim=3)
-MIRROR = 1.0
 
 
 def rotation(angle: float) -> np.ndarray:
@@ -71,15 +70,14 @@ def _as_stored(mesh: SectorMesh, on_surface: np.ndarray, sectors: int) -> dict[t
     """Blocks by tooth; the loaded tooth's own under tent loads, without the near field."""
     weights = tent_weights(mesh.section.flank_roll, mesh.axial_positions)
     size = len(weights)
-    near = flank_near_field(mesh, 1, MIRROR)
+    near = flank_near_field(mesh, 1, flank_images(mesh.gear, 1))
     result = {}
     for read in range(sectors):
         for loaded in range(sectors):
             block = np.s_[read * size : (read + 1) * size, loaded * size : (loaded + 1) * size]
             result[read, loaded] = on_surface[block]  # displacement into the flank under loads into it
             if read == loaded:
-                own = on_surface[block] @ weights - near
-                result[read, loaded] = (own + own.T) / 2
+                result[read, loaded] = regular_part(mesh, on_surface[block] @ weights, near)
     return result
 
 

@@ -1,0 +1,32 @@
+"""The verb `schema`: describe every key of the gearbox file, for editors or for people."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from exugear.cli.console import say
+from exugear.cli.errors import exit_codes
+
+
+def schema(
+    page: Annotated[bool, typer.Option("--page", help="A page in Markdown instead, for people.")] = False,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="File to write. (default: standard output)")
+    ] = None,
+) -> None:
+    """Describe every key of the gearbox file as a JSON schema, which editors read."""
+    with exit_codes():
+        from exugear.schema.json_schema import json_schema
+        from exugear.schema.page import page as described
+        from fe_ste.tools.files import write_file
+
+        text = described() if page else json.dumps(json_schema(), indent=1, ensure_ascii=False) + "\n"
+        if out is None:
+            typer.echo(text, nl=False)
+            return
+        write_file(out, text.encode())
+        say(f"Written: {out}")

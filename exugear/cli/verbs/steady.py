@@ -1,0 +1,167 @@
+"""The verb `steady`: steady response of a variant over speed, every mesh order and their combinations."""
+
+from __future__ import annotations
+
+import json
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from exugear.cli.case import make_results_folder, open_project
+from exugear.cli.console import note, print_json, print_table, progress_bar, say
+from exugear.cli.dynamics import reduce_elastic_bodies
+from exugear.cli.errors import exit_codes, interruption, model_errors
+from exugear.cli.options import (
+    USUAL_LAW,
+    CaseArgument,
+    FilesBelowOption,
+    InertiasOption,
+    JsonOption,
+    LawOption,
+    OutOption,
+    ScriptsOption,
+    VariantOption,
+)
+from exugear.cli.tables import compute_missing_tables
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from exugear.project import Project
+    from exugear.steady.peaks import Peak
+    from exugear.steady.settings import SteadySettings
+
+SHOWN_PEAKS = 15
+
+
+class Level(StrEnum):
+    """What varies: the transmission error as excitation, the stiffness over the mesh cycle, or laws in time."""
+
+    linear = "linear"
+    parametric = "parametric"
+    nonlinear = "nonlinear"
+
+
+def steady(
+    case: CaseArgument,
+    variant: VariantOption,
+    mesh_law: LawOption = USUAL_LAW,
+    inertias: InertiasOption = None,
+    level: Annotated[
+        Level,
+        typer.Option(
+            help="linear: the transmission error as excitation; parametric: stiffness that varies, all meshes at once; "
+            "nonlinear: laws in time, such as table with teeth that part."
+        ),
+    ] = Level.parametric,
+    speeds: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FIRST:LAST:COUNT",
+            help="Speeds of the input, rpm, positive about +z. (default: those that the first load case passes)",
+            show_default=False,
+        ),
+    ] = None,
+    branches: Annotated[
+        bool,
+        typer.Option(
+            "--branches", help="Follow the states from the first speed to the last through folds (level nonlinear)."
+        ),
+    ] = False,
+    out: OutOption = None,
+    files_below: FilesBelowOption = None,
+    scripts: ScriptsOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Compute the steady response over speed: what resonates, without a run-up.
+
+    Speeds are added where mesh orders meet modes. Tables that are missing or do not fit the case are computed first.
+    """
+    with exit_codes():
+        from exugear.model.choice import Choice
+
+        project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
+        with model_errors():
+            settings = _settings(project, level, speeds, branches)
+        make_results_folder(project.folder)
+        compute_missing_tables(project)
+        reduce_elastic_bodies(project)
+        data = _respond(project, settings)
+        _tell(project, settings, data, as_json)
+
+
+def _settings(project: Project, level: Level, speeds: str | None, branches: bool) -> SteadySettings:
+    from exugear.steady.settings import SpeedRange, SteadySettings, check_law, usual_speeds
+
+    check_law(project.choice.mesh_law, level.value)
+    asked = usual_speeds(project.gearbox) if speeds is None else SpeedRange.from_text(speeds)
+    return SteadySettings(asked, level.value, branches=branches)
+
+
+def _respond(project: Project, settings: SteadySettings) -> xr.Dataset:
+    """Compute the response behind a progress bar, or find one that is kept."""
+    with progress_bar() as bar:
+        task = bar.add_task(f"{project.choice.variant}: mean system", total=None)
+
+        def show(done: int, total: int) -> None:
+            interruption.check()
+            bar.update(task, completed=done, total=total, description=f"{project.choice.variant}: steady response")
+
+        with model_errors():
+            return project.steady(settings, show)
+
+
+def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json: bool) -> None:
+    from exugear.model.parts import RPM
+    from exugear.steady.peaks import peaks
+
+    path, found = project.steady_path(settings), peaks(data)
+    growth = float(data.attrs["growth_rate"])
+    if growth > 0.0:
+        note(f"Unstable: disturbances grow by up to {growth:.3g} 1/s; no steady state lasts", style="yellow")
+    if as_json:
+        print_json(
+            {
+                "case": project.gearbox.source,
+                **{key: str(data.attrs[key]) for key in ("variant", "mesh_law", "inertias", "level")},
+                "speeds": int(data.sizes["point"]),
+                "lines": int(data.sizes["line"]),
+                "growth_rate_1_per_s": growth,
+                "largest_energy_error": float(abs(data["energy_error"]).max()),
+                "folds_rpm": [fold / RPM for fold in json.loads(data.attrs["folds"])],
+                "planet_spread": float(data.attrs["planet_spread"]),
+                "peaks_of_overall_dte": [_summary(peak) for peak in found],
+                "file": str(path),
+            }
+        )
+        return
+    shown = [_row(peak) for peak in found[:SHOWN_PEAKS]]
+    title = f"Overall transmission error, {project.choice.variant}, {settings.level}: its loudest peaks"
+    if shown:
+        print_table(title, shown)
+    fastest = float(abs(data["speed"]).max()) / RPM
+    say(f"{data.sizes['point']} speeds up to {fastest:.4g} rpm, slowest decay {-growth:.3g} 1/s, in {path}")
+
+
+def _summary(peak: Peak) -> dict[str, Any]:
+    from exugear.model.parts import RPM
+
+    return {
+        "line": peak.line,
+        "order": peak.order,
+        "speed_rpm": peak.speed / RPM,
+        "frequency_Hz": peak.frequency,
+        "amplitude_m": peak.amplitude,
+    }
+
+
+def _row(peak: Peak) -> dict[str, str]:
+    from exugear.model.parts import RPM
+
+    return {
+        "line": peak.line,
+        "rpm": f"{peak.speed / RPM:.2f}",
+        "Hz": f"{peak.frequency:.1f}",
+        "um": f"{1e6 * peak.amplitude:.3f}",
+    }

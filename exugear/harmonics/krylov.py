@@ -1,0 +1,91 @@
+"""Linear equations of harmonic balance, solved without their matrix."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from fe_ste.tools.arrays import Complexes, Floats
+
+MOST_PRODUCTS = 400
+"""Products with the operator after which the search is given up."""
+
+
+class HarmonicBalanceError(RuntimeError):
+    """No balance of all lines was found."""
+
+
+def solve_lines(
+    apply: Callable[[Complexes], Complexes], right: Complexes, tolerance: float, start: Complexes | None = None
+) -> tuple[Complexes, int]:
+    """Solve A y = b for coefficients of lines by GMRES (Saad and Schultz 1986) over real and imaginary parts.
+
+    A is linear over the reals alone, since products of signals mix lines with their conjugates.
+
+    Parameters
+    ----------
+    apply : callable
+        A times an array of the shape of `right`.
+    right : complex array
+    tolerance : float
+        Residual over the size of the right-hand side.
+    start : complex array, optional
+
+    Returns
+    -------
+    solution : complex array
+    products : int
+        Products with A that it took.
+
+    Raises
+    ------
+    HarmonicBalanceError
+        Not within `MOST_PRODUCTS`.
+
+    Examples
+    --------
+    >>> solve_lines(lambda y: y + 0.1j * y.conj(), np.array([1.1 + 0.1j]), 1e-12)[0].round(12)
+    array([1.1010101-0.01010101j])
+    """
+
+    def real(values: Complexes) -> Floats:
+        return np.ascontiguousarray(values).view(np.float64).ravel()
+
+    def lines(values: Floats) -> Complexes:
+        return values.view(np.complex128).reshape(right.shape)
+
+    wanted = tolerance * float(np.linalg.norm(right))
+    x = np.zeros(2 * right.size) if start is None else real(start).copy()
+    remainder = real(right) - (real(apply(lines(x))) if start is not None else 0.0)
+    size = float(np.linalg.norm(remainder))
+    if size <= wanted:
+        return lines(x), 0
+    most = min(MOST_PRODUCTS, 2 * right.size)
+    basis, hessenberg = np.zeros((most + 1, x.size)), np.zeros((most + 1, most))
+    # Givens rotations keep the least-squares problem triangular; its residual is then known without solving it.
+    turns, rest = np.zeros((most, 2)), np.zeros(most + 1)
+    basis[0], rest[0] = remainder / size, size
+    for n in range(most):
+        w = real(apply(lines(basis[n])))
+        for _ in range(2):  # orthogonal to round-off
+            shares = basis[: n + 1] @ w
+            hessenberg[: n + 1, n] += shares
+            w = w - shares @ basis[: n + 1]
+        length = float(np.linalg.norm(w))
+        column = hessenberg[:, n]
+        for i in range(n):
+            c, s = turns[i]
+            column[i], column[i + 1] = c * column[i] + s * column[i + 1], c * column[i + 1] - s * column[i]
+        radius = float(np.hypot(column[n], length))
+        turns[n] = column[n] / radius, length / radius
+        column[n] = radius
+        rest[n], rest[n + 1] = turns[n, 0] * rest[n], -turns[n, 1] * rest[n]
+        if abs(rest[n + 1]) <= wanted or length == 0.0:
+            steps = np.linalg.solve(np.triu(hessenberg[: n + 1, : n + 1]), rest[: n + 1])
+            return lines(x + steps @ basis[: n + 1]), n + 1
+        basis[n + 1] = w / length
+    raise HarmonicBalanceError(
+        f"harmonic balance: the residual stays at {abs(rest[most]) / max(size, 1e-300):.1e} of its start after "
+        f"{most} products"
+    )

@@ -1,0 +1,105 @@
+"""Sets of lines: the frequencies at which something driven by several periodic causes vibrates.
+
+Each cause is a base with a frequency of its own. What all of them do together is a sum of lines, at integer
+combinations k . base of these frequencies. Real signals need one line of each pair k, -k.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
+
+
+@dataclass(frozen=True, eq=False)
+class LineSet:
+    r"""Lines of a real signal x = x_0 + sum_k (c_k e^(i k . theta) + its conjugate).
+
+    Arrays of a signal have the coefficients c along their first axis; the first one, the mean, is real. The peak
+    amplitude of a line is 2 \|c_k\|.
+
+    Attributes
+    ----------
+    index : (n, bases) array of int
+        Multiples of each base; the first line is the mean.
+    orders : (n,) array
+        Frequency of each line over that of the reference, not negative.
+    """
+
+    index: Integers
+    orders: Floats
+
+    def __repr__(self) -> str:
+        """Sizes in one line."""
+        return f"<LineSet: {len(self.index)} lines of {self.index.shape[1]} bases>"
+
+    @cached_property
+    def _radix(self) -> Integers:
+        """Weights that make one number of a vector of multiples; wide enough for sums of several lines."""
+        span = 64 * (int(np.abs(self.index).max(initial=0)) + 1)
+        return np.array([span**n for n in range(self.index.shape[1])], dtype=np.int64)
+
+    @cached_property
+    def _sorted_keys(self) -> tuple[Integers, Integers]:
+        keys = self.index @ self._radix
+        order = np.argsort(keys)
+        return keys[order], order
+
+    def find(self, multiples: Integers) -> tuple[Integers, Booleans]:
+        """Place of lines (..., bases) in the set, -1 for none, and whether it is the conjugate that stands there."""
+        keys, order = self._sorted_keys
+        wanted = multiples @ self._radix
+
+        def look(values: Integers) -> Integers:
+            at = np.minimum(np.searchsorted(keys, values), len(keys) - 1)
+            return np.where(keys[at] == values, order[at], -1)
+
+        direct, mirrored = look(wanted), look(-wanted)
+        return np.where(direct >= 0, direct, mirrored), (direct < 0) & (mirrored >= 0)
+
+    def values(self, coefficients: Complexes, angles: Floats) -> Floats:
+        """Values (samples, ...) of signals with `coefficients` (n, ...) at angles (samples, bases) of the bases, rad.
+
+        Examples
+        --------
+        >>> lines = line_set([1.0], 2)
+        >>> lines.values(np.array([1.0, 0.5, 0.0], dtype=complex), np.array([[0.0], [np.pi]]))
+        array([2., 0.])
+        """
+        turning = np.exp(1j * (angles @ self.index.T))
+        turning[:, 1:] *= 2.0
+        return np.asarray(np.real(np.tensordot(turning, coefficients, axes=1)))
+
+
+def line_set(orders: Sequence[float], harmonics: int, combinations: int = 0) -> LineSet:
+    """Each base alone up to its harmonics, and combinations of bases with a small sum of multiples.
+
+    Parameters
+    ----------
+    orders : sequence of float
+        Frequency of each base over that of the reference, positive.
+    harmonics : int
+        Highest multiple of one base alone.
+    combinations : int
+        Largest sum of the magnitudes of a combination's multiples.
+
+    Examples
+    --------
+    >>> lines = line_set([1.0, 4.5], harmonics=2, combinations=2)
+    >>> [tuple(row) for row in lines.index.tolist()]
+    [(0, 0), (1, 0), (2, 0), (-1, 1), (0, 1), (1, 1), (0, 2)]
+    """
+    bases = np.asarray(orders, dtype=np.float64)
+    rows = {tuple(n * unit) for unit in np.eye(bases.size, dtype=np.int64) for n in range(1, harmonics + 1)}
+    reach = range(-combinations, combinations + 1)
+    for row in itertools.product(reach, repeat=bases.size):
+        if 0 < sum(map(abs, row)) <= combinations and row > tuple(-n for n in row):
+            rows.add(row if np.dot(row, bases) >= 0.0 else tuple(-n for n in row))
+    index = np.array(sorted((tuple(map(int, row)) for row in rows), key=lambda row: float(np.dot(row, bases))))
+    index = np.vstack([np.zeros((1, bases.size), dtype=np.int64), index.astype(np.int64).reshape(-1, bases.size)])
+    return LineSet(index, index @ bases)

@@ -1,0 +1,306 @@
+"""The mean system: equations of motion in the rotating frame, linearised about the static state at speed.
+
+    M u'' + C(W) u' + K(W) u = forces,   C and K quadratic in the speed W of the overall input
+
+Gyroscopic, Coriolis and centrifugal terms are in C and K. They come from the assembly's own forces by central
+differences, since these know every element; the parabolas through three speeds are exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.linalg
+
+from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.statics import BalanceError, static_state
+from exugear.rotating.equal_planets import with_equal_planets
+from exugear.rotating.rotating_frame import RotatingFrame, SteadyError, planet_sets
+from fe_ste.tools.arrays import Complexes, Floats
+
+PLACE_STEP, RATE_STEP = 1e-6, 1e-3
+"""Steps of central differences by u and u'; forces are all but linear in the latter."""
+MOST_STEPS = 20
+"""Steps of Newton's method to the static state."""
+BALANCED = 1e-8
+"""Residual over the largest load that counts as balanced; the search goes on as far as it falls."""
+VARIATION = 2e-4
+"""Largest change of stiffness over the carrier's angle that counts as none, over the stiffness.
+
+Static tilts that are not the same for all planets bend the geometry by 5e-5 in the GRC; unequal planets bring 1e-3."""
+CHECKED_ANGLES = (0.7, 1.9)
+"""Angles of the input at which that is looked at, rad."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeanSystem:
+    """Mean system of an assembly over speed.
+
+    Attributes
+    ----------
+    frame : RotatingFrame
+    speeds : (3,) array
+        Speeds of the input at which it was linearised, rad/s.
+    mass : (size, size) array
+    damping, stiffness : (3, size, size) arrays
+        C and K there.
+    static : (3, size) array
+        Static coordinates u there.
+    torque : (3,) array
+        Torque of the drive that keeps the speed, N m.
+    drive : (size,) array
+        Generalized force of a unit of that torque.
+    pinned : int
+        Coordinate whose mean is zero: the spin of the overall input.
+    planet_spread : float
+        Largest change of planet bearings' stiffness that makes them equal, over that stiffness.
+    """
+
+    frame: RotatingFrame
+    speeds: Floats
+    mass: Floats
+    damping: Floats
+    stiffness: Floats
+    static: Floats
+    torque: Floats
+    drive: Floats
+    pinned: int
+    planet_spread: float
+
+    def __repr__(self) -> str:
+        """Size and speeds in one line."""
+        return f"<MeanSystem: {self.size} coordinates, {self.speeds.min():.4g} to {self.speeds.max():.4g} rad/s>"
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates."""
+        return len(self.mass)
+
+    @cached_property
+    def _parabola(self) -> Floats:
+        """From values at the three speeds to coefficients of 1, W, W^2."""
+        return np.asarray(np.linalg.inv(np.vander(self.speeds, 3, increasing=True)))
+
+    def at(self, values: Floats, speed: float) -> Floats:
+        """Value (...) at a speed (rad/s) of what is known at the three, (3, ...): exact for parabolas."""
+        weights = np.array([1.0, speed, speed**2]) @ self._parabola
+        return np.asarray(np.tensordot(weights, values, axes=1))
+
+    def stiffness_at(self, speed: float) -> Floats:
+        """K (size, size) at a speed of the input, rad/s."""
+        return self.at(self.stiffness, speed)
+
+    def damping_at(self, speed: float) -> Floats:
+        """C (size, size) at a speed of the input, rad/s."""
+        return self.at(self.damping, speed)
+
+    def static_at(self, speed: float) -> Floats:
+        """Coordinates u (size,) of the static state at a speed of the input, rad/s."""
+        return self.at(self.static, speed)
+
+    def torque_at(self, speed: float) -> float:
+        """Torque of the drive at a speed of the input (rad/s), N m."""
+        return float(self.at(self.torque, speed))
+
+    def responses(self, speed: float, frequencies: Floats, loads: Floats) -> Complexes:
+        """Amplitudes (lines, size, n) under unit loads (size, n) at angular frequencies (lines,), none of them zero."""
+        stiffness, damping = self.stiffness_at(speed), self.damping_at(speed)
+        w = frequencies[:, None, None]
+        loads = np.broadcast_to(loads.astype(complex), (len(frequencies), *loads.shape))
+        return np.asarray(np.linalg.solve(stiffness - w**2 * self.mass + 1j * w * damping, loads))
+
+    def still(self, stiffness: Floats, loads: Floats) -> Floats:
+        """Find static deflections under loads (size, n), and in the last row the torque of the drive that they need.
+
+        The train is free to roll: the mean angle of the input stays, and the drive takes what a load would turn.
+        """
+        n = self.size
+        bordered = np.zeros((n + 1, n + 1))
+        bordered[:n, :n], bordered[:n, n], bordered[n, self.pinned] = stiffness, -self.drive, 1.0
+        # Rows of torque and stiffness differ by ten orders of magnitude.
+        size = np.sqrt(np.abs(np.diag(stiffness)).clip(min=1.0))
+        scale = np.append(1.0 / size, 1.0)
+        reach = float(np.abs(scale[:n] * self.drive).max())
+        columns = np.append(scale[:n], 1.0 / reach)
+        solved = np.linalg.solve(
+            scale[:, None] * bordered * columns, scale[:, None] * np.vstack([loads, np.zeros((1, loads.shape[1]))])
+        )
+        return np.asarray(columns[:, None] * solved)
+
+    def eigenvalues(self, speed: float) -> Complexes:
+        """Eigenvalues of the mean system at a speed of the input, 1/s; free rolling among them."""
+        n = self.size
+        lower = np.linalg.solve(self.mass, np.hstack([-self.stiffness_at(speed), -self.damping_at(speed)]))
+        return np.asarray(scipy.linalg.eigvals(np.vstack([np.eye(n, 2 * n, n), lower])))
+
+
+def mean_system(assembly: Assembly, speeds: Floats) -> MeanSystem:
+    """Linearise an assembly about its static states at speeds of the overall input.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    speeds : array_like
+        rad/s; the system holds between the lowest and the highest.
+
+    Raises
+    ------
+    SteadyError
+        Its matrices are not constant in the rotating frame, and why.
+    BalanceError
+        The static load has no equilibrium.
+    """
+    _check(assembly)
+    sets = planet_sets(assembly)
+    assembly, spread = with_equal_planets(assembly, sets)
+    frame = RotatingFrame(assembly, sets)
+    drive, load = _drive_and_load(assembly)
+    low, high = float(np.min(speeds)), float(np.max(speeds))
+    low, high = (low, high) if high > low else (low - 0.5 * abs(low), high + 0.5 * abs(high))
+    at = np.array([low, 0.5 * (low + high), high])
+    u, torque = _first_guess(assembly, frame, drive), 0.0
+    rows = []
+    matrix = None
+    for speed in at:
+        u, torque = _static(frame, float(speed), drive, load, u, torque, matrix)
+        damping, matrix = tangents(frame, 0.0, float(speed), u)
+        rows.append((u, torque, damping, matrix))
+    static, torques, dampings, stiffnesses = (np.array(values) for values in zip(*rows, strict=True))
+    pinned = assembly.spin[assembly.gearbox.case.overall.input]
+    system = MeanSystem(
+        frame, at, _mass(frame, static[1]), dampings, stiffnesses, static, torques, drive, pinned, spread
+    )
+    _check_constant(system)
+    return system
+
+
+def _check(assembly: Assembly) -> None:
+    """Refuse what has no constant matrices, or no single speed."""
+    gearbox = assembly.gearbox
+    if gearbox.train.degrees_of_freedom != 1:
+        raise SteadyError(
+            f"the gear train has {gearbox.train.degrees_of_freedom} degrees of freedom; the steady response over one "
+            "speed needs one: fix a body or couple two"
+        )
+    if assembly.travelling.first.size:
+        raise SteadyError(
+            "the ring gear is elastic, and meshes travel around its seats: stiffness changes with the carrier's angle, "
+            "which the steady response cannot treat; make the ring's body rigid (flexibility = 'none')"
+        )
+    if gearbox.deviations:
+        raise SteadyError(
+            "deviations: errors of pitch and run-out return with the wheels' turns, which the steady response does not "
+            "take as causes; leave them out, or run the load case in time"
+        )
+    if gearbox.pin_offsets:
+        raise SteadyError(
+            "pins: planets with position errors share the load unequally and their matrices turn with the carrier, "
+            "which the steady response cannot treat; leave the errors out, or run the load case in time"
+        )
+    if assembly.has_rows:
+        raise SteadyError(
+            "bearings: the law iso16281 of rolling elements is not linear; the steady response takes bearings by their "
+            "stiffness (law = 'stiffness')"
+        )
+
+
+def _drive_and_load(assembly: Assembly) -> tuple[Floats, Floats]:
+    """Generalized force of a unit of the drive's torque, and those of the static load.
+
+    What the file locks is what keeps the speed: its torque is whatever balances the others.
+    """
+    load, overall = assembly.gearbox.case.static_load, assembly.gearbox.case.overall
+    keeper = load.locked[0] if load.locked else overall.input
+    return assembly.torque_vector({keeper: 1.0}), assembly.torque_vector(load.torques_N_m)
+
+
+def _first_guess(assembly: Assembly, frame: RotatingFrame, drive: Floats) -> Floats:
+    """Find the static state at rest, rolled back until the input stands at zero, in the coordinates of the frame."""
+    q = static_state(assembly).q
+    rolling = assembly.rolling_velocity(np.zeros(assembly.size), frame.speeds)
+    pinned = assembly.spin[assembly.gearbox.case.overall.input]
+    return np.asarray(np.linalg.solve(frame.matrices(0.0)[0], q - q[pinned] * rolling))
+
+
+def _residual(
+    frame: RotatingFrame, psi: float, speed: float, u: Floats, du: Floats | None = None, ddu: Floats | None = None
+) -> Floats:
+    """Generalized forces (size,) in the frame that inertia needs, less those that elements give."""
+    assembly = frame.assembly
+    q, v, a = frame.state(psi, speed, u, du, ddu)
+    missing = assembly.inertia_forces(q, v, a) - assembly.forces(q, v, frame.mean_meshes)
+    return np.asarray(frame.matrices(psi)[0].T @ missing)
+
+
+def tangents(frame: RotatingFrame, psi: float, speed: float, u: Floats) -> tuple[Floats, Floats]:
+    """Damping and stiffness (size, size) in the frame, about the coordinates u at the input's angle psi.
+
+    The input turns at `speed` (rad/s).
+    """
+    damping = _slopes(lambda step: _residual(frame, psi, speed, u, step), len(u), RATE_STEP)
+    return damping, _stiffness(frame, psi, speed, u)
+
+
+def _stiffness(frame: RotatingFrame, psi: float, speed: float, u: Floats) -> Floats:
+    return _slopes(lambda step: _residual(frame, psi, speed, u + step), len(u), PLACE_STEP)
+
+
+def _mass(frame: RotatingFrame, u: Floats) -> Floats:
+    """Mass (size, size) in the frame: what accelerations need, which is linear in them."""
+    assembly, t = frame.assembly, frame.matrices(0.0)[0]
+    q, v, a = frame.state(0.0, 0.0, u)
+    columns = [assembly.inertia_forces(q, v, a + t @ e) - assembly.inertia_forces(q, v, a) for e in np.eye(len(u))]
+    return np.asarray(t.T @ np.array(columns).T)
+
+
+def _slopes(function: Callable[[Floats], Floats], size: int, step: float) -> Floats:
+    columns = [(function(e) - function(-e)) / (2.0 * step) for e in step * np.eye(size)]
+    return np.array(columns).T
+
+
+def _static(
+    frame: RotatingFrame, speed: float, drive: Floats, load: Floats, u: Floats, torque: float, matrix: Floats | None
+) -> tuple[Floats, float]:
+    """Find the static state at a speed, and the torque that keeps it; `matrix` is the stiffness at another speed."""
+    n, assembly = len(u), frame.assembly
+    pinned = assembly.spin[assembly.gearbox.case.overall.input]
+    t0 = frame.matrices(0.0)[0]
+    drive, load = t0.T @ drive, t0.T @ load
+    largest = max(1.0, float(np.abs(load).max()))
+    best = before = np.inf
+    bordered = np.zeros((n + 1, n + 1))
+    for _ in range(MOST_STEPS):
+        missing = _residual(frame, 0.0, speed, u) - load - torque * drive
+        error = float(np.abs(np.append(missing, largest * u[pinned])).max()) / largest
+        if not error < np.inf or (best < BALANCED and error > 0.5 * best):
+            break
+        best = min(best, error)
+        # The elements are all but linear: one matrix serves for several steps.
+        if matrix is None or error > 0.1 * before:
+            matrix = _stiffness(frame, 0.0, speed, u)
+        before = error
+        bordered[:n, :n], bordered[:n, n], bordered[n, pinned] = matrix, -drive * largest, largest
+        step = np.linalg.solve(bordered, -np.append(missing, largest * u[pinned]))
+        u, torque = u + step[:n], torque + largest * float(step[n])
+    if not best < BALANCED:
+        raise BalanceError(f"static state at {speed:.4g} rad/s: the residual stays at {best:.1e} of the load")
+    return u, torque
+
+
+def _check_constant(system: MeanSystem) -> None:
+    """Refuse a system whose stiffness changes with the carrier's angle."""
+    if not system.frame.sets:
+        return
+    k, u, speed = system.stiffness[1], system.static[1], float(system.speeds[1])
+    size = np.sqrt(np.abs(np.diag(k)).clip(min=1e-3 * np.abs(np.diag(k)).max()))
+    for psi in CHECKED_ANGLES:
+        other = _stiffness(system.frame, psi, speed, u)
+        change = float(np.abs((other - k) / np.outer(size, size)).max())
+        if change > VARIATION:
+            raise SteadyError(
+                f"the stiffness changes by {100.0 * change:.2g} % as the carrier turns (unequal planets, or a support "
+                "that turns with them), which the steady response cannot treat; run the load case in time instead"
+            )

@@ -1,0 +1,76 @@
+"""What mesh laws read of the motion and what they push along: rows by the frame's coordinates, as waves.
+
+A law along a row reads its deflection and the position in the mesh cycle, and has one force. The law `table` reads the
+approach of both flanks, the centre distance, the misalignment of both flanks and the position, and pushes along all
+but the last (`exugear.tooth_mesh.laws.table`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from exugear.kernels.meshes import MeshArrays
+from exugear.kernels.table_law import NOMINAL_DEFLECTION, NOMINAL_DISTANCE, NOMINAL_MISALIGNMENT
+from exugear.rotating.mesh_waves import MeshWaves
+from fe_ste.tools.arrays import Floats
+
+DEFLECTION, POSITION = 0, -1
+"""Places among what a law reads: the first and the last."""
+FRONT, BACK, CENTRE, TILT, BACK_TILT = range(5)
+"""Places among what the law `table` reads and pushes along."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeshPorts:
+    """Rows of all mesh waves at one speed; m waves, r readings, f forces.
+
+    Attributes
+    ----------
+    readings : (m, r, size) array
+        Rows of what the law reads; the last is the position in the mesh cycle, in cycles.
+    static : (m, r) array
+        Their values in the static state; the position counts from there.
+    forces : (m, f, size) array
+        Rows along which its forces push.
+    positions : (m,) array
+        Position in the mesh cycle at zero angle of the input.
+    """
+
+    readings: Floats
+    static: Floats
+    forces: Floats
+    positions: Floats
+
+
+def mesh_ports(waves: MeshWaves, speed: float, parting: bool) -> MeshPorts:
+    """Rows of all mesh waves at a speed of the input (rad/s); `parting` for the law `table`."""
+    meshes = waves.assembly.meshes
+    rows, offsets = _table_rows(meshes) if parting else _row_rows(meshes)
+    means = np.array([wave.wave == 0 for wave in waves.waves])
+    firsts = [wave.first for wave in waves.waves]
+    readings = [waves.gradients(row, speed) for row in rows] + [waves.position_rows()]
+    static = [waves.values(row, speed) + means * offset[firsts] for row, offset in zip(rows, offsets, strict=True)]
+    forces = readings[:-1] if parting else [waves.gradients(meshes.force, speed)]
+    return MeshPorts(
+        readings=np.stack(readings, axis=1),
+        static=np.stack([*static, np.zeros(len(means))], axis=1),
+        forces=np.stack(forces, axis=1),
+        positions=waves.positions(speed),
+    )
+
+
+def _row_rows(meshes: MeshArrays) -> tuple[list[Floats], list[Floats]]:
+    return [meshes.deflection], [meshes.table.nominal[:, NOMINAL_DEFLECTION]]
+
+
+def _table_rows(meshes: MeshArrays) -> tuple[list[Floats], list[Floats]]:
+    """Rows of both flanks and of where the gears stand, and their values at zero coordinates."""
+    table = meshes.table
+    nominal = table.nominal.T
+    front = nominal[NOMINAL_DEFLECTION]
+    tilt = nominal[NOMINAL_MISALIGNMENT]
+    rows = [meshes.deflection, table.back, table.centre, table.misalignment, table.back_misalignment]
+    # The other flank closes when the loaded one opens by the backlash.
+    return rows, [front, -front - table.backlash, nominal[NOMINAL_DISTANCE], tilt, tilt]

@@ -1,0 +1,279 @@
+"""Gear meshes in the rotating frame: the scalar signals through which everything that varies acts.
+
+The meshes of N planets are written as waves around the carrier, as the planets are: with the gradient g_n of the
+deflection of mesh n by the frame's coordinates u
+
+    d_n = d_0 + d_c cos theta_n + d_s sin theta_n,   rows g_0 = mean g_n, g_c = 2/N sum g_n cos theta_n, g_s likewise,
+
+and a force F_n in each mesh is a generalized force -(N g_0 F_0 + N/2 g_c F_c + N/2 g_s F_s). Planets that mesh in
+phase have one position in the mesh cycle, so that their stiffness k multiplies each wave by itself.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from exugear.dynamics.assembly import Assembly
+from exugear.harmonics.products import fourier_coefficients
+from exugear.kernels.coordinates import BODY_SIZE, SPIN
+from exugear.kernels.meshes import FRAME, ROW_SIZE, frame_row
+from exugear.rotating.mean_system import MeanSystem
+from exugear.rotating.rotating_frame import PlanetSet, RotatingFrame, SteadyError
+from fe_ste.tools.arrays import Complexes, Floats
+
+SAMPLES = 64
+"""Samples of each cubic piece of a stiffness for its Fourier coefficients: aliases are below 1e-7 of it."""
+IN_PHASE = 1e-6
+"""Mesh cycles by which planets in phase may differ."""
+SAME_BASE = 1e-9
+"""Share by which mesh frequencies of one base may differ."""
+WAVES = ("mean", "cosine", "sine")
+
+
+@dataclass(frozen=True)
+class MeshWave:
+    """One wave of the meshes of a family, or a single mesh.
+
+    Attributes
+    ----------
+    name : str
+        Family, with the wave where there are several.
+    family : str
+    first : int
+        Mesh that stands for the family in the assembly's arrays.
+    wave : int
+        0 mean, 1 cosine, 2 sine.
+    weight : float
+        What a unit of its force counts in generalized forces.
+    base : int
+        Base whose angle is that of the mesh cycle.
+    sense : float
+        Mesh cycles per cycle of the base when the input turns about +z: 1 or -1.
+    carrier : float
+        Turns of the waves per turn of the input.
+    """
+
+    name: str
+    family: str
+    first: int
+    wave: int
+    weight: float
+    base: int
+    sense: float
+    carrier: float
+
+
+@dataclass(frozen=True, eq=False)
+class MeshWaves:
+    """All mesh waves of a mean system; m waves.
+
+    Attributes
+    ----------
+    system : MeanSystem
+    waves : tuple of MeshWave
+    base_orders : (bases,) array
+        Mesh frequencies over the frequency of the input's turns.
+    base_names : tuple of str
+        Meshes of each base.
+    """
+
+    system: MeanSystem
+    waves: tuple[MeshWave, ...]
+    base_orders: Floats
+    base_names: tuple[str, ...]
+
+    @property
+    def assembly(self) -> Assembly:
+        """What was linearised."""
+        return self.system.frame.assembly
+
+    @cached_property
+    def groups(self) -> tuple[tuple[tuple[int, ...], PlanetSet | None], ...]:
+        """Meshes and planets of each family, in the order of the waves' families."""
+        return _groups(self.system.frame)
+
+    @cached_property
+    def weights(self) -> Floats:
+        """(m,) array."""
+        return np.array([wave.weight for wave in self.waves])
+
+    @cached_property
+    def mean_stiffness(self) -> Floats:
+        """Mean stiffness of each wave's mesh in the law's coordinate, (m,), N/m."""
+        return np.array([float(np.mean(self.assembly.elements[wave.first].stiffness)) for wave in self.waves])
+
+    @cached_property
+    def damping(self) -> Floats:
+        """Damping of each wave's mesh in the law's coordinate, (m,), N s/m."""
+        return np.array([self.assembly.meshes.damping[wave.first] for wave in self.waves])
+
+    @cached_property
+    def line_of_action(self) -> Floats:
+        """Force on the transverse line of action per force of the law, (m,)."""
+        return np.array([self.assembly.meshes.line_of_action[wave.first] for wave in self.waves])
+
+    @cached_property
+    def partners(self) -> Floats:
+        """What a mesh that travels through the waves sees besides their own rates, (m, m).
+
+        The rate of wave a is d_a' + W p_ab d_b at the speed W of the input.
+        """
+        rates = np.zeros((len(self.waves),) * 2)
+        for n, wave in enumerate(self.waves):
+            if wave.wave == 1:
+                rates[n, n + 1], rates[n + 1, n] = wave.carrier, -wave.carrier
+        return rates
+
+    def gradients(self, rows: Floats, speed: float) -> Floats:
+        """Waves (m, size) of the gradients of rows (meshes, 12) by the frame's coordinates, at a speed (rad/s)."""
+        frame = self.system.frame
+        q, _, _ = frame.state(0.0, speed, self.system.static_at(speed))
+        found = np.array([_row(self.assembly, m, q, own)[1] for m, own in enumerate(rows)])
+        return self._waves_of(found @ frame.matrices(0.0)[0])
+
+    def values(self, rows: Floats, speed: float) -> Floats:
+        """Waves (m,) of the values of rows (meshes, 12) in the static state at a speed (rad/s)."""
+        frame = self.system.frame
+        q, _, _ = frame.state(0.0, speed, self.system.static_at(speed))
+        return self._waves_of(np.array([_row(self.assembly, m, q, own)[0] for m, own in enumerate(rows)]))
+
+    def position_rows(self) -> Floats:
+        """Rows of the position in the mesh cycle by the frame's coordinates, (m, size), cycles."""
+        assembly, gradients = self.assembly, np.zeros((len(self.assembly.elements), self.assembly.size))
+        for m, index in enumerate(assembly.meshes.coordinates):
+            for at, sign in ((SPIN, 1.0), (FRAME, -1.0)):
+                if index[at] >= 0:
+                    gradients[m, index[at]] += sign * assembly.meshes.cycles[m]
+        return self._waves_of(gradients @ self.system.frame.matrices(0.0)[0])
+
+    def positions(self, speed: float) -> Floats:
+        """Position in the mesh cycle of each wave's mesh at zero angle of the input, (m,), cycles."""
+        moved = self.position_rows() @ self.system.static_at(speed)
+        own = np.array([self.assembly.meshes.phase[wave.first] for wave in self.waves])
+        mean = {wave.family: float(moved[n]) for n, wave in enumerate(self.waves) if wave.wave == 0}
+        return np.asarray(own + np.array([mean[wave.family] for wave in self.waves]))
+
+    def cycle_coefficients(self, harmonics: int, reciprocal: bool = False) -> Complexes:
+        """Fourier coefficients (m, harmonics + 1) of the stiffness over the mesh cycle (N/m), or of 1 over it."""
+        return np.array([self._cycle_coefficients(wave.first, harmonics, reciprocal) for wave in self.waves])
+
+    def _cycle_coefficients(self, mesh: int, harmonics: int, reciprocal: bool) -> Complexes:
+        """Fourier coefficients of a mesh's stiffness over its cycle."""
+        meshes = self.assembly.meshes
+        pieces = int(meshes.pieces[mesh])
+        powers = np.vander(np.arange(SAMPLES) / SAMPLES, 4, increasing=True)
+        values = (meshes.stiffness[mesh, :pieces] @ powers.T).ravel()
+        return fourier_coefficients(1.0 / values if reciprocal else values, harmonics)
+
+    def _waves_of(self, values: Floats) -> Floats:
+        """Waves (m, ...) of values (meshes, ...) at zero angle of the input."""
+        out: Floats = np.empty((len(self.waves), *values.shape[1:]))
+        at = 0
+        for meshes, planets in self.groups:
+            own = values[list(meshes)]
+            if planets is None:
+                out[at] = own[0]
+                at += 1
+                continue
+            shapes = planets.shapes(0.0)[0][:, :3]
+            norms = (shapes**2).sum(axis=0)
+            out[at : at + 3] = np.tensordot(shapes / norms, own, axes=(0, 0))
+            at += 3
+        return out
+
+
+def mesh_waves(system: MeanSystem) -> MeshWaves:
+    """Mesh waves of a mean system.
+
+    Raises
+    ------
+    SteadyError
+        Planets do not mesh in phase.
+    """
+    assembly = system.frame.assembly
+    gearbox = assembly.gearbox
+    frequencies = gearbox.train.mesh_frequencies(2.0 * math.pi)
+    orders: list[float] = []
+    names: list[list[str]] = []
+    waves: list[MeshWave] = []
+    for meshes, planets in _groups(system.frame):
+        mesh = assembly.elements[meshes[0]].mesh
+        order = frequencies[mesh.name]
+        base = next((n for n, known in enumerate(orders) if abs(order - known) < SAME_BASE * known), len(orders))
+        if base == len(orders):
+            orders.append(order)
+            names.append([])
+        names[base].append(mesh.family)
+        if planets is not None:
+            _check_phases(assembly, meshes)
+        sense = math.copysign(1.0, _cycles_per_turn(system.frame, meshes[0]))
+        own = (meshes[0],)
+        if planets is None:
+            waves.append(MeshWave(mesh.name, mesh.name, *own, 0, 1.0, base, sense, 0.0))
+            continue
+        for number, name in enumerate(WAVES):
+            weight = planets.waves * (1.0 if number == 0 else 0.5)
+            label = mesh.family if number == 0 else f"{mesh.family} {name}"
+            waves.append(MeshWave(label, mesh.family, *own, number, weight, base, sense, planets.ratio))
+    return MeshWaves(system, tuple(waves), np.array(orders), tuple(", ".join(own) for own in names))
+
+
+def _groups(frame: RotatingFrame) -> tuple[tuple[tuple[int, ...], PlanetSet | None], ...]:
+    """Meshes of each family of planets in the order of the planets, and single meshes."""
+    found: dict[str, tuple[tuple[int, ...], PlanetSet | None]] = {}
+    for m, element in enumerate(frame.assembly.elements):
+        ends = {element.mesh.pinion, element.mesh.gear}
+        planets = next((group for group in frame.sets if ends & set(group.names)), None)
+        if planets is None:
+            found[element.mesh.name] = ((m,), None)
+            continue
+        key = f"{element.mesh.family} of {planets.carrier} {planets.names[0]}"
+        found[key] = ((*found.get(key, ((), None))[0], m), planets)
+    out = []
+    for meshes, planets in found.values():
+        if planets is not None:
+            by_planet = {
+                name: m
+                for m in meshes
+                for name in planets.names
+                if name in (frame.assembly.elements[m].mesh.pinion, frame.assembly.elements[m].mesh.gear)
+            }
+            meshes = tuple(by_planet[name] for name in planets.names)
+        out.append((meshes, planets))
+    return tuple(out)
+
+
+def _cycles_per_turn(frame: RotatingFrame, mesh: int) -> float:
+    """Mesh cycles per rad of the input, signed."""
+    element = frame.assembly.elements[mesh]
+    speeds = frame.speeds
+    relative = speeds.get(element.mesh.pinion, 0.0) - speeds.get(element.mesh.frame, 0.0)
+    return float(frame.assembly.meshes.cycles[mesh] * relative)
+
+
+def _check_phases(assembly: Assembly, meshes: tuple[int, ...]) -> None:
+    phases = assembly.meshes.phase[list(meshes)]
+    apart = (phases - phases[0] + 0.5) % 1.0 - 0.5
+    if np.abs(apart).max() > IN_PHASE:
+        mesh = assembly.elements[meshes[0]].mesh
+        raise SteadyError(
+            f"meshes.{mesh.family}: its planets do not mesh in phase (by up to {np.abs(apart).max():.3g} of a cycle), "
+            "so that the carrier's angle is a cause of its own, which the steady response does not take; run the load "
+            "case in time instead"
+        )
+
+
+def _row(assembly: Assembly, mesh: int, q: Floats, row: Floats) -> tuple[float, Floats]:
+    """Value of a row (12,) of a mesh, and its gradient (size,) by the coordinates."""
+    meshes = assembly.meshes
+    index, out = meshes.coordinates[mesh], np.zeros(assembly.size)
+    local, turning = np.empty(ROW_SIZE), np.empty(ROW_SIZE)
+    value = frame_row(q, index, meshes.axis[mesh], row, local, turning)
+    for at in range(2 * BODY_SIZE + 1):
+        if index[at] >= 0:
+            out[index[at]] += local[at]
+    return float(value), out

@@ -1,0 +1,136 @@
+"""Mesh laws on many samples at once: forces and their slopes by what the laws read, in compiled loops.
+
+A law along a row reads deflection and position; the law `table` both flanks, the centre distance, both misalignments
+and the position (`exugear.rotating.mesh_ports`). Loops are compiled by `fe_ste.tools.compilation`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from exugear.kernels.meshes import MeshArrays
+from exugear.kernels.table_law import (
+    LAW_BY_DISTANCE,
+    LAW_BY_MISALIGNMENT,
+    LAW_FORCE,
+    LAW_STIFFNESS,
+    ORDERS,
+    TableArrays,
+    scratch_memory,
+    surface_law,
+    surface_tangent,
+)
+from exugear.rotating.mesh_ports import BACK, BACK_TILT, CENTRE, FRONT, TILT
+from fe_ste.tools.arrays import Floats
+from fe_ste.tools.compilation import compiled
+
+TOUCHING = 1.0e-6
+"""Approach over which the damping of teeth that touch sets in, m.
+
+By the law itself it jumps at first touch, by 4 % of the load in the GRC: no balance of smooth lines ends there. A
+thousandth of the response is what the ramp costs.
+"""
+TABLE_READINGS, TABLE_FORCES = 6, 5
+
+
+class LawSamples(NamedTuple):
+    """A law on s samples, with r readings and f forces.
+
+    Attributes
+    ----------
+    force : (s, f) array
+        Elastic and damped parts together, N and N m.
+    slope : (s, f, r) array
+        Derivatives by the readings.
+    damping : (s, f, r) array
+        Derivatives by their rates.
+    """
+
+    force: Floats
+    slope: Floats
+    damping: Floats
+
+
+def sample_stiffness(stiffness: Floats, readings: Floats) -> LawSamples:
+    """Sample a law along a row without its damper, which is in the mean system.
+
+    Parameters
+    ----------
+    stiffness : (3, s) array
+        Stiffness where the mean speed alone has brought the mesh, N/m, and its two derivatives per cycle.
+    readings : (s, 2) array
+        Deflection, m, and how far the vibration has moved the position, cycles. It is a thousandth of a cycle or less,
+        so that a parabola serves.
+    """
+    deflection, moved = readings.T
+    value = stiffness[0] + moved * (stiffness[1] + 0.5 * moved * stiffness[2])
+    by_position = (stiffness[1] + moved * stiffness[2]) * deflection
+    slope = np.stack([value, by_position], axis=1)[:, None]
+    return LawSamples((value * deflection)[:, None], slope, np.zeros_like(slope))
+
+
+def sample_table(meshes: MeshArrays, mesh: int, readings: Floats, rates: Floats) -> LawSamples:
+    """Sample the law `table`; readings and their rates (s, 6), the position in the cycle among them as a whole."""
+    shape = len(readings), TABLE_FORCES
+    out = LawSamples(np.zeros(shape), np.zeros((*shape, TABLE_READINGS)), np.zeros((*shape, TABLE_READINGS)))
+    # The other flank runs backwards through its cycle.
+    turned = meshes.table.back_phase[mesh] + meshes.phase[mesh]
+    _fill_flank(1.0, mesh, readings, rates, turned, meshes.table, *out)
+    _fill_flank(-1.0, mesh, readings, rates, turned, meshes.table, *out)
+    return out
+
+
+@compiled
+def _fill_flank(
+    side: float,
+    m: int,
+    readings: Floats,
+    rates: Floats,
+    turned: float,
+    tables: TableArrays,
+    force: Floats,
+    slope: Floats,
+    damping: Floats,
+) -> None:
+    """Add one flank (1, -1) to forces and slopes; `turned` is the sum of both flanks' positions."""
+    own = FRONT if side > 0.0 else BACK
+    tilt = TILT if side > 0.0 else BACK_TILT
+    position = readings.shape[1] - 1
+    sense = side * tables.sense[m]
+    time = tables.damping_time[m]
+    memory, second = scratch_memory(), np.empty((4, 4))
+    places = np.array([own, CENTRE, tilt, position])
+    signs = np.array([1.0, 1.0, sense, side])
+    piece = 0
+    for s in range(readings.shape[0]):
+        delta, rate = readings[s, own], rates[s, own]
+        if delta <= tables.lowest[m]:
+            continue
+        pmc = readings[s, position] if side > 0.0 else turned - readings[s, position]
+        centre, misalignment = readings[s, CENTRE], sense * readings[s, tilt]
+        piece, t = surface_law(delta, pmc, centre, misalignment, m, tables, piece, ORDERS.shape[0], memory)
+        if t < 0.0:
+            continue
+        surface_tangent(t, piece, m, tables, memory, second)
+        law, cubic = memory.law, memory.cubic
+        stiffness = law[LAW_STIFFNESS]
+        # Damping fades in over the approach after first touch; a piece beyond the first is well behind it.
+        ramp, ramp_slope = 1.0, 0.0
+        if piece == 0:
+            whole = min(TOUCHING, cubic[0, 1] + cubic[0, 2] + cubic[0, 3])
+            x = (delta - cubic[0, 0]) / whole
+            if x < 1.0:
+                ramp, ramp_slope = x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x) / whole
+        force[s, own] += law[LAW_FORCE] + time * ramp * stiffness * rate
+        force[s, CENTRE] += law[LAW_BY_DISTANCE]
+        force[s, tilt] += sense * law[LAW_BY_MISALIGNMENT]
+        damping[s, own, own] += time * ramp * stiffness
+        for b in range(4):
+            # First touch itself moves with centre distance, misalignment and position.
+            touch = 1.0 if b == 0 else -cubic[b, 0]
+            by = second[0, b] + time * rate * (ramp * second[3, b] + ramp_slope * touch * stiffness)
+            slope[s, own, places[b]] += signs[b] * by
+            slope[s, CENTRE, places[b]] += signs[b] * second[1, b]
+            slope[s, tilt, places[b]] += sense * signs[b] * second[2, b]

@@ -1,0 +1,1 @@
+"""The gearbox file described: every key with unit, range, default and meaning."""

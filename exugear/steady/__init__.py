@@ -1,0 +1,1 @@
+"""Steady response of a gearbox over speed: balance of all mesh lines, resonances, file."""

@@ -1,0 +1,156 @@
+"""All that the balance of lines needs of a gearbox at one speed, taken from parabolas through three speeds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from exugear.harmonics.lines import LineSet
+from exugear.harmonics.products import Product
+from exugear.rotating.mean_system import MeanSystem
+from exugear.rotating.mesh_ports import DEFLECTION, MeshPorts, mesh_ports
+from exugear.rotating.mesh_waves import MeshWaves
+from exugear.rotating.signals import SignalName, SignalRows, mesh_signal_names, signal_rows
+from exugear.tooth_mesh.laws.registry import LAWS
+from fe_ste.tools.arrays import Booleans, Complexes, Floats, SparseMatrix
+
+
+@dataclass(frozen=True, eq=False)
+class Interface:
+    """The meshes of a gearbox as they meet its mean system at one speed; m waves, r readings, f forces, n lines.
+
+    Attributes
+    ----------
+    speed : float
+        Of the overall input, rad/s.
+    frequencies : (n,) array
+        Angular frequencies of the lines, rad/s.
+    motion : (n, size, m, f) complex array
+        Motion under a unit of each force, the waves' weights in it.
+    ports : MeshPorts
+        What the meshes read and push along.
+    rows : SignalRows
+        Signals from the motion.
+    torque : float
+        Of the drive in the static state, N m.
+    torque_per_force : (m, f) array
+        Torque of the drive per steady force, N m/N.
+    """
+
+    speed: float
+    frequencies: Floats
+    motion: Complexes
+    ports: MeshPorts
+    rows: SignalRows
+    torque: float
+    torque_per_force: Floats
+
+    @cached_property
+    def deflection(self) -> Complexes:
+        """Deflections (n, m, m, f) under a unit of each force."""
+        return np.asarray(np.tensordot(self.ports.readings[:, DEFLECTION], self.motion, axes=(1, 1)).swapaxes(0, 1))
+
+    @cached_property
+    def readings(self) -> Complexes:
+        """All that the laws read (n, m, r, m, f) under a unit of each force."""
+        found = np.tensordot(self.ports.readings, self.motion, axes=(2, 1))
+        return np.asarray(np.moveaxis(found, 2, 0))
+
+
+class Gearset:
+    """A gearbox ready for the balance of lines at any speed within a range.
+
+    Parameters
+    ----------
+    waves : MeshWaves
+    lines : LineSet
+    stiffness_harmonics : int
+        Highest harmonic of the mesh stiffness.
+    """
+
+    def __init__(self, waves: MeshWaves, lines: LineSet, stiffness_harmonics: int) -> None:
+        self.waves, self.lines, self.harmonics = waves, lines, stiffness_harmonics
+        self.parting = LAWS[waves.assembly.mesh_law].loses_contact
+        ports, rows = [], []
+        for speed in waves.system.speeds:
+            ports.append(mesh_ports(waves, float(speed), self.parting))
+            rows.append(signal_rows(waves.system, float(speed)))
+        self._ports = {
+            name: np.array([getattr(own, name) for own in ports])
+            for name in ("readings", "static", "forces", "positions")
+        }
+        self._rows = {
+            name: np.array([getattr(own, name) for own in rows]) for name in ("by_place", "by_rate", "by_acceleration")
+        }
+        self._row_names = rows[0].names
+        self.signal_names: tuple[SignalName, ...] = (*self._row_names, *mesh_signal_names(waves))
+
+    @property
+    def system(self) -> MeanSystem:
+        """The mean system."""
+        return self.waves.system
+
+    @cached_property
+    def cycle_coefficients(self) -> Complexes:
+        """Fourier coefficients (m, harmonics + 1) of each wave's stiffness over its mesh cycle, N/m."""
+        return self.waves.cycle_coefficients(self.harmonics)
+
+    @cached_property
+    def cycle_compliances(self) -> Complexes:
+        """Fourier coefficients (m, harmonics + 1) of one over the stiffness, m/N."""
+        return self.waves.cycle_coefficients(self.harmonics, reciprocal=True)
+
+    @cached_property
+    def products(self) -> tuple[Product, ...]:
+        """Product with the stiffness of each base."""
+        return tuple(Product(self.lines, base, self.harmonics) for base in range(len(self.waves.base_orders)))
+
+    def forward(self, speed: float) -> Booleans:
+        """Tell which waves' meshes (m,) run through their cycles forward at a speed of the input."""
+        return np.array([wave.sense for wave in self.waves.waves]) * math.copysign(1.0, speed) > 0.0
+
+    def by_angle(self, coefficients: Complexes, positions: Floats, speed: float) -> Complexes:
+        """Coefficients (m, h + 1) over mesh cycles, by the angles of the bases instead."""
+        shift = np.exp(2j * math.pi * positions[:, None] * np.arange(coefficients.shape[1]))
+        turned = coefficients * shift
+        return np.asarray(np.where(self.forward(speed)[:, None], turned, np.conj(turned)))
+
+    def ports_at(self, speed: float) -> MeshPorts:
+        """Find what the meshes read and push along at a speed of the input, rad/s."""
+        return MeshPorts(**{name: self.system.at(values, speed) for name, values in self._ports.items()})
+
+    def loads(self, ports: MeshPorts) -> Floats:
+        """Generalized forces (size, m f) of a unit of each force, in the frame."""
+        weighted = ports.forces * self.waves.weights[:, None, None]
+        return np.asarray(weighted.reshape(-1, weighted.shape[2]).T)
+
+    def at(self, speed: float) -> Interface:
+        """Everything at one speed of the input (rad/s), which is not zero."""
+        system, ports = self.system, self.ports_at(speed)
+        frequencies, loads = abs(speed) * self.lines.orders, self.loads(ports)
+        still = system.still(system.stiffness_at(speed), loads)
+        moving = system.responses(speed, frequencies[1:], loads)
+        motion = np.concatenate([still[None, :-1].astype(complex), moving])
+        shape = ports.forces.shape[:2]
+        rows = {name: system.at(values, speed) for name, values in self._rows.items()}
+        return Interface(
+            speed=speed,
+            frequencies=frequencies,
+            motion=motion.reshape(*motion.shape[:2], *shape),
+            ports=ports,
+            rows=SignalRows(self._row_names, **rows),
+            torque=system.torque_at(speed),
+            torque_per_force=still[-1].reshape(shape),
+        )
+
+    def compliances(self, speed: float) -> Complexes:
+        """Fourier coefficients (m, harmonics + 1) of one over the stiffness by the bases' angles, m/N."""
+        return self.by_angle(self.cycle_compliances, self.system.at(self._ports["positions"], speed), speed)
+
+    def coupling(self, speed: float) -> list[tuple[SparseMatrix, SparseMatrix]]:
+        """Map lines by the stiffness (N/m) of each wave."""
+        turned = self.by_angle(self.cycle_coefficients, self.system.at(self._ports["positions"], speed), speed)
+        return [self.products[wave.base].matrices(own) for wave, own in zip(self.waves.waves, turned, strict=True)]

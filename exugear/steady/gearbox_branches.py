@@ -1,0 +1,94 @@
+"""Branches of steady states over speed, through their folds, with the stability of every point."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from exugear.harmonics.branches import Scales, trace
+from exugear.rotating.mesh_ports import DEFLECTION
+from exugear.steady.nonlinear import Balance
+from exugear.steady.point_solver import PointSolver
+from exugear.steady.stability import growth_at
+from fe_ste.tools.arrays import Booleans, Complexes, Floats
+
+LONGEST = 0.4
+"""Longest step along a branch: over the size of the vibration at its start, and in hundredths of the speed."""
+
+
+@dataclass(frozen=True, eq=False)
+class SteadyBranch:
+    """Steady states along a branch; n points.
+
+    Attributes
+    ----------
+    speed : (n,) array
+        Of the overall input, rad/s.
+    readings : (n, lines, m, r) complex array
+        What the mesh laws read.
+    growth : (n,) array
+        Fastest growth of a disturbance, 1/s, over the bases looked at one at a time.
+    folds : tuple of float
+        Speeds at which the branch turns back, rad/s.
+    """
+
+    speed: Floats
+    readings: Complexes
+    growth: Floats
+    folds: tuple[float, ...]
+
+    def __repr__(self) -> str:
+        """Points, range and folds in one line."""
+        folds = ", ".join(f"{speed:.5g}" for speed in self.folds) or "none"
+        return (
+            f"<SteadyBranch: {len(self.speed)} points, {self.speed.min():.4g} to {self.speed.max():.4g} rad/s, "
+            f"folds at {folds}>"
+        )
+
+    @property
+    def stable(self) -> Booleans:
+        """Whether disturbances decay, (n,)."""
+        return np.asarray(self.growth < 0.0)
+
+
+def follow_branch(
+    solver: PointSolver, first: float, last: float, progress: Callable[[float], None] | None = None
+) -> SteadyBranch:
+    """Follow the steady states from one speed of the input to another (rad/s), folds included.
+
+    Parameters
+    ----------
+    solver : PointSolver
+        Of the level `nonlinear`.
+    first, last : float
+        rad/s, of one sense.
+    progress : callable, optional
+        Called with the speed of each point.
+
+    Raises
+    ------
+    HarmonicBalanceError
+        No steady state was found at the first speed, or the branch was lost.
+    """
+    gearset, kept = solver.gearset, solver.lattice
+
+    def balance_at(speed: float) -> Balance:
+        return Balance(gearset, gearset.at(speed), kept)
+
+    def residual(readings: Complexes, speed: float) -> tuple[Complexes, Callable[[Complexes], Complexes]]:
+        balance = balance_at(speed)
+        excess, change, _ = balance.forces(readings)
+        missing = readings - balance.static - balance.answer(excess)
+        return missing, lambda step: step - balance.answer(change(step))
+
+    start = solver.readings(first)
+    size = float(np.linalg.norm(start[0, :, DEFLECTION]))
+    scales = Scales(0.1 * size, 0.01 * abs(first))
+    found = trace(residual, start, first, last, scales, step=0.1 * LONGEST, longest=LONGEST, progress=progress)
+    growth = [
+        max(growth_at(balance_at(float(speed)), readings, base) for base in range(len(gearset.waves.base_orders)))
+        for speed, readings in zip(found.parameter, found.lines, strict=True)
+    ]
+    return SteadyBranch(found.parameter, found.lines, np.array(growth), tuple(fold for _, fold in found.folds))

@@ -1,0 +1,153 @@
+"""Steady response of a gearbox at one speed, by mesh forces that are linear in the deflections.
+
+With what the mesh laws read y, and the forces F that the meshes have beyond those of their mean stiffness
+
+    y_k = y_static [k = 0] - G(w_k) F_k
+
+for every line k. Level `linear`: F is what the static transmission error excites under the mean force. Level
+`parametric`: F = (k(pmc) - k_mean) d, all mesh frequencies at once; the equations are linear and GMRES solves them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from exugear.harmonics.krylov import solve_lines
+from exugear.rotating.mesh_ports import DEFLECTION
+from exugear.steady.excitation import Gearset, Interface
+from fe_ste.tools.arrays import Complexes, Floats
+
+TOLERANCE = 1e-9
+"""Residual of the balance over the static deflections."""
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """Steady state at one speed; n lines, m mesh waves, f forces of each.
+
+    Arrays of lines hold coefficients; `exugear.harmonics.lines.LineSet` says how they make a signal.
+
+    Attributes
+    ----------
+    interface : Interface
+    deflection : (n, m) complex array
+        Deflections, m.
+    excess : (n, m, f) complex array
+        Forces beyond those of the mean system, in the law's coordinates, N and N m.
+    force : (n, m) complex array
+        Forces of the meshes on the line of action, N.
+    products : int
+        Products with the operator that the solution took.
+    apart : (m,) array
+        Share of time in which teeth are apart.
+    """
+
+    interface: Interface
+    deflection: Complexes
+    excess: Complexes
+    force: Complexes
+    products: int
+    apart: Floats
+
+    @property
+    def motion(self) -> Complexes:
+        """Coefficients (n, size) of the motion about the static state, in the rotating frame."""
+        return np.asarray(-np.einsum("nsmf,nmf->ns", self.interface.motion, self.excess))
+
+    @property
+    def torque(self) -> float:
+        """Mean torque of the drive that keeps the speed, N m."""
+        return self.interface.torque - float(np.sum(self.interface.torque_per_force * self.excess[0].real))
+
+
+def linear_response(gearset: Gearset, interface: Interface) -> Response:
+    """Response to the static transmission errors as given displacements, of first order in the variation of stiffness.
+
+    F = -k_mean e with e = F_0 (1/k - mean of 1/k), the transmission error under the static force F_0 = k_mean d.
+    """
+    static = interface.ports.static[:, DEFLECTION]
+    excess = transmission_errors(gearset, interface)[..., 0]
+    deflection = _answer(interface, excess)
+    deflection[0] += static
+    return _response(gearset, interface, deflection, excess, 0)
+
+
+def transmission_errors(gearset: Gearset, interface: Interface) -> Complexes:
+    """Find the forces (n, m, 1) that static transmission errors make of the mean stiffness, N; see there."""
+    compliances = gearset.compliances(interface.speed)
+    mean, static = gearset.waves.mean_stiffness, interface.ports.static[:, DEFLECTION]
+    excess = np.zeros((len(gearset.lines.index), len(static)), dtype=complex)
+    for n, wave in enumerate(gearset.waves.waves):
+        alone = np.zeros((gearset.harmonics + 1, gearset.lines.index.shape[1]), dtype=np.int64)
+        alone[:, wave.base] = np.arange(gearset.harmonics + 1)
+        at, mirrored = gearset.lines.find(alone)
+        use = (at > 0) & ~mirrored
+        excess[at[use], n] = -(mean[n] ** 2) * static[n] * compliances[n, use]
+    return excess[..., None]
+
+
+def parametric_response(gearset: Gearset, interface: Interface) -> Response:
+    """Response to stiffness that varies with the position in the mesh cycle, this moving with the mean speed alone."""
+    maps, mean = gearset.coupling(interface.speed), gearset.waves.mean_stiffness
+
+    def forces(deflection: Complexes) -> Complexes:
+        conjugate = deflection.conj()
+        full = [s @ deflection[:, n] + t @ conjugate[:, n] for n, (s, t) in enumerate(maps)]
+        return np.asarray(np.stack(full, axis=1) - mean * deflection)
+
+    def apply(deflection: Complexes) -> Complexes:
+        return np.asarray(deflection - _answer(interface, forces(deflection)))
+
+    static = interface.ports.static[:, DEFLECTION]
+    given = np.zeros((len(gearset.lines.index), len(static)), dtype=complex)
+    given[0] = static
+    deflection, products = solve_lines(apply, given, TOLERANCE)
+    return _response(gearset, interface, deflection, forces(deflection), products)
+
+
+def _answer(interface: Interface, excess: Complexes) -> Complexes:
+    """Deflections -G F (n, m) under forces (n, m) of laws with one force."""
+    return np.asarray(-np.einsum("nij,nj->ni", interface.deflection[..., 0], excess))
+
+
+def _response(
+    gearset: Gearset, interface: Interface, deflection: Complexes, excess: Complexes, products: int
+) -> Response:
+    """Complete a response with the whole forces of its meshes, those of mean stiffness and damping among them."""
+    waves = gearset.waves
+    rates = rates_of(gearset, interface, deflection)
+    force = (excess + waves.mean_stiffness * deflection + waves.damping * rates) * waves.line_of_action
+    return Response(interface, deflection, excess[..., None], force, products, np.zeros(len(waves.waves)))
+
+
+def rates_of(gearset: Gearset, interface: Interface, values: Complexes) -> Complexes:
+    """Rates (n, m, ...) of what meshes read (n, m, ...), as the meshes see it that travel through the waves."""
+    frequencies = interface.frequencies.reshape(-1, *(1,) * (values.ndim - 1))
+    carried = np.moveaxis(np.tensordot(gearset.waves.partners, values, axes=(1, 1)), 0, 1)
+    return np.asarray(1j * frequencies * values + interface.speed * carried)
+
+
+def signals(gearset: Gearset, response: Response) -> Complexes:
+    """Coefficients (n, signals) of all signals of a response, in the order of `Gearset.signal_names`."""
+    interface = response.interface
+    of_motion = interface.rows.of(response.motion, interface.frequencies)
+    return np.concatenate([of_motion, response.deflection, response.force], axis=1)
+
+
+def dissipated_and_given(gearset: Gearset, response: Response) -> tuple[float, float]:
+    """Mean power that damping takes from the vibration, and that varying meshes give to it, W.
+
+    Both are equal in a steady state.
+    """
+    interface, motion = response.interface, response.motion
+    w, moving = interface.frequencies[1:], motion[1:]
+    damping, stiffness = gearset.system.damping_at(interface.speed), gearset.system.stiffness_at(interface.speed)
+    taken = 2.0 * float(np.sum(w**2 * np.real(np.einsum("ns,st,nt->n", moving.conj(), damping, moving))))
+    # A stiffness that is not symmetric takes power, too.
+    taken += 2.0 * float(np.sum(w * np.imag(np.einsum("ns,st,nt->n", moving.conj(), stiffness, moving))))
+    ports = interface.ports
+    along = np.einsum("ns,mfs->nmf", moving, ports.forces) * gearset.waves.weights[:, None]
+    rates = 1j * w[:, None, None] * along
+    return taken, -2.0 * float(np.sum(np.real(response.excess[1:] * np.conj(rates))))

@@ -1,0 +1,164 @@
+"""What a steady response is asked for: speeds, level, lines."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from dataclasses import asdict, dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.fingerprint import input_hash
+from exugear.loads.summary import summarise_loads
+from exugear.model.gearbox import Gearbox
+from exugear.model.parts import RPM
+from exugear.model.versions import STEADY
+from exugear.rotating.rotating_frame import SteadyError
+from exugear.tooth_mesh.laws.registry import LAWS
+from fe_ste.tools.arrays import Floats
+
+Level = Literal["linear", "parametric", "nonlinear"]
+LEVELS: tuple[Level, ...] = get_args(Level)
+USUAL_COUNT = 400
+MOST_COUNT = 20000
+SLOWEST = 1e-6
+"""Share of the fastest speed below which the input stands, and nothing is excited in time."""
+
+
+@dataclass(frozen=True)
+class SpeedRange:
+    """Even speeds of the overall input.
+
+    Attributes
+    ----------
+    first, last : float
+        rad/s, positive about +z.
+    count : int
+        How many, both ends included.
+    """
+
+    first: float
+    last: float
+    count: int
+
+    def __post_init__(self) -> None:
+        """Refuse what is no range."""
+        if not (math.isfinite(self.first) and math.isfinite(self.last)):
+            raise SteadyError(f"speeds {self.text}: must be finite")
+        if not 1 <= self.count <= MOST_COUNT:
+            raise SteadyError(f"speeds {self.text}: the count must be from 1 to {MOST_COUNT}")
+        if self.first * self.last < 0.0:
+            raise SteadyError(f"speeds {self.text}: change their sense; ask for each sense of rotation by itself")
+        if self.first == self.last == 0.0:
+            raise SteadyError(f"speeds {self.text}: nothing is excited while the input stands; name a speed")
+
+    @property
+    def text(self) -> str:
+        """The range as it is written, rpm."""
+        return f"{self.first / RPM:g}:{self.last / RPM:g}:{self.count}"
+
+    @property
+    def values(self) -> Floats:
+        """Speeds without standstill, rad/s, ascending."""
+        speeds = np.sort(np.linspace(self.first, self.last, self.count))
+        return np.asarray(speeds[np.abs(speeds) > SLOWEST * np.abs(speeds).max()])
+
+    @classmethod
+    def from_text(cls, text: str) -> SpeedRange:
+        """Read ``FIRST:LAST:COUNT``, rpm of the overall input.
+
+        Examples
+        --------
+        >>> SpeedRange.from_text("0:60:3").values.round(6)
+        array([3.141593, 6.283185])
+        """
+        parts = text.split(":")
+        try:
+            first, last, count = float(parts[0]), float(parts[1]), int(parts[2])
+            if len(parts) != 3:
+                raise ValueError
+        except (ValueError, IndexError):
+            raise SteadyError(f"speeds {text!r}: must be FIRST:LAST:COUNT in rpm of the input, as 0:215:400") from None
+        return cls(first * RPM, last * RPM, count)
+
+
+def usual_speeds(gearbox: Gearbox) -> SpeedRange:
+    """Speeds that the first load case passes, from standstill on.
+
+    Raises
+    ------
+    SteadyError
+        There is no load case, or it does not turn the train.
+
+    Examples
+    --------
+    >>> usual_speeds(Gearbox.from_toml("cases/grc750/gearbox.toml")).text
+    '0:-214.5...:400'
+    """
+    for case in gearbox.load_cases.values():
+        loads = summarise_loads(gearbox, case)
+        if loads.fastest_speed > 0.0:
+            return SpeedRange(0.0, math.copysign(loads.fastest_speed, loads.end_speed), USUAL_COUNT)
+    raise SteadyError("speeds: no load case turns the train; name them, as 0:215:400 in rpm of the input")
+
+
+def check_law(name: str, level: Level) -> None:
+    """Refuse a mesh law that a level cannot take.
+
+    Raises
+    ------
+    SteadyError
+        The gears only roll, or the teeth part and the level is linear in the deflections.
+    """
+    law = LAWS[name]
+    if not law.has_force:
+        raise SteadyError(f"mesh law {name}: its gears only roll, so that nothing vibrates; take another law")
+    if law.loses_contact and level != "nonlinear":
+        raise SteadyError(
+            f"mesh law {name}: its teeth may part, which the level {level} cannot tell; take the level nonlinear, or "
+            "the law line_of_action"
+        )
+
+
+@dataclass(frozen=True)
+class SteadySettings:
+    """What is asked for.
+
+    Attributes
+    ----------
+    speeds : SpeedRange
+    level : {"linear", "parametric", "nonlinear"}
+        The static transmission error as excitation, stiffness that varies with the mesh cycle, or laws evaluated in
+        time, the position in the cycle moving with the vibration.
+    harmonics : int
+        Harmonics of each mesh frequency.
+    combinations : int
+        Largest sum of multiples of several mesh frequencies.
+    at_resonances : bool
+        Whether speeds are added where lines cross modes.
+    branches : bool
+        Whether the states are followed by arc length from the first speed to the last, through folds, with the
+        stability of each; the count of speeds and `at_resonances` then play no part.
+    """
+
+    speeds: SpeedRange
+    level: Level = "parametric"
+    harmonics: int = 10
+    combinations: int = 3
+    at_resonances: bool = True
+    branches: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse what is no level, and branches where there are none."""
+        if self.level not in LEVELS:
+            raise SteadyError(f"level {self.level!r} is unknown; levels are {', '.join(LEVELS)}")
+        if self.branches and self.level != "nonlinear":
+            raise SteadyError(f"branches: the level {self.level} has one state at each speed; take the level nonlinear")
+
+    def hash_with(self, assembly: Assembly) -> str:
+        """SHA-256 of all that a response depends on."""
+        content = {"method_version": STEADY, "input": input_hash(assembly), "settings": asdict(self)}
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

@@ -1,0 +1,121 @@
+"""Stability of steady states: what varying meshes do to a disturbance.
+
+A balance of lines says nothing of its stability. Two ways tell the largest growth: a first-order estimate for all pairs
+of modes at once, which finds the speeds where two modes and a harmonic of a mesh work together (Hsu 1963), and Floquet
+exponents of the whole system at one speed, one base at a time, the meshes of others at their mean.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from exugear.dynamics.linearised import RIGID_BODY_LIMIT
+from exugear.harmonics.floquet import exponents, kicks_needed
+from exugear.rotating.mesh_ports import DEFLECTION
+from exugear.steady.excitation import Gearset
+from exugear.steady.nonlinear import Balance
+from exugear.steady.resonances import mean_modes
+from fe_ste.tools.arrays import Complexes
+
+PARTING_KICKS = 1000
+"""Kicks per period at least where teeth part, so that the instants at which they do are met."""
+ROLLING = 2
+"""Multipliers of free rolling, which are one: angle and speed."""
+CHECKED = 3
+"""Candidates whose Floquet exponents are computed."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A speed at which two modes and a harmonic of a mesh frequency may work together.
+
+    Attributes
+    ----------
+    speed : float
+        Of the input, rad/s.
+    base, harmonic : int
+        Which mesh frequency, and the multiple of it that is the sum or difference of both modes' frequencies.
+    growth : float
+        Estimate of the fastest growth there, 1/s.
+    """
+
+    speed: float
+    base: int
+    harmonic: int
+    growth: float
+
+
+def candidates(gearset: Gearset, low: float, high: float) -> tuple[Candidate, ...]:
+    """Find combination resonances between two speeds (rad/s), the fastest growing first, to first order."""
+    middle = 0.5 * (low + high)
+    values, right, left = mean_modes(gearset.system, middle)
+    size, ports = gearset.system.size, gearset.ports_at(middle)
+    felt = left[:, size:] @ np.linalg.solve(gearset.system.mass, gearset.loads(ports).astype(complex))
+    seen = right[:, :size] @ ports.readings[:, DEFLECTION].T
+    decay, frequency = -values.real, values.imag
+    slow = min(abs(low), abs(high))
+    found = []
+    for base, order in enumerate(gearset.waves.base_orders):
+        own = np.array([wave.base == base for wave in gearset.waves.waves])
+        for harmonic in range(1, gearset.harmonics + 1):
+            stiffness = own * gearset.cycle_coefficients[:, harmonic]
+            for sign in (1.0, -1.0):
+                partner = seen.conj() if sign > 0.0 else seen
+                there = (felt * stiffness) @ partner.T
+                back = there.conj() if sign > 0.0 else (felt * stiffness.conj()) @ seen.T
+                product = there * back.T
+                growth = -0.5 * (decay[:, None] + decay) + np.real(
+                    np.sqrt(0.25 * (decay[:, None] - decay) ** 2 + product)
+                )
+                speed = (frequency[:, None] + sign * frequency) / (harmonic * order)
+                inside = (speed >= slow) & (speed <= max(abs(low), abs(high))) & (speed > 0.0)
+                if inside.any():
+                    i, j = np.unravel_index(np.argmax(np.where(inside, growth, -np.inf)), growth.shape)
+                    at = float(np.copysign(speed[i, j], middle))
+                    found.append(Candidate(at, base, harmonic, float(growth[i, j])))
+    return tuple(sorted(found, key=lambda candidate: -candidate.growth))
+
+
+def growth_at(balance: Balance, readings: Complexes, base: int) -> float:
+    """Fastest growth of a disturbance of a steady state, 1/s, by Floquet exponents over one period of a base.
+
+    Parameters
+    ----------
+    balance : Balance
+        At the speed.
+    readings : (n, m, r) complex array
+        What the laws read in the steady state.
+    base : int
+        Base that varies.
+    """
+    gearset, interface = balance.gearset, balance.interface
+    system, ports = gearset.system, interface.ports
+    size, speed = system.size, interface.speed
+    period = 2.0 * np.pi / (abs(speed) * float(gearset.waves.base_orders[base]))
+    values = system.eigenvalues(speed)
+    kicks = kicks_needed(float(np.abs(values).max()) / 2.0 / np.pi, period)
+    kicks = max(kicks, PARTING_KICKS) if gearset.parting else kicks
+    varying = balance.tangents_along(readings, base, kicks)
+    lower = np.linalg.solve(system.mass, np.hstack([-system.stiffness_at(speed), -system.damping_at(speed)]))
+    pushes = np.vstack(
+        [np.zeros((size, varying.shape[1])), np.linalg.solve(system.mass, gearset.loads(ports))],
+    )
+    rows = ports.readings.reshape(-1, size)
+    # Rates of the waves as their meshes see them: those in the frame, and what the turning carries along.
+    carried = speed * np.tensordot(gearset.waves.partners, ports.readings, axes=1).reshape(-1, size)
+    reads = np.block([[rows, np.zeros_like(rows)], [carried, rows]])
+    found = exponents(np.vstack([np.eye(size, 2 * size, size), lower]), pushes, reads, varying, period)
+    rolling = np.argsort(np.abs(np.exp(found * period) - 1.0))[:ROLLING]
+    return float(np.delete(found, rolling).real.max())
+
+
+def mean_growth(gearset: Gearset) -> float:
+    """Fastest growth of the mean system over its speeds, 1/s; free rolling left out."""
+    rates = []
+    for speed in gearset.system.speeds:
+        values = gearset.system.eigenvalues(float(speed))
+        elastic = np.abs(values.imag) > 2.0 * np.pi * RIGID_BODY_LIMIT
+        rates.append(float(values.real[elastic].max(initial=-np.inf)))
+    return max(rates)

@@ -1,0 +1,170 @@
+"""The file of a steady response: netCDF when it is complete, and the points of one that was stopped."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from exugear.dynamics.assembly import Assembly
+from exugear.model.choice import Choice
+from exugear.model.versions import STEADY
+from exugear.results.folder import modes_path
+from exugear.steady.settings import SteadySettings
+from exugear.steady.steady_response import Solved, SteadyResponse, response_of
+from fe_ste.tools.files import FileError
+from fe_ste.tools.sealed import Layout, load_dataset, read_sealed, write_dataset, write_sealed
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_LAYOUT = Layout(
+    "steady response",
+    STEADY,
+    {
+        "speed": ("point",),
+        "index": ("line", "base"),
+        "order": ("line",),
+        "amplitude": ("point", "line", "signal"),
+        "phase": ("point", "line", "signal"),
+        "units": ("signal",),
+        "drive_torque": ("point",),
+        "energy_error": ("point",),
+        "growth": ("point",),
+        "apart_share": ("point", "mesh_wave"),
+    }
+    | {name: (name,) for name in ("base", "signal", "mesh_wave")},
+    ("gearbox", "variant", "mesh_law", "inertias", "level", "input_hash", "growth_rate"),
+)
+
+
+def steady_path(folder: str | Path, choice: Choice, settings: SteadySettings) -> Path:
+    """Place of the steady response of a choice that names its inertia set: beside its modes."""
+    return modes_path(folder, choice).with_name(f"steady-{'branch' if settings.branches else settings.level}.nc")
+
+
+def to_dataset(response: SteadyResponse) -> xr.Dataset:
+    """Labelled arrays with units, what `write_response` writes."""
+    import xarray as xr
+
+    assembly, solved = response.assembly, response.solved
+    amplitude = solved.amplitude
+    variables: dict[str, tuple[tuple[str, ...], Any, dict[str, str]]] = {
+        "speed": (("point",), solved.speed, {"units": "rad/s", "long_name": "speed of the overall input"}),
+        "index": (("line", "base"), response.lines.index, {"units": "1", "long_name": "multiples of the bases"}),
+        "order": (("line",), response.lines.orders, {"units": "1", "long_name": "periods per turn of the input"}),
+        "amplitude": (
+            ("point", "line", "signal"),
+            np.abs(amplitude).astype(np.float32),
+            {"units": "as units says", "long_name": "peak amplitude; of line 0 the mean"},
+        ),
+        "phase": (
+            ("point", "line", "signal"),
+            np.angle(amplitude).astype(np.float32),
+            {"units": "rad", "long_name": "against cos(order * angle of the input)"},
+        ),
+        "units": (("signal",), np.array([own.units for own in response.signals], dtype=object), {}),
+        "drive_torque": (("point",), solved.drive_torque, {"units": "N m"}),
+        "energy_error": (("point",), solved.energy_error, {"units": "1"}),
+        "growth": (("point",), solved.growth, {"units": "1/s", "long_name": "fastest growth along a branch"}),
+        "apart_share": (("point", "mesh_wave"), solved.apart, {"units": "1", "long_name": "share of time apart"}),
+    }
+    coordinates: dict[str, Any] = {
+        "mesh_wave": np.array(response.wave_names, dtype=object),
+        "base": np.array(response.base_names, dtype=object),
+        "signal": np.array([own.name for own in response.signals], dtype=object),
+    }
+    attributes = {
+        "gearbox": assembly.gearbox.name,
+        "variant": assembly.variant,
+        "mesh_law": assembly.mesh_law,
+        "inertias": assembly.inertias,
+        "level": response.settings.level,
+        "settings": json.dumps(asdict(response.settings), sort_keys=True),
+        "input_hash": response.input_hash,
+        "method_version": STEADY,
+        "housing_factor": assembly.housing_factor,
+        "bearing_laws": assembly.bearing_laws,
+        "growth_rate": response.growth_rate,
+        "planet_spread": response.planet_spread,
+        "folds": json.dumps(response.folds),
+        "crossings": json.dumps([asdict(crossing) for crossing in response.crossings]),
+    }
+    return xr.Dataset(variables, coordinates, attributes)
+
+
+def write_response(path: Path, response: SteadyResponse) -> None:
+    """Write a steady response whole or not at all, and forget the points of one that was stopped."""
+    write_dataset(path, to_dataset(response))
+    partial_path(path).unlink(missing_ok=True)
+
+
+def load_response(path: str | Path) -> xr.Dataset:
+    """Read what `write_response` wrote.
+
+    Raises
+    ------
+    FileError
+        The file is missing, damaged, or of another version.
+
+    Examples
+    --------
+    >>> load_response("nowhere/steady-parametric.nc")
+    Traceback (most recent call last):
+    fe_ste.tools.files.FileError: nowhere/steady-parametric.nc: no such file
+    """
+    return load_dataset(Path(path), _LAYOUT)
+
+
+def stored_or_computed(
+    path: Path,
+    assembly: Assembly,
+    settings: SteadySettings,
+    progress: Callable[[int, int], None] | None = None,
+) -> xr.Dataset:
+    """Read the response of an assembly at `path` if it is there and fits; else compute and write it.
+
+    Points that a stopped computation left are taken up; what is stopped again leaves its points.
+    """
+    wanted = settings.hash_with(assembly)
+    with suppress(FileError):
+        stored = load_response(path)
+        if stored.attrs["input_hash"] == wanted:
+            return stored
+    path.parent.mkdir(parents=True, exist_ok=True)
+    response = response_of(
+        assembly,
+        settings,
+        known=kept_points(path, wanted),
+        progress=progress,
+        keep=lambda solved: keep_points(path, wanted, solved),
+    )
+    write_response(path, response)
+    return load_response(path)
+
+
+def partial_path(path: Path) -> Path:
+    """Place of the points of a response that is not complete."""
+    return path.with_suffix(".partial.npz")
+
+
+def keep_points(path: Path, input_hash: str, solved: Solved) -> None:
+    """Write the points that are solved so far beside the response at `path`, whole or not at all."""
+    content = io.BytesIO()
+    arrays = {own.name: getattr(solved, own.name) for own in fields(Solved)}
+    np.savez(content, input_hash=np.array(input_hash), **arrays)
+    write_sealed(partial_path(path), content.getbuffer())
+
+
+def kept_points(path: Path, input_hash: str) -> Solved | None:
+    """Points of a response that was stopped and had the same input, None where there are none."""
+    with suppress(FileError), np.load(io.BytesIO(read_sealed(partial_path(path))), allow_pickle=False) as data:
+        if str(data["input_hash"]) == input_hash:
+            return Solved(**{own.name: data[own.name] for own in fields(Solved)})
+    return None

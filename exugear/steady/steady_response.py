@@ -1,0 +1,326 @@
+"""Steady response of a gearbox over speed: every line at every speed, without a run-up."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from exugear.bodies.elastic_body import ElasticBody
+from exugear.dynamics.assemble import assemble
+from exugear.dynamics.assembly import Assembly
+from exugear.harmonics.lines import LineSet
+from exugear.model.choice import Choice
+from exugear.model.gearbox import Gearbox
+from exugear.model.parts import RPM
+from exugear.rotating.rotating_frame import SteadyError
+from exugear.rotating.signals import SignalName
+from exugear.steady.excitation import Gearset
+from exugear.steady.gearbox_branches import follow_branch
+from exugear.steady.point_solver import PointSolver, gearset_of
+from exugear.steady.resonances import Crossing, crossings, refined
+from exugear.steady.response import Response, dissipated_and_given, signals
+from exugear.steady.settings import SteadySettings, check_law, usual_speeds
+from exugear.tooth_mesh.law import MeshData
+from fe_ste.tools.arrays import Complexes, Floats
+from fe_ste.tools.notebook import html_table, value_range
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """Points of a steady response as they are solved and kept.
+
+    Attributes
+    ----------
+    speed : (points,) array
+        Of the overall input, rad/s.
+    amplitude : (points, lines, signals) complex array
+        Peak amplitudes; of line 0 the mean of the vibration about the static state.
+    drive_torque : (points,) array
+        N m.
+    energy_error : (points,) array
+        Power that damping takes less that given by the meshes, over the larger of both.
+    products : (points,) array
+        Products with the operator of the balance.
+    apart : (points, waves) array
+        Share of time in which the teeth of each mesh wave are apart.
+    growth : (points,) array
+        Fastest growth of a disturbance along a branch, 1/s; NaN elsewhere.
+    """
+
+    speed: Floats
+    amplitude: Complexes
+    drive_torque: Floats
+    energy_error: Floats
+    products: Floats
+    apart: Floats
+    growth: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class SteadyResponse:
+    """Steady response over speed.
+
+    Attributes
+    ----------
+    assembly : Assembly
+        As it was solved, with equal planets.
+    settings : SteadySettings
+    input_hash : str
+        Of gearbox, choices and settings.
+    lines : LineSet
+    base_names, wave_names : tuple of str
+        Meshes of each base, and mesh waves.
+    signals : tuple of SignalName
+    solved : Solved
+        Points in ascending order of speed, or along a branch.
+    crossings : tuple of Crossing
+        Where lines meet modes, the strongest first.
+    folds : tuple of float
+        Speeds at which a branch turns back, rad/s.
+    growth_rate : float
+        Fastest growth of any disturbance over the speeds, 1/s: of the mean system, and where two modes and a mesh
+        frequency work together.
+    planet_spread : float
+        Largest change of planet bearings' stiffness that made the planets equal, over that stiffness.
+    """
+
+    assembly: Assembly
+    settings: SteadySettings
+    input_hash: str
+    lines: LineSet
+    base_names: tuple[str, ...]
+    wave_names: tuple[str, ...]
+    signals: tuple[SignalName, ...]
+    solved: Solved
+    crossings: tuple[Crossing, ...]
+    folds: tuple[float, ...]
+    growth_rate: float
+    planet_spread: float
+
+    def __repr__(self) -> str:
+        """Gearbox, variant, level and sizes in one line."""
+        assembly = self.assembly
+        return (
+            f"<SteadyResponse of {assembly.gearbox.name[:60]!r}, {assembly.variant}, {assembly.mesh_law}, "
+            f"{self.settings.level}: {len(self.solved.speed)} speeds, {len(self.lines.orders)} lines>"
+        )
+
+    def _repr_html_(self) -> str:
+        """Sizes as a small table in a notebook."""
+        return html_table(
+            repr(self).strip("<>"),
+            {
+                "speed of the input": value_range(self.solved.speed, "rpm", 1.0 / RPM),
+                "lines": str(len(self.lines.orders)),
+                "signals": str(len(self.signals)),
+                "fastest growth of the mean system": f"{self.growth_rate:.3g} 1/s",
+            },
+        )
+
+    def amplitude(self, signal: str, line: tuple[int, ...]) -> Complexes:
+        """Amplitude (points,) of a line, given by its multiples of the bases, in a signal, given by its name.
+
+        Raises
+        ------
+        SteadyError
+            There is no such signal, or no such line.
+        """
+        names = [own.name for own in self.signals]
+        if signal not in names:
+            raise SteadyError(f"no signal {signal!r}; signals are {', '.join(names)}")
+        place, mirrored = self.lines.find(np.array(line, dtype=np.int64))
+        if place < 0:
+            raise SteadyError(f"no line {line}; single bases go up to {self.settings.harmonics}")
+        found = self.solved.amplitude[:, int(place), names.index(signal)]
+        return np.conj(found) if mirrored else found
+
+
+SLOWEST_BRANCH = 0.01
+"""Share of the fastest speed at which a branch from standstill begins."""
+Kept = Callable[[Solved], None]
+
+
+def steady_response(
+    gearbox: Gearbox,
+    choice: Choice,
+    stiffness: Mapping[str, MeshData],
+    bodies: Mapping[str, ElasticBody] | None = None,
+    settings: SteadySettings | None = None,
+) -> SteadyResponse:
+    """Steady response of a gearbox variant under its static load, over speeds of the overall input.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    choice : Choice
+        Variant, mesh law and inertia set.
+    stiffness : mapping of pair name to (n,) array
+        Mesh stiffness F_bt / STE over the cycle, N/m.
+    bodies : mapping of body name to ElasticBody, optional
+        Reduced elastic bodies, which the variant `flexible` needs.
+    settings : SteadySettings, optional
+        Speeds and level; those that the first load case passes, and `parametric`, by default.
+
+    Raises
+    ------
+    SteadyError
+        What cannot be treated, and why.
+    BalanceError
+        The static load has no equilibrium.
+
+    Examples
+    --------
+    >>>     from exugear.steady.settings import SpeedRange
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> shape = 1.0 + 0.05 * np.cos(2.0 * np.pi * np.arange(50) / 50)
+    >>> mean = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
+    >>> stiffness = {name: value * shape for name, value in mean.items()}
+    >>> settings = SteadySettings(SpeedRange.from_text("10:20:3"), at_resonances=False)
+    >>> response = steady_response(gearbox, Choice("rigid"), stiffness, settings=settings)
+    >>> response.amplitude("overall_dte", (0, 1, 0)).shape
+    (3,)
+    """
+    assembly = assemble(gearbox, choice, stiffness, bodies)
+    return response_of(assembly, settings or SteadySettings(usual_speeds(gearbox)))
+
+
+def response_of(
+    assembly: Assembly,
+    settings: SteadySettings,
+    known: Solved | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    keep: Kept | None = None,
+    keep_every: float = 10.0,
+) -> SteadyResponse:
+    """Steady response of an assembly.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    settings : SteadySettings
+    known : Solved, optional
+        Points that were solved before.
+    progress : callable, optional
+        Called with the number of points that are solved, and of all.
+    keep : callable, optional
+        Called with the points that are solved, at times.
+    keep_every : float
+        Seconds between them.
+    """
+    check_law(assembly.mesh_law, settings.level)
+    even = settings.speeds.values
+    gearset = gearset_of(assembly, even, settings.harmonics, settings.combinations)
+    solver = PointSolver(gearset, settings)
+    told = progress or (lambda done, total: None)
+    found = crossings(gearset, float(even.min()), float(even.max()), solver.forcing) if settings.at_resonances else ()
+    folds: tuple[float, ...] = ()
+    if settings.branches:
+        solved, folds = _along_branch(solver, settings.speeds.first, settings.speeds.last, told)
+    else:
+        solved = _solve(solver, refined(even, found), known, told, keep, keep_every)
+    return SteadyResponse(
+        assembly=gearset.waves.assembly,
+        settings=settings,
+        input_hash=settings.hash_with(assembly),
+        lines=gearset.lines,
+        base_names=gearset.waves.base_names,
+        wave_names=tuple(wave.name for wave in gearset.waves.waves),
+        signals=gearset.signal_names,
+        solved=solved,
+        crossings=found,
+        folds=folds,
+        growth_rate=solver.growth(float(even.min()), float(even.max())),
+        planet_spread=gearset.system.planet_spread,
+    )
+
+
+def _solve(
+    solver: PointSolver,
+    speeds: Floats,
+    known: Solved | None,
+    progress: Callable[[int, int], None],
+    keep: Kept | None,
+    keep_every: float,
+) -> Solved:
+    """Solve all speeds, beginning with what is known of them."""
+    count = 0 if known is None else _same_beginning(known.speed, speeds)
+    gearset = solver.gearset
+    out = _empty(gearset, speeds)
+    if known is not None:
+        for name in ("amplitude", "drive_torque", "energy_error", "products", "apart", "growth"):
+            getattr(out, name)[:count] = getattr(known, name)[:count]
+    kept, done = time.monotonic(), count
+    try:
+        for n in range(count, len(speeds)):
+            _fill(out, n, gearset, solver.response(float(speeds[n])))
+            done = n + 1
+            progress(done, len(speeds))
+            if keep is not None and time.monotonic() - kept > keep_every:
+                keep(_first(out, done))
+                kept = time.monotonic()
+    except KeyboardInterrupt:
+        if keep is not None and done:
+            keep(_first(out, done))
+        raise
+    return out
+
+
+def _along_branch(
+    solver: PointSolver, first: float, last: float, progress: Callable[[int, int], None]
+) -> tuple[Solved, tuple[float, ...]]:
+    """Points along a branch between two speeds (rad/s), and its folds; progress counts in hundredths of the range."""
+    fastest = max(abs(first), abs(last))
+    first, last = (np.copysign(SLOWEST_BRANCH * fastest, first + last) if s == 0.0 else s for s in (first, last))
+    branch = follow_branch(
+        solver, first, last, lambda s: progress(int(100.0 * abs(s - first) / abs(last - first)), 100)
+    )
+    out = _empty(solver.gearset, branch.speed)
+    for n, (speed, readings) in enumerate(zip(branch.speed, branch.readings, strict=True)):
+        _fill(out, n, solver.gearset, solver.response_to(readings, float(speed)))
+    out.growth[:] = branch.growth
+    return out, branch.folds
+
+
+def _empty(gearset: Gearset, speeds: Floats) -> Solved:
+    points = len(speeds)
+    shape = (points, len(gearset.lines.orders), len(gearset.signal_names))
+    return Solved(
+        speed=speeds,
+        amplitude=np.zeros(shape, dtype=complex),
+        drive_torque=np.zeros(points),
+        energy_error=np.zeros(points),
+        products=np.zeros(points),
+        apart=np.zeros((points, len(gearset.waves.waves))),
+        growth=np.full(points, np.nan),
+    )
+
+
+def _fill(out: Solved, n: int, gearset: Gearset, response: Response) -> None:
+    """Enter the response at one speed as point n."""
+    out.amplitude[n] = signals(gearset, response)
+    out.amplitude[n, 1:] *= 2.0
+    taken, given = dissipated_and_given(gearset, response)
+    out.drive_torque[n], out.products[n] = response.torque, response.products
+    out.apart[n] = response.apart
+    out.energy_error[n] = (taken - given) / max(abs(taken), abs(given), 1e-300)
+
+
+def _same_beginning(known: Floats, speeds: Floats) -> int:
+    """Count the points that are known already."""
+    count = min(len(known), len(speeds))
+    return count if np.array_equal(known[:count], speeds[:count]) else 0
+
+
+def _first(solved: Solved, count: int) -> Solved:
+    return Solved(
+        solved.speed[:count],
+        solved.amplitude[:count],
+        solved.drive_torque[:count],
+        solved.energy_error[:count],
+        solved.products[:count],
+        solved.apart[:count],
+        solved.growth[:count],
+    )

@@ -1,0 +1,1 @@
+"""Gearbox files to start from."""

@@ -1,0 +1,72 @@
+"""The verb `steady` as a user meets it: what it writes and prints, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import xarray as xr
+from typer.testing import CliRunner
+
+from exugear.cli.app import app
+from exugear.cli.verbs.steady import Level
+from exugear.steady.settings import LEVELS
+
+from ..spur_case import COARSE_INPUT, SPUR_CASE
+
+
+@pytest.fixture(autouse=True)
+def coarse_tables(monkeypatch):
+    monkeypatch.setattr("exugear.tooth_mesh.tables.TableInput", COARSE_INPUT)
+
+
+@pytest.fixture
+def case(tmp_path):
+    path = tmp_path / "spur.toml"
+    path.write_text(SPUR_CASE, encoding="utf-8")
+    return path
+
+
+def steady(case, *more):
+    return CliRunner().invoke(app, ["steady", str(case), "--out", str(case.parent / "out"), *map(str, more)])
+
+
+def test_the_levels_offered_are_those_of_the_library():
+    assert tuple(level.value for level in Level) == LEVELS
+
+
+def test_steady_writes_a_response_and_sums_it_up(case):
+    outcome = steady(case, "--variant", "bushing", "--speeds", "1400:1500:10", "--json")
+    assert outcome.exit_code == 0, outcome.stderr
+    summary = json.loads(outcome.stdout)
+    path = Path(summary["file"])
+    assert path == case.parent / "out" / "bushing" / "line_of_action-disc" / "steady-parametric.nc"
+    with xr.open_dataset(path, engine="h5netcdf") as data:
+        assert data.sizes["point"] == summary["speeds"] >= 10
+    assert summary["peaks_of_overall_dte"][0]["amplitude_m"] > 0.0
+    assert summary["largest_energy_error"] < 1e-4
+    again = steady(case, "--variant", "bushing", "--speeds", "1400:1500:10")
+    assert again.exit_code == 0
+    assert "speeds up to 1500 rpm" in again.stdout
+
+
+def test_the_range_of_the_load_case_is_the_usual_one(case):
+    outcome = steady(case, "--variant", "rigid", "--level", "linear", "--json")
+    assert outcome.exit_code == 0, outcome.stderr
+    assert json.loads(outcome.stdout)["speeds"] >= 399
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--variant", "rigid", "--speeds", "5"), "must be FIRST:LAST:COUNT"),
+        (("--variant", "rigid", "--speeds", "-5:5:10"), "change their sense"),
+        (("--variant", "rigid", "--mesh-law", "rigid"), "nothing vibrates"),
+        (("--variant", "rigid", "--mesh-law", "table"), "its teeth may part"),
+    ],
+)
+def test_what_cannot_be_answered_is_one_sentence_and_code_2(case, options, said):
+    outcome = steady(case, *options)
+    assert outcome.exit_code == 2
+    assert said in outcome.stderr

@@ -1,0 +1,116 @@
+"""The file of a steady response: what it holds, when it is taken as it is, and what a stopped one leaves."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from exugear.dynamics.assemble import assemble
+from exugear.model.choice import Choice
+from exugear.rotating.rotating_frame import SteadyError
+from exugear.steady.peaks import line_name, peaks
+from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear.steady.steady_file import keep_points, kept_points, load_response, partial_path, stored_or_computed
+from exugear.steady.steady_response import response_of
+from fe_ste.tools.files import FileError
+
+SETTINGS = SteadySettings(SpeedRange(0.0, 20.0, 21), at_resonances=False)
+
+
+@pytest.fixture(scope="module")
+def assembly(grc, stiffness):
+    return assemble(grc, Choice("rigid"), stiffness)
+
+
+def test_a_file_gives_back_the_response_with_units_and_origin(assembly, tmp_path):
+    response, path = response_of(assembly, SETTINGS), tmp_path / "steady.nc"
+    data = stored_or_computed(path, assembly, SETTINGS)
+    assert data.attrs["input_hash"] == response.input_hash
+    assert dict(data.sizes) == {"point": 20, "line": 53, "base": 3, "signal": len(response.signals), "mesh_wave": 8}
+    assert str(data["units"][0].item()) == "m"
+    line = int(np.argmin(abs(data["order"].to_numpy() - 99.0)))
+    known = response.amplitude("overall_dte", (1, 0, 0))
+    stored = data["amplitude"][:, line, 0] * np.exp(1j * data["phase"][:, line, 0])
+    # Single precision.
+    np.testing.assert_allclose(stored, known, rtol=1e-6, atol=1e-6 * abs(known).max())
+    assert json.loads(data.attrs["settings"])["level"] == "parametric"
+
+
+def test_a_file_that_fits_is_taken_and_another_input_is_computed(assembly, tmp_path):
+    path, asked = tmp_path / "steady.nc", []
+    for _ in range(2):
+        stored_or_computed(path, assembly, SETTINGS, lambda done, total: asked.append(done))
+    assert asked == list(range(1, 21))
+    other = SteadySettings(SpeedRange(0.0, 20.0, 11), at_resonances=False)
+    assert stored_or_computed(path, assembly, other).sizes["point"] == 10
+
+
+def test_points_of_a_stopped_response_fit_their_input_alone(assembly, tmp_path):
+    path, solved = tmp_path / "steady.nc", response_of(assembly, SETTINGS).solved
+    keep_points(path, "this", solved)
+    found = kept_points(path, "this")
+    assert found is not None
+    np.testing.assert_array_equal(found.amplitude, solved.amplitude)
+    assert kept_points(path, "that") is None
+    whole = partial_path(path).read_bytes()
+    partial_path(path).write_bytes(whole[: len(whole) // 2])
+    assert kept_points(path, "this") is None
+
+
+def test_what_stopped_is_gone_on_with_and_leaves_nothing_behind(assembly, tmp_path):
+    path, seen = tmp_path / "steady.nc", []
+
+    def stop(done, total):
+        if done == 5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        stored_or_computed(path, assembly, SETTINGS, stop)
+    assert partial_path(path).exists() and not path.exists()
+    stored_or_computed(path, assembly, SETTINGS, lambda done, total: seen.append(done))
+    assert seen[0] == 6
+    assert not partial_path(path).exists()
+
+
+def test_a_damaged_file_is_refused(assembly, tmp_path):
+    path = tmp_path / "steady.nc"
+    stored_or_computed(path, assembly, SETTINGS)
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(bytes(content))
+    with pytest.raises(FileError):
+        load_response(path)
+
+
+def test_peaks_are_the_local_maxima_the_loudest_first(assembly, tmp_path):
+    data = stored_or_computed(tmp_path / "steady.nc", assembly, SETTINGS)
+    found = peaks(data)
+    assert found[0].amplitude == pytest.approx(float(data["amplitude"][:, 1:, 0].max()), rel=1e-6)
+    assert [peak.amplitude for peak in found] == sorted((peak.amplitude for peak in found), reverse=True)
+    assert found[0].frequency == pytest.approx(found[0].order * found[0].speed / 2.0 / np.pi)
+    with pytest.raises(SteadyError, match="no signal 'noise'; signals are overall_dte"):
+        peaks(data, "noise")
+
+
+def test_combinations_are_named_by_their_bases():
+    assert line_name((1, -2, 0), ("a, b", "c", "d")) == "a - 2 x c"
+    assert line_name((0, 0, 0), ("a", "b", "c")) == "mean"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("0:215", "must be FIRST:LAST:COUNT"),
+        ("0:fast:3", "must be FIRST:LAST:COUNT"),
+        ("0:1:2:3", "must be FIRST:LAST:COUNT"),
+        ("-5:5:3", "change their sense"),
+        ("0:0:3", "while the input stands"),
+        ("0:nan:3", "must be finite"),
+        ("0:10:0", "the count must be from 1"),
+    ],
+)
+def test_speeds_that_cannot_be_are_told_in_one_sentence(text, said):
+    with pytest.raises(SteadyError, match=said):
+        SpeedRange.from_text(text)

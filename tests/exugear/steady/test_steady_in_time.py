@@ -1,0 +1,148 @@
+"""Steady states against runs in time: a run that starts on its steady state stays there."""
+
+from __future__ import annotations
+
+import tomllib
+
+import numpy as np
+import pytest
+
+from exugear.dynamics.assemble import assemble
+from exugear.dynamics.modes import overall_row
+from exugear.model.choice import Choice
+from exugear.model.gearbox import Gearbox
+from exugear.solvers.compiled.solver import CompiledSystem
+from exugear.solvers.loads import LoadTable
+from exugear.steady.nonlinear import Balance
+from exugear.steady.point_solver import PointSolver, gearset_of
+from exugear.steady.response import dissipated_and_given, signals
+from exugear.steady.settings import SpeedRange, SteadySettings
+
+from .. import table_case
+from ..spur_case import SPUR_CASE
+
+SPUR = Gearbox.from_dict(tomllib.loads(SPUR_CASE))
+
+
+def solver_of(assembly, speeds, level, harmonics=10, combinations=3):
+    gearset = gearset_of(assembly, np.array(speeds), harmonics, combinations)
+    settings = SteadySettings(SpeedRange(*speeds, 2), level, harmonics, combinations)
+    return PointSolver(gearset, settings)
+
+
+def spur_stiffness():
+    cycle = 2.0 * np.pi * np.arange(50) / 50
+    return {"spur": 3e8 * (1.0 + 0.08 * np.cos(cycle) + 0.03 * np.sin(2 * cycle))}
+
+
+@pytest.fixture(scope="module")
+def spur_surface():
+    before = dict(table_case.STIFFNESS)
+    table_case.STIFFNESS["spur"] = 3e8
+    yield {"spur": table_case.surface_of(SPUR, "spur")}
+    table_case.STIFFNESS.clear()
+    table_case.STIFFNESS.update(before)
+
+
+def fitted(solver, response, duration, step, last):
+    """Lines of the overall transmission error of a run in time that starts on a response, and its mean speed."""
+    interface, gearset = response.interface, solver.gearset
+    system, assembly, motion = gearset.system, gearset.waves.assembly, response.motion
+    w = interface.frequencies[1:, None]
+    u = system.static_at(interface.speed) + motion[0].real + 2.0 * motion[1:].sum(axis=0).real
+    q, v, _ = system.frame.state(0.0, interface.speed, u, 2.0 * (1j * w * motion[1:]).sum(axis=0).real)
+    load = assembly.gearbox.case.static_load
+    run = CompiledSystem(assembly, q, v, LoadTable({**load.torques_N_m, load.locked[0]: response.torque}), step)
+    steps, every = round(duration / step), 8
+    time, overall, angle = [], [], []
+    for first in range(0, steps, 8000):
+        states = np.empty((8000, assembly.size))
+        assert run.advance(first, states, np.empty_like(states)) == 8000
+        time.append(step * (first + np.arange(every, 8001, every)))
+        overall.append(states[every - 1 :: every] @ overall_row(assembly))
+        angle.append(states[every - 1 :: every, system.pinned])
+    time, overall, angle = (np.concatenate(values) for values in (time, overall, angle))
+    late = time > duration - last
+    speed, start = np.polyfit(time[late], angle[late], 1)
+    angles = np.outer(np.copysign(1.0, speed) * (speed * time[late] + start), gearset.lines.orders)
+    columns = np.hstack([np.cos(angles), -np.sin(angles[:, 1:])])
+    found = np.linalg.lstsq(columns, overall[late], rcond=None)[0]
+    count = len(gearset.lines.orders)
+    return float(speed), found[1:count] + 1j * found[count:]
+
+
+def apart(solver, speed, duration, step, last):
+    """Differences of lines and of their amplitudes between response and run, over the size of all lines.
+
+    The run keeps its mean speed to a hundred-thousandth, which at a resonance turns phases by a thousandth: the
+    response is solved again at the speed that the run has.
+    """
+    measured, lines = fitted(solver, solver.response(speed), duration, step, last)
+    known = 2.0 * signals(solver.gearset, solver.response(measured))[1:, 0]
+    size = np.linalg.norm(known)
+    return np.linalg.norm(lines - known) / size, np.linalg.norm(abs(lines) - abs(known)) / size
+
+
+@pytest.mark.parametrize("speed", [60.0, 100.0])
+def test_a_spur_pair_started_on_its_steady_state_stays_there(speed):
+    """RK4 at 1/60 kHz, ten harmonics; harmonics beyond and the parabola of the position leave 1e-4."""
+    solver = solver_of(assemble(SPUR, Choice("bushing"), spur_stiffness()), (50.0, 150.0), "nonlinear")
+    assert apart(solver, speed, 0.4, 1.0 / 60e3, 0.2)[0] < 3e-4
+
+
+@pytest.mark.parametrize("speed", [60.0, 150.0])
+def test_a_spur_pair_by_its_table_stays_on_its_steady_state(spur_surface, speed):
+    """As before; teeth do not part here, so that the ramp of damping at first touch plays no part."""
+    assembly = assemble(SPUR, Choice("bushing", "table"), spur_surface)
+    solver = solver_of(assembly, (50.0, 200.0), "nonlinear", 14)
+    assert apart(solver, speed, 0.4, 1.0 / 60e3, 0.2)[0] < 1e-3
+
+
+@pytest.fixture(scope="module")
+def gearbox_solver(grc, stiffness):
+    return solver_of(assemble(grc, Choice("bushing"), stiffness), (1.0, 22.5), "nonlinear", 10, 5)
+
+
+@pytest.mark.validation
+@pytest.mark.parametrize(
+    ("speed", "whole"), [(8.0, 3e-4), (11.0, 3e-4), (-12.0, 3e-4), (14.0, 2e-3), (3.218, 2e-3), (7.232, 2e-3)]
+)
+def test_the_gearbox_started_on_its_steady_state_stays_there(gearbox_solver, speed, whole):
+    """RK4 at 1/120 kHz, the last 2 of 3 s: 3e-4 of the overall signal off resonance, 2e-3 (1e-3 in amplitude) on it."""
+    of_lines, of_amplitudes = apart(gearbox_solver, speed, 3.0, 1.0 / 120e3, 2.0)
+    assert of_lines < whole
+    assert of_amplitudes < 1e-3
+
+
+@pytest.mark.parametrize("law", ["line_of_action", "table"])
+def test_the_tangents_of_the_balance_are_those_of_differences(law, spur_surface):
+    data = spur_surface if law == "table" else spur_stiffness()
+    solver = solver_of(assemble(SPUR, Choice("bushing", law), data), (50.0, 150.0), "nonlinear")
+    balance = Balance(solver.gearset, solver.gearset.at(80.0), solver.lattice)
+    rng = np.random.default_rng(0)
+
+    def some(size):
+        values = size * (rng.normal(size=balance.static.shape) + 1j * rng.normal(size=balance.static.shape))
+        values[0] = values[0].real
+        return values
+
+    state, step = balance.static + some(1e-8), some(1e-10)
+    ahead, behind = balance.forces(state + step)[0], balance.forces(state - step)[0]
+    change = balance.forces(state)[1](step)
+    assert np.abs(change).max() > 0.0
+    # Cubics of the tables have bends at their knots, which a difference may straddle.
+    assert np.linalg.norm(0.5 * (ahead - behind) - change) < 1e-5 * np.linalg.norm(change)
+
+
+def test_the_position_that_moves_with_the_vibration_changes_little(grc, stiffness):
+    """By a thousandth at most where the vibration is small, and never the balance of power."""
+    assembly = assemble(grc, Choice("bushing"), stiffness)
+    found = {}
+    for level in ("parametric", "nonlinear"):
+        solver = solver_of(assembly, (1.0, 22.5), level)
+        response = solver.response(8.0)
+        taken, given = dissipated_and_given(solver.gearset, response)
+        assert given == pytest.approx(taken, rel=1e-6)
+        found[level] = signals(solver.gearset, response)[1:, 0]
+    difference = np.linalg.norm(found["nonlinear"] - found["parametric"])
+    assert 0.0 < difference < 1e-3 * np.linalg.norm(found["parametric"])

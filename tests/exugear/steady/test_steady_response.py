@@ -1,0 +1,103 @@
+"""The steady response against balances of power, against its own orders of magnitude, and against runs in time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from exugear.dynamics.assemble import assemble
+from exugear.model.choice import Choice
+from exugear.steady.point_solver import gearset_of
+from exugear.steady.resonances import crossings, refined
+from exugear.steady.response import (
+    dissipated_and_given,
+    linear_response,
+    parametric_response,
+    signals,
+    transmission_errors,
+)
+from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear.steady.steady_response import response_of
+
+RANGE = np.array([1.0, 22.5])
+
+
+@pytest.fixture(scope="module")
+def gearset(grc, stiffness):
+    return gearset_of(assemble(grc, Choice("bushing"), stiffness), RANGE)
+
+
+@pytest.mark.parametrize("speed", [4.0, 10.0, 14.6])
+def test_damping_takes_the_power_that_the_meshes_give(gearset, speed):
+    taken, given = dissipated_and_given(gearset, parametric_response(gearset, gearset.at(speed)))
+    assert taken > 0.0
+    assert given == pytest.approx(taken, rel=1e-4)
+
+
+def scaled(stiffness, share):
+    return {name: values.mean() + share * (values - values.mean()) for name, values in stiffness.items()}
+
+
+def test_the_linear_level_is_the_first_order_of_the_parametric_one(grc, stiffness):
+    """A tenth of the variation leaves a hundredth of the difference between both."""
+    apart = []
+    for share in (1e-1, 1e-2):
+        gearset = gearset_of(assemble(grc, Choice("bushing"), scaled(stiffness, share)), RANGE)
+        interface = gearset.at(10.0)
+        linear, full = (signals(gearset, level(gearset, interface)) for level in (linear_response, parametric_response))
+        apart.append(np.linalg.norm((full - linear)[1:, 0]))
+    assert apart[1] == pytest.approx(apart[0] / 100.0, rel=0.1)
+
+
+@pytest.mark.parametrize(("speed", "change"), [(4.0, 5e-3), (10.0, 1e-3)])
+def test_more_lines_hardly_change_the_response(gearset, speed, change):
+    """Twice the harmonics and larger combinations, over the size of all lines of the overall transmission error.
+
+    At 4 rad/s harmonics beyond the tenth of the planets' mesh still lie among the modes.
+    """
+    finer = gearset_of(gearset.waves.assembly, RANGE, 20, 5)
+    coarse, fine = (signals(own, parametric_response(own, own.at(speed)))[1:, 0] for own in (gearset, finer))
+    places, _ = finer.lines.find(gearset.lines.index[1:])
+    assert np.linalg.norm(coarse - fine[places - 1]) < change * np.linalg.norm(fine)
+
+
+def test_speeds_are_added_where_a_line_meets_a_mode(gearset):
+    found = crossings(gearset, *RANGE, lambda interface: transmission_errors(gearset, interface))
+    even = np.linspace(*RANGE, 20)
+    speeds = refined(even, found)
+    strongest = found[0]
+    assert strongest.share == 1.0
+    values = gearset.system.eigenvalues(strongest.speed)
+    met = gearset.lines.orders[strongest.line] * strongest.speed
+    assert np.abs(values.imag - met).min() < 1e-3 * met
+    assert np.isin(even, speeds).all()
+    assert np.abs(speeds - strongest.speed).min() < 1e-9
+    assert np.count_nonzero(np.abs(speeds / strongest.speed - 1.0) < 2.5 * strongest.damping) >= 5
+
+
+def test_a_peak_is_a_maximum_of_the_response(gearset):
+    """At the crossing of the strongest line the response is above that two half-widths beside it."""
+    strongest = crossings(gearset, *RANGE, lambda interface: transmission_errors(gearset, interface))[0]
+    offsets = np.array([-2.0, 0.0, 2.0]) * strongest.damping
+    levels = [
+        abs(signals(gearset, parametric_response(gearset, gearset.at(strongest.speed * (1.0 + o))))[strongest.line, 0])
+        for o in offsets
+    ]
+    assert levels[1] > 1.3 * max(levels[0], levels[2])
+
+
+def test_points_known_before_are_not_solved_again(grc, stiffness):
+    assembly = assemble(grc, Choice("rigid"), stiffness)
+    settings = SteadySettings(SpeedRange(5.0, 20.0, 8), at_resonances=False)
+    whole, kept, seen = response_of(assembly, settings).solved, [], []
+
+    def stop(done, total):
+        if done == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        response_of(assembly, settings, progress=stop, keep=kept.append)
+    assert len(kept[-1].speed) == 3
+    again = response_of(assembly, settings, known=kept[-1], progress=lambda done, total: seen.append(done))
+    assert seen == [4, 5, 6, 7, 8]
+    np.testing.assert_array_equal(again.solved.amplitude, whole.amplitude)
