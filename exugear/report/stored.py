@@ -21,10 +21,15 @@ from exugear.results.run_file import FINAL_NAME, PARTIAL_NAME, load_run
 from exugear.runs.trust import verdict_of
 from exugear.spectra.orders import order_lines
 from exugear.spectra.run_spectra import VariantRun, read_run
+from exugear.steady.steady_file import load_response, settings_of
 from exugear.tooth_mesh.placement import MeshError
 from exugear.tooth_mesh.tables import fitting_table
 from fe_ste.tools.files import FileError
 from fe_ste.transmission_error.table import MeshTable, TableError
+
+OTHER_INPUT = "was computed from another input; compute it again"
+_UNFIT = (CaseError, MeshError, VariantError, BearingError, BalanceError, KeyError)
+"""What the case of the folder may say to the choice that a file was computed of."""
 
 
 @dataclass(frozen=True)
@@ -37,22 +42,43 @@ class StoredResults:
     modes : mapping of Choice to xarray.Dataset
         As `exugear.dynamics.modes.Modes.to_dataset` makes them.
     runs : sequence of VariantRun
+    steady : sequence of xarray.Dataset
+        Steady responses as `exugear.steady.steady_file.load_response` reads them.
     """
 
     tables: Mapping[str, MeshTable]
     modes: Mapping[Choice, xr.Dataset]
     runs: Sequence[VariantRun]
+    steady: Sequence[xr.Dataset] = ()
 
     def __bool__(self) -> bool:
         """Tell whether there is anything to report."""
-        return bool(self.tables or self.modes or self.runs)
+        return bool(self.tables or self.modes or self.runs or self.steady)
 
 
 def stored_results(context: Context) -> StoredResults:
     """Read all results that belong to the case of the folder; what does not is noted as left out."""
     tables = _stored_tables(context)
     modes = dict(_stored_modes(context))
-    return StoredResults(tables, modes, list(_stored_runs(context, modes)))
+    return StoredResults(tables, modes, list(_stored_runs(context, modes)), list(_stored_steady(context)))
+
+
+def _stored_steady(context: Context) -> Iterator[xr.Dataset]:
+    for path in sorted(context.folder.glob("*/*/steady-*.nc")):
+        try:
+            data = load_response(path)
+            settings = settings_of(data.attrs)
+            fits = settings.hash_with(context.assembled(choice_of(data.attrs))) == data.attrs["input_hash"]
+        except FileError as error:
+            context.notes.left_out.append(str(error))
+            continue
+        except (*_UNFIT, ValueError) as error:
+            context.notes.left_out.append(f"{context.name_of(path)}: {error}")
+            continue
+        if fits:
+            yield data
+        else:
+            context.notes.left_out.append(f"{context.name_of(path)}: {OTHER_INPUT}")
 
 
 def _stored_tables(context: Context) -> dict[str, MeshTable]:
@@ -114,8 +140,8 @@ def _fits(context: Context, path: Path, attributes: Mapping[str, Any]) -> bool:
             raise CaseError(f"the case has no load case {load_case!r}")
         if input_hash(context.assembled(choice_of(attributes)), load_case) == attributes.get("input_hash"):
             return True
-        reason = "was computed from another input; compute it again"
-    except (CaseError, MeshError, VariantError, BearingError, BalanceError, KeyError) as error:
+        reason = OTHER_INPUT
+    except _UNFIT as error:
         reason = str(error)
     context.notes.left_out.append(f"{context.name_of(path)}: {reason}")
     return False

@@ -17,6 +17,7 @@ from exugear.report.context import Context
 from exugear.report.inputs import assumptions_section, provenance_section, times_section
 from exugear.report.modes import modes_section
 from exugear.report.runs import runs_section
+from exugear.report.steady import steady_section
 from exugear.report.stored import StoredResults, stored_results
 from exugear.report.tables import tables_section
 from exugear.results.folder import REPORT_FILE, kept_case
@@ -24,6 +25,7 @@ from fe_ste.tools.files import write_file
 
 SECTIONS: Final[tuple[Callable[[Context, StoredResults], str], ...]] = (
     runs_section,
+    steady_section,
     modes_section,
     bearings_section,
     tables_section,

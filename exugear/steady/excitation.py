@@ -146,6 +146,10 @@ class Gearset:
             torque_per_force=still[-1].reshape(shape),
         )
 
+    def row_of_overall(self, speed: float) -> Floats:
+        """Row (size,) of the overall transmission error by the frame's coordinates, m/m and m/rad."""
+        return np.asarray(self.system.at(self._rows["by_place"], speed)[0])
+
     def compliances(self, speed: float) -> Complexes:
         """Fourier coefficients (m, harmonics + 1) of one over the stiffness by the bases' angles, m/N."""
         return self.by_angle(self.cycle_compliances, self.system.at(self._ports["positions"], speed), speed)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.harmonics.krylov import solve_lines
-from exugear.rotating.mesh_ports import DEFLECTION
+from exugear.rotating.mesh_ports import DEFLECTION, MeshPorts
 from exugear.steady.excitation import Gearset, Interface
 from fe_ste.tools.arrays import Complexes, Floats
 
@@ -86,6 +86,17 @@ def transmission_errors(gearset: Gearset, interface: Interface) -> Complexes:
         use = (at > 0) & ~mirrored
         excess[at[use], n] = -(mean[n] ** 2) * static[n] * compliances[n, use]
     return excess[..., None]
+
+
+def transmission_error_line(gearset: Gearset, ports: MeshPorts, speed: float, line: int) -> Complexes:
+    """Find the forces (m,) of one line of a single base as `transmission_errors` does for all."""
+    multiples = gearset.lines.index[line]
+    base = int(np.flatnonzero(multiples)[0])
+    harmonic = int(multiples[base])
+    mean, static = gearset.waves.mean_stiffness, ports.static[:, DEFLECTION]
+    own = np.array([wave.base == base for wave in gearset.waves.waves])
+    compliances = gearset.by_angle(gearset.cycle_compliances, ports.positions, speed)[:, harmonic]
+    return np.asarray(-(mean**2) * static * compliances * own)
 
 
 def parametric_response(gearset: Gearset, interface: Interface) -> Response:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -16,7 +16,7 @@ from exugear.dynamics.assembly import Assembly
 from exugear.model.choice import Choice
 from exugear.model.versions import STEADY
 from exugear.results.folder import modes_path
-from exugear.steady.settings import SteadySettings
+from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_response import Solved, SteadyResponse, response_of
 from fe_ste.tools.files import FileError
 from fe_ste.tools.sealed import Layout, load_dataset, read_sealed, write_dataset, write_sealed
@@ -93,6 +93,7 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
         "bearing_laws": assembly.bearing_laws,
         "growth_rate": response.growth_rate,
         "planet_spread": response.planet_spread,
+        "contributions": json.dumps([{"line": line, **asdict(own)} for line, own in response.contributions]),
         "folds": json.dumps(response.folds),
         "crossings": json.dumps([asdict(crossing) for crossing in response.crossings]),
     }
@@ -147,6 +148,21 @@ def stored_or_computed(
     )
     write_response(path, response)
     return load_response(path)
+
+
+def settings_of(attributes: Mapping[str, Any]) -> SteadySettings:
+    """Read the settings that a file was computed with from its attributes.
+
+    Raises
+    ------
+    ValueError
+        They are none.
+    """
+    try:
+        content = json.loads(str(attributes["settings"]))
+        return SteadySettings(**{**content, "speeds": SpeedRange(**content["speeds"])})
+    except (KeyError, TypeError) as error:
+        raise ValueError(f"its settings cannot be read ({error})") from None
 
 
 def partial_path(path: Path) -> Path:

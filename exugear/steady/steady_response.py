@@ -17,6 +17,7 @@ from exugear.model.gearbox import Gearbox
 from exugear.model.parts import RPM
 from exugear.rotating.rotating_frame import SteadyError
 from exugear.rotating.signals import SignalName
+from exugear.steady.contributions import Contributions, contributions, loudest_near
 from exugear.steady.excitation import Gearset
 from exugear.steady.gearbox_branches import follow_branch
 from exugear.steady.point_solver import PointSolver, gearset_of
@@ -78,6 +79,8 @@ class SteadyResponse:
         Points in ascending order of speed, or along a branch.
     crossings : tuple of Crossing
         Where lines meet modes, the strongest first.
+    contributions : tuple of (int, Contributions)
+        Line and what makes it, at the strongest crossings.
     folds : tuple of float
         Speeds at which a branch turns back, rad/s.
     growth_rate : float
@@ -96,6 +99,7 @@ class SteadyResponse:
     signals: tuple[SignalName, ...]
     solved: Solved
     crossings: tuple[Crossing, ...]
+    contributions: tuple[tuple[int, Contributions], ...]
     folds: tuple[float, ...]
     growth_rate: float
     planet_spread: float
@@ -138,6 +142,8 @@ class SteadyResponse:
         return np.conj(found) if mirrored else found
 
 
+EXPLAINED = 20
+"""Crossings whose peaks are taken apart."""
 SLOWEST_BRANCH = 0.01
 """Share of the fastest speed at which a branch from standstill begins."""
 Kept = Callable[[Solved], None]
@@ -231,6 +237,7 @@ def response_of(
         signals=gearset.signal_names,
         solved=solved,
         crossings=found,
+        contributions=() if gearset.parting else _contributions(gearset, found),
         folds=folds,
         growth_rate=solver.growth(float(even.min()), float(even.max())),
         planet_spread=gearset.system.planet_spread,
@@ -266,6 +273,15 @@ def _solve(
             keep(_first(out, done))
         raise
     return out
+
+
+def _contributions(gearset: Gearset, found: tuple[Crossing, ...]) -> tuple[tuple[int, Contributions], ...]:
+    """Find what makes the lines at the strongest crossings, each where it is loudest."""
+    explained = []
+    for crossing in found[:EXPLAINED]:
+        speed = loudest_near(gearset, crossing.speed, 2.0 * crossing.damping, crossing.line)
+        explained.append((crossing.line, contributions(gearset, speed, crossing.line)))
+    return tuple(explained)
 
 
 def _along_branch(

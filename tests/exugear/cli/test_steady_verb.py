@@ -49,6 +49,9 @@ def test_steady_writes_a_response_and_sums_it_up(case):
     again = steady(case, "--variant", "bushing", "--speeds", "1400:1500:10")
     assert again.exit_code == 0
     assert "speeds up to 1500 rpm" in again.stdout
+    report = CliRunner().invoke(app, ["report", str(case.parent / "out")])
+    assert report.exit_code == 0, report.stderr
+    assert "Steady response" in (case.parent / "out" / "report.html").read_text(encoding="utf-8")
 
 
 def test_the_range_of_the_load_case_is_the_usual_one(case):
