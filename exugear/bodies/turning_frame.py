@@ -151,6 +151,7 @@ def turning_arrays(bodies: Iterable[tuple[int, TurningBody]]) -> TurningArrays:
     """Arrays of bodies, each with its first coordinate in the state."""
     given = list(bodies)
     sizes = np.array([body.reduced.size for _, body in given], dtype=np.int64)
+
     def moved(body: TurningBody) -> Floats:
         """Mass matrix times a motion of all seats along each axis by one, (3, size)."""
         motion = np.zeros((3, body.reduced.size))

@@ -32,7 +32,14 @@ from exugear.kernels.meshes import STATE_SIZE, MeshArrays, gear_positions
 from exugear.kernels.rolling import no_rolling
 from exugear.kernels.springs import SpringArrays, add_spring_forces
 from exugear.kernels.table_law import NOMINAL_DEFLECTION
-from exugear.kernels.travelling import TravellingArrays, follow, share_travelling_forces, travelling_tangent
+from exugear.kernels.travelling import (
+    TravellingArrays,
+    follow,
+    share_travelling_forces,
+    travelling_memory,
+    travelling_tangent,
+    weigh_travelling,
+)
 from exugear.kernels.turning import TurningArrays
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
@@ -287,7 +294,9 @@ class Assembly:
         f = np.zeros(x.size)
         add_mesh_forces(x, u, meshes, f)
         if self.travelling.first.size:
-            share_travelling_forces(x, self.travelling, f)
+            shares = travelling_memory(self.travelling)
+            weigh_travelling(x, self.travelling, shares)
+            share_travelling_forces(x, self.travelling, shares, f)
         return f[: self.size]
 
     def mesh_jacobians(self, q: Floats, v: Floats, meshes: MeshArrays | None = None) -> tuple[Floats, Floats]:

@@ -23,6 +23,7 @@ from exugear.kernels.rolling import (
 )
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import compiled
+from fe_ste.tools.inner_kernels import kept_bundle
 
 ARM, POSITION, VELOCITY, ANGULAR_VELOCITY = range(4)
 """Rows of `body_point`."""
@@ -283,7 +284,7 @@ def pass_connectors(
 
 def _pass(q: Floats, v: Floats, connectors: ConnectorArrays, steps: Floats = _NONE, **rooms: Floats) -> None:
     places = (rooms.get(name, none) for name, none in _ROOMS.items())
-    pass_connectors(q, v, steps, connectors, *places)
+    pass_connectors(q, v, steps, kept_bundle(connectors), *places)
 
 
 def add_connector_forces(q: Floats, v: Floats, connectors: ConnectorArrays, f: Floats) -> None:

@@ -26,6 +26,9 @@ from exugear.kernels.coordinates import BODY_SIZE, TILT
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import compiled, kernel
 
+COSINE, SINE, WEIGHT, SLOPE = range(4)
+"""Columns of what a sector shares with a travelling seat: direction from its middle, weight and derivative of it."""
+
 
 class TravellingArrays(NamedTuple):
     """Travelling seats; t seats, s sectors at most.
@@ -73,23 +76,38 @@ def sector_weight(cosine: float, sine: float, count: int) -> tuple[float, float]
     return weight / count, slope / count
 
 
+def travelling_memory(seats: TravellingArrays) -> Floats:
+    """Memory (t, s, 4) for `weigh_travelling`."""
+    return np.zeros((*seats.sectors.shape, 4))
+
+
 @kernel
-def place_travelling(q: Floats, v: Floats, seats: TravellingArrays | None) -> None:
+def weigh_travelling(q: Floats, seats: TravellingArrays | None, shares: Floats) -> None:
+    """Fill what each sector has to do with each travelling seat, if any: see the columns of `shares`."""
+    if seats is None:
+        return
+    for t in range(seats.first.size):
+        angle = seats.angle[t] + q[seats.frame[t]]
+        c, s = math.cos(angle), math.sin(angle)
+        for k in range(seats.number[t]):
+            # Angle from the sector's middle to the seat, by the difference of the two directions.
+            x, y, share = seats.axes[t, k, 0], seats.axes[t, k, 1], shares[t, k]
+            share[COSINE], share[SINE] = c * x + s * y, s * x - c * y
+            share[WEIGHT], share[SLOPE] = sector_weight(share[COSINE], share[SINE], seats.number[t])
+
+
+@kernel
+def place_travelling(q: Floats, v: Floats, seats: TravellingArrays | None, shares: Floats) -> None:
     """Fill coordinates and rates of all travelling seats, if any, from those of the sectors."""
     if seats is None:
         return
     for t in range(seats.first.size):
-        o, frame = seats.first[t], seats.frame[t]
-        angle, speed = seats.angle[t] + q[frame], v[frame]
-        c, s = math.cos(angle), math.sin(angle)
+        o, speed = seats.first[t], v[seats.frame[t]]
         for i in range(BODY_SIZE):
             q[o + i], v[o + i] = 0.0, 0.0
         for k in range(seats.number[t]):
-            # Angle from the sector's middle to the seat, by the difference of the two directions.
-            x, y = seats.axes[t, k, 0], seats.axes[t, k, 1]
-            cosine, sine = c * x + s * y, s * x - c * y
-            weight, slope = sector_weight(cosine, sine, seats.number[t])
-            j = seats.sectors[t, k]
+            share, j = shares[t, k], seats.sectors[t, k]
+            cosine, sine, weight, slope = share[COSINE], share[SINE], share[WEIGHT], share[SLOPE]
             # Translations, then angles: the sector's motion turned on by that angle, its share, and what the share
             # and the turning change as the seat travels.
             for i in (0, TILT):
@@ -104,20 +122,16 @@ def place_travelling(q: Floats, v: Floats, seats: TravellingArrays | None) -> No
 
 
 @kernel
-def share_travelling_forces(q: Floats, seats: TravellingArrays | None, f: Floats) -> None:
+def share_travelling_forces(q: Floats, seats: TravellingArrays | None, shares: Floats, f: Floats) -> None:
     """Move the generalized forces on all travelling seats to their sectors and to the angle they travel with."""
     if seats is None:
         return
     for t in range(seats.first.size):
         o, frame = seats.first[t], seats.frame[t]
-        angle = seats.angle[t] + q[frame]
-        c, s = math.cos(angle), math.sin(angle)
         travelling = 0.0  # power of the forces as the seat travels, per rad/s: the force on the frame's angle
         for k in range(seats.number[t]):
-            x, y = seats.axes[t, k, 0], seats.axes[t, k, 1]
-            cosine, sine = c * x + s * y, s * x - c * y
-            weight, slope = sector_weight(cosine, sine, seats.number[t])
-            j = seats.sectors[t, k]
+            share, j = shares[t, k], seats.sectors[t, k]
+            cosine, sine, weight, slope = share[COSINE], share[SINE], share[WEIGHT], share[SLOPE]
             for i in (0, TILT):
                 # The transposed map: turned back, times the share.
                 fx, fy = cosine * f[o + i] + sine * f[o + i + 1], cosine * f[o + i + 1] - sine * f[o + i]
@@ -138,8 +152,11 @@ def follow(q: Floats, v: Floats, seats: TravellingArrays) -> tuple[Floats, Float
     size, extended = q.shape[1], q.shape[1] + BODY_SIZE * seats.first.size + 1
     x, u = np.zeros((len(q), extended)), np.zeros((len(q), extended))
     x[:, :size], u[:, :size] = q, v
+    count, sectors = seats.sectors.shape
+    shares = np.zeros((count, sectors, 4))
     for n in range(len(q)):
-        place_travelling(x[n], u[n], seats)
+        weigh_travelling(x[n], seats, shares)
+        place_travelling(x[n], u[n], seats, shares)
     return x, u
 
 

@@ -33,12 +33,15 @@ class Component:
     type, name : str
     attributes : mapping of str to Attribute
         By their present names.
+    asked : set of str
+        Names that were asked for so far: what nobody asks for is left out of an import, and told.
     """
 
     number: int
     type: str
     name: str = ""
     attributes: Mapping[str, Attribute] = field(default_factory=dict)
+    asked: set[str] = field(default_factory=set, repr=False)
 
     def __str__(self) -> str:
         """Return how messages and comments name it."""
@@ -47,7 +50,7 @@ class Component:
 
     def given(self, key: str) -> bool:
         """Tell whether the file says anything under a key."""
-        attribute = self.attributes.get(key)
+        attribute = self._attribute(key)
         return attribute is not None and attribute.value not in ("", ())
 
     def quantity(self, key: str, unit: str = "none") -> float | None:
@@ -58,7 +61,7 @@ class Component:
         RexsError
             The value is no number, or its unit does not measure the same.
         """
-        attribute = self.attributes.get(key)
+        attribute = self._attribute(key)
         if attribute is None or not self.given(key):
             return None
         return self._number(key, attribute.value) * self._factor(key, attribute, unit)
@@ -89,7 +92,7 @@ class Component:
         RexsError
             The value is not three numbers.
         """
-        attribute = self.attributes.get(key)
+        attribute = self._attribute(key)
         if attribute is None:
             return None
         if not isinstance(attribute.value, tuple) or len(attribute.value) != 3:
@@ -100,12 +103,12 @@ class Component:
 
     def text(self, key: str) -> str:
         """Text on one line; empty where the file gives none."""
-        attribute = self.attributes.get(key)
+        attribute = self._attribute(key)
         return "" if attribute is None or isinstance(attribute.value, tuple) else plain(attribute.value)
 
     def flag(self, key: str, number: int = 0) -> bool | None:
         """Truth value, of an array that with a number; None where the file gives none."""
-        attribute = self.attributes.get(key)
+        attribute = self._attribute(key)
         if attribute is None:
             return None
         value = attribute.value
@@ -116,7 +119,11 @@ class Component:
 
     def with_attributes(self, attributes: Mapping[str, Attribute]) -> Component:
         """Return the component with some attributes replaced, as a load case does."""
-        return Component(self.number, self.type, self.name, {**self.attributes, **attributes})
+        return Component(self.number, self.type, self.name, {**self.attributes, **attributes}, self.asked)
+
+    def _attribute(self, key: str) -> Attribute | None:
+        self.asked.add(key)
+        return self.attributes.get(key)
 
     def _number(self, key: str, value: Value) -> float:
         try:

@@ -24,7 +24,7 @@ from fe_ste.elasticity.hexmesh import MeshSettings, SectorMesh, sector_mesh
 from fe_ste.geometry.gears import Gear
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.notebook import html_table
-from fe_ste.tools.threads import one_dense_thread
+from fe_ste.tools.threads import both, one_dense_thread
 
 #: Teeth on either side of the loaded one whose displacement is kept.
 TOOTH_REACH = 4
@@ -182,14 +182,16 @@ def _flank_compliance(
     incompatible_modes: bool,
 ) -> FlankCompliance:
     mesh = sector_mesh(gear, settings)
-    sector = CondensedSector.from_mesh(mesh, side, incompatible_modes)
+    images = flank_images(gear, side)
+    sector, near = both(
+        lambda: CondensedSector.from_mesh(mesh, side, incompatible_modes),
+        lambda: flank_near_field(mesh, side, images, incompatible_modes),
+    )
     if open_teeth is None:
         faces, torque = sector.ring_faces(gear.teeth, min(TOOTH_REACH, (gear.teeth - 2) // 2)), sector.ring_torque()
     else:
         faces, torque = sector.open_faces(open_teeth)
     regular = {}
-    images = flank_images(gear, side)
-    near = flank_near_field(mesh, side, images, incompatible_modes)
     for (read, loaded), cut_faces in faces.items():
         regular[read, loaded] = sector.displacement(read == loaded, *cut_faces)
         if read == loaded:

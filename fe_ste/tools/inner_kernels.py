@@ -190,14 +190,35 @@ def bundle(given: Given) -> Given:
     return given if _settings.DISABLE_JIT else cast(Given, _Bundle(given))
 
 
+def kept_bundle(given: Given) -> Given:
+    """Return the bundle of a named tuple, the same one for the same tuple while it is among the latest.
+
+    For functions that Python calls often: to make a bundle takes longer than many of them.
+    """
+    if _settings.DISABLE_JIT:
+        return given
+    kept = _latest.get(id(given))
+    if kept is None or kept.given is not given:
+        kept = _Bundle(given)
+        _latest.pop(id(given), None)
+        _latest[id(given)] = kept
+        while len(_latest) > _MOST_KEPT:
+            _latest.pop(next(iter(_latest)))
+    return cast(Given, kept)
+
+
 class _Bundle:
     """A named tuple and its row."""
 
     def __init__(self, given: tuple[Any, ...]) -> None:
-        self._given = given
+        self.given = given
         self._row = np.array(_words_of(given), dtype=np.int64)
         self._address = self._row.ctypes.data
         self._numba_type_ = _type_of(given)
+
+
+_latest: dict[int, _Bundle] = {}
+_MOST_KEPT = 16
 
 
 class _BundleType(types.Type):

@@ -13,12 +13,13 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from threadpoolctl import ThreadpoolController
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+Other = TypeVar("Other")
 
 _here = threading.local()
 
@@ -58,6 +59,19 @@ def side_by_side(function: Callable[[Item], Result], items: Iterable[Item]) -> l
 
     with ThreadPoolExecutor(2) as threads:
         return list(threads.map(beside, given))
+
+
+def both(first: Callable[[], Result], second: Callable[[], Other]) -> tuple[Result, Other]:
+    """Call two functions, `side_by_side`.
+
+    Examples
+    --------
+    >>> both(lambda: 1, lambda: "two")
+    (1, 'two')
+    """
+    calls: list[Callable[[], Any]] = [first, second]
+    one, other = side_by_side(lambda call: call(), calls)
+    return one, other
 
 
 def available_cores() -> int:

@@ -20,6 +20,7 @@ from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.notebook import html_table, value_range
+from fe_ste.tools.threads import one_dense_thread
 
 if TYPE_CHECKING:
     from fe_ste.elasticity.flank import FlankCompliance
@@ -73,10 +74,11 @@ class PairCompliance:
         reach, outermost = _teeth_in_contact(pair, flanks)
         teeth = np.arange(-outermost, outermost + 1)
         senses = (1, 1 if pair.gear.internal else -1)
-        pinion, gear = (
-            RegularCompliance.from_flank(flank, sense, teeth, reach)
-            for flank, sense in zip(flanks, senses, strict=True)
-        )
+        with one_dense_thread():
+            pinion, gear = (
+                RegularCompliance.from_flank(flank, sense, teeth, reach)
+                for flank, sense in zip(flanks, senses, strict=True)
+            )
         return cls(pair, flanks, contact, axial, teeth, reach, (pinion, gear))
 
     def at_centre_distance(self, centre_distance: float) -> PairCompliance:

@@ -140,21 +140,19 @@ def find_bodies(model: Model, places: Places, notes: Notes) -> Bodies:
     groups: dict[int, list[Component]] = {}
     for part in model.of_type("shaft", "side_plate", "gear_casing", *GEARS):
         groups.setdefault(union.root(part.number), []).append(part)
-    meshing = {number for one in model.relations_of("stage") for role, number in one.roles.items() if role != "stage"}
+    working = _working(model, union)
     sets = _planet_sets(model, places, union, groups)
     planets = {root for members in sets for root, _ in members}
     pins = {one.roles["shaft"] for one in model.relations_of("planet_pin") if "shaft" in one.roles}
-    names = _names(model, groups, planets, meshing, union)
+    names = _names(
+        {root: parts for root, parts in groups.items() if root in working - planets}, _carriers(model, union)
+    )
     found: list[Body] = []
     for root, parts in groups.items():
-        fixed = any(part.type == "gear_casing" for part in parts)
-        at_work = meshing & {part.number for part in parts}
-        if root in planets or (fixed and not at_work):
-            continue
-        if not at_work and root not in _carriers(model, union):
+        if root in names:
+            found.append(Body(names[root], tuple(_axial(parts)), _axis(places, parts, pins), _is_fixed(parts)))
+        elif root not in planets and not _is_fixed(parts):
             notes.ignored.append(f"{', '.join(str(part) for part in parts)}: in no mesh, turns idly")
-            continue
-        found.append(Body(names[root], tuple(_axial(parts)), _axis(places, parts, pins), fixed))
     by_root = {union.root(part.number): body for body in found for part in body.parts}
     for number, members in enumerate(sets):
         name = _lettered("planet", number, len(sets))
@@ -182,6 +180,24 @@ def _joined(model: Model) -> _Union:
         if both and rigid and is_engaged(model, connection) and all(end.number in union for end in both):
             union.join(both[0].number, both[1].number)
     return union
+
+
+def _working(model: Model, union: _Union) -> set[int]:
+    """Roots of what meshes or carries planets, and of what connections with some stiffness tie to it."""
+    numbers = {one for relation in model.relations_of("stage") for one in relation.roles.values()}
+    working = {union.root(number) for number in numbers if number in union} | _carriers(model, union)
+    ties = []
+    for connection in model.of_type(*JOINING):
+        both = ends(model, connection)
+        if both and torsional_stiffness(connection) and is_engaged(model, connection):
+            ties.append({union.root(end.number) for end in both if end.number in union and end.type != "gear_casing"})
+    for _ in ties:
+        working |= {root for tie in ties if tie & working for root in tie}
+    return working
+
+
+def _is_fixed(parts: Iterable[Component]) -> bool:
+    return any(part.type == "gear_casing" for part in parts)
 
 
 def _carriers(model: Model, union: _Union) -> set[int]:
@@ -213,6 +229,8 @@ def _planet_sets(
     """Gather sets of equal planets: (root, shaft) of each."""
     sets: dict[tuple[object, ...], list[tuple[int, Component]]] = {}
     for relation in model.relations_of("planet_shaft"):
+        if not {"shaft", "planetary_stage"} <= relation.roles.keys() or relation.roles["shaft"] not in union:
+            raise RexsError("a relation 'planet_shaft' does not say which shaft and which planetary_stage it joins")
         shaft = model.components[relation.roles["shaft"]]
         root = union.root(shaft.number)
         gears = sorted(
@@ -248,10 +266,11 @@ def _planet_body(
     carriers = [by_root[root] for root in dict.fromkeys(union.root(one.number) for one in held) if root in by_root]
     if not carriers:
         raise RexsError(
-            f"{model.components[stage]}: the carrier of {shaft} is missing or does not turn; a held carrier cannot be "
-            "imported yet"
+            f"{model.components[stage]}: no planet_carrier_shaft or planet_pin tells which carrier {shaft} turns on"
         )
     carrier = carriers[0]
+    if carrier.fixed:
+        raise RexsError(f"{model.components[stage]}: a held carrier cannot be imported yet")
     placed = []
     for root, one in members:
         x, y, _ = places.position(one)
@@ -273,21 +292,11 @@ def _planet_body(
     )
 
 
-def _names(
-    model: Model, groups: Mapping[int, list[Component]], planets: set[int], meshing: set[int], union: _Union
-) -> dict[int, str]:
+def _names(groups: Mapping[int, list[Component]], carriers: set[int]) -> dict[int, str]:
     """Names of the bodies that are no planets, by role, numbered in the order of the file."""
-    carriers = _carriers(model, union)
     roles: dict[str, list[int]] = {}
     for root, parts in groups.items():
-        if root in planets or not (meshing & {part.number for part in parts} or root in carriers):
-            continue
-        if any(part.type == "gear_casing" for part in parts):
-            role = "housing"
-        elif root in carriers:
-            role = "carrier"
-        else:
-            role = "shaft"
+        role = "housing" if _is_fixed(parts) else "carrier" if root in carriers else "shaft"
         roles.setdefault(role, []).append(root)
     names = {root: _lettered("carrier", n, len(roles["carrier"])) for n, root in enumerate(roles.get("carrier", []))}
     names |= {root: "housing" for root in roles.get("housing", [])}

@@ -26,11 +26,10 @@ from exugear.rexs.to_case.body_blocks import (
 )
 from exugear.rexs.to_case.gear_blocks import gear_blocks, mesh_blocks, pair_blocks, teeth_of
 from exugear.rexs.to_case.loads import Ends, Loads, ends_of, load_case_blocks, loads_of, static_load
-from exugear.rexs.to_case.notes import Block, Entry, Notes, assumed, derived, read, tidy
+from exugear.rexs.to_case.modifications import MODIFICATIONS
+from exugear.rexs.to_case.notes import Block, Entry, Notes, assumed, derived, read, tidy, toml_text
 from exugear.rexs.to_case.places import Places
 from exugear.rexs.to_case.supports import BEARINGS, PLAIN_BEARINGS, bearing_blocks, coupling_blocks, joint_blocks
-from exugear.rexs.to_case.text import toml_text
-from exugear.rexs.to_case.toothing import modified_flanks
 from exugear.rexs.tree import Model
 
 OTHER_GEARS = {"bevel": "bevel gears", "worm": "worm gears", "hypoid": "hypoid gears"}
@@ -55,6 +54,7 @@ READ_TYPES = frozenset(
         "cylindrical_gear_flank",
         "rack_shaped_tool",
         "cutter_wheel_tool",
+        *MODIFICATIONS,
         "material",
         "rolling_bearing_row",
         "rolling_element",
@@ -116,15 +116,15 @@ def to_case(model: Model, source: str, path: str | Path = "gearbox.toml") -> Imp
     draft = _Draft(model, places, notes)
     notes.faults.tell()
     static = draft.static.value[draft.ends.input]
-    draft.leave_stiff(path, source)
-    gearbox = _checked(draft.text(source, {}), path)
+    draft.leave_stiff(source, path)
+    gearbox = draft.checked(draft.text(source, {}), path)
     ratio = gearbox.train.ratio
     cases = load_case_blocks(draft.loads, draft.ends, static, ratio)
     _compare_speeds(gearbox, draft.loads, draft.ends, notes)
     notes.faults.tell()
     _note_ignored(model, notes)
     text = draft.text(source, cases)
-    gearbox = _checked(text, path)
+    gearbox = draft.checked(text, path)
     return Imported(text, gearbox, tuple(notes.changed), tuple(notes.ignored), tuple(notes.checked))
 
 
@@ -168,10 +168,37 @@ class _Draft:
         ]
         self.settings = _settings(model, places, self.ends, self.static, self._output_gear())
 
-    def leave_stiff(self, path: str | Path, source: str) -> None:
+    def checked(self, text: str, path: str | Path) -> Gearbox:
+        """Read the gearbox file and try its parts; a fault names the components that it is about.
+
+        Raises
+        ------
+        RexsError
+            The gearbox cannot be as the file has it.
+        """
+        content: dict[str, Any] = tomllib.loads(text)
+        try:
+            gearbox = Gearbox.from_dict(content, str(path))
+            check_parts(gearbox)
+        except CaseError as error:
+            raise RexsError(
+                *(self._with_components(fault.removeprefix(f"{path}: ")) for fault in error.faults)
+            ) from None
+        return gearbox
+
+    def _with_components(self, fault: str) -> str:
+        """Return a fault of the gearbox file with the components that its parts stand for."""
+        words = set(re.split(r"[^\w.]", fault)) | set(re.split(r"\W", fault))
+        blocks = {name: block.comment for _, group in self.groups for name, block in group.items() if block.comment}
+        told = [
+            f"{name} is {comment}" for name, comment in blocks.items() if name in words or name.split(".")[1] in words
+        ]
+        return f"{fault} ({'; '.join(told)})" if told else fault
+
+    def leave_stiff(self, source: str, path: str | Path) -> None:
         """Take bodies as rigid in all variants whose shape has no place for its seats, and say why."""
         try:
-            _checked(self.text(source, {}), path)
+            self.checked(self.text(source, {}), path)
         except RexsError as error:
             found = (_SHAPE_FAULT.search(fault) for fault in error.faults)
             reasons = {match[1]: match[2] for match in found if match}
@@ -239,18 +266,19 @@ def _head(model: Model, source: str, notes: Notes) -> list[str]:
         ("Left out", notes.ignored),
     ):
         if found:
-            lines += ["", f"{title}:", *(f"- {plain(line, 400)}" for line in dict.fromkeys(found))]
+            lines += ["", f"{title}:", *(f"- {plain(line, 2000)}" for line in dict.fromkeys(found))]
     return lines
 
 
 def _note_ignored(model: Model, notes: Notes) -> None:
-    """List the types of components of which nothing was read."""
-    notes.changed += modified_flanks(model)
-    counts: dict[str, int] = {}
-    for part in model.components.values():
-        if part.type not in READ_TYPES:
-            counts[part.type] = counts.get(part.type, 0) + 1
-    notes.ignored += [f"{plain(kind)}, {count} of them" for kind, count in sorted(counts.items())]
+    """List the types of components of which nothing was read, and the attributes of others that nothing asked for."""
+    for kind in sorted({part.type for part in model.components.values()}):
+        parts = model.of_type(kind)
+        unread = {key for part in parts for key in part.attributes} - {key for part in parts for key in part.asked}
+        if kind not in READ_TYPES:
+            notes.ignored.append(f"{plain(kind)}, {len(parts)} of them")
+        elif unread:
+            notes.ignored.append(f"{kind}: {', '.join(plain(key) for key in sorted(unread))}")
 
 
 def _compare_speeds(gearbox: Gearbox, loads: Sequence[Loads], ends: Ends, notes: Notes) -> None:
@@ -270,13 +298,3 @@ def _compare_speeds(gearbox: Gearbox, loads: Sequence[Loads], ends: Ends, notes:
                     f"{one.name}: the file turns {body} at {speed:g} rpm, but with {ends.input} at {base:g} rpm the "
                     f"train rolls at {rolls:g} rpm"
                 )
-
-
-def _checked(text: str, path: str | Path) -> Gearbox:
-    content: dict[str, Any] = tomllib.loads(text)
-    try:
-        gearbox = Gearbox.from_dict(content, str(path))
-        check_parts(gearbox)
-    except CaseError as error:
-        raise RexsError(*(f"as a gearbox file: {fault}" for fault in error.faults)) from None
-    return gearbox

@@ -16,6 +16,7 @@ from exugear.rexs.to_case.meshing import (
     with_shifts,
     without_undercut,
 )
+from exugear.rexs.to_case.modifications import modification_of
 from exugear.rexs.to_case.notes import Block, Entry, Notes, assumed, derived, read, tidy
 from exugear.rexs.to_case.places import Places
 from exugear.rexs.to_case.shafts import Cylinder, seat_diameter
@@ -214,10 +215,19 @@ def gear_blocks(
     """Tables of the gears; `sections` are those of the shafts of each body."""
     return {
         teeth.names[number]: Block(
-            str(gear.part), _entries(model, gear, teeth.z[number], sections[teeth.bodies[number].name], notes)
+            str(gear.part),
+            _entries(model, gear, teeth.z[number], sections[teeth.bodies[number].name], notes),
+            _modification(model, gear, notes),
         )
         for number, gear in teeth.gears.items()
     }
+
+
+def _modification(model: Model, gear: Toothing, notes: Notes) -> dict[str, Block]:
+    with notes.faults.gathered():
+        entries = modification_of(model, gear, notes)
+        return {"modification": Block("", entries)} if entries else {}
+    return {}
 
 
 def _entries(model: Model, gear: Toothing, z: float, sections: Sequence[Cylinder], notes: Notes) -> dict[str, Entry]:
@@ -238,8 +248,8 @@ def _entries(model: Model, gear: Toothing, z: float, sections: Sequence[Cylinder
     if gear.root is not None:
         entries["root_diameter_mm"] = gear.root
     rack = {"addendum": 1.0, "dedendum": gear.dedendum.value, "tip_radius": gear.tip_radius.value}
-    tip = "given" if gear.tip is not None else "assumed (A)"
-    parts = (f"addendum {tip}", f"dedendum: {gear.dedendum.comment}", f"tip radius: {gear.tip_radius.comment}")
+    tip = "addendum: tip_diameter_mm counts" if gear.tip is not None else "addendum: A"
+    parts = (tip, f"dedendum: {gear.dedendum.comment}", f"tip radius: {gear.tip_radius.comment}")
     entries["rack"] = Entry(rack, "; ".join(" ".join(part.split()) for part in parts))
     material = material_of(model, gear.part)
     table = material_table(material)

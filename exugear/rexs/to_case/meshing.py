@@ -20,7 +20,10 @@ SHIFT_TOLERANCE = 1e-3
 PLACE_TOLERANCE = 0.02
 """Largest difference of a centre distance and the positions of the gears, mm."""
 MARGIN = 1e-4
-"""Distance that a replaced tip keeps from the form circle of its mate, in normal modules."""
+"""Rounding allowed for where a tool or a tip is replaced, in normal modules."""
+CLEARANCE = 0.1
+"""Roll length that a tip which the file does not give keeps from its mate's form circle, in normal modules: the
+breadth of the contact under load reaches beyond the path of contact."""
 
 
 @dataclass(frozen=True)
@@ -182,7 +185,10 @@ def without_undercut(gear: Toothing, notes: Notes) -> Toothing:
 
 
 def with_clear_tips(gears: dict[int, Toothing], stages: Sequence[Stage], notes: Notes) -> dict[int, Toothing]:
-    """Move back tips that would touch their mate below its form circle, where it has no involute."""
+    """Move back tips that would touch their mate below its form circle, where it has no involute.
+
+    A tip that the file gives is left alone as long as it does not; one that it does not give keeps a clearance.
+    """
     cleared = dict(gears)
     for stage in stages:
         for tip, mate in ((stage.gear, stage.pinion), (stage.pinion, stage.gear)):
@@ -191,16 +197,16 @@ def with_clear_tips(gears: dict[int, Toothing], stages: Sequence[Stage], notes: 
                 continue
             own = 2e3 * unchecked("", cleared[tip]).tip_radius
             notes.changed.append(
-                f"{cleared[tip].part}: tip diameter {bound:g} mm instead of {own:.4f} mm, which touches "
-                f"{cleared[mate].part} below its form circle"
+                f"{cleared[tip].part}: tip diameter {bound:g} mm instead of {own:.4f} mm, which reaches the form "
+                f"circle of {cleared[mate].part} or comes too near to it"
             )
-            entry = assumed(bound, f"{own:.4f} would touch {cleared[mate].part} below its form circle")
+            entry = assumed(bound, f"{own:.4f} would come too near to the form circle of {cleared[mate].part}")
             cleared[tip] = dataclasses.replace(cleared[tip], tip=entry)
     return cleared
 
 
 def _tip_bound(gears: Mapping[int, Toothing], stage: Stage, which: int) -> float | None:
-    """Tip diameter (mm) at which a gear reaches just to its mate's form circle; None if it does not reach there."""
+    """Tip diameter (mm) at which a gear keeps clear of its mate's form circle; None if it does so already."""
     pinion, gear = unchecked("pinion", gears[stage.pinion]), unchecked("gear", gears[stage.gear])
     pair = UncheckedPair(name="", pinion=pinion, gear=gear, centre_distance=1e-3 * stage.distance.value)
     tip = gear if which == stage.gear else pinion
@@ -208,9 +214,11 @@ def _tip_bound(gears: Mapping[int, Toothing], stage: Stage, which: int) -> float
         excess = pinion.form_roll_length - pair.pinion_roll_length(gear.tip_roll_length)
     else:
         excess = pinion.tip_roll_length - pair.pinion_roll_length(gear.form_roll_length)
+    clearance = MARGIN if gears[which].tip else CLEARANCE
+    excess += clearance * tip.normal_module
     if excess <= 0.0:
         return None
-    roll = tip.tip_roll_length - tip.outward * (excess + MARGIN * tip.normal_module)
+    roll = tip.tip_roll_length - tip.outward * excess
     diameter = 2e3 * math.hypot(tip.base_radius, roll)
     # Rounded to the side that clears.
     return round((math.floor if tip.outward > 0 else math.ceil)(1e4 * diameter) / 1e4, 4)

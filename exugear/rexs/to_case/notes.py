@@ -1,7 +1,9 @@
-"""What an import remembers beside the values: assumptions, checks, what was left out, all written into the file."""
+"""Values of the gearbox file with their sources, how they are written, and what an import notes beside them."""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -9,6 +11,8 @@ from exugear.rexs.faults import Faults, RexsError
 
 ASSUMED = "A"
 DERIVED = "D"
+COMMENT_COLUMN = 44
+"""Column in which comments begin, where the value is not longer."""
 
 
 @dataclass(frozen=True)
@@ -111,3 +115,63 @@ class Block:
     comment: str = ""
     entries: dict[str, Entry] = field(default_factory=dict)
     blocks: dict[str, Block] = field(default_factory=dict)
+
+
+def toml_text(head: Sequence[str], top: Mapping[str, Entry], groups: Sequence[tuple[str, Mapping[str, Block]]]) -> str:
+    """Gearbox file with comments.
+
+    Parameters
+    ----------
+    head : sequence of str
+        Lines of comment before everything else.
+    top : mapping of str to Entry
+        Keys outside of tables.
+    groups : sequence of (str, mapping of str to Block)
+        Heading and tables, by their dotted name.
+    """
+    lines = [f"# {line}".rstrip() for line in head]
+    lines += ["", *(_line(key, entry) for key, entry in top.items())]
+    for heading, blocks in groups:
+        if blocks:
+            lines += ["", *([f"# {'-' * 20} {heading}"] if heading else [])]
+        for name, block in blocks.items():
+            lines += _table(name, block)
+    return "\n".join(lines) + "\n"
+
+
+def _table(name: str, block: Block) -> Iterator[str]:
+    yield ""
+    yield _with_comment(f"[{name}]", block.comment)
+    yield from (_line(key, entry) for key, entry in block.entries.items())
+    for key, inner in block.blocks.items():
+        yield from list(_table(f"{name}.{key}", inner))[1:]
+
+
+def _line(key: str, entry: Entry) -> str:
+    if isinstance(entry.value, list) and any(isinstance(one, Mapping) for one in entry.value):
+        rows = "".join(f"    {toml_value(one)},\n" for one in entry.value)
+        return f"{_with_comment(f'{key} = [', entry.comment)}\n{rows}]"
+    return _with_comment(f"{key} = {toml_value(entry.value)}", entry.comment)
+
+
+def _with_comment(text: str, comment: str) -> str:
+    return f"{text:<{COMMENT_COLUMN - 1}} # {comment.strip()}" if comment.strip() else text
+
+
+def toml_value(value: Any) -> str:
+    """Write a value as TOML.
+
+    Examples
+    --------
+    >>> toml_value({"sun": 1.0, "names": ["a", True]})
+    '{ sun = 1.0, names = ["a", true] }'
+    """
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int | float):
+        return repr(value)
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{key} = {toml_value(entry)}" for key, entry in value.items()) + " }"
+    return "[" + ", ".join(toml_value(entry) for entry in value) + "]"

@@ -39,7 +39,7 @@ class Places:
             with faults.gathered():
                 directions[part] = self._frame(part, 0)[1][:, 0]
         faults.tell()
-        self._axes = _axes(list(directions.values()), self._up(list(directions)))
+        self._axes = _axes(list(directions.values()), self._outermost(list(directions)))
         skew = [part for part, direction in directions.items() if abs(direction @ self._axes[2]) < 1.0 - PARALLEL]
         if skew:
             names = ", ".join(str(part) for part in skew[:3])
@@ -70,9 +70,10 @@ class Places:
         """Return a vector of the gear unit's axes in those of the gearbox file."""
         return np.asarray(self._axes @ vector)
 
-    def _up(self, parts: list[Component]) -> Floats:
-        units = self._model.of_type("gear_unit")
-        return self._frame((units or parts)[0], 0)[1][:, 2] if units or parts else np.array([0.0, 0.0, 1.0])
+    def _outermost(self, parts: list[Component]) -> Floats:
+        """Axes u, v, w of the gear unit as columns; of the first part in a file without one."""
+        first = [*self._model.of_type("gear_unit"), *parts][:1]
+        return self._frame(first[0], 0)[1] if first else np.eye(3)
 
     def _frame(self, part: Component, depth: int) -> tuple[Floats, Floats]:
         """Origin (3) and axes u, v, w as columns (3, 3), in the outermost frame."""
@@ -115,9 +116,11 @@ def _own_axes(part: Component) -> Floats:
     return np.column_stack([u, np.cross(w, u), w])
 
 
-def _axes(directions: list[Floats], up: Floats) -> Floats:
-    """Axes x, y, z of the gearbox file as rows: z along the first direction, y as near to `up` as can be."""
-    along = directions[0] if directions else np.array([1.0, 0.0, 0.0])
+def _axes(directions: list[Floats], unit: Floats) -> Floats:
+    """Axes x, y, z of the gearbox file as rows: v, w, u of the gear unit, or z along the first shaft and y near w."""
+    along, up = unit[:, 0], unit[:, 2]
+    if directions and abs(directions[0] @ along) < 1.0 - PARALLEL:
+        along = directions[0]
     across = up - (up @ along) * along
     if np.linalg.norm(across) < 1e-3:
         least = int(np.argmin(np.abs(along)))

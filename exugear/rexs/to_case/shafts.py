@@ -66,7 +66,7 @@ def inertia_of(cylinders: Iterable[Cylinder]) -> Inertia:
     --------
     >>> disc = inertia_of([Cylinder(0.0, 100.0, 200.0, 0.0, 7850.0)])
     >>> round(disc.mass, 3), round(disc.axial, 5), round(disc.transverse, 5), disc.centre
-    (24.662, 0.12331, 0.0822, 50.0)
+    (24.662, 0.12331, 0.08221, 50.0)
     """
     parts = [one for one in cylinders if one.mass > 0.0]
     mass = sum(one.mass for one in parts)

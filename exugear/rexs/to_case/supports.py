@@ -56,7 +56,9 @@ def bearing_blocks(model: Model, places: Places, bodies: Bodies, notes: Notes) -
                 blocks[f"bearing_{len(blocks) + 1}"] = block
     for part, body, on in _flexible_connections(model, bodies):
         entries = _stiffness(part, notes)
-        if entries:
+        if not entries:
+            continue
+        with notes.faults.gathered():
             blocks[f"bearing_{len(blocks) + 1}"] = _placed(places, part, body, on, {"stiffness": Block("", entries)})
     return blocks
 
@@ -256,7 +258,7 @@ def _stiffness(part: Component, notes: Notes) -> dict[str, Entry]:
         absorbed = part.text("axial_force_absorption")
         if key == "axial_stiffness" and absorbed == "no_direction":
             continue
-        if value is None and key == "bending_stiffness":
+        if value is None and (key == "bending_stiffness" or part.type in JOINING):
             continue
         if value is None and key == "axial_stiffness" and absorbed not in ("both_directions", "positive", "negative"):
             continue

@@ -15,22 +15,10 @@ THINNING = 0.02
 """Tooth thinning assumed where the file gives none, in normal modules: half of a usual backlash."""
 EQUAL = 1e-6
 """Largest difference of numbers on equal flanks or planets."""
+LEAST_RADIUS = 0.2
+"""Least radius of a tool's corner that the tooth model can have in all cases, in normal modules."""
 RIGID_MODULUS = 1e6
 """Young's modulus (MPa) above which a material stands for 'rigid'; the stiffest there are have less."""
-MODIFICATIONS = (
-    "tip_relief",
-    "root_relief",
-    "triangular_tip_relief",
-    "triangular_root_relief",
-    "profile_crowning",
-    "profile_slope",
-    "profile_twist",
-    "helix_crowning",
-    "helix_slope",
-    "end_relief_datum_face",
-    "end_relief_non_datum_face",
-    "topographical_modification",
-)
 
 
 @dataclass(frozen=True)
@@ -97,7 +85,7 @@ def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes
         tip=_tip(gear, teeth * module, notes),
         root=_diameter(gear, "root_diameter"),
         dedendum=_of_tool(tool, internal, "addendum_coefficient_reference_profile", 1.25),
-        tip_radius=_of_tool(tool, internal, "tip_corner_radius_factor_reference_profile", 0.25 if tool else 0.38),
+        tip_radius=_rounded(_of_tool(tool, internal, "tip_corner_radius_factor_reference_profile", 0.38)),
         thinning=_thinning(gear, module),
         chamfer=chamfer,
         internal=internal,
@@ -120,14 +108,6 @@ def _flank(model: Model, gear: Component) -> Component | None:
                 f"{gear}: left and right flank differ in {key} ({one} and {other}); only equal flanks can be imported"
             )
     return left[0]
-
-
-def modified_flanks(model: Model) -> list[str]:
-    """Lines on flank modifications, which are not imported yet."""
-    return [
-        f"{part}: flank modification not imported, give it in [gears.NAME.modification]"
-        for part in model.of_type(*MODIFICATIONS)
-    ]
 
 
 def _tool(model: Model, gear: Component) -> Component | None:
@@ -190,6 +170,13 @@ def _of_tool(tool: Component | None, internal: bool, key: str, usual: float) -> 
     if internal:
         return assumed(tidy(value), f"{key} of {tool}: the fillet is an arc instead of that cut by the wheel")
     return read(tidy(value), f"{key} of {tool}")
+
+
+def _rounded(radius: Entry) -> Entry:
+    """Return the radius of the tool's corner; a sharp one gets a radius, as the tooth model wants a fillet."""
+    if radius.value >= LEAST_RADIUS:
+        return radius
+    return assumed(LEAST_RADIUS, f"the file says {radius.value:g}, a corner too sharp for the tooth model")
 
 
 def _thinning(gear: Component, module: float) -> Entry:

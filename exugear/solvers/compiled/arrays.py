@@ -22,8 +22,6 @@ W_X, W_Y, W_Z, SIN_A, COS_A, SIN_B, COS_B = range(9, 16)
 FRAME_SIZE = 16
 COSINE, SINE = range(2)
 """Columns of `Work.turns`."""
-STRAIN, STRAIN_RATE, TRUE_RATE, LOCAL_FORCE = range(4)
-"""Rows of `Work.motion`."""
 WRENCH = PADDED
 """First column of force and moment, global axes, in `Work.loads`, behind the generalized forces."""
 RELATIVE_PLACE, RELATIVE_AXIS, RELATIVE_VELOCITY, FIRST_TURNING, SECOND_TURNING, RELATIVE_TILT = range(0, 18, 3)
@@ -209,10 +207,11 @@ class Work(NamedTuple):
     relative : (18,) motion of a pair's second body against the first
     sums : (9,) force and moments on both bodies of a pair
     supports : (c, 18) strain of each connector, its rate, force and moment on the first body, in that body's axes
-    motion : (4, 6) strain, its rate, the true rate of change, force of a connector in its own axes
+    motion : (24,) true rate of change of a connector's strain, elastic force and damping force, padded
     rolling : (m,) see `exugear.kernels.rolling.rolling_forces`
     mesh : memory of the meshes' laws
     series : (s,) line of each torque series that was used last
+    shares : (t, s, 4) see `exugear.kernels.travelling.weigh_travelling`
     scratch, memory : memory of the elastic bodies, and of those in turning frames
     """
 
@@ -233,5 +232,6 @@ class Work(NamedTuple):
     rolling: Floats
     mesh: MeshMemory
     series: Integers
+    shares: Floats
     scratch: Floats
     memory: Floats

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from exugear.kernels.coordinates import SPIN, TILT
 from exugear.kernels.elastic import set_elastic_motion
-from exugear.kernels.travelling import place_travelling, share_travelling_forces
+from exugear.kernels.travelling import place_travelling, share_travelling_forces, weigh_travelling
 from exugear.kernels.turning import set_turning_motion
 from exugear.solvers.compiled.arrays import (
     ANGLE,
@@ -100,14 +100,15 @@ def evaluate(t: float, q: Floats, v: Floats, equations: Equations, work: Work) -
     """
     bodies, places, force = equations.bodies, equations.places, work.force
     place_bodies(q, v, bodies, work)
-    place_travelling(q, v, equations.travelling)
+    weigh_travelling(q, equations.travelling, work.shares)
+    place_travelling(q, v, equations.travelling, work.shares)
     gather_places(q, v, places, work)
     set_loads(t, q, v, equations.loads, work.series, force)
     add_connectors(q, bodies, equations.connectors, equations.pairs, work)
     add_meshes(q, v, equations.meshes, work)
     add_springs(q, v, equations.springs, force)
     add_loads_of_places(bodies, places, work)
-    share_travelling_forces(q, equations.travelling, force)
+    share_travelling_forces(q, equations.travelling, work.shares, force)
     set_accelerations(v, bodies, work)
     set_elastic_motion(q, v, force, equations.elastic, work.scratch, work.rate)
     set_turning_motion(q, v, force, equations.turning, work.memory, work.rate)

@@ -12,6 +12,7 @@ from exugear.kernels.meshes import FRAME, ROW_SIZE, SPIN_1, SPIN_2
 from exugear.kernels.products import filled_up
 from exugear.kernels.rolling import rolling_memory
 from exugear.kernels.table_law import NOMINAL_DEFLECTION, scratch_memory
+from exugear.kernels.travelling import travelling_memory
 from exugear.kernels.turning import turning_memory
 from exugear.model.sections.entries import GROUND
 from exugear.solvers.compiled.arrays import (
@@ -314,7 +315,7 @@ def work_for(equations: Equations, q: Floats, v: Floats) -> Work:
         relative=np.zeros(RELATIVE_SIZE),
         sums=np.zeros(9),
         supports=np.zeros((equations.connectors.number.size, SUPPORT_SIZE)),
-        motion=np.zeros((4, BODY_SIZE)),
+        motion=np.zeros(3 * PADDED),
         rolling=np.zeros(0) if rolling is None else rolling_memory(rolling),
         mesh=MeshMemory(
             gradient=np.zeros((3, ROW_SIZE)),
@@ -325,6 +326,7 @@ def work_for(equations: Equations, q: Floats, v: Floats) -> Work:
             row=np.zeros(FRAME),
         ),
         series=equations.loads.first[:-1].copy(),
+        shares=np.zeros((0, 0, 4)) if equations.travelling is None else travelling_memory(equations.travelling),
         scratch=np.zeros((3, 0)) if equations.elastic is None else scratch_for(equations.elastic),
         memory=np.zeros((6, 0)) if equations.turning is None else turning_memory(equations.turning),
     )

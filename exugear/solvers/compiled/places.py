@@ -26,6 +26,7 @@ from exugear.solvers.compiled.arrays import (
 )
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import kernel
+from fe_ste.tools.octets import SIZE, all_eight, put
 
 SMALL_ANGLE = 1.0 / 32.0
 """Below it the first terms of the series below are exact to round-off: the next ones are 1e-17 of them."""
@@ -95,8 +96,8 @@ def gather_places(q: Floats, v: Floats, places: Places, work: Work) -> None:
         for i in range(3):
             place[i], place[PADDED_TILT + i] = q[o + i], q[o + TILT + i]
             place[PADDED + i], place[PADDED + PADDED_TILT + i] = v[o + i], v[o + TILT + i]
-        for i in range(load.size):
-            load[i] = 0.0
+        put(load, 0, all_eight(0.0))
+        put(load, SIZE, all_eight(0.0))
     # Bodies with their spin alone stay where they are.
     for n in range(places.spin.size):
         place, load, o = work.places[places.start.size + n], work.loads[places.start.size + n], places.spin[n]

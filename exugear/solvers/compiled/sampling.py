@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from exugear.dynamics.signals import SignalLayout
-from exugear.kernels.coordinates import AXIAL, BODY_SIZE, SPIN, TILT
+from exugear.kernels.coordinates import AXIAL, BODY_SIZE, PADDED, PADDED_TILT, SPIN, TILT
 from exugear.kernels.elastic import damped_power, motion_energies
 from exugear.kernels.fast_meshes import (
     DISSIPATED,
@@ -36,10 +36,11 @@ from exugear.kernels.turning import turning_energies, turning_powers
 from exugear.solvers.compiled.arrays import (
     COS_B,
     COSINE,
+    DAMPED,
+    LAG,
     SIN_B,
     SINE,
     SUPPORT_LOAD,
-    TRUE_RATE,
     W_X,
     W_Y,
     W_Z,
@@ -48,6 +49,7 @@ from exugear.solvers.compiled.arrays import (
     Equations,
     Joints,
     Loads,
+    Pairs,
     Springs,
     Work,
 )
@@ -57,6 +59,7 @@ from exugear.solvers.compiled.places import tilt_sines
 from exugear.tooth_mesh.laws.table import TABLE_FORM
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import kernel
+from fe_ste.tools.octets import SIZE, all_eight, eight, put, sum_of
 
 
 class Columns(NamedTuple):
@@ -149,23 +152,37 @@ def observe_rolling(
 
 @kernel
 def observe_connectors(
-    q: Floats, v: Floats, stride: int, bodies: Bodies, connectors: Connectors, work: Work, energy: Floats
+    q: Floats,
+    v: Floats,
+    stride: int,
+    bodies: Bodies,
+    connectors: Connectors,
+    pairs: Pairs,
+    work: Work,
+    energy: Floats,
 ) -> None:
     """Add energy and powers of all bearings, these for `stride` samples (see `take_sample`)."""
-    derivative = work.motion[TRUE_RATE]
+    derivative = work.motion
     for n in range(connectors.ends.shape[0]):
         strain, rate = work.supports[n, :BODY_SIZE], work.supports[n, BODY_SIZE:SUPPORT_LOAD]
         true_rate(strain, rate, work.frames[connectors.ends[n, 0]], derivative)
+        one, damping = pairs.data[n], all_eight(0.0)
+        elastic = damping
+        for column in range(BODY_SIZE):
+            of_column = eight(one, PADDED * column)
+            elastic, damping = elastic + of_column * strain[column], damping + of_column * rate[column]
+        put(work.motion, PADDED, elastic)
+        put(work.motion, 2 * PADDED, damping * one[LAG])
         stored, lost, turned = 0.0, 0.0, 0.0
         for row in range(BODY_SIZE):
-            elastic, damped = 0.0, 0.0
-            for column in range(BODY_SIZE):
-                stiffness = connectors.stiffness[n, column, row]
-                elastic += stiffness * strain[column]
-                damped += (connectors.time[n] * stiffness + connectors.damping[n, column, row]) * rate[column]
-            stored += elastic * strain[row]
+            place = row if row < TILT else row - TILT + PADDED_TILT
+            force, damped = work.motion[PADDED + place], work.motion[2 * PADDED + place]
+            if one[DAMPED] == 1.0:
+                for column in range(BODY_SIZE):
+                    damped += connectors.damping[n, column, row] * rate[column]
+            stored += force * strain[row]
             lost += damped * rate[row]
-            turned += elastic * (rate[row] - derivative[row])
+            turned += force * (rate[row] - derivative[row])
         energy[ELASTIC] += 0.5 * stored
         energy[DISSIPATED] += stride * lost
         energy[OF_BEARING_RATES] += stride * turned
@@ -263,8 +280,10 @@ def observe_elastic_bodies(
 def observe_loads(t: float, q: Floats, v: Floats, loads: Loads, work: Work, energy: Floats) -> None:
     """Add the power of what acts from outside at time t (s); nothing acts on travelling seats."""
     set_loads(t, q, v, loads, work.series, work.force)
-    for i in range(loads.steady.size):
-        energy[OF_LOADS] += work.force[i] * v[i]
+    power = all_eight(0.0)
+    for i in range(0, v.size, SIZE):
+        power = power + eight(work.force, i) * eight(v, i)
+    energy[OF_LOADS] += sum_of(power)
 
 
 @kernel
@@ -295,7 +314,7 @@ def take_sample(
     if stride > 0 and whole:
         observe_bodies(q, v, equations.bodies, work, energy)
     if stride > 0:
-        observe_connectors(q, v, stride, equations.bodies, equations.connectors, work, energy)
+        observe_connectors(q, v, stride, equations.bodies, equations.connectors, equations.pairs, work, energy)
         observe_springs(q, v, stride, equations.springs, energy)
         observe_elastic_bodies(q, v, stride, whole, equations, work, energy)
 

@@ -38,6 +38,7 @@ from exugear.tooth_mesh.laws.line_of_action import stiffness_law
 from exugear.tooth_mesh.laws.table import TABLE_FORM, add_table_tangent, table_force
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import compiled, kernel
+from fe_ste.tools.inner_kernels import kept_bundle
 
 _NOTHING, _NO_ROWS = np.zeros(0), np.zeros((0, 0))
 """No room for what `pass_meshes` fills."""
@@ -158,16 +159,21 @@ def acting_table(meshes: MeshArrays) -> TableArrays | None:
     return meshes.table if (meshes.form == TABLE_FORM).any() else None
 
 
+def _bundles(meshes: MeshArrays) -> tuple[MeshArrays, TableArrays | None]:
+    table = acting_table(meshes)
+    return kept_bundle(meshes), None if table is None else kept_bundle(table)
+
+
 def add_mesh_forces(q: Floats, v: Floats, meshes: MeshArrays, f: Floats) -> None:
     """Add the generalized forces of all meshes to f, shape of q."""
-    pass_meshes(q, v, meshes, acting_table(meshes), _NO_ROWS, f, _NO_ROWS, _NO_ROWS)
+    pass_meshes(q, v, *_bundles(meshes), _NO_ROWS, f, _NO_ROWS, _NO_ROWS)
 
 
 def add_mesh_jacobian(q: Floats, v: Floats, meshes: MeshArrays, jq: Floats, jv: Floats) -> None:
     """Add d f/dq and d f/dv of `add_mesh_forces` to jq and jv, each (n, n)."""
-    pass_meshes(q, v, meshes, acting_table(meshes), _NO_ROWS, _NOTHING, jq, jv)
+    pass_meshes(q, v, *_bundles(meshes), _NO_ROWS, _NOTHING, jq, jv)
 
 
 def mesh_state(q: Floats, v: Floats, meshes: MeshArrays, out: Floats) -> None:
     """Fill (m, 10): what each mesh does; columns as named in `exugear.kernels.meshes`."""
-    pass_meshes(q, v, meshes, acting_table(meshes), out, _NOTHING, _NO_ROWS, _NO_ROWS)
+    pass_meshes(q, v, *_bundles(meshes), out, _NOTHING, _NO_ROWS, _NO_ROWS)

@@ -13,7 +13,14 @@ from exugear.bodies.finite_elements.solid_matrices import assemble
 from exugear.bodies.finite_elements.solid_seats import SolidSeat, seat_rows
 from exugear.bodies.finite_elements.turned_hexahedra import turned_hexahedra
 from exugear.bodies.finite_elements.turned_section import Shaft
-from exugear.kernels.travelling import TravellingArrays, follow, share_travelling_forces, travelling_tangent
+from exugear.kernels.travelling import (
+    TravellingArrays,
+    follow,
+    share_travelling_forces,
+    travelling_memory,
+    travelling_tangent,
+    weigh_travelling,
+)
 from fe_ste.elimination.sparse import factorise
 from fe_ste.geometry.gears import Material
 
@@ -81,13 +88,19 @@ def test_rates_are_the_derivatives_of_motions(seats: TravellingArrays) -> None:
     assert follow(q[None], v[None], seats)[1][0] == pytest.approx((ends[0] - ends[1]) / (2.0 * step), abs=1e-8)
 
 
+def shares_at(x: np.ndarray, seats: TravellingArrays) -> np.ndarray:
+    shares = travelling_memory(seats)
+    weigh_travelling(x, seats, shares)
+    return shares
+
+
 def test_forces_do_the_same_work_on_sectors_and_frame(seats: TravellingArrays) -> None:
     q, v = state()
     x, u = (values[0] for values in follow(q[None], v[None], seats))
     force = np.random.default_rng(5).normal(size=x.size)
     force[-1] = 0.0  # what stays zero takes no force
     shared = force.copy()
-    share_travelling_forces(x, seats, shared)
+    share_travelling_forces(x, seats, shares_at(x, seats), shared)
     assert not shared[SIZE:].any()
     assert shared @ u == pytest.approx(force @ u, rel=1e-13)
 
@@ -100,7 +113,7 @@ def test_tangent_is_the_derivative_of_a_law_on_travelling_seats(seats: Travellin
     def forces(q: np.ndarray, v: np.ndarray) -> np.ndarray:
         x, u = (values[0] for values in follow(q[None], v[None], seats))
         f = stiffness @ x + damping @ u
-        share_travelling_forces(x, seats, f)
+        share_travelling_forces(x, seats, shares_at(x, seats), f)
         return f[:SIZE]
 
     q, v = state()
