@@ -590,6 +590,41 @@ def bearings_section(part: Results) -> str:
     )
 
 
+def steady_section(part: Results) -> str:
+    """Tables of steady responses over speed."""
+    rows = [
+        [
+            row["variant"],
+            row["level"],
+            "yes" if row["refined"] else "no",
+            str(row["speeds"]),
+            duration(row["processor_s"]),
+            duration(row["processor_s"] / row["speeds"]),
+        ]
+        for row in part["responses"]
+    ]
+    growth = [
+        [str(row["harmonics"]), str(row["combinations"]), str(row["lines"]), duration(row["processor_s"])]
+        for row in part["growth"]
+    ]
+    return "\n".join(
+        [
+            "## Steady response over speed\n",
+            f"{circumstances(part)} GRC, 400 speeds of the carrier from 0 to 215 rpm, mean system and signals "
+            f"included; processor time of one thread, medians of {part['rounds']} rounds.\n",
+            table(["variant", "level", "speeds added at resonances", "speeds", "all", "a speed"], rows),
+            "Lines, variant bushing, level parametric, no speeds added:\n",
+            table(["harmonics", "sum of multiples of combinations", "lines", "all"], growth),
+            items(
+                [
+                    "What bounds it: half of a speed is the compliance of each line, a dense solution of the mean "
+                    "system. It grows with the number of lines and the third power of the coordinates.",
+                ]
+            ),
+        ]
+    )
+
+
 SECTIONS = {
     "startup": startup_section,
     "tables": tables_section,
@@ -597,6 +632,7 @@ SECTIONS = {
     "grids": grids_section,
     "elastic": elastic_section,
     "bearings": bearings_section,
+    "steady": steady_section,
 }
 
 

@@ -69,6 +69,13 @@ def measure_startup(quick: bool) -> dict[str, Any]:
     return startup.measure(quick)
 
 
+def measure_steady(quick: bool) -> dict[str, Any]:
+    """See `steady`."""
+    import steady
+
+    return steady.measure(quick)
+
+
 PARTS: dict[str, Callable[[bool], dict[str, Any]]] = {
     "startup": measure_startup,
     "tables": measure_tables,
@@ -76,6 +83,7 @@ PARTS: dict[str, Callable[[bool], dict[str, Any]]] = {
     "grids": measure_grids,
     "elastic": measure_elastic,
     "bearings": measure_bearings,
+    "steady": measure_steady,
 }
 
 
