@@ -39,6 +39,7 @@ def sweep_rate(time: Floats, speed: Floats, order: float) -> float:
 
     Examples
     --------
+    >>> import numpy as np
     >>> round(sweep_rate(np.array([0.0, 2.0]), np.array([0.0, 4.0 * np.pi]), 10.0), 6)
     10.0
     """

@@ -179,7 +179,7 @@ def steady_response(
 
     Examples
     --------
-    >>>     from exugear.steady.settings import SpeedRange
+    >>> from exugear.steady.settings import SpeedRange
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
     >>> shape = 1.0 + 0.05 * np.cos(2.0 * np.pi * np.arange(50) / 50)
     >>> mean = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
