@@ -2,7 +2,7 @@
 
 A law along a row reads its deflection and the position in the mesh cycle, and has one force. The law `table` reads the
 approach of both flanks, the centre distance, the misalignment of both flanks and the position, and pushes along all
-but the last (`exugear.tooth_mesh.laws.table`).
+but the last (`exugear.tooth_mesh.laws.table`). Kernels of `fe_ste.tools.compilation` read the numbers of its rows.
 """
 
 from __future__ import annotations
