@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.sparse
 
 from exugear.harmonics.lines import LineSet
-from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers, SparseMatrix
+from fe_ste.tools.arrays import Complexes, Floats, Integers
 
 
 def fourier_coefficients(samples: Floats, harmonics: int) -> Complexes:
@@ -42,24 +41,16 @@ class Product:
     harmonics: int
 
     @cached_property
-    def _places(self) -> tuple[Integers, Integers, Integers, Booleans]:
-        """Row, column, harmonic and whether the column's conjugate is meant, of each entry."""
+    def _sources(self) -> Integers:
+        """Where the factor (n, 2 h + 1) of each line and order -h .. h stands: values, their conjugates, a zero."""
         count, orders = len(self.lines.index), np.arange(-self.harmonics, self.harmonics + 1)
         source = np.repeat(self.lines.index[:, None, :], len(orders), axis=1)
         source[:, :, self.base] -= orders
-        column, mirrored = self.lines.find(source)
-        row = np.broadcast_to(np.arange(count)[:, None], column.shape)
-        harmonic, found = np.broadcast_to(orders, column.shape), column >= 0
-        return row[found], column[found], harmonic[found], mirrored[found]
+        # The mean is its own conjugate, and is found as it stands.
+        place, mirrored = self.lines.find(source)
+        return np.where(place < 0, 2 * count, place + count * mirrored)
 
-    def matrices(self, coefficients: Complexes) -> tuple[SparseMatrix, SparseMatrix]:
-        """Sparse S and S' for which S c + S' conj(c) are the coefficients of the product; `coefficients` c_0 .. c_h."""
-        row, column, harmonic, mirrored = self._places
-        values = np.where(harmonic >= 0, coefficients[np.abs(harmonic)], np.conj(coefficients[np.abs(harmonic)]))
-        count = len(self.lines.index)
-        # The mean is its own conjugate: entries that find it count once, as they stand.
-        direct = ~mirrored
-        return tuple(
-            scipy.sparse.csr_array((values[part], (row[part], column[part])), shape=(count, count))
-            for part in (direct, mirrored)
-        )  # type: ignore[return-value]
+    def of(self, coefficients: Complexes, values: Complexes) -> Complexes:
+        """Coefficients (n,) of the product of a signal `values` (n,) and a real function, `coefficients` c_0 .. c_h."""
+        both = np.concatenate([coefficients[:0:-1].conj(), coefficients])
+        return np.asarray(np.concatenate([values, values.conj(), [0.0]])[self._sources] @ both)

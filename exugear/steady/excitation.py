@@ -15,7 +15,7 @@ from exugear.rotating.mesh_ports import DEFLECTION, MeshPorts, mesh_ports
 from exugear.rotating.mesh_waves import MeshWaves
 from exugear.rotating.signals import SignalName, SignalRows, mesh_signal_names, signal_rows
 from exugear.tooth_mesh.laws.registry import LAWS
-from fe_ste.tools.arrays import Booleans, Complexes, Floats, SparseMatrix
+from fe_ste.tools.arrays import Booleans, Complexes, Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +154,11 @@ class Gearset:
         """Fourier coefficients (m, harmonics + 1) of one over the stiffness by the bases' angles, m/N."""
         return self.by_angle(self.cycle_compliances, self.system.at(self._ports["positions"], speed), speed)
 
-    def coupling(self, speed: float) -> list[tuple[SparseMatrix, SparseMatrix]]:
-        """Map lines by the stiffness (N/m) of each wave."""
-        turned = self.by_angle(self.cycle_coefficients, self.system.at(self._ports["positions"], speed), speed)
-        return [self.products[wave.base].matrices(own) for wave, own in zip(self.waves.waves, turned, strict=True)]
+    def coefficients(self, speed: float) -> Complexes:
+        """Fourier coefficients (m, harmonics + 1) of the stiffness by the bases' angles, N/m."""
+        return self.by_angle(self.cycle_coefficients, self.system.at(self._ports["positions"], speed), speed)
+
+    def stretched(self, coefficients: Complexes, deflection: Complexes) -> Complexes:
+        """Products (n, m) of each wave's stiffness, by its `coefficients`, with its deflection (n, m), N."""
+        waves = zip(self.waves.waves, coefficients, deflection.T, strict=True)
+        return np.stack([self.products[wave.base].of(own, values) for wave, own, values in waves], axis=1)

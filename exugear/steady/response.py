@@ -101,12 +101,10 @@ def transmission_error_line(gearset: Gearset, ports: MeshPorts, speed: float, li
 
 def parametric_response(gearset: Gearset, interface: Interface) -> Response:
     """Response to stiffness that varies with the position in the mesh cycle, this moving with the mean speed alone."""
-    maps, mean = gearset.coupling(interface.speed), gearset.waves.mean_stiffness
+    coefficients, mean = gearset.coefficients(interface.speed), gearset.waves.mean_stiffness
 
     def forces(deflection: Complexes) -> Complexes:
-        conjugate = deflection.conj()
-        full = [s @ deflection[:, n] + t @ conjugate[:, n] for n, (s, t) in enumerate(maps)]
-        return np.asarray(np.stack(full, axis=1) - mean * deflection)
+        return np.asarray(gearset.stretched(coefficients, deflection) - mean * deflection)
 
     def apply(deflection: Complexes) -> Complexes:
         return np.asarray(deflection - _answer(interface, forces(deflection)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -173,11 +174,25 @@ def fitting_table(gearbox: Gearbox, name: str, out: Path, grid: bool = False) ->
         The file is missing, unreadable, or was computed from another input.
     """
     path = table_path(out, name)
-    table = MeshTable.open(path)
+    table = _opened(path)
     wanted = wanted_table(gearbox, name, table.dataset.sizes["pmc"], grid)
     if not (table.input_hash == wanted.hash or (not grid and _holds(table, wanted))):
         raise TableError(f"{path}: was computed from another input; compute it again")
     return table
+
+
+def _opened(path: Path) -> MeshTable:
+    """Read a table, or give the one that was read of the same file before: a verb looks at each several times."""
+    try:
+        status = path.stat()
+    except OSError:
+        return MeshTable.open(path)  # says what is wrong
+    return _read(path, (status.st_ino, status.st_size, status.st_mtime_ns))
+
+
+@lru_cache(maxsize=16)
+def _read(path: Path, version: tuple[int, ...]) -> MeshTable:
+    return MeshTable.open(path)
 
 
 def _holds(table: MeshTable, static: TableInput) -> bool:

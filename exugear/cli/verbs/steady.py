@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from exugear.steady.peaks import Peak
     from exugear.steady.settings import SteadySettings
 
+LEAST_AMPLITUDE = 1e-12
+"""Amplitude of the overall transmission error below which a peak is round-off, m."""
 SHOWN_PEAKS = 15
 
 
@@ -116,10 +118,12 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
     from exugear.model.parts import RPM
     from exugear.steady.peaks import peaks
 
-    path, found = project.steady_path(settings), peaks(data)
+    path, found = project.steady_path(settings), [peak for peak in peaks(data) if peak.amplitude > LEAST_AMPLITUDE]
     growth = float(data.attrs["growth_rate"])
     if growth > 0.0:
         note(f"Unstable: disturbances grow by up to {growth:.3g} 1/s; no steady state lasts", style="yellow")
+    if not found:
+        note(f"Nothing resonates: by the mesh law {data.attrs['mesh_law']} hardly anything excites the gearbox")
     if as_json:
         print_json(
             {

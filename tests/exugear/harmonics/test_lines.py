@@ -40,8 +40,7 @@ def test_the_product_of_lines_is_the_product_of_the_functions():
     """Lines of the factor reach two, the function's harmonics two: a set of four holds the whole product."""
     lines = line_set(BASES, 4, 4)
     signal, function = random_lines(lines, 2), np.array([2.0, 0.3 + 0.1j, 0.2j])
-    direct, mirrored = Product(lines, 1, 2).matrices(function)
-    product = direct @ signal + mirrored @ signal.conj()
+    product = Product(lines, 1, 2).of(function, signal)
     angles = np.random.default_rng(1).uniform(0.0, 2.0 * np.pi, (20, 2))
     values = 2.0 + 2.0 * np.real(function[1] * np.exp(1j * angles[:, 1]) + function[2] * np.exp(2j * angles[:, 1]))
     expected = values * lines.values(signal, angles)
@@ -52,10 +51,10 @@ def balance(damping, frequency, lines, functions, force):
     """Lines of x'' + 2 z x' + k(t) x = F with k = 1 + a function of each base's angle."""
     w = frequency * lines.orders
     answer = 1.0 / (1.0 - w**2 + 2j * damping * w)
-    maps = [Product(lines, base, len(own) - 1).matrices(np.asarray(own)) for base, own in enumerate(functions)]
+    factors = [(Product(lines, base, len(own) - 1), np.asarray(own)) for base, own in enumerate(functions)]
 
     def apply(x):
-        return x + answer * sum(s @ x + t @ x.conj() for s, t in maps)
+        return x + answer * sum(product.of(own, x) for product, own in factors)
 
     right = np.zeros(len(w), dtype=complex)
     right[0] = force
