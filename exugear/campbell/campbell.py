@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +16,7 @@ from fe_ste.tools.arrays import Floats
 if TYPE_CHECKING:
     import xarray as xr
 
-LAYOUT: Mapping[str, tuple[str, ...]] = {
+LAYOUT: dict[str, tuple[str, ...]] = {
     "campbell_speed": ("campbell_point",),
     "mode_frequency": ("campbell_point", "mode"),
     "mode_damping": ("campbell_point", "mode"),
@@ -114,10 +113,9 @@ def campbell_of(system: MeanSystem, low: float, high: float, highest: float) -> 
 def campbell_from(data: xr.Dataset) -> Campbell:
     """Read a diagram from the dataset of a file that holds one."""
     values = {name: data[name].to_numpy() for name in LAYOUT}
-    return Campbell(
-        *(values[name] for name in ("campbell_speed", "mode_frequency", "mode_damping", "mode_whirl")),
-        *(tuple(str(own) for own in values[name]) for name in ("mode_kind", "mode_name")),
-    )
+    kinds, names = (tuple(str(own) for own in values[name]) for name in ("mode_kind", "mode_name"))
+    speeds, frequency, damping, whirl = (values[name] for name in list(LAYOUT)[:4])
+    return Campbell(speeds, frequency, damping, whirl, kinds, names)
 
 
 def _fastest(tracks: ModeTracks, mode: int) -> int:

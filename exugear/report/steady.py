@@ -154,7 +154,7 @@ def _mode_rows(
             strongest[mode] = own
     rows: list[dict[str, object]] = []
     for mode in sorted(range(len(diagram.names)), key=lambda m: -strongest.get(m, {"share": 0.0})["share"]):
-        own = strongest.get(mode)
+        met = strongest.get(mode)
         known = np.flatnonzero(~np.isnan(diagram.frequency[:, mode]))
         known = known[np.argsort(np.abs(diagram.speeds[known]))]
         slow, fast = diagram.frequency[known[[0, -1]], mode]
@@ -170,10 +170,10 @@ def _mode_rows(
             "share / %": "",
             "what moves": diagram.names[mode],
         }
-        if own is not None:
-            line = line_name(tuple(int(n) for n in index[int(own["line"])]), bases)
-            row["strongest crossing"] = f"{line} at {abs(own['speed']) / RPM:.1f} rpm"
-            row["share / %"] = f"{100.0 * own['share']:.1f}"
+        if met is not None:
+            line = line_name(tuple(int(n) for n in index[int(met["line"])]), bases)
+            row["strongest crossing"] = f"{line} at {abs(met['speed']) / RPM:.1f} rpm"
+            row["share / %"] = f"{100.0 * met['share']:.1f}"
         rows.append(row)
     return rows
 

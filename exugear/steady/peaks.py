@@ -187,7 +187,7 @@ def planet_sidebands(
 
     found = []
     for family, (carrier, ratio) in carriers.items():
-        waves = [f"mesh_force {family} {wave}" for wave in ("mean", "cosine", "sine")]
+        waves = [f"mesh_force {family}{wave}" for wave in ("", " cosine", " sine")]
         if not set(waves) <= set(names):
             continue
         mean, cosine, sine = (coefficient(name) for name in waves)

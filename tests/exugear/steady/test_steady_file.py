@@ -120,8 +120,8 @@ def test_a_planet_feels_waves_at_the_line_plus_and_minus_its_carrier(assembly, t
     point = int(np.argmin(abs(data["speed"].to_numpy() - peak.speed)))
     line = int(np.argmin(abs(data["order"].to_numpy() - peak.order)))
     forced = data.copy(deep=True)
-    for name, (amplitude, phase) in {"cosine": (3.0, 0.4), "sine": (2.0, 1.9), "mean": (0.5, 0.0)}.items():
-        place = point, line, names.index(f"mesh_force sun_planet {name}")
+    for name, (amplitude, phase) in {" cosine": (3.0, 0.4), " sine": (2.0, 1.9), "": (0.5, 0.0)}.items():
+        place = point, line, names.index(f"mesh_force sun_planet{name}")
         forced["amplitude"].to_numpy()[place], forced["phase"].to_numpy()[place] = amplitude, phase
     # Whole numbers of periods of both: the line at 40 and the carrier at 3 of them.
     t = np.arange(4096) / 4096.0
