@@ -1,4 +1,4 @@
-"""Section of the report on steady responses: levels along orders, peaks, and run-ups that are too fast for them."""
+"""Section of the report on steady responses: levels along orders, peaks, too fast run-ups, modes over speed."""
 
 from __future__ import annotations
 
@@ -8,8 +8,12 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 import xarray as xr
 
+from exugear.campbell.campbell import Campbell, campbell_from
+from exugear.loads.summary import summarise_loads
 from exugear.model.parts import RPM
-from exugear.pictures.steady_diagrams import OrderCurve, plot_order_curves
+from exugear.model.reading import CaseError
+from exugear.model.sections.entries import GROUND
+from exugear.pictures.steady_diagrams import Mark, ModeCurve, OrderCurve, plot_campbell_over_speed, plot_order_curves
 from exugear.report import page
 from exugear.report.context import Context, choice_of, file_part, words_of
 from exugear.report.stored import StoredResults
@@ -17,13 +21,19 @@ from exugear.results.run_file import load_run
 from exugear.spectra.orders import OrderLine, order_lines
 from exugear.spectra.run_spectra import VariantRun
 from exugear.spectra.sweeps import TOO_FAST, run_up_cut, sweep_rate, sweep_severity
-from exugear.steady.peaks import Peak, line_name, peaks
+from exugear.steady.peaks import Peak, line_name, peaks, planet_sidebands, sidebands
 
 SHOWN = 20
 """Peaks in a table."""
 LEAST_SHARE, MOST_TOLD = 0.05, 3
 """Least share that is told of what makes a resonance, and how many."""
 TELL_FAST = "too fast"
+EXPLAINED, BESIDE = 5, 6
+"""Peaks whose sidebands are told, the loudest of each line, and how many of each kind at most."""
+OTHER_KIND = "other"
+"""Kind of modes that no planet set carries, in the legend."""
+WHIRLING = 0.3
+"""Whirl from which its sense is told."""
 SAME_SPEED = 0.02
 """Share of the speed within which a peak belongs to the crossing of its line with a mode."""
 
@@ -60,6 +70,8 @@ def _response(context: Context, data: xr.Dataset, runs: Sequence[VariantRun]) ->
         ),
         page.table(rows, ("line",)),
         _contributions_table(data),
+        _campbell(context, data, f"campbell-{level}-{file_part(choice)}", label),
+        _sidebands_table(context, data, peaks(data)),
         page.paragraph(
             f"Slowest decay of a disturbance {-growth:.3g} 1/s. A run-up is called too fast for a resonance where "
             f"f' / (2 pi zeta^2 f^2) is above {TOO_FAST:g}: the peak does not build up."
@@ -90,6 +102,118 @@ def _contributions_table(data: xr.Dataset) -> str:
     return page.folded(
         said, page.table(rows, ("line", "excited by", "carried by", "per stiffness of", "per inertia of"))
     )
+
+
+def _campbell(context: Context, data: xr.Dataset, name: str, label: str) -> str:
+    """Picture and table of the modes over speed, with the crossings that excite them."""
+    diagram = campbell_from(data)
+    if not diagram.names:
+        return ""
+    crossings = json.loads(data.attrs["crossings"])
+    path = context.picture_path(name)
+    curves = [
+        ModeCurve(kind or OTHER_KIND, np.abs(diagram.speeds), frequency)
+        for kind, frequency in zip(diagram.kinds, diagram.frequency.T, strict=True)
+    ]
+    marks = [Mark(abs(own["speed"]), own["frequency"], own["share"]) for own in crossings]
+    plot_campbell_over_speed(curves, order_lines(context.gearbox, 1), marks, _ranges(context), path)
+    caption = (
+        f"Modes over speed as seen from the housing, {label}; circles where mesh orders and their harmonics meet "
+        "modes, as large as these are excited."
+    )
+    rows = _mode_rows(diagram, data, crossings)
+    return page.picture(path, caption) + page.folded(
+        "Modes over speed and the crossing that excites each most: share of the largest peak of a signal",
+        page.table(rows, ("type", "strongest crossing", "what moves")),
+    )
+
+
+def _ranges(context: Context) -> dict[str, tuple[float, float]]:
+    """Speeds of the input that each load case passes, without sign, rad/s."""
+    ranges = {}
+    for name, case in context.gearbox.load_cases.items():
+        try:
+            loads = summarise_loads(context.gearbox, case)
+        except CaseError as error:
+            context.notes.left_out.append(f"speeds of load case {name}: {error}")
+            continue
+        slowest = min(abs(loads.start_speed), abs(loads.end_speed))
+        ranges[name] = (0.0 if loads.start_speed * loads.end_speed < 0.0 else slowest, loads.fastest_speed)
+    return ranges
+
+
+def _mode_rows(
+    diagram: Campbell, data: xr.Dataset, crossings: Sequence[Mapping[str, float]]
+) -> list[dict[str, object]]:
+    """Rows of the modes, those that are excited most first."""
+    bases, index = tuple(str(name) for name in data["base"].to_numpy()), data["index"].to_numpy()
+    strongest: dict[int, Mapping[str, float]] = {}
+    for own in crossings:
+        mode = diagram.mode_at(own["speed"], own["frequency"])
+        if mode is not None and own["share"] > strongest.get(mode, {"share": 0.0})["share"]:
+            strongest[mode] = own
+    rows: list[dict[str, object]] = []
+    for mode in sorted(range(len(diagram.names)), key=lambda m: -strongest.get(m, {"share": 0.0})["share"]):
+        met = strongest.get(mode)
+        known = np.flatnonzero(~np.isnan(diagram.frequency[:, mode]))
+        known = known[np.argsort(np.abs(diagram.speeds[known]))]
+        slow, fast = diagram.frequency[known[[0, -1]], mode]
+        whirl = float(diagram.whirl[known[-1], mode])
+        row: dict[str, object] = {
+            "mode": mode + 1,
+            "slow / Hz": f"{slow:.1f}",
+            "fast / Hz": f"{fast:.1f}",
+            "damping / %": f"{100.0 * diagram.damping[known[-1], mode]:.3f}",
+            "type": diagram.kinds[mode],
+            "whirl": "forward" if whirl > WHIRLING else "backward" if whirl < -WHIRLING else "",
+            "strongest crossing": "",
+            "share / %": "",
+            "what moves": diagram.names[mode],
+        }
+        if met is not None:
+            line = line_name(tuple(int(n) for n in index[int(met["line"])]), bases)
+            row["strongest crossing"] = f"{line} at {abs(met['speed']) / RPM:.1f} rpm"
+            row["share / %"] = f"{100.0 * met['share']:.1f}"
+        rows.append(row)
+    return rows
+
+
+def _sidebands_table(context: Context, data: xr.Dataset, found: Sequence[Peak]) -> str:
+    """Table of the lines beside the loudest peaks, each with its cause."""
+    carriers = _carriers(context)
+    loudest: dict[str, Peak] = {}
+    for peak in found:
+        loudest.setdefault(peak.line, peak)
+    rows = []
+    for peak in list(loudest.values())[:EXPLAINED]:
+        bands = (*sidebands(data, peak)[:BESIDE], *planet_sidebands(data, peak, carriers)[:BESIDE])
+        for band in bands:
+            rows.append(
+                {
+                    "peak": f"{peak.line} at {abs(peak.speed) / RPM:.1f} rpm",
+                    "peak / Hz": f"{peak.frequency:.1f}",
+                    "beside it": band.line,
+                    "at / Hz": f"{band.frequency:.1f}",
+                    "apart / Hz": f"{band.frequency - peak.frequency:+.2f}",
+                    "amplitude": _amplitude(data, band.line, band.amplitude),
+                    "share / %": f"{100.0 * band.share:.1f}",
+                    "cause": band.cause,
+                }
+            )
+    said = "Sidebands of the loudest peaks and their causes: lines at the speed of the peak that other meshes or the "
+    return page.folded(f"{said}turning planets make", page.table(rows, ("beside it", "cause"))) if rows else ""
+
+
+def _amplitude(data: xr.Dataset, line: str, amplitude: float) -> str:
+    return f"{amplitude:.3g} N" if line.startswith("mesh_force ") else f"{1e6 * amplitude:.3g} µm"
+
+
+def _carriers(context: Context) -> dict[str, tuple[str, float]]:
+    """Carrier of the planets of each family of meshes, and its turns per turn of the input."""
+    gearbox = context.gearbox
+    speeds = gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)
+    own = {mesh.family: mesh.frame for mesh in gearbox.meshes if mesh.frame != GROUND}
+    return {family: (frame, speeds[frame]) for family, frame in own.items() if speeds.get(frame)}
 
 
 def _shares(parts: Iterable[tuple[str, float]]) -> str:

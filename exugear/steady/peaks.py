@@ -1,7 +1,8 @@
-"""Peaks of a stored steady response: which line is loud at which speed, and how wide its peak is."""
+"""Peaks of a stored steady response: which line is loud at which speed, and which lines stand beside it, and why."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -93,3 +94,121 @@ def peaks(data: xr.Dataset, signal: str = "overall_dte", least: float = 0.01) ->
         for point, line in zip(*np.nonzero(highest), strict=True)
     ]
     return tuple(sorted(found, key=lambda peak: -peak.amplitude))
+
+
+@dataclass(frozen=True)
+class Sideband:
+    """A line beside a peak, at the speed of the peak.
+
+    Attributes
+    ----------
+    line : str
+        Its name, as of `Peak`; of a planet's sidebands the signal.
+    frequency : float
+        Hz.
+    amplitude : float
+        In the signal's unit.
+    share : float
+        Amplitude over that of the line that it stands beside: of the peak, or of the largest wave of the signal.
+    cause : str
+        What modulates the line of the peak.
+    """
+
+    line: str
+    frequency: float
+    amplitude: float
+    share: float
+    cause: str
+
+
+def sidebands(data: xr.Dataset, peak: Peak, signal: str = "overall_dte", least: float = 0.01) -> tuple[Sideband, ...]:
+    """Lines that differ from a peak's by whole multiples of the other mesh frequencies, the loudest first.
+
+    Parameters
+    ----------
+    data : Dataset
+        As `exugear.steady.steady_file.load_response` reads it.
+    peak : Peak
+        Of it.
+    signal : str
+    least : float
+        Share of the peak below which a line is left out.
+    """
+    point, own = _place(data, peak)
+    index, bases = data["index"].to_numpy(), tuple(str(name) for name in data["base"].to_numpy())
+    names = [str(name) for name in data["signal"].to_numpy()]
+    values: Floats = data["amplitude"].to_numpy()[point, :, names.index(signal)].astype(np.float64)
+    carrying = int(np.argmax(np.abs(index[own])))
+    found = []
+    for line in range(1, len(index)):
+        # Lines are as good as their conjugates: the one whose multiple of the peak's base has the sign of the peak's.
+        multiples = index[line] * (-1 if index[line][carrying] * index[own][carrying] < 0 else 1)
+        apart = multiples - index[own]
+        if line == own or multiples[carrying] != index[own][carrying] or values[line] < least * values[own]:
+            continue
+        found.append(
+            Sideband(
+                line=line_name(tuple(int(n) for n in index[line]), bases),
+                frequency=float(data["order"][line]) * abs(peak.speed) / (2.0 * np.pi),
+                amplitude=float(values[line]),
+                share=float(values[line] / values[own]),
+                cause=_signed(line_name(tuple(int(n) for n in apart), bases)),
+            )
+        )
+    return tuple(sorted(found, key=lambda band: -band.amplitude))
+
+
+def planet_sidebands(
+    data: xr.Dataset, peak: Peak, carriers: Mapping[str, tuple[str, float]], least: float = 0.01
+) -> tuple[Sideband, ...]:
+    """Lines beside a peak in the force of one planet's meshes, which pass the cosine and the sine wave.
+
+    With waves F_c cos theta + F_s sin theta and a carrier at the angular speed W, a planet feels (F_c -+ i F_s) / 2 at
+    the frequency of the line plus and minus W, as its place turns.
+
+    Parameters
+    ----------
+    data : Dataset
+        As `exugear.steady.steady_file.load_response` reads it.
+    peak : Peak
+        Of it.
+    carriers : mapping of family of meshes to (str, float)
+        Carrier of the planets and its turns per turn of the input.
+    least : float
+        Share of the force that all planets share, or of the largest line, below which a line is left out.
+    """
+    point, line = _place(data, peak)
+    names = [str(name) for name in data["signal"].to_numpy()]
+
+    def coefficient(name: str) -> complex:
+        place = {"point": point, "line": line, "signal": names.index(name)}
+        own = data[["amplitude", "phase"]].isel(place)
+        return complex(float(own["amplitude"]) * np.exp(1j * float(own["phase"])))
+
+    found = []
+    for family, (carrier, ratio) in carriers.items():
+        waves = [f"mesh_force {family}{wave}" for wave in ("", " cosine", " sine")]
+        if not set(waves) <= set(names):
+            continue
+        mean, cosine, sine = (coefficient(name) for name in waves)
+        turning = ratio * peak.speed
+        felt = {1: 0.5 * abs(cosine - 1j * sine), -1: 0.5 * abs(cosine + 1j * sine)}
+        largest = max(abs(mean), *felt.values(), 1e-300)
+        for sign, amplitude in felt.items():
+            if amplitude >= least * largest:
+                shifted = peak.frequency + sign * turning / (2.0 * np.pi)
+                more = sign * turning > 0.0
+                cause = f"{'+' if more else '-'} {carrier}: planets pass the waves around it"
+                name = f"mesh_force {family}, one planet"
+                found.append(Sideband(name, shifted, float(amplitude), float(amplitude / largest), cause))
+    return tuple(sorted(found, key=lambda band: -band.share))
+
+
+def _place(data: xr.Dataset, peak: Peak) -> tuple[int, int]:
+    """Point and line of a peak."""
+    orders: Floats = data["order"].to_numpy()
+    return int(np.argmin(np.abs(data["speed"].to_numpy() - peak.speed))), int(np.argmin(np.abs(orders - peak.order)))
+
+
+def _signed(words: str) -> str:
+    return words if words.startswith("- ") else f"+ {words}"

@@ -8,13 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-import scipy.linalg
 
-from exugear.dynamics.linearised import RIGID_BODY_LIMIT
-from exugear.rotating.mean_system import MeanSystem
+from exugear.rotating.mean_modes import mean_modes
 from exugear.rotating.mesh_ports import DEFLECTION
 from exugear.steady.excitation import Gearset, Interface
 from fe_ste.tools.arrays import Complexes, Floats
@@ -55,29 +52,6 @@ class Crossing:
     frequency: float
     damping: float
     share: float
-
-
-def mean_modes(system: MeanSystem, speed: float) -> tuple[Complexes, Complexes, Complexes]:
-    """Eigenvalues (n,) of the mean system at a speed with positive frequency, and right and left shapes (n, 2 size).
-
-    Left shapes are scaled so that the response to a load b at the angular frequency w is the sum of
-    right (left . [0, M^-1 b]) / (i w - eigenvalue). Free rolling is left out.
-    """
-    n = system.size
-    lower = np.linalg.solve(system.mass, np.hstack([-system.stiffness_at(speed), -system.damping_at(speed)]))
-    values, left, right = _eig(np.vstack([np.eye(n, 2 * n, n), lower]))
-    kept = values.imag > 2.0 * np.pi * RIGID_BODY_LIMIT
-    kept &= np.abs(values.imag) > np.abs(values.real)
-    order = np.flatnonzero(kept)[np.argsort(values[kept].imag)]
-    right, left = right[:, order].T, left[:, order].conj().T
-    return values[order], right, left / np.einsum("js,js->j", left, right)[:, None]
-
-
-def _eig(matrix: Floats) -> tuple[Complexes, Complexes, Complexes]:
-    """Eigenvalues, and left and right eigenvectors as columns."""
-    found: Any = scipy.linalg.eig(matrix, left=True, right=True)
-    values, left, right = found
-    return values, left, right
 
 
 def crossings(gearset: Gearset, low: float, high: float, forcing: Forcing) -> tuple[Crossing, ...]:

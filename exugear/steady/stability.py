@@ -13,10 +13,10 @@ import numpy as np
 
 from exugear.dynamics.linearised import RIGID_BODY_LIMIT
 from exugear.harmonics.floquet import exponents, kicks_needed
+from exugear.rotating.mean_modes import mean_modes
 from exugear.rotating.mesh_ports import DEFLECTION
 from exugear.steady.excitation import Gearset
 from exugear.steady.nonlinear import Balance
-from exugear.steady.resonances import mean_modes
 from fe_ste.tools.arrays import Complexes
 
 PARTING_KICKS = 1000

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from exugear.campbell.campbell import LAYOUT
 from exugear.dynamics.assembly import Assembly
 from exugear.model.choice import Choice
 from exugear.model.versions import STEADY
@@ -39,7 +40,8 @@ _LAYOUT = Layout(
         "growth": ("point",),
         "apart_share": ("point", "mesh_wave"),
     }
-    | {name: (name,) for name in ("base", "signal", "mesh_wave")},
+    | {name: (name,) for name in ("base", "signal", "mesh_wave")}
+    | LAYOUT,
     ("gearbox", "variant", "mesh_law", "inertias", "level", "input_hash", "growth_rate"),
 )
 
@@ -75,6 +77,7 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
         "growth": (("point",), solved.growth, {"units": "1/s", "long_name": "fastest growth along a branch"}),
         "apart_share": (("point", "mesh_wave"), solved.apart, {"units": "1", "long_name": "share of time apart"}),
     }
+    variables |= response.campbell.variables()
     coordinates: dict[str, Any] = {
         "mesh_wave": np.array(response.wave_names, dtype=object),
         "base": np.array(response.base_names, dtype=object),

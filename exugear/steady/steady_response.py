@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.bodies.elastic_body import ElasticBody
+from exugear.campbell.campbell import Campbell, campbell_of
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.harmonics.lines import LineSet
@@ -21,7 +22,7 @@ from exugear.steady.contributions import Contributions, contributions, loudest_n
 from exugear.steady.excitation import Gearset
 from exugear.steady.gearbox_branches import follow_branch
 from exugear.steady.point_solver import PointSolver, gearset_of
-from exugear.steady.resonances import Crossing, crossings, refined
+from exugear.steady.resonances import HARMONICS, Crossing, crossings, refined
 from exugear.steady.response import Response, dissipated_and_given, signals
 from exugear.steady.settings import SteadySettings, check_law, usual_speeds
 from exugear.tooth_mesh.law import MeshData
@@ -88,6 +89,8 @@ class SteadyResponse:
         frequency work together.
     planet_spread : float
         Largest change of planet bearings' stiffness that made the planets equal, over that stiffness.
+    campbell : Campbell
+        Modes over the speeds, as far up as the lines that `crossings` looks at.
     """
 
     assembly: Assembly
@@ -103,6 +106,7 @@ class SteadyResponse:
     folds: tuple[float, ...]
     growth_rate: float
     planet_spread: float
+    campbell: Campbell
 
     def __repr__(self) -> str:
         """Gearbox, variant, level and sizes in one line."""
@@ -241,7 +245,17 @@ def response_of(
         folds=folds,
         growth_rate=solver.growth(float(even.min()), float(even.max())),
         planet_spread=gearset.system.planet_spread,
+        campbell=_campbell(gearset, even),
     )
+
+
+def _campbell(gearset: Gearset, speeds: Floats) -> Campbell:
+    """Modes that a mesh or one of its harmonics may reach; of elastic bodies, those that their band holds."""
+    assembly, low, high = gearset.waves.assembly, float(speeds.min()), float(speeds.max())
+    highest = HARMONICS * float(gearset.waves.base_orders.max()) * float(np.abs(speeds).max()) / (2.0 * np.pi)
+    if assembly.elastic_bodies:
+        highest = min(highest, assembly.gearbox.case.elasticity.band_Hz)
+    return campbell_of(gearset.system, low, high, highest)
 
 
 def _solve(

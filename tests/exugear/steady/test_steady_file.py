@@ -7,10 +7,11 @@ import json
 import numpy as np
 import pytest
 
+from exugear.campbell.campbell import campbell_from
 from exugear.dynamics.assemble import assemble
 from exugear.model.choice import Choice
 from exugear.rotating.rotating_frame import SteadyError
-from exugear.steady.peaks import line_name, peaks
+from exugear.steady.peaks import line_name, peaks, planet_sidebands, sidebands
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import keep_points, kept_points, load_response, partial_path, stored_or_computed
 from exugear.steady.steady_response import response_of
@@ -28,7 +29,9 @@ def test_a_file_gives_back_the_response_with_units_and_origin(assembly, tmp_path
     response, path = response_of(assembly, SETTINGS), tmp_path / "steady.nc"
     data = stored_or_computed(path, assembly, SETTINGS)
     assert data.attrs["input_hash"] == response.input_hash
-    assert dict(data.sizes) == {"point": 20, "line": 53, "base": 3, "signal": len(response.signals), "mesh_wave": 8}
+    sizes = {"point": 20, "line": 53, "base": 3, "signal": len(response.signals), "mesh_wave": 8}
+    assert {name: data.sizes[name] for name in sizes} == sizes
+    np.testing.assert_array_equal(campbell_from(data).frequency, response.campbell.frequency)
     assert str(data["units"][0].item()) == "m"
     line = int(np.argmin(abs(data["order"].to_numpy() - 99.0)))
     known = response.amplitude("overall_dte", (1, 0, 0))
@@ -92,6 +95,43 @@ def test_peaks_are_the_local_maxima_the_loudest_first(assembly, tmp_path):
     assert found[0].frequency == pytest.approx(found[0].order * found[0].speed / 2.0 / np.pi)
     with pytest.raises(SteadyError, match="no signal 'noise'; signals are overall_dte"):
         peaks(data, "noise")
+
+
+def test_sidebands_are_combinations_with_the_line_of_the_peak_and_named_by_what_is_added(assembly, tmp_path):
+    data = stored_or_computed(tmp_path / "steady.nc", assembly, SETTINGS)
+    peak = next(own for own in peaks(data) if own.line == "high_speed")
+    found = sidebands(data, peak, least=1e-9)
+    causes = {band.cause: band for band in found}
+    assert {"+ sun_planet", "- sun_planet", "+ intermediate", "- 2 x intermediate"} <= set(causes)
+    below = causes["- sun_planet"]
+    assert below.line == "high_speed - sun_planet"
+    assert below.frequency == pytest.approx(peak.frequency - 99.0 * peak.speed / 2.0 / np.pi)
+    line = int(np.argmin(abs(data["order"].to_numpy() - (peak.order - 99.0))))
+    point = int(np.argmin(abs(data["speed"].to_numpy() - peak.speed)))
+    assert below.amplitude == pytest.approx(float(data["amplitude"][point, line, 0]))
+    assert below.share == pytest.approx(below.amplitude / peak.amplitude)
+
+
+def test_a_planet_feels_waves_at_the_line_plus_and_minus_its_carrier(assembly, tmp_path):
+    """Against the force of the planet at zero angle, sampled in time over turns of the carrier."""
+    data = stored_or_computed(tmp_path / "steady.nc", assembly, SETTINGS)
+    peak = next(own for own in peaks(data) if own.line == "intermediate")
+    names = [str(name) for name in data["signal"].to_numpy()]
+    point = int(np.argmin(abs(data["speed"].to_numpy() - peak.speed)))
+    line = int(np.argmin(abs(data["order"].to_numpy() - peak.order)))
+    forced = data.copy(deep=True)
+    for name, (amplitude, phase) in {" cosine": (3.0, 0.4), " sine": (2.0, 1.9), "": (0.5, 0.0)}.items():
+        place = point, line, names.index(f"mesh_force sun_planet{name}")
+        forced["amplitude"].to_numpy()[place], forced["phase"].to_numpy()[place] = amplitude, phase
+    # Whole numbers of periods of both: the line at 40 and the carrier at 3 of them.
+    t = np.arange(4096) / 4096.0
+    force = 3.0 * np.cos(2 * np.pi * 40 * t + 0.4) * np.cos(2 * np.pi * 3 * t)
+    force += 2.0 * np.cos(2 * np.pi * 40 * t + 1.9) * np.sin(2 * np.pi * 3 * t)
+    known = 2.0 * np.abs(np.fft.rfft(force)) / t.size
+    found = {band.cause[0]: band for band in planet_sidebands(forced, peak, {"sun_planet": ("carrier", 1.0)})}
+    assert found["+"].amplitude == pytest.approx(known[43], rel=1e-6)
+    assert found["-"].amplitude == pytest.approx(known[37], rel=1e-6)
+    assert found["+"].frequency - peak.frequency == pytest.approx(peak.speed / 2.0 / np.pi)
 
 
 def test_combinations_are_named_by_their_bases():

@@ -1,0 +1,1 @@
+"""Campbell diagram of a gearbox: modes of the mean system followed over speed, named by type."""
