@@ -146,8 +146,7 @@ def plot_campbell_over_speed(
     if not curves:
         raise ValueError("plot_campbell_over_speed: at least one mode is needed")
     fastest = max(float(curve.speed.max()) for curve in curves)
-    reached = [float(line.frequency(fastest)) for line in lines] + [mark.frequency for mark in marks]
-    top = 1.05 * max(reached or [float(np.nanmax(curve.frequency)) for curve in curves])
+    top = 1.1 * max([float(np.nanmax(curve.frequency)) for curve in curves] + [mark.frequency for mark in marks])
     kinds = list(dict.fromkeys(curve.kind for curve in curves))
     with drawing_style():
         figure = new_figure(7.2, 5.4)
