@@ -107,7 +107,7 @@ def _contributions_table(data: xr.Dataset) -> str:
 def _campbell(context: Context, data: xr.Dataset, name: str, label: str) -> str:
     """Picture and table of the modes over speed, with the crossings that excite them."""
     diagram = campbell_from(data)
-    if not diagram.names:
+    if not diagram.names or len(diagram.speeds) < 2:
         return ""
     crossings = json.loads(data.attrs["crossings"])
     path = context.picture_path(name)
