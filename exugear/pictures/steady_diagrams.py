@@ -151,7 +151,7 @@ def plot_campbell_over_speed(
     if not curves:
         raise ValueError("plot_campbell_over_speed: at least one mode is needed")
     fastest = max(float(curve.speed.max()) for curve in curves)
-    top = 1.05 * max(float(np.nanmax(curve.frequency)) for curve in curves)
+    top = 1.1 * max([float(np.nanmax(curve.frequency)) for curve in curves] + [mark.frequency for mark in marks])
     strip = 0.25 + 0.16 * len(ranges)
     with drawing_style():
         figure = new_figure(7.2, 6.0 + strip)

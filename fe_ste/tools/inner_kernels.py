@@ -218,7 +218,7 @@ class _Bundle:
 
 
 _latest: dict[int, _Bundle] = {}
-_MOST_KEPT = 16
+_MOST_KEPT = 64
 
 
 class _BundleType(types.Type):

@@ -24,9 +24,9 @@ def test_modes_orders_marks_and_load_cases_lie_where_the_axes_say():
     above, panel = figure.axes
     drawn = [line.get_xydata().round(9).tolist() for line in panel.lines]
     assert [[0.0, 0.4], [300.0, 0.41], [600.0, 0.42]] in drawn
-    # 60 per turn: 1 kHz at 1000 rpm; its double leaves the diagram above, at 1.05 of 900 Hz.
+    # 60 per turn: 1 kHz at 1000 rpm; its double leaves the diagram above, at 1.1 of 900 Hz.
     assert [[0.0, 0.0], [600.0, 0.6]] in drawn
-    assert [[0.0, 0.0], [472.5, 0.945]] in drawn
+    assert [[0.0, 0.0], [495.0, 0.99]] in drawn
     circles = panel.collections[0]
     np.testing.assert_allclose(circles.get_offsets(), [(410.0, 0.41), (250.0, 0.5)])
     assert circles.get_sizes()[0] > 10.0 * circles.get_sizes()[1]
