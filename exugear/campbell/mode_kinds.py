@@ -154,4 +154,4 @@ def circle(x: complex, y: complex) -> float:
     >>> circle(1.0, -1j), circle(1.0, 1j), circle(1.0, 2.0)
     (2.0, -2.0, 0.0)
     """
-    return float(-2.0 * (np.conj(x) * y).imag)
+    return float(0.0 - 2.0 * (np.conj(x) * y).imag)

@@ -125,6 +125,8 @@ def plot_campbell_over_speed(
     marks: Sequence[Mark],
     ranges: Mapping[str, tuple[float, float]],
     path: str | Path | None = None,
+    *,
+    harmonics: int = 3,
 ) -> Figure:
     """Draw modes over speed with order lines, and where these meet, as large as the mode is excited there.
 
@@ -132,11 +134,14 @@ def plot_campbell_over_speed(
     ----------
     curves : sequence of ModeCurve
     lines : sequence of OrderLine
+        Those of the meshes.
     marks : sequence of Mark
     ranges : mapping of name to (float, float)
-        Speeds of the input in operation without sign, rad/s.
+        Speeds of the input that load cases pass, without sign, rad/s: bars above the diagram.
     path : path-like, optional
         Where to write the picture.
+    harmonics : int
+        Multiples of each order that are drawn, those above the first thin and without name.
 
     Raises
     ------
@@ -147,31 +152,30 @@ def plot_campbell_over_speed(
         raise ValueError("plot_campbell_over_speed: at least one mode is needed")
     fastest = max(float(curve.speed.max()) for curve in curves)
     top = 1.1 * max([float(np.nanmax(curve.frequency)) for curve in curves] + [mark.frequency for mark in marks])
-    kinds = list(dict.fromkeys(curve.kind for curve in curves))
+    strip = 0.25 + 0.16 * len(ranges)
     with drawing_style():
-        figure = new_figure(7.2, 5.4)
-        panel = figure.add_subplot()
+        figure = new_figure(7.2, 6.0 + strip)
+        above, panel = figure.subplots(2, 1, sharex=True, height_ratios=[strip, 6.0])
         panel.grid(False)
-        for number, (name, (slow, fast)) in enumerate(ranges.items()):
-            panel.axvspan(slow / RPM, fast / RPM, color="#EEEEEE", zorder=0, label=None if number else "in operation")
-            _name_at(panel, name, (0.5 * (slow + fast) / RPM, 1e-3 * top), (0, -9 - 9 * number), "center")
-        for kind in kinds:
-            for number, curve in enumerate(own for own in curves if own.kind == kind):
-                panel.plot(
-                    curve.speed / RPM, 1e-3 * curve.frequency, color=COLOURS[kinds.index(kind) % len(COLOURS)],
-                    linewidth=0.9, label=None if number else kind, zorder=2,
-                )  # fmt: skip
+        _draw_ranges(above, ranges)
+        _draw_modes(panel, curves)
         for line in lines:
-            end = float(line.frequency(fastest))
-            reach = min(1.0, top / end)
-            panel.plot(
-                [0.0, reach * fastest / RPM], [0.0, 1e-3 * reach * end], color="#888888", linewidth=0.7,
-                linestyle="--", zorder=1,
-            )  # fmt: skip
-            _name_at(panel, line.name, (reach * fastest / RPM, 1e-3 * reach * end), (2, 0), "left")
+            for multiple in range(1, harmonics + 1):
+                end = multiple * float(line.frequency(fastest))
+                reach = min(1.0, top / end)
+                panel.plot(
+                    [0.0, reach * fastest / RPM], [0.0, 1e-3 * reach * end], color="#888888",
+                    linewidth=0.9 if multiple == 1 else 0.4, linestyle="--", zorder=1,
+                )  # fmt: skip
+                if multiple == 1:
+                    panel.annotate(
+                        line.name, (reach * fastest / RPM, 1e-3 * reach * end), (3, 3), fontsize=7.0,
+                        textcoords="offset points", color="#555555", annotation_clip=False,
+                    )  # fmt: skip
         panel.scatter(
             [mark.speed / RPM for mark in marks], [1e-3 * mark.frequency for mark in marks],
-            s=[4.0 + 90.0 * mark.share for mark in marks], facecolor="none", edgecolor="#000000", zorder=3,
+            s=[4.0 + 90.0 * mark.share for mark in marks], facecolor="none", edgecolor="#000000", linewidth=0.8,
+            zorder=3,
         )  # fmt: skip
         panel.set(xlim=(0.0, fastest / RPM), ylim=(0.0, 1e-3 * top))
         panel.set(xlabel="Input speed / rpm", ylabel="Frequency / kHz")
@@ -179,7 +183,29 @@ def plot_campbell_over_speed(
         return finish_figure(figure, path)
 
 
-def _name_at(panel: Axes, name: str, place: tuple[float, float], shift: tuple[int, int], side: str) -> None:
-    panel.annotate(
-        name, place, shift, textcoords="offset points", fontsize=7.0, color="#555555", horizontalalignment=side
-    )
+def _draw_ranges(panel: Axes, ranges: Mapping[str, tuple[float, float]]) -> None:
+    """Draw the speeds of load cases as bars, one below the other."""
+    if not ranges:
+        panel.set_axis_off()
+        return
+    for number, (slow, fast) in enumerate(ranges.values()):
+        # A bar of no length, of one speed, is seen by its ends.
+        panel.plot(
+            [slow / RPM, fast / RPM], [number, number], color="#999999", linewidth=5.0, solid_capstyle="butt",
+            marker="|", markersize=5.0, markeredgewidth=2.0,
+        )  # fmt: skip
+    panel.set_yticks(range(len(ranges)), list(ranges))
+    panel.tick_params(axis="both", labelsize=7.0, length=0.0, labelbottom=False)
+    panel.set_ylim(len(ranges) - 0.4, -0.6)
+    panel.set_title("Speeds of the load cases", loc="left", fontsize=8.0)
+
+
+def _draw_modes(panel: Axes, curves: Sequence[ModeCurve]) -> None:
+    """Draw modes over speed, each kind in its colour and once in the legend."""
+    kinds = sorted({curve.kind for curve in curves})
+    for colour, kind in enumerate(kinds):
+        for number, curve in enumerate(own for own in curves if own.kind == kind):
+            panel.plot(
+                curve.speed / RPM, 1e-3 * curve.frequency, color=COLOURS[colour % len(COLOURS)], linewidth=0.9,
+                label=None if number else kind, zorder=2,
+            )  # fmt: skip

@@ -107,7 +107,7 @@ def _contributions_table(data: xr.Dataset) -> str:
 def _campbell(context: Context, data: xr.Dataset, name: str, label: str) -> str:
     """Picture and table of the modes over speed, with the crossings that excite them."""
     diagram = campbell_from(data)
-    if not diagram.names:
+    if not diagram.names or len(diagram.speeds) < 2:
         return ""
     crossings = json.loads(data.attrs["crossings"])
     path = context.picture_path(name)
@@ -195,16 +195,34 @@ def _sidebands_table(context: Context, data: xr.Dataset, found: Sequence[Peak]) 
                     "beside it": band.line,
                     "at / Hz": f"{band.frequency:.1f}",
                     "apart / Hz": f"{band.frequency - peak.frequency:+.2f}",
-                    "amplitude": _amplitude(data, band.line, band.amplitude),
+                    "amplitude": _amplitude(band.line, band.amplitude),
                     "share / %": f"{100.0 * band.share:.1f}",
                     "cause": band.cause,
                 }
             )
+    if not rows:
+        return ""
     said = "Sidebands of the loudest peaks and their causes: lines at the speed of the peak that other meshes or the "
-    return page.folded(f"{said}turning planets make", page.table(rows, ("beside it", "cause"))) if rows else ""
+    table = page.table(rows, ("beside it", "cause"))
+    return page.folded(f"{said}turning planets make", page.paragraph(_passages(context, carriers)) + table)
 
 
-def _amplitude(data: xr.Dataset, line: str, amplitude: float) -> str:
+def _passages(context: Context, carriers: Mapping[str, tuple[str, float]]) -> str:
+    """Tell how often planets pass a place of the housing, and how that goes into the order of their meshes."""
+    gearbox = context.gearbox
+    orders = {mesh.family: gearbox.train.mesh_frequencies(2.0 * np.pi)[mesh.name] for mesh in gearbox.meshes}
+    told = []
+    for family, (carrier, ratio) in carriers.items():
+        count = sum(mesh.family == family for mesh in gearbox.meshes)
+        passage = count * abs(ratio)
+        told.append(
+            f"{family}: {count} planets of {carrier} pass a place of the housing at order {passage:g}, which goes "
+            f"{orders[family] / passage:g} times into the order of the meshes, {orders[family]:g}."
+        )
+    return " ".join(told)
+
+
+def _amplitude(line: str, amplitude: float) -> str:
     return f"{amplitude:.3g} N" if line.startswith("mesh_force ") else f"{1e6 * amplitude:.3g} µm"
 
 

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import xarray as xr
 
-from exugear.campbell.campbell import campbell_from, campbell_of
+from exugear.campbell.campbell import LAYOUT, campbell_from, campbell_of
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.modes import eigenmodes
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.rotating.mean_system import mean_system
 from exugear.templates.kinds import template
+from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
 
 PLANETS = 4
 FAST = 200.0
@@ -86,10 +89,23 @@ def test_a_mode_is_found_by_speed_and_frequency(diagram):
     assert diagram.mode_at(FAST, 3.0 * own.max()) is None
 
 
-def test_a_file_gives_the_diagram_back(diagram, tmp_path):
-    path = tmp_path / "campbell.nc"
-    xr.Dataset(diagram.variables()).to_netcdf(path, engine="h5netcdf")
-    with xr.open_dataset(path, engine="h5netcdf") as data:
-        found = campbell_from(data)
+def test_below_all_modes_the_diagram_is_empty(planetary):
+    system = mean_system(assemble(planetary, Choice("rigid"), STIFFNESS), np.array([0.0, FAST]))
+    empty = campbell_of(system, 0.0, FAST, 1.0)
+    assert empty.names == () and empty.frequency.shape == (len(empty.speeds), 0)
+    assert empty.mode_at(1.0, 1.0) is None
+
+
+@pytest.mark.parametrize("modes", [None, 0])
+def test_a_file_gives_the_diagram_back(diagram, tmp_path, modes):
+    """Also one of no modes."""
+    path, kept = tmp_path / "campbell.nc", slice(modes)
+    diagram = replace(
+        diagram,
+        **{name: getattr(diagram, name)[:, kept] for name in ("frequency", "damping", "whirl")},
+        **{name: getattr(diagram, name)[kept] for name in ("kinds", "names")},
+    )
+    write_dataset(path, xr.Dataset(diagram.variables(), attrs={"method_version": 1}))
+    found = campbell_from(load_dataset(path, Layout("diagram", 1, LAYOUT)))
     np.testing.assert_array_equal(found.frequency, diagram.frequency)
     assert (found.kinds, found.names) == (diagram.kinds, diagram.names)

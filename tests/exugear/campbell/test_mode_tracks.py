@@ -82,3 +82,8 @@ def test_a_mode_that_leaves_the_range_of_frequencies_ends_and_others_go_on():
     assert gone.any(axis=0).sum() == 1
     rising = int(np.argmax(gone.any(axis=0)))
     np.testing.assert_array_equal(gone[:, rising], 5.0 + 15.0 * tracks.speeds >= 15.0)
+
+
+def test_one_speed_has_its_modes():
+    tracks = mode_tracks(uncoupled(0.0), 0.2, 0.2)
+    np.testing.assert_allclose(2.0 * np.pi * tracks.frequency, [[8.0, 10.0]], rtol=1e-7)
