@@ -29,7 +29,7 @@ PARTIAL_NAME = "run.partial"
 """Folder with the pieces of a run that is not complete."""
 EARLIER_PARTIAL_NAME = "run.partial.nc"
 """What an earlier version wrote instead; it can be neither trusted nor gone on with."""
-STRETCH_BYTES = 32_000_000
+STRETCH_BYTES = 16_000_000
 """What is read of pieces before it is written to the whole: writing costs by the call, not by the byte."""
 TEXT = np.dtype("O", metadata={"vlen": str})
 """Text of any length, as HDF5 stores it."""

@@ -134,8 +134,9 @@ class Recorder:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Wait for the second thread."""
+        """Wait for the second thread, and give back the memory of the buffers: joining pieces needs some."""
         self._writer.shutdown()
+        self.buffer = self._spare = StateBuffer(0, 0, 0)
 
     @property
     def halted(self) -> bool:
