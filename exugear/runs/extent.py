@@ -122,9 +122,9 @@ def buffer_rows(wanted: float, size: int, signals: int) -> int:
     Examples
     --------
     >>> buffer_rows(40000, size=60, signals=60), buffer_rows(1e12, size=60, signals=60)
-    (40000, 298261)
+    (40000, 209715)
     """
-    numbers = 2 * size + 5 * signals + 30  # states, signals in the filter and under the judge, energies
+    numbers = 4 * size + 6 * signals + 40  # two buffers of states, signals and energies; the filter and the judge
     return max(1, min(round(wanted), BUFFER_BYTES // (8 * numbers)))
 
 

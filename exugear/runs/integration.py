@@ -8,7 +8,6 @@ from exugear.runs.interruption import Interruption
 from exugear.runs.plan import RunPlan
 from exugear.runs.recorder import Recorder
 from exugear.runs.start import RunStart
-from exugear.solvers.compiled.observers import Observer
 from exugear.solvers.compiled.solver import CompiledSystem
 from fe_ste.tools.arrays import Floats
 
@@ -16,12 +15,6 @@ STEPS_AT_ONCE = 2000
 """Steps of one call of the compiled solver: Ctrl-C is heard between calls, and a step takes up to half a ms."""
 STEP_TOLERANCE = 1e-3
 """How far Exudyn's clock may be from the step that is due, in steps."""
-
-
-def compile_loop(plan: RunPlan, start: RunStart) -> None:
-    """Have the loop over time compiled, which takes seconds once per installation, while Ctrl-C still ends at once."""
-    nothing = np.empty((0, plan.assembly.size))
-    Observer(plan.assembly, start.loads).observe(np.empty(0), nothing, nothing)
 
 
 def integrate(plan: RunPlan, start: RunStart, recorder: Recorder, interruption: Interruption) -> None:

@@ -130,7 +130,9 @@ class Recorder:
         self._writing: Future[float] | None = None
 
     def __enter__(self) -> Recorder:
-        """Nothing is to be prepared."""
+        """Have the loop over time compiled, which takes seconds once per installation, while Ctrl-C still ends it."""
+        nothing = np.empty((0, self._plan.assembly.size))
+        self._observer.observe(np.empty(0), nothing, nothing)
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -20,7 +20,7 @@ from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.results.run_file import join_pieces
 from exugear.runs.extent import SAMPLE_RATE, check_disk, check_duration, too_fine
-from exugear.runs.integration import compile_loop, integrate
+from exugear.runs.integration import integrate
 from exugear.runs.interruption import interruptible
 from exugear.runs.outcome import LimitError, Progress, ProgressMeter, Run, RunError
 from exugear.runs.plan import RunPlan, plan_run
@@ -139,8 +139,7 @@ def simulate(
 def _carry_out(plan: RunPlan, start: RunStart, progress: Callable[[Progress], None] | None) -> Run:
     """Integrate to the end, or to the first fault or interruption, and join the pieces of a complete run."""
     meter = ProgressMeter(start.state.step * plan.step, plan.duration, progress)
-    compile_loop(plan, start)
-    with interruptible() as interruption, Recorder(plan, start, meter.reach) as recorder:
+    with Recorder(plan, start, meter.reach) as recorder, interruptible() as interruption:
         integrate(plan, start, recorder, interruption)
         recorder.finish()
         if recorder.fault:

@@ -41,7 +41,10 @@ def new(
             raise BadInputError(f"{case}: name a file that ends with .toml")
         if case.exists() or case.is_symlink():
             raise BadInputError(f"{case}: is there already and is not written over; name another file")
-        write_file(case, template(kind.value).encode())
+        try:
+            write_file(case, template(kind.value).encode())
+        except OSError as error:
+            raise BadInputError(f"{case}: cannot be written ({error.strerror}); name another file") from error
         if as_json:
             print_json({"case": str(case), "kind": kind.value})
             return

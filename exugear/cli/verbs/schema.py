@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from exugear.cli.console import say
-from exugear.cli.errors import exit_codes
+from exugear.cli.errors import BadInputError, exit_codes
 
 
 def schema(
@@ -28,5 +28,8 @@ def schema(
         if out is None:
             typer.echo(text, nl=False)
             return
-        write_file(out, text.encode())
+        try:
+            write_file(out, text.encode())
+        except OSError as error:
+            raise BadInputError(f"--out {out}: cannot be written ({error.strerror}); name another file") from error
         say(f"Written: {out}")

@@ -70,3 +70,9 @@ def test_a_file_that_is_there_is_not_written_over(tmp_path: Path) -> None:
     assert refused.exit_code == 2 and "not written over" in refused.stderr
     assert mine.read_text(encoding="utf-8") == "mine"
     assert exugear("new", tmp_path / "mine.txt", "--kind", "pair").exit_code == 2
+
+
+def test_a_place_where_no_file_can_be_is_bad_input(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    assert exugear("new", tmp_path / "file" / "mine.toml", "--kind", "pair").exit_code == 2
+    assert exugear("schema", "--out", tmp_path).exit_code == 2
