@@ -18,7 +18,7 @@ from exugear.results.run_file import load_run
 from exugear.spectra.order_cut import OrderCut
 from exugear.spectra.orders import OrderLine
 from exugear.spectra.sweeps import run_up_cut, sweep_rate
-from exugear.steady.order_cuts import ComparedPeak, compared_peaks
+from exugear.steady.peaks import ComparedPeak, compared_peaks
 
 
 def compared(variant: str) -> tuple[ComparedPeak, ...]:

@@ -12,8 +12,7 @@ from exugear.model.choice import Choice
 from exugear.rotating.rotating_frame import SteadyError
 from exugear.spectra.orders import OrderLine
 from exugear.spectra.sweeps import sweep_severity
-from exugear.steady.order_cuts import compared_peaks, damping_at, steady_cut
-from exugear.steady.peaks import peaks
+from exugear.steady.peaks import compared_peaks, damping_at, peaks, steady_cut
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import to_dataset
 from exugear.steady.steady_response import response_of
