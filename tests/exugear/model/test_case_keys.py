@@ -26,8 +26,8 @@ from exugear.model.sections.entries import Section
 from exugear.results.folder import keep_case
 from exugear.tooth_mesh.tables import wanted_table
 
-from ..case_mutations import bases, toml_text
 from .. import gear_trains
+from ..case_mutations import bases, toml_text
 
 FOR_PEOPLE = {"LoadCaseSection.description", "BearingSection.designation", "CatalogueSection.designation"}
 """Keys that stand in the file and its copy in the results for people to read."""
