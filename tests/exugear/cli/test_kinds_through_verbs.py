@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from pathlib import Path
 from typing import Any
@@ -32,7 +33,7 @@ def exugear(*arguments: object) -> Any:
 def told() -> dict[str, str]:
     """Rows of the table in the user guide by kind."""
     lines = GUIDE.read_text(encoding="utf-8").split(HEAD)[1].splitlines()
-    rows = [line for line in lines[2:] if line.startswith("|")]
+    rows = itertools.takewhile(lambda line: line.startswith("|"), lines[2:])
     return {row.split("|")[1].strip(): row for row in rows}
 
 
