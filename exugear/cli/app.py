@@ -17,8 +17,10 @@ from exugear.cli.streams import standard_streams
 VERBS = (
     "new", "import_", "schema", "check", "ste", "bearings", "modes", "steady", "run", "sweep", "loads", "view", "report"
 )  # fmt: skip
-"""In the order of the help. Each is a function of this name in the module of this name in `exugear.cli.verbs`; what
-Python reserves has a line after it, which the command line leaves out."""
+"""In the order of the help. Each is a function of this name in the module of this name in `exugear.cli.verbs`, or in
+`exugear.cli.file_verbs`; what Python reserves has a line after it, which the command line leaves out."""
+FILE_VERBS = ("new", "import_", "schema")
+"""Those in `exugear.cli.file_verbs`: they make, describe or exchange gearbox files."""
 
 app = typer.Typer(
     help="Transmission error of gear pairs by finite elements, and gearbox dynamics in Exudyn.",
@@ -57,4 +59,5 @@ def _program(
 
 
 for verb in VERBS:
-    app.command(verb.rstrip("_"))(getattr(importlib.import_module(f"exugear.cli.verbs.{verb}"), verb))
+    room = "file_verbs" if verb in FILE_VERBS else "verbs"
+    app.command(verb.rstrip("_"))(getattr(importlib.import_module(f"exugear.cli.{room}.{verb}"), verb))

@@ -1,0 +1,1 @@
+"""Verbs of the command line that make, describe or exchange gearbox files."""
