@@ -1,1 +1,0 @@
-"""Verbs of the command line that make, describe or exchange gearbox files."""
