@@ -19,6 +19,9 @@ from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.bearing_duties import bearing_duties
 from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.modes import Modes, eigenmodes
+from exugear.life.life import checked_loads, compute_life, life_hash
+from exugear.life.life_file import life_path, stored_life, write_life
+from exugear.life.pair_stresses import pair_stresses
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.named_files import NOTHING_MORE, Permissions
@@ -246,6 +249,40 @@ class Project:
         self.keep_case()
         write_duties(self.bearings_path, duties, input_hash(assembly))
         return duties
+
+    def life_tables(self) -> list[TableRequest]:
+        """List the tables that a life needs, and find those that are there: of all pairs that get one."""
+        return self.requested_tables(grid=LAWS[self.choice.mesh_law].needs_axes)
+
+    def life(
+        self, begin: Callable[[str], None] | None = None, progress: Callable[[int, int], None] | None = None
+    ) -> xr.Dataset:
+        """Rate gears and bearings under the loads of the file, written to `life_path`; one that fits is taken as it is.
+
+        Parameters
+        ----------
+        begin : callable, optional
+            Called with the name of each pair before its root stress is computed.
+        progress : callable, optional
+            Called with the number of static states that are solved, and of all.
+        """
+        counted, assembly = checked_loads(self.gearbox), self.assembly()
+        requests = self.life_tables()
+        tables = {request.name: request.wanted.hash for request in requests if request.stored is not None}
+        digest = life_hash(assembly, counted, tables)
+        kept = stored_life(self.life_path, digest)
+        if kept is not None:
+            return kept
+        self.keep_case()
+        with time_noted(self.folder, f"life, {self.choice.variant}, {self.choice.mesh_law}"):
+            stresses = pair_stresses(requests, self.folder, begin)
+            life = compute_life(assembly, counted, stresses, digest, progress)
+            return write_life(self.life_path, life, self.gearbox.name)
+
+    @property
+    def life_path(self) -> Path:
+        """File of the life."""
+        return life_path(self.folder, self.choice)
 
     def run(self, **options: Any) -> Run:
         """Run the load case in time; options as those of `exugear.runs.runup.simulate`.

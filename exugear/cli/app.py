@@ -15,7 +15,7 @@ from exugear.cli.console import say, say_what_is_logged
 from exugear.cli.streams import standard_streams
 
 VERBS = (
-    "new", "import_", "schema", "check", "ste", "bearings", "modes", "steady", "run", "loads", "view", "report"
+    "new", "import_", "schema", "check", "ste", "bearings", "modes", "steady", "run", "loads", "life", "view", "report"
 )  # fmt: skip
 """In the order of the help. Each is a function of this name in the module of this name in `exugear.cli.verbs`; what
 Python reserves has a line after it, which the command line leaves out."""
