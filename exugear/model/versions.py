@@ -16,4 +16,4 @@ RUN = 3
 #: Life of gears and bearings (`exugear.life`, and the root stress of `fe_ste.root_stress`).
 LIFE = 1
 #: Steady responses (`exugear.steady`, and all that modes rest on).
-STEADY = 2
+STEADY = 3
