@@ -19,9 +19,6 @@ from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.bearing_duties import bearing_duties
 from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.modes import Modes, eigenmodes
-from exugear.life.life import checked_loads, compute_life, life_hash
-from exugear.life.life_file import life_path, stored_life, write_life
-from exugear.life.pair_stresses import pair_stresses
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.named_files import NOTHING_MORE, Permissions
@@ -266,6 +263,10 @@ class Project:
         progress : callable, optional
             Called with the number of static states that are solved, and of all.
         """
+        from exugear.life.life import checked_loads, compute_life, life_hash  # root stress, which a run needs not
+        from exugear.life.life_file import stored_life, write_life
+        from exugear.life.pair_stresses import pair_stresses
+
         counted, assembly = checked_loads(self.gearbox), self.assembly()
         requests = self.life_tables()
         tables = {request.name: request.wanted.hash for request in requests if request.stored is not None}
@@ -282,6 +283,8 @@ class Project:
     @property
     def life_path(self) -> Path:
         """File of the life."""
+        from exugear.life.life_file import life_path
+
         return life_path(self.folder, self.choice)
 
     def run(self, **options: Any) -> Run:
