@@ -256,6 +256,8 @@ class Project:
     ) -> xr.Dataset:
         """Rate gears and bearings under the loads of the file, written to `life_path`; one that fits is taken as it is.
 
+        Tables that are missing are computed first.
+
         Parameters
         ----------
         begin : callable, optional
@@ -268,8 +270,10 @@ class Project:
         from exugear.life.pair_stresses import pair_stresses
 
         counted, assembly = checked_loads(self.gearbox), self.assembly()
+        if any(request.stored is None for request in self.life_tables()):
+            self.tables(grid=LAWS[self.choice.mesh_law].needs_axes)
         requests = self.life_tables()
-        tables = {request.name: request.wanted.hash for request in requests if request.stored is not None}
+        tables = {request.name: request.wanted.hash for request in requests}
         digest = life_hash(assembly, counted, tables)
         kept = stored_life(self.life_path, digest)
         if kept is not None:

@@ -21,7 +21,7 @@ from fe_ste.tools.arrays import Floats
 
 TORQUE_SHARES = (0.1, 0.25, 0.5, 0.75, 1.0)
 """Torques over the largest at which laws that are not linear are solved."""
-LONGEST_TURN = 0.05
+LONGEST_TURN = 0.02
 """Longest step, rad, in which a train is rolled to an angle."""
 
 
