@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.counting.duration import DurationDistribution
+from exugear.life.dynamic_factor import DynamicFactor
 from exugear.life.exposure import FLANKS, ToothExposure
 from exugear.life.static_balance import StaticBalance
 from exugear.model.gearbox import Gearbox
@@ -118,6 +119,7 @@ def flank_lives(
     extremes: Floats,
     balance: StaticBalance,
     stresses: Mapping[str, MeshCycleStress],
+    dynamic: Mapping[str, DynamicFactor],
 ) -> tuple[FlankLife, ...]:
     """Rate all gears of pairs whose stresses are known.
 
@@ -133,6 +135,7 @@ def flank_lives(
         Torques that count for static safety alone, with partial factors, N m.
     balance : StaticBalance
     stresses : mapping of pair name to MeshCycleStress
+    dynamic : mapping of mesh family to DynamicFactor
     """
     pairs = {mesh.family: mesh.pair for mesh in gearbox.meshes}
     lives = []
@@ -144,7 +147,7 @@ def flank_lives(
             worn = np.sign(torques) == sense
             largest = np.max(sense * np.concatenate([torques, found.upper, extremes]), initial=0.0)
             if largest > 0.0:
-                case = _Case(gearbox, rating, tooth, pair, balance, stresses[pair.name], sense)
+                case = _Case(gearbox, rating, tooth, pair, balance, stresses[pair.name], dynamic[tooth.family], sense)
                 lives.append(case.life(found, torques, worn, sense * float(largest)))
     return tuple(lives)
 
@@ -159,16 +162,17 @@ class _Case:
     pair: GearPair
     balance: StaticBalance
     stress: MeshCycleStress
+    dynamic: DynamicFactor
     sense: int
 
     def life(self, found: DurationDistribution, torques: Floats, worn: Floats, largest: float) -> FlankLife:
         tooth, stress = self.tooth, self.stress
         passed = list(tooth.meshes)
-        hertz, root, _ = self._stresses(torques[worn])
+        hertz, root, _ = self._stresses(torques[worn], self.dynamic.at(found.speed[worn]))
         # Each turn meets each angle and each mesh once: a bin's cycles are shared evenly among them.
         share = tooth.cycles / (len(passed) * len(self.balance.angle))
         cycles = np.broadcast_to((found.revolutions[worn] * share)[:, None, None], hertz.shape)
-        worst_hertz, worst_root, compression = self._stresses(np.array([largest]))
+        worst_hertz, worst_root, compression = self._stresses(np.array([largest]), np.full(1, self.dynamic.largest))
         torque, tilt = self._loads(np.array([largest]))
         force = tangential_force(self.pair.pinion, float(torque.mean()) / self.pair.pinion.base_radius)
         return FlankLife(
@@ -193,10 +197,10 @@ class _Case:
         tilt = self.balance.at(self.balance.misalignment, torques)[..., passed]
         return force * self.pair.pinion.base_radius, tilt
 
-    def _stresses(self, torques: Floats) -> tuple[Floats, Floats, Floats]:
+    def _stresses(self, torques: Floats, dynamic: Floats) -> tuple[Floats, Floats, Floats]:
         """Contact stress, root stress and root compression of each mesh, (torques, angles, meshes), Pa."""
         torque, tilt = self._loads(torques)
-        torque = torque * self.rating.dynamic_factor
+        torque = torque * dynamic[:, None, None]
         stress, member = self.stress, self.tooth.member
         return (
             stress.at(stress.hertz, 0.5, torque, tilt),

@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 from exugear.bearings.rolling.life import basic_rating_life
 from exugear.cli import app as cli
 from exugear.life.counted import count_loads
+from exugear.life.dynamic_factor import stated_factors
 from exugear.life.gear_life import flank_lives
 from exugear.life.life import checked_loads, compute_life, rating_of
 from exugear.life.life_file import read_life
@@ -99,7 +100,17 @@ def lives(project: Project, stresses: dict[str, MeshCycleStress]) -> dict[str, A
     torques = found.torques(counted.bin_value)
     balance = static_balance(project.assembly(), counted.body, found.upper, 12)
     none = np.zeros(0)
-    rated = flank_lives(gearbox, rating_of(gearbox), counted.teeth, found, torques, none, balance, stresses)
+    rated = flank_lives(
+        gearbox,
+        rating_of(gearbox),
+        counted.teeth,
+        found,
+        torques,
+        none,
+        balance,
+        stresses,
+        stated_factors(gearbox, rating_of(gearbox).dynamic_factor),
+    )
     return {f"{one.gear} {one.flank}": one for one in rated}
 
 
@@ -180,7 +191,7 @@ def test_an_extreme_load_counts_for_static_safety_alone(tmp_path, first, stresse
     content["loads"]["sources"]["storm"] = storm
     worse = Project(Gearbox.from_dict(content, str(tmp_path / "g.toml")), tmp_path, first.choice)
     quiet, loud = (
-        compute_life(one.assembly(), checked_loads(one.gearbox), stresses, "")
+        compute_life(one.assembly(), checked_loads(one.gearbox), stresses, stated_factors(one.gearbox, 1.0), "")
         for one in (spur_project(tmp_path, TABLE), worse)
     )
     for calm, storm_too in zip(quiet.flanks, loud.flanks, strict=True):
@@ -198,6 +209,13 @@ def test_an_extreme_load_counts_for_static_safety_alone(tmp_path, first, stresse
         (lambda content: content["loads"].update(body="shaft_2"), "static_load.locked holds shaft_2"),
         (lambda content: content["rating"]["gears"]["pinion"].pop("curve"), "give curve, or contact_curve"),
         (lambda content: content["rating"].update(dynamic_factor=0.5), "must lie between 1 and 10"),
+        (lambda content: content["rating"].update(dynamic_factor_run="run_up"), "give dynamic_factor, or"),
+        (
+            lambda content: content.update(
+                rating={"dynamic_factor_run": "no", "least_dynamic_factor": 1.0, "viscosity_40_mm2_per_s": 320.0}
+            ),
+            "dynamic_factor_run = 'no': load cases are run_up",
+        ),
     ],
 )
 def test_bad_sections_are_one_error_each(tmp_path, change, message):

@@ -64,5 +64,7 @@ def test_damage_of_a_run_in_time_is_that_of_the_balance_at_rest(tmp_path, varian
         own = [number for number, other in enumerate(families) if other == family]
         scale = float(acting.mean() * shares[:, own].mean())
         in_time = np.mean((forces[:, own] / scale) ** SLOPE)
-        at_rest = np.mean((acting / acting.mean()) ** SLOPE) * np.mean((shares[:, own] / shares[:, own].mean()) ** SLOPE)
+        at_rest = np.mean((acting / acting.mean()) ** SLOPE) * np.mean(
+            (shares[:, own] / shares[:, own].mean()) ** SLOPE
+        )
         assert in_time == pytest.approx(at_rest, rel=0.01)
