@@ -17,3 +17,5 @@ RUN = 3
 LIFE = 1
 #: Steady responses (`exugear.steady`, and all that modes rest on).
 STEADY = 3
+#: Points of studies (`exugear.studies`: their figures; what these rest on has its own version).
+STUDY = 1
