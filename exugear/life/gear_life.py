@@ -15,8 +15,8 @@ import numpy as np
 
 from exugear.counting.duration import DurationDistribution
 from exugear.life.dynamic_factor import DynamicFactor
-from exugear.life.exposure import FLANKS, ToothExposure
 from exugear.life.static_balance import StaticBalance
+from exugear.load_spectrum.exposure import FLANKS, ToothExposure
 from exugear.model.gearbox import Gearbox
 from exugear.model.sections.loads import RatingSection, StrengthSection
 from fe_ste.geometry.gears import GearPair

@@ -13,10 +13,10 @@ from exugear.counting.duration import DurationDistribution
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.fingerprint import input_hash
 from exugear.life.bearing_life import BearingLife, bearing_lives
-from exugear.life.counted import CountedLoads, count_loads
 from exugear.life.dynamic_factor import DynamicFactor
 from exugear.life.gear_life import FlankLife, check_strengths, flank_lives
 from exugear.life.static_balance import StaticBalance, static_balance
+from exugear.load_spectrum.counted import CountedLoads, count_loads
 from exugear.model.gearbox import Gearbox
 from exugear.model.sections.loads import RatingSection
 from exugear.model.versions import LIFE

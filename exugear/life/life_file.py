@@ -14,7 +14,7 @@ import numpy as np
 from exugear.life.bearing_life import BearingLife
 from exugear.life.gear_life import FlankLife
 from exugear.life.life import Life
-from exugear.life.spectra_files import write_table
+from exugear.load_spectrum.spectra_files import write_table
 from exugear.model.choice import Choice
 from exugear.model.versions import LIFE
 from exugear.results.folder import modes_path

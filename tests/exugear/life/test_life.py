@@ -15,13 +15,13 @@ from typer.testing import CliRunner
 
 from exugear.bearings.rolling.life import basic_rating_life
 from exugear.cli import app as cli
-from exugear.life.counted import count_loads
 from exugear.life.dynamic_factor import stated_factors
 from exugear.life.gear_life import flank_lives
 from exugear.life.life import checked_loads, compute_life, rating_of
 from exugear.life.life_file import read_life
 from exugear.life.pair_stresses import pair_stresses
 from exugear.life.static_balance import rolled_coordinates, static_balance
+from exugear.load_spectrum.counted import count_loads
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError

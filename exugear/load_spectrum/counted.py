@@ -11,8 +11,8 @@ import numpy as np
 
 from exugear.counting.duration import DurationDistribution, equivalent_load
 from exugear.counting.rainflow import damage_equivalent_range
-from exugear.life.exposure import FLANKS, ToothExposure, bearing_turns, tooth_exposures
-from exugear.life.sources import LoadSource, distribution, load_sources, section_of, told
+from exugear.load_spectrum.exposure import FLANKS, ToothExposure, bearing_turns, tooth_exposures
+from exugear.load_spectrum.sources import LoadSource, distribution, load_sources, section_of, told
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import RPM
 
@@ -136,7 +136,7 @@ def count_loads(gearbox: Gearbox) -> CountedLoads:
     Raises
     ------
     CaseError
-        A source that cannot be used: see `exugear.life.sources.load_sources`.
+        A source that cannot be used: see `exugear.load_spectrum.sources.load_sources`.
     """
     loads, sources = section_of(gearbox), load_sources(gearbox)
     teeth = tooth_exposures(gearbox, loads.body)

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from exugear.counting.duration import DurationDistribution, load_duration
-from exugear.life.rexs_load_cases import rexs_load_cases
 from exugear.load_files.channels import Channels, LoadFileError
 from exugear.load_files.reading import LARGEST_SERIES, SERIES_ENDINGS, decoded, file_content, read_channels
 from exugear.load_files.tables import read_headed
+from exugear.load_spectrum.rexs_load_cases import rexs_load_cases
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import RPM
 from exugear.model.sections.loads import LoadsSection, SourceSection
