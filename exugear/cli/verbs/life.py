@@ -1,4 +1,4 @@
-"""The verb `life`: how long gears and bearings last under the loads of section [loads], and what limits them."""
+"""The verb `life`: how long gears and bearings last under the loads of section ``loads``, and what limits them."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def life(
     scripts: ScriptsOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Rate gears and bearings under the loads of section [loads]: damages, safety factors, lives, what limits.
+    """Rate gears and bearings under the loads of section ``loads``: damages, safety factors, lives, what limits.
 
     Tables that are missing or do not fit the case are computed first.
     """
