@@ -18,7 +18,8 @@ from exugear.cli import app as cli
 from exugear.life.dynamic_factor import stated_factors
 from exugear.life.gear_life import flank_lives
 from exugear.life.life import checked_loads, compute_life, rating_of
-from exugear.life.life_file import read_life
+from exugear.life.life_diagrams import damage_matrix
+from exugear.life.life_file import limits, read_life
 from exugear.life.pair_stresses import pair_stresses
 from exugear.life.static_balance import rolled_coordinates, static_balance
 from exugear.load_spectrum.counted import count_loads
@@ -314,5 +315,10 @@ def test_the_verb_tells_what_limits_and_what_that_rests_on(tmp_path, first):
     assert told["limits"][0]["damage"] >= told["limits"][-1]["damage"]
     assert any("variant rigid has none" in line for line in told["unrated"])
     assert any(line.startswith("K_v = 1.05") for line in told["assumptions"])
+    picture = Path(told["file"]).with_suffix(".png")
+    assert picture.stat().st_size > 10_000
+    data = read_life(Path(told["file"]))
+    _, shares = damage_matrix(data, limits(data))
+    assert shares.sum(axis=1) == pytest.approx(np.ones(len(shares)))
     shown = CliRunner().invoke(cli.app, arguments)
     assert "What limits the life of 10 years" in shown.stdout
