@@ -39,7 +39,7 @@ def input_hash(assembly: Assembly, load_case: str | None = None) -> str:
     content = {
         "method_version": RUN if load_case else MODES,
         "reduction_version": REDUCTION if assembly.elastic_bodies else None,
-        "gearbox": gearbox.content,
+        "gearbox": gearbox.computed_content,
         "variant": assembly.variant,
         "law": assembly.mesh_law,
         "inertias": assembly.inertias,

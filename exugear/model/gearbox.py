@@ -35,6 +35,9 @@ from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.tools.notebook import html_table
 
+WORDS = ("labels", "operation")
+"""Tables of the file that only pages read: they make no stored result another one."""
+
 
 @dataclass(frozen=True)
 class Gearbox:
@@ -149,6 +152,11 @@ class Gearbox:
     def ste(self) -> SteSection:
         """Settings of the STE tables."""
         return self.case.ste
+
+    @property
+    def computed_content(self) -> dict[str, Any]:
+        """What was read from the file less its words for people: all that numbers can depend on."""
+        return {key: value for key, value in self.content.items() if key not in WORDS}
 
     @property
     def warnings(self) -> tuple[str, ...]:

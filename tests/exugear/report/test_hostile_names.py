@@ -17,6 +17,7 @@ from typing import Any
 import matplotlib.image
 import numpy as np
 import pytest
+from exugear.pictures.viewer import write_mode_page
 from rich.console import Console
 from typer.testing import CliRunner
 
@@ -27,7 +28,6 @@ from exugear.pictures.motions import mode_scene
 from exugear.pictures.scene import mode_figure
 from exugear.pictures.shapes import BodyShape
 from exugear.pictures.surfaces import tube_surface
-from exugear.pictures.viewer import write_mode_page
 from exugear.report import page
 from fe_ste.tools.rendering import RenderingError
 
