@@ -12,6 +12,7 @@ from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.fingerprint import input_hash
 from exugear.model.parts import LoadCase
 from exugear.model.versions import RUN
+from exugear.results.decimation import Decimator
 from exugear.results.run_file import FINAL_NAME, PARTIAL_NAME
 from exugear.runs.extent import too_fine
 from exugear.runs.outcome import RunError
@@ -77,6 +78,11 @@ class RunPlan:
     def duration(self) -> float:
         """Simulated time, s."""
         return self.steps * self.step
+
+    @property
+    def samples(self) -> int:
+        """Number of samples that the file will hold."""
+        return Decimator(self.steps_per_sample, 0).count_of(self.steps + 1)
 
     @property
     def is_implicit(self) -> bool:

@@ -16,6 +16,7 @@ from exugear.model.sections.bodies import BodySection
 from exugear.model.sections.connections import BearingSection, CouplingSection, JointSection, MeshSection, MountSection
 from exugear.model.sections.entries import LONGEST_VALUE, MOST_ENTRIES, Entries, FileName, Name, Section, Text
 from exugear.model.sections.gears import DeviationSection, GearSection, PairSection, PinSection
+from exugear.model.sections.loads import LoadsSection, RatingSection
 
 
 class LoadCaseSection(Section):
@@ -224,6 +225,10 @@ class CaseFile(Section):
     """Words for people by name of a body, bearing, pair or other entry; pages show them instead of the name."""
     ste: SteSection = SteSection()
     """Tables of the transmission error."""
+    loads: LoadsSection | None = None
+    """Loads over the life of the gearbox."""
+    rating: RatingSection | None = None
+    """How gears are rated."""
 
     @model_validator(mode="after")
     def _labels_of_entries(self) -> CaseFile:
