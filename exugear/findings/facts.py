@@ -183,7 +183,7 @@ def best_words(best: BestChange) -> str:
     change = f"{best.label} {figure_text(best.value)} instead of {figure_text(best.default)}"
     if best.gain < GAIN:
         return (
-            f"Nothing that was varied makes what lies within an octave of it {GAIN:g} dB quieter: where the mode fades, "
-            f"another takes over. Most is won by {change}: {figure_text(best.gain, 2)} dB."
+            f"Nothing that was varied makes what lies within an octave of it {GAIN:g} dB quieter: where the mode "
+            f"fades, another takes over. Most is won by {change}: {figure_text(best.gain, 2)} dB."
         )
     return f"What lies within an octave of it becomes {figure_text(best.gain, 2)} dB quieter by {change}."

@@ -45,7 +45,7 @@ def near_section(material: Material) -> Part:
         material.context.notes.statements.append(_statement(model, data, nearest, visible, target))
     words = (
         "Share: of the mode in the mobility of the overall transmission error. Where the nearest mode has a share "
-        f"under {100 * VISIBLE_SHARE:g} %, the nearest that has more stands below it. Near means within {100 * NEAR:g} %."
+        f"under {100 * VISIBLE_SHARE:g} %, the nearest that has more stands below it. Near: within {100 * NEAR:g} %."
     )
     title = f"Modes near {target:.0f} Hz"
     table = pieces.table(rows, ("inertias", "what moves"), caption=title, name="near")
