@@ -133,7 +133,7 @@ def _waterfall(values: Floats, data: xr.Dataset, run: VariantRun) -> Waterfall:
 
 def loudest_order(spectra: Waterfall, lines: Sequence[OrderLine]) -> LoudestOrder | None:
     """Find where a waterfall is loudest along its orders; None where no order lies in its band."""
-    levels = np.array([line_level(spectra, line) for line in lines])
+    levels = np.array([line_level(spectra, line) for line in lines]).reshape(len(lines), spectra.time.size)
     if not np.isfinite(levels).any():
         return None
     line, frame = divmod(int(np.nanargmax(levels)), levels.shape[1])

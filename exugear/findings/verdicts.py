@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from exugear.dynamics.signals import BALANCE_TERMS, MESH_TIMES, energy_residual
 from exugear.findings.context import Context
 from exugear.findings.groups import RunGroup
@@ -64,7 +66,7 @@ class RunFigures:
 def run_figures(run: VariantRun) -> RunFigures:
     """Read the figures of a run."""
     data = load_run(run.path, ("time", *MESH_TIMES, *BALANCE_TERMS))
-    times = tuple(float(data[name].max()) for name in MESH_TIMES)
+    times = tuple(float(np.max(data[name].to_numpy(), initial=0.0)) for name in MESH_TIMES)
     return RunFigures(energy_residual(data), times, float(data["time"][-1]))
 
 

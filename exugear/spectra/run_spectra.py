@@ -31,6 +31,8 @@ from fe_ste.tools.notebook import html_table
 LEAST_SHARE = 1e-5
 """Modes with a smaller share of the overall transmission error's mobility are no match for a resonance of it."""
 
+LONGEST_WINDOW = 0.25
+"""Part of a run that a window has at most: one whose speed hardly changes would want a longer one than the run."""
 _NAMES = ("time", "input_speed", "overall_dte")
 
 
@@ -72,7 +74,7 @@ class RunSignals:
             The speed does not change, so that nothing says how long a window should be.
         """
         sweep = float(self.attributes["highest_order"]) * float(np.ptp(self.speed)) / (2.0 * math.pi * self.span)
-        return sweep_matched_window(sweep)
+        return min(sweep_matched_window(sweep), LONGEST_WINDOW * self.span)
 
     def waterfall(self, window_length: float | None = None) -> Waterfall:
         """Waterfall of the overall transmission error with a window (s), the suitable one by default."""

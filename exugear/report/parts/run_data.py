@@ -84,7 +84,7 @@ def _variant(material: Material, group: RunGroup, run: VariantRun) -> dict[str, 
 
 def _highest(material: Material, spectra: Waterfall) -> int:
     """Count the spectral lines that are drawn."""
-    fundamental = max(material.context.gearbox.train.mesh_frequencies(2.0 * math.pi).values())
+    fundamental = max(material.context.gearbox.train.mesh_frequencies(2.0 * math.pi).values(), default=math.inf)
     top = TOP * fundamental * float(spectra.speed.max()) / (2.0 * math.pi)
     return max(4, int(np.searchsorted(spectra.frequency, min(top, float(spectra.frequency[-1])))))
 

@@ -81,7 +81,7 @@ function mendRuns(group, choice) {
   state.lines = state.lines.filter((line) => pageData.lines[line]);
   const moved = "resonance" in choice || "variant" in choice || "group" in choice;
   if (moved) followResonance(variant, choice);
-  if (!state.lines.length) state.lines = [0];
+  if (!state.lines.length && pageData.lines.length) state.lines = [0];
 }
 
 /**
