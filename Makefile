@@ -7,6 +7,7 @@ PYTHON ?=
 EXTRAS ?= all,dev
 VENV := .venv
 INSTALLED := $(VENV)/installed
+DOCS_INSTALLED := $(VENV)/installed-docs
 RUN := $(VENV)/bin
 PIP := $(RUN)/python -m pip --quiet --quiet --disable-pip-version-check
 
@@ -15,6 +16,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 
 CASE := cases/grc750/gearbox.toml
 RESULTS := results/grc750
+SITE := build/docs/html
 EXUGEAR := $(RUN)/exugear
 
 # The tables, and beside them runs of a moment that have the loops over time compiled: 25 s of one core, once per
@@ -61,7 +63,7 @@ FIND_PYTHON := for candidate in $(if $(PYTHON),"$(PYTHON)",python3 python3.13 py
 	echo "exugear needs Python 3.11, 3.12 or 3.13; found: $$($(or $(PYTHON),python3) --version 2>&1)." >&2; \
 	echo "Install one, or name it: make PYTHON=/path/to/python3.12 TARGET" >&2; exit 1
 
-.PHONY: help demo demo-short test validate benchmarks check lock clean
+.PHONY: help demo demo-short test validate benchmarks check docs lock clean
 
 help:
 	@echo "make demo        GRC 750 from gear data to waterfalls, modes and a report, into $(RESULTS)"
@@ -70,6 +72,7 @@ help:
 	@echo "make validate    the long comparisons with references"
 	@echo "make benchmarks  what all of it costs, into benchmarks/results.md and what README and docs quote"
 	@echo "make check       ruff and mypy"
+	@echo "make docs        the documentation site, with its examples run, into $(SITE)"
 	@echo "make lock        renew requirements.lock from what installs today"
 	@echo "make clean       remove all that make made, results and $(VENV) too"
 
@@ -79,6 +82,10 @@ $(INSTALLED): pyproject.toml requirements.lock
 		echo "No virtual environment: on Debian and Ubuntu install the package python3-venv." >&2; exit 1; }
 	@echo "Installing exugear[$(EXTRAS)] into $(VENV); this takes a minute or two."
 	@$(PIP) install --constraint requirements.lock --editable ".[$(EXTRAS)]"
+	@touch $@
+
+$(DOCS_INSTALLED): $(INSTALLED)
+	@$(PIP) install --constraint requirements.lock --editable ".[$(EXTRAS),docs]"
 	@touch $@
 
 demo: $(INSTALLED)
@@ -106,14 +113,24 @@ check: $(INSTALLED)
 	$(RUN)/ruff check .
 	$(RUN)/mypy
 
+# Warnings are errors. Examples run again when a source of the packages changed; their tables stay in examples/results.
+docs: $(DOCS_INSTALLED)
+	$(call begin,$(SITE))
+	$(RUN)/python -m sphinx --quiet --fail-on-warning --keep-going --jobs auto \
+		--doctree-dir build/docs/doctrees --builder html docs $(SITE)
+	$(RUN)/python docs/tools/check_site.py $(SITE)
+	$(RUN)/python docs/tools/check_spelling.py
+	$(call end,$(SITE))
+
 lock:
 	@python=$$($(FIND_PYTHON)) || exit 1; "$$python" -m venv --clear $(VENV)-lock
-	$(VENV)-lock/bin/python -m pip --quiet --quiet install ".[all,dev]"
+	$(VENV)-lock/bin/python -m pip --quiet --quiet install ".[all,dev,docs]"
 	{ echo "# Versions the tests ran with (make lock); pip takes them as constraints."; \
 	$(VENV)-lock/bin/python -m pip freeze --exclude exugear; } > requirements.lock.new
 	mv requirements.lock.new requirements.lock
 	rm -rf $(VENV)-lock
 
 clean:
+	rm -rf docs/elsewhere docs/gallery docs/reference/rooms docs/reference/command_line.md examples/results
 	rm -rf $(VENV) $(VENV)-lock results build *.egg-info .pytest_cache .mypy_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
