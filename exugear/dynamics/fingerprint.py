@@ -39,7 +39,8 @@ def input_hash(assembly: Assembly, load_case: str | None = None) -> str:
     content = {
         "method_version": RUN if load_case else MODES,
         "reduction_version": REDUCTION if assembly.elastic_bodies else None,
-        "gearbox": gearbox.content,
+        # What acts over a life, and how parts are rated, changes nothing in the equations.
+        "gearbox": {key: value for key, value in gearbox.content.items() if key not in ("loads", "rating")},
         "variant": assembly.variant,
         "law": assembly.mesh_law,
         "inertias": assembly.inertias,

@@ -16,6 +16,7 @@ from exugear.model.sections.bodies import BodySection
 from exugear.model.sections.connections import BearingSection, CouplingSection, JointSection, MeshSection, MountSection
 from exugear.model.sections.entries import LONGEST_VALUE, MOST_ENTRIES, Entries, FileName, Name, Section, Text
 from exugear.model.sections.gears import DeviationSection, GearSection, PairSection, PinSection
+from exugear.model.sections.loads import LoadsSection, RatingSection
 
 
 class LoadCaseSection(Section):
@@ -207,6 +208,10 @@ class CaseFile(Section):
     """What a report looks for."""
     ste: SteSection = SteSection()
     """Tables of the transmission error."""
+    loads: LoadsSection | None = None
+    """Loads over the life of the gearbox."""
+    rating: RatingSection | None = None
+    """How gears are rated."""
 
     def __repr__(self) -> str:
         """Return one short line: the title, and how many entries the tables have."""

@@ -62,7 +62,7 @@ def teeth_of(model: Model, places: Places, bodies: Bodies, notes: Notes) -> Teet
     RexsError
         All that keeps stages from being gear pairs.
     """
-    first = _firsts(model, places, bodies)
+    first = first_of_planets(model, places, bodies)
     met: dict[frozenset[int], tuple[Component, list[Component]]] = {}
     for relation in model.relations_of("stage"):
         with notes.faults.gathered():
@@ -101,7 +101,7 @@ def teeth_of(model: Model, places: Places, bodies: Bodies, notes: Notes) -> Teet
     )
 
 
-def _firsts(model: Model, places: Places, bodies: Bodies) -> dict[int, int]:
+def first_of_planets(model: Model, places: Places, bodies: Bodies) -> dict[int, int]:
     """Map each planet's gear to that of the first planet which is like it, by their numbers."""
 
     def ordered(parts: Iterable[Component]) -> list[int]:

@@ -148,7 +148,7 @@ def _placed(places: Places, part: Component, body: Body, on: Body | None, inside
     if on is not None and not on.fixed:
         entries["on"] = Entry(on.name)
     entries["z_mm"] = read(places.position(part)[2], "support_vector")
-    return Block(str(part), entries, inside)
+    return Block(str(part), entries, inside, part.number)
 
 
 def _support(model: Model, part: Component, sense: int, notes: Notes) -> dict[str, Block]:
