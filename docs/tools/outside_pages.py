@@ -14,16 +14,28 @@ from sphinx.application import Sphinx
 
 DOCS = Path(__file__).parent.parent
 ROOT = DOCS.parent
-PAGES = {
-    "benchmarks/results.md": "elsewhere/performance.md",
-    "benchmarks/README.md": "elsewhere/benchmarks.md",
-    "benchmarks/truth/README.md": "elsewhere/truth.md",
-    "benchmarks/calculix/README.md": "elsewhere/calculix.md",
-    "benchmarks/nonlinear/README.md": "elsewhere/nonlinear.md",
-    "cases/grc750/README.md": "elsewhere/grc750.md",
-    "CHANGELOG.md": "elsewhere/changes.md",
-    "README.md": "index.md",
-}
+FOLDERS = ("benchmarks", "cases")
+"""Folders whose documents are pages of the site."""
+
+
+def page_of(file: str) -> str:
+    """Page of the site that shows a document, both from the root of the project.
+
+    Examples
+    --------
+    >>> page_of("benchmarks/calculix/README.md"), page_of("CHANGELOG.md")
+    ('docs/elsewhere/benchmarks/calculix/readme.md', 'docs/elsewhere/changelog.md')
+    """
+    return f"docs/elsewhere/{file.lower()}"
+
+
+def outside_documents() -> list[str]:
+    """Documents that stand elsewhere in the project and are pages of the site."""
+    found = [file for folder in FOLDERS for file in (ROOT / folder).rglob("*.md")]
+    return ["CHANGELOG.md", *sorted(file.relative_to(ROOT).as_posix() for file in found)]
+
+
+PAGES = {"README.md": "docs/index.md", **{file: page_of(file) for file in outside_documents()}}
 """Files of the project and the pages of the site that show them."""
 LINK = re.compile(r"(\]\()([^)\s#:]+)((?:#[^)\s]*)?\))")
 
@@ -41,19 +53,21 @@ def with_links(text: str, old: Path, new: Path) -> str:
     def changed(link: re.Match[str]) -> str:
         begin, target, end = link.groups()
         place = Path(relpath(ROOT / old.parent / target, ROOT)).as_posix()
-        page = f"docs/{PAGES[place]}" if place in PAGES else place
+        page = PAGES.get(place, place)
         return f"{begin}{relpath(page, new.parent)}{end}"
 
     return LINK.sub(changed, text)
 
 
 def _write_pages(app: Sphinx) -> None:
-    for file, page in PAGES.items():
-        if page == "index.md":
-            continue
-        target = DOCS / page
-        text = with_links((ROOT / file).read_text(encoding="utf-8"), Path(file), Path("docs", page))
-        target.parent.mkdir(exist_ok=True)
+    for old in (DOCS / "elsewhere").rglob("*.md"):
+        if old.relative_to(ROOT).as_posix() not in PAGES.values():
+            old.unlink()
+    for file in outside_documents():
+        page = Path(page_of(file))
+        text = with_links((ROOT / file).read_text(encoding="utf-8"), Path(file), page)
+        target = ROOT / page
+        target.parent.mkdir(exist_ok=True, parents=True)
         if not target.is_file() or target.read_text(encoding="utf-8") != text:
             target.write_text(text, encoding="utf-8")
 
