@@ -24,6 +24,7 @@ VERBS = (
     "verbs.modes",
     "verbs.steady",
     "verbs.run",
+    "verbs.sweep",
     "verbs.loads",
     "verbs.view",
     "verbs.report",

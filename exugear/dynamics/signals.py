@@ -375,7 +375,9 @@ class SignalLayout:
         counts = np.zeros((len(MESH_TIMES), len(self.names["mesh"])))
         for signal in self.signals:
             if signal.is_mesh_time and signal.formula is not None:
-                counts[MESH_TIMES.index(signal.name)] = np.sum(signal.formula(self, rows), axis=0)
+                # Along columns as they lie counting takes four times as long.
+                passing = np.ascontiguousarray(signal.formula(self, rows).T)
+                counts[MESH_TIMES.index(signal.name)] = [np.count_nonzero(mesh) for mesh in passing]
         return counts
 
 
@@ -389,7 +391,7 @@ def signal_layout(assembly: Assembly) -> SignalLayout:
     return SignalLayout(
         signals_of(LAWS[assembly.mesh_law].signals_positions),
         {"mesh": assembly.mesh_names, "support": assembly.connector_names or joints},
-        gearbox.gears[gearbox.case.overall.output_gear].base_radius,
+        gearbox.output_radius,
     )
 
 

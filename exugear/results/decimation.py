@@ -5,32 +5,48 @@ from __future__ import annotations
 import numpy as np
 
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.compilation import summing
+from fe_ste.tools.compilation import kernel
+from fe_ste.tools.octets import SIZE, all_eight, eight, put
 
 TAPS_PER_FACTOR = 31
 """Length of the anti-aliasing filter per decimation factor: 80 dB above 0.58, flat below 0.42 of the rate."""
 
 
-@summing
+@kernel
+def filtered(rows: Floats, middle: int, column: int, taps: Floats) -> float:
+    """One column of rows around a middle one, filtered."""
+    total: float = taps[0] * rows[middle, column]
+    for k in range(1, taps.size):
+        total += taps[k] * (rows[middle - k, column] + rows[middle + k, column])
+    return total
+
+
+@kernel
+def filtered_eight(rows: Floats, middle: int, column: int, taps: Floats) -> Floats:
+    """Eight columns of rows around a middle one, filtered; in two sums, because each addition waits for the last."""
+    near, far = eight(rows[middle], column) * taps[0], all_eight(0.0)
+    for k in range(1, taps.size - 1, 2):
+        near = near + (eight(rows[middle - k], column) + eight(rows[middle + k], column)) * taps[k]
+        far = far + (eight(rows[middle - k - 1], column) + eight(rows[middle + k + 1], column)) * taps[k + 1]
+    if taps.size % 2 == 0:
+        k = taps.size - 1
+        near = near + (eight(rows[middle - k], column) + eight(rows[middle + k], column)) * taps[k]
+    total: Floats = near + far
+    return total
+
+
+@kernel
 def filter_rows(rows: Floats, taps: Floats, factor: int, out: Floats) -> None:
     """Fill out (count, columns) with every so many rows, filtered by symmetric taps of unit sum (middle first)."""
-    half = taps.size - 1
+    half, columns = taps.size - 1, rows.shape[1]
     for n in range(out.shape[0]):
         middle = n * factor + half
-        for c in range(rows.shape[1]):
-            out[n, c] = rows[middle, c]
-        # Two taps at a time: half of the traffic with `out`. The last one of an odd number stands alone.
-        for k in range(1, taps.size - 1, 2):
-            near, far = taps[k], taps[k + 1]
-            for c in range(rows.shape[1]):
-                at = rows[middle, c]
-                out[n, c] += near * ((rows[middle - k, c] - at) + (rows[middle + k, c] - at)) + far * (
-                    (rows[middle - k - 1, c] - at) + (rows[middle + k + 1, c] - at)
-                )
-        if half % 2 == 1:
-            for c in range(rows.shape[1]):
-                at = rows[middle, c]
-                out[n, c] += taps[half] * ((rows[middle - half, c] - at) + (rows[middle + half, c] - at))
+        if columns < SIZE:
+            for c in range(columns):
+                out[n, c] = filtered(rows, middle, c, taps)
+        for c in range(0, columns if columns >= SIZE else 0, SIZE):
+            first = min(c, columns - SIZE)  # the last ones lap over those before
+            put(out[n], first, filtered_eight(rows, middle, first, taps))
 
 
 def low_pass(factor: int, half: int) -> Floats:
@@ -77,6 +93,17 @@ class Decimator:
         self.taps = low_pass(factor, self.half)
         self.pending = np.zeros((0, count))
         self.pending_first = 0  # number of the raw row that `pending` starts with
+
+    def count_of(self, rows: int) -> int:
+        """Count the results of so many rows in all.
+
+        Examples
+        --------
+        >>> Decimator(2, 1).count_of(200)
+        69
+        """
+        first = self.half + -self.half % self.factor
+        return max(0, (rows - 1 - self.half - first) // self.factor + 1)
 
     def push(self, rows: Floats) -> tuple[int, Floats]:
         """Filter as far as the rows reach: number of the raw row of the first result, and the results."""

@@ -173,8 +173,8 @@ class RunPieces:
         self.lengths = {name: self.lengths[name] + len(piece.arrays[name]) for name in GROWING}
         self.lengths["pending"] = len(piece.arrays["state_pending"])
 
-    def append(self, times: Floats, rows: Floats, balance_times: Floats, balances: Floats, state: Checkpoint) -> None:
-        """Write a piece.
+    def append(self, times: Floats, rows: Floats, balance_times: Floats, balances: Floats, state: Checkpoint) -> Piece:
+        """Write a piece and return it.
 
         Parameters
         ----------
@@ -209,6 +209,7 @@ class RunPieces:
         piece = Piece(arrays, self.attributes, names, self._checksum)
         path = _piece_path(self.folder, len(self.paths) + 1)
         self._count(path, piece, piece.write(path))
+        return piece
 
     def last_checkpoint(self) -> Checkpoint:
         """Read the state that the last piece was left with."""

@@ -1,14 +1,15 @@
-"""The file of a run: its pieces joined to netCDF when it is complete, and read back, whole or in pieces.
+"""The file of a run: it grows beside the pieces of the run, and is read back, whole or in pieces.
 
-A run in progress, or one that was stopped, is the folder ``run.partial`` (`exugear.results.pieces`). When it is
-complete the pieces are joined into ``run.nc``. `load_run` reads both.
+A run in progress, or one that was stopped, is the folder ``run.partial`` (`exugear.results.pieces`). ``run.nc`` grows
+in it, beside the pieces, and takes its place when the run is complete (`RunFile`). `load_run` reads both.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping
+from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import h5netcdf
 import numpy as np
@@ -29,8 +30,6 @@ PARTIAL_NAME = "run.partial"
 """Folder with the pieces of a run that is not complete."""
 EARLIER_PARTIAL_NAME = "run.partial.nc"
 """What an earlier version wrote instead; it can be neither trusted nor gone on with."""
-STRETCH_BYTES = 16_000_000
-"""What is read of pieces before it is written to the whole: writing costs by the call, not by the byte."""
 TEXT = np.dtype("O", metadata={"vlen": str})
 """Text of any length, as HDF5 stores it."""
 _LAYOUT = Layout(
@@ -41,76 +40,134 @@ _LAYOUT = Layout(
 )
 
 
-def join_pieces(pieces: RunPieces, path: Path) -> None:
-    """Join the pieces of a run into one file, a few in memory at a time, and remove them.
+class RunFile:
+    """The file of a run, which grows while the run goes on; as a context manager it removes what is not finished.
 
-    Raises
-    ------
-    OSError
-        The disk is full, say; the pieces are kept.
+    Samples come to their places as the pieces are written, so that little is left to do at the end. Until it is
+    finished nothing can go on from this file: that is what pieces are for.
+
+    Parameters
+    ----------
+    path : Path
+        Its place when it is finished; until then it is in the folder of the pieces.
+    pieces : RunPieces
+        Of the run; what a run that was stopped has left is taken over from their files.
+    samples : int
+        How many there are of each signal in the whole run.
     """
-    with replacement(path, pieces.folder) as raw:
-        target = ErrorKeeper(raw)
-        with h5netcdf.File(target, "w") as whole:
-            _copy_pieces(pieces, whole, target)
-        target.check()
-        seal(raw)
-    discard_pieces(pieces.folder)
 
+    def __init__(self, path: Path, pieces: RunPieces, samples: int) -> None:
+        self._path = path
+        self._pieces = pieces
+        self._samples = samples
+        self._written = self._taken = 0
+        self._last: Piece | None = None
+        self._lines: list[Mapping[str, NDArray[Any]]] = []
+        self._open = ExitStack()
+        self._raw: IO[bytes]
+        self._target: ErrorKeeper
+        self._file: h5netcdf.File
 
-def _copy_pieces(pieces: RunPieces, whole: h5netcdf.File, target: ErrorKeeper) -> None:
-    last, _ = Piece.read(pieces.paths[-1])
-    _define(whole, last, pieces.attributes, pieces.lengths)
-    for name, values in last.arrays.items():
-        if values.size and VARIABLES[name].dimensions[0] not in GROWING:
-            whole.variables[name][:] = values
-    growing = [name for name in last.arrays if VARIABLES[name].dimensions[0] in GROWING]
-    done = dict.fromkeys(GROWING, 0)
-    for stretch in _stretches(pieces.paths, growing):
-        for name, values in stretch.items():
-            start = done[VARIABLES[name].dimensions[0]]
+    def __enter__(self) -> RunFile:
+        """Leave the disk alone: the file is made with the first piece."""
+        return self
+
+    def __exit__(self, *raised: Any) -> None:
+        """Remove the file, unless it is finished."""
+        with suppress(_Unfinished):
+            self._open.__exit__(*(raised if raised[0] else (_Unfinished, _Unfinished(), None)))
+
+    def add(self, piece: Piece) -> None:
+        """Take over the piece that was written last.
+
+        Raises
+        ------
+        OSError
+            The disk is full, say; the pieces are kept.
+        """
+        self._take_over(len(self._pieces.paths) - 1)
+        self._take(piece)
+
+    def finish(self) -> None:
+        """Write what the end alone tells, give the file its name and remove the pieces.
+
+        Raises
+        ------
+        OSError
+            As `add`.
+        """
+        self._take_over(len(self._pieces.paths))
+        if self._last is None or self._written != self._samples:
+            raise ValueError(f"{self._written} samples were written of {self._samples}")
+        for key, value in self._pieces.attributes.items():
+            self._file.attrs[key] = value
+        rest = {name: values for name, values in self._last.arrays.items() if _dimension(name) != "time"}
+        for name in rest:
+            if _dimension(name) in GROWING:
+                rest[name] = np.concatenate([lines[name] for lines in self._lines])
+        _define(self._file, rest)
+        for name, values in rest.items():
             if values.size:
-                whole.variables[name][start : start + len(values)] = values
-        done = {name: done[name] + len(stretch[name]) for name in GROWING}
-        target.check()
+                self._file.variables[name][:] = values
+        self._file.close()
+        self._target.check()
+        seal(self._raw)
+        self._open.close()
+        discard_pieces(self._pieces.folder)
+
+    def _take_over(self, pieces: int) -> None:
+        """Take so many pieces from their files, as far as they are not taken yet."""
+        for path in self._pieces.paths[self._taken : pieces]:
+            self._take(Piece.read(path)[0])
+
+    def _take(self, piece: Piece) -> None:
+        if self._last is None:
+            self._begin(piece)
+        samples = {name: values for name, values in piece.arrays.items() if _dimension(name) == "time"}
+        end = self._written + len(samples["time"])
+        for name, values in samples.items():
+            if values.size:
+                self._file.variables[name][self._written : end] = values
+        self._target.check()
+        self._lines.append({name: values for name, values in piece.arrays.items() if _dimension(name) in GROWING[1:]})
+        self._last, self._written, self._taken = piece, end, self._taken + 1
+
+    def _begin(self, piece: Piece) -> None:
+        """Make the file with the names that a piece has, and room for all samples."""
+        self._raw = self._open.enter_context(replacement(self._path, self._pieces.folder))
+        self._target = ErrorKeeper(self._raw)
+        self._file = self._open.enter_context(h5netcdf.File(self._target, "w"))
+        for dimension, names in piece.names.items():
+            self._file.dimensions[dimension] = len(names) or None
+            made = self._file.create_variable(dimension, (dimension,), TEXT)
+            if names:
+                made[:] = np.array(names, dtype=object)
+        self._file.dimensions["time"] = self._samples
+        _define(self._file, {name: values for name, values in piece.arrays.items() if _dimension(name) == "time"})
 
 
-def _stretches(paths: Iterable[Path], names: Sequence[str]) -> Iterator[dict[str, NDArray[Any]]]:
-    """Join some variables of pieces, as many pieces at a time as fit into the memory set aside for it."""
-    together: list[Mapping[str, NDArray[Any]]] = []
-    size = 0
-    for path in paths:
-        piece, _ = Piece.read(path, names)
-        together.append(piece.arrays)
-        size += sum(values.nbytes for values in piece.arrays.values())
-        if size >= STRETCH_BYTES:
-            yield {name: np.concatenate([arrays[name] for arrays in together]) for name in names}
-            together, size = [], 0
-    if together:
-        yield {name: np.concatenate([arrays[name] for arrays in together]) for name in names}
+class _Unfinished(Exception):
+    """What ends a file that is not to be kept."""
 
 
-def _define(file: h5netcdf.File, piece: Piece, attributes: Mapping[str, Any], lengths: Mapping[str, int]) -> None:
-    """Define the variables of a whole run of so many samples, with the other dimensions of a piece."""
-    sizes = {name: len(names) for name, names in piece.names.items()}
-    for name, values in piece.arrays.items():
-        sizes |= dict(zip(VARIABLES[name].dimensions, values.shape, strict=True))
-    # What has no length must be able to grow: netCDF knows no empty dimension.
-    file.dimensions = {name: size or None for name, size in {**sizes, **lengths}.items()}
-    for key, value in attributes.items():
-        file.attrs[key] = value
-    for name, variable in VARIABLES.items():
-        if name not in piece.arrays:
-            continue
+def _dimension(name: str) -> str:
+    """First dimension of a variable."""
+    return VARIABLES[name].dimensions[0]
+
+
+def _define(file: h5netcdf.File, arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Define variables like these, with the dimensions that are not there yet."""
+    for name, values in arrays.items():
+        variable = VARIABLES[name]
+        for dimension, size in zip(variable.dimensions, values.shape, strict=True):
+            if dimension not in file.dimensions:
+                # What has no length must be able to grow: netCDF knows no empty dimension.
+                file.dimensions[dimension] = size or None
         shape = [file.dimensions[dimension].size for dimension in variable.dimensions]
         chunks = None if all(shape) else tuple(max(1, size) for size in shape)
         made = file.create_variable(name, variable.dimensions, variable.kind, chunks=chunks)
         for key, words in variable.attributes.items():
             made.attrs[key] = words
-    for dimension, names in piece.names.items():
-        made = file.create_variable(dimension, (dimension,), TEXT)
-        if names:
-            made[:] = np.array(names, dtype=object)
 
 
 def load_run(path: str | Path, names: Iterable[str] | None = None) -> xr.Dataset:

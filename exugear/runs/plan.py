@@ -12,6 +12,7 @@ from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.fingerprint import input_hash
 from exugear.model.parts import LoadCase
 from exugear.model.versions import RUN
+from exugear.results.decimation import Decimator
 from exugear.results.run_file import FINAL_NAME, PARTIAL_NAME
 from exugear.runs.extent import too_fine
 from exugear.runs.outcome import RunError
@@ -79,6 +80,11 @@ class RunPlan:
         return self.steps * self.step
 
     @property
+    def samples(self) -> int:
+        """Number of samples that the file will hold."""
+        return Decimator(self.steps_per_sample, 0).count_of(self.steps + 1)
+
+    @property
     def is_implicit(self) -> bool:
         """Whether Exudyn solves constraints, which its explicit solvers cannot."""
         return self.assembly.variant == "jointed" or bool(self.assembly.floating)
@@ -97,8 +103,8 @@ class RunPlan:
             "housing_factor": assembly.housing_factor,
             "bearing_laws": assembly.bearing_laws,
             "ratio": gearbox.train.ratio,
-            "output_base_radius": gearbox.gears[gearbox.case.overall.output_gear].base_radius,
-            "highest_order": max(gearbox.train.mesh_frequencies(2.0 * math.pi).values()),
+            "output_base_radius": gearbox.output_radius,
+            "highest_order": max(gearbox.train.mesh_frequencies(2.0 * math.pi).values(), default=1.0),
             "step": self.step,
             "band": self.band,
             "fastest_eigenvalue": self.integration.fastest_rate,

@@ -15,6 +15,7 @@ import numpy as np
 from exugear.dynamics.signals import ENERGIES, POWERS
 from exugear.results.decimation import Decimator
 from exugear.results.pieces import Checkpoint
+from exugear.results.run_file import RunFile
 from exugear.runs.account import EnergyAccount
 from exugear.runs.extent import buffer_rows
 from exugear.runs.plan import RunPlan
@@ -92,6 +93,8 @@ class Recorder:
     ----------
     plan : RunPlan
     start : RunStart
+    file : RunFile
+        The file that grows with the run.
     progress : callable, optional
         Called after each write, in the caller's thread, with the time that is on the disk, s.
 
@@ -107,11 +110,14 @@ class Recorder:
         Accelerations that a solver with a memory goes on from after the last state, the latest last.
     """
 
-    def __init__(self, plan: RunPlan, start: RunStart, progress: Callable[[float], None] | None = None) -> None:
+    def __init__(
+        self, plan: RunPlan, start: RunStart, file: RunFile, progress: Callable[[float], None] | None = None
+    ) -> None:
         self.last_time = 0.0
         self.fault = ""
         self._plan = plan
         self._start = start
+        self._file = file
         self._progress = progress
         self._judge = start.judge
         self._observer = Observer(plan.assembly, start.loads)
@@ -136,7 +142,7 @@ class Recorder:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Wait for the second thread, and give back the memory of the buffers: joining pieces needs some."""
+        """Wait for the second thread, and give back the memory of the buffers."""
         self._writer.shutdown()
         self.buffer = self._spare = StateBuffer(0, 0, 0)
 
@@ -230,7 +236,8 @@ class Recorder:
         end = float(times[-1])
         self._note_verdict(against + self._reasons(end))
         state = self._checkpoint(end, rows, past)
-        self._start.pieces.append(self._plan.step * numbers, samples, times[written], balances, state)
+        pieces = self._start.pieces
+        self._file.add(pieces.append(self._plan.step * numbers, samples, times[written], balances, state))
         buffer.clear()
         return end
 

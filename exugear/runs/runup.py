@@ -18,7 +18,7 @@ from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.signals import signal_layout
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
-from exugear.results.run_file import join_pieces
+from exugear.results.run_file import RunFile
 from exugear.runs.extent import SAMPLE_RATE, check_disk, check_duration, too_fine
 from exugear.runs.integration import integrate
 from exugear.runs.interruption import interruptible
@@ -137,9 +137,20 @@ def simulate(
 
 
 def _carry_out(plan: RunPlan, start: RunStart, progress: Callable[[Progress], None] | None) -> Run:
-    """Integrate to the end, or to the first fault or interruption, and join the pieces of a complete run."""
-    meter = ProgressMeter(start.state.step * plan.step, plan.duration, progress)
-    with Recorder(plan, start, meter.reach) as recorder, interruptible() as interruption:
+    """Integrate to the end, or to the first fault or interruption, and keep the file of a complete run."""
+    with RunFile(plan.final_path, start.pieces, plan.samples) as file:
+        meter = ProgressMeter(start.state.step * plan.step, plan.duration, progress)
+        run = _integrate(plan, start, file, meter)
+        if run.complete:
+            meter.reach(run.end)
+            start.pieces.note("complete", 1)
+            file.finish()
+    return run
+
+
+def _integrate(plan: RunPlan, start: RunStart, file: RunFile, meter: ProgressMeter) -> Run:
+    """Integrate and tell how it ended; a fault, or a limit that was passed, is raised."""
+    with Recorder(plan, start, file, meter.reach) as recorder, interruptible() as interruption:
         integrate(plan, start, recorder, interruption)
         recorder.finish()
         if recorder.fault:
@@ -153,10 +164,6 @@ def _carry_out(plan: RunPlan, start: RunStart, progress: Callable[[Progress], No
     run = Run(path, complete, recorder.last_time, meter.wall, reasons, recorder.halted)
     if run.halted:
         raise LimitError(f"{'; '.join(reasons)}; what was reached is in {plan.partial_path}", run)
-    if complete:
-        meter.reach(recorder.last_time)
-        start.pieces.note("complete", 1)
-        join_pieces(start.pieces, plan.final_path)
     return run
 
 

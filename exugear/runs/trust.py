@@ -160,11 +160,11 @@ class Judge:
         # A run that diverges passes through numbers whose sums overflow: infinite or not a number, they are too large.
         with np.errstate(over="ignore", invalid="ignore"):
             self._see_energy(account_times, account)
-            spins = np.abs(v[:, self._spins])
-            self._keep(RIM, times, spins, self._radii, self.limits.rim_speed_stopped)
-            self._keep(SPEED, times, spins, self._radii / self._allowed, 1.0)
-            given_way = np.maximum(deflections, -deflections - self._gaps)
-            self._keep(DEFLECTION, times, given_way, 1.0 / self._heights, self.limits.deflection_marked)
+            spins = v.T[self._spins]
+            self._keep(RIM, times, spins, 0.0, self._radii, self.limits.rim_speed_stopped)
+            self._keep(SPEED, times, spins, 0.0, self._radii / self._allowed, 1.0)
+            given_way = np.ascontiguousarray(deflections.T)
+            self._keep(DEFLECTION, times, given_way, self._gaps, 1.0 / self._heights, self.limits.deflection_marked)
 
     def _see_energy(self, times: Floats, lines: Floats) -> None:
         start, scale = self.figures[ACCOUNT, [AT_START, SCALE]]
@@ -172,17 +172,22 @@ class Judge:
             start, scale = lines[0, KINETIC] + lines[0, ELASTIC], 0.0
         left, scales = energy_left_over(lines, start, scale)
         self.figures[ACCOUNT, [AT_START, SCALE]] = start, scales[-1]
-        self._keep(ENERGY, times, left[:, None], np.ones(1), self.limits.energy_marked)
+        self._keep(ENERGY, times, left[None], 0.0, np.ones(1), self.limits.energy_marked)
 
-    def _keep(self, row: int, times: Floats, values: Floats, scales: Floats, limit: float) -> None:
-        """Remember the largest of values (n, bodies or meshes) times scales, and when and where one passes a limit."""
+    def _keep(
+        self, row: int, times: Floats, values: Floats, gaps: Floats | float, scales: Floats, limit: float
+    ) -> None:
+        """Remember how large values become, and when and where one first passes a limit.
+
+        Values (bodies or meshes, n) count with either sign, negative ones without a gap, each row times its scale.
+        """
         if not values.size:
             return
-        most = (values.max(axis=0) * scales).max()
+        most = (np.maximum(values.max(axis=1), -values.min(axis=1) - gaps) * scales).max()
         if most <= limit:  # not so if any is no number
             self.figures[row, LARGEST] = max(self.figures[row, LARGEST], most)
             return
-        values = values * scales
+        values = (np.maximum(values.T, -values.T - gaps)) * scales
         known = np.where(np.isnan(values), np.inf, values)
         largest, since, _ = self.figures[row]
         self.figures[row, LARGEST] = max(largest, known.max())

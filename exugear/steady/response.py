@@ -76,15 +76,14 @@ def linear_response(gearset: Gearset, interface: Interface) -> Response:
 
 def transmission_errors(gearset: Gearset, interface: Interface) -> Complexes:
     """Find the forces (n, m, 1) that static transmission errors make of the mean stiffness, N; see there."""
-    compliances = gearset.compliances(interface.speed)
-    mean, static = gearset.waves.mean_stiffness, interface.ports.static[:, DEFLECTION]
-    excess = np.zeros((len(gearset.lines.index), len(static)), dtype=complex)
+    errors = _harmonics_of_errors(gearset, interface.ports, interface.speed)
+    excess = np.zeros((len(gearset.lines.index), len(errors)), dtype=complex)
     for n, wave in enumerate(gearset.waves.waves):
         alone = np.zeros((gearset.harmonics + 1, gearset.lines.index.shape[1]), dtype=np.int64)
         alone[:, wave.base] = np.arange(gearset.harmonics + 1)
         at, mirrored = gearset.lines.find(alone)
         use = (at > 0) & ~mirrored
-        excess[at[use], n] = -(mean[n] ** 2) * static[n] * compliances[n, use]
+        excess[at[use], n] = -gearset.waves.mean_stiffness[n] * errors[n, use]
     return excess[..., None]
 
 
@@ -93,18 +92,27 @@ def transmission_error_line(gearset: Gearset, ports: MeshPorts, speed: float, li
     multiples = gearset.lines.index[line]
     base = int(np.flatnonzero(multiples)[0])
     harmonic = int(multiples[base])
-    mean, static = gearset.waves.mean_stiffness, ports.static[:, DEFLECTION]
     own = np.array([wave.base == base for wave in gearset.waves.waves])
-    compliances = gearset.by_angle(gearset.cycle_compliances, ports.positions, speed)[:, harmonic]
-    return np.asarray(-(mean**2) * static * compliances * own)
+    errors = _harmonics_of_errors(gearset, ports, speed)[:, harmonic]
+    return np.asarray(-gearset.waves.mean_stiffness * errors * own)
+
+
+def _harmonics_of_errors(gearset: Gearset, ports: MeshPorts, speed: float) -> Complexes:
+    """Harmonics (m, h + 1) of the static transmission errors by the bases' angles, m; the first is no error."""
+    force = gearset.waves.mean_stiffness * ports.static[:, DEFLECTION]
+    compliances = gearset.by_angle(gearset.cycle_compliances, ports.positions, speed)
+    ahead = gearset.slopes(compliances, speed)
+    return np.asarray(force[:, None] * compliances + force[gearset.mean_waves, None] * ahead)
 
 
 def parametric_response(gearset: Gearset, interface: Interface) -> Response:
     """Response to stiffness that varies with the position in the mesh cycle, this moving with the mean speed alone."""
     coefficients, mean = gearset.coefficients(interface.speed), gearset.waves.mean_stiffness
+    slopes, means = gearset.slopes(coefficients, interface.speed), gearset.mean_waves
 
     def forces(deflection: Complexes) -> Complexes:
-        return np.asarray(gearset.stretched(coefficients, deflection) - mean * deflection)
+        found = gearset.stretched(coefficients, deflection) - mean * deflection
+        return np.asarray(found + gearset.stretched(slopes, deflection[:, means]))
 
     def apply(deflection: Complexes) -> Complexes:
         return np.asarray(deflection - _answer(interface, forces(deflection)))
@@ -153,10 +161,9 @@ def dissipated_and_given(gearset: Gearset, response: Response) -> tuple[float, f
     interface, motion = response.interface, response.motion
     w, moving = interface.frequencies[1:], motion[1:]
     damping, stiffness = gearset.system.damping_at(interface.speed), gearset.system.stiffness_at(interface.speed)
-    taken = 2.0 * float(np.sum(w**2 * np.real(np.einsum("ns,st,nt->n", moving.conj(), damping, moving))))
+    rates = 1j * w[:, None] * moving
     # A stiffness that is not symmetric takes power, too.
-    taken += 2.0 * float(np.sum(w * np.imag(np.einsum("ns,st,nt->n", moving.conj(), stiffness, moving))))
+    taken = 2.0 * float(np.sum((rates.conj() * (rates @ damping.T + moving @ stiffness.T)).real))
     ports = interface.ports
-    along = np.einsum("ns,mfs->nmf", moving, ports.forces) * gearset.waves.weights[:, None]
-    rates = 1j * w[:, None, None] * along
-    return taken, -2.0 * float(np.sum(np.real(response.excess[1:] * np.conj(rates))))
+    along = np.tensordot(rates, ports.forces, axes=(1, 2)) * gearset.waves.weights[:, None]
+    return taken, -2.0 * float(np.sum((response.excess[1:] * along.conj()).real))

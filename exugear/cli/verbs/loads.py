@@ -21,7 +21,7 @@ def loads(
     scripts: ScriptsOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Read the files of section [loads], and tell what each mesh and bearing sees of them.
+    """Read the files that section ``loads`` names, and tell what each mesh and bearing sees of them.
 
     No tables are needed. Writes load duration distributions as CSV, and a picture of them.
     """

@@ -60,5 +60,5 @@ class Observer:
 
     def complete(self, q: Floats, v: Floats, signals: Floats) -> None:
         """Fill those signals (samples, columns) that states q, v (samples, size) have by themselves."""
-        signals[:, self.layout["input_speed"]] = v[:, [self._input]]
-        signals[:, self.layout["overall_dte_angle"]] = (q @ self._overall)[:, None]
+        signals[:, self.layout["input_speed"].start] = v[:, self._input]
+        signals[:, self.layout["overall_dte_angle"].start] = q @ self._overall

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from exugear.campbell.campbell import modes_over_speed
 from exugear.dynamics.assemble import assemble
 from exugear.model.choice import Choice
 from exugear.steady.contributions import contributions, loudest_near
@@ -24,7 +25,8 @@ def gearset(grc, stiffness):
 
 @pytest.fixture(scope="module")
 def peak(gearset):
-    crossing = crossings(gearset, *RANGE, lambda interface: transmission_errors(gearset, interface))[0]
+    tracks = modes_over_speed(gearset.system, *RANGE, 3e3)
+    crossing = crossings(gearset, tracks, lambda interface: transmission_errors(gearset, interface))[0]
     return loudest_near(gearset, crossing.speed, 2.0 * crossing.damping, crossing.line), crossing.line
 
 
