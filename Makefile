@@ -7,6 +7,7 @@ PYTHON ?=
 EXTRAS ?= all,dev
 VENV := .venv
 INSTALLED := $(VENV)/installed
+DOCS_INSTALLED := $(VENV)/installed-docs
 RUN := $(VENV)/bin
 WEB_VENV := $(VENV)-web
 NODE := 24.19.0
@@ -20,6 +21,7 @@ SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist loadfile
 
 CASE := cases/grc750/gearbox.toml
 RESULTS := results/grc750
+SITE := build/docs/html
 EXUGEAR := $(RUN)/exugear
 
 # The tables, and beside them runs of a moment that have the loops over time compiled: 25 s of one core, once per
@@ -66,7 +68,7 @@ FIND_PYTHON := for candidate in $(if $(PYTHON),"$(PYTHON)",python3 python3.13 py
 	echo "exugear needs Python 3.11, 3.12 or 3.13; found: $$($(or $(PYTHON),python3) --version 2>&1)." >&2; \
 	echo "Install one, or name it: make PYTHON=/path/to/python3.12 TARGET" >&2; exit 1
 
-.PHONY: help demo demo-short test validate benchmarks check check-web vendor-web lock clean
+.PHONY: help demo demo-short test validate benchmarks check check-web vendor-web docs lock clean
 
 help:
 	@echo "make demo        GRC 750 from gear data to waterfalls, modes and a report, into $(RESULTS)"
@@ -77,6 +79,7 @@ help:
 	@echo "make check       ruff and mypy"
 	@echo "make check-web   the pages' scripts: linted, types checked; with a node of its own"
 	@echo "make vendor-web  renew the libraries in the pages from npm, at the versions that web/package.json pins"
+	@echo "make docs        the documentation site, with its examples run, into $(SITE)"
 	@echo "make lock        renew requirements.lock from what installs today"
 	@echo "make clean       remove all that make made, results and $(VENV) too"
 
@@ -86,6 +89,10 @@ $(INSTALLED): pyproject.toml requirements.lock
 		echo "No virtual environment: on Debian and Ubuntu install the package python3-venv." >&2; exit 1; }
 	@echo "Installing exugear[$(EXTRAS)] into $(VENV); this takes a minute or two."
 	@$(PIP) install --constraint requirements.lock --editable ".[$(EXTRAS)]"
+	@touch $@
+
+$(DOCS_INSTALLED): $(INSTALLED)
+	@$(PIP) install --constraint requirements.lock --editable ".[$(EXTRAS),docs]"
 	@touch $@
 
 demo: $(INSTALLED)
@@ -126,9 +133,18 @@ check-web: $(WEB_VENV)/installed
 vendor-web: $(WEB_VENV)/installed
 	cd web && PATH="$(CURDIR)/$(WEB_VENV)/bin:$$PATH" npm run --silent vendor
 
+# Warnings are errors. Examples run again when a source of the packages changed; their tables stay in examples/results.
+docs: $(DOCS_INSTALLED)
+	$(call begin,$(SITE))
+	$(RUN)/python -m sphinx --quiet --fail-on-warning --keep-going --jobs auto \
+		--doctree-dir build/docs/doctrees --builder html docs $(SITE)
+	$(RUN)/python docs/tools/check_site.py $(SITE)
+	$(RUN)/python docs/tools/check_spelling.py
+	$(call end,$(SITE))
+
 lock:
 	@python=$$($(FIND_PYTHON)) || exit 1; "$$python" -m venv --clear $(VENV)-lock
-	$(VENV)-lock/bin/python -m pip --quiet --quiet install ".[all,dev]"
+	$(VENV)-lock/bin/python -m pip --quiet --quiet install ".[all,dev,docs]"
 	{ echo "# Versions the tests ran with (make lock); pip takes them as constraints."; \
 	$(VENV)-lock/bin/python -m pip freeze --exclude exugear; } > requirements.lock.new
 	mv requirements.lock.new requirements.lock
@@ -136,4 +152,5 @@ lock:
 
 clean:
 	rm -rf $(VENV) $(VENV)-lock $(WEB_VENV) web/node_modules results build *.egg-info .pytest_cache .mypy_cache .ruff_cache
+	rm -rf docs/elsewhere docs/gallery docs/reference/rooms docs/reference/command_line.md examples/results
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
