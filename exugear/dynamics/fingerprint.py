@@ -11,7 +11,6 @@ from exugear.dynamics.assembly import Assembly
 from exugear.model.versions import MODES, REDUCTION, RUN
 from fe_ste.transmission_error.surface import SteSurface
 
-
 UNREAD = ("load_cases", "loads", "rating", "report", "ste")
 """Sections that change nothing in the equations: load cases but that of a run, what acts over a life and how parts are
 rated, settings of reports and of tables, whose content goes into the hash by itself."""
