@@ -122,19 +122,60 @@ class GearSection(Section):
         return self
 
 
+_Waves = Annotated[tuple[q.MeshStiffnessWave, ...], Field(strict=False, max_length=100)]
+_Cycle = Annotated[tuple[q.MeshStiffness, ...], Field(strict=False, min_length=2, max_length=2000)]
+
+
+class MeshStiffnessSection(Section):
+    """Mesh stiffness that the file states, for textbook models: no table is computed of its pair.
+
+    It is that of the whole face on the transverse line of action, force over deflection: constant, as a Fourier
+    series over the mesh cycle, or as values over it.
+    """
+
+    mean_N_per_m: q.MeshStiffness | None = None
+    """Mean over the mesh cycle; alone it is constant."""
+    cosine_N_per_m: _Waves = ()
+    """Cosine waves about the mean, first order first; at zero a loaded flank stands in the pitch point."""
+    sine_N_per_m: _Waves = ()
+    """Sine waves about the mean likewise."""
+    over_cycle_N_per_m: _Cycle | None = None
+    """Values at equal distances over the mesh cycle from zero on instead, joined by a smooth curve."""
+
+    @model_validator(mode="after")
+    def _form(self) -> MeshStiffnessSection:
+        if (self.mean_N_per_m is None) == (self.over_cycle_N_per_m is None):
+            raise ValueError("give mean_N_per_m, with waves or without, or over_cycle_N_per_m")
+        waves = [key for key in ("cosine_N_per_m", "sine_N_per_m") if getattr(self, key)]
+        if self.over_cycle_N_per_m is not None and waves:
+            raise ValueError(f"over_cycle_N_per_m stands alone: leave {', '.join(waves)} out")
+        return self
+
+
 class PairSection(Section):
-    """Two gears that mesh: `pinion` is the smaller one (the planet against a ring)."""
+    """Two gears that mesh.
+
+    Gear 1 of tables and results is the smaller one, the planet against a ring, whichever the file calls `pinion`.
+    """
 
     pinion: Name
-    """The smaller gear; the planet against a ring."""
+    """One gear, the smaller one by custom; the planet against a ring."""
     gear: Name
-    """The larger gear."""
+    """The other gear."""
     centre_distance_mm: q.LengthMm
     """Distance of the axes, positive for rings, too."""
     common_face_width_mm: q.FaceWidthMm | None = None
     """Width over which the faces touch, where that is less than the narrower face, as with chamfered ends."""
     table: bool = True
-    """Whether it gets a table of the transmission error."""
+    """Whether it gets a table of the transmission error; false where its stiffness is stated."""
+    stiffness: MeshStiffnessSection | None = None
+    """Stiffness that the file states, in place of a table."""
+
+    @model_validator(mode="after")
+    def _one_source(self) -> PairSection:
+        if self.stiffness is not None and self.table and "table" in self.model_fields_set:
+            raise ValueError("table = true makes no sense beside a stated stiffness; give one of them")
+        return self
 
 
 class DeviationSection(Section):

@@ -110,6 +110,8 @@ InertiaKgM2 = Annotated[float, Range(1e-12, 1e10, (1e-9, 1e9))]
 # Supports. A solid steel block of a metre has 2e11 N/m and 2e10 N m/rad.
 Stiffness = Annotated[float, Range(0.0, 1e13, (1.0, 1e12), "N/m or N m/rad")]
 StiffnessEntry = Annotated[float, _within(1e13, 1e12, "N/m, N or N m/rad")]
+MeshStiffness = Annotated[float, Range(1.0, 1e13, (1e5, 1e12), "N/m on the line of action, of the whole face")]
+MeshStiffnessWave = Annotated[float, _within(1e13, 1e12, "N/m on the line of action, of the whole face")]
 CouplingStiffness = Annotated[float, Range(1e-3, 1e13, (1e-2, 1e12), "N m/rad")]
 CouplingDamping = Annotated[float, Range(0.0, 1e9, (0.0, 1e7), "N m s/rad")]
 DampingTimeS = Annotated[
