@@ -72,11 +72,17 @@ def remarks(gearbox: Gearbox) -> tuple[str, ...]:
     """Tell what is possible and unusual, and what some verbs will refuse; a line each."""
     lines = list(gearbox.warnings)
     for name, spec in gearbox.pairs.items():
-        if not spec.static_torque > 0.0 and any(mesh.pair.name == name for mesh in gearbox.meshes):
+        if spec.static_torque > 0.0 or spec.stiffness:
+            continue
+        if any(mesh.pair.name == name for mesh in gearbox.meshes):
             lines.append(f"pairs.{name}: carries no torque in [static_load], and so gets no table")
-    freedoms = gearbox.train.degrees_of_freedom
-    if freedoms > 1:
-        lines.append(f"meshes: the train has {freedoms} degrees of freedom; modes are possible, runs are not yet")
+    train = gearbox.train
+    if train.degrees_of_freedom > 1:
+        others = ", ".join(train.independent[1:])
+        lines.append(
+            f"meshes: the train has {train.degrees_of_freedom} degrees of freedom; ratio, orders and speeds of the "
+            f"input hold while {others} stand{'s' if len(train.independent) == 2 else ''}"
+        )
     return tuple(lines)
 
 

@@ -391,7 +391,7 @@ def signal_layout(assembly: Assembly) -> SignalLayout:
     return SignalLayout(
         signals_of(LAWS[assembly.mesh_law].signals_positions),
         {"mesh": assembly.mesh_names, "support": assembly.connector_names or joints},
-        gearbox.gears[gearbox.case.overall.output_gear].base_radius,
+        gearbox.output_radius,
     )
 
 

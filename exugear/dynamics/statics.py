@@ -299,7 +299,7 @@ def _load_scale(applied: Floats) -> float:
 def accelerating_start(
     assembly: Assembly,
     torques: Mapping[str, float],
-    input_speed: float = 0.0,
+    speeds: float | Mapping[str, float] = 0.0,
     driven: tuple[str, float] | None = None,
 ) -> StartState:
     """State that rolls with a uniform acceleration, deflections in balance with loads and inertia forces.
@@ -308,34 +308,32 @@ def accelerating_start(
     ----------
     assembly : Assembly
     torques : mapping of body name to torque about +z, N m
-    input_speed : float
-        Speed of the overall input, rad/s; all other speeds follow by rolling.
+    speeds : float, or mapping of body name to float
+        Speed of the overall input, rad/s, from which all others follow by rolling; or of several bodies, as
+        `exugear.train.train.Train.rolling` takes them.
     driven : (body, spin rate), optional
         A body whose spin rate (rad/s2) is prescribed; the torque that this takes is solved for.
 
     Raises
     ------
     BalanceError
-        As `locked_equilibrium`; also when the train has several degrees of freedom.
+        As `locked_equilibrium`.
     """
-    gearbox = assembly.gearbox
-    reference = gearbox.case.overall.input
-    unit = gearbox.train.rolling_speeds(reference, 1.0)
-    speeds = {name: value * input_speed for name, value in unit.items()}
+    train = assembly.gearbox.train
+    speeds = train.rolling(speeds if isinstance(speeds, Mapping) else {train.input: speeds})
     applied = assembly.torque_vector(torques)
-    pinned = assembly.spin[reference]
+    pinned = [assembly.spin[name] for name in train.independent]
     direction = np.zeros(assembly.size)
-    known_rate = 0.0
     if driven is not None:
         direction[assembly.spin[driven[0]]] = 1.0
-        known_rate = driven[1] / unit[driven[0]]
     size = _load_scale(applied)
-    motions = assembly.motions
+    motions, modes = assembly.motions, train.kinematic_modes
+    # Unknown: deflections, the acceleration in each way to roll, and the torque of a drive.
+    unknown = motions.shape[1] + modes.shape[1]
 
     def split(x: Floats) -> tuple[Floats, dict[str, float], float]:
-        rate = known_rate if driven is not None else float(x[-1])
-        torque = size * float(x[-1]) if driven is not None else 0.0
-        return motions @ x[:-1], {name: value * rate for name, value in unit.items()}, torque
+        rates = dict(zip(train.spins, (modes @ x[motions.shape[1] : unknown]).tolist(), strict=True))
+        return motions @ x[: motions.shape[1]], rates, 0.0 if driven is None else size * float(x[-1])
 
     def solve(assembly: Assembly, start: Floats, meshes: MeshArrays | None) -> Floats:
         def residual(x: Floats) -> Floats:
@@ -343,13 +341,16 @@ def accelerating_start(
             v = assembly.rolling_velocity(q, speeds)
             needed = assembly.inertia_forces(q, v, assembly.rolling_acceleration(q, speeds, rates))
             unbalanced = assembly.forces(q, v, meshes) + applied + torque * direction - needed
-            return np.append(motions.T @ unbalanced, size * q[pinned])
+            off = [] if driven is None else [size * (rates[driven[0]] - driven[1])]
+            return np.concatenate([motions.T @ unbalanced, size * q[pinned], off])
 
-        # The residual is linear in the last unknown, an acceleration or a torque: no step is too long for it.
-        steps = np.append(np.full(start.size - 1, DIFFERENCE_STEP), 1.0)
+        # The residual is linear in the last unknowns, accelerations and a torque: no step is too long for them.
+        steps = np.full(start.size, 1.0)
+        steps[: motions.shape[1]] = DIFFERENCE_STEP
         derivative = _by_differences(residual, steps)
         return _newton(residual, derivative, start, np.full(start.size, size), "start of the run")
 
-    x = _from_linear(assembly, np.zeros(motions.shape[1] + 1), lambda x: split(x)[0], solve, None)
+    start = np.zeros(unknown + (driven is not None))
+    x = _from_linear(assembly, start, lambda x: split(x)[0], solve, None)
     q, rates, torque = split(x)
     return StartState(q, assembly.rolling_velocity(q, speeds), rates, torque)

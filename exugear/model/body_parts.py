@@ -47,8 +47,9 @@ def _family(origin: Origin, family: str, section: BodySection, inertias: str) ->
             f"needs the sets {', '.join(inertia_sets(origin))}"
         )
     angles = [math.radians(angle) for angle in section.planet_angles_deg] or [0.0]
+    held = section.carrier is not None and origin.case.bodies[section.carrier].fixed
     for suffix, angle in zip(origin.suffixes(family), angles, strict=True):
-        yield _body(family, suffix, section, inertia, angle, _axis(origin, family, angle))
+        yield _body(family, suffix, section, inertia, angle, _axis(origin, family, angle), held)
 
 
 def _body(
@@ -58,6 +59,7 @@ def _body(
     inertia: InertiaSection | None,
     angle: float,
     axis: tuple[float, float],
+    held: bool,
 ) -> Body:
     return Body(
         name=family + suffix,
@@ -67,11 +69,12 @@ def _body(
         mass=(inertia and inertia.mass_kg) or 0.0,
         axial=inertia.axial_kg_m2 if inertia else 0.0,
         transverse=(inertia and inertia.transverse_kg_m2) or 0.0,
-        carrier=section.carrier,
+        carrier=None if section.carrier is None or held else section.carrier,
         orbit_angle=angle if section.carrier else 0.0,
         spin_only=section.spin_only,
         fixed=section.fixed,
         wheels={gear: z * 1e-3 for gear, z in section.wheels_z_mm.items()},
+        planet_of=section.carrier,
     )
 
 
@@ -103,8 +106,8 @@ def pin_offsets(origin: Origin, bodies: Mapping[str, Body]) -> dict[str, tuple[f
 
     def offset(name: str, section: PinSection) -> tuple[str, tuple[float, float]]:
         body = bodies.get(section.body)
-        if body is None or body.carrier is None:
-            planets = ", ".join(planet.name for planet in bodies.values() if planet.carrier) or "none"
+        if body is None or body.planet_of is None:
+            planets = ", ".join(planet.name for planet in bodies.values() if planet.planet_of) or "none"
             raise origin.fault(f"pins.{name}.body = {section.body!r}: no planet; planets are {planets}")
         error = 1e-6 * complex(section.radial_um, section.tangential_um)
         error *= complex(math.cos(body.orbit_angle), math.sin(body.orbit_angle))
@@ -124,9 +127,15 @@ def load_cases(origin: Origin, spinning: Sequence[str]) -> dict[str, LoadCase]:
 
     def load_case(name: str, section: LoadCaseSection) -> LoadCase:
         key = f"load_cases.{name}"
-        for body in (*section.torques_N_m, *((section.driven_body,) if section.driven_body else ())):
+        driven = (section.driven_body,) if section.driven_body else ()
+        for body in (*section.torques_N_m, *section.start_speeds_rpm, *driven):
             if body not in spinning:
                 raise origin.fault(f"{key}: no turning body {body!r}; bodies are {', '.join(spinning)}")
+        if origin.case.overall.input in section.start_speeds_rpm:
+            raise origin.fault(
+                f"{key}.start_speeds_rpm: {origin.case.overall.input} is the overall input, whose speed is "
+                "start_speed_rpm; leave it out here"
+            )
         series = None
         if section.torque_series is not None:
             series = origin.file(f"{key}.torque_series", section.torque_series, LARGEST_TABLE)
@@ -136,6 +145,7 @@ def load_cases(origin: Origin, spinning: Sequence[str]) -> dict[str, LoadCase]:
             torque_series=series,
             duration=section.duration_s,
             start_speed=section.start_speed_rpm * RPM,
+            start_speeds={body: speed * RPM for body, speed in section.start_speeds_rpm.items()},
             driven_body=section.driven_body,
             end_speed=None if section.end_speed_rpm is None else section.end_speed_rpm * RPM,
             drive_stiffness=section.drive_stiffness_N_m_per_rad,

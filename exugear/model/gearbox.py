@@ -311,6 +311,22 @@ class Gearbox:
             fault=self.fault,
         )
 
+    @property
+    def output_radius(self) -> float:
+        """Base radius of the overall output gear, m; 1 m for a rotor without gears."""
+        name = self.case.overall.output_gear
+        return 1.0 if name is None else self.gears[name].base_radius
+
+    def start_speeds(self, case: LoadCase) -> dict[str, float]:
+        """Spins of all bodies at the start of a load case, rad/s.
+
+        Raises
+        ------
+        CaseError
+            Its speeds contradict each other.
+        """
+        return self.train.rolling({self.case.overall.input: case.start_speed, **case.start_speeds})
+
     @cached_property
     def pairs(self) -> dict[str, PairSpec]:
         """Gear pairs with the static torque on gear 1 that the train's statics give."""
@@ -318,7 +334,14 @@ class Gearbox:
         forces: dict[str, list[float]] = {}
         for mesh in self.meshes:
             forces.setdefault(mesh.pair.name, []).append(static_forces[mesh.name])
-        return gear_parts.pair_specs(self.case.pairs, self.gear_pairs, self.modifications, forces)
+        return gear_parts.pair_specs(
+            self.case.pairs, self.gear_pairs, self.modifications, forces, self.stated_stiffness
+        )
+
+    @cached_property
+    def stated_stiffness(self) -> dict[str, tuple[float, ...]]:
+        """Mesh stiffness of the pairs of which the file states it, N/m at equal distances over the mesh cycle."""
+        return gear_parts.stated_stiffness(self._origin)
 
     def table_distances(self, pair: str) -> tuple[float, ...]:
         """Centre distances (m) of a pair's table with axes.
@@ -347,7 +370,7 @@ def _stages(gearbox: Gearbox) -> tuple[tuple[Callable[[], object], ...], ...]:
         ),
         (lambda: _check_inertia_sets(gearbox), lambda: gearbox.modifications, lambda: gearbox.gear_pairs),
         (
-            lambda: refuse(checks.faults_of_overall(case.overall, gearbox.spinning)),
+            lambda: refuse(checks.faults_of_overall(case.overall, gearbox.spinning, gearbox.gears)),
             lambda: gearbox.bearings,
             lambda: gearbox.meshes,
         ),
@@ -358,6 +381,7 @@ def _stages(gearbox: Gearbox) -> tuple[tuple[Callable[[], object], ...], ...]:
             lambda: gearbox.load_cases,
             lambda: gearbox.deviations,
             lambda: gearbox.pin_offsets,
+            lambda: gearbox.stated_stiffness,
             lambda: refuse(checks.faults_of_centre_distances(gearbox.meshes, gearbox.named_bodies)),
             lambda: refuse(checks.faults_of_planets(case, gearbox.bodies(), gearbox.gears, gearbox.meshes)),
         ),
@@ -395,9 +419,15 @@ def _check_inertia_sets(gearbox: Gearbox) -> None:
 def _check_train(gearbox: Gearbox) -> None:
     """Let the static load be held, and the train roll from input to output."""
     gearbox.train.static_mesh_forces()
-    if not gearbox.meshes:
-        raise gearbox.fault("meshes: none is at work; a gearbox has at least one")
+    if gearbox.gears and not gearbox.meshes:
+        raise gearbox.fault("meshes: none is at work; gears need at least one")
     _ = gearbox.train.ratio
+    for case in gearbox.load_cases.values():
+        try:
+            gearbox.start_speeds(case)
+        except CaseError as error:
+            key = f"load_cases.{case.name}.start_speeds_rpm"
+            raise CaseError(*(f"{fault}; see {key}" for fault in error.faults)) from None
 
 
 def _elements(gearbox: Gearbox) -> dict[str, Sequence[Mesh | Bearing | Coupling]]:

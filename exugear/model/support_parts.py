@@ -62,7 +62,7 @@ def bearings(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Bearing, ...]:
                 damping=section.damping,
                 factor=origin.case.housing.factor if section.housing_factor_applies else 1.0,
                 # A planet turns about its bearing, all other bodies in theirs, unless the file says otherwise.
-                carries_outer_ring=bodies[body].carrier == on
+                carries_outer_ring=bodies[body].planet_of == on
                 if section.outer_ring is None
                 else section.outer_ring == "body",
                 law=section.law,

@@ -85,7 +85,8 @@ def plot_campbell(
         panel.set(xlim=(0.0, end_speed), ylim=(0.0, 1e-3 * top))
         panel.set(xlabel="Input speed / rpm", ylabel="Frequency / kHz")
         panel.set_title(title, loc="left")
-        figure.legend(loc="outside upper center", ncols=4)
+        if order_lines:
+            figure.legend(loc="outside upper center", ncols=4)
         return finish_figure(figure, path)
 
 

@@ -65,9 +65,12 @@ def _waterfall_picture(
     context: Context, runs: Sequence[VariantRun], comparisons: Sequence[Comparison], label: str, file_part: str
 ) -> str:
     lines = order_lines(context.gearbox)
-    fundamental = max(context.gearbox.train.mesh_frequencies(2.0 * math.pi).values())
-    fastest = max(float(run.spectra.speed.max()) for run in runs)
-    top = min(1.1 * fundamental * fastest / (2.0 * math.pi), *(float(run.spectra.frequency[-1]) for run in runs))
+    tops = [float(run.spectra.frequency[-1]) for run in runs]
+    if lines:
+        fundamental = max(context.gearbox.train.mesh_frequencies(2.0 * math.pi).values())
+        fastest = max(float(run.spectra.speed.max()) for run in runs)
+        tops.append(1.1 * fundamental * fastest / (2.0 * math.pi))
+    top = min(tops)
     marks = {c.first.variant: [finding.strongest for finding in c.only_first] for c in comparisons}
     path = context.picture_path(f"waterfall-{file_part}")
     spectra = {run.variant: run.spectra for run in runs}
@@ -126,6 +129,8 @@ def _finding_row(finding: Finding) -> dict[str, object]:
 def _levels_picture(context: Context, runs: Sequence[VariantRun], label: str, file_part: str) -> str:
     lines = order_lines(context.gearbox, 1)
     reached = [line for line in lines if any(np.isfinite(line.frequency(run.spectra.speed)).any() for run in runs)]
+    if not reached:
+        return ""
     path = context.picture_path(f"orders-{file_part}")
     plot_order_levels(
         {run.variant: run.spectra for run in runs}, reached, path, marks={run.variant: run.picks for run in runs}
@@ -135,7 +140,7 @@ def _levels_picture(context: Context, runs: Sequence[VariantRun], label: str, fi
 
 def _run_row(run: VariantRun) -> dict[str, object]:
     data = load_run(run.path, ("time", *MESH_TIMES, *BALANCE_TERMS))
-    times = [float(data[name].max()) for name in MESH_TIMES]
+    times = [float(np.max(data[name].to_numpy(), initial=0.0)) for name in MESH_TIMES]
     residual = energy_residual(data)
     end = float(data["time"][-1])
     return {

@@ -84,6 +84,8 @@ def _stored_steady(context: Context) -> Iterator[xr.Dataset]:
 def _stored_tables(context: Context) -> dict[str, MeshTable]:
     tables = {}
     for name in dict.fromkeys(mesh.pair.name for mesh in context.gearbox.meshes):
+        if name in context.gearbox.stated_stiffness:
+            continue
         try:
             tables[name] = fitting_table(context.gearbox, name, context.folder)
         except TableError as error:

@@ -10,7 +10,7 @@ differences, since these know every element; the parabolas through three speeds 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -193,6 +193,24 @@ def mean_system(assembly: Assembly, speeds: Floats) -> MeanSystem:
     return MeanSystem(frame, at, mass, dampings, stiffnesses, static, torques, drive, pinned, spread)
 
 
+def unsuitable(assembly: Assembly, elastic: Collection[str] = ()) -> str:
+    """Say why an assembly has no steady response that this room can compute; empty if nothing speaks against it.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    elastic : collection of str
+        Bodies that another variant takes as elastic, which this one does not.
+    """
+    try:
+        _check(assembly)
+        planet_sets(assembly)
+    except SteadyError as error:
+        return str(error)
+    turning = {name for body in assembly.bodies if body.carrier is not None for name in (body.name, body.carrier)}
+    return ", ".join(f"bodies.{name}: elastic and turning with planets" for name in elastic if name in turning)
+
+
 def _check(assembly: Assembly) -> None:
     """Refuse what has no constant matrices, or no single speed."""
     gearbox = assembly.gearbox
@@ -201,6 +219,8 @@ def _check(assembly: Assembly) -> None:
             f"the gear train has {gearbox.train.degrees_of_freedom} degrees of freedom; the steady response over one "
             "speed needs one: fix a body or couple two"
         )
+    if not gearbox.meshes:
+        raise SteadyError("the train has no meshes, and so nothing that excites it; run a load case in time instead")
     if assembly.travelling.first.size:
         raise SteadyError(
             "the ring gear is elastic, and meshes travel around its seats: stiffness changes with the carrier's angle, "

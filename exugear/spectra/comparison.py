@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -133,6 +134,6 @@ def compare(first: VariantRun, second: VariantRun, rule: AbsenceRule | None = No
         values = first.attributes[key], second.attributes[key]
         if values[0] != values[1]:
             raise ValueError(f"runs to compare differ in {key}: {values[0]!r} and {values[1]!r}")
-    if first.spectra.window_length != second.spectra.window_length:
+    if not math.isclose(first.spectra.window_length, second.spectra.window_length, rel_tol=1e-9):  # of rounded times
         raise ValueError("runs to compare were analysed with windows of different length")
     return Comparison(first, second, rule or AbsenceRule())

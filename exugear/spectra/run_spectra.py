@@ -30,6 +30,8 @@ from fe_ste.tools.notebook import html_table
 LEAST_SHARE = 1e-5
 """Modes with a smaller share of the overall transmission error's mobility are no match for a resonance of it."""
 
+LONGEST_WINDOW = 0.25
+"""Part of a run that a window has at most: one whose speed hardly changes would want a longer one than the run."""
 WATERFALL_NAMES = ("time", "input_speed", "overall_dte")
 """Variables of a run that its waterfall is made of."""
 
@@ -63,7 +65,7 @@ def _waterfall_of(data: xr.Dataset, path: str | Path, window_length: float | Non
         raise ValueError(f"{path}: holds {time.size} samples, too few for a spectrum; run for longer")
     if window_length is None:
         sweep = highest_order * abs(np.ptp(speed)) / (2.0 * math.pi * np.ptp(time))
-        window_length = sweep_matched_window(sweep)
+        window_length = min(sweep_matched_window(sweep), LONGEST_WINDOW * float(np.ptp(time)))
     rate = (time.size - 1) / float(np.ptp(time))
     return waterfall(values, speed, rate, window_length=window_length)
 

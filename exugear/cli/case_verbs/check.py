@@ -26,15 +26,18 @@ def check(case: CaseArgument, files_below: FilesBelowOption = None, as_json: Jso
         pairs = [_pair_summary(name, spec) for name, spec in gearbox.pairs.items()]
         loads = _load_summaries(gearbox)
         variants = {variant: lacking(gearbox, variant) for variant in USER_VARIANTS}
+        steady = _steady_lacks(gearbox, variants)
         bearings, doubts = ([], []) if variants["bushing"] else _bearing_summaries(gearbox)
         warnings = [*remarks(gearbox), *doubts]
         if as_json:
             summary = {"case": str(case), "name": gearbox.name, "ratio": gearbox.train.ratio, "pairs": pairs}
-            found = {"bearings": bearings, "load_cases": loads, "variants": variants, "warnings": warnings}
+            found = {"bearings": bearings, "load_cases": loads, "variants": variants, "steady": steady}
+            found["warnings"] = warnings
             print_json({**summary, **found})
         else:
             say(f"{gearbox.name}: no fault found, ratio {gearbox.train.ratio:.6f}")
-            print_table("Gear pairs", [_pair_row(pair) for pair in pairs])
+            if pairs:
+                print_table("Gear pairs", [_pair_row(pair) for pair in pairs])
             if loads:
                 title = f"Load cases, rolling at the overall input {gearbox.case.overall.input}"
                 print_table(title, [_load_row(one) for one in loads], ("loaded flanks",))
@@ -44,11 +47,37 @@ def check(case: CaseArgument, files_below: FilesBelowOption = None, as_json: Jso
                     say("* stated by the file, which the stiffness goes by")
             for variant, reason in variants.items():
                 say(f"variant {variant}: {f'not possible, {reason}' if reason else 'possible'}")
+            for reason in dict.fromkeys(filter(None, steady.values())):
+                names = ", ".join(variant for variant in steady if steady[variant] == reason)
+                say(f"steady response ({names}): not possible, {reason}")
             for line in warnings:
                 note(f"Warning: {line}", style="yellow")
         for one in loads:
             for doubt in one["doubts"]:
                 note(f"load_cases.{one['load_case']}: {doubt}", style="yellow")
+
+
+def _steady_lacks(gearbox: Gearbox, variants: dict[str, str]) -> dict[str, str]:
+    """Say of each variant that is possible why it has no steady response over speed; empty where it has one."""
+    from exugear.bearings.supports import elastic_names
+    from exugear.dynamics.assemble import assemble
+    from exugear.model.choice import Choice
+    from exugear.rotating.mean_system import unsuitable
+    from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+
+    law, reasons = "iso6336", {}
+    for variant in (name for name, lack in variants.items() if not lack):
+        elastic = elastic_names(gearbox) if variant == "flexible" else ()
+        # What speaks against it does not depend on finite elements: bodies stay rigid here.
+        rigid = "bushing" if variant == "flexible" else variant
+        try:
+            with model_errors():
+                assembly = assemble(gearbox, Choice(rigid, law), mesh_stiffness(gearbox, law))
+        except FailedError as error:
+            reasons[variant] = str(error)
+            continue
+        reasons[variant] = unsuitable(assembly, elastic)
+    return reasons
 
 
 def _tell_scripts(gearbox: Gearbox) -> None:

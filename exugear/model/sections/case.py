@@ -30,6 +30,8 @@ class LoadCaseSection(Section):
     """Simulated time."""
     start_speed_rpm: q.SpeedRpm = 0.0
     """Speed of the overall input at the start."""
+    start_speeds_rpm: dict[Name, q.SpeedRpm] = {}
+    """Speeds of further bodies at the start, of a train with several degrees of freedom; else its locked ones stand."""
     driven_body: Name | None = None
     """Body whose speed is prescribed; with the two keys that follow."""
     end_speed_rpm: q.SpeedRpm | None = None
@@ -60,8 +62,8 @@ class OverallSection(Section):
     """Body whose angle counts as the input."""
     output: Name
     """Body whose angle counts as the output."""
-    output_gear: Name
-    """Gear whose base circle turns the angle into a length."""
+    output_gear: Name | None = None
+    """Gear whose base circle turns the angle into a length; needed where there are gears, else it is taken at 1 m."""
 
 
 class StaticLoadSection(Section):
@@ -174,13 +176,13 @@ class CaseFile(Section):
     """What the overall transmission error compares."""
     static_load: StaticLoadSection
     """Static state that fixes loaded flanks, tables and operating points of bearings."""
-    gears: Entries[GearSection]
+    gears: Entries[GearSection] = {}
     """Toothed wheels by name."""
-    pairs: Entries[PairSection]
+    pairs: Entries[PairSection] = {}
     """Pairs of gears that mesh, by name; each gets a table."""
     bodies: Entries[BodySection]
     """Bodies by name."""
-    meshes: Entries[MeshSection]
+    meshes: Entries[MeshSection] = {}
     """Pairs at work between bodies, by name."""
     load_cases: Entries[LoadCaseSection]
     """Load cases in time, by name; the first is the default."""

@@ -76,6 +76,7 @@ RackHeight = Annotated[float, Range(0.05, 5.0, (0.4, 2.0), "in normal modules")]
 RackRadius = Annotated[float, Range(0.0, 1.0, (0.0, 0.6), "in normal modules")]
 FaceWidthMm = Annotated[float, Range(0.1, 5000.0, (1.0, 1500.0))]
 ThinningMm = Annotated[float, Range(0.0, 50.0, (0.0, 3.0))]
+ChamferMm = Annotated[float, Range(0.0, 50.0, (0.0, 10.0))]
 RollLengthMm = Annotated[float, Range(1e-3, 1000.0, (0.01, 200.0))]
 RollAngleDeg = Annotated[float, Range(1e-3, 120.0)]
 
@@ -109,6 +110,8 @@ InertiaKgM2 = Annotated[float, Range(1e-12, 1e10, (1e-9, 1e9))]
 # Supports. A solid steel block of a metre has 2e11 N/m and 2e10 N m/rad.
 Stiffness = Annotated[float, Range(0.0, 1e13, (1.0, 1e12), "N/m or N m/rad")]
 StiffnessEntry = Annotated[float, _within(1e13, 1e12, "N/m, N or N m/rad")]
+MeshStiffness = Annotated[float, Range(1.0, 1e13, (1e5, 1e12), "N/m on the line of action, of the whole face")]
+MeshStiffnessWave = Annotated[float, _within(1e13, 1e12, "N/m on the line of action, of the whole face")]
 CouplingStiffness = Annotated[float, Range(1e-3, 1e13, (1e-2, 1e12), "N m/rad")]
 CouplingDamping = Annotated[float, Range(0.0, 1e9, (0.0, 1e7), "N m s/rad")]
 DampingTimeS = Annotated[
