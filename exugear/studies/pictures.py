@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -126,9 +126,22 @@ def _draw_curves(axes: Axes, values: xr.DataArray, along: str, rows: Floats, lab
         style = "-" if place < len(COLOURS) else "--"
         axes.plot(x, rows[n], style, marker=".", color=COLOURS[place % len(COLOURS)], label=labels[n])
     if x.min() > 0.0 and x.max() / x.min() > WIDE:
-        axes.set_xscale("log")
+        _logarithmic(axes, "x")
     axes.set_xlabel(_label(values[along]))
     axes.set_ylabel(_label(values))
+
+
+def _logarithmic(axes: Axes, which: Literal["x", "y"]) -> None:
+    """Give an axis a logarithmic scale whose numbers are plain words: the style draws no formulas."""
+    from matplotlib.ticker import FuncFormatter, NullFormatter
+
+    if which == "x":
+        axes.set_xscale("log")
+    else:
+        axes.set_yscale("log")
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def _combinations(values: xr.DataArray, dimensions: list[str]) -> list[str]:
@@ -150,7 +163,7 @@ def _draw_bars(axes: Axes, values: xr.DataArray, along: str, rows: Floats, label
     axes.set_xticks(np.arange(len(words)), words)
     known = values.to_numpy()[np.isfinite(values.to_numpy())]
     if known.size and known.min() > 0.0 and known.max() / known.min() > WIDE:
-        axes.set_yscale("log")
+        _logarithmic(axes, "y")
     axes.set_xlabel(along)
     axes.set_ylabel(_label(values))
 
@@ -167,7 +180,7 @@ def _draw_spread(axes: Axes, values: xr.DataArray, along: str, rows: Floats, lab
         axes.plot(np.quantile(known, MARKED), MARKED, "o", color=colour, markersize=3.5)
     spread = values.to_numpy()[np.isfinite(values.to_numpy())]
     if spread.min() > 0.0 and spread.max() / spread.min() > WIDE:
-        axes.set_xscale("log")
+        _logarithmic(axes, "x")
     axes.set_xlabel(_label(values))
     axes.set_ylabel("share of draws below")
     axes.set_ylim(0.0, 1.0)

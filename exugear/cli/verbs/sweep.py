@@ -6,7 +6,6 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 
 from exugear.cli.case import check_choice, check_files_below, make_results_folder
@@ -223,6 +222,8 @@ def _print(study: Study, folder: Path, swept: Swept, summary: dict[str, Any]) ->
 
 def _print_front(figures: list[str], study: Study, dataset: xr.Dataset) -> None:
     """Print the case as it is and what no other point beats, spread over the front."""
+    import numpy as np
+
     names = [*study.file.parameters, *figures]
     front = dataset.isel(evaluation=dataset["on_front"].to_numpy() == 1).sortby(figures[0])
     shown = sorted({round(n) for n in np.linspace(0, front.sizes["evaluation"] - 1, SHOWN_OF_FRONT)})
