@@ -13,6 +13,9 @@ PIP := $(RUN)/python -m pip --quiet --quiet --disable-pip-version-check
 # Idle BLAS threads wait actively and slow compiled loops beside them; the command line sets the same.
 export OPENBLAS_NUM_THREADS ?= 1
 
+# Tests of one file stay together: they share tables and runs.
+SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist loadfile
+
 CASE := cases/grc750/gearbox.toml
 RESULTS := results/grc750
 EXUGEAR := $(RUN)/exugear
@@ -94,10 +97,10 @@ demo-short: $(INSTALLED)
 	$(call end,$(RESULTS)-short)
 
 test: $(INSTALLED)
-	$(RUN)/python -m pytest
+	$(RUN)/python -m pytest $(SIDE_BY_SIDE)
 
 validate: $(INSTALLED)
-	$(RUN)/python -m pytest -m validation
+	$(RUN)/python -m pytest -m validation $(SIDE_BY_SIDE)
 
 benchmarks: $(INSTALLED)
 	$(RUN)/python benchmarks/run_all.py
