@@ -132,6 +132,7 @@ def locked_equilibrium(
     torques: Mapping[str, float],
     locked: Sequence[str],
     meshes: MeshArrays | None = None,
+    about: Floats | None = None,
 ) -> Floats:
     """Coordinates at rest under torques (N m) with some spins held at zero.
 
@@ -143,6 +144,8 @@ def locked_equilibrium(
         balance, it stays where it is
     meshes : MeshArrays, optional
         Mesh arrays to use instead of the assembly's, such as its `mean_meshes`.
+    about : (size,) array, optional
+        Coordinates of the train rolled to another position, at which spins are held instead of zero.
 
     Raises
     ------
@@ -153,13 +156,14 @@ def locked_equilibrium(
     free = assembly.motions @ scipy.linalg.null_space(assembly.motions[held])
     applied = assembly.torque_vector(torques)
     rest = np.zeros(assembly.size)
+    origin = rest if about is None else about
 
     def solve(assembly: Assembly, start: Floats, meshes: MeshArrays | None) -> Floats:
         def residual(x: Floats) -> Floats:
-            return free.T @ (assembly.forces(free @ x, rest, meshes) + applied)
+            return free.T @ (assembly.forces(origin + free @ x, rest, meshes) + applied)
 
         def derivative(held: Assembly, x: Floats) -> Floats:
-            stiffness = tangent_stiffness(held, free @ x, held.meshes if meshes is None else meshes)
+            stiffness = tangent_stiffness(held, origin + free @ x, held.meshes if meshes is None else meshes)
             return np.asarray(-free.T @ stiffness @ free)
 
         def search(share: float) -> Floats:
@@ -172,8 +176,8 @@ def locked_equilibrium(
                 return search(share)
         return search(last)
 
-    x = _from_linear(assembly, np.zeros(free.shape[1]), lambda x: np.asarray(free @ x), solve, meshes)
-    return np.asarray(free @ x)
+    x = _from_linear(assembly, np.zeros(free.shape[1]), lambda x: np.asarray(origin + free @ x), solve, meshes)
+    return np.asarray(origin + free @ x)
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -54,7 +55,7 @@ def gears(origin: Origin) -> dict[str, Gear]:
 
 def _gear(name: str, section: GearSection) -> Gear:
     """Gear from its section: millimetres to metres, degrees to radians."""
-    return Gear(
+    gear = Gear(
         name=name,
         teeth=section.teeth,
         normal_module=section.normal_module_mm * 1e-3,
@@ -73,7 +74,13 @@ def _gear(name: str, section: GearSection) -> Gear:
             poissons_ratio=section.material.poissons_ratio,
             density=section.material.density_kg_per_m3,
         ),
+        tip_form_diameter=None if section.tip_form_diameter_mm is None else section.tip_form_diameter_mm * 1e-3,
+        root_form_diameter=None if section.root_form_diameter_mm is None else section.root_form_diameter_mm * 1e-3,
     )
+    if not section.tip_chamfer_mm:
+        return gear
+    height = gear.outward * section.tip_chamfer_mm * 1e-3
+    return replace(gear, tip_form_diameter=2.0 * (gear.tip_radius - height))
 
 
 def modifications(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, FlankModification]:
@@ -166,6 +173,7 @@ def gear_pairs(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, GearPair]
             pinion=first,
             gear=second,
             centre_distance=section.centre_distance_mm * 1e-3,
+            common_face_width=(None if section.common_face_width_mm is None else section.common_face_width_mm * 1e-3),
         )
 
     return part_of_each(of_section, origin.case.pairs)

@@ -102,12 +102,24 @@ class GearSection(Section):
     """Tip diameter; from rack and profile shift by default."""
     root_diameter_mm: q.LengthMm | None = None
     """Root diameter; from rack and profile shift by default."""
+    tip_form_diameter_mm: q.LengthMm | None = None
+    """Where a chamfer or rounding ends the flank at the tip (d_Fa); the tip diameter by default. Contact ends there."""
+    tip_chamfer_mm: q.ChamferMm = 0.0
+    """Height of a chamfer at the tip, instead of the form diameter there."""
+    root_form_diameter_mm: q.LengthMm | None = None
+    """Where the flank ends at the root (d_Ff), if before its fillet begins, as after grinding. Contact ends there."""
     rack: RackSection = RackSection()
     """Basic rack, ISO 53 A by default."""
     material: MaterialSection = MaterialSection()
     """Elastic material, steel by default."""
     modification: ModificationSection | None = None
     """Material removed from both flanks of every tooth."""
+
+    @model_validator(mode="after")
+    def _one_tip_form(self) -> GearSection:
+        if self.tip_form_diameter_mm is not None and self.tip_chamfer_mm:
+            raise ValueError("give tip_form_diameter_mm or tip_chamfer_mm, not both: each says where the flank ends")
+        return self
 
 
 _Waves = Annotated[tuple[q.MeshStiffnessWave, ...], Field(strict=False, max_length=100)]
@@ -152,6 +164,8 @@ class PairSection(Section):
     """The other gear."""
     centre_distance_mm: q.LengthMm
     """Distance of the axes, positive for rings, too."""
+    common_face_width_mm: q.FaceWidthMm | None = None
+    """Width over which the faces touch, where that is less than the narrower face, as with chamfered ends."""
     table: bool = True
     """Whether it gets a table of the transmission error; false where its stiffness is stated."""
     stiffness: MeshStiffnessSection | None = None

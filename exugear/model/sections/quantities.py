@@ -76,6 +76,7 @@ RackHeight = Annotated[float, Range(0.05, 5.0, (0.4, 2.0), "in normal modules")]
 RackRadius = Annotated[float, Range(0.0, 1.0, (0.0, 0.6), "in normal modules")]
 FaceWidthMm = Annotated[float, Range(0.1, 5000.0, (1.0, 1500.0))]
 ThinningMm = Annotated[float, Range(0.0, 50.0, (0.0, 3.0))]
+ChamferMm = Annotated[float, Range(0.0, 50.0, (0.0, 10.0))]
 RollLengthMm = Annotated[float, Range(1e-3, 1000.0, (0.01, 200.0))]
 RollAngleDeg = Annotated[float, Range(1e-3, 120.0)]
 
