@@ -198,13 +198,15 @@ def kept_rows(path: Path, head: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def candidates(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Each stiffness of each set with the order that rises most there, and whether it is as the reference has it."""
+    """Each stiffness of each set with the loudest order that rises as wanted, or that which rises most if none does."""
     found = []
     for row in rows:
         rigid = max((peak["rise_dB"] for peak in row["rigid"].values()), default=0.0)
         for own in row["bushing"]:
             none = {"rise_dB": 0.0, "Hz": TARGET_HZ, "m": 0.0}
-            line, peak = max(own["peaks"].items(), key=lambda item: item[1]["rise_dB"], default=("none", none))
+            risen = {name: peak for name, peak in own["peaks"].items() if peak["rise_dB"] >= WANTED}
+            by = "m" if risen else "rise_dB"
+            line, peak = max((risen or own["peaks"]).items(), key=lambda item: item[1][by], default=("none", none))
             met = peak["rise_dB"] >= WANTED > rigid
             found.append({**row["set"], "radial_N_per_m": own["radial_N_per_m"], "line": line, **peak, "met": met})
     return found
