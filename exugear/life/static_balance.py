@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.dynamics.assembly import Assembly, VariantError
-from exugear.dynamics.statics import locked_equilibrium
+from exugear.dynamics.statics import BalanceError, locked_equilibrium
 from exugear.kernels.meshes import FORCE
 from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
@@ -188,7 +188,12 @@ _State = tuple[Floats, Floats, Floats, Floats]
 def _state(assembly: Assembly, body: str, torque: float, about: Floats, wrench: Floats | None) -> _State:
     """Mesh forces and misalignments, loads and tilts of inner rings at rest."""
     locked = assembly.gearbox.case.static_load.locked
-    q = locked_equilibrium(assembly, {body: torque}, locked, assembly.mean_meshes, about, wrench)
+    try:
+        q = locked_equilibrium(assembly, {body: torque}, locked, assembly.mean_meshes, about, wrench)
+    except BalanceError as error:
+        hint = "; tables may end at a smaller load or misalignment: widen the axes of [ste]"
+        needs_axes = LAWS[assembly.mesh_law].needs_axes
+        raise BalanceError(f"under {torque:.6g} N m on {body}: {error}{hint if needs_axes else ''}") from error
     force = assembly.mesh_states(q, np.zeros_like(q), assembly.mean_meshes)[:, FORCE]
     flanks = np.array([element.flank for element in assembly.elements])
     return force, flanks * assembly.gear_positions(q)[:, 1], *_inner_rings(assembly, q)
