@@ -134,6 +134,7 @@ def locked_equilibrium(
     meshes: MeshArrays | None = None,
     about: Floats | None = None,
     other_loads: Floats | None = None,
+    near: Floats | None = None,
 ) -> Floats:
     """Coordinates at rest under torques (N m) with some spins held at zero.
 
@@ -149,6 +150,9 @@ def locked_equilibrium(
         Coordinates of the train rolled to another position, at which spins are held instead of zero.
     other_loads : (size,) array, optional
         Generalized forces beside the torques, N and N m.
+    near : (size,) array, optional
+        Coordinates from which the search begins, such as those under a similar load; by default it begins with linear
+        bearings and teeth, as it does where these lead nowhere.
 
     Raises
     ------
@@ -179,6 +183,9 @@ def locked_equilibrium(
                 return search(share)
         return search(last)
 
+    if near is not None:
+        with suppress(BalanceError):
+            return np.asarray(origin + free @ solve(assembly, free.T @ (near - origin), meshes))
     x = _from_linear(assembly, np.zeros(free.shape[1]), lambda x: np.asarray(origin + free @ x), solve, meshes)
     return np.asarray(origin + free @ x)
 

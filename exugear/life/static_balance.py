@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,6 +22,8 @@ from fe_ste.tools.arrays import Floats
 
 TORQUE_SHARES = (0.1, 0.25, 0.5, 0.75, 1.0)
 """Torques over the largest at which laws that are not linear are solved."""
+NEXT_SHARE = 0.7
+"""Share of the deflections under a torque from which the search under the next smaller one begins."""
 LONGEST_TURN = 0.02
 """Longest step, rad, in which a train is rolled to an angle."""
 
@@ -163,40 +166,58 @@ def static_balance(
     VariantError
         Loads of a hub on a body that has no place in space.
     """
-    solved, turns = _torques(torques, is_linear(assembly)), _angles(assembly, angles)
-    wrenches = [None, *_wrenches(assembly, body, np.zeros(5) if hub is None else hub)]
+    linear = is_linear(assembly)
+    solved, turns = _torques(torques, linear), _angles(assembly, angles)
+    wrenches = _wrenches(assembly, body, np.zeros(5) if hub is None else hub)
     carrier = _carrier(assembly)
     states: list[list[list[_State | None]]] = []
-    for a, turn in enumerate(turns):
+    done = 0
+    for turn in turns:
         about = rolled_coordinates(assembly, carrier, turn) if carrier else np.zeros(assembly.size)
-        row = []
-        for t, torque in enumerate(solved):
-            row.append([
-                None if n and wrench is None else _state(assembly, body, float(torque), about, wrench)
-                for n, wrench in enumerate(wrenches)
-            ])  # fmt: skip
+        row: list[list[_State | None]] = [[] for _ in solved]
+        near: Floats | None = None
+        for t in np.argsort(-np.abs(solved)).tolist():  # from the largest on: where teeth and rollers touch is known
+            torque, before = float(solved[t]), near
+            q = _at_rest(assembly, body, torque, about, None, before)
+            row[t] = [_State.of(assembly, q)]
+            for wrench in wrenches:
+                other = None if wrench is None else _at_rest(assembly, body, torque, about, wrench, q)
+                row[t].append(None if other is None else _State.of(assembly, other))
+            near = about + (q - about) * NEXT_SHARE if not linear else None
+            done += 1
             if progress is not None:
-                progress(a * len(solved) + t + 1, len(solved) * len(turns))
+                progress(done, len(solved) * len(turns))
         states.append(row)
     force, misalignment, load, tilt = (_response(states, key, hub) for key in range(4))
-    return StaticBalance(solved, turns, force, misalignment, load, tilt, is_linear(assembly))
+    return StaticBalance(solved, turns, force, misalignment, load, tilt, linear)
 
 
-_State = tuple[Floats, Floats, Floats, Floats]
-
-
-def _state(assembly: Assembly, body: str, torque: float, about: Floats, wrench: Floats | None) -> _State:
+class _State(NamedTuple):
     """Mesh forces and misalignments, loads and tilts of inner rings at rest."""
+
+    force: Floats
+    misalignment: Floats
+    load: Floats
+    tilt: Floats
+
+    @classmethod
+    def of(cls, assembly: Assembly, q: Floats) -> _State:
+        force = assembly.mesh_states(q, np.zeros_like(q), assembly.mean_meshes)[:, FORCE]
+        flanks = np.array([element.flank for element in assembly.elements])
+        return cls(force, flanks * assembly.gear_positions(q)[:, 1], *_inner_rings(assembly, q))
+
+
+def _at_rest(
+    assembly: Assembly, body: str, torque: float, about: Floats, wrench: Floats | None, near: Floats | None
+) -> Floats:
+    """Coordinates at rest, (size,)."""
     locked = assembly.gearbox.case.static_load.locked
     try:
-        q = locked_equilibrium(assembly, {body: torque}, locked, assembly.mean_meshes, about, wrench)
+        return locked_equilibrium(assembly, {body: torque}, locked, assembly.mean_meshes, about, wrench, near)
     except BalanceError as error:
         hint = "; tables may end at a smaller load or misalignment: widen the axes of [ste]"
         needs_axes = LAWS[assembly.mesh_law].needs_axes
         raise BalanceError(f"under {torque:.6g} N m on {body}: {error}{hint if needs_axes else ''}") from error
-    force = assembly.mesh_states(q, np.zeros_like(q), assembly.mean_meshes)[:, FORCE]
-    flanks = np.array([element.flank for element in assembly.elements])
-    return force, flanks * assembly.gear_positions(q)[:, 1], *_inner_rings(assembly, q)
 
 
 def _wrenches(assembly: Assembly, body: str, hub: Floats) -> list[Floats | None]:
