@@ -11,10 +11,6 @@ from exugear.dynamics.assembly import Assembly
 from exugear.model.versions import MODES, REDUCTION, RUN
 from fe_ste.transmission_error.surface import SteSurface
 
-UNREAD = ("load_cases", "loads", "rating", "report", "ste")
-"""Sections that change nothing in the equations: load cases but that of a run, what acts over a life and how parts are
-rated, settings of reports and of tables, whose content goes into the hash by itself."""
-
 
 def input_hash(assembly: Assembly, load_case: str | None = None) -> str:
     """SHA-256 of all that the equations of a variant depend on: gearbox file with its solids, choices, mesh stiffness.
@@ -43,7 +39,7 @@ def input_hash(assembly: Assembly, load_case: str | None = None) -> str:
     content = {
         "method_version": RUN if load_case else MODES,
         "reduction_version": REDUCTION if assembly.elastic_bodies else None,
-        "gearbox": {key: value for key, value in gearbox.content.items() if key not in UNREAD},
+        "gearbox": gearbox.computed_content,
         "load": gearbox.content["load_cases"][load_case] if load_case else None,
         "variant": assembly.variant,
         "law": assembly.mesh_law,

@@ -35,6 +35,11 @@ from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.tools.notebook import html_table
 
+BESIDE_EQUATIONS = ("labels", "load_cases", "loads", "operation", "rating", "report", "ste")
+"""Tables of the file that change nothing in the equations: words and speeds for pages, what acts over a life, how parts
+are rated, settings of reports and of tables, whose content goes into hashes by itself, and load cases: a run adds its
+own."""
+
 
 @dataclass(frozen=True)
 class Gearbox:
@@ -149,6 +154,11 @@ class Gearbox:
     def ste(self) -> SteSection:
         """Settings of the STE tables."""
         return self.case.ste
+
+    @property
+    def computed_content(self) -> dict[str, Any]:
+        """What was read from the file less `BESIDE_EQUATIONS`: what the equations depend on."""
+        return {key: value for key, value in self.content.items() if key not in BESIDE_EQUATIONS}
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -320,12 +320,12 @@ def test_two_bearings_without_tilt_stiffness_hold_a_shaft(case: Any) -> None:
 def test_variants_that_cannot_be_built_are_told_and_refused_before_anything_is_written(
     tmp_path: Path, cases: Any
 ) -> None:
-    content = changed(copy.deepcopy(cases[1]["spur"]), {"joints": {}})
+    content = changed(copy.deepcopy(cases[1]["spur"]), {"joints": {"joint_1": {"body": "shaft_1", "z_mm": 0.0}}})
     content["bearings"]["bearing_2"]["stiffness"] = {"radial_N_per_m": 1e8, "tilt_N_m_per_rad": 1e6}
     file = tmp_path / "case.toml"
     file.write_text(toml_text(content), encoding="utf-8")
     found = json.loads(exugear("check", file, "--json").stdout)["variants"]
-    assert found["rigid"] == "no joint holds shaft_1, shaft_2; add one under [joints]"
+    assert found["rigid"] == "no joint holds shaft_2; add one under [joints]"
     assert found["bushing"] == "body shaft_2 can move along z without resistance; add or stiffen a bearing"
     assert found["flexible"].startswith("no body is elastic")
     for variant, reason in found.items():
