@@ -5,6 +5,7 @@
 SHELL := /bin/sh
 PYTHON ?=
 EXTRAS ?= all,dev
+PROJECT_URL ?=
 VENV := .venv
 INSTALLED := $(VENV)/installed
 RUN := $(VENV)/bin
@@ -64,7 +65,7 @@ FIND_PYTHON := for candidate in $(if $(PYTHON),"$(PYTHON)",python3 python3.13 py
 	echo "exugear needs Python 3.11, 3.12 or 3.13; found: $$($(or $(PYTHON),python3) --version 2>&1)." >&2; \
 	echo "Install one, or name it: make PYTHON=/path/to/python3.12 TARGET" >&2; exit 1
 
-.PHONY: help demo demo-short test validate benchmarks check lock clean
+.PHONY: help demo demo-short test validate benchmarks check dist wheel-test lock clean
 
 help:
 	@echo "make demo        GRC 750 from gear data to waterfalls, modes and a report, into $(RESULTS)"
@@ -73,6 +74,8 @@ help:
 	@echo "make validate    the long comparisons with references"
 	@echo "make benchmarks  what all of it costs, into benchmarks/results.md and what README and docs quote"
 	@echo "make check       ruff and mypy"
+	@echo "make dist        sdist and wheel into dist; PROJECT_URL=https://... makes links and pictures absolute"
+	@echo "make wheel-test  the wheel installed and used on Python 3.11, 3.12 and 3.13, as far as they are found"
 	@echo "make lock        renew requirements.lock from what installs today"
 	@echo "make clean       remove all that make made, results and $(VENV) too"
 
@@ -81,7 +84,7 @@ $(INSTALLED): pyproject.toml requirements.lock
 	$(RUN)/python -c 'import pip' 2>/dev/null || "$$python" -m venv --clear $(VENV) || { \
 		echo "No virtual environment: on Debian and Ubuntu install the package python3-venv." >&2; exit 1; }
 	@echo "Installing exugear[$(EXTRAS)] into $(VENV); this takes a minute or two."
-	@$(PIP) install --constraint requirements.lock --editable ".[$(EXTRAS)]"
+	@$(PIP) install --constraint requirements.lock --config-settings editable_mode=compat --editable ".[$(EXTRAS)]"
 	@touch $@
 
 demo: $(INSTALLED)
@@ -109,6 +112,13 @@ check: $(INSTALLED)
 	$(RUN)/ruff check .
 	$(RUN)/mypy
 
+dist: $(INSTALLED)
+	@$(RUN)/python -c 'import build' 2>/dev/null || $(PIP) install build
+	$(RUN)/python packaging/build.py --out dist --url "$(PROJECT_URL)"
+
+wheel-test: dist
+	$(RUN)/python packaging/try_wheel.py dist/exugear-*.whl --constraint requirements.lock
+
 lock:
 	@python=$$($(FIND_PYTHON)) || exit 1; "$$python" -m venv --clear $(VENV)-lock
 	$(VENV)-lock/bin/python -m pip --quiet --quiet install ".[all,dev]"
@@ -118,5 +128,5 @@ lock:
 	rm -rf $(VENV)-lock
 
 clean:
-	rm -rf $(VENV) $(VENV)-lock results build *.egg-info .pytest_cache .mypy_cache .ruff_cache
+	rm -rf $(VENV) $(VENV)-lock results build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
