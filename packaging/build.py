@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parent.parent
 LINK = re.compile(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)")
 MADE = ("results", "dist", "build", ".git", ".ci")
 """Folders beside the sources that no distribution holds; packages may have such names."""
-LEFT_OUT = shutil.ignore_patterns(".venv*", "*.egg-info", "__pycache__", ".*_cache")
+LEFT_OUT = shutil.ignore_patterns(".venv*", "*.egg-info", "__pycache__", ".*_cache", "node_modules")
 PAGES = {"Documentation": "docs/user_guide.md", "Changelog": "CHANGELOG.md"}
 
 

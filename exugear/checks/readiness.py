@@ -57,7 +57,17 @@ def lacking(gearbox: Gearbox, variant: str) -> str:
     lack = unsupported(gearbox, variant)
     if lack or variant not in ON_BEARINGS:
         return lack
-    return free_motion(gearbox, variant) or _misplaced_factors(gearbox, variant)
+    return _misfits(gearbox, variant) or free_motion(gearbox, variant) or _misplaced_factors(gearbox, variant)
+
+
+def _misfits(gearbox: Gearbox, variant: str) -> str:
+    """Say which elastic body cannot be, or has a seat beside it: the first fault that `check_parts` tells of them."""
+    for name in elastic_names(gearbox) if variant == "flexible" else ():
+        try:
+            _build_elastic_body(gearbox, name)
+        except CaseError as error:
+            return error.faults[0].removeprefix(f"{gearbox.source}: ")
+    return ""
 
 
 def _misplaced_factors(gearbox: Gearbox, variant: str) -> str:

@@ -55,6 +55,8 @@ class BearingLife:
         C_0r over the largest static equivalent load.
     ratings : Ratings
     remarks : tuple of str
+    by_bin : array (bins,)
+        Parts of the damage by bin of torque, by L10r, or by L10 where there is none.
     """
 
     name: str
@@ -69,6 +71,7 @@ class BearingLife:
     static_safety: float
     ratings: Ratings
     remarks: tuple[str, ...]
+    by_bin: Floats
 
 
 def bearing_lives(
@@ -126,11 +129,13 @@ class _Case:
             lambda side, axial: equivalent_load(rows, section.type, side, abs(axial), ratings.static)
         )(radial, loads[..., 2])
         basic = np.vectorize(lambda load: basic_rating_life(ratings.dynamic, load, section.type))(equivalents)
-        damage = float(np.sum(share / (1e6 * basic)))
+        by_bin = np.sum(share / (1e6 * basic), axis=1)
+        damage = float(by_bin.sum())
         lives, pressure, remarks = self._reference(rows, ratings, worst)
         reference = math.nan
         if lives is not None:
-            reference = float(np.sum(share / (1e6 * _interpolated(lives, radial))))
+            by_bin = np.sum(share / (1e6 * _interpolated(lives, radial)), axis=1)
+            reference = float(by_bin.sum())
         static = max(
             equivalent_static_load(rows, section.type, math.hypot(one[0], one[1]), abs(one[2]))
             for one in worst.reshape(-1, 6)
@@ -155,6 +160,7 @@ class _Case:
             static_safety=ratings.static / static if static else math.inf,
             ratings=ratings,
             remarks=tuple(remarks),
+            by_bin=by_bin,
         )
 
     def _reference(

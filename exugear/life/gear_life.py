@@ -10,12 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from exugear.counting.duration import DurationDistribution
-from exugear.life.exposure import FLANKS, ToothExposure
+from exugear.life.dynamic_factor import DynamicFactor
 from exugear.life.static_balance import StaticBalance
+from exugear.load_spectrum.exposure import FLANKS, ToothExposure
 from exugear.model.gearbox import Gearbox
 from exugear.model.sections.loads import RatingSection, StrengthSection
 from fe_ste.geometry.gears import GearPair
@@ -32,7 +34,7 @@ from fe_ste.standards.service_life import (
     CASE_HARDENED_BENDING,
     CASE_HARDENED_CONTACT,
     LifeCurve,
-    miner_sum,
+    damages,
     safety_factor,
 )
 from fe_ste.standards.tooth_root import root_stress_factors
@@ -68,6 +70,8 @@ class FlankLife:
         Largest share of the load outside the path of contact: what tip relief would take away.
     face_load : float
         Highest over mean line load along the face at the largest load.
+    contact_by_bin, root_by_bin : array (bins,)
+        Parts of the damages by bin of torque; NaN without strength.
     """
 
     gear: str
@@ -87,6 +91,8 @@ class FlankLife:
     nominal_root: float
     outside: float
     face_load: float
+    contact_by_bin: Floats
+    root_by_bin: Floats
 
 
 def check_strengths(
@@ -118,6 +124,7 @@ def flank_lives(
     extremes: Floats,
     balance: StaticBalance,
     stresses: Mapping[str, MeshCycleStress],
+    dynamic: Mapping[str, DynamicFactor],
 ) -> tuple[FlankLife, ...]:
     """Rate all gears of pairs whose stresses are known.
 
@@ -133,6 +140,7 @@ def flank_lives(
         Torques that count for static safety alone, with partial factors, N m.
     balance : StaticBalance
     stresses : mapping of pair name to MeshCycleStress
+    dynamic : mapping of mesh family to DynamicFactor
     """
     pairs = {mesh.family: mesh.pair for mesh in gearbox.meshes}
     lives = []
@@ -144,7 +152,7 @@ def flank_lives(
             worn = np.sign(torques) == sense
             largest = np.max(sense * np.concatenate([torques, found.upper, extremes]), initial=0.0)
             if largest > 0.0:
-                case = _Case(gearbox, rating, tooth, pair, balance, stresses[pair.name], sense)
+                case = _Case(gearbox, rating, tooth, pair, balance, stresses[pair.name], dynamic[tooth.family], sense)
                 lives.append(case.life(found, torques, worn, sense * float(largest)))
     return tuple(lives)
 
@@ -159,19 +167,25 @@ class _Case:
     pair: GearPair
     balance: StaticBalance
     stress: MeshCycleStress
+    dynamic: DynamicFactor
     sense: int
 
     def life(self, found: DurationDistribution, torques: Floats, worn: Floats, largest: float) -> FlankLife:
         tooth, stress = self.tooth, self.stress
         passed = list(tooth.meshes)
-        hertz, root, _ = self._stresses(torques[worn])
+        hertz, root, _ = self._stresses(torques[worn], self.dynamic.at(found.speed[worn]))
         # Each turn meets each angle and each mesh once: a bin's cycles are shared evenly among them.
         share = tooth.cycles / (len(passed) * len(self.balance.angle))
         cycles = np.broadcast_to((found.revolutions[worn] * share)[:, None, None], hertz.shape)
-        worst_hertz, worst_root, compression = self._stresses(np.array([largest]))
+        worst_hertz, worst_root, compression = self._stresses(np.array([largest]), np.full(1, self.dynamic.largest))
         torque, tilt = self._loads(np.array([largest]))
         force = tangential_force(self.pair.pinion, float(torque.mean()) / self.pair.pinion.base_radius)
+        rated = self._rated(hertz, root, cycles, found.speed[worn], float(worst_hertz.max()), float(worst_root.max()))
+        by_bin = np.zeros((2, len(torques)))
+        by_bin[:, worn] = rated.pop("by_bin")
         return FlankLife(
+            contact_by_bin=by_bin[0],
+            root_by_bin=by_bin[1],
             gear=tooth.gear,
             family=tooth.family,
             flank=FLANKS[self.sense * tooth.flank],
@@ -183,7 +197,7 @@ class _Case:
             nominal_root=self._nominal_root(force),
             outside=float(stress.at(stress.outside, 0.0, torque, tilt).max()),
             face_load=float(stress.at(stress.face_load, 0.0, torque, tilt).max()),
-            **self._rated(hertz, root, cycles, found.speed[worn], float(worst_hertz.max()), float(worst_root.max())),
+            **rated,
         )
 
     def _loads(self, torques: Floats) -> tuple[Floats, Floats]:
@@ -193,10 +207,10 @@ class _Case:
         tilt = self.balance.at(self.balance.misalignment, torques)[..., passed]
         return force * self.pair.pinion.base_radius, tilt
 
-    def _stresses(self, torques: Floats) -> tuple[Floats, Floats, Floats]:
+    def _stresses(self, torques: Floats, dynamic: Floats) -> tuple[Floats, Floats, Floats]:
         """Contact stress, root stress and root compression of each mesh, (torques, angles, meshes), Pa."""
         torque, tilt = self._loads(torques)
-        torque = torque * self.rating.dynamic_factor
+        torque = torque * dynamic[:, None, None]
         stress, member = self.stress, self.tooth.member
         return (
             stress.at(stress.hertz, 0.5, torque, tilt),
@@ -216,25 +230,27 @@ class _Case:
 
     def _rated(
         self, hertz: Floats, root: Floats, cycles: Floats, speed: Floats, worst_hertz: float, worst_root: float
-    ) -> dict[str, float]:
+    ) -> dict[str, Any]:
         strength = self.rating.gears.get(self.tooth.gear)
         keys = ("contact_damage", "root_damage", "contact_safety", "root_safety", "contact_static", "root_static")
         if strength is None:
-            return dict.fromkeys(keys, math.nan)
+            return {**dict.fromkeys(keys, math.nan), "by_bin": np.nan}
         contact, bending = life_curves(strength)
         allowed = self._contact_strength(strength, speed)[:, None, None]
         both_ways = strength.mean_stress_factor or 1.0
         endured = 1e6 * strength.sigma_F_lim_MPa * PLAIN_TEST_GEAR * strength.root_factor * both_ways
         static = 1e6 * strength.sigma_H_lim_MPa * contact.factors[0]
+        by_contact = damages(contact, hertz / allowed, 1.0, cycles).sum(axis=(1, 2))
+        by_root = damages(bending, root, endured, cycles).sum(axis=(1, 2))
         values = (
-            miner_sum(contact, hertz / allowed, 1.0, cycles),
-            miner_sum(bending, root, endured, cycles),
+            float(by_contact.sum()),
+            float(by_root.sum()),
             safety_factor(contact, hertz / allowed, 1.0, cycles),
             safety_factor(bending, root, endured, cycles),
             static / worst_hertz,
             endured * bending.factors[0] / worst_root,
         )
-        return dict(zip(keys, values, strict=True))
+        return {**dict(zip(keys, values, strict=True)), "by_bin": np.stack([by_contact, by_root])}
 
     def _contact_strength(self, strength: StrengthSection, speed: Floats) -> Floats:
         """Pa at a life factor of one, for each speed (rad/s) of the loaded body."""

@@ -101,7 +101,9 @@ class Waterfall:
 
         The wider of one over the window's length and what the sweep of that order allows.
         """
-        rate = np.gradient(line.frequency(self.speed), self.time)
+        frequency = line.frequency(self.speed)
+        # One frame alone tells of no sweep.
+        rate = np.gradient(frequency, self.time) if self.time.size > 1 else np.zeros(1)
         resolution: Floats = np.maximum(sweep_limited_resolution(rate), 1.0 / self.window_length)
         return resolution
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from exugear.cli.case import read_gearbox
 from exugear.cli.console import note, print_json, print_table, say
-from exugear.cli.errors import FailedError, exit_codes, model_errors
+from exugear.cli.errors import BadInputError, FailedError, exit_codes, model_errors
 from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ def check(case: CaseArgument, files_below: FilesBelowOption = None, as_json: Jso
         from exugear.checks.readiness import lacking, remarks
         from exugear.model.choice import USER_VARIANTS
 
-        gearbox = read_gearbox(case, files_below, tell=False)
+        gearbox = _read(case, files_below, as_json)
         _tell_scripts(gearbox)
         pairs = [_pair_summary(name, spec) for name, spec in gearbox.pairs.items()]
         loads = _load_summaries(gearbox)
@@ -55,6 +56,18 @@ def check(case: CaseArgument, files_below: FilesBelowOption = None, as_json: Jso
         for one in loads:
             for doubt in one["doubts"]:
                 note(f"load_cases.{one['load_case']}: {doubt}", style="yellow")
+
+
+def _read(case: Path, files_below: Path | None, as_json: bool) -> Gearbox:
+    """Read the file; of one with faults print these as an object, too, if that is asked for."""
+    from exugear.model.reading import CaseError
+
+    try:
+        return read_gearbox(case, files_below, tell=False)
+    except BadInputError as error:
+        if as_json and isinstance(error.__cause__, CaseError):
+            print_json({"case": str(case), "faults": list(error.__cause__.faults)})
+        raise
 
 
 def _steady_lacks(gearbox: Gearbox, variants: dict[str, str]) -> dict[str, str]:

@@ -50,6 +50,7 @@ def life(
     """
     with exit_codes():
         from exugear.life.life import checked_loads
+        from exugear.life.life_diagrams import draw_life
         from exugear.life.life_file import summary
         from exugear.model.choice import Choice
 
@@ -63,11 +64,13 @@ def life(
         compute_tables(requests)
         reduce_elastic_bodies(project)
         data = _rate(project)
+        picture = project.life_path.with_suffix(".png")
+        draw_life(data, picture)
         if as_json:
             print_json({"case": str(case), **summary(data), "file": str(project.life_path)})
             return
         _tell(data)
-        say(f"Life in {project.life_path}, tables with commas beside it")
+        say(f"Life in {project.life_path}, tables with commas and a picture beside it")
 
 
 def _rate(project: Project) -> xr.Dataset:

@@ -109,8 +109,12 @@ class RatingSection(Section):
 
     edition: Literal["ISO 6336:2006"] = "ISO 6336:2006"
     """Edition of the standard, named in every output."""
-    dynamic_factor: q.LoadFactorK
-    """K_v: largest over mean mesh force at speed, of a run or a steady response with errors of the wheels."""
+    dynamic_factor: q.LoadFactorK | None = None
+    """K_v of all meshes, as stated; or the next two keys."""
+    dynamic_factor_run: Name | None = None
+    """Load case whose run gives K_v over speed: largest over mean force of each mesh within 20 cycles."""
+    least_dynamic_factor: q.LoadFactorK | None = None
+    """Least K_v beside a run: without errors of the wheels a run has too little."""
     viscosity_40_mm2_per_s: q.Viscosity
     """Kinematic viscosity of the oil at 40 degrees Celsius."""
     carrier_angles: q.CarrierAngles = 12
@@ -121,3 +125,10 @@ class RatingSection(Section):
     """Safety against pitting that is asked for."""
     least_S_F: q.SafetyFactor | None = None
     """Safety against breakage that is asked for."""
+
+    @model_validator(mode="after")
+    def _dynamic_factor(self) -> RatingSection:
+        of_run = (self.dynamic_factor_run is not None, self.least_dynamic_factor is not None)
+        if (self.dynamic_factor is not None) == all(of_run) or (self.dynamic_factor is not None and any(of_run)):
+            raise ValueError("give dynamic_factor, or dynamic_factor_run and least_dynamic_factor")
+        return self

@@ -15,12 +15,14 @@ from typer.testing import CliRunner
 
 from exugear.bearings.rolling.life import basic_rating_life
 from exugear.cli import app as cli
-from exugear.life.counted import count_loads
+from exugear.life.dynamic_factor import stated_factors
 from exugear.life.gear_life import flank_lives
 from exugear.life.life import checked_loads, compute_life, rating_of
-from exugear.life.life_file import read_life
+from exugear.life.life_diagrams import damage_matrix
+from exugear.life.life_file import limits, read_life
 from exugear.life.pair_stresses import pair_stresses
 from exugear.life.static_balance import rolled_coordinates, static_balance
+from exugear.load_spectrum.counted import count_loads
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
@@ -99,7 +101,17 @@ def lives(project: Project, stresses: dict[str, MeshCycleStress]) -> dict[str, A
     torques = found.torques(counted.bin_value)
     balance = static_balance(project.assembly(), counted.body, found.upper, 12)
     none = np.zeros(0)
-    rated = flank_lives(gearbox, rating_of(gearbox), counted.teeth, found, torques, none, balance, stresses)
+    rated = flank_lives(
+        gearbox,
+        rating_of(gearbox),
+        counted.teeth,
+        found,
+        torques,
+        none,
+        balance,
+        stresses,
+        stated_factors(gearbox, rating_of(gearbox).dynamic_factor),
+    )
     return {f"{one.gear} {one.flank}": one for one in rated}
 
 
@@ -180,7 +192,7 @@ def test_an_extreme_load_counts_for_static_safety_alone(tmp_path, first, stresse
     content["loads"]["sources"]["storm"] = storm
     worse = Project(Gearbox.from_dict(content, str(tmp_path / "g.toml")), tmp_path, first.choice)
     quiet, loud = (
-        compute_life(one.assembly(), checked_loads(one.gearbox), stresses, "")
+        compute_life(one.assembly(), checked_loads(one.gearbox), stresses, stated_factors(one.gearbox, 1.0), "")
         for one in (spur_project(tmp_path, TABLE), worse)
     )
     for calm, storm_too in zip(quiet.flanks, loud.flanks, strict=True):
@@ -198,6 +210,13 @@ def test_an_extreme_load_counts_for_static_safety_alone(tmp_path, first, stresse
         (lambda content: content["loads"].update(body="shaft_2"), "static_load.locked holds shaft_2"),
         (lambda content: content["rating"]["gears"]["pinion"].pop("curve"), "give curve, or contact_curve"),
         (lambda content: content["rating"].update(dynamic_factor=0.5), "must lie between 1 and 10"),
+        (lambda content: content["rating"].update(dynamic_factor_run="run_up"), "give dynamic_factor, or"),
+        (
+            lambda content: content.update(
+                rating={"dynamic_factor_run": "no", "least_dynamic_factor": 1.0, "viscosity_40_mm2_per_s": 320.0}
+            ),
+            "dynamic_factor_run = 'no': load cases are run_up",
+        ),
     ],
 )
 def test_bad_sections_are_one_error_each(tmp_path, change, message):
@@ -296,5 +315,10 @@ def test_the_verb_tells_what_limits_and_what_that_rests_on(tmp_path, first):
     assert told["limits"][0]["damage"] >= told["limits"][-1]["damage"]
     assert any("variant rigid has none" in line for line in told["unrated"])
     assert any(line.startswith("K_v = 1.05") for line in told["assumptions"])
+    picture = Path(told["file"]).with_suffix(".png")
+    assert picture.stat().st_size > 10_000
+    data = read_life(Path(told["file"]))
+    _, shares = damage_matrix(data, limits(data))
+    assert shares.sum(axis=1) == pytest.approx(np.ones(len(shares)))
     shown = CliRunner().invoke(cli.app, arguments)
     assert "What limits the life of 10 years" in shown.stdout
