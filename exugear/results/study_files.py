@@ -66,9 +66,13 @@ def stored_studies(folder: Path, gearbox: Gearbox) -> Iterator[StoredStudy]:
                 attributes = dict(data.attrs)
         except FileError:
             continue
-        counts = (int(attributes[name]) for name in ("points", "failed", "missing"))
-        pictures = tuple(sorted((path.parent / PICTURES).glob("*.png")))
-        fits = attributes["case_digest"] == case_digest(gearbox)
         yield StoredStudy(
-            path, str(attributes["title"]), str(attributes.get("description", "")), *counts, fits, pictures
+            path=path,
+            title=str(attributes["title"]),
+            description=str(attributes.get("description", "")),
+            points=int(attributes["points"]),
+            failed=int(attributes["failed"]),
+            missing=int(attributes["missing"]),
+            fits=attributes["case_digest"] == case_digest(gearbox),
+            pictures=tuple(sorted((path.parent / PICTURES).glob("*.png"))),
         )
