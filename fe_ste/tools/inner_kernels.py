@@ -19,6 +19,7 @@ import hashlib
 import operator
 import struct
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -83,11 +84,15 @@ class Kernel(CPUDispatcher):
 
     def __init__(self, function: Callable[..., object], options: dict[str, Any]) -> None:
         super().__init__(py_func=function, targetoptions=options, pipeline_class=_WholeCompiler)
-        inner = {**options, **_NO_WRAPPERS}
-        # numba's type holds it by a weak reference.
-        self._part = CPUDispatcher(py_func=function, targetoptions=inner, pipeline_class=_PartCompiler)
-        for dispatcher in (self, self._part):
-            cast(Any, dispatcher)._compiler._customize_flags = _Flags
+        cast(Any, self)._compiler._customize_flags = _Flags
+
+    @cached_property
+    def _part(self) -> Any:
+        """What it is for another kernel; made when one asks for it, and kept, since numba's type holds it weakly."""
+        options = {**self.targetoptions, **_NO_WRAPPERS}
+        part: Any = CPUDispatcher(py_func=self.py_func, targetoptions=options, pipeline_class=_PartCompiler)
+        part._compiler._customize_flags = _Flags
+        return part
 
     def compile(self, signature: Any) -> Any:
         """Compile for types of arguments, as numba; Python looks for garbage less often, of which there is none."""
