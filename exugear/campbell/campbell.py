@@ -77,24 +77,20 @@ class Campbell:
         return {name: (LAYOUT[name], own, attributes) for name, (own, attributes) in values.items()}
 
 
-def campbell_of(system: MeanSystem, low: float, high: float, highest: float) -> Campbell:
-    """Campbell diagram of a mean system.
-
-    Parameters
-    ----------
-    system : MeanSystem
-    low, high : float
-        Ends of the range of speeds of the input, rad/s.
-    highest : float
-        Frequency up to which modes are followed, Hz.
-    """
+def modes_over_speed(system: MeanSystem, low: float, high: float, highest: float) -> ModeTracks:
+    """Follow the modes of a mean system between two speeds of the input (rad/s), up to a frequency (Hz)."""
 
     def modes_at(speed: float) -> Found:
         values, right, left = mean_modes(system, speed)
         kept = values.imag <= 2.0 * np.pi * highest
         return values[kept], right[kept], left[kept]
 
-    tracks = mode_tracks(modes_at, low, high)
+    return mode_tracks(modes_at, low, high)
+
+
+def campbell_of(system: MeanSystem, tracks: ModeTracks) -> Campbell:
+    """Campbell diagram of the modes of a mean system, followed over speed."""
+    low, high = tracks.speeds[0], tracks.speeds[-1]
     namer = ModeNamer(system, high if abs(high) > abs(low) else low)
     whirl = np.full(tracks.frequency.shape, np.nan)
     for n, m in zip(*np.nonzero(~np.isnan(tracks.frequency)), strict=True):

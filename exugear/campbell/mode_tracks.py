@@ -1,10 +1,10 @@
 """Modes followed over speed: which mode at one speed is which at the next.
 
-Two modes at neighbouring speeds are compared by left and right shapes,
+Two modes at neighbouring speeds are compared by left and right shapes::
 
-    MAC_ij = |(left_i . right_j) (left_j . right_i)|,   left_i . right_i = 1 at each speed,
+    MAC_ij = |(left_i . right_j) (left_j . right_i)|,   left_i . right_i = 1 at each speed
 
-which is 1 for the same mode, and 0 for different ones of one system, however it is damped and however gyroscopic:
+This is 1 for the same mode, and 0 for different ones of one system, however it is damped and however gyroscopic:
 shapes of such systems are not orthogonal by mass alone. Where modes veer, steps are halved until shapes change
 gradually. Two modes that changed places within a step crossed if MAC_ij is zero; else they are coupled by half a gap
 
@@ -46,13 +46,14 @@ class ModeTracks:
         Ascending, rad/s.
     eigenvalues : (n, m) complex array
         1/s; NaN where a mode is none: beyond the highest frequency, or overdamped.
-    shapes : (n, m, size) complex array
-        Displacements.
+    shapes, left : (n, m, size) complex arrays
+        Displacements, and the parts of left shapes that loads meet; zero where a mode is none.
     """
 
     speeds: Floats
     eigenvalues: Complexes
     shapes: Complexes
+    left: Complexes
 
     @property
     def frequency(self) -> Floats:
@@ -147,8 +148,8 @@ def _joined(speeds: Floats, found: list[Found]) -> ModeTracks:
         places.append([own[n] for n in range(len(other[0]))])
     size = found[0][1].shape[1] // 2
     eigenvalues = np.full((len(speeds), count), complex(np.nan, np.nan))
-    shapes = np.zeros((len(speeds), count, size), dtype=np.complex128)
-    for n, (place, (values, right, _)) in enumerate(zip(places, found, strict=True)):
-        eigenvalues[n, place], shapes[n, place] = values, right[:, :size]
+    shapes, partners = np.zeros((2, len(speeds), count, size), dtype=np.complex128)
+    for n, (place, (values, right, left)) in enumerate(zip(places, found, strict=True)):
+        eigenvalues[n, place], shapes[n, place], partners[n, place] = values, right[:, :size], left[:, size:]
     order = np.argsort(np.nanmean(eigenvalues.imag, axis=0)) if count else np.zeros(0, dtype=np.int64)
-    return ModeTracks(speeds, eigenvalues[:, order], shapes[:, order])
+    return ModeTracks(speeds, eigenvalues[:, order], shapes[:, order], partners[:, order])

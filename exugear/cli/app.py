@@ -14,9 +14,25 @@ import typer
 from exugear.cli.console import say, say_what_is_logged
 from exugear.cli.streams import standard_streams
 
-VERBS = ("new", "import_", "schema", "check", "ste", "bearings", "modes", "steady", "run", "view", "report")
-"""In the order of the help. Each is a function of this name in the module of this name in `exugear.cli.verbs`; what
-Python reserves has a line after it, which the command line leaves out."""
+VERBS = (
+    "case_verbs.new",
+    "case_verbs.import_",
+    "case_verbs.schema",
+    "case_verbs.check",
+    "verbs.ste",
+    "verbs.bearings",
+    "verbs.modes",
+    "verbs.steady",
+    "verbs.run",
+    "verbs.sweep",
+    "verbs.loads",
+    "verbs.life",
+    "verbs.view",
+    "verbs.report",
+    "case_verbs.export",
+)
+"""Room and module of each verb, in the order of the help. The function has the name of its module; what Python reserves
+has a line after it, which the command line leaves out."""
 
 app = typer.Typer(
     help="Transmission error of gear pairs by finite elements, and gearbox dynamics in Exudyn.",
@@ -54,5 +70,6 @@ def _program(
     """Hold what all verbs share."""
 
 
-for verb in VERBS:
-    app.command(verb.rstrip("_"))(getattr(importlib.import_module(f"exugear.cli.verbs.{verb}"), verb))
+for place in VERBS:
+    verb = place.rpartition(".")[2]
+    app.command(verb.rstrip("_"))(getattr(importlib.import_module(f"exugear.cli.{place}"), verb))

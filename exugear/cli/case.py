@@ -72,6 +72,7 @@ def check_choice(gearbox: Gearbox, choice: Choice, folder: Path) -> None:
     from exugear.checks.readiness import lacking
     from exugear.results.folder import bodies_folder
     from exugear.tooth_mesh.laws.registry import LAWS
+    from exugear.tooth_mesh.tables import without_table
 
     with model_errors():
         gearbox.bodies(choice.inertias)
@@ -83,6 +84,10 @@ def check_choice(gearbox: Gearbox, choice: Choice, folder: Path) -> None:
             raise gearbox.fault(f"variant {choice.variant}: {reason}")
         if choice.variant == Variant.flexible:
             check_solids(gearbox, bodies_folder(folder))
+    if LAWS[choice.mesh_law].needs_axes:
+        without = without_table(gearbox, [mesh.pair.name for mesh in gearbox.meshes])
+        if without:
+            raise BadInputError(gearbox.fault(without))
     if not LAWS[choice.mesh_law].has_force and choice.variant != Variant.rigid:
         raise BadInputError(
             f"--mesh-law {choice.mesh_law}: its gears only roll, which needs the variant rigid, not {choice.variant}"

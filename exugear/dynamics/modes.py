@@ -260,12 +260,16 @@ def modes_of(assembly: Assembly, preload: bool = True) -> Modes:
 
 
 def overall_row(assembly: Assembly) -> Floats:
-    """Build the row (size,) of the overall DTE as a length: (output - ratio input) times base radius, m."""
+    """Build the row (size,) of the overall DTE as a length: (output - ratio input) times base radius, m.
+
+    In a train of several degrees of freedom the shares of the further bodies that fix the output are taken off, too.
+    """
     overall = assembly.gearbox.case.overall
-    radius = assembly.gearbox.gears[overall.output_gear].base_radius
+    radius = assembly.gearbox.output_radius
     row = np.zeros(assembly.size)
     row[assembly.spin[overall.output]] += radius
-    row[assembly.spin[overall.input]] -= radius * assembly.gearbox.train.ratio
+    for body, share in assembly.gearbox.train.shares.items():
+        row[assembly.spin[body]] -= radius * share
     return row
 
 

@@ -120,6 +120,9 @@ def locked_equilibrium(
     torques: Mapping[str, float],
     locked: Sequence[str],
     meshes: MeshArrays | None = None,
+    about: Floats | None = None,
+    other_loads: Floats | None = None,
+    near: Floats | None = None,
 ) -> Floats:
     """Coordinates at rest under torques (N m) with some spins held at zero.
 
@@ -131,6 +134,13 @@ def locked_equilibrium(
         balance, it stays where it is
     meshes : MeshArrays, optional
         Mesh arrays to use instead of the assembly's, such as its `mean_meshes`.
+    about : (size,) array, optional
+        Coordinates of the train rolled to another position, at which spins are held instead of zero.
+    other_loads : (size,) array, optional
+        Generalized forces beside the torques, N and N m.
+    near : (size,) array, optional
+        Coordinates from which the search begins, such as those under a similar load; by default it begins with linear
+        bearings and teeth, as it does where these lead nowhere.
 
     Raises
     ------
@@ -139,15 +149,16 @@ def locked_equilibrium(
     """
     held = [assembly.spin[name] for name in _held(assembly, torques, locked)]
     free = assembly.motions @ scipy.linalg.null_space(assembly.motions[held])
-    applied = assembly.torque_vector(torques)
+    applied = assembly.torque_vector(torques) + (0.0 if other_loads is None else other_loads)
     rest = np.zeros(assembly.size)
+    origin = rest if about is None else about
 
     def solve(assembly: Assembly, start: Floats, meshes: MeshArrays | None) -> Floats:
         def residual(x: Floats) -> Floats:
-            return free.T @ (assembly.forces(free @ x, rest, meshes) + applied)
+            return free.T @ (assembly.forces(origin + free @ x, rest, meshes) + applied)
 
         def derivative(held: Assembly, x: Floats) -> Floats:
-            stiffness = tangent_stiffness(held, free @ x, held.meshes if meshes is None else meshes)
+            stiffness = tangent_stiffness(held, origin + free @ x, held.meshes if meshes is None else meshes)
             return np.asarray(-free.T @ stiffness @ free)
 
         def search(share: float) -> Floats:
@@ -160,8 +171,11 @@ def locked_equilibrium(
                 return search(share)
         return search(last)
 
-    x = _from_linear(assembly, np.zeros(free.shape[1]), lambda x: np.asarray(free @ x), solve, meshes)
-    return np.asarray(free @ x)
+    if near is not None:
+        with suppress(BalanceError):
+            return np.asarray(origin + free @ solve(assembly, free.T @ (near - origin), meshes))
+    x = _from_linear(assembly, np.zeros(free.shape[1]), lambda x: np.asarray(origin + free @ x), solve, meshes)
+    return np.asarray(origin + free @ x)
 
 
 @dataclass(frozen=True)
@@ -287,7 +301,7 @@ def _load_scale(applied: Floats) -> float:
 def accelerating_start(
     assembly: Assembly,
     torques: Mapping[str, float],
-    input_speed: float = 0.0,
+    speeds: float | Mapping[str, float] = 0.0,
     driven: tuple[str, float] | None = None,
 ) -> StartState:
     """State that rolls with a uniform acceleration, deflections in balance with loads and inertia forces.
@@ -296,34 +310,32 @@ def accelerating_start(
     ----------
     assembly : Assembly
     torques : mapping of body name to torque about +z, N m
-    input_speed : float
-        Speed of the overall input, rad/s; all other speeds follow by rolling.
+    speeds : float, or mapping of body name to float
+        Speed of the overall input, rad/s, from which all others follow by rolling; or of several bodies, as
+        `exugear.train.train.Train.rolling` takes them.
     driven : (body, spin rate), optional
         A body whose spin rate (rad/s2) is prescribed; the torque that this takes is solved for.
 
     Raises
     ------
     BalanceError
-        As `locked_equilibrium`; also when the train has several degrees of freedom.
+        As `locked_equilibrium`.
     """
-    gearbox = assembly.gearbox
-    reference = gearbox.case.overall.input
-    unit = gearbox.train.rolling_speeds(reference, 1.0)
-    speeds = {name: value * input_speed for name, value in unit.items()}
+    train = assembly.gearbox.train
+    speeds = train.rolling(speeds if isinstance(speeds, Mapping) else {train.input: speeds})
     applied = assembly.torque_vector(torques)
-    pinned = assembly.spin[reference]
+    pinned = [assembly.spin[name] for name in train.independent]
     direction = np.zeros(assembly.size)
-    known_rate = 0.0
     if driven is not None:
         direction[assembly.spin[driven[0]]] = 1.0
-        known_rate = driven[1] / unit[driven[0]]
     size = _load_scale(applied)
-    motions = assembly.motions
+    motions, modes = assembly.motions, train.kinematic_modes
+    # Unknown: deflections, the acceleration in each way to roll, and the torque of a drive.
+    unknown = motions.shape[1] + modes.shape[1]
 
     def split(x: Floats) -> tuple[Floats, dict[str, float], float]:
-        rate = known_rate if driven is not None else float(x[-1])
-        torque = size * float(x[-1]) if driven is not None else 0.0
-        return motions @ x[:-1], {name: value * rate for name, value in unit.items()}, torque
+        rates = dict(zip(train.spins, (modes @ x[motions.shape[1] : unknown]).tolist(), strict=True))
+        return motions @ x[: motions.shape[1]], rates, 0.0 if driven is None else size * float(x[-1])
 
     def solve(assembly: Assembly, start: Floats, meshes: MeshArrays | None) -> Floats:
         def residual(x: Floats) -> Floats:
@@ -331,21 +343,23 @@ def accelerating_start(
             v = assembly.rolling_velocity(q, speeds)
             needed = assembly.inertia_forces(q, v, assembly.rolling_acceleration(q, speeds, rates))
             unbalanced = assembly.forces(q, v, meshes) + applied + torque * direction - needed
-            return np.append(motions.T @ unbalanced, size * q[pinned])
+            off = [] if driven is None else [size * (rates[driven[0]] - driven[1])]
+            return np.concatenate([motions.T @ unbalanced, size * q[pinned], off])
 
         def derivative(x: Floats) -> Floats:
             # At rest: what velocities add to the stiffness is small against it, and costs no more than a step or two.
             stiffness = tangent_stiffness(assembly, split(x)[0], assembly.meshes if meshes is None else meshes)
-            matrix = np.zeros((x.size, x.size))
-            matrix[:-1, :-1] = -motions.T @ stiffness @ motions
-            matrix[-1, :-1] = size * motions[pinned]
-            # The residual is linear in the last unknown, an acceleration or a torque: no step is too long for it.
-            last = np.eye(x.size)[-1]
-            matrix[:, -1] = 0.5 * (residual(x + last) - residual(x - last))
+            matrix, bends = np.zeros((x.size, x.size)), motions.shape[1]
+            matrix[:bends, :bends] = -motions.T @ stiffness @ motions
+            matrix[bends : bends + len(pinned), :bends] = size * motions[pinned]
+            # The residual is linear in the last unknowns, accelerations and a torque: no step is too long for them.
+            for n, e in enumerate(np.eye(x.size)[bends:], start=bends):
+                matrix[:, n] = 0.5 * (residual(x + e) - residual(x - e))
             return matrix
 
         return _newton(residual, derivative, start, np.full(start.size, size), "start of the run")
 
-    x = _from_linear(assembly, np.zeros(motions.shape[1] + 1), lambda x: split(x)[0], solve, None)
+    start = np.zeros(unknown + (driven is not None))
+    x = _from_linear(assembly, start, lambda x: split(x)[0], solve, None)
     q, rates, torque = split(x)
     return StartState(q, assembly.rolling_velocity(q, speeds), rates, torque)

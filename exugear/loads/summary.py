@@ -1,8 +1,9 @@
 """What a load case does to the train as it rolls: net torque, speeds, and the flanks that its meshes load.
 
-Gears and couplings count as rigid and all axes as fixed, so that one speed tells all others: that of the overall
-input. To it torques are referred by their power and inertias by their kinetic energy, planets' orbits included. This
-costs nothing beside a run, and shows the wrong sign of a torque before one is begun.
+Gears and couplings count as rigid and all axes as fixed, so that the speed of the overall input tells all others, and
+in a train of several degrees of freedom a few more speeds. To it torques are referred by their power and inertias by
+their kinetic energy, planets' orbits included. This costs nothing beside a run, and shows the wrong sign of a torque
+before one is begun.
 """
 
 from __future__ import annotations
@@ -47,6 +48,8 @@ class LoadSummary:
         Of the overall input, rad/s; the last without sign.
     rim_speeds : mapping of body name to float
         Speed of the fastest gear's rim on each body with gears at `fastest_speed`, m/s.
+    mesh_frequencies : mapping of mesh name to float
+        Highest mesh frequency of each, Hz.
     mesh_forces : mapping of mesh name to float
         F_bt at the start, N; its sign says which flank of gear 1 carries, as in `Train.static_mesh_forces`.
     flanks : mapping of mesh family to str
@@ -63,6 +66,7 @@ class LoadSummary:
     end_speed: float
     fastest_speed: float
     rim_speeds: Mapping[str, float]
+    mesh_frequencies: Mapping[str, float]
     mesh_forces: Mapping[str, float]
     flanks: Mapping[str, str]
     reversed_flanks: tuple[str, ...]
@@ -90,8 +94,8 @@ class LoadSummary:
 
     @property
     def fastest_rim(self) -> tuple[str, float]:
-        """Body with the fastest rim and its speed, m/s."""
-        return max(self.rim_speeds.items(), key=lambda item: item[1])
+        """Body with the fastest rim and its speed, m/s; no body and standstill of a rotor without gears."""
+        return max(self.rim_speeds.items(), key=lambda item: item[1], default=("", 0.0))
 
 
 def summarise_loads(
@@ -130,34 +134,37 @@ def summarise_loads(
     """
     series = torque_series(gearbox, case) if series is None else series
     total = case.duration if duration is None else duration
-    names = gearbox.spinning
-    rolling = gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)
+    names, reference = gearbox.spinning, gearbox.case.overall.input
+    rolling = gearbox.train.rolling_speeds(reference, 1.0)
     unit = np.array([rolling[name] for name in names])
     axial = _axial_inertias(gearbox, inertias)
-    inertia = float(axial @ unit**2)
     times = _instants(series, total)
     torques = _torques(names, case, series, times)
-    rates, speeds = _motion(gearbox, case, times, torques @ unit / inertia)
-    needed = torques - rates[:, None] * axial * unit
-    if case.driven_body is not None:
-        driven = names.index(case.driven_body)
-        needed[:, driven] -= needed @ unit / unit[driven]  # what the machine adds
-    forces = _mesh_forces(gearbox, needed)
-    fastest = float(np.abs(speeds).max())
+    rates, added = _rates(gearbox, case, axial, torques)
+    spins = _speeds(gearbox, case, times, rates)
+    speeds = spins[:, names.index(reference)]
+    forces = _mesh_forces(gearbox, torques + added - rates * axial)
+    fastest = dict(zip(names, np.abs(spins).max(axis=0).tolist(), strict=True))
     flanks, reversed_flanks = _flanks(gearbox, forces)
     return LoadSummary(
         name=case.name,
-        inertia=inertia,
-        net_torque=float(torques[0] @ unit),
+        inertia=float(axial @ unit**2),
+        net_torque=_without_round_off(float(torques[0] @ unit), torques[0] * unit),
         driven=case.driven_body is not None,
         start_speed=case.start_speed,
         end_speed=float(speeds[-1]),
-        fastest_speed=fastest,
-        rim_speeds={name: fastest * abs(rolling[name]) * radius for name, radius in rim_radii(gearbox).items()},
+        fastest_speed=fastest[reference],
+        rim_speeds={name: fastest[name] * radius for name, radius in rim_radii(gearbox).items()},
+        mesh_frequencies=_highest_mesh_frequencies(gearbox, spins),
         mesh_forces={mesh.name: float(force) for mesh, force in zip(gearbox.meshes, forces[0], strict=True)},
         flanks=flanks,
         reversed_flanks=reversed_flanks,
     )
+
+
+def _without_round_off(total: float, parts: Floats) -> float:
+    """Return a sum, or zero where it is the round-off of its parts."""
+    return total if abs(total) > UNLOADED * float(np.abs(parts).max(initial=0.0)) else 0.0
 
 
 def doubts_about(loads: LoadSummary) -> tuple[str, ...]:
@@ -215,15 +222,47 @@ def _torques(names: tuple[str, ...], case: LoadCase, series: Series, times: Floa
     return torques
 
 
-def _motion(gearbox: Gearbox, case: LoadCase, times: Floats, free: Floats) -> tuple[Floats, Floats]:
-    """Rates (rad/s2) and speeds (rad/s) of the overall input; `free` are the rates that the torques alone give."""
-    if case.driven_body is not None:
-        rates = np.full(len(times), drive_rate(gearbox, case) / _drive_ratio(gearbox, case))
-    else:
-        rates = free
+def _rates(gearbox: Gearbox, case: LoadCase, axial: Floats, torques: Floats) -> tuple[Floats, Floats]:
+    """Spin rates (rad/s2) and what a machine adds to the torques (N m), both (times, bodies), of the rolling train.
+
+    Equations of motion in the ways to roll; a machine prescribes the rate of its body, and its torque is one unknown
+    more.
+    """
+    modes = gearbox.train.kinematic_modes
+    matrix, loads = modes.T @ (axial[:, None] * modes), modes.T @ torques.T
+    added = np.zeros_like(torques)
+    if case.driven_body is None:
+        return (modes @ np.linalg.solve(matrix, loads)).T, added
+    driven = gearbox.spinning.index(case.driven_body)
+    row = modes[driven]
+    # The machine's torque in units that make the row as large as the inertias.
+    scale = float(np.abs(matrix).max())
+    bordered = np.block([[matrix, -scale * row[:, None]], [scale * row[None, :], np.zeros((1, 1))]])
+    rate = np.full((1, loads.shape[1]), scale * drive_rate(gearbox, case))
+    solved = np.linalg.solve(bordered, np.concatenate([loads, rate]))
+    added[:, driven] = scale * solved[-1]
+    return (modes @ solved[:-1]).T, added
+
+
+def _speeds(gearbox: Gearbox, case: LoadCase, times: Floats, rates: Floats) -> Floats:
+    """Spins (times, bodies), rad/s, from the start of a load case on."""
+    start = gearbox.start_speeds(case)
     # Between the instants torques are linear: the trapezoidal rule is exact at them.
-    gained = np.append(0.0, np.cumsum(0.5 * (rates[1:] + rates[:-1]) * np.diff(times)))
-    return rates, case.start_speed + gained
+    gained = np.cumsum(0.5 * (rates[1:] + rates[:-1]) * np.diff(times)[:, None], axis=0)
+    gained = np.concatenate([np.zeros((1, rates.shape[1])), gained])
+    return np.asarray(np.array([start[name] for name in gearbox.spinning]) + gained)
+
+
+def _highest_mesh_frequencies(gearbox: Gearbox, spins: Floats) -> dict[str, float]:
+    """Highest mesh frequency of each mesh (Hz), of spins (times, bodies); a body that is no spin stands."""
+    of_body = dict(zip(gearbox.spinning, spins.T, strict=True))
+    standing = np.zeros(len(spins))
+    return {
+        mesh.name: float(np.abs(of_body.get(mesh.pinion, standing) - of_body.get(mesh.frame, standing)).max())
+        * mesh.pair.pinion.teeth
+        / (2.0 * math.pi)
+        for mesh in gearbox.meshes
+    }
 
 
 def drive_rate(gearbox: Gearbox, case: LoadCase) -> float:
@@ -234,12 +273,7 @@ def drive_rate(gearbox: Gearbox, case: LoadCase) -> float:
 
 def driven_start_speed(gearbox: Gearbox, case: LoadCase) -> float:
     """Speed of the driven body at the start, rad/s; the case states it at the overall input."""
-    return _drive_ratio(gearbox, case) * case.start_speed
-
-
-def _drive_ratio(gearbox: Gearbox, case: LoadCase) -> float:
-    """Spin of the driven body per spin of the overall input."""
-    return gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)[str(case.driven_body)]
+    return gearbox.start_speeds(case)[str(case.driven_body)]
 
 
 def _mesh_forces(gearbox: Gearbox, applied: Floats) -> Floats:

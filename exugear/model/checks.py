@@ -8,6 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -30,23 +31,49 @@ LARGEST_MATRICES = 2e9
 """Largest memory of all matrices of the elements together, bytes: each is over the coordinates of all bodies."""
 
 
-def check(stages: Iterable[Iterable[Callable[[], object]]]) -> None:
-    """Run checks in stages; each stage needs those before it.
+@dataclass(frozen=True)
+class Check:
+    """One check of a gearbox.
+
+    Attributes
+    ----------
+    name : str
+    run : callable
+        Raises `CaseError` where something is wrong.
+    needs : tuple of str
+        Checks without which this one makes no sense.
+    """
+
+    name: str
+    run: Callable[[], object]
+    needs: tuple[str, ...] = ()
+
+
+def check(checks: Iterable[Check]) -> None:
+    """Run all checks in their order but those that need one which failed, or which could not be run.
 
     Raises
     ------
     CaseError
-        All faults of the first stage that has any.
+        All faults that are found.
+
+    Examples
+    --------
+    >>> check([Check("gears", lambda: None), Check("pairs", lambda: None, ("gears",))])
     """
-    for stage in stages:
-        faults: list[str] = []
-        for step in stage:
-            try:
-                step()
-            except CaseError as error:
-                faults += error.faults
-        if faults:
-            raise CaseError(*faults)
+    faults: list[str] = []
+    failed: set[str] = set()
+    for one in checks:
+        if failed & set(one.needs):
+            failed.add(one.name)
+            continue
+        try:
+            one.run()
+        except CaseError as error:
+            faults += error.faults
+            failed.add(one.name)
+    if faults:
+        raise CaseError(*faults)
 
 
 def faults_of_bodies(case: CaseFile) -> Iterator[str]:
@@ -75,8 +102,6 @@ def _faults_of_carrier(case: CaseFile, key: str, name: str) -> Iterator[str]:
         yield f"{key}: that body is not enabled"
     elif carrier.carrier is not None:
         yield f"{key}: a carrier cannot be a planet"
-    elif carrier.fixed:
-        yield f"{key}: a carrier that is fixed does not work yet; give each planet axis_position_mm instead"
     elif carrier.spin_only:
         yield f"{key}: a spin-only body has no place, and so carries no planets"
 
@@ -105,13 +130,13 @@ def faults_of_size(bodies: int, elements: int) -> Iterator[str]:
         )
 
 
-def faults_of_overall(overall: OverallSection, spinning: Sequence[str]) -> Iterator[str]:
-    """Tell an overall input or output that does not turn, or that both are one."""
+def faults_of_overall(overall: OverallSection, spinning: Sequence[str], gears: Collection[str]) -> Iterator[str]:
+    """Tell an overall input or output that does not turn, or that both are one where there are gears."""
     for key in ("input", "output"):
         if getattr(overall, key) not in spinning:
             yield (f"overall.{key} = {getattr(overall, key)!r}: no such turning body; bodies are {', '.join(spinning)}")
             return
-    if overall.input == overall.output:
+    if overall.input == overall.output and gears:
         yield f"overall.output = {overall.output!r}: is the input, too; name the body at the other end"
 
 
@@ -120,8 +145,13 @@ def faults_of_output_gear(
 ) -> Iterator[str]:
     """Tell an output gear that does not turn with the output.
 
-    The overall transmission error is a length on it. A carrier has no gear, and so any serves.
+    The overall transmission error is a length on it. A carrier has no gear, and so any serves; a rotor without gears
+    needs none.
     """
+    if overall.output_gear is None:
+        if gears:
+            yield "overall.output_gear: this key is missing; name a gear on whose base circle the angle is a length"
+        return
     if overall.output_gear not in gears:
         yield f"overall.output_gear = {overall.output_gear!r}: no such gear; gears are {', '.join(gears)}"
         return
@@ -190,10 +220,10 @@ def faults_of_planets(
     case: CaseFile, bodies: Iterable[Body], gears: Mapping[str, Gear], meshes: Sequence[Mesh]
 ) -> Iterator[str]:
     """Tell planets that run into each other, of one set or of several on a carrier, and such as cannot be assembled."""
-    planets = [body for body in bodies if body.carrier is not None]
+    planets = [body for body in bodies if body.planet_of is not None]
     told = set()
     for planet, other in itertools.combinations(planets, 2):
-        if (planet.family, other.family) in told or planet.carrier != other.carrier:
+        if (planet.family, other.family) in told or planet.planet_of != other.planet_of:
             continue
         if any({mesh.pinion, mesh.gear} == {planet.name, other.name} for mesh in meshes):
             continue
@@ -202,7 +232,8 @@ def faults_of_planets(
             told.add((planet.family, other.family))
             yield collision
     for family in case.bodies:
-        yield from _faults_of_assembly(family, [body for body in planets if body.family == family], meshes)
+        others = {body.name for body in planets if body.family != family}
+        yield from _faults_of_assembly(family, [body for body in planets if body.family == family], others, meshes)
 
 
 def _collisions(case: CaseFile, planet: Body, other: Body, gears: Mapping[str, Gear]) -> Iterator[str]:
@@ -219,15 +250,23 @@ def _collisions(case: CaseFile, planet: Body, other: Body, gears: Mapping[str, G
             )
 
 
-def _faults_of_assembly(family: str, planets: Sequence[Body], meshes: Sequence[Mesh]) -> Iterator[str]:
-    """Compare every planet with the first: going round two meshes must close on whole teeth.
+def _faults_of_assembly(
+    family: str, planets: Sequence[Body], others: Collection[str], meshes: Sequence[Mesh]
+) -> Iterator[str]:
+    """Compare every planet with the first: going round two meshes with central wheels must close on whole teeth.
+
+    Planets that mesh with planets of another set close chains that only the places of all teeth tell.
 
     With tooth numbers zp of the planet wheel and zc of the central wheel (negative for an external one),
     (zc_b zp_a - zc_a zp_b) angle / 2 pi must be a multiple of gcd(zp_a, zp_b); for one planet wheel
     between sun and ring this is the familiar (z_sun + z_ring) angle / 2 pi = integer.
     """
     for planet in planets[1:]:
-        teeth = [_teeth_on_planet(mesh, planet.name) for mesh in meshes if planet.name in (mesh.pinion, mesh.gear)]
+        teeth = [
+            _teeth_on_planet(mesh, planet.name)
+            for mesh in meshes
+            if planet.name in (mesh.pinion, mesh.gear) and not {mesh.pinion, mesh.gear} & set(others)
+        ]
         angle = planet.orbit_angle - planets[0].orbit_angle
         for planet_teeth, central_teeth in teeth[1:]:
             whole = math.gcd(planet_teeth, teeth[0][0])

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -15,7 +16,13 @@ from exugear.model.origin import Origin, part_of_each, parts_of_each
 from exugear.model.parts import Body, Mesh, PairSpec, WheelDeviation
 from exugear.model.sections.connections import MeshSection
 from exugear.model.sections.entries import GROUND
-from exugear.model.sections.gears import DeviationSection, GearSection, ModificationSection, PairSection
+from exugear.model.sections.gears import (
+    DeviationSection,
+    GearSection,
+    MeshStiffnessSection,
+    ModificationSection,
+    PairSection,
+)
 from fe_ste.flanks.modifications import (
     FlankModification,
     Relief,
@@ -24,10 +31,23 @@ from fe_ste.flanks.modifications import (
     radius_at_roll_length_from_tip,
 )
 from fe_ste.flanks.topography import FlankTopography
+from fe_ste.geometry.fitting import (
+    LEAST_ROOT_MARGIN,
+    ROOT_MARGIN,
+    clear_tip_diameter,
+    fitted_tip_diameter,
+    root_margin,
+    shift_beside,
+)
+from fe_ste.geometry.gear_relations import UncheckedGear
 from fe_ste.geometry.gears import BasicRack, Gear, GearPair, Material
+from fe_ste.geometry.pair_relations import UncheckedPair
+from fe_ste.tools.arrays import Floats
 
 DEEPEST_REMOVAL = 0.5
 """Most that a modification or an error may take off a flank, in normal modules: a tooth is 1.6 thick."""
+SAMPLES_PER_WAVE = 64
+"""Values in each wave of a stated stiffness: cubics between them are off by 1e-5 of its amplitude."""
 ANGLE_TOLERANCE = 1e-4
 """Allowed difference between a stated angle of the line of centres and the positions of the bodies, rad."""
 
@@ -40,12 +60,75 @@ def gears(origin: Origin) -> dict[str, Gear]:
     CaseError
         A gear that cannot be made, with its key.
     """
-    return part_of_each(lambda name, section: origin.guarded(f"gears.{name}", _gear, name, section), origin.case.gears)
+    plain = {name: _unchecked(name, section) for name, section in origin.case.gears.items()}
+    shifted = {**plain, **part_of_each(partial(_with_shift, origin, plain), _flagged(origin, "shift"))}
+    fitted = {**shifted, **part_of_each(partial(_with_fitted_tip, origin, shifted), _flagged(origin, "tip"))}
+
+    def of_section(name: str, section: GearSection) -> Gear:
+        gear = fitted[name]
+        if section.tip_chamfer_mm:
+            height = gear.outward * section.tip_chamfer_mm * 1e-3
+            gear = replace(gear, tip_form_diameter=2.0 * (gear.tip_radius - height))
+        return origin.guarded(
+            f"gears.{name}", Gear, **{field.name: getattr(gear, field.name) for field in fields(gear)}
+        )
+
+    return part_of_each(of_section, origin.case.gears)
 
 
-def _gear(name: str, section: GearSection) -> Gear:
+def _flagged(origin: Origin, what: Literal["shift", "tip"]) -> dict[str, GearSection]:
+    """Sections of gears whose shift or tip follows from their mates."""
+    key = {"shift": "profile_shift_from_centre_distance", "tip": "fitted_tip"}[what]
+    return {name: section for name, section in origin.case.gears.items() if getattr(section, key)}
+
+
+def _pairs_of(origin: Origin, gears: Mapping[str, UncheckedGear], name: str) -> Iterator[tuple[str, UncheckedPair]]:
+    """Pairs of a gear by name, gear 1 being the external or smaller one."""
+    for pair, section in origin.case.pairs.items():
+        both = [gears[one] for one in (section.pinion, section.gear) if one in gears]
+        if name in (section.pinion, section.gear) and len(both) == 2:
+            first, second = sorted(both, key=lambda gear: (gear.internal, gear.teeth))
+            distance = 1e-3 * section.centre_distance_mm
+            yield pair, UncheckedPair(name=pair, pinion=first, gear=second, centre_distance=distance)
+
+
+def _with_shift(origin: Origin, gears: Mapping[str, UncheckedGear], name: str, section: GearSection) -> UncheckedGear:
+    """Gear with the profile shift that leaves no backlash at the centre distance of its first pair."""
+    key = f"gears.{name}.profile_shift_from_centre_distance"
+    for pair_name, pair in _pairs_of(origin, gears, name):
+        mate = pair.gear if pair.pinion.name == name else pair.pinion
+        if origin.case.gears[mate.name].profile_shift_from_centre_distance:
+            raise origin.fault(f"{key}: {mate.name} of pairs.{pair_name} has no profile_shift either; give one of them")
+        shift = shift_beside(mate, gears[name], pair.centre_distance)
+        if shift is None:
+            raise origin.fault(
+                f"{key}: at pairs.{pair_name}.centre_distance_mm = {1e3 * pair.centre_distance:g} no line of action "
+                "touches both base circles; correct it"
+            )
+        return replace(gears[name], profile_shift=shift)
+    raise origin.fault(f"{key}: the gear is in no pair, whose centre distance would give it; give profile_shift")
+
+
+def _with_fitted_tip(
+    origin: Origin, gears: Mapping[str, UncheckedGear], name: str, section: GearSection
+) -> UncheckedGear:
+    """Gear with its tip shortened as far as all of its mates ask for."""
+    gear = gears[name]
+    try:
+        tips = [
+            fitted_tip_diameter(pair, pair.gear if pair.gear.name == name else pair.pinion)
+            for _, pair in _pairs_of(origin, gears, name)
+        ]
+    except ValueError:
+        return gear  # what makes the pair impossible is told when it is built
+    if not tips:
+        raise origin.fault(f"gears.{name}.fitted_tip: the gear is in no pair that its tip could be fitted to")
+    return replace(gear, tip_diameter=max(tips) if gear.internal else min(tips))
+
+
+def _unchecked(name: str, section: GearSection) -> UncheckedGear:
     """Gear from its section: millimetres to metres, degrees to radians."""
-    return Gear(
+    return UncheckedGear(
         name=name,
         teeth=section.teeth,
         normal_module=section.normal_module_mm * 1e-3,
@@ -64,7 +147,23 @@ def _gear(name: str, section: GearSection) -> Gear:
             poissons_ratio=section.material.poissons_ratio,
             density=section.material.density_kg_per_m3,
         ),
+        tip_form_diameter=None if section.tip_form_diameter_mm is None else section.tip_form_diameter_mm * 1e-3,
+        root_form_diameter=None if section.root_form_diameter_mm is None else section.root_form_diameter_mm * 1e-3,
     )
+
+
+def margins_of_roots(pairs: Iterable[GearPair]) -> Iterator[str]:
+    """Tell tips that come so near to their mate's fillet that contact under load reaches it, and what would not."""
+    for pair in pairs:
+        for tip, mate in ((pair.pinion, pair.gear), (pair.gear, pair.pinion)):
+            margin = root_margin(pair, tip)
+            if margin < LEAST_ROOT_MARGIN * tip.normal_module:
+                clear = 1e3 * clear_tip_diameter(pair, tip, ROOT_MARGIN * tip.normal_module)
+                yield (
+                    f"gears.{tip.name}: its tip touches {mate.name} {1e3 * margin:.3f} mm of roll length above the "
+                    "fillet, which contact under load may reach, and then finds no solution there: "
+                    f"tip_diameter_mm = {clear:.3f} keeps clear, or fitted_tip = true"
+                )
 
 
 def modifications(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, FlankModification]:
@@ -147,16 +246,25 @@ def gear_pairs(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, GearPair]
                 raise origin.fault(
                     f"pairs.{name}.{key} = {getattr(section, key)!r}: no such gear; gears are {', '.join(gears)}"
                 )
+        first, second = gears[section.pinion], gears[section.gear]
+        if _is_turned_over(first, second):
+            first, second = second, first
         return origin.guarded(
             f"pairs.{name}",
             GearPair,
             name=name,
-            pinion=gears[section.pinion],
-            gear=gears[section.gear],
+            pinion=first,
+            gear=second,
             centre_distance=section.centre_distance_mm * 1e-3,
+            common_face_width=(None if section.common_face_width_mm is None else section.common_face_width_mm * 1e-3),
         )
 
     return part_of_each(of_section, origin.case.pairs)
+
+
+def _is_turned_over(pinion: Gear, gear: Gear) -> bool:
+    """Tell whether a file calls the larger gear or the ring the pinion: gear 1 is the other one all the same."""
+    return pinion.internal > gear.internal or (pinion.internal == gear.internal and pinion.teeth > gear.teeth)
 
 
 def pair_specs(
@@ -164,6 +272,7 @@ def pair_specs(
     pairs: Mapping[str, GearPair],
     modifications: Mapping[str, FlankModification],
     mesh_forces: Mapping[str, list[float]],
+    stated: Mapping[str, tuple[float, ...]],
 ) -> dict[str, PairSpec]:
     """Gather what the tables of pairs need.
 
@@ -173,6 +282,8 @@ def pair_specs(
     modifications : mapping of gear name to FlankModification
     mesh_forces : mapping of pair name to list of float
         Static force F_bt of each of the pair's meshes at work, N; the pair's own is the mean of their amounts.
+    stated : mapping of pair name to tuple of float
+        Mesh stiffness of pairs of which the file states it.
     """
     specs = {}
     for name, pair in pairs.items():
@@ -182,11 +293,47 @@ def pair_specs(
             name=name,
             pair=pair,
             static_torque=force * pair.pinion.base_radius,
-            table=section.table,
+            table=section.table and section.stiffness is None,
             flank=-1 if sum(forces) < 0.0 else 1,
-            modifications=(modifications[section.pinion], modifications[section.gear]),
+            modifications=(modifications[pair.pinion.name], modifications[pair.gear.name]),
+            stiffness=stated.get(name, ()),
         )
     return specs
+
+
+def stated_stiffness(origin: Origin) -> dict[str, tuple[float, ...]]:
+    """Mesh stiffness of the pairs of which the file states it, N/m at equal distances over the mesh cycle, by name.
+
+    Raises
+    ------
+    CaseError
+        A stiffness that is not above zero somewhere in the cycle.
+    """
+
+    def of_section(name: str, section: PairSection) -> tuple[float, ...]:
+        assert section.stiffness is not None
+        values = _over_cycle(section.stiffness)
+        if values.min() <= 0.0:
+            raise origin.fault(
+                f"pairs.{name}.stiffness: falls to {values.min():g} N/m in the mesh cycle; lessen its waves, "
+                "it must stay above zero"
+            )
+        return tuple(values.tolist())
+
+    return part_of_each(of_section, {name: one for name, one in origin.case.pairs.items() if one.stiffness is not None})
+
+
+def _over_cycle(section: MeshStiffnessSection) -> Floats:
+    """Values over the mesh cycle, N/m: those of the file, or the sum of its waves, dense enough for cubics between."""
+    if section.over_cycle_N_per_m is not None:
+        return np.array(section.over_cycle_N_per_m)
+    highest = max(len(section.cosine_N_per_m), len(section.sine_N_per_m))
+    angle = 2.0 * np.pi * np.arange(max(1, SAMPLES_PER_WAVE * highest)) / max(1, SAMPLES_PER_WAVE * highest)
+    values = np.full(angle.shape, section.mean_N_per_m, dtype=np.float64)
+    for waves, function in ((section.cosine_N_per_m, np.cos), (section.sine_N_per_m, np.sin)):
+        for order, amplitude in enumerate(waves, start=1):
+            values += amplitude * function(order * angle)
+    return values
 
 
 def meshes(origin: Origin, pairs: Mapping[str, GearPair], bodies: Mapping[str, Body]) -> tuple[Mesh, ...]:
@@ -216,7 +363,10 @@ def _meshes_of_section(
     origin: Origin, family: str, section: MeshSection, pair: GearPair, bodies: Mapping[str, Body]
 ) -> Iterator[Mesh]:
     key = f"meshes.{family}"
-    instances = origin.instances(key, section.pinion_body, section.gear_body)
+    ends, stated_deg = (section.pinion_body, section.gear_body), section.position_angle_deg
+    if pair.pinion.name != origin.case.pairs[section.pair].pinion:
+        ends, stated_deg = ends[::-1], None if stated_deg is None else stated_deg + 180.0
+    instances = origin.instances(key, *ends)
     phases = section.phase if isinstance(section.phase, tuple) else (section.phase,) * len(instances)
     if len(phases) != len(instances):
         raise origin.fault(f"{key}.phase = {list(phases)}: {len(instances)} meshes need {len(instances)} phases")
@@ -227,7 +377,7 @@ def _meshes_of_section(
             raise origin.fault(f"{key}.frame = {frame!r}: no such body; use a carrier's name or ground")
         dx, dy = gear_body.axis[0] - pinion_body.axis[0], gear_body.axis[1] - pinion_body.axis[1]
         angle = math.atan2(dy, dx)
-        _check_angle(origin, key, section.position_angle_deg, angle)
+        _check_angle(origin, key, stated_deg, angle)
         z = _middle_of_faces(origin, key, pair, pinion_body, gear_body)
         yield Mesh(
             name=family + suffix,

@@ -36,13 +36,15 @@ class Body:
         Mass, and inertia about its axis and across it, kg, kg m2, kg m2; a spin-only body has inertia about its axis
         alone.
     carrier : str, optional
-        Carrier that a planet rides on.
+        Carrier that a planet rides on; none while it is held: then its planets turn on axes that stand still.
     orbit_angle : float
         Its angle there, rad.
     spin_only, fixed : bool
         Whether it has no place in space, or does not turn.
     wheels : mapping of gear name to float
         Middle of the gear's face width, z, m.
+    planet_of : str, optional
+        Carrier of the set that a planet belongs to, held or not.
     """
 
     name: str
@@ -57,6 +59,7 @@ class Body:
     spin_only: bool
     fixed: bool
     wheels: Mapping[str, float]
+    planet_of: str | None = None
 
     def __repr__(self) -> str:
         """Return one short line."""
@@ -82,6 +85,8 @@ class Body:
             return "fixed"
         if self.carrier is not None:
             return f"planet on {self.carrier}"
+        if self.planet_of is not None:
+            return f"planet on {self.planet_of}, which is held"
         return "spin only" if self.spin_only else "turning"
 
 
@@ -306,6 +311,8 @@ class LoadCase:
         s.
     start_speed : float
         Of the overall input, rad/s.
+    start_speeds : mapping of body name to float
+        Of further bodies, in a train of several degrees of freedom, rad/s.
     driven_body : str, optional
         Body whose speed a machine prescribes.
     end_speed : float, optional
@@ -320,6 +327,7 @@ class LoadCase:
     torque_series: Path | None
     duration: float
     start_speed: float
+    start_speeds: Mapping[str, float]
     driven_body: str | None
     end_speed: float | None
     drive_stiffness: float | None
@@ -363,6 +371,8 @@ class PairSpec:
         of flank +1; turned about the line of centres it is that of flank -1, with the ends of the face exchanged.
     modifications : tuple of FlankModification
         Gear 1, gear 2, in the axes of the gearbox.
+    stiffness : tuple of float
+        Mesh stiffness that the file states, at equal distances over the mesh cycle, N/m; empty if it states none.
     """
 
     name: str
@@ -371,6 +381,7 @@ class PairSpec:
     table: bool
     flank: int
     modifications: tuple[FlankModification, FlankModification]
+    stiffness: tuple[float, ...] = ()
 
     def __repr__(self) -> str:
         """Return one short line."""
@@ -389,6 +400,7 @@ class PairSpec:
                 "static torque on gear 1": value_range(self.static_torque, "N m"),
                 "loaded flank": f"{self.flank:+d}",
                 "table": "wanted" if self.table else "not wanted",
+                "stated stiffness": value_range(np.array(self.stiffness), "N/m") if self.stiffness else "none",
             },
         )
 

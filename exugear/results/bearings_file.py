@@ -10,7 +10,7 @@ from typing import Any
 
 from exugear.bearings.duty import BearingDuty
 from exugear.model.versions import MODES
-from fe_ste.tools.files import write_file
+from fe_ste.tools.files import FileError, read_text, write_file
 
 
 def duty_summary(duty: BearingDuty) -> dict[str, Any]:
@@ -24,6 +24,7 @@ def duty_summary(duty: BearingDuty) -> dict[str, Any]:
         "reaction_kN": None if duty.reaction is None else 1e-3 * duty.reaction,
         "radial_stiffness_N_per_m": duty.radial_stiffness,
         "axial_stiffness_N_per_m": float(duty.stiffness[2, 2]),
+        "stiffness_matrix_N_m_rad": duty.stiffness.tolist(),
         "tilt_stiffness_N_m_per_rad": 0.5 * float(duty.stiffness[3, 3] + duty.stiffness[4, 4]),
         "misalignment_mrad": 1e3 * duty.misalignment,
         "most_loaded_element_kN": 1e-3 * duty.element_load,
@@ -35,6 +36,23 @@ def duty_summary(duty: BearingDuty) -> dict[str, Any]:
         "L10r_Mrev": _finite(duty.reference_life),
         "remarks": list(duty.remarks),
     }
+
+
+def read_duties(path: Path) -> dict[str, Any]:
+    """Read what `write_duties` wrote.
+
+    Raises
+    ------
+    FileError
+        The file is missing, damaged, or of another version.
+    """
+    try:
+        content = json.loads(read_text(path))
+        if content["method_version"] == MODES and isinstance(content["bearings"], list):
+            return dict(content)
+    except (ValueError, KeyError, TypeError):
+        raise FileError(f"{path}: is damaged; run `exugear bearings` again") from None
+    raise FileError(f"{path}: was written by another version; run `exugear bearings` again")
 
 
 def _finite(life: float) -> float | None:

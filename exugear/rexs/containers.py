@@ -5,10 +5,13 @@ from __future__ import annotations
 import io
 import zipfile
 import zlib
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+from exugear.rexs import json_additions, xml_additions
+from exugear.rexs.additions import Addition, by_place
 from exugear.rexs.faults import RexsError, plain
-from exugear.rexs.parsing import parse_model
+from exugear.rexs.parsing import is_json, parse_model
 from exugear.rexs.tree import Model
 from fe_ste.tools.files import FileError, open_regular
 
@@ -34,6 +37,66 @@ def read_rexs(path: str | Path) -> Model:
     >>> read_rexs("tests/exugear/rexs/data/SEW_3-stage_cylindrical_gearbox_1.0.rexs")
     <Model REXS 1.0: 86 components, 82 relations>
     """
+    return parsed(_bytes_of(path), path)
+
+
+def parsed(content: bytes, path: str | Path) -> Model:
+    """Read the bytes of a REXS file; `path` is for messages.
+
+    Raises
+    ------
+    RexsError
+        As in `read_rexs`.
+    """
+    try:
+        return parse_model(_member(content)[1] if _is_archive(content) else content)
+    except RexsError as error:
+        raise RexsError(*(f"{path}: {fault}" for fault in error.faults)) from None
+
+
+def with_additions(path: str | Path, additions: Iterable[Addition]) -> bytes:
+    """Bytes of a REXS file with attributes added: the same kind, version and encoding, and all else as it is.
+
+    An attribute that its component has already is replaced. Of an archive the other members stay.
+
+    Parameters
+    ----------
+    path : path-like
+    additions : iterable of Addition
+
+    Raises
+    ------
+    RexsError
+        The file cannot be read, or an addition names a component that it does not have.
+    """
+    content = _bytes_of(path)
+    model = parsed(content, path)
+    placed = by_place(additions)
+    cases = {case.number for case in model.load_cases}
+    for case, component in placed:
+        if component not in model.components or not (case is None or case in cases):
+            raise RexsError(
+                f"{path}: there is no component {component}" + ("" if case is None else f", load case {case}")
+            )
+    if not _is_archive(content):
+        return _put_in(content, placed)
+    member, unpacked = _member(content)
+    packed = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(packed, "w") as new:
+        new.comment = old.comment
+        _check_size(sum(one.file_size for one in old.infolist()))
+        for one in old.infolist():
+            new.writestr(one, _put_in(unpacked, placed) if one.filename == member else old.read(one))
+    return packed.getvalue()
+
+
+def _put_in(content: bytes, placed: Mapping[tuple[int | None, int], Mapping[str, Addition]]) -> bytes:
+    if is_json(content):
+        return json_additions.with_additions(content, placed)
+    return xml_additions.with_additions(content, placed)
+
+
+def _bytes_of(path: str | Path) -> bytes:
     try:
         with open_regular(Path(path)) as file:
             content = file.read(LARGEST + 1)
@@ -41,9 +104,13 @@ def read_rexs(path: str | Path) -> Model:
         raise RexsError(str(error)) from None
     try:
         _check_size(len(content))
-        return parse_model(_member(content) if content[:2] == b"PK" else content)
     except RexsError as error:
-        raise RexsError(*(f"{path}: {fault}" for fault in error.faults)) from None
+        raise RexsError(f"{path}: {error}") from None
+    return content
+
+
+def _is_archive(content: bytes) -> bool:
+    return content[:2] == b"PK"
 
 
 def _check_size(size: int) -> None:
@@ -51,8 +118,8 @@ def _check_size(size: int) -> None:
         raise RexsError(f"is larger than {LARGEST / 1e6:g} MB")
 
 
-def _member(content: bytes) -> bytes:
-    """Bytes of the one model in an archive."""
+def _member(content: bytes) -> tuple[str, bytes]:
+    """Name and bytes of the one model in an archive."""
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             members = archive.infolist()
@@ -70,4 +137,4 @@ def _member(content: bytes) -> bytes:
     except (zipfile.BadZipFile, NotImplementedError, EOFError, OSError, zlib.error) as error:
         raise RexsError(f"the archive is damaged: {error}") from None
     _check_size(len(unpacked))
-    return unpacked
+    return models[0].filename, unpacked

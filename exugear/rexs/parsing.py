@@ -35,12 +35,20 @@ def parse_model(content: bytes) -> Model:
     RexsError
         What is wrong with the file.
     """
-    start = content[:200].lstrip(b"\xef\xbb\xbf\xff\xfe \t\r\n\x00")
-    if start[:1] in (b"{", b"["):
+    if is_json(content):
         return _model(_header_of_json(content))
-    if start[:1] == b"<":
+    if _start(content) == b"<":
         return _model(_header_of_xml(content))
     raise RexsError("the file is neither XML nor JSON nor a zip archive of one of them: it is no REXS file")
+
+
+def is_json(content: bytes) -> bool:
+    """Tell whether the bytes of a file begin as JSON does."""
+    return _start(content) in (b"{", b"[")
+
+
+def _start(content: bytes) -> bytes:
+    return content[:200].lstrip(b"\xef\xbb\xbf\xff\xfe \t\r\n\x00")[:1]
 
 
 @dataclass

@@ -84,3 +84,8 @@ def unit_factor(unit: str, wanted: str) -> float | None:
         return None
     ratio = _UNITS[unit][1] / _UNITS[wanted][1]
     return float(f"{ratio:.15g}")
+
+
+def degree_sign(version: tuple[int, int]) -> str:
+    """Return how a version writes degrees."""
+    return "°" if version < (1, 4) else "deg"

@@ -31,7 +31,7 @@ class MeshPorts:
     readings : (m, r, size) array
         Rows of what the law reads; the last is the position in the mesh cycle, in cycles.
     static : (m, r) array
-        Their values in the static state; the position counts from there.
+        Their values in the static state; the mean position counts from there.
     forces : (m, f, size) array
         Rows along which its forces push.
     positions : (m,) array
@@ -52,10 +52,12 @@ def mesh_ports(waves: MeshWaves, speed: float, parting: bool) -> MeshPorts:
     firsts = [wave.first for wave in waves.waves]
     readings = [waves.gradients(row, speed) for row in rows] + [waves.position_rows()]
     static = [waves.values(row, speed) + means * offset[firsts] for row, offset in zip(rows, offsets, strict=True)]
+    # The mean position counts from the static state; what planets are ahead of each other by stays.
+    ahead = np.where(means, 0.0, readings[-1] @ waves.system.static_at(speed))
     forces = readings[:-1] if parting else [waves.gradients(meshes.force, speed)]
     return MeshPorts(
         readings=np.stack(readings, axis=1),
-        static=np.stack([*static, np.zeros(len(means))], axis=1),
+        static=np.stack([*static, ahead], axis=1),
         forces=np.stack(forces, axis=1),
         positions=waves.positions(speed),
     )

@@ -65,6 +65,16 @@ class PlanetSet:
         """Number of planets, which is that of waves."""
         return len(self.names)
 
+    def values(self, turned: Floats) -> Floats:
+        """Waves at the planets (..., planets, waves) where the carrier has turned by angles (...), rad."""
+        theta = turned[..., None] + self.angles
+        found = [np.ones_like(theta)]
+        for m in range(1, (self.waves - 1) // 2 + 1):
+            found += [np.cos(m * theta), np.sin(m * theta)]
+        if self.waves % 2 == 0:
+            found.append(np.broadcast_to(np.where(np.arange(self.waves) % 2, -1.0, 1.0), theta.shape))
+        return np.stack(found, axis=-1)
+
     def shapes(self, psi: float) -> Jet:
         """Waves at the planets (planets, waves), and two derivatives by the input's angle psi (rad).
 
@@ -168,8 +178,26 @@ class RotatingFrame:
         size = self.assembly.size
         return np.eye(size), np.zeros((size, size)), np.zeros((size, size))
 
+    @cached_property
+    def _kept(self) -> dict[float, tuple[Jet, Jet]]:
+        """Matrices and rolling at the last angle: differences ask for one angle many times."""
+        return {}
+
+    def _at(self, psi: float) -> tuple[Jet, Jet]:
+        if psi not in self._kept:
+            self._kept.clear()
+            self._kept[psi] = self._matrices(psi), self._rolling(psi)
+        return self._kept[psi]
+
     def matrices(self, psi: float) -> Jet:
         """T and its two derivatives by psi, each (size, size)."""
+        return self._at(psi)[0]
+
+    def rolling(self, psi: float) -> Jet:
+        """q_rolling and its two derivatives by psi, each (size,)."""
+        return self._at(psi)[1]
+
+    def _matrices(self, psi: float) -> Jet:
         turned = self._unit()
         for planets, coordinates in self._planet_coordinates:
             waves = planets.shapes(psi)
@@ -198,8 +226,7 @@ class RotatingFrame:
         (r, r1, r2), (w, w1, w2) = turning, waves
         return r @ w, r1 @ w + r @ w1, r2 @ w + 2.0 * r1 @ w1 + r @ w2
 
-    def rolling(self, psi: float) -> Jet:
-        """q_rolling and its two derivatives by psi, each (size,)."""
+    def _rolling(self, psi: float) -> Jet:
         assembly, still = self.assembly, np.zeros(self.assembly.size)
         place = psi * assembly.rolling_velocity(still, self.speeds)
         rate = assembly.rolling_velocity(still, self.speeds)

@@ -103,7 +103,7 @@ def _first_state(
     driven = None
     if case.driven_body is not None:
         driven = case.driven_body, drive_rate(assembly.gearbox, case)
-    balanced = accelerating_start(assembly, torques, case.start_speed, driven)
+    balanced = accelerating_start(assembly, torques, assembly.gearbox.start_speeds(case), driven)
     start_angle = 0.0
     if case.driven_body is not None and case.drive_stiffness is not None:
         start_angle = float(balanced.q[assembly.spin[case.driven_body]]) + balanced.drive_torque / case.drive_stiffness

@@ -62,7 +62,7 @@ def contributions(gearset: Gearset, speed: float, line: int) -> Contributions:
     """
     frequency, row = abs(speed) * float(gearset.lines.orders[line]), gearset.row_of_overall(speed)
     forces, loads = _excitation(gearset, speed, line)
-    dynamic = _dynamic(gearset, speed, frequency)
+    dynamic = gearset.system.dynamic(speed, frequency)
     # One solution from either side: what the signal sees of any load, and what moves under these loads.
     adjoint = np.linalg.solve(dynamic.T, row.astype(np.complex128)).astype(np.complex128)
     motion = np.linalg.solve(dynamic, loads).astype(np.complex128)
@@ -85,7 +85,7 @@ def loudest_near(gearset: Gearset, speed: float, width: float, line: int) -> flo
 
     def quietness(factor: float) -> float:
         at = speed * factor
-        dynamic = _dynamic(gearset, at, abs(at) * float(gearset.lines.orders[line]))
+        dynamic = gearset.system.dynamic(at, abs(at) * float(gearset.lines.orders[line]))
         return -abs(complex(gearset.row_of_overall(at) @ np.linalg.solve(dynamic, _excitation(gearset, at, line)[1])))
 
     found = scipy.optimize.minimize_scalar(
@@ -100,14 +100,6 @@ def _excitation(gearset: Gearset, speed: float, line: int) -> tuple[Complexes, C
     excess = transmission_error_line(gearset, ports, speed, line)
     forces = -2.0 * gearset.loads(ports) * excess
     return forces, np.asarray(forces.sum(axis=1))
-
-
-def _dynamic(gearset: Gearset, speed: float, frequency: float) -> Complexes:
-    """Dynamic stiffness (size, size) of the mean system at an angular frequency."""
-    system = gearset.system
-    return np.asarray(
-        system.stiffness_at(speed) - frequency**2 * system.mass + 1j * frequency * system.damping_at(speed)
-    )
 
 
 def _share(part: complex, total: complex) -> float:

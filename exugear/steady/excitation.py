@@ -8,14 +8,15 @@ from functools import cached_property
 
 import numpy as np
 
+from exugear.harmonics.lattice import Lattice, lattice
 from exugear.harmonics.lines import LineSet
 from exugear.harmonics.products import Product
 from exugear.rotating.mean_system import MeanSystem
-from exugear.rotating.mesh_ports import DEFLECTION, MeshPorts, mesh_ports
+from exugear.rotating.mesh_ports import DEFLECTION, POSITION, MeshPorts, mesh_ports
 from exugear.rotating.mesh_waves import MeshWaves
 from exugear.rotating.signals import SignalName, SignalRows, mesh_signal_names, signal_rows
 from exugear.tooth_mesh.laws.registry import LAWS
-from fe_ste.tools.arrays import Booleans, Complexes, Floats
+from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,12 +68,15 @@ class Gearset:
     ----------
     waves : MeshWaves
     lines : LineSet
+    larger : LineSet
+        Lines that are kept apart where forces are evaluated in time.
     stiffness_harmonics : int
         Highest harmonic of the mesh stiffness.
     """
 
-    def __init__(self, waves: MeshWaves, lines: LineSet, stiffness_harmonics: int) -> None:
+    def __init__(self, waves: MeshWaves, lines: LineSet, larger: LineSet, stiffness_harmonics: int) -> None:
         self.waves, self.lines, self.harmonics = waves, lines, stiffness_harmonics
+        self._larger = larger
         self.parting = LAWS[waves.assembly.mesh_law].loses_contact
         ports, rows = [], []
         for speed in waves.system.speeds:
@@ -87,6 +91,22 @@ class Gearset:
         }
         self._row_names = rows[0].names
         self.signal_names: tuple[SignalName, ...] = (*self._row_names, *mesh_signal_names(waves))
+
+    @cached_property
+    def lattice(self) -> Lattice:
+        """Samples on which forces are evaluated in time."""
+        return lattice(self.lines, self._larger)
+
+    @property
+    def base_names(self) -> tuple[str, ...]:
+        """Names of all bases: meshes, and carriers whose turns put lines beside those of their planets."""
+        return (*self.waves.base_names, *(name for name, _ in self.waves.carriers))
+
+    @cached_property
+    def mean_waves(self) -> Integers:
+        """Mean wave of each wave's meshes, (m,)."""
+        means = [n for n, wave in enumerate(self.waves.waves) if wave.wave == 0]
+        return np.array([max(n for n in means if n <= own) for own in range(len(self.waves.waves))])
 
     @property
     def system(self) -> MeanSystem:
@@ -150,10 +170,6 @@ class Gearset:
         """Row (size,) of the overall transmission error by the frame's coordinates, m/m and m/rad."""
         return np.asarray(self.system.at(self._rows["by_place"], speed)[0])
 
-    def compliances(self, speed: float) -> Complexes:
-        """Fourier coefficients (m, harmonics + 1) of one over the stiffness by the bases' angles, m/N."""
-        return self.by_angle(self.cycle_compliances, self.system.at(self._ports["positions"], speed), speed)
-
     def coefficients(self, speed: float) -> Complexes:
         """Fourier coefficients (m, harmonics + 1) of the stiffness by the bases' angles, N/m."""
         return self.by_angle(self.cycle_coefficients, self.system.at(self._ports["positions"], speed), speed)
@@ -162,3 +178,13 @@ class Gearset:
         """Products (n, m) of each wave's stiffness, by its `coefficients`, with its deflection (n, m), N."""
         waves = zip(self.waves.waves, coefficients, deflection.T, strict=True)
         return np.stack([self.products[wave.base].of(own, values) for wave, own, values in waves], axis=1)
+
+    def slopes(self, coefficients: Complexes, speed: float) -> Complexes:
+        """Coefficients (m, h + 1) by the bases' angles of what planets ahead in the mesh cycle have more of a function.
+
+        `coefficients` are those of the function itself. Planets stand ahead by as much as their static spins differ,
+        1e-4 of a cycle in the GRC: to first order that gives a mean wave to cosine and sine.
+        """
+        ahead = self.system.at(self._ports["static"], speed)[:, POSITION]
+        rate = 2j * math.pi * np.where(self.forward(speed), 1.0, -1.0)[:, None] * np.arange(coefficients.shape[1])
+        return np.asarray(ahead[:, None] * rate * coefficients)

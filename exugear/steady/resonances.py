@@ -1,17 +1,19 @@
 """Where lines cross modes of the mean system: speeds at which a response has to be looked at, and how strong it is.
 
-With half a per mille of damping a peak is as wide as a per mille of its speed: even steps miss it. The linear response
-of one mode tells which crossings matter.
+With half a per mille of damping a peak is as wide as a per mille of its speed: even steps miss it. Modes are those of
+the Campbell diagram, followed over speed by their shapes; where a line passes a mode, the linear response of that mode
+tells whether it matters.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from exugear.rotating.mean_modes import mean_modes
+from exugear.campbell.mode_tracks import ModeTracks
+from exugear.rotating.mean_system import MeanSystem
 from exugear.rotating.mesh_ports import DEFLECTION
 from exugear.steady.excitation import Gearset, Interface
 from fe_ste.tools.arrays import Complexes, Floats
@@ -25,8 +27,10 @@ AROUND = (-2.0, -0.7, 0.0, 0.7, 2.0)
 """Speeds around a crossing in half-widths of its peak."""
 MOST = 120
 """Crossings at most, the strongest first."""
-ROUNDS = 2
-"""Times that a crossing is found anew at its own speed."""
+ROUNDS = 4
+"""Iterations to a mode at the speed where a line meets it; their error is squared each time."""
+SAME = 0.5
+"""Least MAC with the followed mode for what they end in to be that mode."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +43,8 @@ class Crossing:
         Of the input, rad/s.
     line : int
         Place in the line set.
+    mode : int
+        Place among the modes that were followed.
     frequency : float
         Of the mode there, Hz.
     damping : float
@@ -49,32 +55,48 @@ class Crossing:
 
     speed: float
     line: int
+    mode: int
     frequency: float
     damping: float
     share: float
 
 
-def crossings(gearset: Gearset, low: float, high: float, forcing: Forcing) -> tuple[Crossing, ...]:
-    """Crossings of lines of single bases with modes between two speeds of the input (rad/s), the strongest first.
+@dataclass(frozen=True, eq=False)
+class _Mode:
+    """A mode at a speed: eigenvalue, displacements (size,), and the left shape (size,), which loads meet."""
+
+    value: complex
+    shape: Complexes
+    left: Complexes
+
+    def assurance(self, other: _Mode, mass: Floats, damping: Floats) -> float:
+        """MAC of two modes, 1 for the same and 0 for different ones of the quadratic eigenvalue problem."""
+
+        def between(one: _Mode, two: _Mode) -> complex:
+            return complex(one.left @ (((one.value + two.value) * mass + damping) @ two.shape))
+
+        own = between(self, self) * between(other, other)
+        return abs(between(self, other) * between(other, self) / own)
+
+
+def crossings(gearset: Gearset, tracks: ModeTracks, forcing: Forcing) -> tuple[Crossing, ...]:
+    """Crossings of lines of single bases with modes over the speeds of these, the strongest first.
 
     `forcing` gives the forces of the meshes (lines, m, f), N, that vary in the static state.
     """
-    middle = 0.5 * (low + high)
-    values, peaks = _peaks(gearset, middle, forcing)
-    strongest = peaks.max(axis=(0, 1))
-    found = []
     lines = _looked_at(gearset)
-    shares = np.max(peaks / np.maximum(strongest, 1e-300), axis=2)
-    for mode, value in enumerate(values):
-        for at, line in enumerate(lines):
-            speed = float(np.copysign(value.imag / gearset.lines.orders[line], middle))
-            # The mode moves with speed: whether it is met in the range shows where it is met.
-            if shares[mode, at] >= LEAST_SHARE and 0.8 * min(abs(low), abs(high)) <= abs(speed) <= 1.2 * max(
-                abs(low), abs(high)
-            ):
-                found.append(Crossing(speed, line, value.imag / 2.0 / np.pi, 0.0, float(shares[mode, at])))
-    found.sort(key=lambda crossing: -crossing.share)
-    exact = (_met(gearset, crossing) for crossing in found[:MOST])
+    forces = forcing(gearset.at(float(gearset.system.speeds[1])))[lines]
+    met = _passages(tracks, gearset.lines.orders[lines])
+    peaks = np.array([_peak(gearset, tracks, mode, speed, forces[at]) for mode, at, speed in met])
+    shares = np.max(peaks / np.maximum(peaks.max(axis=0, initial=0.0), 1e-300), axis=1) if met else np.zeros(0)
+    strongest = [n for n in np.argsort(-shares, kind="stable") if shares[n] >= LEAST_SHARE][:MOST]
+    exact = []
+    for n in strongest:
+        mode, at, speed = met[n]
+        value = _followed(gearset.system, tracks, mode, speed).value
+        near = Crossing(speed, lines[at], mode, value.imag / 2.0 / np.pi, -value.real / abs(value), float(shares[n]))
+        exact.append(_met(gearset.system, tracks, gearset.lines.orders, near))
+    low, high = tracks.speeds[0], tracks.speeds[-1]
     return tuple(crossing for crossing in exact if low <= crossing.speed <= high)
 
 
@@ -86,35 +108,68 @@ def refined(speeds: Floats, found: tuple[Crossing, ...]) -> Floats:
 
 
 def _looked_at(gearset: Gearset) -> list[int]:
-    """Lines of a single base up to the highest harmonic that is looked at."""
-    index = np.abs(gearset.lines.index)
+    """Lines of a single mesh frequency, and those beside it, up to the highest harmonic that is looked at."""
+    index = np.abs(gearset.lines.index[:, : len(gearset.waves.base_orders)])
     alone = (np.count_nonzero(index, axis=1) == 1) & (index.sum(axis=1) <= HARMONICS)
     return [int(line) for line in np.flatnonzero(alone)]
 
 
-def _peaks(gearset: Gearset, speed: float, forcing: Forcing) -> tuple[Complexes, Floats]:
-    """Eigenvalues, and what each mode makes of each line at resonance (modes, lines, signals).
+def _passages(tracks: ModeTracks, orders: Floats) -> list[tuple[int, int, float]]:
+    """Where lines of given orders pass modes: mode, place of the line, and speed (rad/s) on straight lines between."""
+    found = []
+    speed = tracks.speeds
+    for at, order in enumerate(orders):
+        above = tracks.eigenvalues.imag - order * np.abs(speed)[:, None]
+        passed = above[:-1] * above[1:] <= 0.0  # a comparison with NaN is false
+        for step, mode in zip(*np.nonzero(passed), strict=True):
+            before, after = above[step, mode], above[step + 1, mode]
+            share = before / (before - after) if before != after else 0.0
+            found.append((int(mode), at, float(speed[step] + share * (speed[step + 1] - speed[step]))))
+    return found
+
+
+def _followed(system: MeanSystem, tracks: ModeTracks, mode: int, speed: float) -> _Mode:
+    """Mode at the followed speed that is nearest to another."""
+    apart = np.where(np.isnan(tracks.eigenvalues[:, mode].imag), np.inf, np.abs(tracks.speeds - speed))
+    n = int(np.argmin(apart))
+    left = np.linalg.solve(system.mass.T, tracks.left[n, mode])
+    return _Mode(complex(tracks.eigenvalues[n, mode]), tracks.shapes[n, mode], left)
+
+
+def _peak(gearset: Gearset, tracks: ModeTracks, mode: int, speed: float, force: Complexes) -> Floats:
+    """Find what a mode makes at resonance of a line with forces (m, f) of the meshes, (signals,).
 
     Signals are the overall transmission error and the deflections of the meshes.
     """
-    interface = gearset.at(speed)
-    values, right, left = mean_modes(gearset.system, speed)
-    size = gearset.system.size
-    felt = left[:, size:] @ np.linalg.solve(gearset.system.mass, gearset.loads(interface.ports).astype(complex))
-    rows = np.vstack([interface.rows.by_place[:1], interface.ports.readings[:, DEFLECTION]])
-    seen = np.abs(right[:, :size] @ rows.T)
-    force = forcing(interface)
-    pushed = [np.abs(felt @ force[line].ravel()) / np.abs(values.real) for line in _looked_at(gearset)]
-    return values, np.array([seen * own[:, None] for own in pushed]).transpose(1, 0, 2)
+    own, ports = _followed(gearset.system, tracks, mode, speed), gearset.ports_at(speed)
+    rows = np.vstack([gearset.row_of_overall(speed)[None], ports.readings[:, DEFLECTION]])
+    pushed = abs(own.left @ (gearset.loads(ports) @ force.ravel()))
+    return np.asarray(np.abs(rows @ own.shape) * pushed / abs(own.value.real))
 
 
-def _met(gearset: Gearset, crossing: Crossing) -> Crossing:
-    """Find a crossing with the mode as it is at that speed."""
-    speed, order = crossing.speed, gearset.lines.orders[crossing.line]
-    wanted, damping = 2.0 * np.pi * crossing.frequency, 0.0
+def _met(system: MeanSystem, tracks: ModeTracks, orders: Floats, near: Crossing) -> Crossing:
+    """Find a crossing with the mode as it is at that speed, by Rayleigh quotients from either side.
+
+    Ostrowski (1959); their error is cubed from one to the next, and the speed goes with them.
+    """
+    order, at = float(orders[near.line]), near.speed
+    start = _followed(system, tracks, near.mode, at)
+    own = _Mode(complex(start.value.real, order * abs(at)), start.shape, start.left)
     for _ in range(ROUNDS):
-        values = gearset.system.eigenvalues(speed)
-        value = values[np.argmin(np.abs(values.imag - wanted))]
-        wanted, damping = float(value.imag), float(-value.real / abs(value))
-        speed = float(np.copysign(wanted / order, speed))
-    return Crossing(speed, crossing.line, wanted / 2.0 / np.pi, damping, crossing.share)
+        own = _improved(own, system.mass, system.damping_at(at), system.stiffness_at(at))
+        at = float(np.copysign(own.value.imag / order, at))
+    if start.assurance(own, system.mass, system.damping_at(at)) < SAME:
+        return near
+    damping = float(-own.value.real / abs(own.value))
+    return replace(near, speed=at, frequency=own.value.imag / 2.0 / np.pi, damping=damping)
+
+
+def _improved(own: _Mode, mass: Floats, damping: Floats, stiffness: Floats) -> _Mode:
+    """Improve a mode by inverse iteration of its shapes and the Rayleigh quotient of both."""
+    slope = 2.0 * own.value * mass + damping
+    matrix = own.value**2 * mass + own.value * damping + stiffness
+    right: Complexes = np.linalg.solve(matrix, slope @ own.shape).astype(np.complex128)
+    left: Complexes = np.linalg.solve(matrix.T, slope.T @ own.left).astype(np.complex128)
+    right, left = right / np.linalg.norm(right), left / np.linalg.norm(left)
+    value = own.value - complex(left @ matrix @ right) / complex(left @ slope @ right)
+    return _Mode(value, right, left)

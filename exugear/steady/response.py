@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.harmonics.krylov import solve_lines
-from exugear.rotating.mesh_ports import DEFLECTION, MeshPorts
+from exugear.rotating.mesh_places import mesh_places
+from exugear.rotating.mesh_ports import DEFLECTION, POSITION, MeshPorts
 from exugear.steady.excitation import Gearset, Interface
 from fe_ste.tools.arrays import Complexes, Floats
 
@@ -76,35 +77,62 @@ def linear_response(gearset: Gearset, interface: Interface) -> Response:
 
 def transmission_errors(gearset: Gearset, interface: Interface) -> Complexes:
     """Find the forces (n, m, 1) that static transmission errors make of the mean stiffness, N; see there."""
-    compliances = gearset.compliances(interface.speed)
-    mean, static = gearset.waves.mean_stiffness, interface.ports.static[:, DEFLECTION]
-    excess = np.zeros((len(gearset.lines.index), len(static)), dtype=complex)
+    if gearset.waves.carriers:
+        return _errors_in_time(gearset, interface.ports, interface.speed)
+    errors = _harmonics_of_errors(gearset, interface.ports, interface.speed)
+    excess = np.zeros((len(gearset.lines.index), len(errors)), dtype=complex)
     for n, wave in enumerate(gearset.waves.waves):
         alone = np.zeros((gearset.harmonics + 1, gearset.lines.index.shape[1]), dtype=np.int64)
         alone[:, wave.base] = np.arange(gearset.harmonics + 1)
         at, mirrored = gearset.lines.find(alone)
         use = (at > 0) & ~mirrored
-        excess[at[use], n] = -(mean[n] ** 2) * static[n] * compliances[n, use]
+        excess[at[use], n] = -gearset.waves.mean_stiffness[n] * errors[n, use]
     return excess[..., None]
 
 
 def transmission_error_line(gearset: Gearset, ports: MeshPorts, speed: float, line: int) -> Complexes:
     """Find the forces (m,) of one line of a single base as `transmission_errors` does for all."""
+    if gearset.waves.carriers:
+        return np.asarray(_errors_in_time(gearset, ports, speed)[line, :, 0])
     multiples = gearset.lines.index[line]
     base = int(np.flatnonzero(multiples)[0])
     harmonic = int(multiples[base])
-    mean, static = gearset.waves.mean_stiffness, ports.static[:, DEFLECTION]
     own = np.array([wave.base == base for wave in gearset.waves.waves])
-    compliances = gearset.by_angle(gearset.cycle_compliances, ports.positions, speed)[:, harmonic]
-    return np.asarray(-(mean**2) * static * compliances * own)
+    errors = _harmonics_of_errors(gearset, ports, speed)[:, harmonic]
+    return np.asarray(-gearset.waves.mean_stiffness * errors * own)
+
+
+def _errors_in_time(gearset: Gearset, ports: MeshPorts, speed: float) -> Complexes:
+    """Find the forces of `transmission_errors` (n, m, 1) where each planet meshes out of phase with the others."""
+    places = mesh_places(gearset.waves, speed, ports.positions, gearset.lattice.angles)
+    deflection, ahead = places.there @ ports.static[:, DEFLECTION], places.there @ ports.static[:, POSITION]
+    mean = gearset.waves.mean_stiffness[list(places.means)]
+    excess = np.empty_like(places.positions)
+    for u, n in enumerate(places.means):
+        harmonics = gearset.cycle_compliances[n]
+        turning = np.exp(2j * np.pi * (places.positions[:, [u]] + ahead[..., [u]]) * np.arange(1, len(harmonics)))
+        excess[:, u] = -(mean[u] ** 2) * deflection[..., u] * 2.0 * (turning @ harmonics[1:]).real
+    found = gearset.lattice.coefficients((places.back @ excess[..., None])[..., 0])
+    found[0] = 0.0
+    return found[..., None]
+
+
+def _harmonics_of_errors(gearset: Gearset, ports: MeshPorts, speed: float) -> Complexes:
+    """Harmonics (m, h + 1) of the static transmission errors by the bases' angles, m; the first is no error."""
+    force = gearset.waves.mean_stiffness * ports.static[:, DEFLECTION]
+    compliances = gearset.by_angle(gearset.cycle_compliances, ports.positions, speed)
+    ahead = gearset.slopes(compliances, speed)
+    return np.asarray(force[:, None] * compliances + force[gearset.mean_waves, None] * ahead)
 
 
 def parametric_response(gearset: Gearset, interface: Interface) -> Response:
     """Response to stiffness that varies with the position in the mesh cycle, this moving with the mean speed alone."""
     coefficients, mean = gearset.coefficients(interface.speed), gearset.waves.mean_stiffness
+    slopes, means = gearset.slopes(coefficients, interface.speed), gearset.mean_waves
 
     def forces(deflection: Complexes) -> Complexes:
-        return np.asarray(gearset.stretched(coefficients, deflection) - mean * deflection)
+        found = gearset.stretched(coefficients, deflection) - mean * deflection
+        return np.asarray(found + gearset.stretched(slopes, deflection[:, means]))
 
     def apply(deflection: Complexes) -> Complexes:
         return np.asarray(deflection - _answer(interface, forces(deflection)))
@@ -153,10 +181,9 @@ def dissipated_and_given(gearset: Gearset, response: Response) -> tuple[float, f
     interface, motion = response.interface, response.motion
     w, moving = interface.frequencies[1:], motion[1:]
     damping, stiffness = gearset.system.damping_at(interface.speed), gearset.system.stiffness_at(interface.speed)
-    taken = 2.0 * float(np.sum(w**2 * np.real(np.einsum("ns,st,nt->n", moving.conj(), damping, moving))))
+    rates = 1j * w[:, None] * moving
     # A stiffness that is not symmetric takes power, too.
-    taken += 2.0 * float(np.sum(w * np.imag(np.einsum("ns,st,nt->n", moving.conj(), stiffness, moving))))
+    taken = 2.0 * float(np.sum((rates.conj() * (rates @ damping.T + moving @ stiffness.T)).real))
     ports = interface.ports
-    along = np.einsum("ns,mfs->nmf", moving, ports.forces) * gearset.waves.weights[:, None]
-    rates = 1j * w[:, None, None] * along
-    return taken, -2.0 * float(np.sum(np.real(response.excess[1:] * np.conj(rates))))
+    along = np.tensordot(rates, ports.forces, axes=(1, 2)) * gearset.waves.weights[:, None]
+    return taken, -2.0 * float(np.sum((response.excess[1:] * along.conj()).real))

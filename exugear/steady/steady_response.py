@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.bodies.elastic_body import ElasticBody
-from exugear.campbell.campbell import Campbell, campbell_of
+from exugear.campbell.campbell import Campbell, campbell_of, modes_over_speed
+from exugear.campbell.mode_tracks import ModeTracks
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.harmonics.lines import LineSet
@@ -225,7 +226,8 @@ def response_of(
     gearset = gearset_of(assembly, even, settings.harmonics, settings.combinations)
     solver = PointSolver(gearset, settings)
     told = progress or (lambda done, total: None)
-    found = crossings(gearset, float(even.min()), float(even.max()), solver.forcing) if settings.at_resonances else ()
+    tracks = _tracks(gearset, even)
+    found = crossings(gearset, tracks, solver.forcing) if settings.at_resonances else ()
     folds: tuple[float, ...] = ()
     if settings.branches:
         solved, folds = _along_branch(solver, settings.speeds.first, settings.speeds.last, told)
@@ -236,7 +238,7 @@ def response_of(
         settings=settings,
         input_hash=settings.hash_with(assembly),
         lines=gearset.lines,
-        base_names=gearset.waves.base_names,
+        base_names=gearset.base_names,
         wave_names=tuple(wave.name for wave in gearset.waves.waves),
         signals=gearset.signal_names,
         solved=solved,
@@ -245,17 +247,17 @@ def response_of(
         folds=folds,
         growth_rate=solver.growth(float(even.min()), float(even.max())),
         planet_spread=gearset.system.planet_spread,
-        campbell=_campbell(gearset, even),
+        campbell=campbell_of(gearset.system, tracks),
     )
 
 
-def _campbell(gearset: Gearset, speeds: Floats) -> Campbell:
-    """Modes that a mesh or one of its harmonics may reach; of elastic bodies, those that their band holds."""
+def _tracks(gearset: Gearset, speeds: Floats) -> ModeTracks:
+    """Follow modes that a mesh or one of its harmonics may reach; of elastic bodies, those that their band holds."""
     assembly, low, high = gearset.waves.assembly, float(speeds.min()), float(speeds.max())
     highest = HARMONICS * float(gearset.waves.base_orders.max()) * float(np.abs(speeds).max()) / (2.0 * np.pi)
     if assembly.elastic_bodies:
         highest = min(highest, assembly.gearbox.case.elasticity.band_Hz)
-    return campbell_of(gearset.system, low, high, highest)
+    return modes_over_speed(gearset.system, low, high, highest)
 
 
 def _solve(

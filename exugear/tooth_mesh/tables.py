@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
+from fe_ste.transmission_error.hertz import pitch_point_pressure
 from fe_ste.transmission_error.table import MeshTable, TableError, TableInput
 
 if TYPE_CHECKING:
@@ -96,6 +97,8 @@ def requested_tables(
         if name not in gearbox.pairs:
             known = ", ".join(gearbox.pairs)
             raise CaseError(f"{gearbox.source}: no gear pair {name!r}; the pairs are {known}")
+        if name in gearbox.stated_stiffness:
+            raise gearbox.fault(without_table(gearbox, [name]))
         if not gearbox.pairs[name].static_torque > 0.0:
             raise CaseError(
                 f"{gearbox.source}: pairs.{name}: carries no torque in [static_load]; "
@@ -104,6 +107,17 @@ def requested_tables(
     grid = grid or gearbox.ste.grid
     wanted = {name: wanted_table(gearbox, name, positions or gearbox.ste.positions, grid) for name in chosen}
     return [_request(gearbox, name, out, table, grid) for name, table in wanted.items()]
+
+
+def without_table(gearbox: Gearbox, names: Iterable[str]) -> str:
+    """Say which of these pairs get no table because the file states their stiffness; empty if none."""
+    stated = [name for name in names if name in gearbox.stated_stiffness]
+    if not stated:
+        return ""
+    return (
+        f"pairs.{stated[0]}.stiffness: is stated, so the pair has no table; leave it out to have one computed, "
+        "or take a mesh law that needs a stiffness alone (line_of_action, constant, seed, iso6336)"
+    )
 
 
 def table_path(out: Path, name: str) -> Path:
@@ -221,6 +235,8 @@ def missing_tables(gearbox: Gearbox, out: Path, grid: bool = False) -> list[Tabl
     """
     requests = []
     for name in dict.fromkeys(mesh.pair.name for mesh in gearbox.meshes):
+        if name in gearbox.stated_stiffness and not grid:
+            continue
         try:
             fitting_table(gearbox, name, out, grid)
         except TableError:
@@ -263,6 +279,7 @@ def summarise(request: TableRequest, table: MeshTable) -> dict[str, Any]:
         "ste_peak_to_peak_um": figure(1e6 * (data["ste"].max() - data["ste"].min())),
         "mesh_stiffness_mean_N_per_m": figure(data["mesh_stiffness"].mean()),
         "max_pressure_MPa": figure(1e-6 * data["max_pressure"].max()),
+        "pitch_point_pressure_MPa": 1e-6 * pitch_point_pressure(request.wanted.pair, float(data["torque"])),
         "input_hash": table.input_hash,
     }
 

@@ -98,30 +98,71 @@ class Train:
         """Spin of the output per spin of the input."""
         return self.rolling_speeds(self.input, 1.0)[self.output]
 
-    def rolling_speeds(self, body: str, speed: float) -> dict[str, float]:
-        """Spins of all bodies (rad/s) in rolling motion when `body` turns at `speed`.
+    @cached_property
+    def independent(self) -> tuple[str, ...]:
+        """Bodies whose speeds tell all others: the input, and those that stand while it alone turns."""
+        return self._prescribed({self.input: 1.0})
 
-        In a train of several degrees of freedom, locked bodies other than input and output stand.
+    @cached_property
+    def shares(self) -> dict[str, float]:
+        """Spin of the output per spin of each of the `independent` bodies; of the input it is the ratio."""
+        return {body: self.rolling({self.input: 0.0, body: 1.0})[self.output] for body in self.independent}
+
+    def rolling_speeds(self, body: str, speed: float) -> dict[str, float]:
+        """Spins of all bodies (rad/s) in rolling motion when `body` turns at `speed`: see `rolling`."""
+        return self.rolling({body: speed})
+
+    def rolling(self, speeds: Mapping[str, float]) -> dict[str, float]:
+        """Spins of all bodies (rad/s) in rolling motion when some turn at given speeds.
+
+        In a train of several degrees of freedom, locked bodies stand: not those that turn with the first one given,
+        with input or output, nor such as cannot stand beside those given.
+
+        Parameters
+        ----------
+        speeds : mapping of body name to float
+            rad/s.
 
         Raises
         ------
         Exception
-            As `fault` makes it: the train is not fixed by that, or the body does not turn with it.
+            As `fault` makes it: the train is not fixed by that, the bodies do not turn so, or one does not turn.
+
+        Examples
+        --------
+        >>> from exugear.model.gearbox import Gearbox
+        >>> train = Gearbox.from_toml("cases/grc750/gearbox.toml").train
+        >>> round(train.rolling({"carrier": 1.0})["hss"], 6)
+        81.490683
         """
-        if body not in self.spins:
-            raise self.fault(f"body {body!r} does not turn; bodies are {', '.join(self.spins)}")
+        for body in speeds:
+            if body not in self.spins:
+                raise self.fault(f"body {body!r} does not turn; bodies are {', '.join(self.spins)}")
         if not self.degrees_of_freedom:
             raise self.fault("meshes: the gear train cannot turn, its meshes and couplings lock each other")
-        prescribed = (body, *self._standing(body))
-        rows = self._modes_of(prescribed)
-        speeds = np.array([speed, *(0.0 for _ in prescribed[1:])])
-        weights, _, rank, _ = np.linalg.lstsq(rows, speeds, rcond=1e-9)
-        if rank < self.degrees_of_freedom or np.abs(rows @ weights - speeds).max() > 1e-9 * abs(speed):
+        prescribed = self._prescribed(speeds)
+        rows, given = self._modes_of(prescribed), np.array([speeds.get(name, 0.0) for name in prescribed])
+        weights, _, rank, _ = np.linalg.lstsq(rows, given, rcond=1e-9)
+        if rank < self.degrees_of_freedom:
             raise self.fault(
                 f"the gear train has {self.degrees_of_freedom} degrees of freedom; turning {', '.join(prescribed)} "
                 "does not fix it: name the bodies that are held in static_load.locked"
             )
+        if np.abs(rows @ weights - given).max() > 1e-9 * np.abs(given).max():
+            raise self.fault(
+                f"the speeds of {', '.join(speeds)} contradict each other: the gear train has "
+                f"{self.degrees_of_freedom} degree{'s' if self.degrees_of_freedom > 1 else ''} of freedom"
+            )
         return dict(zip(self.spins, (self.kinematic_modes @ weights).tolist(), strict=True))
+
+    def _prescribed(self, speeds: Mapping[str, float]) -> tuple[str, ...]:
+        """Bodies with given speeds, and of those that stand the ones that these leave free."""
+        chosen = list(speeds)
+        for name in self._standing(chosen[0]):
+            rank = np.linalg.matrix_rank(self._modes_of(tuple(chosen)))
+            if np.linalg.matrix_rank(self._modes_of((*chosen, name))) > rank:
+                chosen.append(name)
+        return tuple(chosen)
 
     def mesh_frequencies(self, speed: float) -> dict[str, float]:
         """Mesh frequency (Hz) of each mesh when the input turns at `speed` rad/s; a frame that is no spin stands."""

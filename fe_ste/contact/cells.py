@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fe_ste.contact.kinematics import FlankPair, rigid_gap, tip_limit
+from fe_ste.contact.kinematics import FlankPair, circle_limit, rigid_gap
 from fe_ste.tools.arrays import Booleans, Floats, Integers
 from fe_ste.tools.compilation import compiled
 
@@ -60,19 +60,23 @@ def _lay_cells(
     cut = np.zeros(most, np.bool_)
     edges = np.empty(count + 1)
     step = 2.0 * half_window / count
-    top = 0.5 * pair.base_radius_1 * pair.tip_roll_1**2
     used = 0
     for tooth in teeth:
         for layer in range(len(axial)):
             # The contact line: roll grows with the rotation, by a pitch from tooth to tooth and along the helix.
             line = pair.working_roll + rotation + tooth * pair.pitch_1 + pair.twist_1 * axial[layer]
-            # Gear 1's own tip bounds the window above, the tip of gear 2 below.
-            lowest_roll = tip_limit(pair, axial[layer], tooth, rotation)
+            # Gear 1's own tip bounds the window above, the tip of gear 2 below; where a flank ends in an edge towards
+            # its root, this bounds it likewise.
+            lowest_roll = circle_limit(pair, pair.tip_radius_2, axial[layer], tooth, rotation)
+            highest_roll = pair.tip_roll_1
+            if 0.0 < pair.root_radius_2 < math.inf:
+                highest_roll = circle_limit(pair, pair.root_radius_2, axial[layer], tooth, rotation)
             bottom = 0.5 * pair.base_radius_1 * lowest_roll**2
+            top = 0.5 * pair.base_radius_1 * highest_roll**2
             if top - bottom < step:
                 continue
             # Elastic teeth touch a little before and after the path of contact: the window then stays at the edge.
-            line = min(max(line, lowest_roll), pair.tip_roll_1)
+            line = min(max(line, lowest_roll), highest_roll)
             centre = 0.5 * pair.base_radius_1 * line**2
             number = 0
             for edge in range(count + 1):

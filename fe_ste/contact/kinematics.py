@@ -48,10 +48,14 @@ class FlankPair(NamedTuple):
     form_roll_1: float
     tip_roll_1: float
     tip_radius_2: float
+    root_radius_2: float  # of the circle that ends contact towards the root of gear 2; 0 or infinite for none
 
     @classmethod
     def from_pair(cls, pair: GearPair, form_roll: float, tip_roll: float) -> FlankPair:
-        """Collect the numbers of `pair`; `form_roll` and `tip_roll` bound the flank of gear 1."""
+        """Collect the numbers of `pair`; `form_roll` and `tip_roll` bound the flank of gear 1.
+
+        Where a flank ends in an edge, at a chamfer of the tip or at a relieved root, contact ends there as well.
+        """
         pinion, gear, working_angle = pair.pinion, pair.gear, pair.working_pressure_angle
         return cls(
             base_radius_1=pinion.base_radius,
@@ -65,9 +69,14 @@ class FlankPair(NamedTuple):
             twist_2=math.tan(gear.base_helix_angle) / gear.base_radius,
             base_helix_cosine=math.cos(pinion.base_helix_angle),
             kind=-1.0 if gear.internal else 1.0,
-            form_roll_1=form_roll,
-            tip_roll_1=tip_roll,
-            tip_radius_2=gear.tip_radius,
+            form_roll_1=max(form_roll, pinion.root_form_roll_length / pinion.base_radius)
+            if pinion.has_relieved_root
+            else form_roll,
+            tip_roll_1=min(tip_roll, pinion.tip_form_roll_length / pinion.base_radius)
+            if pinion.tip_form_diameter is not None
+            else tip_roll,
+            tip_radius_2=gear.tip_form_radius,
+            root_radius_2=gear.root_form_radius if gear.has_relieved_root else math.inf if gear.internal else 0.0,
         )
 
 
@@ -123,16 +132,19 @@ def rigid_gap(pair: FlankPair, roll: float, axial: float, tooth: int, rotation: 
 
 
 @compiled
-def tip_limit(pair: FlankPair, axial: float, tooth: int, rotation: float) -> float:
-    """Least roll angle on gear 1 that the tip circle of gear 2 reaches, by bisection; within gear 1's flank."""
+def circle_limit(pair: FlankPair, radius: float, axial: float, tooth: int, rotation: float) -> float:
+    """Roll angle on gear 1 at a circle of gear 2, by bisection; within gear 1's flank.
+
+    Of the tip circle it is the least that gear 2 reaches, of the circle that ends its flank at the root the largest.
+    """
     low, high = pair.form_roll_1, pair.tip_roll_1
-    if pair.kind * (_polar_on_gear_2(pair, low, axial, tooth, rotation)[0] - pair.tip_radius_2) <= 0.0:
+    if pair.kind * (_polar_on_gear_2(pair, low, axial, tooth, rotation)[0] - radius) <= 0.0:
         return low
-    if pair.kind * (_polar_on_gear_2(pair, high, axial, tooth, rotation)[0] - pair.tip_radius_2) >= 0.0:
+    if pair.kind * (_polar_on_gear_2(pair, high, axial, tooth, rotation)[0] - radius) >= 0.0:
         return high
     for _ in range(60):  # halves the interval down to rounding
         middle = 0.5 * (low + high)
-        if pair.kind * (_polar_on_gear_2(pair, middle, axial, tooth, rotation)[0] - pair.tip_radius_2) > 0.0:
+        if pair.kind * (_polar_on_gear_2(pair, middle, axial, tooth, rotation)[0] - radius) > 0.0:
             low = middle
         else:
             high = middle

@@ -26,7 +26,7 @@ from fe_ste.tools.arrays import Floats
 from fe_ste.tools.notebook import html_table
 from fe_ste.tools.threads import both, one_dense_thread
 
-#: Teeth on either side of the loaded one whose displacement is kept.
+#: Teeth on either side of the loaded one whose displacement is kept, unless more may touch at once.
 TOOTH_REACH = 4
 
 
@@ -143,6 +143,7 @@ def flank_compliance(
     settings: MeshSettings | None = None,
     *,
     open_teeth: int | None = None,
+    tooth_reach: int = TOOTH_REACH,
     incompatible_modes: bool = True,
 ) -> FlankCompliance:
     """Compute the compliance of one flank of `gear` by finite elements.
@@ -156,6 +157,8 @@ def flank_compliance(
     settings : MeshSettings, optional
     open_teeth : int, optional
         Odd number of teeth of an open sector with free cut faces; without it the closed ring.
+    tooth_reach : int
+        Teeth on either side of the loaded one whose displacement is kept, of a closed ring that has as many.
     incompatible_modes : bool
         See `fe_ste.elasticity.bricks.stiffness_matrix`.
 
@@ -171,7 +174,7 @@ def flank_compliance(
     if open_teeth is not None and not (1 <= open_teeth <= gear.teeth and open_teeth % 2 == 1):
         raise ValueError(f"open_teeth = {open_teeth}: must be an odd number from 1 to {gear.teeth}")
     with one_dense_thread():
-        return _flank_compliance(gear, side, settings, open_teeth, incompatible_modes)
+        return _flank_compliance(gear, side, settings, open_teeth, tooth_reach, incompatible_modes)
 
 
 def _flank_compliance(
@@ -179,6 +182,7 @@ def _flank_compliance(
     side: int,
     settings: MeshSettings | None,
     open_teeth: int | None,
+    tooth_reach: int,
     incompatible_modes: bool,
 ) -> FlankCompliance:
     mesh = sector_mesh(gear, settings)
@@ -188,7 +192,7 @@ def _flank_compliance(
         lambda: flank_near_field(mesh, side, images, incompatible_modes),
     )
     if open_teeth is None:
-        faces, torque = sector.ring_faces(gear.teeth, min(TOOTH_REACH, (gear.teeth - 2) // 2)), sector.ring_torque()
+        faces, torque = sector.ring_faces(gear.teeth, min(tooth_reach, (gear.teeth - 2) // 2)), sector.ring_torque()
     else:
         faces, torque = sector.open_faces(open_teeth)
     regular = {}

@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from fe_ste.elasticity.flank import FlankCompliance, flank_compliance
+from fe_ste.elasticity.flank import TOOTH_REACH, FlankCompliance, flank_compliance
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.geometry.gears import Gear
 from fe_ste.tools.sealed import read_sealed, write_sealed
@@ -49,6 +49,7 @@ def known_flanks(
     settings: MeshSettings | None = None,
     *,
     open_teeth: int | None = None,
+    tooth_reach: int = TOOTH_REACH,
     incompatible_modes: bool = True,
 ) -> list[FlankCompliance]:
     """Return flanks as `fe_ste.elasticity.flank.flank_compliance` does, each gear computed at most once.
@@ -63,14 +64,20 @@ def known_flanks(
         Gears and sides: +1 counter-clockwise, -1 clockwise.
     settings : MeshSettings, optional
     open_teeth : int, optional
+    tooth_reach : int
     incompatible_modes : bool
+        As in `fe_ste.elasticity.flank.flank_compliance`, all three.
 
     Raises
     ------
     ValueError
         As in `fe_ste.elasticity.flank.flank_compliance`.
     """
-    options: dict[str, Any] = {"open_teeth": open_teeth, "incompatible_modes": incompatible_modes}
+    options: dict[str, Any] = {
+        "open_teeth": open_teeth,
+        "tooth_reach": tooth_reach,
+        "incompatible_modes": incompatible_modes,
+    }
     settings = settings or MeshSettings()
     keys = [_key(gear, settings, options) for gear, _ in wanted]
     gears: dict[str, Gear] = {}

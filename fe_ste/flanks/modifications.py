@@ -138,7 +138,7 @@ class FlankModification:
             If a relief starts outside the involute between form and tip circle.
         """
         roll_length = np.sqrt(np.maximum(radius**2 - gear.base_radius**2, 0.0))
-        form, tip = gear.form_roll_length, gear.tip_roll_length
+        form, tip = gear.root_form_roll_length, gear.tip_form_roll_length
         from_form = (roll_length - form) / (tip - form)
         along_face = z / gear.face_width
         gap = (
@@ -181,7 +181,7 @@ def _check_removal(key: str, amount: float) -> None:
 
 def _relief_gap(gear: Gear, key: str, relief: Relief, roll_length: Floats, end: float) -> Floats:
     """Gap of a relief that reaches its amount at the roll length `end`."""
-    low, high = sorted((gear.form_radius, gear.tip_radius))
+    low, high = sorted((gear.root_form_radius, gear.tip_form_radius))
     if not low < relief.start_radius < high:
         raise GeometryError(
             f"gear '{gear.name}': {key}.start_radius = {1e3 * relief.start_radius:.4f} mm must lie on the "
@@ -225,7 +225,7 @@ def radius_at_roll_length_from_tip(gear: Gear, roll_length: float) -> float:
     >>> round(1e3 * radius_at_roll_length_from_tip(gear, 4e-3), 4)
     76.3716
     """
-    return _radius_at(gear, gear.tip_roll_length - gear.outward * roll_length)
+    return _radius_at(gear, gear.tip_form_roll_length - gear.outward * roll_length)
 
 
 def radius_at_roll_length_from_root(gear: Gear, roll_length: float) -> float:
@@ -254,7 +254,7 @@ def radius_at_roll_length_from_root(gear: Gear, roll_length: float) -> float:
     >>> radius_at_roll_length_from_root(gear, 0.0) == gear.form_radius
     True
     """
-    return _radius_at(gear, gear.form_roll_length + gear.outward * roll_length)
+    return _radius_at(gear, gear.root_form_roll_length + gear.outward * roll_length)
 
 
 def _radius_at(gear: Gear, roll_length: float) -> float:

@@ -11,19 +11,23 @@ import numbers
 import numpy as np
 
 from fe_ste.geometry.fillet import root_fillet
-from fe_ste.geometry.gear_relations import UncheckedGear
+from fe_ste.geometry.gear_relations import ROUNDING, UncheckedGear
 from fe_ste.geometry.involute import involute
 from fe_ste.geometry.pair_relations import UncheckedPair
 
 LEAST_TEETH = 5
 """Fewest teeth; below lie worms and pump rotors."""
-LEAST_TIP_THICKNESS = 0.2
-"""Least tooth thickness at the tip circle, normal section, in normal modules."""
+LEAST_TIP_THICKNESS = 0.1
+"""Least tooth thickness at the tip circle, normal section, in normal modules: below, elements there degenerate."""
+USUAL_TIP_THICKNESS = 0.2
+"""What is usual at least; published gears have a little less."""
+LEAST_NECK_THICKNESS = 0.2
+"""Least thickness of what undercut leaves of a tooth, normal section, in normal modules."""
 PRESSURE_ANGLE_RANGE = (math.radians(10.0), math.radians(35.0))
 """Normal pressure angles accepted, rad."""
 LARGEST_HELIX_ANGLE = math.radians(50.0)
 """Largest magnitude of the helix angle at the reference circle, rad."""
-LENGTH_TOLERANCE = 1e-9
+LENGTH_TOLERANCE = ROUNDING
 """Rounding allowed for when lengths are compared, in normal modules."""
 FILLET_TOLERANCE = 1e-5
 """Error of the fillet as a polygon when a tip corner is led past it, in normal modules."""
@@ -52,7 +56,8 @@ def check_gear(gear: UncheckedGear) -> None:
         _check_internal_space(gear)
     else:
         _check_generating_rack(gear)
-        _check_undercut(gear)
+        _check_flank(gear)
+    _check_form_circles(gear)
     _check_tip_thickness(gear)
     _check_held_diameter(gear)
 
@@ -71,6 +76,7 @@ def check_gear_pair(pair: UncheckedPair) -> None:
         With one message that says what would be right.
     """
     _check_teeth_of_mates(pair)
+    _check_common_face(pair)
     _check_equal_rack(pair)
     _check_hands(pair)
     _check_centre_distance(pair)
@@ -118,7 +124,8 @@ def _check_values(gear: UncheckedGear) -> None:
         "material.youngs_modulus": gear.material.youngs_modulus,
         "material.density": gear.material.density,
     }
-    given = {"tip_diameter": gear.tip_diameter, "root_diameter": gear.root_diameter}
+    keys = ("tip_diameter", "root_diameter", "tip_form_diameter", "root_form_diameter")
+    given = {key: getattr(gear, key) for key in keys}
     positive |= {key: value for key, value in given.items() if value is not None}
     for key, value in positive.items():
         if not _is_number(value) or value <= 0.0:
@@ -175,20 +182,46 @@ def _check_generating_rack(gear: UncheckedGear) -> None:
     raise _refuse_gear(gear, "rack.tip_radius", f"{radius:g}", remedy)
 
 
-def _check_undercut(gear: UncheckedGear) -> None:
-    """Refuse a rack whose straight flank reaches so deep that it cuts back into the involute."""
-    lacking = -gear.form_roll_length * math.sin(gear.transverse_pressure_angle)
-    if lacking > LENGTH_TOLERANCE * gear.normal_module:
-        if gear.root_diameter is not None:
-            least = gear.root_diameter + 2.0 * lacking
-            remedy = f"undercuts the involute: at least {_mm(least)} is needed"
-            raise _refuse_gear(gear, "root_diameter", _mm(gear.root_diameter), remedy)
-        least = gear.profile_shift + lacking / gear.normal_module
-        remedy = f"undercuts the involute: at least {least:.4f} (or more teeth) is needed"
-        raise _refuse_gear(gear, "profile_shift", f"{gear.profile_shift:g}", remedy)
+def _check_flank(gear: UncheckedGear) -> None:
+    """Refuse a tooth that its root, undercut or not, leaves no flank, and one that undercut leaves too thin a neck."""
+    if gear.is_undercut:
+        neck = _neck_thickness(gear) / gear.normal_module
+        if neck < LEAST_NECK_THICKNESS:
+            least = gear.profile_shift - gear.generated_roll_length / gear.normal_module * math.sin(
+                gear.transverse_pressure_angle
+            )
+            remedy = (
+                f"undercuts the tooth to a neck {max(neck, 0.0):.4f} normal modules thick: at least "
+                f"{LEAST_NECK_THICKNESS} is needed; without undercut it is {least:.4f}"
+            )
+            raise _refuse_gear(gear, "profile_shift", f"{gear.profile_shift:g}", remedy)
     if gear.tip_radius <= gear.form_radius:
         remedy = f"leaves no involute: it must lie above the form diameter of {_mm(2.0 * gear.form_radius)}"
         raise _refuse_gear(gear, "tip_diameter", _mm(2.0 * gear.tip_radius), remedy)
+
+
+def _neck_thickness(gear: UncheckedGear) -> float:
+    """Least thickness of an external tooth below its flank, transverse section, m."""
+    return 2.0 * float(np.min(np.abs(root_fillet(gear, np.linspace(0.0, 1.0, 201))[:, 1])))
+
+
+def _check_form_circles(gear: UncheckedGear) -> None:
+    """Refuse form circles that are given beyond the flank, or that leave none."""
+    tolerance, out = LENGTH_TOLERANCE * gear.normal_module, gear.outward
+    if (gear.tip_form_radius - gear.tip_radius) * out > tolerance:
+        word = "smaller" if gear.internal else "larger"
+        remedy = f"must not be {word} than the tip diameter of {_mm(2.0 * gear.tip_radius)}"
+        raise _refuse_gear(gear, "tip_form_diameter", _mm(2.0 * gear.tip_form_radius), remedy)
+    if gear.root_form_diameter is not None and (gear.form_radius - 0.5 * gear.root_form_diameter) * out > tolerance:
+        word = "at most" if gear.internal else "at least"
+        remedy = (
+            f"lies in the root fillet: {word} {_mm(2.0 * gear.form_radius)}, where the tool's tip ends the involute"
+        )
+        raise _refuse_gear(gear, "root_form_diameter", _mm(gear.root_form_diameter), remedy)
+    if (gear.tip_form_radius - gear.root_form_radius) * out <= tolerance:
+        word = "below" if gear.internal else "above"
+        remedy = f"leaves no flank: it must lie {word} the root form diameter of {_mm(2.0 * gear.root_form_radius)}"
+        raise _refuse_gear(gear, "tip_form_diameter", _mm(2.0 * gear.tip_form_radius), remedy)
 
 
 def _check_internal_space(gear: UncheckedGear) -> None:
@@ -234,6 +267,17 @@ def _check_teeth_of_mates(pair: UncheckedPair) -> None:
     if gear.teeth < least:
         remedy = f"must be at least {least}: the pinion, '{pinion.name}' with {pinion.teeth}, is the smaller"
         raise _refuse_pair(pair, f"teeth of '{gear.name}'", f"{gear.teeth}", remedy)
+
+
+def _check_common_face(pair: UncheckedPair) -> None:
+    width, most = pair.common_face_width, min(pair.pinion.face_width, pair.gear.face_width)
+    if width is None:
+        return
+    if not _is_number(width) or not 0.0 < width <= most + LENGTH_TOLERANCE * pair.pinion.normal_module:
+        value = _mm(width) if _is_number(width) else f"{width!r}"
+        raise _refuse_pair(
+            pair, "common_face_width", value, f"must be above zero and at most the narrower face, {_mm(most)}"
+        )
 
 
 def _check_equal_rack(pair: UncheckedPair) -> None:
@@ -295,22 +339,26 @@ def _check_tip_clearances(pair: UncheckedPair) -> None:
 
 
 def _check_tip_interference(pair: UncheckedPair) -> None:
-    """Refuse a tip that touches its mate below the form circle, where the mate has a fillet."""
+    """Refuse a tip that touches its mate below the form circle, where the mate has a fillet.
+
+    Where undercut or a relieved root ends the mate's flank in an edge there is nothing to touch: contact ends there.
+    """
     tolerance = LENGTH_TOLERANCE * pair.pinion.normal_module
-    reach_of_gear = pair.pinion_roll_length(pair.gear.tip_roll_length)
+    reach_of_gear = pair.pinion_roll_length(pair.gear.tip_form_roll_length)
     reach_of_pinion = pair.pinion_roll_length(pair.gear.form_roll_length)
     for tip, mate, excess in (
         (pair.gear, pair.pinion, pair.pinion.form_roll_length - reach_of_gear),
-        (pair.pinion, pair.gear, pair.pinion.tip_roll_length - reach_of_pinion),
+        (pair.pinion, pair.gear, pair.pinion.tip_form_roll_length - reach_of_pinion),
     ):
-        if excess > tolerance:
-            bound = 2.0 * math.hypot(tip.base_radius, tip.tip_roll_length - tip.outward * excess)
+        if excess > tolerance and not mate.has_relieved_root:
+            bound = 2.0 * math.hypot(tip.base_radius, tip.tip_form_roll_length - tip.outward * excess)
             word = "at least" if tip.internal else "at most"
             remedy = (
                 f"interferes with the root fillet of '{mate.name}', which begins at the form diameter "
                 f"{_mm(2.0 * mate.form_radius)}: {word} {_mm(bound)} is needed"
             )
-            raise _refuse_pair(pair, f"tip_diameter of '{tip.name}'", _mm(2.0 * tip.tip_radius), remedy)
+            key = "tip_diameter" if tip.tip_form_diameter is None else "tip_form_diameter"
+            raise _refuse_pair(pair, f"{key} of '{tip.name}'", _mm(2.0 * tip.tip_form_radius), remedy)
 
 
 def _check_contact(pair: UncheckedPair) -> None:
@@ -334,10 +382,11 @@ def _check_fillet_clearance(pair: UncheckedPair) -> None:
 
 
 def corner_to_fillet_gap(pair: UncheckedPair, tip: UncheckedGear, mate: UncheckedGear) -> float:
-    """Least gap between the way of a tip corner and the mate's root fillet.
+    """Least gap between the way of a tip's corners and the mate's root fillet.
 
     The corner leaves the line of action at the end of the path of contact and goes deeper than there. The
-    flanks are taken in contact, as on the path of contact.
+    flanks are taken in contact, as on the path of contact. A chamfer makes two corners, at the tip form circle and,
+    as far from the flank as it is high, at the tip circle.
 
     Parameters
     ----------
@@ -352,7 +401,17 @@ def corner_to_fillet_gap(pair: UncheckedPair, tip: UncheckedGear, mate: Unchecke
         Arc about the mate's axis, m; negative if the corner cuts into the fillet, infinite if it does not get
         below the form circle.
     """
-    distance, radius = pair.centre_distance, tip.tip_radius
+    corners = [(tip.tip_form_radius, tip.half_angle(tip.tip_form_radius))]
+    chamfer = abs(tip.tip_radius - tip.tip_form_radius)
+    if chamfer > 0.0:
+        corners.append((tip.tip_radius, corners[0][1] - chamfer / tip.tip_radius))
+    return min(_corner_gap(pair, tip, mate, *corner) for corner in corners)
+
+
+def _corner_gap(
+    pair: UncheckedPair, tip: UncheckedGear, mate: UncheckedGear, radius: float, half_angle_of_corner: float
+) -> float:
+    distance = pair.centre_distance
     # Origin on the tip's axis, x along the line of centres to the pitch point; x as the mate sees it is
     # to_mate * distance + turn * x.
     to_mate, turn = (-1.0 if tip.internal else 1.0), -float(pair.gear.outward)
@@ -363,7 +422,7 @@ def corner_to_fillet_gap(pair: UncheckedPair, tip: UncheckedGear, mate: Unchecke
     x, y = to_mate * distance + turn * radius * np.cos(corner), radius * np.sin(corner)
     seen_radius, seen_angle = np.hypot(x, y), np.arctan2(y, x)
     # The flanks touch at the pitch point at rotation zero.
-    rotation = corner - tip.half_angle(radius) + tip.half_angle(pair.working_radius(tip))
+    rotation = corner - half_angle_of_corner + tip.half_angle(pair.working_radius(tip))
     mate_tooth = mate.half_angle(pair.working_radius(mate)) + rotation * tip.teeth / mate.teeth
     fillet = root_fillet(mate, np.linspace(0.0, 1.0, 2001))[:: -mate.outward]
     half_angle = np.interp(seen_radius, np.hypot(*fillet.T), np.arctan2(fillet[:, 1], fillet[:, 0]))

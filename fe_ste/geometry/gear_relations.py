@@ -6,13 +6,34 @@ Nothing is refused here: the checks ask an unchecked gear for its radii and angl
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal, overload
+from functools import cached_property
+from typing import Any, Literal, overload
 
 import numpy as np
 
 from fe_ste.geometry.involute import involute
+from fe_ste.geometry.trochoid import RackTipCut
 from fe_ste.tools.arrays import Floats
+
+ROUNDING = 1e-9
+"""Rounding allowed for when lengths are compared, in normal modules."""
+LATER_INPUTS = frozenset(("tip_form_diameter", "root_form_diameter", "common_face_width"))
+"""Inputs of gears and pairs that came after files with hashes of the others."""
+
+
+def inputs_that_are_given(items: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    """Return inputs without the later ones that nobody gave, so that hashes of older inputs stay as they were.
+
+    For `dataclasses.asdict`, as its `dict_factory`.
+
+    Examples
+    --------
+    >>> inputs_that_are_given([("teeth", 20), ("tip_diameter", None), ("tip_form_diameter", None)])
+    {'teeth': 20, 'tip_diameter': None}
+    """
+    return {key: value for key, value in items if not (value is None and key in LATER_INPUTS)}
 
 
 @dataclass(frozen=True)
@@ -71,6 +92,8 @@ class UncheckedGear:
     root_diameter: float | None = None
     tooth_thinning: float = 0.0
     material: Material = Material()
+    tip_form_diameter: float | None = None
+    root_form_diameter: float | None = None
 
     @property
     def outward(self) -> int:
@@ -164,16 +187,86 @@ class UncheckedGear:
         return math.sqrt(self.tip_radius**2 - self.base_radius**2)
 
     @property
-    def form_roll_length(self) -> float:
-        """Roll length at which the involute meets the root fillet, m; negative if the flank is undercut.
+    def tip_form_radius(self) -> float:
+        """Radius at which a chamfer or rounding of the tip ends the flank (ISO 21771: d_Fa / 2), m."""
+        return self.tip_radius if self.tip_form_diameter is None else 0.5 * self.tip_form_diameter
 
-        External: the last straight point of the generating rack, followed down the line of action.
+    @property
+    def root_form_radius(self) -> float:
+        """Radius at which the flank ends towards the root (ISO 21771: d_Ff / 2), m.
+
+        The one that is given, where a tool with protuberance or a grinding wheel ends the flank before the fillet
+        that is modelled does.
+        """
+        given = self.form_radius if self.root_form_diameter is None else 0.5 * self.root_form_diameter
+        return self.outward * max(self.outward * given, self.outward * self.form_radius)
+
+    @property
+    def tip_form_roll_length(self) -> float:
+        """Roll length at `tip_form_radius`, m."""
+        if self.tip_form_diameter is None:
+            return self.tip_roll_length
+        return math.sqrt(self.tip_form_radius**2 - self.base_radius**2)
+
+    @property
+    def root_form_roll_length(self) -> float:
+        """Roll length at `root_form_radius`, m."""
+        if self.root_form_diameter is None:
+            return self.form_roll_length
+        return math.sqrt(max(self.root_form_radius**2 - self.base_radius**2, 0.0))
+
+    @property
+    def has_relieved_root(self) -> bool:
+        """Whether the flank ends in an edge towards the root, beyond which a mate's tip is free."""
+        return self.is_undercut or (self.root_form_radius - self.form_radius) * self.outward > 0.0
+
+    @property
+    def is_undercut(self) -> bool:
+        """Whether the tip of the generating rack cuts back into the involute."""
+        return not self.internal and self.generated_roll_length < -ROUNDING * self.normal_module
+
+    @property
+    def form_roll_length(self) -> float:
+        """Roll length at which the involute meets the root fillet, m.
+
+        External: where the generating rack's straight flank ends, or where its tip has cut the involute away.
         Internal: the centre of the fillet lies on the involute shifted by the fillet radius into the tooth
         space, which is an involute of the same base circle.
         """
         if self.internal:
             radius = self.fillet_radius
             return radius + math.sqrt((self.root_radius - radius) ** 2 - self.base_radius**2)
+        if not self.is_undercut:
+            return max(self.generated_roll_length, 0.0)
+        radius = self.rack_tip_cut.polar(np.array([self.fillet_start]))[0].item()
+        return math.sqrt(max(radius**2 - self.base_radius**2, 0.0))
+
+    @property
+    def fillet_start(self) -> float:
+        """Parameter of `rack_tip_cut` at which the fillet of an external gear begins: above 0 on an undercut tooth."""
+        return self.rack_tip_cut.undercut_parameter if self.is_undercut else 0.0
+
+    @cached_property
+    def rack_tip_cut(self) -> RackTipCut:
+        """Curve that the rounded tip of the generating rack cuts into the root of an external gear."""
+        return RackTipCut(
+            reference_radius=self.reference_radius,
+            base_radius=self.base_radius,
+            root_radius=self.root_radius,
+            half_pitch_angle=0.5 * self.angular_pitch,
+            base_half_angle=self.half_angle(self.base_radius),
+            pressure_angle=self.normal_pressure_angle,
+            helix_angle=self.helix_angle,
+            rounding=self.fillet_radius,
+            half_land=self.rack_tip_half_land,
+        )
+
+    @property
+    def generated_roll_length(self) -> float:
+        """Roll length down to which the straight flank of the generating rack cuts, m; negative where that undercuts.
+
+        The last straight point of the rack, followed down the line of action.
+        """
         straight = self.dedendum_factor - self.rack.tip_radius * (1.0 - math.sin(self.normal_pressure_angle))
         depth = (straight - self.profile_shift) * self.normal_module
         angle = self.transverse_pressure_angle

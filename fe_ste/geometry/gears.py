@@ -55,12 +55,17 @@ class Gear(UncheckedGear):
         backlash.
     material : Material
         Elastic constants and density.
+    tip_form_diameter : float, optional
+        Where a chamfer or rounding of the tip ends the flank, m; the tip diameter if not given. Contact ends there,
+        while the elastic tooth reaches to the tip.
+    root_form_diameter : float, optional
+        Where the flank ends towards the root, m, if that is before the root fillet begins. Contact ends there.
 
     Raises
     ------
     GeometryError
-        If a value makes no sense, the tip is thinner than 0.2 normal modules, the flank is undercut, or the
-        root fillet does not fit.
+        If a value makes no sense, the tip or the neck of an undercut tooth is thinner than 0.2 normal modules, or
+        the root fillet does not fit.
 
     Examples
     --------
@@ -117,6 +122,8 @@ class GearPair(UncheckedPair):
         The larger gear, external or internal.
     centre_distance : float
         Operating centre distance, m, positive also for an internal pair.
+    common_face_width : float, optional
+        Width over which the faces touch, m, where that is less than the narrower face; in its middle.
 
     Raises
     ------

@@ -20,6 +20,7 @@ class UncheckedPair:
     pinion: UncheckedGear
     gear: UncheckedGear
     centre_distance: float
+    common_face_width: float | None = None
 
     @property
     def _signed_teeth_sum(self) -> int:
@@ -33,7 +34,9 @@ class UncheckedPair:
 
     @property
     def face_width(self) -> float:
-        """Common face width, m."""
+        """Common face width, m: that which is given, else that of the narrower gear."""
+        if self.common_face_width is not None:
+            return self.common_face_width
         return min(self.pinion.face_width, self.gear.face_width)
 
     @property
@@ -112,12 +115,12 @@ class UncheckedPair:
     @property
     def path_start(self) -> float:
         """Coordinate xi of the end of the path of contact set by the gear's tip, m."""
-        return max(self.pinion_roll_length(self.gear.tip_roll_length), self.pinion.form_roll_length)
+        return max(self.pinion_roll_length(self.gear.tip_form_roll_length), self.pinion.root_form_roll_length)
 
     @property
     def path_end(self) -> float:
         """Coordinate xi of the end of the path of contact set by the pinion's tip, m."""
-        return min(self.pinion.tip_roll_length, self.pinion_roll_length(self.gear.form_roll_length))
+        return min(self.pinion.tip_form_roll_length, self.pinion_roll_length(self.gear.root_form_roll_length))
 
     @property
     def transverse_contact_ratio(self) -> float:

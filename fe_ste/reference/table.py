@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fe_ste.geometry.gear_relations import inputs_that_are_given
 from fe_ste.geometry.gears import GearPair
 from fe_ste.reference.contact_model import Iteration, convergence_table
 from fe_ste.reference.finite_deformation import von_mises
@@ -92,7 +93,7 @@ class NonlinearInput:
 
     def resolved(self) -> dict[str, Any]:
         """Return the input as plain data, with everything that has a default spelled out."""
-        return {"method": METHOD, "method_version": NONLINEAR_TABLE, **asdict(self)}
+        return {"method": METHOD, "method_version": NONLINEAR_TABLE, **asdict(self, dict_factory=inputs_that_are_given)}
 
     @cached_property
     def hash(self) -> str:

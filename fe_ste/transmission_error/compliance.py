@@ -176,8 +176,14 @@ def pair_compliance(
     --------
     fe_ste.elasticity.known_flanks.known_flanks : Where computed gears are kept.
     """
-    from fe_ste.elasticity.known_flanks import known_flanks  # finite elements, which a table that is there spares
+    # finite elements, which a table that is there spares
+    from fe_ste.elasticity.flank import TOOTH_REACH
+    from fe_ste.elasticity.known_flanks import known_flanks
 
     sides = ((pair.pinion, 1), (pair.gear, -1 if pair.gear.internal else 1))
-    pinion, gear = known_flanks(sides, mesh, open_teeth=open_teeth, incompatible_modes=incompatible_modes)
+    # Of wide helical gears more pairs touch at once than neighbours are usually kept.
+    reach = max(TOOTH_REACH, math.ceil(pair.total_contact_ratio))
+    pinion, gear = known_flanks(
+        sides, mesh, open_teeth=open_teeth, tooth_reach=reach, incompatible_modes=incompatible_modes
+    )
     return PairCompliance.from_flanks(pair, (pinion, gear), contact)

@@ -347,6 +347,8 @@ def _check_on_flanks(compliance: PairCompliance, cells: Cells, force: Floats) ->
     """Refuse contact at a form circle, where the involute ends and the fillet begins."""
     touching = force > 0
     for flank, roll in zip(compliance.flanks, (cells.roll, cells.gear_roll), strict=True):
+        if flank.gear.has_relieved_root:
+            continue  # no cell lies beyond the edge there
         margin = (roll - flank.roll[0]) if not flank.gear.internal else (flank.roll[-1] - roll)
         if (margin[touching] < 0.01 * np.ptp(flank.roll)).any():
             raise ContactError(f"gear {flank.gear.name}: contact reaches the form circle, where the involute ends")

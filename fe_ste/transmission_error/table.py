@@ -22,6 +22,7 @@ import numpy as np
 from fe_ste.contact.cells import ContactSettings
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.flanks.modifications import FlankModification
+from fe_ste.geometry.gear_relations import inputs_that_are_given
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.files import FileError
 from fe_ste.tools.notebook import html_table, value_range
@@ -96,7 +97,7 @@ class TableInput:
 
     def resolved(self) -> dict[str, Any]:
         """Return the input as plain data, with everything that has a default spelled out."""
-        return {"method_version": TABLE, **asdict(self)}
+        return {"method_version": TABLE, **asdict(self, dict_factory=inputs_that_are_given)}
 
     @cached_property
     def hash(self) -> str:

@@ -71,13 +71,13 @@ def _draw_campbell(found: Modes, path: Path) -> Path:
     gearbox, least = found.assembly.gearbox, 1e-3
     shares = mobility_shares(found.to_dataset())
     seen = (found.frequency > 0.0) & (shares >= least)
-    highest = max(gearbox.train.mesh_frequencies(1.0).values())
+    highest = max(gearbox.train.mesh_frequencies(1.0).values(), default=0.0)
     top = 1.1 * float(max(found.frequency[seen], default=1.0))
     picture = path.with_name("campbell.png")
     plot_campbell(
         found.frequency[seen],
         order_lines(gearbox),
-        top / highest,
+        top / highest if highest else 1.0,
         picture,
         weights=(shares[seen] / shares.max()) ** 0.5,
         highest_frequency=top,

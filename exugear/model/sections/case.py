@@ -16,6 +16,7 @@ from exugear.model.sections.bodies import BodySection
 from exugear.model.sections.connections import BearingSection, CouplingSection, JointSection, MeshSection, MountSection
 from exugear.model.sections.entries import LONGEST_VALUE, MOST_ENTRIES, Entries, FileName, Name, Section, Text
 from exugear.model.sections.gears import DeviationSection, GearSection, PairSection, PinSection
+from exugear.model.sections.loads import LoadsSection, RatingSection
 
 
 class LoadCaseSection(Section):
@@ -29,6 +30,8 @@ class LoadCaseSection(Section):
     """Simulated time."""
     start_speed_rpm: q.SpeedRpm = 0.0
     """Speed of the overall input at the start."""
+    start_speeds_rpm: dict[Name, q.SpeedRpm] = {}
+    """Speeds of further bodies at the start, of a train with several degrees of freedom; else its locked ones stand."""
     driven_body: Name | None = None
     """Body whose speed is prescribed; with the two keys that follow."""
     end_speed_rpm: q.SpeedRpm | None = None
@@ -59,8 +62,8 @@ class OverallSection(Section):
     """Body whose angle counts as the input."""
     output: Name
     """Body whose angle counts as the output."""
-    output_gear: Name
-    """Gear whose base circle turns the angle into a length."""
+    output_gear: Name | None = None
+    """Gear whose base circle turns the angle into a length; needed where there are gears, else it is taken at 1 m."""
 
 
 class StaticLoadSection(Section):
@@ -121,6 +124,13 @@ class GravitySection(Section):
     """Vector in the axes of the gearbox."""
 
 
+class OperationSection(Section):
+    """How the gearbox works in service; what a report sets its speeds against."""
+
+    rated_speed_rpm: Annotated[q.SpeedRpm, Field(gt=0.0)] | None = None
+    """Speed of the overall input at rated power, without sign."""
+
+
 class ReportSection(Section):
     """What a report looks for: modes near a frequency that was measured or published."""
 
@@ -162,6 +172,12 @@ class SteSection(Section):
         return self
 
 
+Label = Annotated[Text, Field(min_length=1, max_length=80)]
+"""Words for a name: short, since tables and diagrams hold them."""
+_NAMED = ("bodies", "bearings", "joints", "mounts", "couplings", "meshes", "pairs", "gears", "load_cases", "pins")
+"""Tables whose entries may have a label."""
+
+
 class CaseFile(Section):
     """The whole gearbox file."""
 
@@ -173,13 +189,13 @@ class CaseFile(Section):
     """What the overall transmission error compares."""
     static_load: StaticLoadSection
     """Static state that fixes loaded flanks, tables and operating points of bearings."""
-    gears: Entries[GearSection]
+    gears: Entries[GearSection] = {}
     """Toothed wheels by name."""
-    pairs: Entries[PairSection]
+    pairs: Entries[PairSection] = {}
     """Pairs of gears that mesh, by name; each gets a table."""
     bodies: Entries[BodySection]
     """Bodies by name."""
-    meshes: Entries[MeshSection]
+    meshes: Entries[MeshSection] = {}
     """Pairs at work between bodies, by name."""
     load_cases: Entries[LoadCaseSection]
     """Load cases in time, by name; the first is the default."""
@@ -203,10 +219,26 @@ class CaseFile(Section):
     """Seats of bearings where the housing is not elastic."""
     gravity: GravitySection = GravitySection()
     """Weight."""
+    operation: OperationSection = OperationSection()
+    """How the gearbox works in service."""
     report: ReportSection = ReportSection()
     """What a report looks for."""
+    labels: Annotated[dict[Name, Label], Field(max_length=MOST_ENTRIES)] = {}
+    """Words for people by name of a body, bearing, pair or other entry; pages show them instead of the name."""
     ste: SteSection = SteSection()
     """Tables of the transmission error."""
+    loads: LoadsSection | None = None
+    """Loads over the life of the gearbox."""
+    rating: RatingSection | None = None
+    """How gears are rated."""
+
+    @model_validator(mode="after")
+    def _labels_of_entries(self) -> CaseFile:
+        known = {name for table in _NAMED for name in getattr(self, table)}
+        for name in self.labels:
+            if name not in known:
+                raise ValueError(f"labels.{name}: no entry of that name; labels are for {', '.join(_NAMED)}")
+        return self
 
     def __repr__(self) -> str:
         """Return one short line: the title, and how many entries the tables have."""

@@ -90,6 +90,8 @@ class GearSection(Section):
     """Helix angle at the reference circle; right hand positive, a ring as the planet that it meshes with."""
     profile_shift: q.ProfileShift = 0.0
     """Profile shift in normal modules; positive for a larger gear, of a ring as well."""
+    profile_shift_from_centre_distance: bool = False
+    """Whether the profile shift is the one that leaves no backlash at the centre distance, beside that of the mate."""
     face_width_mm: q.FaceWidthMm
     """Width of the teeth."""
     held_diameter_mm: q.LengthMm
@@ -100,8 +102,16 @@ class GearSection(Section):
     """Tooth thickness taken off on the reference circle, for backlash."""
     tip_diameter_mm: q.LengthMm | None = None
     """Tip diameter; from rack and profile shift by default."""
+    fitted_tip: bool = False
+    """Whether the tip is shortened as far as mates ask for: the rack's clearance, and room above their fillets."""
     root_diameter_mm: q.LengthMm | None = None
     """Root diameter; from rack and profile shift by default."""
+    tip_form_diameter_mm: q.LengthMm | None = None
+    """Where a chamfer or rounding ends the flank at the tip (d_Fa); the tip diameter by default. Contact ends there."""
+    tip_chamfer_mm: q.ChamferMm = 0.0
+    """Height of a chamfer at the tip, instead of the form diameter there."""
+    root_form_diameter_mm: q.LengthMm | None = None
+    """Where the flank ends at the root (d_Ff), if before its fillet begins, as after grinding. Contact ends there."""
     rack: RackSection = RackSection()
     """Basic rack, ISO 53 A by default."""
     material: MaterialSection = MaterialSection()
@@ -109,18 +119,69 @@ class GearSection(Section):
     modification: ModificationSection | None = None
     """Material removed from both flanks of every tooth."""
 
+    @model_validator(mode="after")
+    def _one_tip_form(self) -> GearSection:
+        if self.tip_form_diameter_mm is not None and self.tip_chamfer_mm:
+            raise ValueError("give tip_form_diameter_mm or tip_chamfer_mm, not both: each says where the flank ends")
+        if self.profile_shift_from_centre_distance and self.profile_shift:
+            raise ValueError("give profile_shift or profile_shift_from_centre_distance = true, not both")
+        return self
+
+
+_Waves = Annotated[tuple[q.MeshStiffnessWave, ...], Field(strict=False, max_length=100)]
+_Cycle = Annotated[tuple[q.MeshStiffness, ...], Field(strict=False, min_length=2, max_length=2000)]
+
+
+class MeshStiffnessSection(Section):
+    """Mesh stiffness that the file states, for textbook models: no table is computed of its pair.
+
+    It is that of the whole face on the transverse line of action, force over deflection: constant, as a Fourier
+    series over the mesh cycle, or as values over it.
+    """
+
+    mean_N_per_m: q.MeshStiffness | None = None
+    """Mean over the mesh cycle; alone it is constant."""
+    cosine_N_per_m: _Waves = ()
+    """Cosine waves about the mean, first order first; at zero a loaded flank stands in the pitch point."""
+    sine_N_per_m: _Waves = ()
+    """Sine waves about the mean likewise."""
+    over_cycle_N_per_m: _Cycle | None = None
+    """Values at equal distances over the mesh cycle from zero on instead, joined by a smooth curve."""
+
+    @model_validator(mode="after")
+    def _form(self) -> MeshStiffnessSection:
+        if (self.mean_N_per_m is None) == (self.over_cycle_N_per_m is None):
+            raise ValueError("give mean_N_per_m, with waves or without, or over_cycle_N_per_m")
+        waves = [key for key in ("cosine_N_per_m", "sine_N_per_m") if getattr(self, key)]
+        if self.over_cycle_N_per_m is not None and waves:
+            raise ValueError(f"over_cycle_N_per_m stands alone: leave {', '.join(waves)} out")
+        return self
+
 
 class PairSection(Section):
-    """Two gears that mesh: `pinion` is the smaller one (the planet against a ring)."""
+    """Two gears that mesh.
+
+    Gear 1 of tables and results is the smaller one, the planet against a ring, whichever the file calls `pinion`.
+    """
 
     pinion: Name
-    """The smaller gear; the planet against a ring."""
+    """One gear, the smaller one by custom; the planet against a ring."""
     gear: Name
-    """The larger gear."""
+    """The other gear."""
     centre_distance_mm: q.LengthMm
     """Distance of the axes, positive for rings, too."""
+    common_face_width_mm: q.FaceWidthMm | None = None
+    """Width over which the faces touch, where that is less than the narrower face, as with chamfered ends."""
     table: bool = True
-    """Whether it gets a table of the transmission error."""
+    """Whether it gets a table of the transmission error; false where its stiffness is stated."""
+    stiffness: MeshStiffnessSection | None = None
+    """Stiffness that the file states, in place of a table."""
+
+    @model_validator(mode="after")
+    def _one_source(self) -> PairSection:
+        if self.stiffness is not None and self.table and "table" in self.model_fields_set:
+            raise ValueError("table = true makes no sense beside a stated stiffness; give one of them")
+        return self
 
 
 class DeviationSection(Section):

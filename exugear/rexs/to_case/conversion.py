@@ -14,8 +14,9 @@ import numpy as np
 from exugear.checks.readiness import check_parts
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
+from exugear.rexs.additions import OWN
 from exugear.rexs.faults import RexsError, plain
-from exugear.rexs.to_case.bodies import GEARS, JOINING, find_bodies
+from exugear.rexs.to_case.bodies import GEARS, JOINING, Bodies, find_bodies
 from exugear.rexs.to_case.body_blocks import (
     INERTIAS,
     body_blocks,
@@ -24,7 +25,7 @@ from exugear.rexs.to_case.body_blocks import (
     meshes_of_bodies,
     sections_of_bodies,
 )
-from exugear.rexs.to_case.gear_blocks import gear_blocks, mesh_blocks, pair_blocks, teeth_of
+from exugear.rexs.to_case.gear_blocks import Teeth, gear_blocks, mesh_blocks, pair_blocks, teeth_of
 from exugear.rexs.to_case.loads import Ends, Loads, ends_of, load_case_blocks, loads_of, static_load
 from exugear.rexs.to_case.modifications import MODIFICATIONS
 from exugear.rexs.to_case.notes import Block, Entry, Notes, assumed, derived, read, tidy, toml_text
@@ -65,6 +66,30 @@ READ_TYPES = frozenset(
 
 
 @dataclass(frozen=True)
+class Found:
+    """What an import found in a REXS file, with the names of the gearbox file.
+
+    Attributes
+    ----------
+    model : Model
+    places : Places
+    bodies : Bodies
+    teeth : Teeth
+    bearings : mapping of str to Block
+    """
+
+    model: Model
+    places: Places
+    bodies: Bodies
+    teeth: Teeth
+    bearings: Mapping[str, Block]
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<Found in {self.model!r}: {self.bodies!r}>"
+
+
+@dataclass(frozen=True)
 class Imported:
     """Outcome of an import.
 
@@ -80,6 +105,8 @@ class Imported:
         What was left out.
     checked : tuple of str
         What the file says twice, compared.
+    found : Found
+        What parts of the gearbox file stand for which components.
     """
 
     text: str
@@ -87,6 +114,7 @@ class Imported:
     changed: tuple[str, ...]
     ignored: tuple[str, ...]
     checked: tuple[str, ...]
+    found: Found
 
     def __repr__(self) -> str:
         """Return one short line."""
@@ -125,7 +153,8 @@ def to_case(model: Model, source: str, path: str | Path = "gearbox.toml") -> Imp
     _note_ignored(model, notes)
     text = draft.text(source, cases)
     gearbox = draft.checked(text, path)
-    return Imported(text, gearbox, tuple(notes.changed), tuple(notes.ignored), tuple(notes.checked))
+    changed, ignored, checked = (tuple(lines) for lines in (notes.changed, notes.ignored, notes.checked))
+    return Imported(text, gearbox, changed, ignored, checked, draft.found)
 
 
 def _refuse_types(model: Model, notes: Notes) -> None:
@@ -149,6 +178,7 @@ class _Draft:
         bodies = find_bodies(model, places, notes)
         self.teeth = teeth_of(model, places, bodies, notes)
         bearings = bearing_blocks(model, places, bodies, notes)
+        self.found = Found(model, places, bodies, self.teeth, bearings)
         sections = sections_of_bodies(model, places, bodies, notes)
         sections = levelled_under_seats(sections, self.teeth, bearings, notes)
         self.loads = loads_of(model, places, bodies, notes)
@@ -274,7 +304,8 @@ def _note_ignored(model: Model, notes: Notes) -> None:
     """List the types of components of which nothing was read, and the attributes of others that nothing asked for."""
     for kind in sorted({part.type for part in model.components.values()}):
         parts = model.of_type(kind)
-        unread = {key for part in parts for key in part.attributes} - {key for part in parts for key in part.asked}
+        keys = {key for part in parts for key in part.attributes if not key.startswith(OWN)}
+        unread = keys - {key for part in parts for key in part.asked}
         if kind not in READ_TYPES:
             notes.ignored.append(f"{plain(kind)}, {len(parts)} of them")
         elif unread:

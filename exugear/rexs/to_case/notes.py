@@ -110,11 +110,14 @@ class Block:
         After its head: the component that it stands for.
     entries : dict of str to Entry
     blocks : dict of str to Block
+    number : int
+        Of the component; 0 where nobody asks for it.
     """
 
     comment: str = ""
     entries: dict[str, Entry] = field(default_factory=dict)
     blocks: dict[str, Block] = field(default_factory=dict)
+    number: int = 0
 
 
 def toml_text(head: Sequence[str], top: Mapping[str, Entry], groups: Sequence[tuple[str, Mapping[str, Block]]]) -> str:

@@ -66,6 +66,10 @@ class Places:
         """Sense of a component's u axis: 1 along +z, -1 against it."""
         return 1 if self._frame(part, 0)[1][:, 0] @ self._axes[2] > 0.0 else -1
 
+    def axes(self, part: Component) -> Floats:
+        """Axes u, v, w of a component as the rows of a (3, 3) array, in the axes of the gearbox file."""
+        return np.asarray((self._axes @ self._frame(part, 0)[1]).T)
+
     def turned(self, vector: Floats) -> Floats:
         """Return a vector of the gear unit's axes in those of the gearbox file."""
         return np.asarray(self._axes @ vector)

@@ -29,7 +29,9 @@ class LineOfAction(Law):
     form = STIFFNESS_FORM
 
     def read(self, gearbox: Gearbox, pair: str, directory: Path) -> Floats | SteSurface:
-        """Stiffness samples of a pair from its table, which must have been computed from exactly this case."""
+        """Stiffness samples of a pair: stated by the file, or from its table, computed from exactly this case."""
+        if pair in gearbox.stated_stiffness:
+            return np.array(gearbox.stated_stiffness[pair])
         try:
             point = fitting_table(gearbox, pair, directory).static_state
         except TableError as error:

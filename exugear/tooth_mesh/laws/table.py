@@ -83,7 +83,7 @@ from exugear.model.parts import Mesh
 from exugear.tooth_mesh.element import MeshElement
 from exugear.tooth_mesh.law import Law, MeshData, TableFlanks
 from exugear.tooth_mesh.placement import MeshError, ToothContact, line_of_action_row, position_rows
-from exugear.tooth_mesh.tables import fitting_table, table_path
+from exugear.tooth_mesh.tables import fitting_table, table_path, without_table
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import kernel
 from fe_ste.transmission_error.surface import InterpolationError, SteSurface, axis_weights, slope_axis_weights
@@ -102,6 +102,8 @@ class Table(Law):
 
     def read(self, gearbox: Gearbox, pair: str, directory: Path) -> Floats | SteSurface:
         """Surface through a pair's table over all axes, which must have been computed from exactly this case."""
+        if pair in gearbox.stated_stiffness:
+            raise MeshError(without_table(gearbox, [pair]))
         try:
             return SteSurface.from_table(fitting_table(gearbox, pair, directory, grid=True).dataset)
         except TableError as error:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from exugear.campbell.campbell import LAYOUT, campbell_from, campbell_of
+from exugear.campbell.campbell import LAYOUT, campbell_from, campbell_of, modes_over_speed
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.modes import eigenmodes
 from exugear.model.choice import Choice
@@ -45,7 +45,7 @@ def planetary(tmp_path_factory):
 @pytest.fixture(scope="module")
 def diagram(planetary):
     system = mean_system(assemble(planetary, Choice("bushing"), STIFFNESS), np.array([0.0, FAST]))
-    return campbell_of(system, 0.0, FAST, 1e5)
+    return campbell_of(system, modes_over_speed(system, 0.0, FAST, 1e5))
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +91,7 @@ def test_a_mode_is_found_by_speed_and_frequency(diagram):
 
 def test_below_all_modes_the_diagram_is_empty(planetary):
     system = mean_system(assemble(planetary, Choice("rigid"), STIFFNESS), np.array([0.0, FAST]))
-    empty = campbell_of(system, 0.0, FAST, 1.0)
+    empty = campbell_of(system, modes_over_speed(system, 0.0, FAST, 1.0))
     assert empty.names == () and empty.frequency.shape == (len(empty.speeds), 0)
     assert empty.mode_at(1.0, 1.0) is None
 

@@ -18,7 +18,7 @@ import pytest
 import xarray
 from typer.testing import CliRunner
 
-from exugear.cli import verbs
+from exugear.cli import case_verbs, verbs
 from exugear.cli.app import VERBS, app
 from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption
 from exugear.model.gearbox import Gearbox
@@ -156,9 +156,23 @@ def test_an_error_of_the_program_itself_keeps_its_traceback():
 
 
 def test_every_file_of_a_verb_is_offered_as_one():
-    files = {path.stem for path in Path(verbs.__file__).parent.glob("*.py")} - {"__init__"}
-    assert set(VERBS) == files
-    assert [command.callback.__name__ for command in app.registered_commands] == list(VERBS)
+    rooms = (case_verbs, verbs)
+    files = {
+        f"{room.__name__.rpartition('.')[2]}.{path.stem}"
+        for room in rooms
+        for path in Path(room.__file__).parent.glob("*.py")
+    }
+    assert set(VERBS) == {file for file in files if not file.endswith(".__init__")}
+    assert [command.callback.__name__ for command in app.registered_commands] == [
+        verb.partition(".")[2] for verb in VERBS
+    ]
+
+
+def test_no_help_text_loses_a_section_in_brackets_as_if_it_were_markup():
+    for command in app.registered_commands:
+        assert "[" not in (command.callback.__doc__ or "").replace("\\[", "").split("Parameters")[0], (
+            command.callback.__name__
+        )
 
 
 def test_the_version_is_that_of_the_distribution():

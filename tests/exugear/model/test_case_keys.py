@@ -26,6 +26,7 @@ from exugear.model.sections.entries import Section
 from exugear.results.folder import keep_case
 from exugear.tooth_mesh.tables import wanted_table
 
+from .. import gear_trains
 from ..case_mutations import bases, toml_text
 
 FOR_PEOPLE = {"LoadCaseSection.description", "BearingSection.designation", "CatalogueSection.designation"}
@@ -60,6 +61,8 @@ def read_keys(monkeypatch: pytest.MonkeyPatch) -> set[tuple[str, str]]:
 def test_every_key_is_read(read_keys: set[tuple[str, str]], tmp_path: Path) -> None:
     catalogue_stiffness.cache_clear()  # what other tests had computed would not be read again
     contents = bases(tmp_path)
+    contents |= {"waves": gear_trains.pair(), "values": gear_trains.pair()}
+    contents["values"]["pairs"]["helical"]["stiffness"] = {"over_cycle_N_per_m": [4e8, 3e8, 4e8]}
     contents["spur"]["ste"] = {"method": "nonlinear", "positions": 8}
     for kind in get_args(connections.BearingType):
         catalogue_rows(connections.CatalogueSection(type=kind, bore_mm=50.0, outer_diameter_mm=90.0, width_mm=20.0))
@@ -70,7 +73,7 @@ def test_every_key_is_read(read_keys: set[tuple[str, str]], tmp_path: Path) -> N
         check_parts(gearbox)
         remarks(gearbox)
         for pair, spec in gearbox.pairs.items():
-            assert spec.table
+            assert spec.table != bool(spec.stiffness)
             wanted_table(gearbox, pair, gearbox.ste.positions, gearbox.ste.grid)
         for variant in ("rigid", "bushing"):
             lacking(gearbox, variant)

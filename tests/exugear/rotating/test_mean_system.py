@@ -10,7 +10,7 @@ from exugear.dynamics.linearised import linearise
 from exugear.dynamics.modes import eigenmodes
 from exugear.model.choice import Choice
 from exugear.rotating.equal_planets import with_equal_planets
-from exugear.rotating.mean_system import mean_system, tangents
+from exugear.rotating.mean_system import PLACES, mean_system, tangents
 from exugear.rotating.mesh_waves import mesh_waves
 from exugear.rotating.rotating_frame import RotatingFrame, SteadyError, planet_sets
 from exugear.steady.settings import SpeedRange, SteadySettings
@@ -49,11 +49,13 @@ def test_rolling_closes_no_mesh_and_strains_no_bearing_wherever_the_carrier_stan
 
 
 def test_at_rest_the_stiffness_is_that_of_the_eigenmodes_in_turned_coordinates(system):
-    """Both by differences of the same forces, about states that differ by the torque at the lock alone."""
+    """Both by differences of the same forces, over the places of the carrier between one planet and the next."""
     frame = system.frame
-    t = frame.matrices(0.0)[0]
-    q, _, _ = frame.state(0.0, 0.0, system.static[0])
-    known = t.T @ linearise(frame.assembly, q).total_stiffness @ t
+    known = np.zeros_like(system.mass)
+    for psi in 2.0 * np.pi / (3 * frame.sets[0].ratio) * np.arange(PLACES) / PLACES:
+        t = frame.matrices(psi)[0]
+        q, _, _ = frame.state(psi, 0.0, system.static[0])
+        known += t.T @ linearise(frame.assembly, q).total_stiffness @ t / PLACES
     size = np.sqrt(np.abs(np.diag(known)))
     assert (np.abs(system.stiffness[0] - known) / np.outer(size, size)).max() < 1e-6
 
@@ -78,11 +80,12 @@ def test_nothing_changes_as_the_carrier_turns(system):
 
 
 def test_parabolas_over_speed_are_exact(assembly, system):
+    """But for the means over the carrier's places, which are those at the middle speed: 1.4e-7."""
     other = mean_system(assembly, np.array([5.0, 9.0]))
     for speed in (5.0, 9.0):
         for parts in ("stiffness_at", "damping_at"):
             here, there = getattr(system, parts)(speed), getattr(other, parts)(speed)
-            assert np.linalg.norm(here - there) < 1e-7 * np.linalg.norm(here)
+            assert np.linalg.norm(here - there) < 1e-6 * np.linalg.norm(here)
 
 
 def test_the_drive_takes_what_the_load_asks_for(system, grc):
@@ -101,7 +104,6 @@ def test_planets_that_are_equal_already_are_left_alone(assembly):
     [
         ({"bodies.planet.planet_angles_deg": [0.0, 180.0]}, "2 planets"),
         ({"bodies.planet.planet_angles_deg": [0.0, 120.0, 237.0]}, "not equally spaced"),
-        ({"bodies.planet.planet_angles_deg": [0.0, 90.0, 180.0, 270.0]}, "do not mesh in phase"),
     ],
 )
 def test_planets_that_the_frame_cannot_hold_are_refused_with_the_reason(grc, stiffness, changes, said):

@@ -104,15 +104,18 @@ def gearbox_solver(grc, stiffness):
     return solver_of(assemble(grc, Choice("bushing"), stiffness), (1.0, 22.5), "nonlinear", 10, 5)
 
 
+OFF, ON = 1e-4, 1e-3
+"""Largest differences off resonance and at one; 3e-4 and 2e-3 are asked for."""
+
+
 @pytest.mark.validation
 @pytest.mark.parametrize(
-    ("speed", "whole"), [(11.0, 3e-4), (-12.0, 3e-4), (21.0, 3e-4), (14.0, 2e-3), (3.218, 2e-3), (7.232, 2e-3)]
+    ("speed", "most"),
+    [(8.0, OFF), (11.0, OFF), (-12.0, OFF), (18.0, OFF), (21.0, OFF), (14.0, ON), (3.218, ON), (7.232, ON)],
 )
-def test_the_gearbox_started_on_its_steady_state_stays_there(gearbox_solver, speed, whole):
-    """RK4 at 1/120 kHz, the last 2 of 3 s: 3e-4 of the overall signal off resonance, 2e-3 (1e-3 in amplitude) on it."""
-    of_lines, of_amplitudes = apart(gearbox_solver, speed, 3.0, 1.0 / 120e3, 2.0)
-    assert of_lines < whole
-    assert of_amplitudes < 1e-3
+def test_the_gearbox_started_on_its_steady_state_stays_there(gearbox_solver, speed, most):
+    """RK4 at 1/120 kHz, the last 2 of 3 s."""
+    assert apart(gearbox_solver, speed, 3.0, 1.0 / 120e3, 2.0)[0] < most
 
 
 @pytest.fixture(scope="module")
@@ -121,10 +124,26 @@ def shafts_solver(grc_shafts, stiffness):
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize("speed", [8.0, 11.0, 14.0])
-def test_elastic_shafts_started_on_their_steady_state_stay_there(shafts_solver, speed):
-    """As before, with 144 coordinates: 3e-4 of the overall signal."""
-    assert apart(shafts_solver, speed, 3.0, 1.0 / 120e3, 2.0)[0] < 3e-4
+@pytest.mark.parametrize(
+    ("speed", "most"), [(8.0, OFF), (11.0, OFF), (18.0, OFF), (14.0, ON), (6.303, ON), (10.402, ON)]
+)
+def test_elastic_shafts_started_on_their_steady_state_stay_there(shafts_solver, speed, most):
+    """As before, with 144 coordinates."""
+    assert apart(shafts_solver, speed, 3.0, 1.0 / 120e3, 2.0)[0] < most
+
+
+def test_planets_ahead_of_each_other_count_at_every_level(grc, stiffness):
+    """Static spins put planets 1e-4 of a cycle ahead, which excites lateral modes: levels agree on what it does."""
+    assembly, found = assemble(grc, Choice("bushing"), stiffness), {}
+    for level in ("linear", "parametric", "nonlinear"):
+        solver = solver_of(assembly, (1.0, 22.5), level, 6)
+        forces = solver.response(18.0).excess[..., 0]
+        waves = {wave.name: n for n, wave in enumerate(solver.gearset.waves.waves)}
+        line = int(solver.gearset.lines.find(np.array([2, 0, 0]))[0])
+        found[level] = np.array([forces[line, waves[f"sun_planet {name}"]] for name in ("cosine", "sine")])
+    size = np.linalg.norm(found["nonlinear"])
+    assert np.linalg.norm(found["parametric"] - found["nonlinear"]) < 0.02 * size
+    assert np.linalg.norm(found["linear"] - found["nonlinear"]) < 0.2 * size
 
 
 @pytest.mark.parametrize("law", ["line_of_action", "table"])

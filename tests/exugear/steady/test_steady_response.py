@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from exugear.campbell.campbell import modes_over_speed
 from exugear.dynamics.assemble import assemble
 from exugear.model.choice import Choice
 from exugear.steady.point_solver import gearset_of
@@ -61,8 +62,26 @@ def test_more_lines_hardly_change_the_response(gearset, speed, change):
     assert np.linalg.norm(coarse - fine[places - 1]) < change * np.linalg.norm(fine)
 
 
-def test_speeds_are_added_where_a_line_meets_a_mode(gearset):
-    found = crossings(gearset, *RANGE, lambda interface: transmission_errors(gearset, interface))
+@pytest.fixture(scope="module")
+def found(gearset):
+    tracks = modes_over_speed(gearset.system, *RANGE, 3e3)
+    return crossings(gearset, tracks, lambda interface: transmission_errors(gearset, interface)), tracks
+
+
+def test_crossings_lie_on_the_modes_that_were_followed(gearset, found):
+    """Eigenvalues of the gearbox at each crossing's own speed; the followed mode is a straight line between speeds."""
+    for crossing in found[0]:
+        values = gearset.system.eigenvalues(crossing.speed)
+        met = gearset.lines.orders[crossing.line] * abs(crossing.speed)
+        nearest = values[np.argmin(np.abs(values.imag - met))]
+        assert nearest.imag == pytest.approx(met, rel=1e-9)
+        assert -nearest.real / abs(nearest) == pytest.approx(crossing.damping, rel=1e-6)
+        followed = np.interp(crossing.speed, found[1].speeds, found[1].frequency[:, crossing.mode])
+        assert crossing.frequency == pytest.approx(followed, rel=2e-3)
+
+
+def test_speeds_are_added_where_a_line_meets_a_mode(gearset, found):
+    found = found[0]
     even = np.linspace(*RANGE, 20)
     speeds = refined(even, found)
     strongest = found[0]
@@ -75,9 +94,9 @@ def test_speeds_are_added_where_a_line_meets_a_mode(gearset):
     assert np.count_nonzero(np.abs(speeds / strongest.speed - 1.0) < 2.5 * strongest.damping) >= 5
 
 
-def test_a_peak_is_a_maximum_of_the_response(gearset):
+def test_a_peak_is_a_maximum_of_the_response(gearset, found):
     """At the crossing of the strongest line the response is above that two half-widths beside it."""
-    strongest = crossings(gearset, *RANGE, lambda interface: transmission_errors(gearset, interface))[0]
+    strongest = found[0][0]
     offsets = np.array([-2.0, 0.0, 2.0]) * strongest.damping
     levels = [
         abs(signals(gearset, parametric_response(gearset, gearset.at(strongest.speed * (1.0 + o))))[strongest.line, 0])

@@ -1,0 +1,269 @@
+"""The verb `check`: read and check a gearbox file, and sum up what follows from it at once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from exugear.cli.case import read_gearbox
+from exugear.cli.console import note, print_json, print_table, say
+from exugear.cli.errors import BadInputError, FailedError, exit_codes, model_errors
+from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption
+
+if TYPE_CHECKING:
+    from exugear.model.gearbox import Gearbox
+    from exugear.model.parts import PairSpec
+
+
+BEYOND = 1.05
+"""Mesh frequencies above this part of the band are told: steps of a run are chosen for the band, and end softly."""
+
+
+def check(case: CaseArgument, files_below: FilesBelowOption = None, as_json: JsonOption = False) -> None:
+    """Read and check a gearbox file; sum up its gear pairs, bearings and load cases. Writes nothing."""
+    with exit_codes():
+        from exugear.checks.readiness import lacking, remarks
+        from exugear.model.choice import USER_VARIANTS
+
+        gearbox = _read(case, files_below, as_json)
+        _tell_scripts(gearbox)
+        pairs = [_pair_summary(name, spec) for name, spec in gearbox.pairs.items()]
+        loads = _load_summaries(gearbox)
+        variants = {variant: lacking(gearbox, variant) for variant in USER_VARIANTS}
+        steady = _steady_lacks(gearbox, variants)
+        bearings, doubts = ([], []) if variants["bushing"] else _bearing_summaries(gearbox)
+        warnings = [*remarks(gearbox), *doubts]
+        if as_json:
+            summary = {"case": str(case), "name": gearbox.name, "ratio": gearbox.train.ratio, "pairs": pairs}
+            found = {"bearings": bearings, "load_cases": loads, "variants": variants, "steady": steady}
+            found["warnings"] = warnings
+            print_json({**summary, **found})
+        else:
+            say(f"{gearbox.name}: no fault found, ratio {gearbox.train.ratio:.6f}")
+            if pairs:
+                print_table("Gear pairs", [_pair_row(pair) for pair in pairs])
+                print_table("Margins of gear 1 and 2", [_margin_row(pair) for pair in pairs])
+            if loads:
+                band = 1e-3 * loads[0]["band_Hz"]
+                title = f"Load cases, rolling at the overall input {gearbox.case.overall.input}; runs keep {band:g} kHz"
+                print_table(title, [_load_row(one) for one in loads], ("loaded flanks",))
+            if bearings:
+                print_table("Bearings under the static load", [_bearing_row(one) for one in bearings], ("most by",))
+                if any(one["reaction_kN"] is not None for one in bearings):
+                    say("* stated by the file, which the stiffness goes by")
+            for variant, reason in variants.items():
+                say(f"variant {variant}: {f'not possible, {reason}' if reason else 'possible'}")
+            for reason in dict.fromkeys(filter(None, steady.values())):
+                names = ", ".join(variant for variant in steady if steady[variant] == reason)
+                say(f"steady response ({names}): not possible, {reason}")
+            for line in warnings:
+                note(f"Warning: {line}", style="yellow")
+        for one in loads:
+            for doubt in one["doubts"]:
+                note(f"load_cases.{one['load_case']}: {doubt}", style="yellow")
+
+
+def _read(case: Path, files_below: Path | None, as_json: bool) -> Gearbox:
+    """Read the file; of one with faults print these as an object, too, if that is asked for."""
+    from exugear.model.reading import CaseError
+
+    try:
+        return read_gearbox(case, files_below, tell=False)
+    except BadInputError as error:
+        if as_json and isinstance(error.__cause__, CaseError):
+            print_json({"case": str(case), "faults": list(error.__cause__.faults)})
+        raise
+
+
+def _steady_lacks(gearbox: Gearbox, variants: dict[str, str]) -> dict[str, str]:
+    """Say of each variant that is possible why it has no steady response over speed; empty where it has one."""
+    from exugear.bearings.supports import elastic_names
+    from exugear.dynamics.assemble import assemble
+    from exugear.model.choice import Choice
+    from exugear.rotating.mean_system import unsuitable
+    from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+
+    law, reasons = "iso6336", {}
+    for variant in (name for name, lack in variants.items() if not lack):
+        elastic = elastic_names(gearbox) if variant == "flexible" else ()
+        # What speaks against it does not depend on finite elements: bodies stay rigid here.
+        rigid = "bushing" if variant == "flexible" else variant
+        try:
+            with model_errors():
+                assembly = assemble(gearbox, Choice(rigid, law), mesh_stiffness(gearbox, law))
+        except FailedError as error:
+            reasons[variant] = str(error)
+            continue
+        reasons[variant] = unsuitable(assembly, elastic)
+    return reasons
+
+
+def _tell_scripts(gearbox: Gearbox) -> None:
+    """Check the solids, and say which of them only a script makes."""
+    from exugear.bodies.of_gearbox.solids import solids_of
+
+    with model_errors():
+        for key, model in solids_of(gearbox):
+            if model.mesh.is_script:
+                note(
+                    f"{key}.file = {model.mesh.path.name!r}: a gmsh script can run any command, so modes, run and "
+                    "view want --allow-scripts or EXUGEAR_ALLOW_SCRIPTS=1 for the variant flexible",
+                    style="yellow",
+                )
+
+
+def _pair_summary(name: str, spec: PairSpec) -> dict[str, Any]:
+    from exugear.checks.margins import pair_margins
+
+    pair, margins = spec.pair, pair_margins(spec)
+    return {
+        "pair": name,
+        "teeth": [pair.pinion.teeth, pair.gear.teeth],
+        "centre_distance_mm": 1e3 * pair.centre_distance,
+        "pressure_angle_deg": math.degrees(pair.working_pressure_angle),
+        "transverse_contact_ratio": pair.transverse_contact_ratio,
+        "overlap_ratio": pair.overlap_ratio,
+        "torque_gear_1_N_m": spec.static_torque,
+        "pitch_point_pressure_MPa": 1e-6 * margins.pitch_point_pressure,
+        "margin_to_form_circle": [None if math.isnan(margin) else margin for margin in margins.form],
+        "tip_thickness_in_modules": list(margins.tip_thickness),
+    }
+
+
+def _pair_row(pair: dict[str, Any]) -> dict[str, str]:
+    return {
+        "pair": pair["pair"],
+        "teeth": "{}/{}".format(*pair["teeth"]),
+        "centre dist.\nmm": f"{pair['centre_distance_mm']:.3f}",
+        "press. angle\ndeg": f"{pair['pressure_angle_deg']:.3f}",
+        "contact ratio\n+ overlap": f"{pair['transverse_contact_ratio']:.3f} + {pair['overlap_ratio']:.3f}",
+        "torque 1\nN m": f"{pair['torque_gear_1_N_m']:.1f}",
+    }
+
+
+def _margin_row(pair: dict[str, Any]) -> dict[str, str]:
+    left = ("-" if margin is None else f"{100 * margin:.1f}" for margin in pair["margin_to_form_circle"])
+    return {
+        "pair": pair["pair"],
+        "pressure at pitch\npoint, MPa": f"{pair['pitch_point_pressure_MPa']:.0f}",
+        "left to form circles\n% of the flanks": " / ".join(left),
+        "tips\nnormal modules": " / ".join(f"{tip:.2f}" for tip in pair["tip_thickness_in_modules"]),
+    }
+
+
+def _bearing_summaries(gearbox: Gearbox) -> tuple[list[dict[str, Any]], list[str]]:
+    """Load and stiffness of catalogue bearings, a line for those of all planets, and what is doubtful about them.
+
+    With the mesh stiffness of ISO 6336: tables may not be there, and the static loads hardly depend on it.
+    """
+    from exugear.bearings.duty import estimate_effects
+    from exugear.dynamics.assemble import assemble
+    from exugear.dynamics.bearing_duties import bearing_duties, bearing_points
+    from exugear.model.choice import Choice
+    from exugear.results.bearings_file import duty_summary
+    from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+
+    if not any(bearing.catalogue for bearing in gearbox.bearings):
+        return [], []
+    law = "iso6336"
+    try:
+        with model_errors():
+            assembly = assemble(gearbox, Choice("bushing", law), mesh_stiffness(gearbox, law))
+            every = bearing_duties(assembly)
+            duties = {duty.family: duty for duty in reversed(every)}
+            points = {point.bearing.family: point for point in reversed(bearing_points(assembly))}
+            effects = {family: estimate_effects(point) for family, point in points.items()}
+    except FailedError as error:
+        return [], [f"bearings: {error}"]
+    summaries = []
+    for family, duty in reversed(duties.items()):
+        ends = [[effect.at_low, effect.at_high] for effect in effects[family]]
+        estimated = {
+            effect.key: {
+                "value": effect.value,
+                "range": [effect.low, effect.high],
+                "radial_stiffness_N_per_m": [None if math.isnan(end) else end for end in pair],
+            }
+            for effect, pair in zip(effects[family], ends, strict=True)
+        }
+        summaries.append({**duty_summary(duty), "bearing": family, "estimated": estimated})
+    doubts = [f"bearings.{duty.name}: {remark}" for duty in every for remark in duty.remarks]
+    return summaries, doubts
+
+
+def _bearing_row(summary: dict[str, Any]) -> dict[str, str]:
+    ranges = {
+        key: [end for end in one["radial_stiffness_N_per_m"] if end is not None]
+        for key, one in summary["estimated"].items()
+    }
+    ends = [end for pair in ranges.values() for end in pair]
+    spread = f"{1e-9 * min(ends):.3g} to {1e-9 * max(ends):.3g}" if ends else ""
+    stated = summary["reaction_kN"] is not None
+    most = max(ranges, key=lambda key: max(ranges[key], default=0.0) - min(ranges[key], default=0.0), default="")
+    return {
+        "bearing": summary["bearing"],
+        "radial\nkN": f"{summary['radial_load_kN']:.4g}{'*' if stated else ''}",
+        "statics\nkN": f"{summary['reaction_kN' if stated else 'radial_load_kN']:.4g}",
+        "axial\nkN": f"{round(summary['axial_load_kN'], 3) + 0.0:.4g}",
+        "radial\nGN/m": f"{1e-9 * summary['radial_stiffness_N_per_m']:.3g}",
+        "over the range\nof estimates": spread,
+        "most by": most,
+    }
+
+
+def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
+    """Sum up what each load case does to the rolling train; one that no run could take is bad input."""
+    from exugear.loads.summary import doubts_about, summarise_loads
+    from exugear.model.parts import RPM
+    from exugear.runs.extent import check_duration
+    from exugear.runs.runup import BAND
+
+    found = []
+    with model_errors():
+        for name, case in gearbox.load_cases.items():
+            check_duration(gearbox, case)
+            loads = summarise_loads(gearbox, case)
+            body, rim = loads.fastest_rim
+            found.append(
+                {
+                    "load_case": name,
+                    "net_torque_N_m": loads.net_torque,
+                    "driven": loads.driven,
+                    "duration_s": case.duration,
+                    "start_speed_rpm": loads.start_speed / RPM,
+                    "end_speed_rpm": loads.end_speed / RPM,
+                    "highest_mesh_frequency_Hz": max(loads.mesh_frequencies.values(), default=0.0),
+                    "band_Hz": BAND,
+                    "fastest_rim_m_per_s": rim,
+                    "fastest_rim_on": body,
+                    "loaded_flanks": dict(loads.flanks),
+                    "reversed_flanks": list(loads.reversed_flanks),
+                    "doubts": [*doubts_about(loads), *_beyond_band(loads.mesh_frequencies, BAND)],
+                }
+            )
+    return found
+
+
+def _beyond_band(frequencies: Mapping[str, float], band: float) -> Iterator[str]:
+    """Tell meshes whose frequency a run does not keep."""
+    beyond = [f"{name} {frequency:.0f} Hz" for name, frequency in frequencies.items() if frequency > BEYOND * band]
+    if beyond:
+        yield (
+            f"beyond the band: runs keep frequencies up to {band:g} Hz, and meshes reach {', '.join(beyond[:3])}; in "
+            "Python simulate(..., band=..., sample_rate=...) keeps more"
+        )
+
+
+def _load_row(summary: dict[str, Any]) -> dict[str, str]:
+    turned = summary["reversed_flanks"]
+    flanks = (f"{name} {sign}{'!' if name in turned else ''}" for name, sign in summary["loaded_flanks"].items())
+    return {
+        "load case": summary["load_case"],
+        "net torque\nN m": f"{summary['net_torque_N_m']:.6g}" + (" (driven)" if summary["driven"] else ""),
+        "end speed\nrpm": f"{summary['end_speed_rpm']:.4g}",
+        "meshes\nkHz": f"{1e-3 * summary['highest_mesh_frequency_Hz']:.3g}",
+        "rim\nm/s": f"{summary['fastest_rim_m_per_s']:.3g}",
+        "loaded flanks": ", ".join(flanks),
+    }

@@ -1,0 +1,75 @@
+"""The verb `export`: results put back into the industry file that the gearbox file was made of."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from exugear.cli.case import read_gearbox
+from exugear.cli.console import note, print_json, say
+from exugear.cli.errors import BadInputError, exit_codes
+from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption, OutOption
+
+SHOWN = 10
+"""Most replaced attributes that are told."""
+
+
+def export(
+    case: CaseArgument,
+    rexs: Annotated[
+        Path,
+        typer.Argument(metavar="FILE.rexs", help="The REXS file that the case was imported from.", show_default=False),
+    ],
+    to: Annotated[
+        Path | None,
+        typer.Option("--to", metavar="FILE", help="File to write. (default: NAME-exugear beside FILE.rexs)"),
+    ] = None,
+    out: OutOption = None,
+    files_below: FilesBelowOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Write a copy of a REXS file with results: what REXS has names for, and the rest as custom_exugear attributes.
+
+    Geometry and static forces are always there; tables, modes, bearings and runs as far as the results folder has them.
+    """
+    with exit_codes():
+        from exugear.project import default_folder
+        from exugear.rexs.export.export import with_results
+        from exugear.rexs.faults import RexsError
+        from fe_ste.tools.files import write_file
+
+        target = to or rexs.with_name(_new_name(rexs.name))
+        if target.exists():
+            raise BadInputError(f"{target}: is there already; name another file with --to")
+        gearbox = read_gearbox(case, files_below)
+        try:
+            exported = with_results(gearbox, out or default_folder(case), rexs)
+        except RexsError as error:
+            raise BadInputError(error) from error
+        write_file(target, exported.content)
+        if as_json:
+            counts = {"attributes": exported.named, "custom_attributes": exported.own}
+            lists = {"replaced": list(exported.replaced), "left_out": list(exported.left_out)}
+            print_json({"file": str(target), **counts, **lists})
+            return
+        for line in exported.left_out:
+            note(f"Left out: {line}", style="yellow")
+        for line in exported.replaced[:SHOWN]:
+            note(f"Replaced: {line}")
+        if len(exported.replaced) > SHOWN:
+            note(f"and {len(exported.replaced) - SHOWN} more replaced")
+        say(f"{target}: {exported.named} attributes of REXS, {exported.own} beginning with custom_exugear_")
+
+
+def _new_name(name: str) -> str:
+    """Name of the copy of a file, whatever ends the name has.
+
+    Examples
+    --------
+    >>> _new_name("gearbox.rexs"), _new_name("gearbox.rexs.zip")
+    ('gearbox-exugear.rexs', 'gearbox-exugear.rexs.zip')
+    """
+    stem, dot, ends = name.partition(".")
+    return f"{stem}-exugear{dot}{ends}"

@@ -1,0 +1,91 @@
+"""The verb `loads`: what a gearbox sees of its sources of loads, counted."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from exugear.cli.case import make_results_folder, read_gearbox
+from exugear.cli.console import note, print_json, print_table, say
+from exugear.cli.errors import exit_codes, model_errors
+from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption, OutOption, ScriptsOption
+
+if TYPE_CHECKING:
+    from exugear.load_spectrum.counted import CountedLoads
+
+
+def loads(
+    case: CaseArgument,
+    out: OutOption = None,
+    files_below: FilesBelowOption = None,
+    scripts: ScriptsOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Read the files that section ``loads`` names, and tell what each mesh and bearing sees of them.
+
+    No tables are needed. Writes load duration distributions as CSV, and a picture of them.
+    """
+    with exit_codes():
+        from exugear.load_spectrum.counted import count_loads
+        from exugear.load_spectrum.diagrams import draw_duration
+        from exugear.load_spectrum.spectra_files import write_spectra
+        from exugear.project import default_folder
+
+        gearbox = read_gearbox(case, files_below, scripts)
+        with model_errors():
+            counted = count_loads(gearbox)
+        folder = (out or default_folder(case)) / "loads"
+        make_results_folder(folder)
+        picture = folder / "load_duration.png"
+        draw_duration(counted.distribution, counted.body, picture)
+        files = [*write_spectra(counted, folder), picture]
+        if as_json:
+            print_json({"case": str(case), **counted.summary(), "files": [str(path) for path in files]})
+            return
+        print_table("Sources of loads", [_source_row(row) for row in counted.source_rows()])
+        title = f"Equivalent loads on {counted.body} over {counted.life_years:g} years: torque in as many revolutions,"
+        print_table(f"{title} range of torque once a second", _equivalent_rows(counted))
+        print_table("What turns through its load", _part_rows(counted))
+        for line in counted.remarks:
+            note(line, style="yellow")
+        say(f"Load duration distributions in {folder}")
+
+
+def _source_row(row: dict[str, Any]) -> dict[str, str]:
+    return {
+        "source": row["source"],
+        "kind": row["kind"],
+        "skipped\ns": f"{row['skipped_s']:.4g}",
+        "hours": f"{row['hours']:.6g}",
+        "mean\nkN m": f"{row['mean_torque_kN_m']:.4g}",
+        "least\nkN m": f"{row['least_torque_kN_m']:.4g}",
+        "largest\nkN m": f"{row['largest_torque_kN_m']:.4g}",
+        "mean\nrpm": f"{row['mean_speed_rpm']:.4g}",
+    }
+
+
+def _equivalent_rows(counted: CountedLoads) -> list[dict[str, str]]:
+    found = counted.distribution
+    rows = [
+        {"by damage with the slope": f"{m:.4g}", "torque\nkN m": f"{1e-3 * value:.4g}", "range\nkN m": ""}
+        for m, value in counted.equivalents().items()
+    ]
+    rows += [
+        {"by damage with the slope": f"{m:.4g}", "torque\nkN m": "", "range\nkN m": f"{1e-3 * value:.4g}"}
+        for m, value in counted.equivalent_ranges.items()
+        if math.isfinite(value)
+    ]
+    say(f"{len(found.hours)} bins, {found.hours.sum():.6g} h, {found.revolutions.sum():.4g} revolutions")
+    return rows
+
+
+def _part_rows(counted: CountedLoads) -> list[dict[str, str]]:
+    return [
+        {
+            "part": str(row["part"]),
+            "loaded by": str(row["loaded_by"]),
+            "cycles": f"{row['cycles']:.4g}",
+            "at the largest\ntorque kN": f"{row['force_kN']:.4g}" if math.isfinite(float(row["force_kN"])) else "",
+        }
+        for row in counted.part_rows()
+    ]

@@ -1,0 +1,234 @@
+"""The verb `sweep`: a study, many variations of one gearbox as one dataset."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from exugear.cli.case import check_choice, check_files_below, make_results_folder
+from exugear.cli.console import note, print_json, print_table, progress_bar, say
+from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption
+from exugear.cli.options import FilesBelowOption, JsonOption, OutOption, ScriptsOption
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from exugear.studies.executors import Opens
+    from exugear.studies.study import Study
+    from exugear.studies.sweep import Shard, Swept
+
+SHOWN_FAILURES = 5
+SHOWN_OF_FRONT = 5
+
+
+class Executor(StrEnum):
+    """Where points are computed."""
+
+    processes = "processes"
+    dask = "dask"
+
+
+def sweep(
+    study: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file.", show_default=False)],
+    executor: Annotated[
+        Executor, typer.Option(help="processes: on this machine; dask: on a Dask cluster.")
+    ] = Executor.processes,
+    workers: Annotated[
+        int | None, typer.Option(min=1, max=1024, help="Processes on this machine. (default: all cores)")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler, as tcp://10.0.0.1:8786.")
+    ] = None,
+    shard: Annotated[
+        str | None, typer.Option(metavar="i/n", help="Compute every n-th point only, from the i-th on.")
+    ] = None,
+    merge: Annotated[bool, typer.Option("--merge", help="Compute nothing, put together what is finished.")] = False,
+    retry: Annotated[bool, typer.Option("--retry-failed", help="Compute points again that failed before.")] = False,
+    out: OutOption = None,
+    files_below: FilesBelowOption = None,
+    scripts: ScriptsOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Vary a gearbox: compute tables, modes, steady responses or runs at each point of a study, as one dataset.
+
+    Points that are finished are kept; the same command goes on after a kill. What fails is told and does not stop the
+    rest.
+    """
+    with exit_codes():
+        from exugear.studies.executors import ExecutorError
+        from exugear.studies.optimisation import OptimisationError
+
+        part, opens = _shard(shard, merge), _executor(executor, workers, scheduler)
+        read = _read(study, files_below, scripts)
+        if read.file.optimise is not None and (merge or retry or shard is not None):
+            raise BadInputError(
+                f"{study}: a search follows from its points one after the other; "
+                "leave --shard, --merge and --retry-failed out"
+            )
+        folder = out or _default_folder(read, study)
+        check_choice(read.gearbox, read.choice, folder)
+        make_results_folder(folder)
+        try:
+            swept = _sweep(read, folder, opens, part, merge, retry)
+        except (ExecutorError, OptimisationError) as error:
+            raise FailedError(error) from error
+        pictures = _draw(read, folder, swept)
+        _tell(read, study, folder, swept, pictures, as_json)
+
+
+def _shard(text: str | None, merge: bool) -> Shard:
+    from exugear.studies.sweep import WHOLE, Shard
+
+    if text is None:
+        return WHOLE
+    if merge:
+        raise BadInputError("--merge puts all parts together and computes none; leave --shard out")
+    try:
+        return Shard.from_text(text)
+    except ValueError as error:
+        raise BadInputError(f"--shard: {error}") from error
+
+
+def _executor(executor: Executor, workers: int | None, scheduler: str | None) -> Opens:
+    from exugear.studies.executors import dask_cluster, processes
+
+    if executor is Executor.dask:
+        if scheduler is None:
+            raise BadInputError("--executor dask needs --scheduler ADDRESS, as tcp://10.0.0.1:8786")
+        if workers is not None:
+            raise BadInputError("--workers: the cluster has as many as were started; leave it out")
+        return dask_cluster(scheduler)
+    if scheduler is not None:
+        raise BadInputError("--scheduler is that of a Dask cluster; add --executor dask")
+    return processes(workers)
+
+
+def _read(path: Path, files_below: Path | None, scripts: bool) -> Study:
+    from exugear.checks.readiness import check_parts
+    from exugear.model.named_files import Permissions
+    from exugear.model.reading import CaseError
+    from exugear.studies.design.reading import StudyError
+    from exugear.studies.study import Study
+
+    check_files_below(files_below)
+    try:
+        study = Study.from_toml(path, Permissions(scripts, files_below))
+        check_parts(study.gearbox)
+    except (StudyError, CaseError) as error:
+        raise BadInputError(error) from error
+    if study.choice.mesh_law not in _laws():
+        laws = ", ".join(_laws())
+        raise BadInputError(f"{path}: choice.mesh_law = {study.choice.mesh_law!r}: no such law; laws are {laws}")
+    return study
+
+
+def _laws() -> list[str]:
+    from exugear.tooth_mesh.laws.registry import LAWS
+
+    return list(LAWS)
+
+
+def _default_folder(study: Study, path: Path) -> Path:
+    from exugear.project import default_folder
+
+    stem = path.name.removesuffix(".toml").removesuffix(".study") or "study"
+    return default_folder(study.gearbox.source) / "studies" / stem
+
+
+def _sweep(study: Study, folder: Path, opens: Opens, shard: Shard, merge: bool, retry: bool) -> Swept:
+    """Carry the study out behind a progress bar."""
+    from exugear.studies.optimisation import optimise
+    from exugear.studies.sweep import sweep as carry_out
+
+    with progress_bar() as bar:
+        task = bar.add_task("points", total=None)
+        first: list[int] = []
+
+        def show(done: int, failed: int, total: int) -> None:
+            interruption.check()
+            first.append(done)  # what was there before says nothing of the time left
+            failures = f", {failed} failed" if failed else ""
+            text = f"point {done} of {total}{failures}"
+            bar.update(task, completed=done - first[0], total=total - first[0], description=text)
+
+        if study.file.optimise is not None:
+            return optimise(study, folder, opens, progress=show)
+        return carry_out(study, folder, opens, shard=shard, merge=merge, retry=retry, progress=show)
+
+
+def _draw(study: Study, folder: Path, swept: Swept) -> list[Path]:
+    """Draw what was put together."""
+    from exugear.studies.pictures import draw_study
+
+    if swept.dataset is None:
+        return []
+    minimised = () if study.file.optimise is None else tuple(study.file.optimise.minimise)
+    return draw_study(swept.dataset, folder, minimised)
+
+
+def _tell(study: Study, path: Path, folder: Path, swept: Swept, pictures: list[Path], as_json: bool) -> None:
+    """Print what came of it; end with 1 if points failed, or are missing where all were asked for."""
+    searched = study.file.optimise is not None
+    total, failed = len(swept.records if searched else study.design.points), swept.failed
+    missing = total - len(swept.records)
+    summary: dict[str, Any] = {
+        "study": str(path),
+        "name": study.file.name,
+        "points": total,
+        "computed": swept.computed,
+        "finished": len(swept.records) - len(failed),
+        "failed": len(failed),
+        "missing": missing,
+        "seconds_of_points": round(sum(record.seconds for record in swept.records.values()), 3),
+        "errors": [record.error for record in failed[:SHOWN_FAILURES]],
+        "file": None if swept.path is None else str(swept.path),
+        "pictures": [str(picture) for picture in pictures],
+    }
+    if as_json:
+        print_json(summary)
+    else:
+        _print(study, folder, swept, summary)
+    if failed:
+        lines = [f"{len(failed)} of {total} points failed; their errors are in {folder}, --retry-failed tries again:"]
+        raise FailedError("\n".join([*lines, *(f"- {record.error}" for record in failed[:SHOWN_FAILURES])]))
+    if missing and swept.path is not None:
+        raise FailedError(f"{missing} of {total} points are missing; run the study, or the shards that have not ended")
+
+
+def _print(study: Study, folder: Path, swept: Swept, summary: dict[str, Any]) -> None:
+    from exugear.studies.dataset import slopes
+    from exugear.studies.design.sampling import SIDE
+
+    say(
+        f"{study.file.name}: {summary['finished']} of {summary['points']} points finished, "
+        f"{swept.computed} computed now, {summary['seconds_of_points']:.1f} s of workers' time in all"
+    )
+    if swept.dataset is None or swept.path is None:
+        note(f"{summary['missing']} points are left to other shards; the last one, or --merge, writes the dataset")
+        say(f"Points in {folder}")
+        return
+    if SIDE in study.design.shape:
+        ranked = sorted(slopes(swept.dataset), key=lambda entry: -abs(entry[2]))
+        rows = [{"parameter": p, "figure": f, "% a step": f"{100.0 * c:+.3f}"} for f, p, c in ranked]
+        if rows:
+            print_table("What moves the figures most", rows, ("figure",))
+    if study.file.optimise is not None:
+        _print_front(study.file.optimise.minimise, study, swept.dataset)
+    say(f"Results in {swept.path}, pictures beside it")
+
+
+def _print_front(figures: list[str], study: Study, dataset: xr.Dataset) -> None:
+    """Print where a search began, and some of what no other point beats, spread over the front."""
+    import numpy as np
+
+    front = dataset.isel(evaluation=dataset["on_front"].to_numpy() == 1).sortby(figures[0])
+    shown = sorted({round(n) for n in np.linspace(0, front.sizes["evaluation"] - 1, SHOWN_OF_FRONT)})
+    points = {"begun at": dataset.isel(evaluation=0)} | {f"point {n + 1}": front.isel(evaluation=n) for n in shown}
+    rows = [
+        {"": name} | {label: f"{float(point[name]):.4g}".replace("nan", "") for label, point in points.items()}
+        for name in (*figures, *study.file.parameters)
+    ]
+    print_table(f"Front of {front.sizes['evaluation']} points that no other beats", rows)

@@ -1,0 +1,179 @@
+"""Load duration distributions: how long, and for how many revolutions, a load lies in each of its bins.
+
+For whatever turns through its load, such as teeth and roller bearings, revolutions at a load are its cycles. Loads of
+either sign have bins of their own, since they press on other flanks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_ste.tools.arrays import Floats, Integers
+
+
+@dataclass(frozen=True, eq=False)
+class DurationDistribution:
+    """Hours and revolutions over bins of torque; empty bins are left out.
+
+    Attributes
+    ----------
+    lower, upper : array (bins,)
+        Edges, N m, by size: the upper one is farther from zero; both have the sign of the torque.
+    torque : array (bins,)
+        Mean of what lies in the bin, each instant weighted by its revolutions, N m.
+    hours, revolutions : array (bins,)
+        Of the shaft whose torque it is.
+    """
+
+    lower: Floats
+    upper: Floats
+    torque: Floats
+    hours: Floats
+    revolutions: Floats
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<DurationDistribution: {len(self.hours)} bins, {self.hours.sum():.6g} h>"
+
+    @property
+    def speed(self) -> Floats:
+        """Mean speed of each bin, rad/s, without sign."""
+        return np.asarray(2.0 * np.pi * self.revolutions / (3600.0 * self.hours))
+
+    def torques(self, value: str) -> Floats:
+        """Torque that stands for each bin: its ``mean``, or its ``upper`` edge, which adds damage."""
+        return self.upper if value == "upper" else self.torque
+
+
+def load_duration(torque: Floats, speed: Floats, hours: Floats, bins: int) -> DurationDistribution:
+    """Sort samples of torque into bins of equal width, from zero to the largest.
+
+    Parameters
+    ----------
+    torque, speed, hours : array (samples,)
+        N m, rad/s, and how long each sample lasts in the whole of the life.
+    bins : int
+        Bins of either sign.
+
+    Examples
+    --------
+    An hour at 100 N m and one at 40 N m, half as fast:
+
+    >>> found = load_duration(np.array([100.0, 40.0]), np.array([2.0, 1.0]), np.ones(2), 10)
+    >>> found.torque.tolist(), found.hours.tolist(), (found.revolutions[1] / found.revolutions[0]).round(6).item()
+    ([40.0, 100.0], [1.0, 1.0], 2.0)
+    """
+    width = float(np.abs(torque).max(initial=0.0)) / bins or 1.0
+    place = np.minimum(np.floor(np.abs(torque) / width).astype(int), bins - 1) + 1
+    place = np.where(torque < 0.0, -place, place)  # a torque of zero counts as positive
+    turns = np.abs(speed) * hours * 3600.0 / (2.0 * np.pi)
+    numbers, inverse = np.unique(place, return_inverse=True)
+    total_hours = np.bincount(inverse, hours).astype(np.float64)
+    revolutions = np.bincount(inverse, turns).astype(np.float64)
+    by_turns = np.bincount(inverse, turns * torque) / np.where(revolutions > 0.0, revolutions, 1.0)
+    by_hours = np.bincount(inverse, hours * torque) / np.where(total_hours > 0.0, total_hours, 1.0)
+    sense = np.sign(numbers)
+    return DurationDistribution(
+        lower=sense * (np.abs(numbers) - 1) * width,
+        upper=sense * np.abs(numbers) * width,
+        torque=np.where(revolutions > 0.0, by_turns, by_hours),
+        hours=total_hours,
+        revolutions=revolutions,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class LoadPoints:
+    """Torques with what acts beside them: the bins of a distribution, split where other loads differ.
+
+    Attributes
+    ----------
+    torque : array (points,)
+        N m.
+    other : array (points, n)
+        Loads beside it, means weighted by revolutions.
+    hours, revolutions : array (points,)
+    bin : array (points,)
+        Bin of the distribution that each point lies in.
+    """
+
+    torque: Floats
+    other: Floats
+    hours: Floats
+    revolutions: Floats
+    bin: Integers
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<LoadPoints: {len(self.hours)} points, {self.hours.sum():.6g} h>"
+
+    @property
+    def speed(self) -> Floats:
+        """Mean speed of each point, rad/s, without sign."""
+        return np.asarray(2.0 * np.pi * self.revolutions / (3600.0 * self.hours))
+
+
+def load_points(
+    found: DurationDistribution, value: str, torque: Floats, speed: Floats, hours: Floats, other: Floats, cells: int
+) -> LoadPoints:
+    """Split the bins of a distribution by other loads.
+
+    Parameters
+    ----------
+    found : DurationDistribution
+        Of the same samples.
+    value : str
+        As in `DurationDistribution.torques`.
+    torque, speed, hours : array (samples,)
+        As in `load_duration`.
+    other : array (samples, n)
+        Loads beside the torque.
+    cells : int
+        Cells from the least to the largest of each of them.
+    """
+    torques = found.torques(value)
+    if not other.any():
+        zeros = np.zeros((len(torques), other.shape[1]))
+        return LoadPoints(torques, zeros, found.hours, found.revolutions, np.arange(len(torques)))
+    width = float(np.abs(found.upper - found.lower)[0])
+    side = np.where(torque < 0.0, -1.0, 1.0)
+    place = side * np.minimum(np.floor(np.abs(torque) / width), np.round(np.abs(found.upper).max() / width) - 1.0)
+    number = np.argmin(
+        np.abs((side * width * (np.abs(place) + 0.5))[:, None] - 0.5 * (found.lower + found.upper)), axis=1
+    )
+    span = np.ptp(other, axis=0)
+    cell = np.floor((other - other.min(axis=0)) / np.where(span > 0.0, span, 1.0) * (cells - 1e-9))
+    keys, inverse = np.unique(np.column_stack([number, cell]), axis=0, return_inverse=True)
+    inverse = inverse.ravel()
+    turns = np.abs(speed) * hours * 3600.0 / (2.0 * np.pi)
+    total = np.bincount(inverse, turns).astype(np.float64)
+    means = [np.bincount(inverse, turns * column) / np.where(total > 0.0, total, 1.0) for column in other.T]
+    bins = keys[:, 0].astype(np.int64)
+    lasting = np.bincount(inverse, hours).astype(np.float64)
+    return LoadPoints(torques[bins], np.array(means).T, lasting, total, bins)
+
+
+def equivalent_load(load: Floats, cycles: Floats, exponent: float) -> float:
+    """Constant load that does the same damage in as many cycles, by Miner's rule with one slope.
+
+    Parameters
+    ----------
+    load : array
+        Taken without sign.
+    cycles : array
+    exponent : float
+        Slope of the S-N curve.
+
+    Examples
+    --------
+    >>> equivalent_load(np.array([0.0, 2.0]), np.array([7.0, 1.0]), 3.0)
+    1.0
+    """
+    largest = float(np.abs(load).max(initial=0.0))
+    total = float(np.sum(cycles))
+    if largest == 0.0 or total == 0.0:
+        return 0.0
+    damage = float(np.sum(cycles * np.abs(load / largest) ** exponent)) / total
+    return float(largest * damage ** (1.0 / exponent))

@@ -1,0 +1,1 @@
+"""From loads over time to the life of gears and bearings, and to what limits it."""

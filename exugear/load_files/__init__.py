@@ -1,0 +1,1 @@
+"""Files of loads over time: turbine simulations, test benches, tables."""

@@ -1,0 +1,141 @@
+"""Sections on measured loads and on rating: what acts on a gearbox over its life, and what its gears withstand."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from exugear.model.sections import quantities as q
+from exugear.model.sections.entries import Entries, FileName, Name, Section, Text
+
+ChannelName = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]+$", max_length=100)]
+"""Name of a channel, as the file of loads writes it; capitals do not matter."""
+_CurvePoint = Annotated[tuple[q.LoadCycles, q.LifeFactor], Field(strict=False)]
+Curve = Annotated[tuple[_CurvePoint, ...], Field(strict=False, min_length=2, max_length=20)]
+"""Life factor over load cycles, straight between its points in logarithms."""
+
+
+class SourceSection(Section):
+    """One file of loads, and how often in a year it happens."""
+
+    file: FileName
+    """OpenFAST output (`.outb`, `.out`), a table (`.csv`) or load cases (`.rexs`), beside the gearbox file."""
+    kind: Literal["fatigue", "extreme"] = "fatigue"
+    """Whether it wears the gearbox out, or only its largest values count."""
+    case: Text = ""
+    """Words for people, such as the design load case."""
+    hours_per_year: q.HoursPerYear | None = None
+    """How long it acts in a year; or the next key."""
+    events_per_year: q.EventsPerYear | None = None
+    """How often the file happens in a year as a whole, from what is skipped on."""
+    skip_s: q.SkippedS | None = None
+    """Beginning of a series that is left out, such as a start from rest; 0 for none, to be stated."""
+    torque: ChannelName | None = None
+    """Channel of the torque on the body; in tables with commas `BODY_N_m` by default."""
+    speed: ChannelName | None = None
+    """Channel of the speed of the body; in tables with commas `BODY_rpm` by default."""
+    hub_forces: Annotated[tuple[ChannelName, ChannelName, ChannelName], Field(strict=False)] | None = None
+    """Channels of the force on the body along x, y and z of the gearbox, axes that stand still; `-` before a name turns
+    its sense."""
+    hub_moments: Annotated[tuple[ChannelName, ChannelName], Field(strict=False)] | None = None
+    """Channels of the moments on the body about x and y, likewise."""
+    torque_factor: q.ChannelFactor = 1.0
+    """Factor on the torque: a sign for the sense of the body, or the scale of another machine."""
+    hub_factor: q.ChannelFactor = 1.0
+    """Factor on forces and moments of the hub."""
+    speed_factor: q.ChannelFactor = 1.0
+    """Factor on the speed."""
+    partial_factor: q.PartialFactor | None = None
+    """Factor of safety on the loads of an extreme source."""
+
+    @model_validator(mode="after")
+    def _how_often(self) -> SourceSection:
+        given = (self.hours_per_year is not None) + (self.events_per_year is not None)
+        if self.kind == "fatigue" and given != 1:
+            raise ValueError("a source of fatigue needs one of hours_per_year and events_per_year")
+        if self.kind == "fatigue" and self.partial_factor is not None:
+            raise ValueError("partial_factor belongs to extreme sources; leave it out")
+        if self.kind == "extreme" and (given or self.partial_factor is None):
+            raise ValueError("an extreme source needs partial_factor, and neither hours_per_year nor events_per_year")
+        if 0.0 in (self.torque_factor, self.speed_factor):
+            raise ValueError("torque_factor and speed_factor must not be 0")
+        return self
+
+
+class LoadsSection(Section):
+    """Loads over the life of the gearbox, from files of turbines or test benches."""
+
+    body: Name
+    """Body on which the torques act, with whose speed they turn."""
+    life_years: q.LifeYears
+    """Time for which the gearbox is rated."""
+    bins: q.LoadBins = 64
+    """Bins of torque of either sign, from zero to the largest."""
+    bin_value: Literal["mean", "upper"] = "mean"
+    """Torque that stands for a bin: the mean of its revolutions, or its upper edge, which adds damage."""
+    sources: Annotated[Entries[SourceSection], Field(min_length=1)]
+    """Files by name."""
+
+
+class StrengthSection(Section):
+    """What a gear withstands, by ISO 6336:2006; numbers of its material from ISO 6336-5 or from tests."""
+
+    sigma_H_lim_MPa: q.StressMPa
+    """Allowable stress number for contact."""
+    sigma_F_lim_MPa: q.StressMPa
+    """Nominal stress number for bending; the plain test gear withstands twice as much (Y_ST = 2)."""
+    curve: Literal["case_hardened"] | None = None
+    """S-N curves by name, those of ISO 6336-6; or the next two keys."""
+    contact_curve: Curve | None = None
+    """Life factor Z_NT over load cycles."""
+    bending_curve: Curve | None = None
+    """Life factor Y_NT over load cycles."""
+    roughness_um: q.RoughnessUm
+    """Mean peak-to-valley roughness Rz of the flanks."""
+    root_factor: q.StrengthFactor
+    """Product of the relative notch sensitivity, surface and size factors of the root (Y_drelT Y_RrelT Y_X)."""
+    mean_stress_factor: q.StrengthFactor | None = None
+    """Y_M of gears whose teeth bend both ways, such as planets and idlers; they need it."""
+
+    @model_validator(mode="after")
+    def _curves(self) -> StrengthSection:
+        own = (self.contact_curve is not None, self.bending_curve is not None)
+        if (self.curve is None) != all(own) or (self.curve is not None and any(own)):
+            raise ValueError("give curve, or contact_curve and bending_curve")
+        for key in ("contact_curve", "bending_curve"):
+            points = getattr(self, key) or ()
+            cycles, factors = [point[0] for point in points], [point[1] for point in points]
+            if cycles != sorted(set(cycles)) or factors != sorted(factors, reverse=True):
+                raise ValueError(f"{key}: cycles must rise and factors must not")
+        return self
+
+
+class RatingSection(Section):
+    """How gears are rated, and what they withstand."""
+
+    edition: Literal["ISO 6336:2006"] = "ISO 6336:2006"
+    """Edition of the standard, named in every output."""
+    dynamic_factor: q.LoadFactorK | None = None
+    """K_v of all meshes, as stated; or the next two keys."""
+    dynamic_factor_run: Name | None = None
+    """Load case whose run gives K_v over speed: largest over mean force of each mesh within 20 cycles."""
+    least_dynamic_factor: q.LoadFactorK | None = None
+    """Least K_v beside a run: without errors of the wheels a run has too little."""
+    viscosity_40_mm2_per_s: q.Viscosity
+    """Kinematic viscosity of the oil at 40 degrees Celsius."""
+    carrier_angles: q.CarrierAngles = 12
+    """Angles of the input at which the static balance is taken."""
+    gears: Entries[StrengthSection] = {}
+    """What gears withstand, by name of the gear; others are not rated."""
+    least_S_H: q.SafetyFactor | None = None
+    """Safety against pitting that is asked for."""
+    least_S_F: q.SafetyFactor | None = None
+    """Safety against breakage that is asked for."""
+
+    @model_validator(mode="after")
+    def _dynamic_factor(self) -> RatingSection:
+        of_run = (self.dynamic_factor_run is not None, self.least_dynamic_factor is not None)
+        if (self.dynamic_factor is not None) == all(of_run) or (self.dynamic_factor is not None and any(of_run)):
+            raise ValueError("give dynamic_factor, or dynamic_factor_run and least_dynamic_factor")
+        return self

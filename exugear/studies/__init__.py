@@ -1,0 +1,1 @@
+"""Studies: many variations of one gearbox, computed on all cores or a cluster, as one labelled dataset."""

@@ -1,0 +1,247 @@
+"""Sections of a study file as it is written: parameters, what is computed, and which figures are kept."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from exugear.model.sections.entries import Name, Text
+
+Value = int | float | str | bool | list[Any]
+MOST_VALUES = 100_000
+Path = Annotated[str, Field(min_length=1, max_length=400)]
+
+
+class StudyPart(BaseModel):
+    """A table of the study file; no key or type is guessed."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class RangeSection(StudyPart):
+    """Values from one to another."""
+
+    first: float
+    """First value."""
+    last: float
+    """Last value."""
+    count: Annotated[int, Field(ge=2, le=MOST_VALUES)]
+    """How many, both ends included."""
+    scale: Literal["linear", "logarithmic"] = "linear"
+    """Equal differences, or equal ratios."""
+
+    @model_validator(mode="after")
+    def _signs(self) -> RangeSection:
+        if self.scale == "logarithmic" and not (self.first > 0.0 and self.last > 0.0):
+            raise ValueError("a logarithmic range goes from one positive value to another")
+        return self
+
+
+class NormalSection(StudyPart):
+    """Normal distribution, cut off at limits where they are given."""
+
+    mean: float = 0.0
+    """Mean."""
+    deviation: Annotated[float, Field(gt=0.0)]
+    """Standard deviation before it is cut off."""
+    least: float | None = None
+    """No draw lies below."""
+    most: float | None = None
+    """No draw lies above."""
+
+    @model_validator(mode="after")
+    def _order(self) -> NormalSection:
+        if self.least is not None and self.most is not None and self.least >= self.most:
+            raise ValueError("least must be below most")
+        return self
+
+
+class UniformSection(StudyPart):
+    """Every value between two is as likely."""
+
+    least: float
+    """Lower end."""
+    most: float
+    """Upper end."""
+
+    @model_validator(mode="after")
+    def _order(self) -> UniformSection:
+        if self.least >= self.most:
+            raise ValueError("least must be below most")
+        return self
+
+
+class ToleranceSection(StudyPart):
+    """Flank deviation of a tolerance class of ISO 1328-1: normal, cut off at the tolerance, three deviations away."""
+
+    gear: Name
+    """Gear of the case."""
+    deviation: Literal["profile_slope", "helix_slope", "single_pitch", "cumulative_pitch", "runout"]
+    """Kind of deviation."""
+    tolerance_class: Annotated[int, Field(ge=1, le=11)]
+    """1 to 11."""
+
+
+KINDS = ("values", "range", "normal", "uniform", "iso1328", "settings", "step")
+"""Keys that say which values a parameter takes."""
+
+
+class ParameterSection(StudyPart):
+    """What is varied: one key of the case or several together, and the values they take."""
+
+    path: Path | None = None
+    """Key of the case, such as ``housing.factor``."""
+    paths: Annotated[list[Path], Field(min_length=2, max_length=500)] | None = None
+    """Several keys: with one value for all, or with `correlation` draws of their own."""
+    acts: Literal["replaces", "scales", "shifts"] = "replaces"
+    """Whether a value stands for that of the case, multiplies it or is added to it."""
+    values: Annotated[list[Value], Field(min_length=1, max_length=MOST_VALUES)] | None = None
+    """A list."""
+    range: RangeSection | None = None
+    """From one value to another."""
+    normal: NormalSection | None = None
+    """A normal distribution."""
+    uniform: UniformSection | None = None
+    """A uniform distribution."""
+    iso1328: ToleranceSection | None = None
+    """A tolerance class of flank deviations."""
+    settings: Annotated[dict[str, dict[Path, Value]], Field(min_length=1, max_length=1000)] | None = None
+    """Several keys by the names of what they are together."""
+    step: Annotated[float, Field(gt=0.0)] | None = None
+    """Half the difference that a local derivative is taken over, in the unit of the values."""
+    correlation: Annotated[float, Field(ge=0.0, le=1.0)] = 1.0
+    """Of the draws of several paths: 1 is one draw for all, 0 are independent draws."""
+
+    @property
+    def kind(self) -> str:
+        """Which of `KINDS` it has."""
+        return next(kind for kind in KINDS if getattr(self, kind) is not None)
+
+    @property
+    def targets(self) -> tuple[str, ...]:
+        """Keys of the case that it sets."""
+        if self.settings is not None:
+            return tuple(dict.fromkeys(path for setting in self.settings.values() for path in setting))
+        return (self.path,) if self.path is not None else tuple(self.paths or ())
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether its values are drawn from a distribution."""
+        return self.kind in ("normal", "uniform", "iso1328")
+
+    @model_validator(mode="after")
+    def _one_of_each(self) -> ParameterSection:
+        given = [kind for kind in KINDS if getattr(self, kind) is not None]
+        if len(given) != 1:
+            raise ValueError(f"give one of {', '.join(KINDS)}; {' and '.join(given) or 'none'} is given")
+        if (self.path is not None) + (self.paths is not None) != (0 if self.settings is not None else 1):
+            raise ValueError("give path or paths; settings name their own paths and need neither")
+        if self.correlation != 1.0 and not (self.is_drawn and self.paths):
+            raise ValueError("correlation is between the draws of several paths; give paths and a distribution")
+        if self.settings is not None and len({frozenset(setting) for setting in self.settings.values()}) > 1:
+            raise ValueError("all settings must set the same keys")
+        return self
+
+
+class ChoiceSection(StudyPart):
+    """What is computed of the gearbox, as on the command line."""
+
+    variant: Literal["rigid", "bushing", "flexible"] = "bushing"
+    """How bodies are held."""
+    mesh_law: str = "line_of_action"
+    """How teeth push each other."""
+    inertias: str | None = None
+    """Inertia set; that of the case by default."""
+    load_case: str | None = None
+    """Load case of runs; the first by default."""
+
+
+class SteadySection(StudyPart):
+    """Steady responses, for figures that are read from them."""
+
+    speeds: str
+    """FIRST:LAST:COUNT in rpm of the input."""
+    level: Literal["linear", "parametric", "nonlinear"] = "parametric"
+    """What varies."""
+    harmonics: Annotated[int, Field(ge=1, le=100)] = 10
+    """Harmonics of each mesh frequency."""
+    combinations: Annotated[int, Field(ge=1, le=20)] = 3
+    """Largest sum of multiples of several mesh frequencies."""
+    at_resonances: bool = True
+    """Whether speeds are added where lines cross modes."""
+
+
+class RunSection(StudyPart):
+    """Runs in time, for figures that are read from them."""
+
+    duration_s: Annotated[float, Field(gt=0.0)] | None = None
+    """Simulated time; that of the load case by default."""
+    solver: Literal["compiled", "exudyn"] | None = None
+    """The compiled one where it applies by default."""
+
+
+class OptimisationSection(StudyPart):
+    """Search for parameters, each within its `uniform` limits, that make figures small."""
+
+    minimise: Annotated[list[Name], Field(min_length=1, max_length=2)]
+    """One figure, or two that are weighed against each other."""
+    weightings: Annotated[int, Field(ge=1, le=50)] = 5
+    """Of two figures: how many weightings, one search each, from the first alone to the second alone."""
+    population: Annotated[int, Field(ge=4, le=1000)] = 16
+    """Points of a generation."""
+    generations: Annotated[int, Field(ge=1, le=10000)] = 20
+    """Most generations of a search."""
+
+
+class StudyFile(StudyPart):
+    """The whole study file."""
+
+    name: Annotated[Text, Field(max_length=200)]
+    """Title of the study."""
+    case: Annotated[str, Field(min_length=1, max_length=1000)]
+    """Gearbox file, beside the study file."""
+    description: Text = ""
+    """Words for people."""
+    choice: ChoiceSection = ChoiceSection()
+    """What is computed."""
+    changes: dict[Path, Value] = {}
+    """Keys of the case with other values in all points."""
+    parameters: Annotated[dict[Name, ParameterSection], Field(min_length=1, max_length=200)]
+    """What is varied, by name."""
+    figures: Annotated[dict[Name, dict[str, Any]], Field(min_length=1, max_length=200)]
+    """What is kept, by name: `figure` says which, other keys are its options."""
+    sampling: Literal["sobol", "latin_hypercube", "random"] = "latin_hypercube"
+    """How distributions are drawn from."""
+    samples: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
+    """Draws, where parameters have distributions."""
+    seed: Annotated[int, Field(ge=0)] = 0
+    """The same seed gives the same draws."""
+    steady: SteadySection | None = None
+    """Settings of steady responses."""
+    run: RunSection = RunSection()
+    """Settings of runs."""
+    optimise: OptimisationSection | None = None
+    """A search instead of all combinations."""
+
+    @model_validator(mode="after")
+    def _fits(self) -> StudyFile:
+        drawn = [name for name, parameter in self.parameters.items() if parameter.is_drawn]
+        if self.optimise is not None:
+            wrong = [name for name, parameter in self.parameters.items() if parameter.kind != "uniform"]
+            if wrong:
+                raise ValueError(f"a search needs the limits of each parameter: give {wrong[0]} a key uniform")
+            lost = [name for name in self.optimise.minimise if name not in self.figures]
+            if lost:
+                raise ValueError(f"optimise.minimise: no figure {lost[0]!r}; figures are {', '.join(self.figures)}")
+            return self
+        if drawn and self.samples is None:
+            raise ValueError(f"parameters.{drawn[0]} is drawn from a distribution: say how often, samples = 64")
+        if self.samples is not None and not drawn:
+            raise ValueError("samples: no parameter has a distribution; leave it out")
+        if drawn and self.sampling == "sobol" and self.samples and self.samples & (self.samples - 1):
+            raise ValueError(f"samples = {self.samples}: a Sobol sequence is even over a power of two of points")
+        steps = [parameter.kind == "step" for parameter in self.parameters.values()]
+        if any(steps) and not all(steps):
+            raise ValueError("local derivatives: give each parameter a step, or none")
+        return self

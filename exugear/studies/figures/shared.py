@@ -1,0 +1,93 @@
+"""Tables and reductions that points of a study share: computed once, whoever asks first, and locked meanwhile."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import filelock
+
+from exugear.bodies.elastic_body import ElasticBody
+from exugear.model.gearbox import Gearbox
+from exugear.tooth_mesh.tables import requested_tables, wanted_table
+from fe_ste.transmission_error.table import MeshTable
+
+UNRELATED = (
+    "name",
+    "load_cases",
+    "static_load",
+    "damping",
+    "ste",
+    "housing",
+    "overall",
+    "report",
+    "pins",
+    "deviations",
+)
+"""Sections of a gearbox file that a reduction of its bodies does not read."""
+
+
+class SharedTableError(RuntimeError):
+    """A table with positions that are not solved."""
+
+
+@contextmanager
+def _waiting(path: Path) -> Iterator[None]:
+    """Hold a lock that others wait for; the system takes it back from a process that is killed."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with filelock.FileLock(path):
+        yield
+
+
+@dataclass(frozen=True)
+class Shared:
+    """Folder of what points share, by the hash of its input.
+
+    Attributes
+    ----------
+    folder : Path
+    """
+
+    folder: Path
+
+    def results_folder(self, gearbox: Gearbox, pair: str, grid: bool = False) -> Path:
+        """Results folder that holds the table of a pair of this gearbox, and no other of this pair."""
+        wanted = wanted_table(gearbox, pair, gearbox.ste.positions, grid or gearbox.ste.grid)
+        return self.folder / "tables" / wanted.hash[:32]
+
+    def table(
+        self, gearbox: Gearbox, pair: str, grid: bool = False, progress: Callable[[int, int], None] | None = None
+    ) -> MeshTable:
+        """Table of a pair; the first that asks computes it, others wait for it.
+
+        Raises
+        ------
+        CaseError
+            The pair carries no load.
+        SharedTableError
+            Positions are not solved.
+        """
+        folder = self.results_folder(gearbox, pair, grid)
+        (request,) = requested_tables(gearbox, folder, [pair], grid=grid)
+        table = request.stored
+        if table is None:
+            with _waiting(folder / "lock"):
+                (request,) = requested_tables(gearbox, folder, [pair], grid=grid)
+                table = request.stored or request.compute(progress)
+        if table.failures:
+            raise SharedTableError(f"{pair}: {len(table.failures)} positions are not solved, first {table.failures[0]}")
+        return table
+
+    def bodies(self, gearbox: Gearbox, inertias: str) -> dict[str, ElasticBody]:
+        """Reduced elastic bodies; likewise."""
+        from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies  # loads finite elements
+
+        own = {key: value for key, value in gearbox.content.items() if key not in UNRELATED}
+        key = hashlib.sha256(json.dumps(own, sort_keys=True).encode()).hexdigest()
+        folder = self.folder / "bodies"
+        with _waiting(folder / f"{key[:32]}.lock"):
+            return reduced_bodies(gearbox, inertias, folder)

@@ -1,0 +1,219 @@
+"""A study: a gearbox, the points that vary it, and the figures that are kept, read from a file and checked."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from exugear.model.choice import Choice
+from exugear.model.gearbox import Gearbox
+from exugear.model.named_files import NOTHING_MORE, Permissions
+from exugear.model.reading import CaseError, fault_line
+from exugear.model.versions import MODES, REDUCTION, RUN, STEADY, STUDY
+from exugear.rotating.rotating_frame import SteadyError
+from exugear.steady.settings import SpeedRange, SteadySettings, check_law
+from exugear.studies.design.paths import PathError, changed, check_path
+from exugear.studies.design.reading import StudyError, parse_study, read_study_file
+from exugear.studies.design.sampling import Design, Point, acting, design_of, listed_values
+from exugear.studies.design.sections import StudyFile
+from exugear.studies.figures.figure import Figure, FigureError
+from exugear.studies.figures.point_results import PointSettings
+from exugear.studies.figures.registry import FIGURES, KeptFigure, kept_figures
+from fe_ste.tools.versions import TABLE
+
+UNREAD = ("name", "report", "loads")
+"""Sections of a case that no figure reads: changing them costs no points."""
+TRIED_VALUES = 200
+"""Most values of a list that are tried before the work begins."""
+
+
+@dataclass(frozen=True)
+class Study:
+    """What is varied, computed and kept. Build one with `from_toml` or `from_dict`.
+
+    Attributes
+    ----------
+    file : StudyFile
+        The file as it is written.
+    source : str
+        Its path or name.
+    gearbox : Gearbox
+        The case, with the changes that all points have.
+    choice : Choice
+    settings : PointSettings
+    figures : mapping of name to KeptFigure
+    design : Design
+        All points.
+
+    Examples
+    --------
+    >>> study = Study.from_dict(
+    ...     {
+    ...         "name": "housing",
+    ...         "case": "cases/grc750/gearbox.toml",
+    ...         "choice": {"variant": "bushing", "mesh_law": "iso6336"},
+    ...         "parameters": {"seat": {"path": "housing.factor", "values": [0.2, 0.3, 0.5]}},
+    ...         "figures": {"ringing": {"figure": "nearest_frequency", "near_Hz": 3215.0}},
+    ...     }
+    ... )
+    >>> study
+    <Study 'housing': 3 points, ringing>
+    """
+
+    file: StudyFile
+    source: str
+    gearbox: Gearbox
+    choice: Choice
+    settings: PointSettings
+    figures: Mapping[str, KeptFigure]
+    design: Design
+
+    @classmethod
+    def from_toml(
+        cls, path: str | Path, permissions: Permissions = NOTHING_MORE, figures: Mapping[str, Figure] = FIGURES
+    ) -> Study:
+        """Read and check a study file and the gearbox file that it names.
+
+        Parameters
+        ----------
+        path : path-like
+        permissions : Permissions
+            What the gearbox file may do.
+        figures : mapping of str to Figure
+            Figures that may be named.
+
+        Raises
+        ------
+        StudyError, CaseError
+            Anything wrong with either file.
+        """
+        path = Path(path)
+        return cls._of(read_study_file(path), str(path), path.parent, permissions, figures)
+
+    @classmethod
+    def from_dict(
+        cls,
+        content: dict[str, Any],
+        source: str = "study",
+        permissions: Permissions = NOTHING_MORE,
+        figures: Mapping[str, Figure] = FIGURES,
+    ) -> Study:
+        """Check content already in memory; its case lies where it says, seen from the working directory."""
+        return cls._of(parse_study(content, source), source, Path(), permissions, figures)
+
+    @classmethod
+    def _of(
+        cls, file: StudyFile, source: str, folder: Path, permissions: Permissions, figures: Mapping[str, Figure]
+    ) -> Study:
+        case = Gearbox.from_toml(folder / file.case, permissions)
+        try:
+            gearbox = _varied(case, file.changes)
+            for name, parameter in file.parameters.items():
+                for path in parameter.targets:
+                    _guarded(f"parameters.{name}", check_path, gearbox.content, path)
+            design = design_of(file, gearbox) if file.optimise is None else Design({}, {}, ())
+            kept = kept_figures(file.figures, figures)
+            settings = _settings(file)
+        except (PathError, FigureError, SteadyError, ValueError) as error:
+            if isinstance(error, CaseError | StudyError):
+                raise
+            raise StudyError(fault_line(source, str(error))) from None
+        choice = Choice(**file.choice.model_dump()).of(gearbox)
+        study = cls(file, source, gearbox, choice, settings, kept, design)
+        study._try_values()
+        return study
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"<Study {self.file.name[:60]!r}: {len(self.design.points)} points, {', '.join(self.figures)}>"
+
+    @cached_property
+    def case_hash(self) -> str:
+        """SHA-256 of all that every point depends on: the case with its files, choices, figures, versions."""
+        content = {
+            "versions": [STUDY, TABLE, REDUCTION, MODES, RUN, STEADY],
+            "case": {key: value for key, value in self.gearbox.content.items() if key not in UNREAD},
+            "files": self._digests(self.gearbox.content),
+            "choice": [self.choice.variant, self.choice.mesh_law, self.choice.inertias, self.choice.load_case],
+            "settings": [repr(self.settings.steady), self.settings.duration, self.settings.solver],
+            "figures": self.file.figures,
+        }
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+    def hash_of(self, changes: Mapping[str, Any]) -> str:
+        """SHA-256 of all that a point depends on, with values at paths of the case."""
+        text = json.dumps([self.case_hash, changes, self._digests(changes)], sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def hashed_points(self) -> Iterator[tuple[str, Point]]:
+        """All points with their hashes."""
+        for point in self.design.points:
+            yield self.hash_of(point.changes), point
+
+    def _digests(self, content: Any) -> list[str]:
+        """Checksums of the files that a content names."""
+        folder = Path(self.gearbox.source).parent
+        named = sorted({text for text in _texts(content) if 0 < len(text) < 256 and "\0" not in text})
+        files = [folder / name for name in named]
+        return [hashlib.sha256(file.read_bytes()).hexdigest() for file in files if file.suffix and file.is_file()]
+
+    def _try_values(self) -> None:
+        """Build the gearbox at each listed value, so that one that cannot be is told before the work.
+
+        Raises
+        ------
+        CaseError
+        """
+        if not self.design.points:
+            return
+        first = self.design.points[0].changes
+        _varied(self.gearbox, first)
+        for parameter in self.file.parameters.values():
+            if parameter.settings is not None:
+                tried: list[Mapping[str, Any]] = list(parameter.settings.values())
+            elif parameter.kind in ("values", "range"):
+                paths, values = parameter.targets, listed_values(parameter)[:TRIED_VALUES]
+                tried = [{path: acting(parameter, self.gearbox, path, value) for path in paths} for value in values]
+            else:
+                continue
+            for changes in tried:
+                _varied(self.gearbox, {**first, **changes})
+
+
+def _varied(gearbox: Gearbox, changes: Mapping[str, Any]) -> Gearbox:
+    return Gearbox.from_dict(changed(gearbox.content, changes), gearbox.source, gearbox.permissions)
+
+
+def _guarded(key: str, check: Any, *arguments: Any) -> None:
+    try:
+        check(*arguments)
+    except PathError as error:
+        raise PathError(f"{key}: {error}") from None
+
+
+def _texts(content: Any) -> Iterator[str]:
+    """All texts in a content."""
+    if isinstance(content, str):
+        yield content
+    elif isinstance(content, Mapping):
+        for value in content.values():
+            yield from _texts(value)
+    elif isinstance(content, list):
+        for value in content:
+            yield from _texts(value)
+
+
+def _settings(file: StudyFile) -> PointSettings:
+    """Read the settings of what points compute."""
+    steady = None
+    if file.steady is not None:
+        own = file.steady
+        check_law(file.choice.mesh_law, own.level)
+        speeds = SpeedRange.from_text(own.speeds)
+        steady = SteadySettings(speeds, own.level, own.harmonics, own.combinations, own.at_resonances)
+    return PointSettings(steady, file.run.duration_s, file.run.solver)
