@@ -9,7 +9,7 @@ import io
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from unicodedata import category
 
 from fe_ste.tools.files import write_file
@@ -93,6 +93,7 @@ def _print_png(figure: Figure, content: io.BytesIO) -> None:
     before = figure.get_dpi()
     figure.set_dpi(_DPI)
     try:
-        FigureCanvasAgg(figure).print_png(content)
+        canvas: Any = FigureCanvasAgg(figure)
+        canvas.print_png(content)
     finally:
         figure.set_dpi(before)
