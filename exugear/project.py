@@ -265,7 +265,13 @@ class Project:
         progress : callable, optional
             Called with the number of static states that are solved, and of all.
         """
-        from exugear.life.life import checked_loads, compute_life, life_hash  # root stress, which a run needs not
+        from exugear.life.dynamic_factor import factors
+        from exugear.life.life import (
+            checked_loads,
+            compute_life,
+            life_hash,
+            rating_of,
+        )  # root stress, which a run needs not
         from exugear.life.life_file import stored_life, write_life
         from exugear.life.pair_stresses import pair_stresses
 
@@ -274,14 +280,18 @@ class Project:
             self.tables(grid=LAWS[self.choice.mesh_law].needs_axes)
         requests = self.life_tables()
         tables = {request.name: request.wanted.hash for request in requests}
-        digest = life_hash(assembly, counted, tables)
+        rating, run = rating_of(self.gearbox), None
+        if rating.dynamic_factor_run is not None:
+            run = self.chosen(load_case=rating.dynamic_factor_run).run_path
+        dynamic = factors(assembly, rating, run, counted.body)
+        digest = life_hash(assembly, counted, tables, input_hash(assembly, rating.dynamic_factor_run) if run else "")
         kept = stored_life(self.life_path, digest)
         if kept is not None:
             return kept
         self.keep_case()
         with time_noted(self.folder, f"life, {self.choice.variant}, {self.choice.mesh_law}"):
             stresses = pair_stresses(requests, self.folder, begin)
-            life = compute_life(assembly, counted, stresses, digest, progress)
+            life = compute_life(assembly, counted, stresses, dynamic, digest, progress)
             return write_life(self.life_path, life, self.gearbox.name)
 
     @property

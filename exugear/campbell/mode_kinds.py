@@ -147,7 +147,7 @@ class ModeNamer:
 
 
 def circle(x: complex, y: complex) -> float:
-    """Product of the axes of an ellipse x, y, twice: |x|^2 + |y|^2 for a circle from x to y, the negative against it.
+    """Product of the axes of an ellipse x, y, twice: ``|x|^2 + |y|^2`` for a circle from x to y, negative against it.
 
     Examples
     --------

@@ -1,10 +1,10 @@
 """Modes followed over speed: which mode at one speed is which at the next.
 
-Two modes at neighbouring speeds are compared by left and right shapes,
+Two modes at neighbouring speeds are compared by left and right shapes::
 
-    MAC_ij = |(left_i . right_j) (left_j . right_i)|,   left_i . right_i = 1 at each speed,
+    MAC_ij = |(left_i . right_j) (left_j . right_i)|,   left_i . right_i = 1 at each speed
 
-which is 1 for the same mode, and 0 for different ones of one system, however it is damped and however gyroscopic:
+This is 1 for the same mode, and 0 for different ones of one system, however it is damped and however gyroscopic:
 shapes of such systems are not orthogonal by mass alone. Where modes veer, steps are halved until shapes change
 gradually. Two modes that changed places within a step crossed if MAC_ij is zero; else they are coupled by half a gap
 

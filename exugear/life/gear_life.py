@@ -10,12 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from exugear.counting.duration import DurationDistribution
-from exugear.life.exposure import FLANKS, ToothExposure
+from exugear.life.acting_loads import ActingLoads
+from exugear.life.dynamic_factor import DynamicFactor
 from exugear.life.static_balance import StaticBalance
+from exugear.load_spectrum.exposure import FLANKS, ToothExposure
 from exugear.model.gearbox import Gearbox
 from exugear.model.sections.loads import RatingSection, StrengthSection
 from fe_ste.geometry.gears import GearPair
@@ -32,7 +34,7 @@ from fe_ste.standards.service_life import (
     CASE_HARDENED_BENDING,
     CASE_HARDENED_CONTACT,
     LifeCurve,
-    miner_sum,
+    damages,
     safety_factor,
 )
 from fe_ste.standards.tooth_root import root_stress_factors
@@ -68,6 +70,8 @@ class FlankLife:
         Largest share of the load outside the path of contact: what tip relief would take away.
     face_load : float
         Highest over mean line load along the face at the largest load.
+    contact_by_bin, root_by_bin : array (bins,)
+        Parts of the damages by bin of torque; NaN without strength.
     """
 
     gear: str
@@ -87,6 +91,8 @@ class FlankLife:
     nominal_root: float
     outside: float
     face_load: float
+    contact_by_bin: Floats
+    root_by_bin: Floats
 
 
 def check_strengths(
@@ -113,11 +119,10 @@ def flank_lives(
     gearbox: Gearbox,
     rating: RatingSection,
     teeth: Sequence[ToothExposure],
-    found: DurationDistribution,
-    torques: Floats,
-    extremes: Floats,
+    acting: ActingLoads,
     balance: StaticBalance,
     stresses: Mapping[str, MeshCycleStress],
+    dynamic: Mapping[str, DynamicFactor],
 ) -> tuple[FlankLife, ...]:
     """Rate all gears of pairs whose stresses are known.
 
@@ -126,13 +131,10 @@ def flank_lives(
     gearbox : Gearbox
     rating : RatingSection
     teeth : sequence of ToothExposure
-    found : DurationDistribution
-    torques : array (bins,)
-        That stand for the bins, N m.
-    extremes : array
-        Torques that count for static safety alone, with partial factors, N m.
+    acting : ActingLoads
     balance : StaticBalance
     stresses : mapping of pair name to MeshCycleStress
+    dynamic : mapping of mesh family to DynamicFactor
     """
     pairs = {mesh.family: mesh.pair for mesh in gearbox.meshes}
     lives = []
@@ -141,11 +143,9 @@ def flank_lives(
         if pair.name not in stresses:
             continue
         for sense in (1, -1):
-            worn = np.sign(torques) == sense
-            largest = np.max(sense * np.concatenate([torques, found.upper, extremes]), initial=0.0)
-            if largest > 0.0:
-                case = _Case(gearbox, rating, tooth, pair, balance, stresses[pair.name], sense)
-                lives.append(case.life(found, torques, worn, sense * float(largest)))
+            if np.any(acting.torques * sense > 0.0):
+                case = _Case(gearbox, rating, tooth, pair, balance, stresses[pair.name], dynamic[tooth.family], sense)
+                lives.append(case.life(acting))
     return tuple(lives)
 
 
@@ -159,44 +159,53 @@ class _Case:
     pair: GearPair
     balance: StaticBalance
     stress: MeshCycleStress
+    dynamic: DynamicFactor
     sense: int
 
-    def life(self, found: DurationDistribution, torques: Floats, worn: Floats, largest: float) -> FlankLife:
-        tooth, stress = self.tooth, self.stress
-        passed = list(tooth.meshes)
-        hertz, root, _ = self._stresses(torques[worn])
-        # Each turn meets each angle and each mesh once: a bin's cycles are shared evenly among them.
-        share = tooth.cycles / (len(passed) * len(self.balance.angle))
-        cycles = np.broadcast_to((found.revolutions[worn] * share)[:, None, None], hertz.shape)
-        worst_hertz, worst_root, compression = self._stresses(np.array([largest]))
-        torque, tilt = self._loads(np.array([largest]))
-        force = tangential_force(self.pair.pinion, float(torque.mean()) / self.pair.pinion.base_radius)
+    def life(self, acting: ActingLoads) -> FlankLife:
+        tooth, stress, points = self.tooth, self.stress, acting.points
+        worn = np.sign(points.torque) == self.sense
+        speed = points.speed[worn]
+        hertz, root, _ = self._stresses(points.torque[worn], points.other[worn], self.dynamic.at(speed))
+        # Each turn meets each angle and each mesh once: cycles are shared evenly among them.
+        share = tooth.cycles / (len(tooth.meshes) * len(self.balance.angle))
+        cycles = np.broadcast_to((points.revolutions[worn] * share)[:, None, None], hertz.shape)
+        worst_torque, worst_hub = acting.worst(self.sense)
+        worst = self._stresses(worst_torque, worst_hub, np.full(len(worst_torque), self.dynamic.largest))
+        torque, tilt = self._loads(worst_torque, worst_hub)
+        top = int(np.abs(worst_torque).argmax())
+        force = tangential_force(self.pair.pinion, float(torque[top].mean()) / self.pair.pinion.base_radius)
+        rated = self._rated(hertz, root, cycles, speed, float(worst[0].max()), float(worst[1].max()))
+        by_point = np.zeros((2, len(points.torque)))
+        by_point[:, worn] = rated.pop("by_point")
         return FlankLife(
+            contact_by_bin=acting.by_bin(by_point[0]),
+            root_by_bin=acting.by_bin(by_point[1]),
             gear=tooth.gear,
             family=tooth.family,
             flank=FLANKS[self.sense * tooth.flank],
-            cycles=float(found.revolutions[worn].sum()) * tooth.cycles,
-            contact_stress=float(worst_hertz.max()),
-            root_stress=float(worst_root.max()),
-            compression=float(compression.min()),
+            cycles=float(points.revolutions[worn].sum()) * tooth.cycles,
+            contact_stress=float(worst[0].max()),
+            root_stress=float(worst[1].max()),
+            compression=float(worst[2].min()),
             nominal_contact=nominal_contact_stress(self.pair, force),
             nominal_root=self._nominal_root(force),
             outside=float(stress.at(stress.outside, 0.0, torque, tilt).max()),
-            face_load=float(stress.at(stress.face_load, 0.0, torque, tilt).max()),
-            **self._rated(hertz, root, cycles, found.speed[worn], float(worst_hertz.max()), float(worst_root.max())),
+            face_load=float(stress.at(stress.face_load, 0.0, torque[top], tilt[top]).max()),
+            **rated,
         )
 
-    def _loads(self, torques: Floats) -> tuple[Floats, Floats]:
-        """Torque on gear 1 (N m) and misalignment (rad) of each mesh, (torques, angles, meshes)."""
+    def _loads(self, torques: Floats, hub: Floats) -> tuple[Floats, Floats]:
+        """Torque on gear 1 (N m) and misalignment (rad) of each mesh, (loads, angles, meshes)."""
         passed = list(self.tooth.meshes)
-        force = np.abs(self.balance.at(self.balance.mesh_force, torques)[..., passed])
-        tilt = self.balance.at(self.balance.misalignment, torques)[..., passed]
+        force = np.abs(self.balance.at(self.balance.mesh_force, torques, hub)[..., passed])
+        tilt = self.balance.at(self.balance.misalignment, torques, hub)[..., passed]
         return force * self.pair.pinion.base_radius, tilt
 
-    def _stresses(self, torques: Floats) -> tuple[Floats, Floats, Floats]:
-        """Contact stress, root stress and root compression of each mesh, (torques, angles, meshes), Pa."""
-        torque, tilt = self._loads(torques)
-        torque = torque * self.rating.dynamic_factor
+    def _stresses(self, torques: Floats, hub: Floats, dynamic: Floats) -> tuple[Floats, Floats, Floats]:
+        """Contact stress, root stress and root compression of each mesh, (loads, angles, meshes), Pa."""
+        torque, tilt = self._loads(torques, hub)
+        torque = torque * dynamic[:, None, None]
         stress, member = self.stress, self.tooth.member
         return (
             stress.at(stress.hertz, 0.5, torque, tilt),
@@ -216,25 +225,27 @@ class _Case:
 
     def _rated(
         self, hertz: Floats, root: Floats, cycles: Floats, speed: Floats, worst_hertz: float, worst_root: float
-    ) -> dict[str, float]:
+    ) -> dict[str, Any]:
         strength = self.rating.gears.get(self.tooth.gear)
         keys = ("contact_damage", "root_damage", "contact_safety", "root_safety", "contact_static", "root_static")
         if strength is None:
-            return dict.fromkeys(keys, math.nan)
+            return {**dict.fromkeys(keys, math.nan), "by_point": np.nan}
         contact, bending = life_curves(strength)
         allowed = self._contact_strength(strength, speed)[:, None, None]
         both_ways = strength.mean_stress_factor or 1.0
         endured = 1e6 * strength.sigma_F_lim_MPa * PLAIN_TEST_GEAR * strength.root_factor * both_ways
         static = 1e6 * strength.sigma_H_lim_MPa * contact.factors[0]
+        by_contact = damages(contact, hertz / allowed, 1.0, cycles).sum(axis=(1, 2))
+        by_root = damages(bending, root, endured, cycles).sum(axis=(1, 2))
         values = (
-            miner_sum(contact, hertz / allowed, 1.0, cycles),
-            miner_sum(bending, root, endured, cycles),
+            float(by_contact.sum()),
+            float(by_root.sum()),
             safety_factor(contact, hertz / allowed, 1.0, cycles),
             safety_factor(bending, root, endured, cycles),
             static / worst_hertz,
             endured * bending.factors[0] / worst_root,
         )
-        return dict(zip(keys, values, strict=True))
+        return {**dict(zip(keys, values, strict=True)), "by_point": np.stack([by_contact, by_root])}
 
     def _contact_strength(self, strength: StrengthSection, speed: Floats) -> Floats:
         """Pa at a life factor of one, for each speed (rad/s) of the loaded body."""

@@ -12,15 +12,16 @@ import numpy as np
 from exugear.counting.duration import DurationDistribution
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.fingerprint import input_hash
+from exugear.life.acting_loads import acting_loads
 from exugear.life.bearing_life import BearingLife, bearing_lives
-from exugear.life.counted import CountedLoads, count_loads
+from exugear.life.dynamic_factor import DynamicFactor
 from exugear.life.gear_life import FlankLife, check_strengths, flank_lives
 from exugear.life.static_balance import StaticBalance, static_balance
+from exugear.load_spectrum.counted import CountedLoads, count_loads
 from exugear.model.gearbox import Gearbox
 from exugear.model.sections.loads import RatingSection
 from exugear.model.versions import LIFE
 from fe_ste.root_stress.mesh_cycle import MeshCycleStress
-from fe_ste.tools.arrays import Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,11 +88,14 @@ def checked_loads(gearbox: Gearbox) -> CountedLoads:
         Loads that cannot be used, or strengths that do not fit the gears.
     """
     rating, counted = rating_of(gearbox), count_loads(gearbox)
+    if rating.dynamic_factor_run is not None and rating.dynamic_factor_run not in gearbox.load_cases:
+        known = ", ".join(gearbox.load_cases) or "none"
+        raise gearbox.fault(f"rating.dynamic_factor_run = {rating.dynamic_factor_run!r}: load cases are {known}")
     check_strengths(gearbox, rating, counted.teeth, bool(np.any(counted.distribution.torque < 0.0)))
     return counted
 
 
-def life_hash(assembly: Assembly, counted: CountedLoads, tables: Mapping[str, str]) -> str:
+def life_hash(assembly: Assembly, counted: CountedLoads, tables: Mapping[str, str], run: str = "") -> str:
     """SHA-256 of all that a life depends on.
 
     Parameters
@@ -100,6 +104,8 @@ def life_hash(assembly: Assembly, counted: CountedLoads, tables: Mapping[str, st
     counted : CountedLoads
     tables : mapping of pair name to str
         Hashes of the tables' inputs.
+    run : str
+        Hash of the input of the run that gives K_v.
     """
     case = assembly.gearbox.content
     content = {
@@ -109,6 +115,7 @@ def life_hash(assembly: Assembly, counted: CountedLoads, tables: Mapping[str, st
         "rating": case.get("rating"),
         "files": {one.name: one.digest for one in counted.sources},
         "tables": dict(tables),
+        "run": run,
     }
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
@@ -117,6 +124,7 @@ def compute_life(
     assembly: Assembly,
     counted: CountedLoads,
     stresses: Mapping[str, MeshCycleStress],
+    dynamic: Mapping[str, DynamicFactor],
     digest: str,
     progress: Callable[[int, int], None] | None = None,
 ) -> Life:
@@ -129,6 +137,8 @@ def compute_life(
         Of `checked_loads`.
     stresses : mapping of pair name to MeshCycleStress
         Pairs without are not rated.
+    dynamic : mapping of mesh family to DynamicFactor
+        K_v.
     digest : str
         Of `life_hash`.
     progress : callable, optional
@@ -140,13 +150,12 @@ def compute_life(
         A static state that is not held.
     """
     gearbox, rating = assembly.gearbox, rating_of(assembly.gearbox)
-    found = counted.distribution
-    torques = found.torques(counted.bin_value)
-    extremes = np.concatenate([np.zeros(0), *_extremes(counted)])
-    covered = np.concatenate([found.upper, extremes])
-    balance = static_balance(assembly, counted.body, covered, rating.carrier_angles, progress)
-    flanks = flank_lives(gearbox, rating, counted.teeth, found, torques, extremes, balance, stresses)
-    bearings = bearing_lives(assembly.supports, counted.bearings, found, torques, extremes, balance)
+    found, acting = counted.distribution, acting_loads(counted)
+    balance = static_balance(
+        assembly, counted.body, acting.torques, rating.carrier_angles, progress, 0.5 * acting.hub_sizes
+    )
+    flanks = flank_lives(gearbox, rating, counted.teeth, acting, balance, stresses, dynamic)
+    bearings = bearing_lives(assembly.supports, counted.bearings, acting, balance)
     families: dict[str, list[int]] = {}
     for number, mesh in enumerate(gearbox.meshes):
         families.setdefault(mesh.family, []).append(number)
@@ -160,13 +169,18 @@ def compute_life(
         flanks=flanks,
         bearings=bearings,
         unrated=tuple(_unrated(assembly, counted, stresses)),
-        assumptions=tuple(_assumptions(rating, counted, found, balance, stresses)),
+        assumptions=tuple(_assumptions(rating, counted, found, balance, stresses, dynamic)),
         input_hash=digest,
     )
 
 
-def _extremes(counted: CountedLoads) -> list[Floats]:
-    return [np.array([one.torque.min(), one.torque.max()]) for one in counted.sources if one.kind == "extreme"]
+def _hub_in_words(counted: CountedLoads) -> str:
+    if not counted.points.other.any():
+        return "torque alone: no forces or moments of a hub"
+    return (
+        f"forces and moments of a hub on {counted.body} in {len(counted.points.torque)} points; what they add is "
+        "linear in them, at each torque"
+    )
 
 
 def _unrated(assembly: Assembly, counted: CountedLoads, stresses: Mapping[str, MeshCycleStress]) -> list[str]:
@@ -191,13 +205,14 @@ def _assumptions(
     found: DurationDistribution,
     balance: StaticBalance,
     stresses: Mapping[str, MeshCycleStress],
+    dynamic: Mapping[str, DynamicFactor],
 ) -> list[str]:
     count = len(balance.torque)
     lines = [
-        "torque alone: no forces or moments of a hub",
+        _hub_in_words(counted),
         f"static balance at {count} torque{'s' * (count > 1)} and {len(balance.angle)} angles of the carrier, "
         + ("proportional to torque" if balance.linear else "forces over torque linear between these"),
-        f"K_v = {rating.dynamic_factor:g} on all meshes as stated; none on bearings",
+        _dynamic_in_words(rating, dynamic, found) + "; none on bearings",
         "face and transverse load factors are in the stresses of the contact of finite elements"
         + (
             ""
@@ -210,3 +225,10 @@ def _assumptions(
     if np.any(found.torque < 0.0):
         lines.append("reversed torque presses the other flanks; teeth there are taken as the mirror of these")
     return [*lines, *counted.remarks]
+
+
+def _dynamic_in_words(rating: RatingSection, dynamic: Mapping[str, DynamicFactor], found: DurationDistribution) -> str:
+    if rating.dynamic_factor is not None:
+        return f"K_v = {rating.dynamic_factor:g} on all meshes as stated"
+    values = ", ".join(f"{family} {float(one.at(found.speed).max()):.3f}" for family, one in dynamic.items())
+    return f"K_v of the run {rating.dynamic_factor_run}, at least {rating.least_dynamic_factor:g}: {values}"

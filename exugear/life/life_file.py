@@ -14,7 +14,7 @@ import numpy as np
 from exugear.life.bearing_life import BearingLife
 from exugear.life.gear_life import FlankLife
 from exugear.life.life import Life
-from exugear.life.spectra_files import write_table
+from exugear.load_spectrum.spectra_files import write_table
 from exugear.model.choice import Choice
 from exugear.model.versions import LIFE
 from exugear.results.folder import modes_path
@@ -28,15 +28,17 @@ FLANK_UNITS = {
     "contact_stress": "Pa", "root_stress": "Pa", "compression": "Pa", "nominal_contact": "Pa", "nominal_root": "Pa",
 }  # fmt: skip
 BEARING_UNITS = {"largest_load": "N", "equivalent": "N", "basic_hours": "h", "reference_hours": "h", "pressure": "Pa"}
-FLANK_NUMBERS = tuple(one.name for one in fields(FlankLife) if one.name not in ("gear", "family", "flank"))
-BEARING_NUMBERS = tuple(one.name for one in fields(BearingLife) if one.name not in ("name", "ratings", "remarks"))
+FLANK_NUMBERS = tuple(one.name for one in fields(FlankLife) if one.type in (float, "float"))
+BEARING_NUMBERS = tuple(one.name for one in fields(BearingLife) if one.type in (float, "float"))
 _LAYOUT = Layout(
     "life",
     LIFE,
     {f"flank_{name}": ("flank",) for name in FLANK_NUMBERS}
     | {f"bearing_{name}": ("bearing",) for name in (*BEARING_NUMBERS, "dynamic_rating", "static_rating")}
     | {name: ("bin",) for name in ("torque", "hours", "revolutions", "speed")}
-    | {"flank": ("flank",), "bearing": ("bearing",)},
+    | {"flank": ("flank",), "bearing": ("bearing",)}
+    | {f"flank_{name}": ("flank", "bin") for name in ("contact_by_bin", "root_by_bin")}
+    | {"bearing_by_bin": ("bearing", "bin")},
     ("gearbox", "variant", "mesh_law", "edition", "input_hash", "assumptions", "unrated"),
 )
 
@@ -64,6 +66,12 @@ def to_dataset(life: Life, gearbox: str) -> xr.Dataset:
     for name in BEARING_NUMBERS:
         values = np.array([getattr(one, name) for one in life.bearings], dtype=np.float64)
         variables[f"bearing_{name}"] = (("bearing",), values, {"units": BEARING_UNITS.get(name, "1")})
+    count, none = len(found.hours), {"units": "1", "long_name": "parts of the damage by bin of torque"}
+    for name in ("contact_by_bin", "root_by_bin"):
+        values = np.array([getattr(one, name) for one in life.flanks]).reshape(-1, count)
+        variables[f"flank_{name}"] = (("flank", "bin"), values, none)
+    values = np.array([one.by_bin for one in life.bearings]).reshape(-1, count)
+    variables["bearing_by_bin"] = (("bearing", "bin"), values, none)
     for name in ("dynamic", "static"):
         values = np.array([getattr(one.ratings, name) for one in life.bearings], dtype=np.float64)
         variables[f"bearing_{name}_rating"] = (("bearing",), values, {"units": "N"})

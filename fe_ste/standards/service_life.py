@@ -65,8 +65,8 @@ CASE_HARDENED_BENDING = LifeCurve((1e3, 3e6, 1e10), (2.5, 1.0, 0.85))
 """Y_NT of case-hardened steel: exponents 8.73724908 and 49.91250338 of the corrigendum's clause C.6."""
 
 
-def miner_sum(curve: LifeCurve, stress: Floats, strength: Floats | float, cycles: Floats) -> float:
-    """Sum of cycles over endured cycles; infinite where a stress exceeds the curve.
+def damages(curve: LifeCurve, stress: Floats, strength: Floats | float, cycles: Floats) -> Floats:
+    """Cycles over endured cycles of each load; infinite where a stress exceeds the curve.
 
     Parameters
     ----------
@@ -78,11 +78,14 @@ def miner_sum(curve: LifeCurve, stress: Floats, strength: Floats | float, cycles
     cycles : array
         Of each load.
     """
-    acting = np.asarray(cycles) > 0.0
     endured = curve.endured(np.asarray(stress / np.asarray(strength, dtype=np.float64)))
-    if np.any(endured[acting] == 0.0):
-        return math.inf
-    return float(np.sum(np.asarray(cycles)[acting] / endured[acting]))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(np.asarray(cycles) > 0.0, np.asarray(cycles) / endured, 0.0)
+
+
+def miner_sum(curve: LifeCurve, stress: Floats, strength: Floats | float, cycles: Floats) -> float:
+    """Sum of `damages`."""
+    return float(np.sum(damages(curve, stress, strength, cycles)))
 
 
 def safety_factor(curve: LifeCurve, stress: Floats, strength: Floats | float, cycles: Floats) -> float:

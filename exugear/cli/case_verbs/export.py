@@ -30,7 +30,7 @@ def export(
     files_below: FilesBelowOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Write a copy of a REXS file with results: what REXS has names for, and the rest as custom_exugear_ attributes.
+    """Write a copy of a REXS file with results: what REXS has names for, and the rest as custom_exugear attributes.
 
     Geometry and static forces are always there; tables, modes, bearings and runs as far as the results folder has them.
     """

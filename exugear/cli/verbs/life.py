@@ -1,4 +1,4 @@
-"""The verb `life`: how long gears and bearings last under the loads of section [loads], and what limits them."""
+"""The verb `life`: how long gears and bearings last under the loads of section ``loads``, and what limits them."""
 
 from __future__ import annotations
 
@@ -44,12 +44,13 @@ def life(
     scripts: ScriptsOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Rate gears and bearings under the loads of section [loads]: damages, safety factors, lives, what limits.
+    """Rate gears and bearings under the loads of section ``loads``: damages, safety factors, lives, what limits.
 
     Tables that are missing or do not fit the case are computed first.
     """
     with exit_codes():
         from exugear.life.life import checked_loads
+        from exugear.life.life_diagrams import draw_life
         from exugear.life.life_file import summary
         from exugear.model.choice import Choice
 
@@ -63,11 +64,13 @@ def life(
         compute_tables(requests)
         reduce_elastic_bodies(project)
         data = _rate(project)
+        picture = project.life_path.with_suffix(".png")
+        draw_life(data, picture)
         if as_json:
             print_json({"case": str(case), **summary(data), "file": str(project.life_path)})
             return
         _tell(data)
-        say(f"Life in {project.life_path}, tables with commas beside it")
+        say(f"Life in {project.life_path}, tables with commas and a picture beside it")
 
 
 def _rate(project: Project) -> xr.Dataset:

@@ -116,12 +116,12 @@ def _free_motions(linear: Linearised, free: Floats) -> tuple[Floats, Floats]:
 
 
 def highest_rate(assembly: Assembly) -> float:
-    """Largest |eigenvalue|, rad/s: it decides whether a step is stable."""
+    """Largest ``|eigenvalue|``, rad/s: it decides whether a step is stable."""
     return float(np.abs(eigenvalues(assembly)).max())
 
 
 def fastest_motion(assembly: Assembly) -> str:
-    """Say in words what the largest |eigenvalue| belongs to: the body that moves, and what holds or damps it.
+    """Say in words what the largest ``|eigenvalue|`` belongs to: the body that moves, and what holds or damps it.
 
     Examples
     --------

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from exugear.life.counted import CountedLoads
+from exugear.load_spectrum.counted import CountedLoads
 from exugear.model.parts import RPM
 from fe_ste.tools.files import write_file
 

@@ -10,8 +10,8 @@ import pytest
 from typer.testing import CliRunner
 
 from exugear.cli import app as cli
-from exugear.life.counted import count_loads
-from exugear.life.sources import load_sources
+from exugear.load_spectrum.counted import count_loads
+from exugear.load_spectrum.sources import load_sources
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
 from exugear.rexs.containers import read_rexs

@@ -39,6 +39,7 @@ def draw_duration(found: DurationDistribution, body: str, path: str | Path | Non
                 lasting = np.cumsum(found.hours[own][order])
                 above.step(lasting, 1e-3 * np.abs(found.torque[own][order]), where="pre", color=colour, label=name)
         above.set(xlabel="hours with at least this torque", ylabel="torque without sign / kN m", xscale="log")
+        above.xaxis.set_major_formatter("{x:g}")
         above.set_title("duration")
         above.legend()
         return finish_figure(figure, path)
