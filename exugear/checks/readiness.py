@@ -10,6 +10,7 @@ import numpy as np
 from exugear.bearings.rolling.rows import BearingError
 from exugear.bearings.support_laws import linear_law, misplaced_factor
 from exugear.bearings.supports import ON_BEARINGS, elastic_names, unsupported
+from exugear.checks.margins import doubts_about_pairs
 from exugear.checks.restraint import free_motion
 from exugear.loads.torque_series import torque_series
 from exugear.model.gearbox import Gearbox
@@ -57,7 +58,17 @@ def lacking(gearbox: Gearbox, variant: str) -> str:
     lack = unsupported(gearbox, variant)
     if lack or variant not in ON_BEARINGS:
         return lack
-    return free_motion(gearbox, variant) or _misplaced_factors(gearbox, variant)
+    return _misfits(gearbox, variant) or free_motion(gearbox, variant) or _misplaced_factors(gearbox, variant)
+
+
+def _misfits(gearbox: Gearbox, variant: str) -> str:
+    """Say which elastic body cannot be, or has a seat beside it: the first fault that `check_parts` tells of them."""
+    for name in elastic_names(gearbox) if variant == "flexible" else ():
+        try:
+            _build_elastic_body(gearbox, name)
+        except CaseError as error:
+            return error.faults[0].removeprefix(f"{gearbox.source}: ")
+    return ""
 
 
 def _misplaced_factors(gearbox: Gearbox, variant: str) -> str:
@@ -83,6 +94,7 @@ def remarks(gearbox: Gearbox) -> tuple[str, ...]:
             f"meshes: the train has {train.degrees_of_freedom} degrees of freedom; ratio, orders and speeds of the "
             f"input hold while {others} stand{'s' if len(train.independent) == 2 else ''}"
         )
+    lines += doubts_about_pairs(gearbox)
     return tuple(lines)
 
 

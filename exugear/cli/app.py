@@ -26,6 +26,7 @@ VERBS = (
     "verbs.run",
     "verbs.sweep",
     "verbs.loads",
+    "verbs.life",
     "verbs.view",
     "verbs.report",
     "case_verbs.export",

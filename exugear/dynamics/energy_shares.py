@@ -80,8 +80,11 @@ def mode_name(assembly: Assembly, element_names: tuple[str, ...], kinetic: Float
             family = "planets" if body.carrier else body.name
             moving[f"{family} {motion}"] = moving.get(f"{family} {motion}", 0.0) + float(share)
     strained: dict[str, float] = {}
+    # Those of all planets together; other names keep their digits.
+    families = {mesh.name: mesh.family for mesh in assembly.gearbox.meshes}
+    families |= {support.name: support.family for support in assembly.supports}
     for name, share in zip(element_names, strain, strict=True):
-        family = name.rstrip("0123456789").rstrip("_")
+        family = families.get(name, name)
         strained[family] = strained.get(family, 0.0) + float(share)
     words, told = [], 0.0
     for what, share in sorted(moving.items(), key=lambda item: -item[1]):

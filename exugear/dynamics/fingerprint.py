@@ -15,7 +15,7 @@ from fe_ste.transmission_error.surface import SteSurface
 def input_hash(assembly: Assembly, load_case: str | None = None) -> str:
     """SHA-256 of all that the equations of a variant depend on: gearbox file with its solids, choices, mesh stiffness.
 
-    The versions of the methods are part of it.
+    The versions of the methods are part of it. Load cases that are not run leave it as it is.
 
     Parameters
     ----------
@@ -39,8 +39,8 @@ def input_hash(assembly: Assembly, load_case: str | None = None) -> str:
     content = {
         "method_version": RUN if load_case else MODES,
         "reduction_version": REDUCTION if assembly.elastic_bodies else None,
-        # What acts over a life, and how parts are rated, changes nothing in the equations.
-        "gearbox": {key: value for key, value in gearbox.content.items() if key not in ("loads", "rating")},
+        "gearbox": gearbox.computed_content,
+        "load": gearbox.content["load_cases"][load_case] if load_case else None,
         "variant": assembly.variant,
         "law": assembly.mesh_law,
         "inertias": assembly.inertias,

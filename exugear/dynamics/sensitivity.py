@@ -211,7 +211,9 @@ def assumed_parameters(
     sets = [gearbox.body(body.name, name).axial for name in gearbox.inertia_sets]
     values = _spanning(min(sets), max(sets), body.axial)
     label = f"axial inertia of {body.name} / kg m²"
-    parameters.append(Parameter(label, values, body.axial, lambda x: built(_inertia_changes(body, inertias, x))))
+    parameters.append(
+        Parameter(label, values, body.axial, lambda x: built(_inertia_changes(gearbox, body, inertias, x)))
+    )
     time = 1e6 * gearbox.case.damping.mesh_time_s
     if time > 0.0:
         values = tuple(time * part for part in FRACTIONS)
@@ -221,13 +223,19 @@ def assumed_parameters(
     return tuple(parameters)
 
 
-def _inertia_changes(body: Body, inertias: str, axial: float) -> dict[str, float]:
-    """Set a body's axial inertia; the transverse one follows where no rigid body could have both otherwise."""
-    key = f"bodies.{body.family}.inertia.{inertias}"
-    changes = {f"{key}.axial_kg_m2": axial}
+def _inertia_changes(gearbox: Gearbox, body: Body, inertias: str, axial: float) -> dict[str, float]:
+    """Set a body's axial inertia; the transverse one follows where no rigid body could have both otherwise.
+
+    Inertia that the program computed from the body's shape is replaced as a whole, in all sets.
+    """
+    place = f"bodies.{body.family}.inertia"
+    values = {"axial_kg_m2": axial}
     if not body.spin_only:
-        changes[f"{key}.transverse_kg_m2"] = max(body.transverse, 0.5 * axial)
-    return changes
+        values["transverse_kg_m2"] = max(body.transverse, 0.5 * axial)
+    if gearbox.case.bodies[body.family].inertia:
+        return {f"{place}.{inertias}.{key}": value for key, value in values.items()}
+    values |= {"mass_kg": body.mass, "centre_of_mass_z_mm": 1e3 * body.centre_of_mass_z}
+    return {f"{place}.{name}.{key}": value for name in gearbox.inertia_sets for key, value in values.items()}
 
 
 def _spanning(low: float, high: float, default: float) -> tuple[float, ...]:

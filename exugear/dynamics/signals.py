@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-COMPONENTS = {"axis": 3}
-"""Entries along a dimension that needs no names: x, y, z in global axes."""
+AXES = ("x", "y", "z")
+"""Entries along the dimension `axis`: the global axes."""
 
 
 @dataclass(frozen=True)
@@ -103,11 +103,12 @@ class Signal(Variable):
 
 
 SIGNALS = (
-    Signal("time", ("time",), "s"),
+    Signal("time", ("time",), "s", "time from the start of the run"),
     Signal(
         "input_speed",
         ("time",),
         "rad/s",
+        "speed of the overall input",
         sign_convention="rotation about +z",
         filled_by=("Observer.complete",),
     ),
@@ -115,6 +116,7 @@ SIGNALS = (
         "overall_dte_angle",
         ("time",),
         "rad",
+        "overall transmission error as an angle of the output",
         sign_convention="output ahead, about +z, of where the ratio puts it",
         filled_by=("Observer.complete",),
     ),
@@ -122,6 +124,7 @@ SIGNALS = (
         "overall_dte",
         ("time",),
         "m",
+        "overall transmission error as a length",
         sign_convention="as overall_dte_angle, at the base radius of the output gear",
         formula=lambda layout, rows: layout.values("overall_dte_angle", rows) * layout.radius,
     ),
@@ -129,6 +132,7 @@ SIGNALS = (
         "mesh_dte",
         ("time", "mesh"),
         "m",
+        "deflection of the mesh along the transverse line of action",
         sign_convention="the loaded flanks approach",
         kind="f4",
         filled_by=("observe_meshes",),
@@ -137,6 +141,7 @@ SIGNALS = (
         "mesh_force",
         ("time", "mesh"),
         "N",
+        "force in the transverse plane of gear 2 on gear 1, whose bodies `mesh_bodies` names in this order",
         sign_convention="the loaded flank pushes",
         kind="f4",
         filled_by=("observe_meshes",),
@@ -145,6 +150,7 @@ SIGNALS = (
         "support_force",
         ("time", "support", "axis"),
         "N",
+        "force of the support on its body, the first that `support_bodies` names, from the second",
         sign_convention="on the body, along the global axis",
         kind="f4",
         filled_by=("observe_supports", "observe_joints"),
@@ -178,6 +184,7 @@ SIGNALS = (
         "centre_distance_change",
         ("time", "mesh"),
         "m",
+        "change of the distance between both gears' axes",
         sign_convention="axes further apart than nominal",
         kind="f4",
         filled_by=("observe_meshes",),
@@ -187,6 +194,7 @@ SIGNALS = (
         "misalignment",
         ("time", "mesh"),
         "rad",
+        "misalignment of the flanks in the plane of action",
         sign_convention="the gap opens at the +z end",
         kind="f4",
         filled_by=("observe_meshes",),
@@ -201,20 +209,28 @@ SIGNALS = (
         laws="table",
         stored=False,
     ),
-    Signal("balance_time", ("balance_time",), "s"),
+    Signal("balance_time", ("balance_time",), "s", "times of the account of energy"),
     Signal(
         "work_of_loads",
         ("balance_time",),
         "J",
+        "work of torques, drive and weight since the start",
         sign_convention="put into the motion",
         filled_by=("observe_loads", "observe_elastic_bodies"),
         is_power=True,
     ),
-    Signal("kinetic_energy", ("balance_time",), "J", filled_by=("observe_bodies", "observe_elastic_bodies")),
+    Signal(
+        "kinetic_energy",
+        ("balance_time",),
+        "J",
+        "kinetic energy of all bodies",
+        filled_by=("observe_bodies", "observe_elastic_bodies"),
+    ),
     Signal(
         "elastic_energy",
         ("balance_time",),
         "J",
+        "elastic energy of meshes, supports, couplings and bodies",
         filled_by=(
             "observe_meshes",
             "observe_connectors",
@@ -226,6 +242,7 @@ SIGNALS = (
         "dissipated_energy",
         ("balance_time",),
         "J",
+        "work of all dampers since the start",
         sign_convention="taken from the motion",
         filled_by=(
             "observe_meshes",
@@ -239,6 +256,7 @@ SIGNALS = (
         "work_of_varying_stiffness",
         ("balance_time",),
         "J",
+        "work of stiffness that changes over the mesh cycle, since the start",
         sign_convention="taken from the motion",
         filled_by=("observe_meshes",),
         is_power=True,
@@ -247,6 +265,7 @@ SIGNALS = (
         "non_conservative_work",
         ("balance_time",),
         "J",
+        "work of the law seed beyond its deflection, since the start",
         sign_convention="taken from the motion",
         filled_by=("observe_meshes",),
         is_power=True,
@@ -255,6 +274,7 @@ SIGNALS = (
         "bearing_rate_work",
         ("balance_time",),
         "J",
+        "work of bearings whose rate is not that of their displacement, since the start",
         sign_convention="taken from the motion",
         filled_by=("observe_connectors",),
         is_power=True,
@@ -302,7 +322,8 @@ class SignalLayout:
 
     Examples
     --------
-    >>> layout = SignalLayout(SIGNALS, {"mesh": ("first", "second"), "support": ("pin",)}, radius=0.1)
+    >>> names = {"mesh": ("first", "second"), "support": ("pin",), "axis": AXES}
+    >>> layout = SignalLayout(SIGNALS, names, radius=0.1)
     >>> layout["mesh_force"], layout["support_force"]
     (slice(4, 6, None), slice(6, 9, None))
     >>> samples = np.arange(2.0 * layout.count).reshape(2, layout.count)
@@ -340,8 +361,7 @@ class SignalLayout:
 
     def shape(self, signal: Variable) -> tuple[int, ...]:
         """Sizes of a signal's dimensions after the first."""
-        sizes = {**COMPONENTS, **{dimension: len(names) for dimension, names in self.names.items()}}
-        return tuple(sizes[dimension] for dimension in signal.dimensions[1:])
+        return tuple(len(self.names[dimension]) for dimension in signal.dimensions[1:])
 
     @property
     def sample_bytes(self) -> int:
@@ -349,7 +369,7 @@ class SignalLayout:
 
         Examples
         --------
-        >>> names = {"mesh": tuple("abcdefgh"), "support": tuple("abcdefghijkl")}
+        >>> names = {"mesh": tuple("abcdefgh"), "support": tuple("abcdefghijkl"), "axis": AXES}
         >>> SignalLayout(signals_of(False), names, radius=0.1).sample_bytes
         240
         """
@@ -390,9 +410,20 @@ def signal_layout(assembly: Assembly) -> SignalLayout:
     joints = tuple(joint.name for joint in gearbox.joints) if assembly.variant == "rigid" else ()
     return SignalLayout(
         signals_of(LAWS[assembly.mesh_law].signals_positions),
-        {"mesh": assembly.mesh_names, "support": assembly.connector_names or joints},
+        {"mesh": assembly.mesh_names, "support": assembly.connector_names or joints, "axis": AXES},
         gearbox.output_radius,
     )
+
+
+def bodies_of_forces(assembly: Assembly) -> dict[str, str]:
+    """Bodies between which meshes and supports act, in words, as attributes of a file.
+
+    Of a mesh those of gear 1 and gear 2; of a support its body and what this sits on.
+    """
+    meshes = [f"{element.mesh.name}: {element.mesh.pinion}, {element.mesh.gear}" for element in assembly.elements]
+    joints = assembly.gearbox.joints if assembly.variant == "rigid" else ()
+    supports = [f"{support.name}: {support.body}, {support.on}" for support in assembly.supports or joints]
+    return {"mesh_bodies": "; ".join(meshes), "support_bodies": "; ".join(supports)}
 
 
 def energy_residual(data: xr.Dataset | Mapping[str, Floats]) -> float:

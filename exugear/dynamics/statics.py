@@ -132,6 +132,9 @@ def locked_equilibrium(
     torques: Mapping[str, float],
     locked: Sequence[str],
     meshes: MeshArrays | None = None,
+    about: Floats | None = None,
+    other_loads: Floats | None = None,
+    near: Floats | None = None,
 ) -> Floats:
     """Coordinates at rest under torques (N m) with some spins held at zero.
 
@@ -143,6 +146,13 @@ def locked_equilibrium(
         balance, it stays where it is
     meshes : MeshArrays, optional
         Mesh arrays to use instead of the assembly's, such as its `mean_meshes`.
+    about : (size,) array, optional
+        Coordinates of the train rolled to another position, at which spins are held instead of zero.
+    other_loads : (size,) array, optional
+        Generalized forces beside the torques, N and N m.
+    near : (size,) array, optional
+        Coordinates from which the search begins, such as those under a similar load; by default it begins with linear
+        bearings and teeth, as it does where these lead nowhere.
 
     Raises
     ------
@@ -151,15 +161,16 @@ def locked_equilibrium(
     """
     held = [assembly.spin[name] for name in _held(assembly, torques, locked)]
     free = assembly.motions @ scipy.linalg.null_space(assembly.motions[held])
-    applied = assembly.torque_vector(torques)
+    applied = assembly.torque_vector(torques) + (0.0 if other_loads is None else other_loads)
     rest = np.zeros(assembly.size)
+    origin = rest if about is None else about
 
     def solve(assembly: Assembly, start: Floats, meshes: MeshArrays | None) -> Floats:
         def residual(x: Floats) -> Floats:
-            return free.T @ (assembly.forces(free @ x, rest, meshes) + applied)
+            return free.T @ (assembly.forces(origin + free @ x, rest, meshes) + applied)
 
         def derivative(held: Assembly, x: Floats) -> Floats:
-            stiffness = tangent_stiffness(held, free @ x, held.meshes if meshes is None else meshes)
+            stiffness = tangent_stiffness(held, origin + free @ x, held.meshes if meshes is None else meshes)
             return np.asarray(-free.T @ stiffness @ free)
 
         def search(share: float) -> Floats:
@@ -172,8 +183,11 @@ def locked_equilibrium(
                 return search(share)
         return search(last)
 
-    x = _from_linear(assembly, np.zeros(free.shape[1]), lambda x: np.asarray(free @ x), solve, meshes)
-    return np.asarray(free @ x)
+    if near is not None:
+        with suppress(BalanceError):
+            return np.asarray(origin + free @ solve(assembly, free.T @ (near - origin), meshes))
+    x = _from_linear(assembly, np.zeros(free.shape[1]), lambda x: np.asarray(origin + free @ x), solve, meshes)
+    return np.asarray(origin + free @ x)
 
 
 @dataclass(frozen=True)

@@ -8,15 +8,20 @@ from collections.abc import Iterator, Mapping, Sequence
 from exugear.model.named_files import LARGEST_TABLE
 from exugear.model.origin import Origin, part_of_each
 from exugear.model.parts import RPM, Body, LoadCase
-from exugear.model.sections.bodies import BodySection, InertiaSection
+from exugear.model.sections.bodies import BodySection, InertiaSection, ShaftSectionSection
 from exugear.model.sections.case import LoadCaseSection
-from exugear.model.sections.gears import PinSection
+from exugear.model.sections.gears import GearSection, PinSection
+from fe_ste.geometry.cylinders import MassProperties, Tube, mass_properties, together
 
 
 def inertia_sets(origin: Origin) -> tuple[str, ...]:
-    """Names of the inertia sets; every moving body has each of them."""
+    """Names of the inertia sets; every moving body has each of them, or none where its inertia follows from its shape.
+
+    Where that of all bodies does, the default set is the only one.
+    """
     moving = [section for section in origin.enabled.values() if not section.fixed]
-    return tuple(moving[0].inertia) if moving else ()
+    named = next((section.inertia for section in moving if section.inertia), None)
+    return tuple(named or (origin.case.default_inertias,)) if moving else ()
 
 
 def bodies(origin: Origin, inertias: str) -> tuple[Body, ...]:
@@ -41,7 +46,9 @@ def bodies(origin: Origin, inertias: str) -> tuple[Body, ...]:
 def _family(origin: Origin, family: str, section: BodySection, inertias: str) -> Iterator[Body]:
     """One body, or the planets of a set."""
     inertia = section.inertia.get(inertias)
-    if inertia is None and not section.fixed:
+    if not section.inertia and not section.fixed:
+        inertia = _computed_inertia(origin, section)
+    elif inertia is None and not section.fixed:
         raise origin.fault(
             f"bodies.{family}.inertia: no set {inertias!r}; every moving body "
             f"needs the sets {', '.join(inertia_sets(origin))}"
@@ -76,6 +83,59 @@ def _body(
         wheels={gear: z * 1e-3 for gear, z in section.wheels_z_mm.items()},
         planet_of=section.carrier,
     )
+
+
+def _computed_inertia(origin: Origin, section: BodySection) -> InertiaSection:
+    """Inertia of the pieces of a body's shape, and of its gears: their blanks, or tubes up to their reference circles.
+
+    A tube begins at the diameter at which the gear is held, or at the shaft where that is thicker.
+    """
+    tubes: list[Tube] = []
+    rings: list[MassProperties] = []
+    shape = section.shape
+    if shape is not None:
+        start = 1e-3 * shape.start_z_mm
+        for piece in shape.sections:
+            tubes.append(_tube(piece, start, shape.material.density_kg_per_m3))
+            start += tubes[-1].length
+    for name, z in section.wheels_z_mm.items():
+        blank = shape.blanks.get(name) if shape is not None else None
+        if blank is not None:
+            rings.append(MassProperties(blank.mass_kg, blank.axial_kg_m2, blank.transverse_kg_m2, 1e-3 * z))
+        elif name in origin.case.gears:
+            tubes.append(gear_tube(origin.case.gears[name], 1e-3 * z, tubes))
+    total = together([mass_properties(tubes), *rings])
+    return InertiaSection.model_construct(
+        mass_kg=total.mass,
+        axial_kg_m2=total.axial,
+        # Of a thin disc it is half the axial one: rounding must not make it less.
+        transverse_kg_m2=max(total.transverse, 0.5 * total.axial),
+        centre_of_mass_z_mm=1e3 * total.centre,
+    )
+
+
+def _tube(piece: ShaftSectionSection, start: float, density: float) -> Tube:
+    ends = (piece.outer_diameter_end_mm, piece.inner_diameter_end_mm)
+    outer_end, inner_end = (None if end is None else 1e-3 * end for end in ends)
+    return Tube(
+        start=start,
+        length=1e-3 * piece.length_mm,
+        outer=1e-3 * piece.outer_diameter_mm,
+        inner=1e-3 * piece.inner_diameter_mm,
+        density=density,
+        outer_end=outer_end,
+        inner_end=inner_end,
+    )
+
+
+def gear_tube(gear: GearSection, z: float, shaft: Sequence[Tube]) -> Tube:
+    """Body of a gear in the middle of its face at z (m) on a shaft: a tube up to its reference circle."""
+    reference = 1e-3 * gear.teeth * gear.normal_module_mm / math.cos(math.radians(gear.helix_angle_deg))
+    width, held = 1e-3 * gear.face_width_mm, 1e-3 * gear.held_diameter_mm
+    under = [one.outer for one in shaft if one.start < z + 0.5 * width and one.start + one.length > z - 0.5 * width]
+    inner, outer = (reference, held) if gear.internal else (min(max([held, *under]), reference), reference)
+    density = gear.material.density_kg_per_m3
+    return Tube(start=z - 0.5 * width, length=width, outer=outer, inner=inner, density=density)
 
 
 def _axis(origin: Origin, family: str, angle: float) -> tuple[float, float]:

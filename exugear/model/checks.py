@@ -8,6 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -30,23 +31,49 @@ LARGEST_MATRICES = 2e9
 """Largest memory of all matrices of the elements together, bytes: each is over the coordinates of all bodies."""
 
 
-def check(stages: Iterable[Iterable[Callable[[], object]]]) -> None:
-    """Run checks in stages; each stage needs those before it.
+@dataclass(frozen=True)
+class Check:
+    """One check of a gearbox.
+
+    Attributes
+    ----------
+    name : str
+    run : callable
+        Raises `CaseError` where something is wrong.
+    needs : tuple of str
+        Checks without which this one makes no sense.
+    """
+
+    name: str
+    run: Callable[[], object]
+    needs: tuple[str, ...] = ()
+
+
+def check(checks: Iterable[Check]) -> None:
+    """Run all checks in their order but those that need one which failed, or which could not be run.
 
     Raises
     ------
     CaseError
-        All faults of the first stage that has any.
+        All faults that are found.
+
+    Examples
+    --------
+    >>> check([Check("gears", lambda: None), Check("pairs", lambda: None, ("gears",))])
     """
-    for stage in stages:
-        faults: list[str] = []
-        for step in stage:
-            try:
-                step()
-            except CaseError as error:
-                faults += error.faults
-        if faults:
-            raise CaseError(*faults)
+    faults: list[str] = []
+    failed: set[str] = set()
+    for one in checks:
+        if failed & set(one.needs):
+            failed.add(one.name)
+            continue
+        try:
+            one.run()
+        except CaseError as error:
+            faults += error.faults
+            failed.add(one.name)
+    if faults:
+        raise CaseError(*faults)
 
 
 def faults_of_bodies(case: CaseFile) -> Iterator[str]:

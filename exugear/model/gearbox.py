@@ -7,7 +7,7 @@ numbered from 1 (`planet_1`, `sun_planet_1`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -34,6 +34,11 @@ from exugear.train.train import Train
 from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.tools.notebook import html_table
+
+BESIDE_EQUATIONS = ("labels", "load_cases", "loads", "operation", "rating", "report", "ste")
+"""Tables of the file that change nothing in the equations: words and speeds for pages, what acts over a life, how parts
+are rated, settings of reports and of tables, whose content goes into hashes by itself, and load cases: a run adds its
+own."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +99,7 @@ class Gearbox:
             Anything wrong with the content, as in :meth:`from_toml`.
         """
         gearbox = cls(parse_case(dict(content), source), source, content, permissions)
-        checks.check(_stages(gearbox))
+        checks.check(_checks_of(gearbox))
         return gearbox
 
     def varied(self, changes: Mapping[str, Any]) -> Gearbox:
@@ -151,6 +156,11 @@ class Gearbox:
         return self.case.ste
 
     @property
+    def computed_content(self) -> dict[str, Any]:
+        """What was read from the file less `BESIDE_EQUATIONS`: what the equations depend on."""
+        return {key: value for key, value in self.content.items() if key not in BESIDE_EQUATIONS}
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """What is possible and unusual about the file, a line each."""
         lines = [f"{key} = {value:g}: {warning}" for key, value, warning in unusual_values(self.case)]
@@ -159,6 +169,11 @@ class Gearbox:
             if torsion and bearing.body in self.spinning and bearing.on not in self.spinning:
                 key = f"bearings.{bearing.family}.stiffness"
                 lines.append(f"{key}: torsion {torsion:g} N m/rad holds {bearing.body} back, which turns")
+        lines += gear_parts.margins_of_roots(self.gear_pairs.values())
+        for name, gear in self.gears.items():
+            if gear.is_undercut:
+                start = 2e3 * gear.form_radius
+                lines.append(f"gears.{name}: undercut by its rack; its flank begins at a diameter of {start:.3f} mm")
         return tuple(dict.fromkeys(lines))
 
     def __repr__(self) -> str:
@@ -359,48 +374,81 @@ class Gearbox:
         return distances
 
 
-def _stages(gearbox: Gearbox) -> tuple[tuple[Callable[[], object], ...], ...]:
-    """List what is checked together, in stages; building parts checks their sections."""
+def _checks_of(gearbox: Gearbox) -> tuple[checks.Check, ...]:
+    """List all checks, each after those it needs; building parts checks their sections."""
+    return (*_checks_of_parts(gearbox), *_checks_of_the_whole(gearbox))
+
+
+def _checks_of_parts(gearbox: Gearbox) -> Iterator[checks.Check]:
     case, refuse = gearbox.case, partial(_refuse, gearbox)
-    return (
-        (
-            lambda: refuse(checks.faults_of_bodies(case)),
-            lambda: refuse(checks.faults_of_mass_properties(case)),
-            lambda: gearbox.gears,
-        ),
-        (lambda: _check_inertia_sets(gearbox), lambda: gearbox.modifications, lambda: gearbox.gear_pairs),
-        (
-            lambda: refuse(checks.faults_of_overall(case.overall, gearbox.spinning, gearbox.gears)),
-            lambda: gearbox.bearings,
-            lambda: gearbox.meshes,
-        ),
-        (
-            lambda: gearbox.joints,
-            lambda: gearbox.mounts,
-            lambda: gearbox.couplings,
-            lambda: gearbox.load_cases,
-            lambda: gearbox.deviations,
-            lambda: gearbox.pin_offsets,
-            lambda: gearbox.stated_stiffness,
-            lambda: refuse(checks.faults_of_centre_distances(gearbox.meshes, gearbox.named_bodies)),
-            lambda: refuse(checks.faults_of_planets(case, gearbox.bodies(), gearbox.gears, gearbox.meshes)),
-        ),
-        (
-            lambda: refuse(checks.faults_of_size(len(gearbox.bodies()), sum(map(len, _elements(gearbox).values())))),
-            lambda: refuse(checks.faults_of_connection(case, gearbox.bodies(), gearbox.meshes, gearbox.couplings)),
-            lambda: refuse(checks.faults_of_torsion(gearbox.spinning, gearbox.couplings, gearbox.bearings)),
-            lambda: refuse(checks.faults_of_supports(case)),
-            lambda: refuse(checks.faults_of_names(_elements(gearbox))),
-            lambda: refuse(checks.faults_of_joints(gearbox.joints, gearbox.named_bodies)),
-            lambda: refuse(checks.faults_of_repetition(case, gearbox.deviations, gearbox.pin_offsets)),
-        ),
-        (
-            lambda: refuse(
-                checks.faults_of_output_gear(case.overall, gearbox.gears, gearbox.bodies(), gearbox.couplings)
-            ),
-            lambda: _check_train(gearbox),
-        ),
+    yield checks.Check("bodies", lambda: refuse(checks.faults_of_bodies(case)))
+    yield checks.Check("masses", lambda: refuse(checks.faults_of_mass_properties(case)))
+    yield checks.Check("gears", lambda: gearbox.gears)
+    yield checks.Check("stiffness", lambda: gearbox.stated_stiffness)
+    yield checks.Check("supports", lambda: refuse(checks.faults_of_supports(case)))
+    yield checks.Check("places", lambda: _check_inertia_sets(gearbox), ("bodies", "masses"))
+    yield checks.Check("modifications", lambda: gearbox.modifications, ("gears",))
+    yield checks.Check("pairs", lambda: gearbox.gear_pairs, ("gears",))
+    yield checks.Check(
+        "ends", lambda: refuse(checks.faults_of_overall(case.overall, gearbox.spinning, case.gears)), ("places",)
     )
+    for name, part in (
+        ("bearings", lambda: gearbox.bearings),
+        ("joints", lambda: gearbox.joints),
+        ("mounts", lambda: gearbox.mounts),
+        ("load cases", lambda: gearbox.load_cases),
+        ("pins", lambda: gearbox.pin_offsets),
+    ):
+        yield checks.Check(name, part, ("places",))
+    yield checks.Check("meshes", lambda: gearbox.meshes, ("places", "pairs"))
+    yield checks.Check("couplings", lambda: gearbox.couplings, ("bearings",))
+    yield checks.Check("deviations", lambda: gearbox.deviations, ("places", "gears"))
+
+
+def _checks_of_the_whole(gearbox: Gearbox) -> Iterator[checks.Check]:
+    case = gearbox.case
+    elements = ("meshes", "bearings", "mounts", "couplings")
+    for name, faults, needs in (
+        ("distances", lambda: checks.faults_of_centre_distances(gearbox.meshes, gearbox.named_bodies), ("meshes",)),
+        (
+            "planets",
+            lambda: checks.faults_of_planets(case, gearbox.bodies(), gearbox.gears, gearbox.meshes),
+            ("meshes",),
+        ),
+        (
+            "size",
+            lambda: checks.faults_of_size(len(gearbox.bodies()), sum(map(len, _elements(gearbox).values()))),
+            elements,
+        ),
+        (
+            "connection",
+            lambda: checks.faults_of_connection(case, gearbox.bodies(), gearbox.meshes, gearbox.couplings),
+            ("ends", "meshes", "couplings"),
+        ),
+        (
+            "torsion",
+            lambda: checks.faults_of_torsion(gearbox.spinning, gearbox.couplings, gearbox.bearings),
+            ("couplings", "supports"),
+        ),
+        ("names", lambda: checks.faults_of_names(_elements(gearbox)), elements),
+        ("axes", lambda: checks.faults_of_joints(gearbox.joints, gearbox.named_bodies), ("joints",)),
+        (
+            "repetition",
+            lambda: checks.faults_of_repetition(case, gearbox.deviations, gearbox.pin_offsets),
+            ("deviations", "pins"),
+        ),
+        (
+            "output",
+            lambda: checks.faults_of_output_gear(case.overall, gearbox.gears, gearbox.bodies(), gearbox.couplings),
+            ("ends", "gears", "couplings"),
+        ),
+    ):
+        yield checks.Check(name, partial(_refuse_found, gearbox, faults), needs)
+    yield checks.Check("train", lambda: _check_train(gearbox), ("connection", "size", "load cases"))
+
+
+def _refuse_found(gearbox: Gearbox, find: Callable[[], Iterable[str]]) -> None:
+    _refuse(gearbox, find())
 
 
 def _refuse(gearbox: Gearbox, faults: Iterable[str]) -> None:

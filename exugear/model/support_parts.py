@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from exugear.model.origin import Origin, parts_of_each
 from exugear.model.parts import Bearing, Body, Coupling, Joint
@@ -12,6 +12,8 @@ from exugear.model.sections.entries import GROUND
 
 def joints(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Joint, ...]:
     """Ideal joints of the variant `rigid`, one for each planet of a set.
+
+    A file without any gets one for each body that turns: in the middle of its bearings, or else of its gears.
 
     Raises
     ------
@@ -30,7 +32,16 @@ def joints(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Joint, ...]:
             for suffix, body, on in origin.instances(key, section.body, section.on)
         )
 
-    return parts_of_each(of_section, origin.case.joints)
+    return parts_of_each(of_section, origin.case.joints or dict(_usual_joints(origin)))
+
+
+def _usual_joints(origin: Origin) -> Iterator[tuple[str, JointSection]]:
+    for name, section in origin.enabled.items():
+        held = [one.z_mm for one in origin.case.bearings.values() if one.body == name]
+        places = held or list(section.wheels_z_mm.values())
+        if places and not section.fixed and not section.spin_only:
+            place = sum(places) / len(places)
+            yield name, JointSection.model_construct(body=name, on=section.carrier or GROUND, z_mm=place)
 
 
 def bearings(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Bearing, ...]:

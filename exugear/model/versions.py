@@ -13,6 +13,8 @@ REDUCTION = 1
 MODES = 2
 #: Runs in time (`exugear.runs`, both solvers, the laws, signals and filters).
 RUN = 3
+#: Life of gears and bearings (`exugear.life`, and the root stress of `fe_ste.root_stress`).
+LIFE = 1
 #: Steady responses (`exugear.steady`, and all that modes rest on).
 STEADY = 3
 #: Points of studies (`exugear.studies`: their figures; what these rest on has its own version).

@@ -10,14 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from exugear.model.parts import RPM
 from exugear.spectra.orders import OrderLine
 from exugear.spectra.resonances import Pick
-from exugear.spectra.waterfall import Waterfall, line_level
+from exugear.spectra.waterfall import Waterfall
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.drawing import COLOURS, drawing_style, finish_figure, new_figure
+from fe_ste.tools.drawing import drawing_style, finish_figure, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -161,57 +160,3 @@ def _draw_marks(panel: Axes, picks: Sequence[Pick]) -> None:
         panel.annotate(
             str(number), (speed, frequency), (6, 6), textcoords="offset points", fontsize=8, color=MARK_COLOUR
         )
-
-
-def plot_order_levels(
-    runs: Mapping[str, Waterfall],
-    lines: Iterable[OrderLine],
-    path: str | Path | None = None,
-    *,
-    marks: Mapping[str, Sequence[Pick]] | None = None,
-    eigenfrequencies: ArrayLike = (),
-) -> Figure:
-    """Draw the levels along order lines over frequency, one panel a line, all runs in it.
-
-    Parameters
-    ----------
-    runs : mapping of str to Waterfall
-        Name in the legend and spectra.
-    lines : iterable of OrderLine
-        One panel each.
-    path : path-like, optional
-        Where to write the picture.
-    marks : mapping of str to sequence of Pick, optional
-        Peaks of a run to mark on its curve.
-    eigenfrequencies : array_like, shape (n,)
-        Hz, as thin vertical lines.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
-    order_lines = tuple(lines)
-    if not order_lines or not runs:
-        raise ValueError("plot_order_levels: at least one line and one run are needed")
-    reference = next(iter(runs.values())).reference_text  # one for all
-    with drawing_style():
-        figure = new_figure(7.2, 2.1 * len(order_lines) + 0.4)
-        panels = figure.subplots(len(order_lines), 1, squeeze=False)[:, 0]
-        for panel, line in zip(panels, order_lines, strict=True):
-            for (name, run), colour in zip(runs.items(), COLOURS, strict=False):
-                panel.plot(1e-3 * line.frequency(run.speed), line_level(run, line), color=colour, label=name)
-                for pick in (marks or {}).get(name, ()):
-                    if pick.line == line:
-                        panel.plot(1e-3 * pick.frequency, pick.level, "v", color=colour, markersize=6)
-            left, right = panel.get_xlim()
-            inside = [value for value in 1e-3 * np.asarray(eigenfrequencies, dtype=np.float64) if left < value < right]
-            for value in inside:
-                panel.axvline(value, color="#999999", linewidth=0.6, zorder=0)
-            panel.set_title(f"order {line.order:g}: {line.name}", loc="left")
-            panel.set_ylabel("Level / dB")
-            panel.margins(x=0.0)
-            low, high = panel.get_ylim()
-            panel.set_ylim(min(low, high - 20.0), high)
-        panels[0].legend(loc="best", ncols=len(runs))
-        panels[-1].set_xlabel(f"Frequency on the order / kHz; 0 dB = {reference}")
-        return finish_figure(figure, path)

@@ -1,38 +1,54 @@
-"""The report of a results folder: one web page with its pictures, tables, assumptions, hashes and times.
+"""The report of a results folder: one web page that needs nothing else.
 
-`SECTIONS` is the order of the page; a section is a function of the `Context` and the `StoredResults`.
+`SECTIONS` is the order of the page; a section is a function of the `Material` that gives its `Part`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
+from exugear.findings.context import Context
+from exugear.findings.groups import run_groups
+from exugear.findings.stored import stored_results
+from exugear.findings.variations import model_variations
+from exugear.findings.words import Words
 from exugear.model.named_files import Permissions
-from exugear.report import page
-from exugear.report.bearings import bearings_section
-from exugear.report.context import Context
-from exugear.report.inputs import assumptions_section, provenance_section, times_section
-from exugear.report.modes import modes_section
-from exugear.report.runs import runs_section
-from exugear.report.steady import steady_section
-from exugear.report.stored import StoredResults, stored_results
-from exugear.report.tables import tables_section
+from exugear.report.parts.material import Material, Part, lines_of
+from exugear.report.parts.run_data import run_data
+from exugear.report.sections.bearings import bearings_section
+from exugear.report.sections.change import change_section
+from exugear.report.sections.gears import gears_section
+from exugear.report.sections.modes import modes_section
+from exugear.report.sections.near import near_section
+from exugear.report.sections.ranking import ranking_section
+from exugear.report.sections.rings import rings_section
+from exugear.report.sections.short import short_section
+from exugear.report.sections.steady import steady_section
+from exugear.report.sections.trust import trust_section
+from exugear.report.shell import page_body
 from exugear.results.folder import REPORT_FILE, kept_case
+from exugear.web.arrays import ArrayStore
+from exugear.web.document import whole_page
 from fe_ste.tools.files import write_file
 
-SECTIONS: Final[tuple[Callable[[Context, StoredResults], str], ...]] = (
-    runs_section,
+SECTIONS: Final[tuple[Callable[[Material], Part], ...]] = (
+    short_section,
+    rings_section,
+    ranking_section,
+    change_section,
+    bearings_section,
     steady_section,
     modes_section,
-    bearings_section,
-    tables_section,
-    times_section,
-    provenance_section,
+    near_section,
+    gears_section,
+    trust_section,
 )
-"""Sections below the head of the page, in their order; each gives its part of the page, or nothing."""
+"""Sections of the page in their order. A new one is a function in ``sections`` and a line here."""
+LIBRARIES: Final = ("uPlot.iife.min.js", "three.min.js")
+"""Vendored libraries that the page needs."""
 
 
 class ReportError(ValueError):
@@ -50,14 +66,12 @@ class Report:
     statements : tuple of str
         What it says in short.
     left_out : tuple of str
-        Files that do not belong to the case, and pictures that could not be made, with the reason.
-    pictures : tuple of Path
+        Files that do not belong to the case, and what could not be computed, with the reason.
     """
 
     path: Path
     statements: tuple[str, ...]
     left_out: tuple[str, ...]
-    pictures: tuple[Path, ...]
 
 
 def write_report(
@@ -66,14 +80,14 @@ def write_report(
     tell: Callable[[str], None] | None = None,
     files_below: Path | None = None,
 ) -> Report:
-    """Write ``report.html`` from what a results folder holds: tables, runs, modes, pictures.
+    """Write ``report.html`` from what a results folder holds: tables, runs, modes, steady responses.
 
     Parameters
     ----------
     folder : path
-        What ``exugear ste``, ``run`` and ``modes`` wrote into.
+        What ``exugear ste``, ``run``, ``modes`` and ``steady`` wrote into.
     target : float, optional
-        Frequency to look for modes at, Hz; the case's reference frequency by default. Without either, modes are listed.
+        Frequency to look for modes at, Hz; the case's reference frequency by default.
     tell : callable, optional
         Called with what is being done.
     files_below : Path, optional
@@ -95,29 +109,49 @@ def write_report(
     gearbox = kept_case(folder, Permissions(below=files_below))
     reference = gearbox.case.report.reference_frequency_Hz if target is None else target
     context = Context(folder, gearbox, reference, tell or (lambda what: None))
+    material = _material(context)
+    parts = [section(material) for section in SECTIONS]
+    # The body comes last: sections note what its head tells.
+    body = page_body(material, parts)
+    data = {**_head_data(material), **_merged(parts)}
+    title = f"{gearbox.name}: where it rings, how loud, and why"
+    path = folder / REPORT_FILE
+    page = whole_page(title, body, "report", data, material.arrays, LIBRARIES)
+    write_file(path, page.encode("utf-8", "replace"))
+    return Report(path, tuple(context.notes.statements), tuple(context.notes.left_out))
+
+
+def _material(context: Context) -> Material:
     results = stored_results(context)
     if not results:
-        raise ReportError(
-            "\n".join([f"{folder}: nothing here belongs to its case", *(context.notes.left_out or ["no files"])])
-        )
-    sections = [section(context, results) for section in SECTIONS]
-    # The head comes last: sections note what it tells.
-    title = f"{gearbox.name}: transmission error and dynamics"
-    path = folder / REPORT_FILE
-    write_file(path, page.whole(title, _head(context), *sections).encode("utf-8"))
-    notes = context.notes
-    return Report(path, tuple(notes.statements), tuple(notes.left_out), tuple(notes.pictures))
+        reasons = context.notes.left_out or ["no files"]
+        raise ReportError("\n".join([f"{context.folder}: nothing here belongs to its case", *reasons]))
+    groups = run_groups(context, results)
+    variations = model_variations(context, results.modes)
+    words = Words(context.gearbox)
+    material = Material(context, results, words, groups, variations, lines_of(context), ArrayStore())
+    return replace(material, run_data=run_data(material))
 
 
-def _head(context: Context) -> str:
-    """Gather what stands above the sections: warnings, the report in short, what is left out, assumptions."""
-    gearbox, notes = context.gearbox, context.notes
-    warning = "Runs that are not to be trusted; what follows shows them all the same"
-    parts = [
-        page.alert(warning, notes.distrusted) if notes.distrusted else "",
-        page.paragraph(f"Ratio {gearbox.train.ratio:.6f}; case {gearbox.source}."),
-        page.section("In short", page.bullets(notes.statements)),
-        page.section("Left out", page.bullets(notes.left_out)) if notes.left_out else "",
-        assumptions_section(context),
-    ]
-    return "".join(parts)
+def _head_data(material: Material) -> dict[str, Any]:
+    gearbox = material.context.gearbox
+    return {
+        "name": gearbox.name,
+        "input": material.input_words,
+        "rated": gearbox.case.operation.rated_speed_rpm,
+        "lines": [],
+        "groups": [],
+        "models": {},
+    }
+
+
+def _merged(parts: list[Part]) -> Mapping[str, Any]:
+    """Put the data of all sections together, their figures under ``charts``."""
+    merged: dict[str, Any] = {"charts": {}}
+    for part in parts:
+        for key, value in part.data.items():
+            if key == "charts":
+                merged["charts"].update(value)
+            else:
+                merged[key] = value
+    return merged

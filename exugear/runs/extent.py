@@ -6,7 +6,7 @@ import math
 import shutil
 from pathlib import Path
 
-from exugear.dynamics.signals import SignalLayout, signals_of
+from exugear.dynamics.signals import AXES, SignalLayout, signals_of
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import LoadCase
 from exugear.model.reading import CaseError
@@ -86,7 +86,7 @@ def sample_bytes(meshes: int, supports: int, tabled: bool) -> int:
     >>> sample_bytes(meshes=8, supports=12, tabled=False)
     240
     """
-    names = {"mesh": ("",) * meshes, "support": ("",) * supports}
+    names = {"mesh": ("",) * meshes, "support": ("",) * supports, "axis": AXES}
     return SignalLayout(signals_of(tabled), names, radius=1.0).sample_bytes
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.fingerprint import input_hash
+from exugear.dynamics.signals import bodies_of_forces
 from exugear.model.parts import LoadCase
 from exugear.model.versions import RUN
 from exugear.results.decimation import Decimator
@@ -105,6 +106,7 @@ class RunPlan:
             "ratio": gearbox.train.ratio,
             "output_base_radius": gearbox.output_radius,
             "highest_order": max(gearbox.train.mesh_frequencies(2.0 * math.pi).values(), default=1.0),
+            **bodies_of_forces(assembly),
             "step": self.step,
             "band": self.band,
             "fastest_eigenvalue": self.integration.fastest_rate,

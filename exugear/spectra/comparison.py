@@ -108,13 +108,18 @@ class Comparison:
 
     @cached_property
     def only_first(self) -> tuple[Finding, ...]:
-        """Resonances of the first run whose peaks the second does not show."""
-        return self.first.findings(only_in_first(self.first.picks, self.second.spectra, self.rule))
+        """Resonances of the first run whose loudest peaks the second does not show."""
+        return self._lacking(self.first, self.second)
 
     @cached_property
     def only_second(self) -> tuple[Finding, ...]:
-        """Resonances of the second run whose peaks the first does not show."""
-        return self.second.findings(only_in_first(self.second.picks, self.first.spectra, self.rule))
+        """Resonances of the second run whose loudest peaks the first does not show."""
+        return self._lacking(self.second, self.first)
+
+    def _lacking(self, run: VariantRun, other: VariantRun) -> tuple[Finding, ...]:
+        # A weak order may be absent where the loudest is not: what is told of a resonance is told of its loudest peak.
+        absent = set(only_in_first((own.strongest for own in run.findings()), other.spectra, self.rule))
+        return tuple(finding for finding in run.findings() if finding.strongest in absent)
 
     @property
     def runs(self) -> tuple[VariantRun, VariantRun]:

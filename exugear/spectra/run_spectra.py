@@ -25,6 +25,7 @@ from exugear.spectra.resonances import (
 )
 from exugear.spectra.spectrum import sweep_matched_window
 from exugear.spectra.waterfall import Waterfall, waterfall
+from fe_ste.tools.arrays import Floats
 from fe_ste.tools.notebook import html_table
 
 LEAST_SHARE = 1e-5
@@ -32,8 +33,71 @@ LEAST_SHARE = 1e-5
 
 LONGEST_WINDOW = 0.25
 """Part of a run that a window has at most: one whose speed hardly changes would want a longer one than the run."""
-WATERFALL_NAMES = ("time", "input_speed", "overall_dte")
-"""Variables of a run that its waterfall is made of."""
+_NAMES = ("time", "input_speed", "overall_dte")
+
+
+@dataclass(frozen=True)
+class RunSignals:
+    """What the waterfall of a run-up is made of.
+
+    Attributes
+    ----------
+    path : Path
+    attributes : mapping
+        What was run.
+    rate : float
+        Samples per second.
+    span : float
+        Simulated time, s.
+    speed, overall : (n,) arrays
+        Speed of the overall input, rad/s; overall transmission error, m.
+    """
+
+    path: Path
+    attributes: Mapping[str, Any]
+    rate: float
+    span: float
+    speed: Floats
+    overall: Floats
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"RunSignals({self.overall.size} samples at {self.rate:.6g} Hz)"
+
+    @property
+    def suitable_window(self) -> float:
+        """Length of the window (s) that suits the fastest first-order sweep.
+
+        Raises
+        ------
+        ValueError
+            The speed does not change, so that nothing says how long a window should be.
+        """
+        sweep = float(self.attributes["highest_order"]) * float(np.ptp(self.speed)) / (2.0 * math.pi * self.span)
+        return min(sweep_matched_window(sweep), LONGEST_WINDOW * self.span)
+
+    def waterfall(self, window_length: float | None = None) -> Waterfall:
+        """Waterfall of the overall transmission error with a window (s), the suitable one by default."""
+        length = self.suitable_window if window_length is None else window_length
+        return waterfall(self.overall, self.speed, self.rate, window_length=length)
+
+
+def run_signals(path: str | Path) -> RunSignals:
+    """Read what the waterfall of a run-up is made of.
+
+    Raises
+    ------
+    ValueError
+        The run is too short.
+    FileError
+        The run is missing or damaged.
+    """
+    data = load_run(path, _NAMES)
+    time, speed, overall = (data[name].to_numpy() for name in _NAMES)
+    if time.size < 2:
+        raise ValueError(f"{path}: holds {time.size} samples, too few for a spectrum; run for longer")
+    span = float(np.ptp(time))
+    return RunSignals(Path(path), data.attrs, (time.size - 1) / span, span, speed, overall)
 
 
 def run_waterfall(path: str | Path, window_length: float | None = None) -> Waterfall:
@@ -53,21 +117,7 @@ def run_waterfall(path: str | Path, window_length: float | None = None) -> Water
     FileError
         The run is missing or damaged.
     """
-    return _waterfall_of(load_run(path, WATERFALL_NAMES), path, window_length)
-
-
-def _waterfall_of(data: xr.Dataset, path: str | Path, window_length: float | None) -> Waterfall:
-    time = data["time"].to_numpy()
-    speed = data["input_speed"].to_numpy()
-    values = data["overall_dte"].to_numpy()
-    highest_order = float(data.attrs["highest_order"])
-    if time.size < 2:
-        raise ValueError(f"{path}: holds {time.size} samples, too few for a spectrum; run for longer")
-    if window_length is None:
-        sweep = highest_order * abs(np.ptp(speed)) / (2.0 * math.pi * np.ptp(time))
-        window_length = min(sweep_matched_window(sweep), LONGEST_WINDOW * float(np.ptp(time)))
-    rate = (time.size - 1) / float(np.ptp(time))
-    return waterfall(values, speed, rate, window_length=window_length)
+    return run_signals(path).waterfall(window_length)
 
 
 @dataclass(frozen=True)
@@ -184,6 +234,15 @@ def read_run(
     FileError
         The run is missing or damaged.
     """
-    data = load_run(path, WATERFALL_NAMES)
-    spectra = _waterfall_of(data, path, window_length)
-    return VariantRun(Path(path), data.attrs, spectra, pick_resonances(spectra, lines), modes)
+    return analysed(run_signals(path), lines, modes, window_length)
+
+
+def analysed(
+    signals: RunSignals,
+    lines: Sequence[OrderLine],
+    modes: xr.Dataset | None = None,
+    window_length: float | None = None,
+) -> VariantRun:
+    """Compute the waterfall of a run-up that was read, and pick its resonances; arguments as in `read_run`."""
+    spectra = signals.waterfall(window_length)
+    return VariantRun(signals.path, signals.attributes, spectra, pick_resonances(spectra, lines), modes)

@@ -101,7 +101,9 @@ class Waterfall:
 
         The wider of one over the window's length and what the sweep of that order allows.
         """
-        rate = np.gradient(line.frequency(self.speed), self.time)
+        frequency = line.frequency(self.speed)
+        # One frame alone tells of no sweep.
+        rate = np.gradient(frequency, self.time) if self.time.size > 1 else np.zeros(1)
         resolution: Floats = np.maximum(sweep_limited_resolution(rate), 1.0 / self.window_length)
         return resolution
 
@@ -122,7 +124,8 @@ def waterfall(
     Parameters
     ----------
     values, speed : array_like, shape (n,)
-        Signal and speed of the reference shaft (rad/s), uniformly sampled from time zero on.
+        Signal and speed of the reference shaft (rad/s), uniformly sampled from time zero on. A signal in single
+        precision is analysed so.
     rate : float
         Sampling rate, Hz.
     window_length : float
@@ -153,7 +156,7 @@ def waterfall(
     >>> float(run.frequency[np.argmax(run.amplitude[0])]), round(float(run.amplitude.max()), 6)
     (300.0, 1.0)
     """
-    signal, shaft = np.asarray(values, dtype=np.float64), np.asarray(speed, dtype=np.float64)
+    signal, shaft = np.asarray(values), np.asarray(speed, dtype=np.float64)
     length = round(window_length * rate)
     if signal.shape != shaft.shape or signal.ndim != 1:
         raise ValueError(f"values {signal.shape} and speed {shaft.shape} must be two rows of equal length")

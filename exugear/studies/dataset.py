@@ -59,7 +59,7 @@ def dataset_of(study: Study, records: Mapping[str, Record]) -> xr.Dataset:
             labels[own] = list(dict.fromkeys([*labels.get(own, []), *told]))
     for name, kept in study.figures.items():
         own = kept.figure.dimension
-        attributes = {"units": kept.figure.units, "long_name": kept.figure.description}
+        attributes = {"units": kept.units, "long_name": kept.figure.description}
         attributes["options"] = json.dumps(dict(kept.options))
         if own:
             values = _filled((*sizes, len(labels[own])), done, lambda record, n=name, d=own: _row(record, n, labels[d]))
@@ -144,7 +144,7 @@ def with_slopes(dataset: xr.Dataset, study: Study) -> xr.Dataset:
         below, above = (dataset[name].isel({SIDE: side}) for side in (0, 1))
         slope = (above - below) / (2.0 * dataset["step"])
         slope = slope.transpose(PARAMETER, ...)
-        slope.attrs = {"units": f"{kept.figure.units} per unit of the parameter", "long_name": f"slope of {name}"}
+        slope.attrs = {"units": f"{kept.units} per unit of the parameter", "long_name": f"slope of {name}"}
         added[f"{_LOCAL}{name}"] = slope
     return dataset.assign(added)
 

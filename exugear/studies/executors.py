@@ -5,11 +5,13 @@ from __future__ import annotations
 import importlib
 import math
 import statistics
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError, Future
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass
-from typing import Any, Protocol
+from types import TracebackType
+from typing import Any, Protocol, Self
 
 from exugear.studies.batches import Task, Work
 from exugear.studies.journal import Record
@@ -133,6 +135,44 @@ def given(executor: Submits, workers: int | None = None) -> Opens:
         yield Pool(executor, available_cores() if workers is None else workers)
 
     return opened
+
+
+class Kept:
+    """Workers that stay for several calls, and are started anew only after they were lost.
+
+    Parameters
+    ----------
+    opens : callable
+        Starts workers.
+    """
+
+    def __init__(self, opens: Opens) -> None:
+        self._opens = opens
+        self._stack = ExitStack()
+        self._pool: Pool | None = None
+
+    @contextmanager
+    def opened(self) -> Iterator[Pool]:
+        """Lend the workers; an error of those who have them sends them away."""
+        if self._pool is None:
+            self._pool = self._stack.enter_context(self._opens())
+        try:
+            yield self._pool
+        except BaseException:
+            self._pool = None
+            if not self._stack.__exit__(*sys.exc_info()):
+                raise
+
+    def __enter__(self) -> Self:
+        """Begin without workers."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Let the workers go."""
+        self._pool = None
+        self._stack.close()
 
 
 def lost_worker(error: BaseException) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
+from contextlib import suppress
 
 from exugear.studies.batches import Task, Work, compute_batch
 from exugear.studies.executors import Opens, Pace, Pool, lost_worker
@@ -37,7 +38,13 @@ class _Running:
                 self.tell(record)
 
     def work(self, pool: Pool) -> None:
-        """Work until nothing is left, or until the pool has lost its workers."""
+        """Work until nothing is left.
+
+        Raises
+        ------
+        BrokenExecutor
+            The pool has lost its workers; their points wait again.
+        """
         at_work: dict[Future[list[Record]], list[Work]] = {}
         try:
             while self.waiting or self.alone or at_work:
@@ -48,6 +55,7 @@ class _Running:
                     del at_work[future]
         except BrokenExecutor:
             self.again([work for batch in at_work.values() for work in batch])
+            raise
 
     def _send(self, pool: Pool, at_work: dict[Future[list[Record]], list[Work]]) -> None:
         ahead = BATCHES_A_WORKER * pool.workers
@@ -123,7 +131,7 @@ def compute_points(task: Task, points: Iterable[Work], opens: Opens, tell: Tell)
     """
     running = _Running(task, points, tell)
     while running.waiting or running.alone:
-        with opens() as pool:
+        with suppress(BrokenExecutor), opens() as pool:
             running.work(pool)
     seen = read_journals(task.folder, running.found)
     _note_here(task, [record for point, record in running.found.items() if point not in seen])

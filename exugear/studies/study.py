@@ -26,6 +26,8 @@ from exugear.studies.figures.point_results import PointSettings
 from exugear.studies.figures.registry import FIGURES, KeptFigure, kept_figures
 from fe_ste.tools.versions import TABLE
 
+UNREAD = ("name", "report", "loads")
+"""Sections of a case that no figure reads: changing them costs no points."""
 TRIED_VALUES = 200
 """Most values of a list that are tried before the work begins."""
 
@@ -135,7 +137,7 @@ class Study:
         """SHA-256 of all that every point depends on: the case with its files, choices, figures, versions."""
         content = {
             "versions": [STUDY, TABLE, REDUCTION, MODES, RUN, STEADY],
-            "case": self.gearbox.content,
+            "case": {key: value for key, value in self.gearbox.content.items() if key not in UNREAD},
             "files": self._digests(self.gearbox.content),
             "choice": [self.choice.variant, self.choice.mesh_law, self.choice.inertias, self.choice.load_case],
             "settings": [repr(self.settings.steady), self.settings.duration, self.settings.solver],

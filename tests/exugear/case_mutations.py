@@ -35,7 +35,7 @@ JUNK: tuple[Any, ...] = (
 def bases(folder: Path) -> dict[str, dict[str, Any]]:
     """Cases to start from, whose files are written into `folder`: all verbs' inputs occur in one of them."""
     for file in GRC.iterdir():
-        if file.suffix not in (".toml", ".py", ".md"):
+        if file.is_file() and file.suffix not in (".toml", ".py", ".md"):
             shutil.copy(file, folder)
     (folder / "plate.vtu").write_text("never read by check", encoding="utf-8")
     (folder / "series.csv").write_text("time_s,shaft_1_N_m\n0.0,100.0\n1.0,120.0\n", encoding="utf-8")

@@ -14,8 +14,10 @@ from exugear.bodies.solids import SolidModel
 from exugear.bodies.turned_shaft import ShaftModel
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Body
-from exugear.model.sections.bodies import ShapeSection
+from exugear.model.sections.bodies import ShaftSectionSection, ShapeSection
 
+CONE_STEPS = 8
+"""Cylinders that stand for a cone."""
 TORQUE_SEAT = "torque"
 """Name of the seat where torques and couplings act."""
 SOLID_SIZE = MeshSize(0.05, 0.05, 1)
@@ -48,10 +50,7 @@ def shaft_model(gearbox: Gearbox, name: str) -> ShaftModel:
         raise gearbox.fault(f"{key}.blanks.{unknown}: no such seat; seats are {', '.join(names)}")
     return ShaftModel(
         name=name,
-        sections=tuple(
-            ShaftSection(s.length_mm * 1e-3, s.outer_diameter_mm * 1e-3, s.inner_diameter_mm * 1e-3)
-            for s in shape.sections
-        ),
+        sections=tuple(cylinder for section in shape.sections for cylinder in cylinders_of(section)),
         material=material_of(shape.material),
         origin=(*body.axis, start),
         seats=seats,
@@ -59,6 +58,19 @@ def shaft_model(gearbox: Gearbox, name: str) -> ShaftModel:
         band=gearbox.case.elasticity.band_Hz,
         limit=gearbox.case.elasticity.limit_Hz,
     )
+
+
+def cylinders_of(section: ShaftSectionSection) -> Iterator[ShaftSection]:
+    """Cylinders of a piece of a shaft; those of a cone have its mean diameters."""
+    ends = (section.outer_diameter_end_mm, section.inner_diameter_end_mm)
+    starts = (section.outer_diameter_mm, section.inner_diameter_mm)
+    count = CONE_STEPS if any(end is not None for end in ends) else 1
+    for step in range(count):
+        share = (step + 0.5) / count
+        outer, inner = (
+            start if end is None else start + share * (end - start) for start, end in zip(starts, ends, strict=True)
+        )
+        yield ShaftSection(1e-3 * section.length_mm / count, 1e-3 * outer, 1e-3 * inner)
 
 
 def _seats(gearbox: Gearbox, body: Body, shape: ShapeSection) -> Iterator[tuple[str, float, float]]:

@@ -11,7 +11,7 @@ from exugear.cli.errors import exit_codes, model_errors
 from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption, OutOption, ScriptsOption
 
 if TYPE_CHECKING:
-    from exugear.life.counted import CountedLoads
+    from exugear.load_spectrum.counted import CountedLoads
 
 
 def loads(
@@ -26,9 +26,9 @@ def loads(
     No tables are needed. Writes load duration distributions as CSV, and a picture of them.
     """
     with exit_codes():
-        from exugear.life.counted import count_loads
-        from exugear.life.diagrams import draw_duration
-        from exugear.life.spectra_files import write_spectra
+        from exugear.load_spectrum.counted import count_loads
+        from exugear.load_spectrum.diagrams import draw_duration
+        from exugear.load_spectrum.spectra_files import write_spectra
         from exugear.project import default_folder
 
         gearbox = read_gearbox(case, files_below, scripts)

@@ -22,9 +22,10 @@ def report(
     files_below: FilesBelowOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Write a report of a results folder: one web page with pictures, tables, assumptions, and where time went.
+    """Write a report of a results folder: one web page that answers where it rings, how loud, and why.
 
-    Compares the variants whose runs and modes are there. gmsh scripts never run: what they would make must be there.
+    The page needs no network and no other file. It compares the variants whose runs and modes are there. gmsh
+    scripts never run: what they would make must be there.
     """
     with exit_codes():
         from exugear.model.reading import CaseError

@@ -14,11 +14,14 @@ from exugear.cli.errors import BadInputError, FailedError, exit_codes, interrupt
 from exugear.cli.options import FilesBelowOption, JsonOption, OutOption, ScriptsOption
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from exugear.studies.executors import Opens
     from exugear.studies.study import Study
     from exugear.studies.sweep import Shard, Swept
 
 SHOWN_FAILURES = 5
+SHOWN_OF_FRONT = 5
 
 
 class Executor(StrEnum):
@@ -56,17 +59,24 @@ def sweep(
     """
     with exit_codes():
         from exugear.studies.executors import ExecutorError
+        from exugear.studies.optimisation import OptimisationError
 
         part, opens = _shard(shard, merge), _executor(executor, workers, scheduler)
         read = _read(study, files_below, scripts)
+        if read.file.optimise is not None and (merge or retry or shard is not None):
+            raise BadInputError(
+                f"{study}: a search follows from its points one after the other; "
+                "leave --shard, --merge and --retry-failed out"
+            )
         folder = out or _default_folder(read, study)
         check_choice(read.gearbox, read.choice, folder)
         make_results_folder(folder)
         try:
             swept = _sweep(read, folder, opens, part, merge, retry)
-        except ExecutorError as error:
+        except (ExecutorError, OptimisationError) as error:
             raise FailedError(error) from error
-        _tell(read, study, folder, swept, as_json)
+        pictures = _draw(read, folder, swept)
+        _tell(read, study, folder, swept, pictures, as_json)
 
 
 def _shard(text: str | None, merge: bool) -> Shard:
@@ -130,6 +140,7 @@ def _default_folder(study: Study, path: Path) -> Path:
 
 def _sweep(study: Study, folder: Path, opens: Opens, shard: Shard, merge: bool, retry: bool) -> Swept:
     """Carry the study out behind a progress bar."""
+    from exugear.studies.optimisation import optimise
     from exugear.studies.sweep import sweep as carry_out
 
     with progress_bar() as bar:
@@ -143,12 +154,25 @@ def _sweep(study: Study, folder: Path, opens: Opens, shard: Shard, merge: bool, 
             text = f"point {done} of {total}{failures}"
             bar.update(task, completed=done - first[0], total=total - first[0], description=text)
 
+        if study.file.optimise is not None:
+            return optimise(study, folder, opens, progress=show)
         return carry_out(study, folder, opens, shard=shard, merge=merge, retry=retry, progress=show)
 
 
-def _tell(study: Study, path: Path, folder: Path, swept: Swept, as_json: bool) -> None:
+def _draw(study: Study, folder: Path, swept: Swept) -> list[Path]:
+    """Draw what was put together."""
+    from exugear.studies.pictures import draw_study
+
+    if swept.dataset is None:
+        return []
+    minimised = () if study.file.optimise is None else tuple(study.file.optimise.minimise)
+    return draw_study(swept.dataset, folder, minimised)
+
+
+def _tell(study: Study, path: Path, folder: Path, swept: Swept, pictures: list[Path], as_json: bool) -> None:
     """Print what came of it; end with 1 if points failed, or are missing where all were asked for."""
-    total, failed = len(study.design.points), swept.failed
+    searched = study.file.optimise is not None
+    total, failed = len(swept.records if searched else study.design.points), swept.failed
     missing = total - len(swept.records)
     summary: dict[str, Any] = {
         "study": str(path),
@@ -161,6 +185,7 @@ def _tell(study: Study, path: Path, folder: Path, swept: Swept, as_json: bool) -
         "seconds_of_points": round(sum(record.seconds for record in swept.records.values()), 3),
         "errors": [record.error for record in failed[:SHOWN_FAILURES]],
         "file": None if swept.path is None else str(swept.path),
+        "pictures": [str(picture) for picture in pictures],
     }
     if as_json:
         print_json(summary)
@@ -190,4 +215,20 @@ def _print(study: Study, folder: Path, swept: Swept, summary: dict[str, Any]) ->
         rows = [{"parameter": p, "figure": f, "% a step": f"{100.0 * c:+.3f}"} for f, p, c in ranked]
         if rows:
             print_table("What moves the figures most", rows, ("figure",))
-    say(f"Results in {swept.path}")
+    if study.file.optimise is not None:
+        _print_front(study.file.optimise.minimise, study, swept.dataset)
+    say(f"Results in {swept.path}, pictures beside it")
+
+
+def _print_front(figures: list[str], study: Study, dataset: xr.Dataset) -> None:
+    """Print where a search began, and some of what no other point beats, spread over the front."""
+    import numpy as np
+
+    front = dataset.isel(evaluation=dataset["on_front"].to_numpy() == 1).sortby(figures[0])
+    shown = sorted({round(n) for n in np.linspace(0, front.sizes["evaluation"] - 1, SHOWN_OF_FRONT)})
+    points = {"begun at": dataset.isel(evaluation=0)} | {f"point {n + 1}": front.isel(evaluation=n) for n in shown}
+    rows = [
+        {"": name} | {label: f"{float(point[name]):.4g}".replace("nan", "") for label, point in points.items()}
+        for name in (*figures, *study.file.parameters)
+    ]
+    print_table(f"Front of {front.sizes['evaluation']} points that no other beats", rows)

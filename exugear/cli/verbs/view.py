@@ -65,43 +65,60 @@ def view(
 
 def _draw_modes(found: Modes, folder: Path, first: int, animation: bool) -> list[Path]:
     """Write the page of all elastic modes, and pictures of the gearbox and one mode if this machine can render."""
+    from exugear.findings.words import Words
+    from exugear.pictures.motions import motions_of
+    from exugear.pictures.shapes import bodies_of
+    from exugear.web.mode_page import write_mode_page
+
+    assembly = found.assembly
+    drawn = {body.name for body in bodies_of(assembly.gearbox)}
+    places = []
+    for place, frequency in enumerate(found.frequency):
+        motions = motions_of(assembly.bodies, assembly.coordinates, assembly.rigid_part(found.shapes[:, place]))
+        if frequency > 0.0 and any(motion.any() for body, motion in motions.items() if body in drawn):
+            places.append(place)
+    if not places:
+        raise BadInputError(f"{label_of(found)}: no elastic mode to show")
+    shown = places.index(first) if first in places else 0
+    words, modes = Words(assembly.gearbox), found.to_dataset()
+    page = write_mode_page(
+        assembly,
+        found.shapes[:, places],
+        [(float(found.frequency[place]), words.moves(modes, place)) for place in places],
+        folder / "modes.html",
+        heading=f"{assembly.gearbox.name}, {label_of(found)}",
+        first=shown,
+        labels=words.labels,
+    )
+    return [page, *_draw_pictures(found, folder, places[shown], animation)]
+
+
+def _draw_pictures(found: Modes, folder: Path, place: int, animation: bool) -> list[Path]:
+    """Draw the gearbox and one mode; nothing where this machine cannot render."""
     from exugear.pictures.elastic_scene import animate_elastic_bodies, draw_elastic_bodies, elastic_scene
     from exugear.pictures.motions import mode_scene, motions_of
     from exugear.pictures.scene import animate_mode, draw_gearbox, draw_mode
     from exugear.pictures.shapes import bodies_of
-    from exugear.pictures.viewer import write_mode_page
     from fe_ste.tools.rendering import RenderingError
 
     assembly = found.assembly
-    bodies = bodies_of(assembly.gearbox)
-    drawn = {body.name for body in bodies}
-    scenes = {}
-    for place, name in enumerate(found.names):
-        motions = motions_of(assembly.bodies, assembly.coordinates, assembly.rigid_part(found.shapes[:, place]))
-        moving = {body: motion for body, motion in motions.items() if body in drawn}
-        if found.frequency[place] > 0.0 and any(motion.any() for motion in moving.values()):
-            scenes[place] = mode_scene(bodies, moving, title=f"{found.frequency[place]:.0f} Hz: {name}")
-    if not scenes:
-        raise BadInputError(f"{label_of(found)}: no elastic mode to show")
-    places = list(scenes)
-    shown = places.index(first) if first in scenes else 0
-    heading = f"{assembly.gearbox.name}, {label_of(found)}"
-    if assembly.elastic_bodies:
-        heading += "; elastic bodies move here as a whole, without their deformation"
-    written = [write_mode_page(list(scenes.values()), folder / "modes.html", heading=heading, first=shown)]
-    scene = scenes[places[shown]]
-    stem = folder / f"mode_{places[shown] + 1}"
+    bodies, shape = bodies_of(assembly.gearbox), found.shapes[:, place]
+    title = f"{found.frequency[place]:.0f} Hz: {found.names[place]}"
+    stem = folder / f"mode_{place + 1}"
+    still, animated = stem.with_suffix(".png"), stem.with_suffix(".gif")
     try:
         draw_gearbox(bodies, folder / "gearbox.png", title=assembly.gearbox.name)
-        still, animated = stem.with_suffix(".png"), stem.with_suffix(".gif")
         if assembly.elastic_bodies:
-            deformed = elastic_scene(assembly, found.shapes[:, places[shown]], title=scene.title)
+            deformed = elastic_scene(assembly, shape, title=title)
             draw_elastic_bodies(deformed, still)
-            written += [animate_elastic_bodies(deformed, animated)] if animation else []
+            moving = [animate_elastic_bodies(deformed, animated)] if animation else []
         else:
+            motions = motions_of(assembly.bodies, assembly.coordinates, assembly.rigid_part(shape))
+            drawn = {body.name for body in bodies}
+            scene = mode_scene(bodies, {name: m for name, m in motions.items() if name in drawn}, title=title)
             draw_mode(scene, still)
-            written += [animate_mode(scene, animated)] if animation else []
-        written += [folder / "gearbox.png", still]
+            moving = [animate_mode(scene, animated)] if animation else []
     except RenderingError as error:
         note(f"No pictures: {error}", style="yellow")
-    return written
+        return []
+    return [*moving, folder / "gearbox.png", still]

@@ -34,7 +34,7 @@ class InertiaSection(Section):
 
 
 class ShaftSectionSection(Section):
-    """A cylindrical piece of a shaft."""
+    """A piece of a shaft: a cylinder, or a cone where a diameter at its end is given."""
 
     length_mm: q.LengthMm
     """Length."""
@@ -42,10 +42,18 @@ class ShaftSectionSection(Section):
     """Outer diameter."""
     inner_diameter_mm: q.BoreMm = 0.0
     """Bore."""
+    outer_diameter_end_mm: q.LengthMm | None = None
+    """Outer diameter at its +z end, of a cone."""
+    inner_diameter_end_mm: q.BoreMm | None = None
+    """Bore at its +z end, of a conical bore."""
 
     @model_validator(mode="after")
     def _has_wall(self) -> ShaftSectionSection:
         check_wall(self.inner_diameter_mm, self.outer_diameter_mm, "inner_diameter_mm")
+        ends = (self.inner_diameter_end_mm, self.outer_diameter_end_mm)
+        starts = (self.inner_diameter_mm, self.outer_diameter_mm)
+        inner, outer = (start if end is None else end for start, end in zip(starts, ends, strict=True))
+        check_wall(inner, outer, "inner_diameter_end_mm")
         return self
 
 
@@ -176,7 +184,7 @@ class BodySection(Section):
     enabled: bool = True
     """Whether it takes part; what is joined to it alone steps aside with it."""
     inertia: dict[Name, InertiaSection] = {}
-    """Mass properties by inertia set."""
+    """Mass properties by inertia set; those that follow from shape, blanks and gears by default."""
     flexibility: Literal["none", "elastic", "nonrotating", "ffrf"] = "none"
     """What the variant `flexible` makes of it."""
     shape: ShapeSection | None = None
@@ -205,6 +213,10 @@ class BodySection(Section):
             raise ValueError("a fixed body has no inertia: leave the section out or set fixed = false")
         if self.spin_only and self.wheels_z_mm:
             raise ValueError("a spin-only body carries no gears: it has no position in space")
-        if not self.fixed and not self.inertia:
-            raise ValueError("a moving body needs an inertia table, e.g. [bodies.NAME.inertia.assemblies]")
+        follows = self.shape is not None or (self.wheels_z_mm and self.carrier is not None)
+        if not self.fixed and not self.inertia and not follows:
+            raise ValueError(
+                "a moving body needs an inertia table, e.g. [bodies.NAME.inertia.assemblies], or a shape from which "
+                "its inertia follows; that of a planet follows from its gears"
+            )
         return self

@@ -124,6 +124,13 @@ class GravitySection(Section):
     """Vector in the axes of the gearbox."""
 
 
+class OperationSection(Section):
+    """How the gearbox works in service; what a report sets its speeds against."""
+
+    rated_speed_rpm: Annotated[q.SpeedRpm, Field(gt=0.0)] | None = None
+    """Speed of the overall input at rated power, without sign."""
+
+
 class ReportSection(Section):
     """What a report looks for: modes near a frequency that was measured or published."""
 
@@ -163,6 +170,12 @@ class SteSection(Section):
             if static not in values:
                 raise ValueError(f"{key} = {list(values)}: {static} must be among them, the static state")
         return self
+
+
+Label = Annotated[Text, Field(min_length=1, max_length=80)]
+"""Words for a name: short, since tables and diagrams hold them."""
+_NAMED = ("bodies", "bearings", "joints", "mounts", "couplings", "meshes", "pairs", "gears", "load_cases", "pins")
+"""Tables whose entries may have a label."""
 
 
 class CaseFile(Section):
@@ -206,14 +219,26 @@ class CaseFile(Section):
     """Seats of bearings where the housing is not elastic."""
     gravity: GravitySection = GravitySection()
     """Weight."""
+    operation: OperationSection = OperationSection()
+    """How the gearbox works in service."""
     report: ReportSection = ReportSection()
     """What a report looks for."""
+    labels: Annotated[dict[Name, Label], Field(max_length=MOST_ENTRIES)] = {}
+    """Words for people by name of a body, bearing, pair or other entry; pages show them instead of the name."""
     ste: SteSection = SteSection()
     """Tables of the transmission error."""
     loads: LoadsSection | None = None
     """Loads over the life of the gearbox."""
     rating: RatingSection | None = None
     """How gears are rated."""
+
+    @model_validator(mode="after")
+    def _labels_of_entries(self) -> CaseFile:
+        known = {name for table in _NAMED for name in getattr(self, table)}
+        for name in self.labels:
+            if name not in known:
+                raise ValueError(f"labels.{name}: no entry of that name; labels are for {', '.join(_NAMED)}")
+        return self
 
     def __repr__(self) -> str:
         """Return one short line: the title, and how many entries the tables have."""

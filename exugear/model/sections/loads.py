@@ -35,8 +35,15 @@ class SourceSection(Section):
     """Channel of the torque on the body; in tables with commas `BODY_N_m` by default."""
     speed: ChannelName | None = None
     """Channel of the speed of the body; in tables with commas `BODY_rpm` by default."""
+    hub_forces: Annotated[tuple[ChannelName, ChannelName, ChannelName], Field(strict=False)] | None = None
+    """Channels of the force on the body along x, y and z of the gearbox, axes that stand still; `-` before a name turns
+    its sense."""
+    hub_moments: Annotated[tuple[ChannelName, ChannelName], Field(strict=False)] | None = None
+    """Channels of the moments on the body about x and y, likewise."""
     torque_factor: q.ChannelFactor = 1.0
     """Factor on the torque: a sign for the sense of the body, or the scale of another machine."""
+    hub_factor: q.ChannelFactor = 1.0
+    """Factor on forces and moments of the hub."""
     speed_factor: q.ChannelFactor = 1.0
     """Factor on the speed."""
     partial_factor: q.PartialFactor | None = None
@@ -109,8 +116,12 @@ class RatingSection(Section):
 
     edition: Literal["ISO 6336:2006"] = "ISO 6336:2006"
     """Edition of the standard, named in every output."""
-    dynamic_factor: q.LoadFactorK
-    """K_v: largest over mean mesh force at speed, of a run or a steady response with errors of the wheels."""
+    dynamic_factor: q.LoadFactorK | None = None
+    """K_v of all meshes, as stated; or the next two keys."""
+    dynamic_factor_run: Name | None = None
+    """Load case whose run gives K_v over speed: largest over mean force of each mesh within 20 cycles."""
+    least_dynamic_factor: q.LoadFactorK | None = None
+    """Least K_v beside a run: without errors of the wheels a run has too little."""
     viscosity_40_mm2_per_s: q.Viscosity
     """Kinematic viscosity of the oil at 40 degrees Celsius."""
     carrier_angles: q.CarrierAngles = 12
@@ -121,3 +132,10 @@ class RatingSection(Section):
     """Safety against pitting that is asked for."""
     least_S_F: q.SafetyFactor | None = None
     """Safety against breakage that is asked for."""
+
+    @model_validator(mode="after")
+    def _dynamic_factor(self) -> RatingSection:
+        of_run = (self.dynamic_factor_run is not None, self.least_dynamic_factor is not None)
+        if (self.dynamic_factor is not None) == all(of_run) or (self.dynamic_factor is not None and any(of_run)):
+            raise ValueError("give dynamic_factor, or dynamic_factor_run and least_dynamic_factor")
+        return self

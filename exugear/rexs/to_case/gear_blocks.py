@@ -13,8 +13,8 @@ from exugear.rexs.to_case.meshing import (
     centre_distance,
     unchecked,
     with_clear_tips,
+    with_form_circles,
     with_shifts,
-    without_undercut,
 )
 from exugear.rexs.to_case.modifications import modification_of
 from exugear.rexs.to_case.notes import Block, Entry, Notes, assumed, derived, read, tidy
@@ -23,6 +23,8 @@ from exugear.rexs.to_case.shafts import Cylinder, seat_diameter
 from exugear.rexs.to_case.toothing import Toothing, is_rigid, material_of, material_table, toothing_of
 from exugear.rexs.tree import Component, Model
 
+FACE_TOLERANCE = 1e-3
+"""Largest difference of face widths that needs no word, mm."""
 LEAST_RIM = 1.0
 """Least height of a rim between root circle and seat, in normal modules; with less the gear is one with its shaft."""
 ANGLE_TOLERANCE = 0.01
@@ -86,7 +88,7 @@ def teeth_of(model: Model, places: Places, bodies: Bodies, notes: Notes) -> Teet
     notes.faults.tell()
     _check_equal_planets(model, bodies, first, gears, notes)
     gears = with_shifts(gears, stages, notes)
-    gears = {number: without_undercut(gear, notes) for number, gear in gears.items()}
+    gears = {number: with_form_circles(gear, notes) for number, gear in gears.items()}
     gears = with_clear_tips(gears, stages, notes)
     owners = {number: body for number in gears if (body := bodies.of(model.components[number])) is not None}
     lost = [str(gears[number].part) for number in gears if number not in owners]
@@ -150,12 +152,23 @@ def _ordered(
             pinion, gear = sorted((one, other), key=lambda each: _size(gears[each.number]))
             apart = math.dist(places.position(one)[:2], places.position(other)[:2])
             distance = centre_distance(part, apart, Notes())
-            stages.append(Stage(part, pinion.number, gear.number, distance))
-            common = part.quantity("common_face_width", "mm")
-            least = min(gears[pinion.number].face_width.value, gears[gear.number].face_width.value)
-            if common is not None and common < least - 1e-6:
-                notes.changed.append(f"{part}: common_face_width {common:g} mm is left out, the faces overlap by more")
+            common = _common_face(places, part, gears[pinion.number], gears[gear.number])
+            stages.append(Stage(part, pinion.number, gear.number, distance, common))
     return stages
+
+
+def _common_face(places: Places, stage: Component, pinion: Toothing, gear: Toothing) -> Entry | None:
+    """Face width that the gears share, where that is less than the narrower face."""
+    least = min(pinion.face_width.value, gear.face_width.value)
+    low, high = -math.inf, math.inf
+    for one in (pinion, gear):
+        z = places.position(one.part)[2]
+        low, high = max(low, z - 0.5 * one.face_width.value), min(high, z + 0.5 * one.face_width.value)
+    stated = stage.quantity("common_face_width", "mm")
+    overlap = tidy(round(high - low, 6))
+    if stated is not None and stated < min(least, overlap) - FACE_TOLERANCE:
+        return read(tidy(stated), "common_face_width")
+    return derived(overlap, "overlap of the faces as they stand") if 0.0 < overlap < least - FACE_TOLERANCE else None
 
 
 def _size(gear: Toothing) -> tuple[bool, int]:
@@ -247,6 +260,10 @@ def _entries(model: Model, gear: Toothing, z: float, sections: Sequence[Cylinder
         entries["tip_diameter_mm"] = gear.tip
     if gear.root is not None:
         entries["root_diameter_mm"] = gear.root
+    if gear.chamfer:
+        entries["tip_chamfer_mm"] = read(gear.chamfer, "tooth_tip_chamfer, or tip_form_diameter")
+    if gear.root_form is not None:
+        entries["root_form_diameter_mm"] = gear.root_form
     rack = {"addendum": 1.0, "dedendum": gear.dedendum.value, "tip_radius": gear.tip_radius.value}
     tip = "addendum: tip_diameter_mm counts" if gear.tip is not None else "addendum: A"
     parts = (tip, f"dedendum: {gear.dedendum.comment}", f"tip radius: {gear.tip_radius.comment}")
@@ -283,7 +300,8 @@ def pair_blocks(teeth: Teeth) -> dict[str, Block]:
                 "pinion": Entry(teeth.names[stage.pinion]),
                 "gear": Entry(teeth.names[stage.gear]),
                 "centre_distance_mm": stage.distance,
-            },
+            }
+            | ({"common_face_width_mm": stage.common_face} if stage.common_face else {}),
         )
         for name, stage in teeth.stages.items()
     }

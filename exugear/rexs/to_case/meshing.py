@@ -11,8 +11,8 @@ from exugear.rexs.faults import RexsError
 from exugear.rexs.to_case.notes import Entry, Notes, assumed, derived, tidy
 from exugear.rexs.to_case.toothing import Toothing
 from exugear.rexs.tree import Component
+from fe_ste.geometry import fitting
 from fe_ste.geometry.gear_relations import BasicRack, UncheckedGear
-from fe_ste.geometry.involute import involute
 from fe_ste.geometry.pair_relations import UncheckedPair
 
 SHIFT_TOLERANCE = 1e-3
@@ -21,9 +21,8 @@ PLACE_TOLERANCE = 0.02
 """Largest difference of a centre distance and the positions of the gears, mm."""
 MARGIN = 1e-4
 """Rounding allowed for where a tool or a tip is replaced, in normal modules."""
-CLEARANCE = 0.1
-"""Roll length that a tip which the file does not give keeps from its mate's form circle, in normal modules: the
-breadth of the contact under load reaches beyond the path of contact."""
+FORM_TOLERANCE = 1e-3
+"""Difference of form diameters that says nothing, in normal modules."""
 
 
 @dataclass(frozen=True)
@@ -38,12 +37,15 @@ class Stage:
         Numbers of the gears' components.
     distance : Entry
         Centre distance, mm.
+    common_face : Entry, optional
+        Face width that the gears share, where that is less than the narrower face, mm.
     """
 
     part: Component
     pinion: int
     gear: int
     distance: Entry
+    common_face: Entry | None = None
 
 
 def centre_distance(stage: Component, apart: float, notes: Notes) -> Entry:
@@ -66,25 +68,19 @@ def centre_distance(stage: Component, apart: float, notes: Notes) -> Entry:
 
 
 def shift_sum(pinion: Toothing, gear: Toothing, distance: float) -> float:
-    """Profile shifts that leave no backlash at a centre distance (mm): x1 + x2, of an internal pair x1 - x2.
-
-    ISO 21771: sum = (z1 + z2) (inv alpha_wt - inv alpha_t) / (2 tan alpha_n), teeth of a ring negative.
+    """Profile shifts that leave no backlash at a centre distance (mm), see `fe_ste.geometry.fitting.shift_sum`.
 
     Raises
     ------
     RexsError
         No working pressure angle belongs to the distance.
     """
-    module, normal = pinion.module.value, math.radians(pinion.pressure_angle.value)
-    helix = math.radians(pinion.helix_angle.value)
-    transverse = math.atan(math.tan(normal) / math.cos(helix))
-    teeth = pinion.teeth - gear.teeth if gear.internal else pinion.teeth + gear.teeth
-    cosine = abs(teeth) * module / math.cos(helix) * math.cos(transverse) / (2.0 * distance)
-    if not 0.0 < cosine < 1.0:
+    total = fitting.shift_sum(unchecked("", pinion), unchecked("", gear), 1e-3 * distance)
+    if total is None:
         raise RexsError(
             f"{pinion.part}, {gear.part}: no line of action touches both base circles at a distance of {distance:g} mm"
         )
-    return teeth * (involute(math.acos(cosine)) - involute(transverse)) / (2.0 * math.tan(normal))
+    return total
 
 
 def with_shifts(gears: Mapping[int, Toothing], stages: Sequence[Stage], notes: Notes) -> dict[int, Toothing]:
@@ -146,7 +142,7 @@ def _check_shifts(gears: Mapping[int, Toothing], stage: Stage, notes: Notes) -> 
 
 def unchecked(name: str, gear: Toothing) -> UncheckedGear:
     """Build the gear with the relations of its geometry."""
-    return UncheckedGear(
+    plain = UncheckedGear(
         name=name,
         teeth=gear.teeth,
         normal_module=1e-3 * gear.module.value,
@@ -160,28 +156,28 @@ def unchecked(name: str, gear: Toothing) -> UncheckedGear:
         tip_diameter=1e-3 * gear.tip.value if gear.tip else None,
         root_diameter=1e-3 * gear.root.value if gear.root else None,
         tooth_thinning=1e-3 * gear.thinning.value,
+        root_form_diameter=1e-3 * gear.root_form.value if gear.root_form else None,
     )
+    if not gear.chamfer:
+        return plain
+    return dataclasses.replace(plain, tip_form_diameter=2.0 * (plain.tip_radius - 1e-3 * plain.outward * gear.chamfer))
 
 
-def without_undercut(gear: Toothing, notes: Notes) -> Toothing:
-    """Round the tool's corner further where the gear would be undercut, which the tooth model cannot have.
-
-    A rounder corner ends its straight flank higher and leaves the root circle as it is.
-    """
-    trial = unchecked("", gear)
-    if gear.internal or trial.form_roll_length >= 0.0:
+def with_form_circles(gear: Toothing, notes: Notes) -> Toothing:
+    """Keep a root form diameter where it ends the flank before the fillet does; undercut ends it by itself."""
+    bare = unchecked("", dataclasses.replace(gear, root_form=None))
+    if bare.is_undercut:
+        notes.checked.append(
+            f"{gear.part}: undercut by its tool; its flank begins at a diameter of {2e3 * bare.form_radius:.4f} mm"
+        )
+    if gear.root_form is None:
         return gear
-    # The straight flank ends rho (1 - sin alpha) above the tool's tip, and may reach down to the interference point.
-    angle, transverse = trial.normal_pressure_angle, trial.transverse_pressure_angle
-    reach = trial.profile_shift + trial.reference_radius / trial.normal_module * math.sin(transverse) ** 2
-    radius = (trial.dedendum_factor - reach) / (1.0 - math.sin(angle)) + MARGIN
-    radius = math.ceil(1e4 * radius) / 1e4
-    notes.changed.append(
-        f"{gear.part}: undercut by its tool of tip radius {gear.tip_radius.value:g}; a radius of {radius:g} normal "
-        "modules is taken, with which the involute is whole"
+    beyond = (1e-3 * gear.root_form.value - 2.0 * bare.form_radius) * bare.outward
+    notes.checked.append(
+        f"{gear.part}: root form diameter {gear.root_form.value:.6g} mm, its tool's rounding gives "
+        f"{2e3 * bare.form_radius:.6g} mm"
     )
-    changed = assumed(radius, f"the file says {gear.tip_radius.value:g}, which undercuts the tooth")
-    return dataclasses.replace(gear, tip_radius=changed)
+    return gear if beyond > FORM_TOLERANCE * bare.normal_module else dataclasses.replace(gear, root_form=None)
 
 
 def with_clear_tips(gears: dict[int, Toothing], stages: Sequence[Stage], notes: Notes) -> dict[int, Toothing]:
@@ -210,15 +206,9 @@ def _tip_bound(gears: Mapping[int, Toothing], stage: Stage, which: int) -> float
     pinion, gear = unchecked("pinion", gears[stage.pinion]), unchecked("gear", gears[stage.gear])
     pair = UncheckedPair(name="", pinion=pinion, gear=gear, centre_distance=1e-3 * stage.distance.value)
     tip = gear if which == stage.gear else pinion
-    if tip is gear:
-        excess = pinion.form_roll_length - pair.pinion_roll_length(gear.tip_roll_length)
-    else:
-        excess = pinion.tip_roll_length - pair.pinion_roll_length(gear.form_roll_length)
-    clearance = MARGIN if gears[which].tip else CLEARANCE
-    excess += clearance * tip.normal_module
-    if excess <= 0.0:
+    margin = (MARGIN if gears[which].tip else fitting.ROOT_MARGIN) * tip.normal_module
+    diameter = 1e3 * fitting.clear_tip_diameter(pair, tip, margin)
+    if fitting.root_margin(pair, tip) >= margin:
         return None
-    roll = tip.tip_roll_length - tip.outward * excess
-    diameter = 2e3 * math.hypot(tip.base_radius, roll)
     # Rounded to the side that clears.
     return round((math.floor if tip.outward > 0 else math.ceil)(1e4 * diameter) / 1e4, 4)

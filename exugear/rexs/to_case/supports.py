@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
+from exugear.bearings.rolling.designations import boundary_of
 from exugear.model.sections.connections import CONTACT_ANGLES_DEG, TYPES_OF_KEYS
 from exugear.rexs.faults import RexsError, plain
 from exugear.rexs.to_case.bodies import (
@@ -159,32 +160,47 @@ def _support(model: Model, part: Component, sense: int, notes: Notes) -> dict[st
             raise RexsError(f"{part}: holds nothing, neither radially nor axially nor against tilting")
         return {"stiffness": Block("", entries)}
     kind = ROLLING_TYPES.get(part.text("bearing_type"))
-    sizes = {key: part.quantity(key, "mm") or 0.0 for key in ("inner_diameter", "outer_diameter", "width")}
+    sizes = _sizes(part, kind, notes)
     rows = part.whole("number_of_bearing_rows") or 1
     paired = rows > 1 and kind in CONTACT_ANGLES_DEG and kind not in ("spherical_roller", "self_aligning_ball")
-    if kind and min(sizes.values()) > 0.0 and not paired:
-        return {"catalogue": Block("", _catalogue(model, part, kind, rows, sense, notes))}
+    if kind and sizes and not paired:
+        return {"catalogue": Block("", _catalogue(model, part, kind, rows, sense, sizes, notes))}
     if not kind:
         why = f"a {part.text('bearing_type') or part.type} has no law here: give its stiffness"
     elif paired:
         why = "a bearing of two rows with contact angles: give its catalogue with arrangement X, O or tandem"
     else:
-        why = "the file gives no dimensions: give its catalogue, or its stiffness"
+        why = "the file gives no dimensions, and no table here has them: give its catalogue, or its stiffness"
     notes.changed.append(f"{part}: BLANK, {why}; until then only the variant rigid runs")
     return {"designation": Block("", {"designation": Entry(_designation(part), f"BLANK: {why}")})}
+
+
+def _sizes(part: Component, kind: str | None, notes: Notes) -> dict[str, Entry]:
+    """Boundary dimensions: those of the file, or those that its designation stands for; empty if neither tells."""
+    keys = {"inner_diameter": "bore_mm", "outer_diameter": "outer_diameter_mm", "width": "width_mm"}
+    given = {ours: part.quantity(key, "mm") for key, ours in keys.items()}
+    if all(given.values()):
+        return {ours: read(given[ours], key) for key, ours in keys.items()}
+    found = boundary_of(_designation(part))
+    if found is None or found.type != kind:
+        return {}
+    source = f"{found.source} by the designation {_designation(part)}: the file gives no dimensions"
+    notes.changed.append(f"{part}: {found.bore:g} x {found.outer:g} x {found.width:g} mm by {source}")
+    sizes = {"bore_mm": found.bore, "outer_diameter_mm": found.outer, "width_mm": found.width}
+    return {key: assumed(value, source) for key, value in sizes.items()}
 
 
 def _designation(part: Component) -> str:
     return plain(part.text("catalogue_designation") or part.text("name") or part.name or part.type, 60)
 
 
-def _catalogue(model: Model, part: Component, kind: str, rows: int, sense: int, notes: Notes) -> dict[str, Entry]:
+def _catalogue(
+    model: Model, part: Component, kind: str, rows: int, sense: int, sizes: Mapping[str, Entry], notes: Notes
+) -> dict[str, Entry]:
     entries = {
         "type": read(kind, f"bearing_type {part.text('bearing_type')}"),
         "designation": Entry(_designation(part)),
-        "bore_mm": read(part.quantity("inner_diameter", "mm"), "inner_diameter"),
-        "outer_diameter_mm": read(part.quantity("outer_diameter", "mm"), "outer_diameter"),
-        "width_mm": read(part.quantity("width", "mm"), "width"),
+        **sizes,
     }
     row = next(iter(_parts_of(model, part, "rolling_bearing_row")), None)
     angle = abs((row or part).quantity("pressure_angle", "deg") or 0.0)

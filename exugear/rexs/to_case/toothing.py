@@ -37,6 +37,8 @@ class Toothing:
     dedendum, tip_radius, thinning : Entry
     chamfer : float
         Radial, mm.
+    root_form : Entry, optional
+        Diameter at which the flank ends towards the root, as far as it is given.
     internal : bool
     """
 
@@ -53,6 +55,7 @@ class Toothing:
     tip_radius: Entry
     thinning: Entry
     chamfer: float
+    root_form: Entry | None
     internal: bool
 
 
@@ -72,8 +75,6 @@ def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes
     teeth = abs(gear.whole("number_of_teeth") or 0)
     if not teeth:
         raise RexsError(f"{gear}: number_of_teeth is missing")
-    if chamfer:
-        notes.changed.append(f"{gear}: tooth_tip_chamfer of {chamfer:g} mm left out, the flank runs up to the tip")
     return Toothing(
         part=gear,
         teeth=teeth,
@@ -87,9 +88,18 @@ def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes
         dedendum=_of_tool(tool, internal, "addendum_coefficient_reference_profile", 1.25),
         tip_radius=_rounded(_of_tool(tool, internal, "tip_corner_radius_factor_reference_profile", 0.38)),
         thinning=_thinning(gear, module),
-        chamfer=chamfer,
+        chamfer=_chamfer(gear, chamfer),
+        root_form=_diameter(gear, "root_form_diameter"),
         internal=internal,
     )
+
+
+def _chamfer(gear: Component, stated: float) -> float:
+    """Height of the tip's chamfer, mm: as stated, or from the tip form diameter."""
+    tip, form = gear.quantity("tip_diameter", "mm"), gear.quantity("tip_form_diameter", "mm")
+    if stated or not tip or not form:
+        return tidy(stated)
+    return tidy(max(0.0, round(0.5 * (abs(tip) - abs(form)) * (-1.0 if gear.type == "ring_gear" else 1.0), 9)))
 
 
 def _flank(model: Model, gear: Component) -> Component | None:

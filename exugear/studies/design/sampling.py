@@ -131,7 +131,7 @@ def _levels(name: str, parameter: ParameterSection, gearbox: Gearbox) -> _Levels
     values = listed_values(parameter)
     changes = tuple({path: acting(parameter, gearbox, path, value) for path in parameter.targets} for value in values)
     labels = _labels(values)
-    return _Levels({name: Axis((name,), labels, _units(parameter), ", ".join(parameter.targets))}, changes)
+    return _Levels({name: Axis((name,), labels, units_of(parameter), ", ".join(parameter.targets))}, changes)
 
 
 def listed_values(parameter: ParameterSection) -> list[Any]:
@@ -159,7 +159,7 @@ def acting(parameter: ParameterSection, gearbox: Gearbox, path: str, value: Any)
     """
     if parameter.acts == "replaces":
         return value
-    own = value_at(gearbox.content, path)
+    own = _own(gearbox, path)
     if isinstance(own, bool) or not isinstance(own, int | float):
         raise PathError(
             f"{path}: the case has no number there that a value {parameter.acts.rstrip('s')}s; give acts = 'replaces'"
@@ -167,12 +167,23 @@ def acting(parameter: ParameterSection, gearbox: Gearbox, path: str, value: Any)
     return _rounded(own * value if parameter.acts == "scales" else own + value)
 
 
+def _own(gearbox: Gearbox, path: str) -> Any:
+    """Value that a case has at a path, also where the file leaves it to the default."""
+    given = value_at(gearbox.content, path)
+    if given is not None:
+        return given
+    found: Any = gearbox.case
+    for key in path.split("."):
+        found = found.get(key) if isinstance(found, Mapping) else getattr(found, key, None)
+    return found
+
+
 def _rounded(value: float) -> float:
     """Twelve digits: what another machine computes is the same point."""
     return float(f"{value:.12g}")
 
 
-def _units(parameter: ParameterSection) -> str:
+def units_of(parameter: ParameterSection) -> str:
     """Return the unit of the values, from the ends of the keys that they set."""
     if parameter.acts == "scales":
         return "1"
@@ -202,7 +213,7 @@ def _draws(study: StudyFile, drawn: Mapping[str, ParameterSection], gearbox: Gea
 
 def _drawn_axes(name: str, parameter: ParameterSection, values: Floats) -> dict[str, Axis]:
     """Coordinates of a drawn parameter: over the draws, and over its paths where these are drawn by themselves."""
-    units, paths = _units(parameter), ", ".join(parameter.targets)
+    units, paths = units_of(parameter), ", ".join(parameter.targets)
     if values.shape[1] == 1:
         return {name: Axis((SAMPLE,), values[:, 0], units, paths)}
     member = f"{name}_path"

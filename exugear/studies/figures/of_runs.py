@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from exugear.studies.figures.of_statics import of_planets
@@ -48,18 +50,37 @@ def order_amplitudes(
 ) -> dict[str, float]:
     """Amplitudes of a signal at orders of the input: a centre and `count` sidebands to either side.
 
-    The run is at constant speed; the orders are read over whole turns of the spacing, so that they do not leak.
+    The run is at constant speed and at least two periods of the spacing long.
+    """
+    orders = {f"{n:+d}" if n else "0": centre + n * spacing for n in range(-count, count + 1)}
+    return dict(zip(orders, _at_orders(results, signal, list(orders.values()), spacing), strict=True))
+
+
+def run_harmonics(results: PointResults, *, mesh: str, count: int = 6, signal: str = OVERALL) -> dict[str, float]:
+    """Amplitudes of a signal at the order of a mesh and its multiples, in a run of two turns of the input or more."""
+    meshes = {own.family: own.name for own in results.gearbox.meshes}
+    if mesh not in meshes:
+        raise PointError(f"no meshes {mesh!r}; meshes are {', '.join(meshes)}")
+    order = results.gearbox.train.mesh_frequencies(2.0 * math.pi)[meshes[mesh]]
+    orders = [n * order for n in range(1, count + 1)]
+    return {str(n): value for n, value in enumerate(_at_orders(results, signal, orders, 1.0), start=1)}
+
+
+def _at_orders(results: PointResults, signal: str, orders: list[float], spacing: float) -> list[float]:
+    """Peak amplitudes of a signal at orders of the input, those `spacing` apart told from each other.
+
+    Hann's window over a whole number of periods of the spacing, at least two: its zeros then fall on all neighbours.
     """
     values, time = _settled(results, signal), results.run["time"].to_numpy()
+    if values.ndim > 1:
+        raise PointError(f"signal {signal!r} is one of each mesh or support; orders are read of single signals")
     speed = np.abs(_settled(results, "input_speed"))
     rate = 1.0 / float(time[1] - time[0])
     angle = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))]) / rate
-    periods = int(angle[-1] * spacing / (2.0 * np.pi))
-    if periods < 1:
-        raise PointError(f"the run is shorter than one period of the order {spacing:g}; make it longer")
-    whole = int(np.searchsorted(angle, 2.0 * np.pi * periods / spacing))
-    orders = {f"{n:+d}" if n else "0": centre + n * spacing for n in range(-count, count + 1)}
-    return {
-        name: float(2.0 / whole * abs(np.exp(-1j * order * angle[:whole]) @ values[:whole]))
-        for name, order in orders.items()
-    }
+    periods = int(angle[-1] * spacing / (2.0 * math.pi))
+    if periods < 2:
+        raise PointError(f"the run has {periods} whole periods of the order {spacing:g}, and needs 2; make it longer")
+    whole = int(np.searchsorted(angle, 2.0 * math.pi * periods / spacing))
+    weights = 1.0 - np.cos(2.0 * math.pi * angle[:whole] / angle[whole])
+    weighed = weights * values[:whole] * (2.0 / weights.sum())
+    return [float(abs(np.exp(-1j * order * angle[:whole]) @ weighed)) for order in orders]

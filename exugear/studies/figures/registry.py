@@ -7,10 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from exugear.dynamics.signals import SIGNALS
 from exugear.studies.figures import of_modes, of_runs, of_statics, of_steady, of_tables
 from exugear.studies.figures.figure import Figure, FigureError, Values
+from exugear.studies.figures.of_runs import OVERALL
 from exugear.studies.figures.point_results import PointResults
 
+AS_SIGNAL = "as the signal"
+"""Unit of figures that an option `signal` names."""
 FIGURES: dict[str, Figure] = {
     "ste_peak_to_peak": Figure(of_tables.ste_peak_to_peak, "m"),
     "ste_harmonic": Figure(of_tables.ste_harmonic, "m"),
@@ -28,15 +32,16 @@ FIGURES: dict[str, Figure] = {
     "nearest_amplification": Figure(of_modes.nearest_amplification, "m/m"),
     "nearest_strain": Figure(of_modes.nearest_strain, "1"),
     "loudest_frequency": Figure(of_modes.loudest_frequency, "Hz"),
-    "largest_line": Figure(of_steady.largest_line, "as the signal"),
-    "loudest_peak": Figure(of_steady.loudest_peak, "as the signal"),
+    "largest_line": Figure(of_steady.largest_line, AS_SIGNAL),
+    "loudest_peak": Figure(of_steady.loudest_peak, AS_SIGNAL),
     "loudest_speed": Figure(of_steady.loudest_speed, "rad/s"),
-    "harmonics": Figure(of_steady.harmonics, "as the signal", "harmonic"),
-    "rms": Figure(of_runs.rms, "as the signal"),
-    "peak_to_peak": Figure(of_runs.peak_to_peak, "as the signal"),
+    "harmonics": Figure(of_steady.harmonics, AS_SIGNAL, "harmonic"),
+    "rms": Figure(of_runs.rms, AS_SIGNAL),
+    "peak_to_peak": Figure(of_runs.peak_to_peak, AS_SIGNAL),
     "final_speed": Figure(of_runs.final_speed, "rad/s"),
     "dynamic_load_sharing": Figure(of_runs.dynamic_load_sharing, "1"),
-    "order_amplitudes": Figure(of_runs.order_amplitudes, "as the signal", "sideband"),
+    "run_harmonics": Figure(of_runs.run_harmonics, AS_SIGNAL, "harmonic"),
+    "order_amplitudes": Figure(of_runs.order_amplitudes, AS_SIGNAL, "sideband"),
 }
 """By the name in a study file."""
 
@@ -53,6 +58,14 @@ class KeptFigure:
 
     figure: Figure
     options: Mapping[str, Any]
+
+    @property
+    def units(self) -> str:
+        """Unit of its numbers; of a signal that one's."""
+        if self.figure.units != AS_SIGNAL:
+            return self.figure.units
+        named = str(self.options.get("signal", OVERALL)).split(" ")[0]
+        return next((signal.units for signal in SIGNALS if signal.name == named), "")
 
     def of(self, results: PointResults) -> Values:
         """Compute it for a point."""

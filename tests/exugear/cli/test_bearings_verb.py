@@ -130,7 +130,7 @@ def test_non_linear_bearings_go_through_modes_run_and_file(case: Path) -> None:
     assert np.all(force[len(force) // 2 :].mean(axis=0) > 100.0)
 
 
-@pytest.mark.parametrize("place", ["exugear.report.sensitivity.vary_parameter", "exugear.report.context.assemble"])
+@pytest.mark.parametrize("place", ["exugear.findings.variations.vary_parameter", "exugear.findings.context.assemble"])
 def test_a_report_leaves_out_what_no_longer_balances(case: Path, monkeypatch: pytest.MonkeyPatch, place: str) -> None:
     """An assumption that is varied too far, and a model that has no static state: a line each, no more."""
     out = case.parent / "out"
@@ -144,4 +144,4 @@ def test_a_report_leaves_out_what_no_longer_balances(case: Path, monkeypatch: py
     assert isinstance(reported.exception, SystemExit | None)
     assert "no balance found" in reported.stderr
     assert "Traceback" not in reported.stderr
-    assert reported.exit_code == (0 if "sensitivity" in place else 2)
+    assert reported.exit_code == (0 if "variations" in place else 2)

@@ -225,8 +225,7 @@ def test_report_of_a_folder_without_results_is_bad_input(tmp_path, name):
     assert not (tmp_path / name / "report.html").exists()
 
 
-def test_report_says_where_it_is_and_where_the_time_went(case, monkeypatch):
-    monkeypatch.setattr("exugear.report.mode_pictures.draw_mode", lambda scene, path: path.write_bytes(b""))
+def test_report_says_where_it_is_and_where_the_time_went(case):
     for variant in ("rigid", "bushing"):
         assert iso("modes", case, "--variant", variant).exit_code == 0
     outcome = exugear("report", case.parent / "out")

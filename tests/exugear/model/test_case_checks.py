@@ -20,6 +20,7 @@ from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
 
+from .. import gear_trains
 from ..assembled import assembled, modes_with_bodies
 from ..case_mutations import bases, toml_text
 
@@ -319,12 +320,12 @@ def test_two_bearings_without_tilt_stiffness_hold_a_shaft(case: Any) -> None:
 def test_variants_that_cannot_be_built_are_told_and_refused_before_anything_is_written(
     tmp_path: Path, cases: Any
 ) -> None:
-    content = changed(copy.deepcopy(cases[1]["spur"]), {"joints": {}})
+    content = changed(copy.deepcopy(cases[1]["spur"]), {"joints": {"joint_1": {"body": "shaft_1", "z_mm": 0.0}}})
     content["bearings"]["bearing_2"]["stiffness"] = {"radial_N_per_m": 1e8, "tilt_N_m_per_rad": 1e6}
     file = tmp_path / "case.toml"
     file.write_text(toml_text(content), encoding="utf-8")
     found = json.loads(exugear("check", file, "--json").stdout)["variants"]
-    assert found["rigid"] == "no joint holds shaft_1, shaft_2; add one under [joints]"
+    assert found["rigid"] == "no joint holds shaft_2; add one under [joints]"
     assert found["bushing"] == "body shaft_2 can move along z without resistance; add or stiffen a bearing"
     assert found["flexible"].startswith("no body is elastic")
     for variant, reason in found.items():
@@ -396,9 +397,36 @@ def test_each_fault_has_a_line_and_there_is_an_end_to_them(case: Any) -> None:
         "ste.positions = 50.0: must be a whole number, without quotes and decimal point",
     ]
     with pytest.raises(CaseError) as caught:
-        case("spur", gears={f"gear_{n}": {} for n in range(10)})
-    assert len(str(caught.value).splitlines()) == 21
-    assert str(caught.value).endswith("and 20 more faults")
+        case("spur", gears={f"gear_{n}": {} for n in range(40)})
+    assert len(str(caught.value).splitlines()) == 101
+    assert str(caught.value).endswith("and 60 more faults")
+
+
+def test_faults_that_have_nothing_to_do_with_each_other_are_told_at_once(tmp_path: Path) -> None:
+    """Of gears, joints and ends of the train; in the message, in JSON and in the error."""
+    content = gear_trains.planetary("ring")
+    content["gears"]["sun"]["profile_shift"] = 3.0
+    content["joints"]["sun"]["body"] = "nobody"
+    content["overall"]["output"] = "housing"
+    file = tmp_path / "case.toml"
+    file.write_text(toml_text(content), encoding="utf-8")
+    outcome = exugear("check", file, "--json")
+    assert outcome.exit_code == 2
+    faults = json.loads(outcome.stdout)["faults"]
+    told = ("gears.sun", "joints.sun", "overall.output")
+    assert all(any(f": {key}" in fault for fault in faults) for key in told), faults
+    assert all(fault in outcome.stderr for fault in faults)
+    with pytest.raises(CaseError) as caught:
+        Gearbox.from_toml(file)
+    assert list(caught.value.faults) == faults
+
+
+def test_a_seat_beside_its_shaft_makes_the_variant_flexible_impossible() -> None:
+    gearbox = Gearbox.from_dict(gear_trains.pair()).varied({"bodies.input.shape.start_z_mm": -20.0})
+    with pytest.raises(CaseError, match=r"bodies.input.shape: seat") as caught:
+        check_parts(gearbox)
+    assert lacking(gearbox, "flexible") in str(caught.value)
+    assert [lacking(gearbox, variant) for variant in ("rigid", "bushing")] == ["", ""]
 
 
 def test_faults_of_several_parts_are_told_together(case: Any) -> None:

@@ -124,7 +124,6 @@ def test_a_permitted_script_runs_once_and_never_for_a_report(scripted: tuple[Pat
     mark.unlink()
     # Its reduction is kept, so neither modes nor a report has to run it again.
     assert modes(case).exit_code == 0
-    monkeypatch.setattr("exugear.report.mode_pictures.draw_elastic_bodies", lambda scene, path: path.write_bytes(b""))
     outcome = exugear("report", out, EXUGEAR_ALLOW_SCRIPTS="1")
     assert outcome.exit_code == 0, outcome.stderr
     assert "Left out: flexible" not in outcome.stderr

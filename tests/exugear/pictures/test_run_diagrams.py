@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from exugear.pictures.run_diagrams import plot_order_levels, plot_waterfalls, pooled_levels
+from exugear.pictures.run_diagrams import plot_waterfalls, pooled_levels
 from exugear.spectra.orders import OrderLine
 from exugear.spectra.resonances import Pick
-from exugear.spectra.waterfall import Waterfall, line_level, waterfall
+from exugear.spectra.waterfall import Waterfall, waterfall
 
 RATE = 2048.0
 MESH, SECOND = OrderLine("mesh", 60.0), OrderLine("2 × mesh", 120.0)
@@ -100,18 +100,6 @@ def test_pooling_leaves_speeds_blank_that_the_run_does_not_reach():
     cells = pooled_levels(run(), 1000.0, 2 * FASTEST)
     half = cells.shape[1] // 2
     assert np.isfinite(cells[:, 5 : half - 5]).all() and np.isnan(cells[:, half + 5 :]).all()
-
-
-def test_order_levels_draw_every_run_on_every_line():
-    runs = {"soft": run(1e-6), "stiff": run(1e-7)}
-    figure = plot_order_levels(runs, [MESH, SECOND], marks={"soft": [pick(300.0, 0.0)]}, eigenfrequencies=[350.0])
-    first, second = figure.axes
-    frequency, level = first.lines[0].get_data()
-    np.testing.assert_allclose(frequency, 1e-3 * MESH.frequency(runs["soft"].speed))
-    np.testing.assert_array_equal(level, line_level(runs["soft"], MESH))
-    assert first.get_title(loc="left") == "order 60: mesh"
-    assert len(first.lines) == 4 and len(second.lines) == 3  # two runs, a mark on the first line, an eigenfrequency
-    assert figure.axes[-1].get_xlabel().endswith("0 dB = 1 µm")
 
 
 def test_run_diagrams_are_written(tmp_path):

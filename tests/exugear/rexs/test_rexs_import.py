@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 import re
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from exugear.bearings.rolling.designations import boundary_of
 from exugear.checks.readiness import lacking
 from exugear.cli.app import app
 from exugear.model.gearbox import Gearbox
@@ -19,6 +21,7 @@ from exugear.rexs.containers import read_rexs
 from exugear.rexs.faults import RexsError
 from exugear.rexs.parsing import parse_model
 from exugear.rexs.to_case.conversion import to_case
+from exugear.rexs.tree import Attribute
 
 DATA = Path(__file__).parent / "data"
 SEW = "SEW_3-stage_cylindrical_gearbox_1.0.rexs"
@@ -166,16 +169,49 @@ def test_all_containers_of_one_gearbox_give_the_same_case(imported):
     assert {**first, "name": ""} == {**second, "name": ""}
 
 
-def test_a_bearing_known_by_designation_only_is_a_blank_that_check_asks_for(imported):
-    gearbox = imported(INDUSTRIAL).gearbox
-    assert gearbox.unknown_bearings == {"bearing_1": "6210-2Z", "bearing_2": "33014", "bearing_3": "33012"}
-    assert "bearings.bearing_1 (6210-2Z)" in lacking(gearbox, "bushing")
+def test_a_bearing_known_by_designation_has_the_dimensions_of_its_standard(imported):
+    """6210: 50 x 90 x 20 mm by ISO 15; 33014: 70 x 110 x 31 and 33012: 60 x 95 x 27 mm by ISO 355."""
+    made = imported(INDUSTRIAL)
+    sizes = {
+        bearing.catalogue.designation: (
+            bearing.catalogue.type,
+            bearing.catalogue.bore_mm,
+            bearing.catalogue.outer_diameter_mm,
+            bearing.catalogue.width_mm,
+        )
+        for bearing in made.gearbox.bearings
+        if bearing.catalogue
+    }
+    assert sizes == {
+        "6210-2Z": ("deep_groove_ball", 50.0, 90.0, 20.0),
+        "33014": ("tapered_roller", 70.0, 110.0, 31.0),
+        "33012": ("tapered_roller", 60.0, 95.0, 27.0),
+    }
+    assert len([line for line in made.text.splitlines() if "# A   ISO " in line]) == 9
+    assert sum("by the designation" in line for line in made.changed) == 3
+    assert lacking(made.gearbox, "bushing") == ""
+
+
+def test_a_bearing_of_an_unknown_designation_is_a_blank_that_check_asks_for():
+    gearbox = edited(INDUSTRIAL, ("6210-2Z", "SPECIAL 7")).gearbox
+    assert gearbox.unknown_bearings == {"bearing_1": "SPECIAL 7"}
+    assert "bearings.bearing_1 (SPECIAL 7)" in lacking(gearbox, "bushing")
+    assert lacking(gearbox, "rigid") == ""
     sizes = {"type": "deep_groove_ball", "bore_mm": 50.0, "outer_diameter_mm": 90.0, "width_mm": 20.0}
     filled = gearbox.varied({"bearings.bearing_1.catalogue": sizes})
-    assert set(filled.unknown_bearings) == {"bearing_2", "bearing_3"}
-    assert {bearing.name for bearing in filled.bearings} - {bearing.name for bearing in gearbox.bearings} == {
-        "bearing_1"
-    }
+    assert not filled.unknown_bearings
+
+
+def test_dimensions_of_designations_are_those_of_another_program(imported):
+    """The SEW file gives dimensions, and designations in the names of its bearings."""
+    found = 0
+    for part in read_rexs(DATA / SEW).of_type("rolling_bearing_with_catalog_geometry"):
+        boundary = boundary_of(part.name.split()[1])
+        assert boundary is not None, part
+        stated = [part.quantity(key, "mm") for key in ("inner_diameter", "outer_diameter", "width")]
+        assert [boundary.bore, boundary.outer, boundary.width] == stated
+        found += 1
+    assert found == 9
 
 
 def test_load_cases_are_those_of_the_spectrum_in_balance(imported):
@@ -204,16 +240,49 @@ def test_an_absurd_tip_diameter_is_replaced_by_that_of_the_rack_and_marked(impor
     )
 
 
-def test_teeth_that_the_model_cannot_have_are_replaced_and_marked(imported):
+def test_undercut_is_imported_as_it_is(imported):
     """A rack of 1.25 with 0.25 undercuts 17 teeth: x_min = 1.25 - 0.25 (1 - sin 20) - 17/2 sin^2 20 = 0.0912 > 0."""
     made = imported(PLANETARY)
-    assert any("undercut by its tool of tip radius 0.25" in line for line in made.changed)
-    assert made.gearbox.gears["sun"].rack.tip_radius == pytest.approx(
-        (1.25 - 8.5 * math.sin(math.radians(20.0)) ** 2) / (1.0 - math.sin(math.radians(20.0))), abs=3e-4
-    )
-    ring = made.gearbox.gears["ring"]
+    sun = made.gearbox.gears["sun"]
+    assert (sun.rack.tip_radius, sun.rack.dedendum, sun.profile_shift) == (0.25, 1.25, 0.0)
+    assert sun.is_undercut
+    pair = made.gearbox.pairs["sun_planet"].pair
+    assert pair.path_start > sun.form_roll_length  # the planet's tip does not reach down to it
+    assert any("undercut by its tool; its flank begins at a diameter of 63.9" in line for line in made.checked)
+
+
+def test_a_chamfer_ends_the_flank_of_the_ring_before_the_fillet_of_its_planets(imported):
+    """Both files have a ring tip of 236 mm; only the one with a chamfer of 0.5 mm clears the planets' form circle."""
+    bare = imported(PLANETARY)
+    ring = bare.gearbox.gears["ring"]
     assert 236.5e-3 < 2.0 * ring.tip_radius < 238e-3  # the form circle of the planet ends it at 236.52
-    assert re.search(r"tip_diameter_mm = 23\d\.\d*\s+# A ", made.text)
+    assert re.search(r"tip_diameter_mm = 23\d\.\d*\s+# A ", bare.text)
+    chamfered = imported("FVA_Planetary_stage_-_Minus_gearing_1.1_vers2.rexsj").gearbox.gears["ring"]
+    assert 2.0 * chamfered.tip_radius == pytest.approx(236e-3, rel=1e-12)
+    assert 2.0 * chamfered.tip_form_radius == pytest.approx(237e-3, rel=1e-12)
+
+
+def test_a_common_face_that_is_narrower_than_both_faces_is_kept():
+    """The first stage of the SEW gearbox: faces of 16 and 11 mm."""
+    text = '<attribute id="center_distance" unit="mm">53.0</attribute>'
+    narrow = '<attribute id="common_face_width" unit="mm">9.0</attribute>'
+    pair = edited(SEW, (text, text + narrow)).gearbox.pairs["stage_1"].pair
+    assert pair.face_width == pytest.approx(9e-3)
+    assert edited(SEW, (text, text + narrow.replace("9.0", "11.0"))).gearbox.pairs["stage_1"].pair.face_width == 11e-3
+
+
+def test_a_gear_that_stands_aside_touches_over_what_the_faces_share():
+    """The wheel moved by 5 mm along its shaft: 16 and 11 mm wide faces then share 8.5 mm."""
+    model = read_rexs(DATA / SEW)
+    places = {part.number: part.vector("support_vector") for part in model.of_type("cylindrical_gear")}
+    pinion, wheel = (to_case(model, SEW).found.teeth.stages["stage_1"].__dict__[key] for key in ("pinion", "gear"))
+    apart = places[wheel][0] - places[pinion][0]
+    moved = Attribute(tuple(map(str, (places[pinion][0] + 5.0, *places[wheel][1:]))), "mm")
+    components = {**model.components}
+    components[wheel] = components[wheel].with_attributes({"support_vector": moved})
+    pair = to_case(dataclasses.replace(model, components=components), SEW).gearbox.pairs["stage_1"].pair
+    assert abs(apart) <= 2.5  # as it is, the narrow face lies within the wide one
+    assert pair.face_width == pytest.approx((8.0 + 5.5 - 5.0) * 1e-3)
 
 
 def test_inertia_is_that_of_sections_and_gears(imported):

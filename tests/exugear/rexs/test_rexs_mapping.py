@@ -228,7 +228,7 @@ def test_a_tapered_bearing_with_dimensions_holds_the_way_it_says(absorbed, towar
     catalogue = gearbox.case.bearings["bearing_2"].catalogue
     assert catalogue.type == "tapered_roller"
     assert catalogue.holds_towards == towards
-    assert set(gearbox.unknown_bearings) == {"bearing_1", "bearing_3"}
+    assert (catalogue.bore_mm, catalogue.outer_diameter_mm, catalogue.width_mm) == (70.0, 110.0, 31.0)
 
 
 def test_a_bearing_of_a_kind_without_law_is_a_blank_with_its_name():

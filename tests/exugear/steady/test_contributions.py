@@ -52,26 +52,66 @@ def test_a_peak_is_loudest_where_it_is_said_to_be(gearset, peak):
     assert here > max(beside)
 
 
-def test_the_derivative_by_a_bearing_is_that_of_a_gearbox_with_a_stiffer_one(grc, stiffness, gearset, peak):
-    """Half a per mille stiffer and softer, in the mean system alone; static states move by as little."""
+def amplitude_with(other, gearset, peak):
+    """Amplitude of the line with the mean system of another gearset, the excitation staying as it is."""
     speed, line = peak
-    frequency = speed * gearset.lines.orders[line]
-    derivative = contributions(gearset, speed, line).supports
+    interface = gearset.at(speed)
+    loads = gearset.loads(interface.ports) @ transmission_errors(gearset, interface)[line, :, 0]
+    dynamic = other.system.dynamic(speed, speed * gearset.lines.orders[line])
+    return abs(gearset.row_of_overall(speed) @ np.linalg.solve(dynamic, loads))
+
+
+def slope(more, less, step):
+    return (more - less) / (step * (more + less))
+
+
+STEP = 5e-4
+"""Share by which a parameter is raised and lowered; static states move by as little."""
+
+
+def test_the_derivative_by_a_bearing_is_that_of_a_gearbox_with_a_stiffer_one(gearset, peak):
+    derivative = contributions(gearset, *peak).supports
     family = max(derivative, key=lambda name: abs(derivative[name]))
-    assembly, step = gearset.waves.assembly, 5e-4
+    assembly = gearset.waves.assembly
     own = [support.family == family for support in assembly.supports]
     amplitudes = []
     for sign in (1.0, -1.0):
-        factor = np.where(own, 1.0 + sign * step, 1.0)[:, None, None]
+        factor = np.where(own, 1.0 + sign * STEP, 1.0)[:, None, None]
         arrays = assembly.connectors
         changed = replace(
             assembly, connectors=arrays._replace(stiffness=factor * arrays.stiffness, damping=factor * arrays.damping)
         )
-        other = gearset_of(changed, RANGE)
-        system = other.system
-        dynamic = system.stiffness_at(speed) - frequency**2 * system.mass + 1j * frequency * system.damping_at(speed)
+        amplitudes.append(amplitude_with(gearset_of(changed, RANGE), gearset, peak))
+    assert derivative[family] == pytest.approx(slope(*amplitudes, STEP), rel=0.02, abs=0.02)
+
+
+@pytest.mark.parametrize("family", ["hss", "lss", "planet", "carrier"])
+def test_the_derivative_by_inertia_is_that_of_a_gearbox_with_a_heavier_body(grc, stiffness, gearset, peak, family):
+    """Mass, both moments of inertia and with them the gyroscopic terms; the latter are left out of the derivative."""
+    section = grc.content["bodies"][family]["inertia"]["assemblies"]
+    keys = ("mass_kg", "axial_kg_m2", "transverse_kg_m2")
+    amplitudes = []
+    for sign in (1.0, -1.0):
+        changes = {f"bodies.{family}.inertia.assemblies.{key}": (1.0 + sign * STEP) * section[key] for key in keys}
+        other = gearset_of(assemble(grc.varied(changes), Choice("bushing"), stiffness), RANGE)
+        amplitudes.append(amplitude_with(other, gearset, peak))
+    derivative = contributions(gearset, *peak).bodies[family]
+    assert derivative == pytest.approx(slope(*amplitudes, STEP), rel=0.02, abs=0.02)
+
+
+def test_the_derivative_by_a_mesh_error_is_its_share(grc, stiffness, gearset, peak):
+    """What varies of one pair's compliance a little more and less: its transmission error, with the mean kept."""
+    speed, line = peak
+    shares = contributions(gearset, speed, line).meshes
+    family = max(shares, key=lambda name: abs(shares[name]))
+    amplitudes = []
+    for sign in (1.0, -1.0):
+        compliance = 1.0 / stiffness[family]
+        own = 1.0 / (compliance.mean() + (1.0 + sign * STEP) * (compliance - compliance.mean()))
+        other = gearset_of(assemble(grc, Choice("bushing"), {**stiffness, family: own}), RANGE)
+        forces = transmission_errors(other, other.at(speed))[line, :, 0]
         interface = gearset.at(speed)
-        loads = gearset.loads(interface.ports) @ transmission_errors(gearset, interface)[line, :, 0]
+        dynamic = gearset.system.dynamic(speed, speed * gearset.lines.orders[line])
+        loads = gearset.loads(interface.ports) @ forces
         amplitudes.append(abs(gearset.row_of_overall(speed) @ np.linalg.solve(dynamic, loads)))
-    difference = (amplitudes[0] - amplitudes[1]) / (2.0 * step * np.mean(amplitudes))
-    assert derivative[family] == pytest.approx(difference, rel=0.02, abs=0.02)
+    assert shares[family] == pytest.approx(slope(*amplitudes, STEP), rel=0.02)

@@ -1,0 +1,168 @@
+"""The verb `life`: how long gears and bearings last under the loads of section ``loads``, and what limits them."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import TYPE_CHECKING
+
+from exugear.cli.case import make_results_folder, open_project
+from exugear.cli.console import note, print_json, print_table, progress_bar, say
+from exugear.cli.dynamics import reduce_elastic_bodies
+from exugear.cli.errors import exit_codes, interruption, model_errors
+from exugear.cli.options import (
+    USUAL_LAW,
+    CaseArgument,
+    FilesBelowOption,
+    InertiasOption,
+    JsonOption,
+    LawOption,
+    OutOption,
+    ScriptsOption,
+    Variant,
+    VariantOption,
+)
+from exugear.cli.tables import compute_tables
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from exugear.project import Project
+
+SHOWN_LIMITS = 8
+
+
+def life(
+    case: CaseArgument,
+    variant: VariantOption = Variant.bushing,
+    mesh_law: LawOption = USUAL_LAW,
+    inertias: InertiasOption = None,
+    out: OutOption = None,
+    files_below: FilesBelowOption = None,
+    scripts: ScriptsOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Rate gears and bearings under the loads of section ``loads``: damages, safety factors, lives, what limits.
+
+    Tables that are missing or do not fit the case are computed first.
+    """
+    with exit_codes():
+        from exugear.life.life import checked_loads
+        from exugear.life.life_diagrams import draw_life
+        from exugear.life.life_file import summary
+        from exugear.model.choice import Choice
+
+        project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
+        with model_errors():
+            checked_loads(project.gearbox)
+        make_results_folder(project.folder)
+        project.keep_case()
+        with model_errors():
+            requests = project.life_tables()
+        compute_tables(requests)
+        reduce_elastic_bodies(project)
+        data = _rate(project)
+        picture = project.life_path.with_suffix(".png")
+        draw_life(data, picture)
+        if as_json:
+            print_json({"case": str(case), **summary(data), "file": str(project.life_path)})
+            return
+        _tell(data)
+        say(f"Life in {project.life_path}, tables with commas and a picture beside it")
+
+
+def _rate(project: Project) -> xr.Dataset:
+    """Rate behind a progress bar, or find what is kept."""
+    with progress_bar() as bar:
+        task = bar.add_task(f"{project.choice.variant}: stresses of pairs", total=None)
+
+        def begin(pair: str) -> None:
+            interruption.check()
+            bar.update(task, description=f"{pair}: root stress by finite elements")
+
+        def show(done: int, total: int) -> None:
+            interruption.check()
+            bar.update(task, completed=done, total=total, description=f"{project.choice.variant}: static balance")
+
+        with model_errors():
+            return project.life(begin, show)
+
+
+def _tell(data: xr.Dataset) -> None:
+    from exugear.life.life_file import limits
+
+    if data.sizes["flank"]:
+        print_table("Flanks: largest contact stress of the life, safety against pitting", _contact_rows(data))
+        print_table("Roots: largest stress of the life, safety against breakage", _root_rows(data))
+    if data.sizes["bearing"]:
+        print_table("Bearings: basic rating life, static safety", _bearing_rows(data))
+    worst = [one for one in limits(data) if one[2] > 0.0][:SHOWN_LIMITS]
+    if worst:
+        rows = [{"limits": part, "by": kind, "damage": f"{damage:.3g}"} for part, kind, damage in worst]
+        print_table(f"What limits the life of {float(data.attrs['life_years']):g} years", rows)
+    for key in ("assumptions", "unrated"):
+        for line in json.loads(data.attrs[key]):
+            note(line, style="yellow" if key == "unrated" else "")
+
+
+def _contact_rows(data: xr.Dataset) -> list[dict[str, str]]:
+    return [
+        {
+            "gear, flank, mesh": label,
+            "sigma_H\nMPa": _told(1e-6 * value("contact_stress"), ".0f"),
+            "ISO\nMPa": _told(1e-6 * value("nominal_contact"), ".0f"),
+            "outside\n%": _told(100.0 * value("outside"), ".1f"),
+            "K_Hb": _told(value("face_load"), ".3f"),
+            "damage": _told(value("contact_damage"), ".3g"),
+            "S_H": _told(value("contact_safety"), ".2f"),
+        }
+        for label, value in _entries(data, "flank")
+    ]
+
+
+def _root_rows(data: xr.Dataset) -> list[dict[str, str]]:
+    return [
+        {
+            "gear, flank, mesh": label,
+            "sigma_F\nMPa": _told(1e-6 * value("root_stress"), ".0f"),
+            "ISO\nMPa": _told(1e-6 * value("nominal_root"), ".0f"),
+            "least\nMPa": _told(1e-6 * value("compression"), ".0f"),
+            "damage": _told(value("root_damage"), ".3g"),
+            "S_F": _told(value("root_safety"), ".2f"),
+            "static\nS_H": _told(value("contact_static"), ".2f"),
+            "static\nS_F": _told(value("root_static"), ".2f"),
+        }
+        for label, value in _entries(data, "flank")
+    ]
+
+
+def _bearing_rows(data: xr.Dataset) -> list[dict[str, str]]:
+    return [
+        {
+            "bearing": label,
+            "largest\nkN": _told(1e-3 * value("largest_load"), ".4g"),
+            "equivalent\nkN": _told(1e-3 * value("equivalent"), ".4g"),
+            "L10\nh": _told(value("basic_hours"), ".3g"),
+            "L10r\nh": _told(value("reference_hours"), ".3g"),
+            "damage\nL10r": _told(value("reference_damage"), ".3g"),
+            "pressure\nMPa": _told(1e-6 * value("pressure"), ".0f"),
+            "S_0": _told(value("static_safety"), ".2f"),
+        }
+        for label, value in _entries(data, "bearing")
+    ]
+
+
+def _entries(data: xr.Dataset, name: str) -> Iterator[tuple[str, Callable[[str], float]]]:
+    """Label of each part, and what gives its figures by their keys."""
+    for place, label in enumerate(data[name].to_numpy().tolist()):
+        yield label, partial(_figure, data, name, place)
+
+
+def _figure(data: xr.Dataset, name: str, place: int, key: str) -> float:
+    return float(data[f"{name}_{key}"][place])
+
+
+def _told(value: float, form: str) -> str:
+    return "" if math.isnan(value) else "none" if math.isinf(value) else format(value, form)

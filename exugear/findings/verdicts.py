@@ -1,0 +1,120 @@
+"""Can this be trusted: checks that were passed, and things to mind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from exugear.dynamics.signals import BALANCE_TERMS, MESH_TIMES, energy_residual
+from exugear.findings.context import Context
+from exugear.findings.groups import RunGroup
+from exugear.findings.words import VARIANTS, figure_text
+from exugear.model.parts import RPM
+from exugear.results.run_file import load_run
+from exugear.runs.trust import verdict_of
+from exugear.spectra.run_spectra import VariantRun
+
+LOUDEST = 10
+"""Loudest resonances that checks look at."""
+ENERGY = 1e-3
+"""Share of energy that may be unaccounted for."""
+MATCHED = 0.8
+"""Least share of the loudest resonances that should match a mode."""
+BEYOND_RATED = 1.3
+"""Speed over the rated one from which a sweep is said to go beyond it."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A check that was passed, or a thing to mind.
+
+    Attributes
+    ----------
+    passed : bool
+    words : str
+    """
+
+    passed: bool
+    words: str
+
+    @property
+    def line(self) -> str:
+        """As a line of text."""
+        return f"{'Passed' if self.passed else 'Mind'}: {self.words}"
+
+
+@dataclass(frozen=True)
+class RunFigures:
+    """Figures that tell of one run's quality.
+
+    Attributes
+    ----------
+    residual : float
+        Share of energy that is not accounted for.
+    times : tuple of float
+        Longest pull of a mesh, longest time that teeth are apart, longest time outside a table, s.
+    end : float
+        Simulated time, s.
+    """
+
+    residual: float
+    times: tuple[float, ...]
+    end: float
+
+
+def run_figures(run: VariantRun) -> RunFigures:
+    """Read the figures of a run."""
+    data = load_run(run.path, ("time", *MESH_TIMES, *BALANCE_TERMS))
+    times = tuple(float(np.max(data[name].to_numpy(), initial=0.0)) for name in MESH_TIMES)
+    return RunFigures(energy_residual(data), times, float(data["time"][-1]))
+
+
+def verdicts_of(context: Context, group: RunGroup, figures: RunFigures) -> tuple[Verdict, ...]:
+    """Judge the main variant of a group; what was passed comes first."""
+    case = context.gearbox.case
+    run = group.runs[group.main]
+    verdicts = [*_of_run(run, figures), *_of_resonances(group)]
+    verdicts.append(
+        Verdict(False, f"damping is assumed (meshes {1e6 * case.damping.mesh_time_s:g} µs): levels are only as good")
+    )
+    sets = context.gearbox.inertia_sets
+    if len(sets) > 1:
+        verdicts.append(Verdict(False, f"inertias are one of {len(sets)} sets ({', '.join(sets)}): see the others"))
+    rated, fastest = case.operation.rated_speed_rpm, float(run.spectra.speed.max()) / RPM
+    if rated is None:
+        verdicts.append(Verdict(False, "the case names no rated speed ([operation] rated_speed_rpm)"))
+    elif fastest > BEYOND_RATED * rated:
+        verdicts.append(Verdict(False, f"the sweep goes to {figure_text(fastest / rated, 2)} times the rated speed"))
+    return tuple(sorted(verdicts, key=lambda own: not own.passed))
+
+
+def _of_run(run: VariantRun, figures: RunFigures) -> list[Verdict]:
+    residual, (pulling, apart, outside) = abs(figures.residual), figures.times
+    verdicts = [Verdict(residual < ENERGY, f"energy adds up to {residual:.0e}")]
+    doubtful = verdict_of(run.attributes)
+    if doubtful:
+        verdicts.append(Verdict(False, f"the run is not to be trusted: {doubtful}"))
+    if pulling > 0.0:
+        verdicts.append(Verdict(False, f"teeth had to pull for {figure_text(pulling)} s: they would have parted"))
+    if apart > 0.0:
+        verdicts.append(Verdict(True, f"teeth were apart for {figure_text(apart)} s, and the law knows it"))
+    if not pulling and not apart:
+        verdicts.append(Verdict(True, f"no tooth had to pull, {VARIANTS[run.variant]}"))
+    if outside > 0.0:
+        verdicts.append(Verdict(False, f"a mesh was outside its table for {figure_text(outside)} s"))
+    if not int(run.attributes["complete"]):
+        verdicts.append(Verdict(False, f"the run was stopped at {figure_text(figures.end)} s"))
+    return verdicts
+
+
+def _of_resonances(group: RunGroup) -> list[Verdict]:
+    loudest = group.ranked[group.main][:LOUDEST]
+    if not loudest:
+        return []
+    count, steady = len(loudest), sum(own.steady for own in loudest)
+    verdicts = [Verdict(steady == count, f"{steady} of the {count} loudest stay with windows of other lengths")]
+    if group.runs[group.main].modes is None:
+        return [*verdicts, Verdict(False, "no modes were computed (exugear modes): nothing tells what moves")]
+    matched = sum(own.finding.mode is not None for own in loudest)
+    return [*verdicts, Verdict(matched >= MATCHED * count, f"{matched} of the {count} loudest match an eigenmode")]

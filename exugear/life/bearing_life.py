@@ -1,0 +1,225 @@
+"""Life of rolling bearings under a load duration distribution: L10 of ISO 281, L10r of ISO/TS 16281, static safety.
+
+Both are basic: lubricant, cleanliness, ribs and cages are left out. Loads are those of the static balance; each turn
+meets each angle of the carrier once.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from exugear.bearings.duty import Ratings, loads_of_rows, ratings_of
+from exugear.bearings.operating_point import cage_angles
+from exugear.bearings.rolling.catalogue import catalogue_rows
+from exugear.bearings.rolling.contact import BearingState, equilibrium
+from exugear.bearings.rolling.life import basic_rating_life, minimum_load, reference_life
+from exugear.bearings.rolling.ratings import equivalent_load, equivalent_static_load
+from exugear.bearings.rolling.rows import BearingError, BearingOfRows, RollerRow, RollingRow
+from exugear.life.acting_loads import ActingLoads
+from exugear.life.static_balance import StaticBalance
+from exugear.model.parts import Bearing
+from fe_ste.tools.arrays import Floats
+
+LAMINAE = 40
+"""Slices of a roller for its loads; 60 change the life by 0.1 %."""
+LOAD_SHARES = (0.15, 0.3, 0.5, 0.7, 0.85, 1.0)
+"""Loads over the largest at which roller loads are solved; lives between them are straight in logarithms."""
+LARGEST_PRESSURE = 4000e6
+"""Contact stress of roller bearings at their static rating, Pa (ISO 76:2006)."""
+
+
+@dataclass(frozen=True)
+class BearingLife:
+    """What a bearing bears over the life of the gearbox.
+
+    Attributes
+    ----------
+    name : str
+    revolutions : float
+        Of its rings against each other in the life.
+    largest_load : float
+        Radial, N, extremes with their partial factors among them.
+    equivalent : float
+        Constant equivalent load of the same damage by ISO 281, N.
+    damage, basic_hours : float
+        Miner's sum, and hours of operation until it is one, by L10.
+    reference_damage, reference_hours : float
+        The same by L10r; NaN where no balance of the rollers was found.
+    pressure : float
+        Largest of rollers or balls under the largest load, Pa; NaN likewise.
+    static_safety : float
+        C_0r over the largest static equivalent load.
+    ratings : Ratings
+    remarks : tuple of str
+    by_bin : array (bins,)
+        Parts of the damage by bin of torque, by L10r, or by L10 where there is none.
+    """
+
+    name: str
+    revolutions: float
+    largest_load: float
+    equivalent: float
+    damage: float
+    basic_hours: float
+    reference_damage: float
+    reference_hours: float
+    pressure: float
+    static_safety: float
+    ratings: Ratings
+    remarks: tuple[str, ...]
+    by_bin: Floats
+
+
+def bearing_lives(
+    supports: tuple[Bearing, ...],
+    turns: Mapping[str, float],
+    acting: ActingLoads,
+    balance: StaticBalance,
+) -> tuple[BearingLife, ...]:
+    """Rate all bearings that turn and have catalogue data.
+
+    Parameters
+    ----------
+    supports : tuple of Bearing
+        In the order of the balance.
+    turns : mapping of bearing name to float
+        Revolutions per revolution of the loaded body.
+    acting : ActingLoads
+    balance : StaticBalance
+    """
+    lives = []
+    for number, support in enumerate(supports):
+        if support.catalogue is None or not turns.get(support.name, 0.0):
+            continue
+        case = _Case(support, acting, balance, number)
+        lives.append(case.life(turns[support.name]))
+    return tuple(lives)
+
+
+@dataclass(frozen=True)
+class _Case:
+    """One bearing, and its number among those of the balance."""
+
+    support: Bearing
+    acting: ActingLoads
+    balance: StaticBalance
+    number: int
+
+    def life(self, turns: float) -> BearingLife:
+        points, carried = self.acting.points, self.balance.bearing_load.of(self.number)
+        loads = self.balance.at(carried, points.torque, points.other)
+        worst = np.concatenate([self.balance.at(carried, *self.acting.worst(sense)) for sense in (1, -1)])
+        section = self.support.catalogue
+        assert section is not None
+        rows = tuple(_sliced(row) for row in catalogue_rows(section))
+        ratings = ratings_of(section)
+        revolutions = points.revolutions * turns
+        share = revolutions[:, None] / loads.shape[1]
+        radial = np.hypot(loads[..., 0], loads[..., 1])
+        equivalents = np.vectorize(
+            lambda side, axial: equivalent_load(rows, section.type, side, abs(axial), ratings.static)
+        )(radial, loads[..., 2])
+        basic = np.vectorize(lambda load: basic_rating_life(ratings.dynamic, load, section.type))(equivalents)
+        by_bin = np.sum(share / (1e6 * basic), axis=1)
+        damage = float(by_bin.sum())
+        lives, pressure, remarks = self._reference(rows, ratings, loads, revolutions, worst)
+        reference = math.nan
+        if lives is not None:
+            by_bin = np.sum(share / (1e6 * _interpolated(lives, radial)), axis=1)
+            reference = float(by_bin.sum())
+        static = max(
+            equivalent_static_load(rows, section.type, math.hypot(one[0], one[1]), abs(one[2]))
+            for one in worst.reshape(-1, 6)
+        )
+        largest = float(np.hypot(worst[..., 0], worst[..., 1]).max())
+        if largest < minimum_load(ratings.dynamic, section.type):
+            remarks.append(f"carries {1e-3 * largest:.3g} kN at most, below the usual least load: elements may slide")
+        if ratings.estimated:
+            remarks.append("ratings estimated from its dimensions")
+        exponent = 10.0 / 3.0 if section.type.endswith("_roller") else 3.0
+        total, hours = float(revolutions.sum()), float(points.hours.sum())
+        return BearingLife(
+            name=self.support.name,
+            revolutions=total,
+            largest_load=largest,
+            equivalent=ratings.dynamic * (1e6 * damage / total) ** (1.0 / exponent) if total else 0.0,
+            damage=damage,
+            basic_hours=hours / damage if damage else math.inf,
+            reference_damage=reference,
+            reference_hours=hours / reference if reference else math.inf,
+            pressure=pressure,
+            static_safety=ratings.static / static if static else math.inf,
+            ratings=ratings,
+            remarks=tuple(remarks),
+            by_bin=self.acting.by_bin(by_bin),
+        )
+
+    def _reference(
+        self, rows: tuple[RollingRow, ...], ratings: Ratings, loads: Floats, revolutions: Floats, worst: Floats
+    ) -> tuple[tuple[Floats, Floats] | None, float, list[str]]:
+        """L10r (millions of revolutions) over radial load (N), the largest pressure (Pa), and remarks.
+
+        Direction, axial load and tilt keep the proportions that they have at the load and angle nearest to the mean of
+        the fourth power over the revolutions.
+        """
+        size = np.hypot(loads[..., 0], loads[..., 1])
+        mean = np.average(np.mean(size**4.0, axis=1), weights=revolutions) ** 0.25
+        t, a = np.unravel_index(int(np.abs(size - mean).argmin()), size.shape)
+        points = self.acting.points
+        tilts = self.balance.at(
+            self.balance.bearing_tilt.of(self.number), points.torque[t : t + 1], points.other[t : t + 1]
+        )
+        load, tilt, top = loads[t, a], tilts[0, a], np.hypot(worst[..., 0], worst[..., 1]).max()
+        if not size[t, a]:
+            return None, math.nan, ["carries nothing"]
+        holds_axially = any(row.contact_angle for row in rows) or not isinstance(rows[0], RollerRow)
+        remarks = []
+        if not holds_axially and abs(load[2]) > 0.01 * size[t, a]:
+            remarks.append(f"ribs carry up to {1e-3 * abs(load[2]):.3g} kN, which no life counts")
+        solved = []
+        for share in LOAD_SHARES:
+            factor = share * float(top) / size[t, a]
+            force = factor * load[:3] * np.array([1.0, 1.0, float(holds_axially)])
+            try:
+                life, pressure = self._life_at(rows, ratings, force, factor * tilt)
+            except BearingError as error:
+                return None, math.nan, [*remarks, f"no L10r: {error}"]
+            solved.append((share * float(top), life))
+        radial, lives = np.array(solved).T
+        return (radial, lives), pressure, remarks
+
+    def _life_at(
+        self, rows: tuple[RollingRow, ...], ratings: Ratings, force: Floats, tilt: Floats
+    ) -> tuple[float, float]:
+        """L10r in millions of revolutions, and the largest pressure (Pa), under a force (N) and a tilt (rad)."""
+        section = self.support.catalogue
+        assert section is not None
+        bearing = BearingOfRows(rows)
+        states: list[BearingState] = [
+            equilibrium(bearing, force, tilt=tilt, first_roller_angle=angle) for angle in cage_angles(rows, 0.0)
+        ]
+        life = reference_life(
+            rows,
+            [np.concatenate(loads) for loads in zip(*map(loads_of_rows, states), strict=True)],
+            section.type,
+            dynamic_rating=ratings.dynamic,
+            inner_ring_turns_against_load=not self.support.carries_outer_ring,
+        )
+        return life, max(float(state.element_pressure.max()) for state in states)
+
+
+def _sliced(row: RollingRow) -> RollingRow:
+    return replace(row, laminae=LAMINAE) if isinstance(row, RollerRow) else row
+
+
+def _interpolated(lives: tuple[Floats, Floats], radial: Floats) -> Floats:
+    """Lives at radial loads, straight in logarithms; below the least load by its slope."""
+    x, y = np.log(lives[0]), np.log(lives[1])
+    with np.errstate(divide="ignore"):
+        at = np.log(radial)
+    slope = (y[1] - y[0]) / (x[1] - x[0])
+    return np.exp(np.where(at < x[0], y[0] + slope * (at - x[0]), np.interp(at, x, y)))

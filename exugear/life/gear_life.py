@@ -1,0 +1,275 @@
+"""Life of gears by ISO 6336:2006 with stresses of finite-element contact: Miner sums and safety factors by flank.
+
+Load sharing, misalignment and the load along face and profile are in the stresses; K_gamma is in the forces of the
+static balance, each planet and angle by its own share; K_v alone is a factor. So none counts twice. Contact stress is
+that of line loads inside the path of contact, root stress that of gauges on the closed ring.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from exugear.life.acting_loads import ActingLoads
+from exugear.life.dynamic_factor import DynamicFactor
+from exugear.life.static_balance import StaticBalance
+from exugear.load_spectrum.exposure import FLANKS, ToothExposure
+from exugear.model.gearbox import Gearbox
+from exugear.model.sections.loads import RatingSection, StrengthSection
+from fe_ste.geometry.gears import GearPair
+from fe_ste.root_stress.mesh_cycle import MeshCycleStress
+from fe_ste.standards.pitting import (
+    lubricant_factor,
+    nominal_contact_stress,
+    reduced_radius,
+    roughness_factor,
+    tangential_force,
+    velocity_factor,
+)
+from fe_ste.standards.service_life import (
+    CASE_HARDENED_BENDING,
+    CASE_HARDENED_CONTACT,
+    LifeCurve,
+    damages,
+    safety_factor,
+)
+from fe_ste.standards.tooth_root import root_stress_factors
+from fe_ste.tools.arrays import Floats
+
+PLAIN_TEST_GEAR = 2.0
+"""Y_ST: stress correction of the test gears that sigma_F_lim belongs to (ISO 6336-3)."""
+
+
+@dataclass(frozen=True)
+class FlankLife:
+    """What one flank of a gear's teeth, and the root below it, bear in one family of meshes.
+
+    Attributes
+    ----------
+    gear, family, flank : str
+        Flank ``+`` faces the sense of +z rotation.
+    cycles : float
+        In the life.
+    contact_stress, root_stress : float
+        Largest of the life, K_v in them, Pa.
+    compression : float
+        Least principal stress of the root, Pa.
+    contact_damage, root_damage : float
+        Miner's sums; NaN without strength.
+    contact_safety, root_safety : float
+        Factors on stress at which they are one; NaN without strength.
+    contact_static, root_static : float
+        Safety under the largest load, extremes with their partial factors among them; NaN without strength.
+    nominal_contact, nominal_root : float
+        sigma_H0 of ISO 6336-2 and sigma_F0 of ISO 6336-3 at the largest load, for comparison; NaN for roots of rings.
+    outside : float
+        Largest share of the load outside the path of contact: what tip relief would take away.
+    face_load : float
+        Highest over mean line load along the face at the largest load.
+    contact_by_bin, root_by_bin : array (bins,)
+        Parts of the damages by bin of torque; NaN without strength.
+    """
+
+    gear: str
+    family: str
+    flank: str
+    cycles: float
+    contact_stress: float
+    root_stress: float
+    compression: float
+    contact_damage: float
+    root_damage: float
+    contact_safety: float
+    root_safety: float
+    contact_static: float
+    root_static: float
+    nominal_contact: float
+    nominal_root: float
+    outside: float
+    face_load: float
+    contact_by_bin: Floats
+    root_by_bin: Floats
+
+
+def check_strengths(
+    gearbox: Gearbox, rating: RatingSection, teeth: Sequence[ToothExposure], reversed_too: bool
+) -> None:
+    """Refuse strengths of unknown gears, and gears that bend both ways without Y_M.
+
+    Raises
+    ------
+    CaseError
+    """
+    for name, strength in rating.gears.items():
+        flanks = {one.flank for one in teeth if one.gear == name}
+        if not flanks:
+            known = ", ".join(sorted({one.gear for one in teeth}))
+            raise gearbox.fault(f"rating.gears.{name}: no gear of that name in a mesh; gears are {known}")
+        if (len(flanks) > 1 or reversed_too) and strength.mean_stress_factor is None:
+            raise gearbox.fault(
+                f"rating.gears.{name}.mean_stress_factor: this key is missing; teeth of {name} bend both ways"
+            )
+
+
+def flank_lives(
+    gearbox: Gearbox,
+    rating: RatingSection,
+    teeth: Sequence[ToothExposure],
+    acting: ActingLoads,
+    balance: StaticBalance,
+    stresses: Mapping[str, MeshCycleStress],
+    dynamic: Mapping[str, DynamicFactor],
+) -> tuple[FlankLife, ...]:
+    """Rate all gears of pairs whose stresses are known.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    rating : RatingSection
+    teeth : sequence of ToothExposure
+    acting : ActingLoads
+    balance : StaticBalance
+    stresses : mapping of pair name to MeshCycleStress
+    dynamic : mapping of mesh family to DynamicFactor
+    """
+    pairs = {mesh.family: mesh.pair for mesh in gearbox.meshes}
+    lives = []
+    for tooth in teeth:
+        pair = pairs[tooth.family]
+        if pair.name not in stresses:
+            continue
+        for sense in (1, -1):
+            if np.any(acting.torques * sense > 0.0):
+                case = _Case(gearbox, rating, tooth, pair, balance, stresses[pair.name], dynamic[tooth.family], sense)
+                lives.append(case.life(acting))
+    return tuple(lives)
+
+
+@dataclass(frozen=True)
+class _Case:
+    """One tooth in one family of meshes under torques of one sense."""
+
+    gearbox: Gearbox
+    rating: RatingSection
+    tooth: ToothExposure
+    pair: GearPair
+    balance: StaticBalance
+    stress: MeshCycleStress
+    dynamic: DynamicFactor
+    sense: int
+
+    def life(self, acting: ActingLoads) -> FlankLife:
+        tooth, stress, points = self.tooth, self.stress, acting.points
+        worn = np.sign(points.torque) == self.sense
+        speed = points.speed[worn]
+        hertz, root, _ = self._stresses(points.torque[worn], points.other[worn], self.dynamic.at(speed))
+        # Each turn meets each angle and each mesh once: cycles are shared evenly among them.
+        share = tooth.cycles / (len(tooth.meshes) * len(self.balance.angle))
+        cycles = np.broadcast_to((points.revolutions[worn] * share)[:, None, None], hertz.shape)
+        worst_torque, worst_hub = acting.worst(self.sense)
+        worst = self._stresses(worst_torque, worst_hub, np.full(len(worst_torque), self.dynamic.largest))
+        torque, tilt = self._loads(worst_torque, worst_hub)
+        top = int(np.abs(worst_torque).argmax())
+        force = tangential_force(self.pair.pinion, float(torque[top].mean()) / self.pair.pinion.base_radius)
+        rated = self._rated(hertz, root, cycles, speed, float(worst[0].max()), float(worst[1].max()))
+        by_point = np.zeros((2, len(points.torque)))
+        by_point[:, worn] = rated.pop("by_point")
+        return FlankLife(
+            contact_by_bin=acting.by_bin(by_point[0]),
+            root_by_bin=acting.by_bin(by_point[1]),
+            gear=tooth.gear,
+            family=tooth.family,
+            flank=FLANKS[self.sense * tooth.flank],
+            cycles=float(points.revolutions[worn].sum()) * tooth.cycles,
+            contact_stress=float(worst[0].max()),
+            root_stress=float(worst[1].max()),
+            compression=float(worst[2].min()),
+            nominal_contact=nominal_contact_stress(self.pair, force),
+            nominal_root=self._nominal_root(force),
+            outside=float(stress.at(stress.outside, 0.0, torque, tilt).max()),
+            face_load=float(stress.at(stress.face_load, 0.0, torque[top], tilt[top]).max()),
+            **rated,
+        )
+
+    def _loads(self, torques: Floats, hub: Floats) -> tuple[Floats, Floats]:
+        """Torque on gear 1 (N m) and misalignment (rad) of each mesh, (loads, angles, meshes)."""
+        passed = list(self.tooth.meshes)
+        force = np.abs(self.balance.at(self.balance.mesh_force, torques, hub)[..., passed])
+        tilt = self.balance.at(self.balance.misalignment, torques, hub)[..., passed]
+        return force * self.pair.pinion.base_radius, tilt
+
+    def _stresses(self, torques: Floats, hub: Floats, dynamic: Floats) -> tuple[Floats, Floats, Floats]:
+        """Contact stress, root stress and root compression of each mesh, (loads, angles, meshes), Pa."""
+        torque, tilt = self._loads(torques, hub)
+        torque = torque * dynamic[:, None, None]
+        stress, member = self.stress, self.tooth.member
+        return (
+            stress.at(stress.hertz, 0.5, torque, tilt),
+            stress.at(stress.root, 1.0, torque, tilt)[..., member],
+            stress.at(stress.compression, 1.0, torque, tilt)[..., member],
+        )
+
+    def _nominal_root(self, force: float) -> float:
+        gear = (self.pair.pinion, self.pair.gear)[self.tooth.member]
+        if gear.internal:
+            return math.nan
+        return (
+            force
+            / (self.pair.face_width * gear.normal_module)
+            * root_stress_factors(self.pair, self.tooth.member).product
+        )
+
+    def _rated(
+        self, hertz: Floats, root: Floats, cycles: Floats, speed: Floats, worst_hertz: float, worst_root: float
+    ) -> dict[str, Any]:
+        strength = self.rating.gears.get(self.tooth.gear)
+        keys = ("contact_damage", "root_damage", "contact_safety", "root_safety", "contact_static", "root_static")
+        if strength is None:
+            return {**dict.fromkeys(keys, math.nan), "by_point": np.nan}
+        contact, bending = life_curves(strength)
+        allowed = self._contact_strength(strength, speed)[:, None, None]
+        both_ways = strength.mean_stress_factor or 1.0
+        endured = 1e6 * strength.sigma_F_lim_MPa * PLAIN_TEST_GEAR * strength.root_factor * both_ways
+        static = 1e6 * strength.sigma_H_lim_MPa * contact.factors[0]
+        by_contact = damages(contact, hertz / allowed, 1.0, cycles).sum(axis=(1, 2))
+        by_root = damages(bending, root, endured, cycles).sum(axis=(1, 2))
+        values = (
+            float(by_contact.sum()),
+            float(by_root.sum()),
+            safety_factor(contact, hertz / allowed, 1.0, cycles),
+            safety_factor(bending, root, endured, cycles),
+            static / worst_hertz,
+            endured * bending.factors[0] / worst_root,
+        )
+        return {**dict(zip(keys, values, strict=True)), "by_point": np.stack([by_contact, by_root])}
+
+    def _contact_strength(self, strength: StrengthSection, speed: Floats) -> Floats:
+        """Pa at a life factor of one, for each speed (rad/s) of the loaded body."""
+        other = (self.pair.gear, self.pair.pinion)[self.tooth.member].name
+        mate = self.rating.gears.get(other, strength)
+        softer = 1e6 * min(strength.sigma_H_lim_MPa, mate.sigma_H_lim_MPa)
+        roughness = 0.5e-6 * (strength.roughness_um + mate.roughness_um)
+        still = lubricant_factor(softer, self.rating.viscosity_40_mm2_per_s)
+        still *= roughness_factor(softer, roughness, reduced_radius(self.pair))
+        moving = np.array([velocity_factor(softer, self._velocity(float(one))) for one in speed])
+        return 1e6 * strength.sigma_H_lim_MPa * still * moving
+
+    def _velocity(self, speed: float) -> float:
+        """Pitch line velocity (m/s) at a speed (rad/s) of the loaded body."""
+        gear = (self.pair.pinion, self.pair.gear)[self.tooth.member]
+        return speed * self.tooth.cycles / len(self.tooth.meshes) * gear.reference_radius
+
+
+def life_curves(strength: StrengthSection) -> tuple[LifeCurve, LifeCurve]:
+    """S-N curves of contact and of bending of a gear."""
+    if strength.contact_curve is None or strength.bending_curve is None:
+        return CASE_HARDENED_CONTACT, CASE_HARDENED_BENDING
+    contact, bending = (
+        LifeCurve(tuple(point[0] for point in curve), tuple(point[1] for point in curve))
+        for curve in (strength.contact_curve, strength.bending_curve)
+    )
+    return contact, bending

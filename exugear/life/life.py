@@ -1,0 +1,234 @@
+"""The life of a gearbox under its loads: gears by flank, bearings, extremes, and what limits it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from exugear.counting.duration import DurationDistribution
+from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.fingerprint import input_hash
+from exugear.life.acting_loads import acting_loads
+from exugear.life.bearing_life import BearingLife, bearing_lives
+from exugear.life.dynamic_factor import DynamicFactor
+from exugear.life.gear_life import FlankLife, check_strengths, flank_lives
+from exugear.life.static_balance import StaticBalance, static_balance
+from exugear.load_spectrum.counted import CountedLoads, count_loads
+from exugear.model.gearbox import Gearbox
+from exugear.model.sections.loads import RatingSection
+from exugear.model.versions import LIFE
+from fe_ste.root_stress.mesh_cycle import MeshCycleStress
+
+
+@dataclass(frozen=True, eq=False)
+class Life:
+    """What a gearbox bears over its life.
+
+    Attributes
+    ----------
+    variant, mesh_law, edition : str
+        What the forces are of, and the edition of the standard that gears are rated by.
+    counted : CountedLoads
+    balance : StaticBalance
+    load_sharing : mapping of mesh family to float
+        K_gamma of the static balance.
+    flanks : tuple of FlankLife
+    bearings : tuple of BearingLife
+    unrated : tuple of str
+        Why parts have no life.
+    assumptions : tuple of str
+        What the figures rest on.
+    input_hash : str
+        Of gearbox file, choices, tables, files of loads and versions of methods.
+    """
+
+    variant: str
+    mesh_law: str
+    edition: str
+    counted: CountedLoads
+    balance: StaticBalance
+    load_sharing: Mapping[str, float]
+    flanks: tuple[FlankLife, ...]
+    bearings: tuple[BearingLife, ...]
+    unrated: tuple[str, ...]
+    assumptions: tuple[str, ...]
+    input_hash: str
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<Life of {self.variant}: {len(self.flanks)} flanks, {len(self.bearings)} bearings>"
+
+
+def rating_of(gearbox: Gearbox) -> RatingSection:
+    """Section [rating] of a gearbox file.
+
+    Raises
+    ------
+    CaseError
+        There is none.
+    """
+    if gearbox.case.rating is None:
+        raise gearbox.fault(
+            "rating: this section is missing; [rating] needs dynamic_factor and viscosity_40_mm2_per_s, and "
+            "[rating.gears.NAME] what a gear withstands"
+        )
+    return gearbox.case.rating
+
+
+def checked_loads(gearbox: Gearbox) -> CountedLoads:
+    """Read the loads, and check what is asked for before any work begins.
+
+    Raises
+    ------
+    CaseError
+        Loads that cannot be used, or strengths that do not fit the gears.
+    """
+    rating, counted = rating_of(gearbox), count_loads(gearbox)
+    if rating.dynamic_factor_run is not None and rating.dynamic_factor_run not in gearbox.load_cases:
+        known = ", ".join(gearbox.load_cases) or "none"
+        raise gearbox.fault(f"rating.dynamic_factor_run = {rating.dynamic_factor_run!r}: load cases are {known}")
+    check_strengths(gearbox, rating, counted.teeth, bool(np.any(counted.distribution.torque < 0.0)))
+    return counted
+
+
+def life_hash(assembly: Assembly, counted: CountedLoads, tables: Mapping[str, str], run: str = "") -> str:
+    """SHA-256 of all that a life depends on.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    counted : CountedLoads
+    tables : mapping of pair name to str
+        Hashes of the tables' inputs.
+    run : str
+        Hash of the input of the run that gives K_v.
+    """
+    case = assembly.gearbox.content
+    content = {
+        "method_version": LIFE,
+        "assembly": input_hash(assembly),
+        "loads": case.get("loads"),
+        "rating": case.get("rating"),
+        "files": {one.name: one.digest for one in counted.sources},
+        "tables": dict(tables),
+        "run": run,
+    }
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def compute_life(
+    assembly: Assembly,
+    counted: CountedLoads,
+    stresses: Mapping[str, MeshCycleStress],
+    dynamic: Mapping[str, DynamicFactor],
+    digest: str,
+    progress: Callable[[int, int], None] | None = None,
+) -> Life:
+    """Rate gears and bearings of a variant under the loads of its gearbox file.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    counted : CountedLoads
+        Of `checked_loads`.
+    stresses : mapping of pair name to MeshCycleStress
+        Pairs without are not rated.
+    dynamic : mapping of mesh family to DynamicFactor
+        K_v.
+    digest : str
+        Of `life_hash`.
+    progress : callable, optional
+        Called with the number of solved static states, and of all.
+
+    Raises
+    ------
+    BalanceError
+        A static state that is not held.
+    """
+    gearbox, rating = assembly.gearbox, rating_of(assembly.gearbox)
+    found, acting = counted.distribution, acting_loads(counted)
+    balance = static_balance(
+        assembly, counted.body, acting.torques, rating.carrier_angles, progress, 0.5 * acting.hub_sizes
+    )
+    flanks = flank_lives(gearbox, rating, counted.teeth, acting, balance, stresses, dynamic)
+    bearings = bearing_lives(assembly.supports, counted.bearings, acting, balance)
+    families: dict[str, list[int]] = {}
+    for number, mesh in enumerate(gearbox.meshes):
+        families.setdefault(mesh.family, []).append(number)
+    return Life(
+        variant=assembly.variant,
+        mesh_law=assembly.mesh_law,
+        edition=rating.edition,
+        counted=counted,
+        balance=balance,
+        load_sharing={family: balance.load_sharing(numbers) for family, numbers in families.items()},
+        flanks=flanks,
+        bearings=bearings,
+        unrated=tuple(_unrated(assembly, counted, stresses)),
+        assumptions=tuple(_assumptions(rating, counted, found, balance, stresses, dynamic)),
+        input_hash=digest,
+    )
+
+
+def _hub_in_words(counted: CountedLoads) -> str:
+    if not counted.points.other.any():
+        return "torque alone: no forces or moments of a hub"
+    return (
+        f"forces and moments of a hub on {counted.body} in {len(counted.points.torque)} points; what they add is "
+        "linear in them, at each torque"
+    )
+
+
+def _unrated(assembly: Assembly, counted: CountedLoads, stresses: Mapping[str, MeshCycleStress]) -> list[str]:
+    gearbox, lines = assembly.gearbox, []
+    rated = rating_of(gearbox).gears
+    for gear in dict.fromkeys(one.gear for one in counted.teeth):
+        if gear not in rated:
+            lines.append(f"gear {gear}: no [rating.gears.{gear}] says what it withstands")
+    for pair in dict.fromkeys(mesh.pair.name for mesh in gearbox.meshes):
+        if pair not in stresses:
+            lines.append(f"pair {pair}: has no table, so no stresses")
+    for support in dict.fromkeys(one.family for one in assembly.supports if one.catalogue is None):
+        lines.append(f"{support}: given by its stiffness alone; a catalogue section would give it a life")
+    if not assembly.supports:
+        lines.append(f"bearings: the variant {assembly.variant} has none")
+    return lines
+
+
+def _assumptions(
+    rating: RatingSection,
+    counted: CountedLoads,
+    found: DurationDistribution,
+    balance: StaticBalance,
+    stresses: Mapping[str, MeshCycleStress],
+    dynamic: Mapping[str, DynamicFactor],
+) -> list[str]:
+    count = len(balance.torque)
+    lines = [
+        _hub_in_words(counted),
+        f"static balance at {count} torque{'s' * (count > 1)} and {len(balance.angle)} angles of the carrier, "
+        + ("proportional to torque" if balance.linear else "forces over torque linear between these"),
+        _dynamic_in_words(rating, dynamic, found) + "; none on bearings",
+        "face and transverse load factors are in the stresses of the contact of finite elements"
+        + (
+            ""
+            if any(len(one.misalignment) > 1 for one in stresses.values())
+            else ", of gears that stand aligned: tables with axes (--grid) have their misalignment"
+        ),
+        "Z_W = Z_X = 1; S-N curves go on beyond their last point: no load is without damage",
+        "lives of bearings are basic: lubricant, cleanliness, ribs and cages are left out",
+    ]
+    if np.any(found.torque < 0.0):
+        lines.append("reversed torque presses the other flanks; teeth there are taken as the mirror of these")
+    return [*lines, *counted.remarks]
+
+
+def _dynamic_in_words(rating: RatingSection, dynamic: Mapping[str, DynamicFactor], found: DurationDistribution) -> str:
+    if rating.dynamic_factor is not None:
+        return f"K_v = {rating.dynamic_factor:g} on all meshes as stated"
+    values = ", ".join(f"{family} {float(one.at(found.speed).max()):.3f}" for family, one in dynamic.items())
+    return f"K_v of the run {rating.dynamic_factor_run}, at least {rating.least_dynamic_factor:g}: {values}"

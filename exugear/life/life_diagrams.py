@@ -1,0 +1,76 @@
+"""Pictures of a life: what limits it, and which torques do the damage."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from exugear.life.life_file import limits
+from fe_ste.tools.arrays import Floats
+from fe_ste.tools.drawing import COLOURS, WARNING_COLOUR, drawing_style, finish_figure, new_figure
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+SHOWN = 16
+"""Most parts that are drawn."""
+LEAST_DAMAGE = 1e-6
+"""Smaller damages are not drawn."""
+KINDS = {"pitting": ("flank", "contact_by_bin"), "root": ("flank", "root_by_bin"), "L10r": ("bearing", "by_bin")}
+"""Dimension and damage by bin of each kind of damage."""
+
+
+def draw_life(data: xr.Dataset, path: str | Path | None = None) -> Figure:
+    """Draw the damages of the parts that limit a life, and over torque where they come from.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        As `exugear.life.life_file.read_life` gives it.
+    path : path-like, optional
+        Where to write the picture.
+    """
+    shown = [one for one in limits(data) if one[2] > LEAST_DAMAGE and np.isfinite(one[2])][:SHOWN]
+    with drawing_style():
+        figure = new_figure(8.5, max(2.2, 0.8 + 0.24 * len(shown)))
+        bars, matrix = figure.subplots(1, 2, sharey=True, width_ratios=(1.0, 1.3))
+        names = [f"{part}, {kind}" for part, kind, _ in shown]
+        values = [damage for _, _, damage in shown]
+        colours = [COLOURS[list(KINDS).index(kind)] for _, kind, _ in shown]
+        bars.barh(range(len(shown)), values, color=colours)
+        bars.axvline(1.0, color=WARNING_COLOUR)
+        bars.set(xscale="log", xlabel="damage in the life (1: worn out)", yticks=range(len(shown)), yticklabels=names)
+        bars.xaxis.set_major_formatter("{x:g}")
+        bars.set_title("what limits")
+        bars.invert_yaxis()
+        edges, shares = damage_matrix(data, shown)
+        if shares.size:
+            drawn = matrix.pcolormesh(1e-3 * edges, np.arange(len(shown) + 1) - 0.5, 100.0 * shares, cmap="viridis")
+            figure.colorbar(drawn, ax=matrix, label="share of the part's damage / %")
+        matrix.set(xlabel=f"torque on {data.attrs['body']} / kN m", title="which torques do it")
+        matrix.grid(False)
+        return finish_figure(figure, path)
+
+
+def damage_matrix(data: xr.Dataset, parts: list[tuple[str, str, float]]) -> tuple[Floats, Floats]:
+    """Edges of the bins (bins + 1,), N m, and the share of each bin in the damage of each part (parts, bins).
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+    parts : list of (part, kind, damage)
+        As `exugear.life.life_file.limits` gives them.
+    """
+    torque = data["torque"].to_numpy()
+    order = np.argsort(torque)
+    rows = []
+    for part, kind, damage in parts:
+        name, key = KINDS[kind]
+        place = data[name].to_numpy().tolist().index(part)
+        rows.append(data[f"{name}_{key}"].to_numpy()[place][order] / damage)
+    middles = 0.5 * (torque[order][1:] + torque[order][:-1])
+    ends = torque[order][[0, -1]]
+    return np.concatenate([ends[:1], middles, ends[1:]]), np.array(rows).reshape(len(parts), -1)

@@ -1,0 +1,177 @@
+"""The file of a life: sealed netCDF with the hash of its input, and tables with commas beside it."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from exugear.life.bearing_life import BearingLife
+from exugear.life.gear_life import FlankLife
+from exugear.life.life import Life
+from exugear.load_spectrum.spectra_files import write_table
+from exugear.model.choice import Choice
+from exugear.model.versions import LIFE
+from exugear.results.folder import modes_path
+from fe_ste.tools.files import FileError
+from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+FLANK_UNITS = {
+    "contact_stress": "Pa", "root_stress": "Pa", "compression": "Pa", "nominal_contact": "Pa", "nominal_root": "Pa",
+}  # fmt: skip
+BEARING_UNITS = {"largest_load": "N", "equivalent": "N", "basic_hours": "h", "reference_hours": "h", "pressure": "Pa"}
+FLANK_NUMBERS = tuple(one.name for one in fields(FlankLife) if one.type in (float, "float"))
+BEARING_NUMBERS = tuple(one.name for one in fields(BearingLife) if one.type in (float, "float"))
+_LAYOUT = Layout(
+    "life",
+    LIFE,
+    {f"flank_{name}": ("flank",) for name in FLANK_NUMBERS}
+    | {f"bearing_{name}": ("bearing",) for name in (*BEARING_NUMBERS, "dynamic_rating", "static_rating")}
+    | {name: ("bin",) for name in ("torque", "hours", "revolutions", "speed")}
+    | {"flank": ("flank",), "bearing": ("bearing",)}
+    | {f"flank_{name}": ("flank", "bin") for name in ("contact_by_bin", "root_by_bin")}
+    | {"bearing_by_bin": ("bearing", "bin")},
+    ("gearbox", "variant", "mesh_law", "edition", "input_hash", "assumptions", "unrated"),
+)
+
+
+def life_path(folder: Path, choice: Choice) -> Path:
+    """Place of the life of a choice that names its inertia set: beside its modes."""
+    return modes_path(folder, choice).with_name("life.nc")
+
+
+def to_dataset(life: Life, gearbox: str) -> xr.Dataset:
+    """Labelled arrays with units, what `write_life` writes."""
+    import xarray as xr
+
+    found = life.counted.distribution
+    variables: dict[str, tuple[tuple[str, ...], Any, dict[str, str]]] = {
+        "torque": (("bin",), found.torques(life.counted.bin_value), {"units": "N m"}),
+        "hours": (("bin",), found.hours, {"units": "h"}),
+        "revolutions": (("bin",), found.revolutions, {"units": "1"}),
+        "speed": (("bin",), found.speed, {"units": "rad/s"}),
+        "load_sharing": (("family",), np.array([*life.load_sharing.values()]), {"units": "1"}),
+    }
+    for name in FLANK_NUMBERS:
+        values = np.array([getattr(one, name) for one in life.flanks], dtype=np.float64)
+        variables[f"flank_{name}"] = (("flank",), values, {"units": FLANK_UNITS.get(name, "1")})
+    for name in BEARING_NUMBERS:
+        values = np.array([getattr(one, name) for one in life.bearings], dtype=np.float64)
+        variables[f"bearing_{name}"] = (("bearing",), values, {"units": BEARING_UNITS.get(name, "1")})
+    count, none = len(found.hours), {"units": "1", "long_name": "parts of the damage by bin of torque"}
+    for name in ("contact_by_bin", "root_by_bin"):
+        values = np.array([getattr(one, name) for one in life.flanks]).reshape(-1, count)
+        variables[f"flank_{name}"] = (("flank", "bin"), values, none)
+    values = np.array([one.by_bin for one in life.bearings]).reshape(-1, count)
+    variables["bearing_by_bin"] = (("bearing", "bin"), values, none)
+    for name in ("dynamic", "static"):
+        values = np.array([getattr(one.ratings, name) for one in life.bearings], dtype=np.float64)
+        variables[f"bearing_{name}_rating"] = (("bearing",), values, {"units": "N"})
+    coordinates = {
+        "flank": np.array([flank_label(one) for one in life.flanks], dtype=object),
+        "bearing": np.array([one.name for one in life.bearings], dtype=object),
+        "family": np.array([*life.load_sharing], dtype=object),
+    }
+    attributes = {
+        "gearbox": gearbox,
+        "variant": life.variant,
+        "mesh_law": life.mesh_law,
+        "edition": life.edition,
+        "body": life.counted.body,
+        "life_years": life.counted.life_years,
+        "sources": json.dumps(life.counted.source_rows()),
+        "assumptions": json.dumps(life.assumptions),
+        "unrated": json.dumps(life.unrated),
+        "bearing_remarks": json.dumps({one.name: one.remarks for one in life.bearings if one.remarks}),
+        "input_hash": life.input_hash,
+        "method_version": LIFE,
+    }
+    return xr.Dataset(variables, coordinates, attributes)
+
+
+def flank_label(one: FlankLife) -> str:
+    """Gear, flank and family of meshes in one text."""
+    return f"{one.gear} {one.flank} {one.family}"
+
+
+def stored_life(path: Path, input_hash: str) -> xr.Dataset | None:
+    """Life of a file that was computed from exactly this input; None without one."""
+    try:
+        dataset = load_dataset(path, _LAYOUT)
+    except FileError:
+        return None
+    return dataset if dataset.attrs["input_hash"] == input_hash else None
+
+
+def read_life(path: Path) -> xr.Dataset:
+    """Life of a file.
+
+    Raises
+    ------
+    FileError
+        It is missing, damaged, or of another version.
+    """
+    return load_dataset(path, _LAYOUT)
+
+
+def write_life(path: Path, life: Life, gearbox: str) -> xr.Dataset:
+    """Write a life whole or not at all, with tables of its flanks and bearings beside it; return its arrays."""
+    dataset = to_dataset(life, gearbox)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_table(path.with_name("life_gears.csv"), ("flank", *FLANK_NUMBERS), _rows(dataset, "flank", FLANK_NUMBERS))
+    write_table(
+        path.with_name("life_bearings.csv"), ("bearing", *BEARING_NUMBERS), _rows(dataset, "bearing", BEARING_NUMBERS)
+    )
+    write_dataset(path, dataset)
+    return dataset
+
+
+def _rows(dataset: xr.Dataset, name: str, numbers: Sequence[str]) -> Iterator[list[str | float]]:
+    for place, label in enumerate(dataset[name].to_numpy().tolist()):
+        yield [label, *(float(dataset[f"{name}_{number}"][place]) for number in numbers)]
+
+
+def limits(dataset: xr.Dataset) -> list[tuple[str, str, float]]:
+    """Damages of all parts of a stored life, largest first: part, kind, Miner's sum."""
+    found = []
+    for name, kinds in {
+        "flank": {"pitting": "contact_damage", "root": "root_damage"},
+        "bearing": {"L10r": "reference_damage"},
+    }.items():
+        for kind, key in kinds.items():
+            values = dataset[f"{name}_{key}"].to_numpy().tolist()
+            found += [
+                (label, kind, value) for label, value in zip(dataset[name].to_numpy().tolist(), values, strict=True)
+            ]
+    return sorted((one for one in found if not math.isnan(one[2])), key=lambda one: -one[2])
+
+
+def summary(dataset: xr.Dataset) -> dict[str, Any]:
+    """Figures for programs, numbers that are none left out."""
+    return {
+        **{key: str(dataset.attrs[key]) for key in ("variant", "mesh_law", "edition", "input_hash")},
+        "flanks": [*_entries(dataset, "flank", FLANK_NUMBERS)],
+        "bearings": [*_entries(dataset, "bearing", BEARING_NUMBERS)],
+        "load_sharing": dict(
+            zip(dataset["family"].to_numpy().tolist(), dataset["load_sharing"].to_numpy().tolist(), strict=True)
+        ),
+        "limits": [{"part": part, "by": kind, "damage": damage} for part, kind, damage in limits(dataset)[:10]
+                   if math.isfinite(damage)],
+        "assumptions": json.loads(dataset.attrs["assumptions"]),
+        "unrated": json.loads(dataset.attrs["unrated"]),
+        "remarks": json.loads(dataset.attrs["bearing_remarks"]),
+    }  # fmt: skip
+
+
+def _entries(dataset: xr.Dataset, name: str, numbers: Sequence[str]) -> Iterator[Mapping[str, Any]]:
+    for label, *values in _rows(dataset, name, numbers):
+        given = {key: value for key, value in zip(numbers, values, strict=True) if math.isfinite(float(value))}
+        yield {name: label, **given}

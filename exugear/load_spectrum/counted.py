@@ -1,0 +1,176 @@
+"""The loads of a gearbox counted: by source, by bin, and as cycles of what turns through them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from exugear.counting.duration import DurationDistribution, LoadPoints, equivalent_load
+from exugear.counting.rainflow import damage_equivalent_range
+from exugear.load_spectrum.exposure import FLANKS, ToothExposure, bearing_turns, tooth_exposures
+from exugear.load_spectrum.sources import LoadSource, distribution, load_sources, points_of, section_of, told
+from exugear.model.gearbox import Gearbox
+from exugear.model.parts import RPM
+
+EXPONENTS = (3.0, 10.0 / 3.0, 6.61, 8.74)
+"""Slopes of the S-N curves of steel structures, of roller bearings, and of contact and bending of gears over torque."""
+RANGE_EXPONENTS = (3.0, 6.6, 10.0)
+
+
+@dataclass(frozen=True, eq=False)
+class CountedLoads:
+    """Loads of a gearbox, counted.
+
+    Attributes
+    ----------
+    body : str
+        Body that they act on.
+    life_years : float
+    sources : tuple of LoadSource
+    distribution : DurationDistribution
+        Of all sources of fatigue.
+    points : LoadPoints
+        Its bins, split where loads of a hub differ.
+    equivalent_ranges : mapping of float to float
+        Damage-equivalent range of torque of one cycle a second in the life, by slope, N m; NaN without series.
+    teeth : tuple of ToothExposure
+    bearings : mapping of str to float
+        Revolutions of bearings per revolution of the body.
+    mesh_forces : mapping of str to float
+        Static force F_bt of mesh families at 1 N m on the body, N, the largest of a family.
+    bin_value : str
+    """
+
+    body: str
+    life_years: float
+    sources: tuple[LoadSource, ...]
+    distribution: DurationDistribution
+    points: LoadPoints
+    equivalent_ranges: Mapping[float, float]
+    teeth: tuple[ToothExposure, ...]
+    bearings: Mapping[str, float]
+    mesh_forces: Mapping[str, float]
+    bin_value: str
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<CountedLoads on {self.body!r}: {len(self.sources)} sources, {self.distribution!r}>"
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What was skipped and scaled, a line each."""
+        return tuple(told(self.sources))
+
+    def equivalents(self) -> dict[float, float]:
+        """Constant torque that does the same damage in the same revolutions, by slope, N m, of either sign."""
+        found = self.distribution
+        torques = found.torques(self.bin_value)
+        return {m: equivalent_load(torques, found.revolutions, m) for m in EXPONENTS}
+
+    def source_rows(self) -> list[dict[str, Any]]:
+        """Figures of each source."""
+        return [
+            {
+                "source": source.name,
+                "case": source.case,
+                "kind": source.kind,
+                "file": source.path.name,
+                "sha256": source.digest,
+                "samples": len(source.torque),
+                "skipped_s": source.skipped,
+                "hours": float(source.hours.sum()),
+                "torque_factor": source.factors[0],
+                "speed_factor": source.factors[1],
+                "mean_torque_kN_m": 1e-3 * float(np.average(source.torque, weights=_weights(source))),
+                "least_torque_kN_m": 1e-3 * float(source.torque.min()),
+                "largest_torque_kN_m": 1e-3 * float(source.torque.max()),
+                "mean_speed_rpm": float(np.average(source.speed, weights=_weights(source))) / RPM,
+            }
+            for source in self.sources
+        ]
+
+    def part_rows(self) -> list[dict[str, Any]]:
+        """Cycles of teeth by gear and flank, revolutions of bearings, and what meshes carry at the largest torque."""
+        found, rows = self.distribution, []
+        largest = float(np.abs(found.torque).max())
+        for sense in (1, -1):
+            turns = float(found.revolutions[np.sign(found.torque) == sense].sum())
+            for tooth in self.teeth if turns else ():
+                rows.append(
+                    {
+                        "part": f"{tooth.gear}, flank {FLANKS[sense * tooth.flank]}",
+                        "loaded_by": tooth.family,
+                        "cycles": turns * tooth.cycles,
+                        "force_kN": 1e-3 * largest * self.mesh_forces[tooth.family],
+                    }
+                )
+        for name, ratio in self.bearings.items():
+            if ratio:
+                cycles = float(found.revolutions.sum()) * ratio
+                rows.append({"part": name, "loaded_by": "", "cycles": cycles, "force_kN": math.nan})
+        return rows
+
+    def summary(self) -> dict[str, Any]:
+        """Figures for programs: units in the keys."""
+        return {
+            "body": self.body,
+            "life_years": self.life_years,
+            "hours": float(self.distribution.hours.sum()),
+            "revolutions": float(self.distribution.revolutions.sum()),
+            "equivalent_torque_kN_m": {f"{m:.4g}": 1e-3 * value for m, value in self.equivalents().items()},
+            "equivalent_range_1_Hz_kN_m": {
+                f"{m:.4g}": 1e-3 * value for m, value in self.equivalent_ranges.items() if math.isfinite(value)
+            },
+            "sources": self.source_rows(),
+            "parts": [
+                {key: value for key, value in row.items() if value == value and value != ""} for row in self.part_rows()
+            ],
+            "remarks": list(self.remarks),
+        }
+
+
+def count_loads(gearbox: Gearbox) -> CountedLoads:
+    """Read and count the loads of a gearbox file.
+
+    Raises
+    ------
+    CaseError
+        A source that cannot be used: see `exugear.load_spectrum.sources.load_sources`.
+    """
+    loads, sources = section_of(gearbox), load_sources(gearbox)
+    found = distribution(gearbox, sources)
+    teeth = tooth_exposures(gearbox, loads.body)
+    forces = gearbox.train.static_mesh_forces({loads.body: 1.0})
+    families: dict[str, float] = {}
+    for mesh in gearbox.meshes:
+        families[mesh.family] = max(families.get(mesh.family, 0.0), abs(forces[mesh.name]))
+    return CountedLoads(
+        body=loads.body,
+        life_years=loads.life_years,
+        sources=sources,
+        distribution=found,
+        points=points_of(gearbox, sources, found),
+        equivalent_ranges={m: _equivalent_range(sources, m) for m in RANGE_EXPONENTS},
+        teeth=teeth,
+        bearings=bearing_turns(gearbox, loads.body),
+        mesh_forces=families,
+        bin_value=loads.bin_value,
+    )
+
+
+def _weights(source: LoadSource) -> Any:
+    return source.hours if source.hours.sum() > 0.0 else None
+
+
+def _equivalent_range(sources: tuple[LoadSource, ...], exponent: float) -> float:
+    """Damage-equivalent range of all series of fatigue together, one cycle a second; NaN without any."""
+    series = [one for one in sources if one.series and one.kind == "fatigue" and one.hours.sum() > 0.0]
+    if not series:
+        return math.nan
+    ranges = [damage_equivalent_range(one.torque, exponent, one.duration) for one in series]
+    hours = [float(one.hours.sum()) for one in series]
+    return equivalent_load(np.array(ranges), np.array(hours), exponent)

@@ -1,0 +1,87 @@
+"""What all sections are made of, and what each of them gives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from exugear.findings.context import Context
+from exugear.findings.groups import RunGroup
+from exugear.findings.stored import StoredResults
+from exugear.findings.variations import ModelVariations
+from exugear.findings.words import Words
+from exugear.model.choice import Choice
+from exugear.spectra.orders import OrderLine, order_lines
+from exugear.web.arrays import ArrayStore
+from exugear.web.pieces import element
+
+
+@dataclass(frozen=True)
+class Material:
+    """What all sections are made of.
+
+    Attributes
+    ----------
+    context : Context
+    results : StoredResults
+    words : Words
+    groups : tuple of RunGroup
+        The default inertia set first.
+    variations : tuple of ModelVariations
+    lines : tuple of OrderLine
+        Orders that are drawn.
+    arrays : ArrayStore
+        Takes the arrays of the page.
+    run_data : mapping
+        Run-ups as data of the page, as `exugear.report.parts.run_data.run_data` makes them.
+    """
+
+    context: Context
+    results: StoredResults
+    words: Words
+    groups: Sequence[RunGroup]
+    variations: Sequence[ModelVariations]
+    lines: Sequence[OrderLine]
+    arrays: ArrayStore
+    run_data: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def input_words(self) -> str:
+        """Words for the overall input, whose speed all figures are over."""
+        return self.words.of(self.context.gearbox.case.overall.input)
+
+
+def lines_of(context: Context) -> tuple[OrderLine, ...]:
+    """Orders that the page draws."""
+    return order_lines(context.gearbox)
+
+
+@dataclass(frozen=True)
+class Part:
+    """What a section gives.
+
+    Attributes
+    ----------
+    html : str
+        Empty where it has nothing to show.
+    data : mapping
+        For the scripts, by keys of its own.
+    title, name : str
+        Its entry in the table of contents; empty for none.
+    """
+
+    html: str
+    data: Mapping[str, Any] = field(default_factory=dict)
+    title: str = ""
+    name: str = ""
+
+
+def only_for(content: str, group: str, variant: str = "") -> str:
+    """Mark content as that of a group of run-ups, or of one variant: scripts show what was chosen, paper shows all."""
+    return element("div", content, data_group=group, data_variant=variant or None) if content else ""
+
+
+def model_name(choice: Choice) -> str:
+    """Name of a model for links and data: variant, law, inertia set."""
+    return f"{choice.variant}-{choice.mesh_law}-{choice.inertias}"

@@ -1,0 +1,206 @@
+"""Run-ups as data of the page: waterfalls and order cuts of all channels, resonances with their facts."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from exugear.findings.channels import Channel, channels_of, loudest_order
+from exugear.findings.groups import RankedResonance, RunGroup
+from exugear.findings.words import VARIANTS, figure_text, percentages
+from exugear.model.parts import RPM
+from exugear.report.parts.material import Material, model_name
+from exugear.report.parts.pooling import cut_levels, level_bytes, pooled
+from exugear.spectra.orders import OrderLine
+from exugear.spectra.run_spectra import VariantRun
+from exugear.spectra.waterfall import Waterfall
+from exugear.web.arrays import rounded
+from fe_ste.tools.arrays import Floats
+
+SPEEDS, CHANNEL_SPEEDS = 438, 160
+"""Columns of the waterfall of the transmission error, and of other channels."""
+STEP, CHANNEL_STEP = 0.5, 1.5
+"""dB per step of a byte."""
+SPAN = 110.0
+"""Span below the highest level (dB) that is kept at least."""
+CHANNEL_LINES = 3
+"""Spectral lines of another channel that are drawn as one."""
+CUTS_EVERY = 2
+"""Every which frame of other channels their order cuts hold."""
+TOP = 1.1
+"""Highest frequency drawn over that of the fastest mesh at the highest speed."""
+ALSO = 4
+"""Further orders that are told to show a resonance."""
+
+
+def run_data(material: Material) -> dict[str, Any]:
+    """Gather what the scripts need of all run-ups: ``lines`` and ``groups``."""
+    return {
+        "lines": [_line(material, line) for line in material.lines],
+        "groups": [_group(material, group) for group in material.groups],
+    }
+
+
+def _line(material: Material, line: OrderLine) -> dict[str, Any]:
+    number, _, family = line.name.rpartition(" × ")
+    return {
+        "name": line.name,
+        "short": material.words.line(line),
+        "sentence": material.words.line_sentence(line),
+        "order": line.order,
+        "harmonic": int(number) if number else 1,
+        "family": family,
+    }
+
+
+def _group(material: Material, group: RunGroup) -> dict[str, Any]:
+    return {
+        "name": group.name,
+        "title": group.title,
+        "loadCase": group.load_case,
+        "law": group.mesh_law,
+        "inertias": group.inertias,
+        "main": group.main,
+        "variants": {variant: _variant(material, group, run) for variant, run in group.runs.items()},
+    }
+
+
+def _variant(material: Material, group: RunGroup, run: VariantRun) -> dict[str, Any]:
+    material.context.tell(f"channels of {run.variant}, {group.inertias}")
+    channels = list(channels_of(run, material.words))
+    return {
+        "words": VARIANTS[run.variant],
+        "model": model_name(group.choice(run.variant)),
+        "window": run.spectra.description,
+        "channels": [_overall(material, run.spectra), *(_channel(material, channel) for channel in channels)],
+        "loudest": {channel.name: _loudest(material, channel) for channel in channels if channel.kind == "support"},
+        "resonances": [_resonance(material, group, run, own) for own in group.ranked[run.variant]],
+    }
+
+
+def _highest(material: Material, spectra: Waterfall) -> int:
+    """Count the spectral lines that are drawn."""
+    fundamental = max(material.context.gearbox.train.mesh_frequencies(2.0 * math.pi).values(), default=math.inf)
+    top = TOP * fundamental * float(spectra.speed.max()) / (2.0 * math.pi)
+    return max(4, int(np.searchsorted(spectra.frequency, min(top, float(spectra.frequency[-1])))))
+
+
+def _overall(material: Material, spectra: Waterfall) -> dict[str, Any]:
+    count = _highest(material, spectra)
+    level = pooled(spectra.level[:, :count], spectra.speed, SPEEDS, 1)
+    return {
+        "name": "overall",
+        "words": "Overall transmission error",
+        "unit": "µm",
+        **_cells(material, level, spectra, _floor(spectra, count), STEP, 1),
+        **_cuts(material, spectra, 1),
+    }
+
+
+def _channel(material: Material, channel: Channel) -> dict[str, Any]:
+    spectra = channel.spectra
+    count = _highest(material, spectra)
+    level = pooled(spectra.level[:, :count], spectra.speed, CHANNEL_SPEEDS, CHANNEL_LINES)
+    copies = f", 1 of {channel.copies}" if channel.copies > 1 else ""
+    return {
+        "name": channel.name,
+        "words": f"Force: {channel.words}{copies}",
+        "unit": "N",
+        **_cells(material, level, spectra, _floor(spectra, count), CHANNEL_STEP, CHANNEL_LINES),
+        **_cuts(material, spectra, CUTS_EVERY),
+    }
+
+
+def _floor(spectra: Waterfall, count: int) -> float:
+    """Level (dB) of the lowest step, a round one."""
+    return 10.0 * math.floor((float(spectra.level[:, 2:count].max()) - SPAN) / 10.0)
+
+
+def _cells(
+    material: Material, level: Floats, spectra: Waterfall, floor: float, step: float, lines: int
+) -> dict[str, Any]:
+    span = [float(spectra.speed.min()) / RPM, float(spectra.speed.max()) / RPM]
+    return {
+        "cells": material.arrays.add(level_bytes(level, floor, step)),
+        "floor": floor,
+        "step": step,
+        "spacing": rounded(lines * float(spectra.frequency[1]), 9),
+        "first": rounded(0.5 * (lines - 1) * float(spectra.frequency[1]), 9),
+        "span": span,
+    }
+
+
+def _cuts(material: Material, spectra: Waterfall, every: int) -> dict[str, Any]:
+    speeds = (spectra.speed[::every] / RPM).astype("f4")
+    return {
+        "cuts": material.arrays.add(cut_levels(spectra, material.lines)[::every].copy(), differences=True),
+        "speeds": material.arrays.add(speeds),
+    }
+
+
+def _loudest(material: Material, channel: Channel) -> dict[str, Any] | None:
+    """Figures of a bearing for its table."""
+    found = loudest_order(channel.spectra, material.lines)
+    return {
+        "words": channel.words,
+        "copies": channel.copies,
+        "mean": rounded(channel.mean, 4),
+        "axial": rounded(channel.axial, 4),
+        "amplitude": rounded(found.amplitude, 4) if found else None,
+        "line": material.words.line(found.line) if found else "",
+        "speed": rounded(found.speed / RPM, 5) if found else None,
+        "frequency": rounded(found.frequency, 5) if found else None,
+    }
+
+
+def _resonance(material: Material, group: RunGroup, run: VariantRun, own: RankedResonance) -> dict[str, Any]:
+    peak, resonance = own.peak, own.finding.resonance
+    return {
+        "frequency": rounded(resonance.frequency, 6),
+        "tolerance": rounded(resonance.resolution, 3),
+        "speed": rounded(own.finding.speed, 5),
+        "peak": rounded(peak.frequency, 6),
+        "line": [line.name for line in material.lines].index(peak.line.name),
+        "level": rounded(peak.level, 4),
+        "steady": own.steady,
+        "mode": own.finding.mode,
+        "facts": _facts(material, group, run, own),
+    }
+
+
+def _facts(material: Material, group: RunGroup, run: VariantRun, own: RankedResonance) -> list[list[str]]:
+    """Terms and words of a resonance for the panel beside the waterfall."""
+    words, peak = material.words, own.peak
+    others = list(dict.fromkeys(p.line for p in own.finding.resonance.picks[1:] if p.line != peak.line))[:ALSO]
+    facts = [
+        [
+            "Level",
+            f"{figure_text(peak.level)} dB = ±{figure_text(10.0 ** (peak.level / 20.0), 2)} µm, "
+            f"{figure_text(peak.prominence, 2)} dB above its surroundings",
+        ],
+        ["Excited by", f"{words.line_sentence(peak.line)} (order {figure_text(peak.line.order, 4)})"],
+    ]
+    if others:
+        facts.append(["Shown by", ", ".join(words.line(line) for line in others)])
+    for variant, level in own.elsewhere.items():
+        lacks = "does not show it, " if variant in own.lacking else ""
+        there = f"{figure_text(level)} dB there" if math.isfinite(level) else "did not go there"
+        facts.append([VARIANTS[variant].capitalize(), f"{lacks}{there}"])
+    facts += _mode_facts(material, run, own)
+    if not own.steady:
+        facts.append(["Mind", "not every length of the window shows it: it may be no resonance"])
+    return facts
+
+
+def _mode_facts(material: Material, run: VariantRun, own: RankedResonance) -> list[list[str]]:
+    mode, modes = own.finding.mode, run.modes
+    if mode is None or modes is None:
+        return [["Mode", "none within the resolution of the sweep"]]
+    damping = 100.0 * float(modes["damping_ratio"][mode])
+    return [
+        ["Mode", f"{own.finding.mode_frequency:.1f} Hz, damping {figure_text(damping, 2)} %"],
+        ["What moves", material.words.moves(modes, mode)],
+        ["What gives", percentages(material.words.gives(modes, mode))],
+    ]

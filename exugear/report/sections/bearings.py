@@ -1,0 +1,171 @@
+"""Section "At the bearings": forces of the run-up, accelerations of seats, and what bearings bear at rest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from exugear.bearings.duty import BearingDuty
+from exugear.bearings.rolling.rows import BearingError
+from exugear.bearings.supports import ON_BEARINGS
+from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.bearing_duties import bearing_duties
+from exugear.dynamics.statics import BalanceError
+from exugear.findings.context import choice_of, words_of
+from exugear.findings.words import VARIANTS, figure_text
+from exugear.model.parts import RPM
+from exugear.report.parts.material import Material, Part, only_for
+from exugear.web import pieces
+from exugear.web.pieces import Cell
+
+LIFTS = 1.0
+"""Swing over the mean force from which a linear bearing is said to have to lift off."""
+SEATS = 12
+"""Seats whose accelerations are listed."""
+
+
+def bearings_section(material: Material) -> Part:
+    """List forces at bearings by run-up, accelerations by steady response, and duties by model."""
+    forces = [
+        only_for(_forces(material, group["name"], variant, own), group["name"], variant)
+        for group in material.run_data["groups"]
+        for variant, own in group["variants"].items()
+    ]
+    accelerations = [_accelerations(material, data) for data in material.results.steady]
+    duties = [_duties(material, assembly) for assembly in material.context.assemblies.values()]
+    if not any((*forces, *accelerations, *duties)):
+        return Part("")
+    note = ""
+    if not any(accelerations):
+        note = pieces.paragraph("Accelerations of the seats come with a steady response: `exugear steady`.", "note")
+    html = pieces.section("At the bearings", *forces, *accelerations, note, *duties, name="bearings")
+    return Part(html, {}, "At the bearings", "bearings")
+
+
+def _forces(material: Material, group: str, variant: str, own: Mapping[str, Any]) -> str:
+    loudest = {name: figures for name, figures in own["loudest"].items() if figures["amplitude"] is not None}
+    if not loudest:
+        return ""
+    largest = max(figures["amplitude"] for figures in loudest.values())
+    rows = [_force_row(group, variant, name, figures, largest) for name, figures in loudest.items()]
+    caption = f"Transverse forces {VARIANTS[variant]}"
+    lifting = [
+        f"{figures['words']}: the force swings by {100.0 * figures['amplitude'] / figures['mean']:.0f} % of its mean; "
+        "a linear bearing cannot lift off, a real one would."
+        for figures in loudest.values()
+        if figures["mean"] and figures["amplitude"] > LIFTS * figures["mean"]
+    ]
+    words = (
+        "Mean force over the middle third of the run-up, and the largest amplitude along an order (root of the summed "
+        "squares of both transverse directions). Of the copies of a planet set the one that swings most stands for all."
+    )
+    table = pieces.table(
+        rows,
+        ("loudest order",),
+        caption=caption,
+        name=f"forces-{group}-{variant}",
+        hidden=("axial / kN",),
+        sortable=True,
+    )
+    warned = pieces.element("div", pieces.bullets(lifting), class_="warning") if lifting else ""
+    return pieces.element("h3", pieces.text(caption)) + pieces.paragraph(words, "note") + table + warned
+
+
+def _force_row(group: str, variant: str, name: str, figures: Mapping[str, Any], largest: float) -> dict[str, object]:
+    amplitude, mean = figures["amplitude"], figures["mean"] or 0.0
+    copies = f" (1 of {figures['copies']})" if figures["copies"] > 1 else ""
+    share = amplitude / mean if mean else math.inf
+    return {
+        "bearing or joint": Cell(f"{figures['words']}{copies}", choice=f"channel:{group}:{variant}:{name}"),
+        "mean / kN": Cell(figure_text(1e-3 * mean), mean),
+        "axial / kN": Cell(figure_text(1e-3 * figures["axial"]), figures["axial"]),
+        "swings by ± / kN": Cell(figure_text(1e-3 * amplitude), amplitude, bar=amplitude / largest),
+        "of the mean / %": Cell(figure_text(100.0 * share, 2) if math.isfinite(share) else "–", min(share, 1e9)),
+        "loudest order": figures["line"],
+        "at / rpm": Cell(figure_text(figures["speed"], 4), figures["speed"]),
+        "at / Hz": Cell(f"{figures['frequency']:.0f}", figures["frequency"]),
+    }
+
+
+def _accelerations(material: Material, data: xr.Dataset) -> str:
+    """Largest accelerations of seats in a steady response, over all its lines and speeds."""
+    signals = [str(name) for name in data["signal"].to_numpy()]
+    places = [place for place, name in enumerate(signals) if name.startswith("seat_acceleration ")]
+    if not places:
+        return ""
+    amplitude = data["amplitude"].to_numpy()[:, 1:, places].astype(np.float64)
+    order = np.argsort(-amplitude.max(axis=(0, 1)))[:SEATS]
+    rows = []
+    for seat in order:
+        point, line = np.unravel_index(int(np.argmax(amplitude[..., seat])), amplitude.shape[:2])
+        speed = abs(float(data["speed"][point]))
+        rows.append(
+            {
+                "seat": _seat_words(material, signals[places[seat]]),
+                "acceleration / (m/s²)": Cell(
+                    figure_text(float(amplitude[point, line, seat])), float(amplitude[point, line, seat])
+                ),
+                "at / rpm": Cell(figure_text(speed / RPM, 4), speed),
+                "at / Hz": Cell(f"{float(data['order'][line + 1]) * speed / (2.0 * np.pi):.0f}"),
+            }
+        )
+    title = (
+        f"Accelerations of the seats: steady response of {words_of(choice_of(data.attrs))}, level {data.attrs['level']}"
+    )
+    return pieces.element("h3", pieces.text(title)) + pieces.table(rows, caption=title, sortable=True)
+
+
+def _seat_words(material: Material, signal: str) -> str:
+    """Words for a signal such as ``seat_acceleration hss_a x``."""
+    _, name, *rest = signal.split(" ")
+    return " ".join([material.words.of(name), *rest])
+
+
+def _duties(material: Material, assembly: Assembly) -> str:
+    if assembly.variant not in ON_BEARINGS or not any(support.catalogue for support in assembly.supports):
+        return ""
+    name = words_of(assembly.choice)
+    try:
+        duties = bearing_duties(assembly)
+    except (BalanceError, BearingError) as error:
+        material.context.notes.left_out.append(f"bearings of {name}: {error}")
+        return ""
+    remarks = [f"{material.words.of(duty.name)}: {remark}." for duty in duties for remark in duty.remarks]
+    rows = [_duty_row(material, duty) for duty in duties]
+    table = pieces.table(
+        rows, ("law",), caption=f"Bearings at the static load, {name}", name=f"duties-{'-'.join(name.split())}"
+    )
+    words = (
+        "Rows of rolling elements by ISO/TS 16281 between rigid rings, under the static load of the case. L10 by "
+        "ISO 281 and L10r by ISO/TS 16281 in million revolutions, basic: lubricant and cleanliness are left out, and "
+        "so are ribs. A rating with a star is estimated from the rows. Linear bearings have the tangent at this load."
+    )
+    content = pieces.paragraph(words, "note") + table + (pieces.bullets(remarks) if remarks else "")
+    return pieces.folded(f"Bearings at the static load: {name}", content)
+
+
+def _duty_row(material: Material, duty: BearingDuty) -> dict[str, object]:
+    sign = "*" if duty.ratings.estimated else ""
+    tilt = 0.5e-6 * float(duty.stiffness[3, 3] + duty.stiffness[4, 4])
+    return {
+        "bearing": material.words.of(duty.name),
+        "law": duty.law,
+        "radial load / kN": f"{1e-3 * duty.radial_load:.4g}",
+        "axial load / kN": f"{round(1e-3 * duty.axial_load, 3) + 0.0:.4g}",
+        "radial / (GN/m)": f"{1e-9 * duty.radial_stiffness:.3g}",
+        "axial / (GN/m)": f"{1e-9 * duty.stiffness[2, 2]:.3g}",
+        "tilt / (MN m/rad)": f"{tilt:.3g}",
+        "misaligned / mrad": f"{1e3 * duty.misalignment:.3f}",
+        "pressure / MPa": f"{1e-6 * duty.pressure:.0f}",
+        "C_r / kN": f"{1e-3 * duty.ratings.dynamic:.4g}{sign}",
+        "L10 / Mrev": _life(duty.basic_life),
+        "L10r / Mrev": _life(duty.reference_life),
+    }
+
+
+def _life(value: float) -> str:
+    return f"{value:.3g}" if math.isfinite(value) else "no load"

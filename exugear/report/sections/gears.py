@@ -1,0 +1,88 @@
+"""Section "Gears and excitation": transmission errors over the mesh cycle with their harmonics, and the gears."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from exugear.findings.excitation import HARMONICS, PairExcitation, excitations
+from exugear.findings.words import figure_text
+from exugear.report.parts.charts import Axis, Curve, chart
+from exugear.report.parts.material import Material, Part
+from exugear.web import pieces
+from exugear.web.pieces import Cell
+
+
+def gears_section(material: Material) -> Part:
+    """Show what excites: each pair's transmission error, its harmonics and stiffness; and the gears' geometry."""
+    found = excitations(material.context, material.results)
+    charts: dict[str, Any] = {}
+    content = []
+    if found:
+        html, charts = chart(
+            "ste",
+            "Static transmission error over one mesh cycle",
+            "Change about the mean.",
+            "; ".join(f"{material.words.of(own.pair)} {_swing(own):.2f} µm peak to peak" for own in found),
+            [Curve(material.words.of(own.pair), own.position, 1e6 * (own.error - own.error.mean())) for own in found],
+            [Axis("position in the mesh cycle"), Axis("transmission error / µm")],
+            material.arrays,
+        )
+        content = [
+            html,
+            pieces.table([_row(material, own) for own in found], caption="Static transmission error", name="errors"),
+            pieces.element("h3", "Harmonics of the transmission error, ± µm"),
+            pieces.table([_harmonics_row(material, own) for own in found], caption="Harmonics", name="harmonics"),
+        ]
+    content.append(pieces.folded("Gears", pieces.table(_gear_rows(material), caption="Gears", name="gears")))
+    html = pieces.section("Static transmission error and gears", *content, name="gears-section")
+    return Part(html, {"charts": charts}, "Excitation", "gears-section")
+
+
+def _swing(own: PairExcitation) -> float:
+    return 1e6 * float(np.ptp(own.error))
+
+
+def _row(material: Material, own: PairExcitation) -> dict[str, object]:
+    return {
+        "pair": material.words.of(own.pair),
+        "torque on gear 1 / N m": f"{own.torque:.1f}",
+        "positions": own.position.size,
+        "mean / µm": f"{1e6 * float(own.error.mean()):.2f}",
+        "peak to peak / µm": Cell(f"{_swing(own):.3f}", _swing(own)),
+        "mean stiffness / (N/µm)": f"{1e-6 * float(own.stiffness.mean()):.0f}",
+        "ISO 6336-1 B / (N/µm)": f"{1e-6 * own.iso_stiffness:.0f}",
+        "pressure / MPa": f"{1e-6 * own.pressure:.0f}" if math.isfinite(own.pressure) else "–",
+    }
+
+
+def _harmonics_row(material: Material, own: PairExcitation) -> dict[str, object]:
+    largest = max(float(own.harmonics.max()), 1e-300)
+    cells = {
+        f"{n + 1}.": Cell(figure_text(1e6 * float(value), 2), float(value), bar=float(value) / largest)
+        for n, value in enumerate(own.harmonics[:HARMONICS])
+    }
+    return {"pair": material.words.of(own.pair), **cells}
+
+
+def _gear_rows(material: Material) -> list[dict[str, object]]:
+    gearbox = material.context.gearbox
+    rows = []
+    for name, gear in gearbox.gears.items():
+        rows.append(
+            {
+                "gear": material.words.of(name),
+                "teeth": gear.teeth,
+                "kind": "internal" if gear.internal else "external",
+                "module / mm": f"{1e3 * gear.normal_module:g}",
+                "pressure angle / °": f"{math.degrees(gear.normal_pressure_angle):g}",
+                "helix angle / °": f"{math.degrees(gear.helix_angle):g}",
+                "profile shift": f"{gear.profile_shift:g}",
+                "face width / mm": f"{1e3 * gear.face_width:g}",
+                "tip diameter / mm": f"{2e3 * gear.tip_radius:.2f}",
+                "root diameter / mm": f"{2e3 * gear.root_radius:.2f}",
+            }
+        )
+    return rows

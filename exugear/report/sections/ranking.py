@@ -1,0 +1,145 @@
+"""Section "Resonances, loudest first": what rings, by which mesh, whether other variants have it, and what moves."""
+
+from __future__ import annotations
+
+import math
+
+from exugear.findings.groups import RankedResonance, RunGroup
+from exugear.findings.words import VARIANTS, figure_text, percentages
+from exugear.report.parts.material import Material, Part, only_for
+from exugear.spectra.comparison import AbsenceRule
+from exugear.spectra.run_spectra import VariantRun
+from exugear.spectra.windows import WINDOW_FACTORS
+from exugear.web import pieces
+from exugear.web.pieces import Cell
+
+SHOWN_SPAN = 60.0
+"""dB below the loudest at which the bar of a level ends."""
+
+
+def ranking_section(material: Material) -> Part:
+    """Rank the resonances of each run-up in a table."""
+    tables = [
+        only_for(_table(material, group, variant), group.name, variant)
+        for group in material.groups
+        for variant in reversed(list(group.runs))
+    ]
+    for group in material.groups:
+        _note_comparisons(material, group)
+    if not tables:
+        return Part("")
+    controls = pieces.element("div", _variant_choice() + _filters(), class_="controls scripts-only")
+    html = pieces.section(
+        "Resonances, loudest first", controls, *tables, pieces.paragraph(_rules(), "note"), name="ranking"
+    )
+    return Part(html, {}, "Ranking", "ranking")
+
+
+def _variant_choice() -> str:
+    return pieces.element("div", "", class_="choices", id="variant", role="group", aria_label="Resonances of")
+
+
+def _filters() -> str:
+    only = pieces.element(
+        "label", pieces.element("input", type="checkbox", id="only-lacking") + " only what another model lacks"
+    )
+    text = pieces.element(
+        "input", type="search", id="filter", placeholder="Filter: shaft, bearing, Hz", aria_label="Filter the table"
+    )
+    limit = pieces.element(
+        "label",
+        "Speeds up to "
+        + pieces.element("input", type="range", id="limit")
+        + pieces.element("output", "", id="limit-shown"),
+    )
+    rated = pieces.element("button", "Around rated", type="button", id="rated", hidden=True)
+    return only + text + limit + rated
+
+
+def _rules() -> str:
+    factors = ", ".join(f"{factor:g}" for factor in WINDOW_FACTORS)
+    return (
+        "A resonance is a peak that stands at least 6 dB above its surroundings along an order; peaks of several "
+        f"orders at one frequency are one. Absent, judged at its loudest peak: {AbsenceRule().description}, with every "
+        f"window. Unsteady: not shown with every length of the window, {factors} times that of the diagrams."
+    )
+
+
+def _table(material: Material, group: RunGroup, variant: str) -> str:
+    run, ranked = group.runs[variant], group.ranked[variant]
+    title = (
+        f"{VARIANTS[variant][0].upper()}{VARIANTS[variant][1:]}, inertias {group.inertias}, load case {group.load_case}"
+    )
+    heading = pieces.element("h3", pieces.text(f"{title}: {len(ranked)}"))
+    rows = [_row(material, group, run, number, own) for number, own in enumerate(ranked, start=1)]
+    if not rows:
+        return heading + pieces.paragraph("No resonance stands out.")
+    table = pieces.table(
+        rows,
+        ("Excited by", "What moves; what gives", *_others(group, variant)),
+        caption=f"Resonances {title}",
+        name=f"ranking-{group.name}-{variant}",
+        hidden=("± µm", "Prominence / dB", "Mode / Hz"),
+        sortable=True,
+        choices=[f"resonance:{group.name}:{variant}:{number}" for number in range(len(rows))],
+    )
+    return heading + table
+
+
+def _others(group: RunGroup, variant: str) -> list[str]:
+    return [f"{VARIANTS[name].capitalize()} / dB" for name in group.runs if name != variant]
+
+
+def _row(material: Material, group: RunGroup, run: VariantRun, number: int, own: RankedResonance) -> dict[str, object]:
+    finding, peak = own.finding, own.peak
+    loudest = group.ranked[run.variant][0].peak.level
+    frequency = f"{finding.resonance.frequency:.0f} ± {finding.resonance.resolution:.0f}"
+    choice = f"resonance:{group.name}:{run.variant}:{number - 1}"
+    matched = finding.mode is not None and run.modes is not None
+    row: dict[str, object] = {
+        "No.": Cell(str(number), number),
+        "Frequency / Hz": Cell(frequency, finding.resonance.frequency, choice),
+        "Speed / rpm": Cell(figure_text(finding.speed, 4), finding.speed),
+        "Excited by": material.words.line(peak.line),
+        "Level / dB": Cell(f"{peak.level:.1f}", peak.level, bar=1.0 - (loudest - peak.level) / SHOWN_SPAN),
+        "± µm": Cell(figure_text(10.0 ** (peak.level / 20.0), 2), peak.level),
+        "Prominence / dB": Cell(figure_text(peak.prominence, 2), peak.prominence),
+    }
+    for name, key in zip((n for n in group.runs if n != run.variant), _others(group, run.variant), strict=True):
+        level = own.elsewhere[name]
+        if name in own.lacking:
+            row[key] = Cell("absent", -1e3, tag="plain")
+        else:
+            row[key] = Cell(f"{level:.1f}" if math.isfinite(level) else "–", level if math.isfinite(level) else -1e4)
+    row["Mode / Hz"] = Cell(
+        f"{finding.mode_frequency:.1f}" if matched else "–", finding.mode_frequency if matched else -1.0
+    )
+    row["What moves; what gives"] = _story(material, run, own)
+    row["Windows"] = Cell("all" if own.steady else "unsteady", float(own.steady), tag="good" if own.steady else "mind")
+    return row
+
+
+def _story(material: Material, run: VariantRun, own: RankedResonance) -> str:
+    mode, modes = own.finding.mode, run.modes
+    if mode is None or modes is None:
+        return "no mode within the resolution"
+    gives = percentages(material.words.gives(modes, mode))
+    return f"{material.words.moves(modes, mode)}; {gives}"
+
+
+def _note_comparisons(material: Material, group: RunGroup) -> None:
+    """Tell which resonances only one of two variants has; unsteady ones are not counted."""
+    for variant, comparison in group.comparisons.items():
+        reference = comparison.second.variant
+        here, there = _only(group, variant, reference), _only(group, reference, variant)
+        material.context.notes.statements.append(
+            f"Resonances in {variant} and not in {reference} ({group.title}): {here}. In {reference} and not in "
+            f"{variant}: {there}."
+        )
+
+
+def _only(group: RunGroup, variant: str, other: str) -> str:
+    frequencies = sorted(
+        own.finding.resonance.frequency for own in group.ranked[variant] if own.steady and other in own.lacking
+    )
+    return ", ".join(f"{frequency:.0f}" for frequency in frequencies) + " Hz" if frequencies else "none"

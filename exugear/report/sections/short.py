@@ -1,0 +1,63 @@
+"""Section "In short": three facts in plain words, checks that were passed, and things to mind."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from exugear.findings.facts import Fact, facts_of
+from exugear.findings.groups import RunGroup
+from exugear.findings.verdicts import Verdict, run_figures, verdicts_of
+from exugear.report.parts.material import Material, Part, only_for
+from exugear.web import pieces
+
+
+def short_section(material: Material) -> Part:
+    """Tell the facts of each group of run-ups as cards; the command line prints the same sentences."""
+    context = material.context
+    content = []
+    for group in material.groups:
+        facts = facts_of(context, material.words, group, material.variations)
+        verdicts = verdicts_of(context, group, run_figures(group.runs[group.main]))
+        several = f"Inertias {group.inertias}: " if len(material.groups) > 1 else ""
+        context.notes.statements.extend(f"{several}{fact.line}" for fact in facts)
+        context.notes.statements.extend(f"{several}{verdict.line}." for verdict in verdicts)
+        content.append(only_for(_group(material, group, facts, verdicts), group.name))
+    if not content:
+        content = [
+            pieces.paragraph("No run-up of this case is here: `exugear run` makes one, and the page tells more.")
+        ]
+    return Part(pieces.section("In short", *content, name="short"), {}, "In short", "short")
+
+
+def _group(material: Material, group: RunGroup, facts: Sequence[Fact], verdicts: Sequence[Verdict]) -> str:
+    scope = (
+        f"{group.title[0].upper()}{group.title[1:]}. Speeds are those of the {material.input_words}, levels those of "
+        "the overall transmission error, 0 dB = 1 µm."
+    )
+    return (
+        pieces.paragraph(scope, "note")
+        + pieces.element("div", "".join(map(_card, facts)), class_="cards")
+        + verdict_list(verdicts)
+    )
+
+
+def _card(fact: Fact) -> str:
+    large = pieces.element(
+        "p", pieces.text(fact.figure) + pieces.element("small", pieces.text(f" {fact.beside}")), class_="large"
+    )
+    more = pieces.element("a", "See more", href=f"#{fact.link}", aria_label=f"See more: {fact.kind}")
+    return pieces.element(
+        "article", f"<h3>{pieces.text(fact.kind)}</h3>{large}{pieces.paragraph(fact.sentence)}{more}", class_="card"
+    )
+
+
+def verdict_list(verdicts: Sequence[Verdict]) -> str:
+    """List what was passed and what to mind; words say which is which beside colours."""
+    entries = []
+    for verdict in verdicts:
+        sign = pieces.element("b", "✓" if verdict.passed else "!", aria_hidden="true")
+        said = pieces.element("span", "Passed: " if verdict.passed else "Mind: ", class_="unseen")
+        entries.append(
+            pieces.element("li", sign + said + pieces.text(verdict.words), class_="good" if verdict.passed else "mind")
+        )
+    return pieces.element("ul", "".join(entries), class_="verdicts", aria_label="Can this be trusted?")

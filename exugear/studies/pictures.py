@@ -1,0 +1,228 @@
+"""Pictures of a study's dataset: curves over parameters, spreads of draws, rankings of slopes, fronts of searches."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from exugear.studies.dataset import slopes
+from exugear.studies.design.sampling import PARAMETER, SAMPLE, SIDE
+from exugear.studies.optimisation import EVALUATION
+from fe_ste.tools.arrays import Floats
+from fe_ste.tools.drawing import COLOURS, drawing_style, finish_figure, new_figure
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FOLDER = "pictures"
+_OF_POINTS = ("error", "doubts", "seconds", "memory", "on_front", "step")
+MOST_CURVES = 12
+"""Curves of one picture; of more values those spread over their range."""
+MOST_PANELS = 6
+"""Panels of one picture."""
+MARKED = (0.25, 0.5, 0.75, 0.95)
+"""Shares of draws that a spread marks."""
+WIDE = 30.0
+"""Ratio of the largest to the smallest value from which a scale is logarithmic."""
+MOST_PICTURES = 24
+"""Pictures of one study."""
+LEAST_SHARE = 1e-3
+"""Share of the longest bar below which a bar is left out."""
+MOST_ROWS = 24
+"""Bars of a ranking."""
+
+
+def draw_study(dataset: xr.Dataset, folder: Path, minimised: tuple[str, ...] = ()) -> list[Path]:
+    """Draw a study into ``pictures`` in its folder; a picture a figure, as its dimensions ask for.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        As `exugear.studies.dataset.dataset_of` makes it.
+    folder : Path
+        Of the study.
+    minimised : tuple of str
+        Figures that a search made small.
+
+    Returns
+    -------
+    list of Path
+    """
+    drawn = []
+    with drawing_style():
+        for name, draw in _pictures(dataset, minimised):
+            path = folder / FOLDER / f"{name}.png"
+            figure = new_figure(6.4, 4.0)
+            figure.suptitle(str(dataset.attrs["title"])[:80], fontsize=9.5)
+            draw(figure)
+            finish_figure(figure, path)
+            drawn.append(path)
+            if len(drawn) == MOST_PICTURES:
+                break
+    return drawn
+
+
+def _pictures(dataset: xr.Dataset, minimised: tuple[str, ...]) -> Iterator[tuple[str, Callable[[Figure], None]]]:
+    """Names of the pictures, and what draws each into a figure."""
+    if SIDE in dataset.dims:
+        yield "slopes", lambda figure: _draw_ranking(figure, dataset)
+        return
+    if EVALUATION in dataset.dims:
+        if len(minimised) == 2:
+            yield "front", lambda figure: _draw_front(figure.add_subplot(), dataset, *minimised)
+        else:
+            yield "search", lambda figure: _draw_search(figure.add_subplot(), dataset, minimised[0])
+        return
+    for name in dataset.data_vars:
+        values = dataset[name]
+        if name not in _OF_POINTS and np.isfinite(values.to_numpy()).any():
+            yield str(name), partial(_draw_over_parameters, values=values)
+
+
+def _draw_over_parameters(figure: Figure, values: xr.DataArray) -> None:
+    """Draw a figure over parameters: along one, a curve for each value of another, a panel for each of all others."""
+    dimensions = [str(own) for own in values.dims if values.sizes[own] > 1] or [str(values.dims[-1])]
+    values = values.squeeze([own for own in values.dims if own not in dimensions])
+    numeric = [own for own in dimensions if _is_number(values, own)]
+    along = SAMPLE if SAMPLE in dimensions else (numeric or dimensions[-1:])[0]
+    others = [own for own in dimensions if own != along]
+    panels, by = others[:-1], others[-1:]
+    labels = _combinations(values, panels)[:MOST_PANELS]
+    shape = (-1, values.sizes[by[0]] if by else 1, values.sizes[along])
+    stacked = values.transpose(*panels, *by, along).to_numpy().reshape(shape)
+    if len(labels) > 1:
+        figure.set_size_inches(3.4 * min(len(labels), 2) + 1.6, 3.0 * -(-len(labels) // 2) + 0.6)
+    grid = figure.subplots(-(-len(labels) // 2), min(len(labels), 2), squeeze=False, sharey=True, sharex=True)
+    draw = _draw_spread if along == SAMPLE else _draw_curves if along in numeric else _draw_bars
+    for axes, rows, label in zip(grid.flat, stacked, labels, strict=False):
+        draw(axes, values, along, rows, _combinations(values, by))
+        axes.set_title(f"{', '.join(panels)} {label}" if panels else "")
+    for axes in grid.flat[len(labels) :]:
+        axes.set_visible(False)
+    if by:
+        handles, names = grid.flat[0].get_legend_handles_labels()
+        figure.legend(handles, names, title=by[0], loc="outside right upper")
+
+
+def _label(values: xr.DataArray) -> str:
+    units = str(values.attrs.get("units", ""))
+    return f"{values.name} / {units}" if units not in ("", "1") else str(values.name)
+
+
+def _is_number(values: xr.DataArray, dimension: str) -> bool:
+    return bool(values[dimension].dtype.kind in "fi") if dimension in values.coords else False
+
+
+def _draw_curves(axes: Axes, values: xr.DataArray, along: str, rows: Floats, labels: list[str]) -> None:
+    x = values[along].to_numpy().astype(np.float64)
+    shown = np.unique(np.linspace(0, len(labels) - 1, min(MOST_CURVES, len(labels))).round().astype(int))
+    for place, n in enumerate(shown):
+        style = "-" if place < len(COLOURS) else "--"
+        axes.plot(x, rows[n], style, marker=".", color=COLOURS[place % len(COLOURS)], label=labels[n])
+    if x.min() > 0.0 and x.max() / x.min() > WIDE:
+        _logarithmic(axes, "x")
+    axes.set_xlabel(_label(values[along]))
+    axes.set_ylabel(_label(values))
+
+
+def _logarithmic(axes: Axes, which: Literal["x", "y"]) -> None:
+    """Give an axis a logarithmic scale whose numbers are plain words: the style draws no formulas."""
+    from matplotlib.ticker import FuncFormatter, NullFormatter
+
+    if which == "x":
+        axes.set_xscale("log")
+    else:
+        axes.set_yscale("log")
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def _combinations(values: xr.DataArray, dimensions: list[str]) -> list[str]:
+    """Names of all combinations along some dimensions."""
+    labels = [""]
+    for dimension in dimensions:
+        own = values[dimension].to_numpy() if dimension in values.coords else np.arange(values.sizes[dimension])
+        words = [f"{entry:.4g}" if isinstance(entry, float) else str(entry) for entry in own]
+        labels = [f"{before}, {word}".removeprefix(", ") for before in labels for word in words]
+    return labels
+
+
+def _draw_bars(axes: Axes, values: xr.DataArray, along: str, rows: Floats, labels: list[str]) -> None:
+    words = _combinations(values, [along])
+    width = 0.8 / min(len(labels), MOST_CURVES)
+    for n, (row, label) in enumerate(zip(rows[:MOST_CURVES], labels, strict=False)):
+        places = np.arange(len(words)) + (n - 0.5 * (min(len(labels), MOST_CURVES) - 1)) * width
+        axes.bar(places, row, width, color=COLOURS[n % len(COLOURS)], label=label)
+    axes.set_xticks(np.arange(len(words)), words)
+    known = values.to_numpy()[np.isfinite(values.to_numpy())]
+    if known.size and known.min() > 0.0 and known.max() / known.min() > WIDE:
+        _logarithmic(axes, "y")
+    axes.set_xlabel(along)
+    axes.set_ylabel(_label(values))
+
+
+def _draw_spread(axes: Axes, values: xr.DataArray, along: str, rows: Floats, labels: list[str]) -> None:
+    """Draw the share of draws below a value; quartiles and 95 % are marked."""
+    for n, (row, label) in enumerate(zip(rows[:MOST_CURVES], labels, strict=False)):
+        known: Floats = np.sort(row[np.isfinite(row)])
+        if not known.size:
+            continue
+        share = (np.arange(known.size) + 0.5) / known.size
+        colour = COLOURS[n % len(COLOURS)]
+        axes.plot(known, share, "-" if n < len(COLOURS) else "--", color=colour, label=label)
+        axes.plot(np.quantile(known, MARKED), MARKED, "o", color=colour, markersize=3.5)
+    spread = values.to_numpy()[np.isfinite(values.to_numpy())]
+    if spread.min() > 0.0 and spread.max() / spread.min() > WIDE:
+        _logarithmic(axes, "x")
+    axes.set_xlabel(_label(values))
+    axes.set_ylabel("share of draws below")
+    axes.set_ylim(0.0, 1.0)
+
+
+def _draw_ranking(figure: Figure, dataset: xr.Dataset) -> None:
+    """Draw what a step of each parameter changes, in percent, the strongest on top."""
+    axes = figure.add_subplot()
+    ranked = sorted(slopes(dataset), key=lambda entry: abs(entry[2]))[-MOST_ROWS:]
+    ranked = [entry for entry in ranked if abs(entry[2]) >= LEAST_SHARE * abs(ranked[-1][2])]
+    figures = list(dict.fromkeys(name for name, _, _ in ranked))
+    for place, (name, _, change) in enumerate(ranked):
+        axes.barh(place, 100.0 * change, color=COLOURS[figures.index(name) % len(COLOURS)])
+    axes.set_yticks(range(len(ranked)), [f"{name} by {parameter}" for name, parameter, _ in ranked])
+    axes.axvline(0.0, color="black", linewidth=0.8)
+    axes.set_xlabel(f"% for a step of the {PARAMETER}")
+    figure.set_size_inches(6.4, max(3.0, 0.24 * len(ranked) + 1.2))
+
+
+def _draw_front(axes: Axes, dataset: xr.Dataset, first: str, second: str) -> None:
+    """Draw all points of a search over its two figures, those that no other beats, and the case as it is."""
+    x, y = dataset[first].to_numpy(), dataset[second].to_numpy()
+    front = dataset["on_front"].to_numpy() == 1
+    order = np.argsort(x[front])
+    axes.plot(x[~front], y[~front], ".", color="#BBBBBB", label="looked at")
+    axes.plot(
+        x[front][order], y[front][order], "o-", color=COLOURS[0], markersize=4, label="no other is better in both"
+    )
+    axes.plot(x[0], y[0], "s", color=COLOURS[1], label="as it is")
+    near = [np.nanquantile(values, 0.9) for values in (x, y)]
+    axes.set_xlim(0.95 * np.nanmin(x), 1.05 * max(near[0], x[0]))
+    axes.set_ylim(0.95 * np.nanmin(y), 1.05 * max(near[1], y[0]))
+    axes.set_xlabel(_label(dataset[first]))
+    axes.set_ylabel(_label(dataset[second]))
+    axes.legend()
+
+
+def _draw_search(axes: Axes, dataset: xr.Dataset, name: str) -> None:
+    """Draw a figure at the points that a search looked at, and the best so far."""
+    values = dataset[name].to_numpy()
+    axes.plot(values, ".", color="#BBBBBB")
+    axes.plot(np.fmin.accumulate(values), color=COLOURS[0])
+    axes.set_ylim(top=1.05 * float(np.nanquantile(values, 0.9)))
+    axes.set_xlabel(EVALUATION)
+    axes.set_ylabel(_label(dataset[name]))

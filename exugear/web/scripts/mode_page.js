@@ -1,0 +1,40 @@
+// The page of the verb `view`: modes of one model in motion, chosen from a list.
+import { find, need } from "./dom.js";
+import { beginModeView, drawMode } from "./mode_view.js";
+import { pageData } from "./page_data.js";
+import { choose, onChange, state } from "./state.js";
+import { beginTables } from "./tables.js";
+import { beginTheme } from "./theme.js";
+
+/** Mark the mode that is shown. */
+function markMode() {
+  const chosen = `mode:${state.model}:${state.mode}`;
+  for (const button of document.querySelectorAll("button[data-choice]")) {
+    const own = button instanceof HTMLElement && button.dataset.choice === chosen;
+    button.closest("tr")?.classList.toggle("chosen", own);
+    if (own) button.setAttribute("aria-current", "true");
+    else button.removeAttribute("aria-current");
+  }
+  const words = pageData.models[state.model]?.modes[state.mode]?.words;
+  if (words) need("mode-words").textContent = words;
+}
+
+/** @param {number} by */
+function step(by) {
+  const count = pageData.models[state.model].modes.length;
+  choose({ mode: (state.mode + by + count) % count });
+}
+
+/** @type {Promise<unknown>} */
+let drawing = Promise.resolve();
+onChange(() => {
+  markMode();
+  drawing = drawMode();
+});
+beginTheme(() => void drawMode());
+beginTables();
+beginModeView();
+find("before")?.addEventListener("click", () => step(-1));
+find("next")?.addEventListener("click", () => step(1));
+choose({ model: Object.keys(pageData.models)[0], mode: pageData.first ?? 0 });
+void drawing.finally(() => document.documentElement.setAttribute("data-ready", ""));

@@ -1,0 +1,107 @@
+// The figure in which the chosen mode moves, with its controls.
+import { find, make, need } from "./dom.js";
+import { addTools } from "./downloads.js";
+import { figureText } from "./numbers.js";
+import { pageData } from "./page_data.js";
+import { Stage } from "./stage.js";
+import { state } from "./state.js";
+
+/** @type {Stage | null} */
+let stage = null;
+
+/** Begin: without WebGL the words stand alone. */
+export function beginModeView() {
+  const canvas = /** @type {HTMLCanvasElement | null} */ (find("view-3d"));
+  if (!canvas) return;
+  try {
+    stage = new Stage(canvas);
+  } catch {
+    need("no-gl").hidden = false;
+    canvas.hidden = true;
+    return;
+  }
+  const still = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
+  setPlaying(!still);
+  need("play").addEventListener("click", () => setPlaying(!stage?.playing));
+  need("amplitude").addEventListener("input", (event) => {
+    if (!stage) return;
+    stage.amplitude = Number(/** @type {HTMLInputElement} */ (event.target).value);
+    stage.place(stage.phase);
+    stage.draw();
+  });
+  need("by-body").addEventListener("change", (event) => {
+    if (!stage) return;
+    stage.byBody = /** @type {HTMLInputElement} */ (event.target).checked;
+    stage.colour();
+    stage.draw();
+  });
+  window.addEventListener("beforeprint", keepStill);
+}
+
+/** @param {boolean} on */
+function setPlaying(on) {
+  stage?.setPlaying(on);
+  const button = need("play");
+  button.textContent = on ? "Pause" : "Play";
+  button.setAttribute("aria-pressed", String(on));
+}
+
+/** Paper shows a picture: what WebGL drew prints cropped. */
+function keepStill() {
+  if (!stage) return;
+  stage.place(1);
+  stage.draw();
+  /** @type {HTMLImageElement} */ (need("still")).src = stage.canvas.toDataURL();
+}
+
+/** Show the chosen mode of the chosen model. */
+export async function drawMode() {
+  const model = pageData.models[state.model];
+  const title = find("mode-title");
+  if (!model || !title) return;
+  const mode = model.modes[state.mode];
+  title.textContent = mode ? `Mode at ${mode.frequency.toFixed(1)} Hz` : "No mode belongs to it";
+  if (!stage) return;
+  stage.canvas.setAttribute("aria-label", mode ? `Mode at ${figureText(mode.frequency, 5)} Hz: ${mode.words}` : "At rest");
+  const current = stage;
+  await current.show(model.stage, state.mode);
+  drawBodies(current);
+  addTools(need("mode-tools"), () => title.textContent ?? "Mode", {
+    rows: motionRows,
+    canvas: () => current.canvas,
+    extra: [make("button", { type: "button", "aria-label": "Look from the start", click: () => lookAgain(current) }, "⤢")],
+  });
+}
+
+/** @param {Stage} current */
+function lookAgain(current) {
+  current.lookFrom([0.75, 0.45, -1]);
+  current.draw();
+}
+
+/** Chips that hide bodies. @param {Stage} current */
+function drawBodies(current) {
+  const place = need("bodies");
+  const owners = current.actors.filter((actor) => actor.data.owner === actor.data.name);
+  const chips = owners.map(({ data }) => {
+    const dot = make("i", { class: "dot" });
+    dot.style.background = data.colour;
+    const chip = make("button", { type: "button", "aria-pressed": String(!current.hidden.has(data.name)) }, dot, data.label);
+    chip.addEventListener("click", () => {
+      if (!current.hidden.delete(data.name)) current.hidden.add(data.name);
+      chip.setAttribute("aria-pressed", String(!current.hidden.has(data.name)));
+      current.place(current.phase);
+      current.draw();
+    });
+    return chip;
+  });
+  place.replaceChildren(...chips);
+}
+
+/** Rows of how bodies move as a whole, the largest displacement of any point 1 m. */
+function motionRows() {
+  const head = ["body", "x / m", "y / m", "z / m", "about x / rad", "about y / rad", "about z / rad"];
+  const current = stage;
+  if (!current) return [head];
+  return [head, ...current.actors.map((actor, place) => [actor.data.label, ...current.motionOf(place)])];
+}

@@ -1,0 +1,56 @@
+// The report: all parts begun, and told what changes.
+import { beginCampbell, drawCampbell } from "./campbell.js";
+import { beginCharts, redrawCharts } from "./charts.js";
+import { drawCuts } from "./cuts.js";
+import { drawDetail } from "./detail.js";
+import { find } from "./dom.js";
+import { beginModeView, drawMode } from "./mode_view.js";
+import { chosenGroup, fastest, onChange, recall } from "./state.js";
+import { beginSwitches, drawSwitches, showChosen } from "./switches.js";
+import { beginLimit, beginTables, drawLimit, markRow } from "./tables.js";
+import { beginTheme } from "./theme.js";
+import { drawWaterfall } from "./waterfall.js";
+
+const hasRuns = find("waterfall") !== null;
+
+/** @param {Set<string>} changed @param {string[]} keys */
+const any = (changed, keys) => keys.some((key) => changed.has(key));
+
+/** @param {Set<string>} changed @returns {Promise<unknown>} */
+async function redraw(changed) {
+  /** @type {Promise<unknown>[]} */
+  const drawn = [];
+  if (hasRuns) {
+    if (any(changed, ["group", "variant", "view", "channel"])) drawSwitches();
+    if (any(changed, ["group", "variant"])) showChosen();
+    if (any(changed, ["group", "limit"])) drawLimit(fastest(chosenGroup()));
+    markRow();
+    drawDetail();
+    const over = ["group", "variant", "view", "channel", "limit", "resonance", "lines"];
+    if (any(changed, over)) drawn.push(drawWaterfall(), drawCuts());
+  }
+  if (any(changed, ["model", "mode", "lines"])) drawCampbell();
+  if (any(changed, ["model", "mode"])) drawn.push(drawMode());
+  return Promise.all(drawn);
+}
+
+/** @type {Promise<unknown>} */
+let drawing = Promise.resolve();
+onChange((changed) => (drawing = redraw(changed)));
+
+beginTheme(() => {
+  if (hasRuns) void Promise.all([drawWaterfall(), drawCuts()]);
+  drawCampbell();
+  void redrawCharts(false);
+});
+if (hasRuns) {
+  beginSwitches();
+  beginLimit();
+} else beginSwitches();
+beginTables();
+beginModeView();
+beginCampbell();
+recall();
+beginCharts();
+window.addEventListener("beforeprint", () => void redrawCharts(true));
+void drawing.finally(() => document.documentElement.setAttribute("data-ready", ""));

@@ -1,0 +1,92 @@
+"""Contact stress and what withstands it by ISO 6336-2:2006, method B.
+
+Checked against the first worked example of ISO/TR 6336-30:2017. Case-hardened and through-hardened steels.
+"""
+
+from __future__ import annotations
+
+import math
+
+from fe_ste.geometry.gears import Gear, GearPair
+
+_SOFT, _HARD = 850e6, 1200e6
+"""Allowable stress numbers, Pa, between which the constants of oil, speed and roughness change."""
+_REFERENCE_RADIUS = 10e-3
+"""Reduced radius of curvature to which roughness is referred, m."""
+
+
+def tangential_force(gear: Gear, base_force: float) -> float:
+    """F_t at the reference circle (N) of a force F_bt on the transverse line of action."""
+    return base_force * gear.base_radius / gear.reference_radius
+
+
+def zone_factor(pair: GearPair) -> float:
+    """Z_H: curvature at the pitch point, and from the reference circle to the normal force."""
+    angle, transverse = pair.working_pressure_angle, pair.pinion.transverse_pressure_angle
+    lean = math.cos(pair.pinion.base_helix_angle)
+    return math.sqrt(2.0 * lean * math.cos(angle) / (math.cos(transverse) ** 2 * math.sin(angle)))
+
+
+def elasticity_factor(pair: GearPair) -> float:
+    """Z_E, the root of Pa: ``1 / sqrt(pi sum (1 - nu^2) / E)``."""
+    gears = (pair.pinion, pair.gear)
+    give = sum((1.0 - one.material.poissons_ratio**2) / one.material.youngs_modulus for one in gears)
+    return math.sqrt(1.0 / (math.pi * give))
+
+
+def contact_ratio_factor(pair: GearPair) -> float:
+    """Z_eps of transverse and overlap ratio."""
+    transverse, overlap = pair.transverse_contact_ratio, pair.overlap_ratio
+    if overlap >= 1.0:
+        return math.sqrt(1.0 / transverse)
+    return math.sqrt((4.0 - transverse) / 3.0 * (1.0 - overlap) + overlap / transverse)
+
+
+def helix_factor(gear: Gear) -> float:
+    """Z_beta = 1 / sqrt(cos beta), as since 2006."""
+    return 1.0 / math.sqrt(math.cos(gear.helix_angle))
+
+
+def nominal_contact_stress(pair: GearPair, force: float) -> float:
+    """sigma_H0 at the pitch point, Pa.
+
+    Parameters
+    ----------
+    pair : GearPair
+    force : float
+        F_t at the reference circle, N.
+    """
+    diameter, ratio = 2.0 * pair.pinion.reference_radius, pair.gear.teeth / pair.pinion.teeth
+    sign = -1.0 if pair.gear.internal else 1.0
+    factors = zone_factor(pair) * elasticity_factor(pair) * contact_ratio_factor(pair) * helix_factor(pair.pinion)
+    return factors * math.sqrt(force / (diameter * pair.face_width) * (ratio + sign) / ratio)
+
+
+def lubricant_factor(limit: float, viscosity: float) -> float:
+    """Z_L of the softer gear's allowable stress number (Pa) and the oil's viscosity at 40 deg C (mm2/s)."""
+    constant = _constant(limit, 0.83, 0.91)
+    return constant + 4.0 * (1.0 - constant) / (1.2 + 134.0 / viscosity) ** 2
+
+
+def velocity_factor(limit: float, velocity: float) -> float:
+    """Z_v of the softer gear's allowable stress number (Pa) and the pitch line velocity (m/s)."""
+    constant = _constant(limit, 0.83, 0.91) + 0.02
+    return constant + 2.0 * (1.0 - constant) / math.sqrt(0.8 + 32.0 / max(velocity, 1e-9))
+
+
+def roughness_factor(limit: float, roughness: float, radius: float) -> float:
+    """Z_R of the softer gear's allowable stress number (Pa), the mean Rz of both gears and the reduced radius (m)."""
+    related = 1e6 * roughness * (_REFERENCE_RADIUS / radius) ** (1.0 / 3.0)
+    exponent = 0.15 if limit < _SOFT else 0.08 if limit > _HARD else 0.32 - 0.2e-9 * limit
+    return float((3.0 / related) ** exponent)
+
+
+def reduced_radius(pair: GearPair) -> float:
+    """Radius of relative curvature at the pitch point in the transverse section, m."""
+    slope = math.tan(pair.working_pressure_angle)
+    sign = -1.0 if pair.gear.internal else 1.0
+    return slope / (1.0 / pair.pinion.base_radius + sign / pair.gear.base_radius)
+
+
+def _constant(limit: float, soft: float, hard: float) -> float:
+    return soft + (hard - soft) * min(max((limit - _SOFT) / (_HARD - _SOFT), 0.0), 1.0)

@@ -1,0 +1,386 @@
+"""Life of a spur pair against closed forms, bins against series, and what is kept and refused."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from exugear.bearings.rolling.life import basic_rating_life
+from exugear.cli import app as cli
+from exugear.dynamics.assemble import assemble
+from exugear.dynamics.assembly import Assembly, VariantError
+from exugear.dynamics.statics import locked_equilibrium
+from exugear.kernels.meshes import FORCE
+from exugear.life.acting_loads import acting_loads
+from exugear.life.dynamic_factor import stated_factors
+from exugear.life.gear_life import flank_lives
+from exugear.life.life import checked_loads, compute_life, rating_of
+from exugear.life.life_diagrams import damage_matrix
+from exugear.life.life_file import limits, read_life
+from exugear.life.pair_stresses import pair_stresses
+from exugear.life.static_balance import rolled_coordinates, static_balance
+from exugear.load_spectrum.counted import count_loads
+from exugear.model.choice import Choice
+from exugear.model.gearbox import Gearbox
+from exugear.model.reading import CaseError
+from exugear.project import Project
+from fe_ste.root_stress.mesh_cycle import MeshCycleStress
+from fe_ste.standards.pitting import nominal_contact_stress
+from fe_ste.standards.tooth_root import root_stress_factors
+
+from ..spur_case import SPUR_CASE
+from ..table_case import surfaces
+
+BASE = 30e-3 * math.cos(math.radians(20.0))
+STRENGTH = {
+    "sigma_H_lim_MPa": 1500.0,
+    "sigma_F_lim_MPa": 500.0,
+    "curve": "case_hardened",
+    "roughness_um": 4.8,
+    "root_factor": 1.0,
+}
+CATALOGUE = {
+    "type": "cylindrical_roller",
+    "bore_mm": 40.0,
+    "outer_diameter_mm": 80.0,
+    "width_mm": 18.0,
+    "dynamic_rating_kN": 60.0,
+    "static_rating_kN": 53.0,
+}
+
+
+def content_of(table: str, folder: Path, **rating: Any) -> dict[str, Any]:
+    """Spur case with loads of a table with commas and a rating."""
+    content = tomllib.loads(SPUR_CASE)
+    (folder / "loads.csv").write_text(table)
+    content["bearings"]["bearing_1"] = {
+        "body": "shaft_1",
+        "z_mm": 0.0,
+        "stiffness": {"axial_N_per_m": 1e8, "tilt_N_m_per_rad": 1e6},
+        "catalogue": CATALOGUE,
+        "housing_factor_applies": False,
+    }
+    content["loads"] = {
+        "body": "shaft_1",
+        "life_years": 10.0,
+        "sources": {"spectrum": {"file": "loads.csv", "hours_per_year": 1000.0}},
+    }
+    gears = {"pinion": {**STRENGTH}, "wheel": {**STRENGTH}}
+    content["rating"] = {"dynamic_factor": 1.0, "viscosity_40_mm2_per_s": 320.0, "gears": gears} | rating
+    return content
+
+
+TABLE = "torque_N_m,speed_rpm,hours\n100,1500,3\n200,1000,1\n"
+
+
+@pytest.fixture(scope="module")
+def first(tmp_path_factory) -> Project:
+    """Folder with table and stresses of the one pair, which take some seconds, and a life."""
+    project = spur_project(tmp_path_factory.mktemp("spur"), TABLE)
+    project.life()
+    return project
+
+
+@pytest.fixture
+def stresses(first) -> dict[str, MeshCycleStress]:
+    return pair_stresses(first.life_tables(), first.folder)
+
+
+def spur_project(folder: Path, table: str, **rating: Any) -> Project:
+    gearbox = Gearbox.from_dict(content_of(table, folder, **rating), str(folder / "gearbox.toml"))
+    return Project(gearbox, folder, Choice("bushing", "iso6336"))
+
+
+def lives(project: Project, stresses: dict[str, MeshCycleStress]) -> dict[str, Any]:
+    """Flanks by gear, computed without files."""
+    gearbox = project.gearbox
+    counted = checked_loads(gearbox)
+    acting = acting_loads(counted)
+    balance = static_balance(project.assembly(), counted.body, acting.torques, 12)
+    dynamic = stated_factors(gearbox, rating_of(gearbox).dynamic_factor)
+    rated = flank_lives(gearbox, rating_of(gearbox), counted.teeth, acting, balance, stresses, dynamic)
+    return {f"{one.gear} {one.flank}": one for one in rated}
+
+
+def test_life_of_a_spur_pair_as_a_user_meets_it(first):
+    """Bearing loads and L10 in closed form, gears beside the standard; a second call finds what is kept."""
+    data = read_life(first.life_path)
+    (bearing,) = data["bearing"].to_numpy().tolist()
+    forces = np.array([100.0, 200.0]) / BASE
+    hours, speeds = np.array([7500.0, 2500.0]), np.array([1500.0, 1000.0])
+    revolutions = hours * speeds * 60.0
+    allowed = np.array([basic_rating_life(60e3, force, "cylindrical_roller") for force in forces])
+    assert bearing == "bearing_1"
+    assert float(data["bearing_damage"][0]) == pytest.approx(np.sum(revolutions / 1e6 / allowed), rel=1e-3)
+    assert float(data["bearing_largest_load"][0]) == pytest.approx(forces[1], rel=1e-3)
+    assert float(data["bearing_static_safety"][0]) == pytest.approx(53e3 / forces[1], rel=1e-3)
+    assert data["load_sharing"].to_numpy() == pytest.approx([1.0], rel=1e-6)
+    cycles = data["flank_cycles"].to_numpy()
+    assert cycles == pytest.approx([revolutions.sum(), revolutions.sum() * 20 / 30])
+    # Finite-element root stress of this pair, whose face is stiff to its ends: within a sixth of the standard's.
+    assert data["flank_root_stress"].to_numpy() == pytest.approx(data["flank_nominal_root"].to_numpy(), rel=0.17)
+    assert first.life_path.with_name("life_gears.csv").read_text().startswith("flank,cycles,")
+    before = first.life_path.stat().st_mtime_ns
+    again = first.life()
+    assert again.identical(data) and first.life_path.stat().st_mtime_ns == before
+    harder = spur_project(first.folder, TABLE, dynamic_factor=1.2).life()
+    assert np.all(harder["flank_contact_stress"].to_numpy() > data["flank_contact_stress"].to_numpy())
+
+
+def test_nominal_stresses_are_those_of_the_standard_at_the_largest_torque(tmp_path, stresses):
+    found = lives(spur_project(tmp_path, TABLE), stresses)
+    pair = spur_project(tmp_path, TABLE).gearbox.gear_pairs["spur"]
+    force = 200.0 / pair.pinion.reference_radius
+    pinion = found["pinion +"]
+    assert pinion.nominal_contact == pytest.approx(nominal_contact_stress(pair, force), rel=1e-6)
+    product = root_stress_factors(pair, 0).product
+    assert pinion.nominal_root == pytest.approx(force / (15e-3 * 3e-3) * product, rel=1e-6)
+
+
+def test_safety_is_the_factor_on_stress_at_which_the_damage_is_one(tmp_path, stresses):
+    """Pitting goes with the root of torque, breakage with torque: loads scaled so have damage one."""
+    found = lives(spur_project(tmp_path, TABLE), stresses)["pinion +"]
+    for key, power, damage in (("contact_safety", 2.0, "contact_damage"), ("root_safety", 1.0, "root_damage")):
+        factor = getattr(found, key) ** power
+        scaled = f"torque_N_m,speed_rpm,hours\n{100 * factor:.9g},1500,3\n{200 * factor:.9g},1000,1\n"
+        more = lives(spur_project(tmp_path, scaled), stresses)["pinion +"]
+        assert getattr(more, damage) == pytest.approx(1.0, rel=1e-3)
+
+
+def test_bins_do_the_damage_of_the_series(tmp_path, stresses):
+    """A swinging torque of 4000 samples in 64 bins and in as many as make each sample its own, within 1 %."""
+    time = np.arange(4000) * 0.1
+    torque = 150.0 + 60.0 * np.sin(0.7 * time) + 25.0 * np.sin(2.9 * time + 1.0)
+    lines = "\n".join(f"{t:.1f},{one:.6f},1000" for t, one in zip(time, torque, strict=True))
+    damages = []
+    for bins in (64, 10_000):
+        content = content_of(f"time_s,shaft_1_N_m,shaft_1_rpm\n{lines}\n", tmp_path)
+        content["loads"] |= {"bins": bins}
+        content["loads"]["sources"]["spectrum"]["skip_s"] = 0.0
+        project = Project(Gearbox.from_dict(content, str(tmp_path / "g.toml")), tmp_path, Choice("bushing", "iso6336"))
+        one = lives(project, stresses)["pinion +"]
+        damages.append((one.contact_damage, one.root_damage))
+    assert damages[0] == pytest.approx(damages[1], rel=0.01)
+
+
+def test_reversed_torque_wears_the_other_flanks_alone(tmp_path, stresses):
+    gears = {"pinion": {**STRENGTH, "mean_stress_factor": 0.7}, "wheel": {**STRENGTH, "mean_stress_factor": 0.7}}
+    table = "torque_N_m,speed_rpm,hours\n200,1000,3\n-100,1000,1\n"
+    found = lives(spur_project(tmp_path, table, gears=gears), stresses)
+    assert set(found) == {"pinion -", "pinion +", "wheel -", "wheel +"}
+    assert found["pinion +"].cycles == pytest.approx(3.0 * found["pinion -"].cycles)
+    assert found["pinion +"].contact_damage > 100.0 * found["pinion -"].contact_damage
+
+
+def test_an_extreme_load_counts_for_static_safety_alone(tmp_path, first, stresses):
+    content = content_of(TABLE, tmp_path)
+    (tmp_path / "storm.csv").write_text("torque_N_m,speed_rpm,hours\n400,1000,1\n")
+    storm = {"file": "storm.csv", "kind": "extreme", "partial_factor": 1.35}
+    content["loads"]["sources"]["storm"] = storm
+    worse = Project(Gearbox.from_dict(content, str(tmp_path / "g.toml")), tmp_path, first.choice)
+    quiet, loud = (
+        compute_life(one.assembly(), checked_loads(one.gearbox), stresses, stated_factors(one.gearbox, 1.0), "")
+        for one in (spur_project(tmp_path, TABLE), worse)
+    )
+    for calm, storm_too in zip(quiet.flanks, loud.flanks, strict=True):
+        assert storm_too.root_damage == pytest.approx(calm.root_damage, rel=1e-6)
+        assert calm.root_static / storm_too.root_static == pytest.approx(1.35 * 400.0 / 200.0, rel=1e-6)
+    assert loud.bearings[0].static_safety == pytest.approx(53e3 / (540.0 / BASE), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda content: content.pop("rating"), "rating: this section is missing"),
+        (lambda content: content["rating"]["gears"].update(sun={**STRENGTH}), "no gear of that name in a mesh"),
+        (lambda content: content["loads"].update(body="nobody"), "does not turn"),
+        (lambda content: content["loads"].update(body="shaft_2"), "static_load.locked holds shaft_2"),
+        (lambda content: content["rating"]["gears"]["pinion"].pop("curve"), "give curve, or contact_curve"),
+        (lambda content: content["rating"].update(dynamic_factor=0.5), "must lie between 1 and 10"),
+        (lambda content: content["rating"].update(dynamic_factor_run="run_up"), "give dynamic_factor, or"),
+        (
+            lambda content: content.update(
+                rating={"dynamic_factor_run": "no", "least_dynamic_factor": 1.0, "viscosity_40_mm2_per_s": 320.0}
+            ),
+            "dynamic_factor_run = 'no': load cases are run_up",
+        ),
+    ],
+)
+def test_bad_sections_are_one_error_each(tmp_path, change, message):
+    content = content_of(TABLE, tmp_path)
+    change(content)
+    with pytest.raises(CaseError, match=message):
+        checked_loads(Gearbox.from_dict(content, str(tmp_path / "gearbox.toml")))
+
+
+def test_gears_that_bend_both_ways_need_their_factor(tmp_path):
+    table = "torque_N_m,speed_rpm,hours\n200,1000,3\n-100,1000,1\n"
+    with pytest.raises(CaseError, match=r"rating.gears.pinion.mean_stress_factor: this key is missing"):
+        checked_loads(spur_project(tmp_path, table).gearbox)
+
+
+def test_bad_input_writes_nothing(tmp_path):
+    case, out = tmp_path / "gearbox.toml", tmp_path / "out"
+    case.write_text(SPUR_CASE)
+    result = CliRunner().invoke(cli.app, ["life", str(case), "--out", str(out)])
+    assert (result.exit_code, out.exists()) == (2, False)
+    assert "rating: this section is missing" in result.stderr
+
+
+GRC = Path("cases/grc750/gearbox.toml")
+
+
+@pytest.fixture(scope="module")
+def grc() -> Project:
+    return Project.from_toml(GRC, "nowhere", Choice("bushing", "iso6336"))
+
+
+def test_planets_change_places_as_the_carrier_turns(grc):
+    """At a third of a turn each planet carries what the one before it carried.
+
+    Not quite: linear bearings have the stiffness of their own planet's load at angle zero.
+    """
+    balance = static_balance(grc.assembly(), "carrier", np.array([240e3]), 3)
+    meshes = [number for number, mesh in enumerate(grc.gearbox.meshes) if mesh.family == "sun_planet"]
+    forces = balance.mesh_force.values[0][:, meshes]
+    assert np.ptp(forces[0]) > 0.01 * forces.mean()
+    assert forces[1] == pytest.approx(np.roll(forces[0], -1), rel=3e-3)
+    mean = forces.mean()
+    train = grc.gearbox.train.static_mesh_forces({"carrier": 240e3})
+    assert mean == pytest.approx(abs(train["sun_planet_1"]), rel=2e-3)
+    assert 1.0 < balance.load_sharing(meshes) < 1.1
+
+
+def test_rolling_goes_round_in_a_circle(grc):
+    assembly = grc.assembly()
+    q = rolled_coordinates(assembly, "carrier", 2.0 * math.pi)
+    place = assembly.coordinates["planet_1"]
+    assert q[list(place[:2])] == pytest.approx([0.0, 0.0], abs=1e-8)
+    assert q[assembly.spin["hss"]] == pytest.approx(2.0 * math.pi * grc.gearbox.train.ratio)
+
+
+def test_linear_laws_are_scaled_and_others_interpolated(grc):
+    """Between its torques the balance of a linear variant is that of another solution."""
+    assembly = grc.assembly()
+    full, half = (static_balance(assembly, "carrier", np.array([torque]), 1) for torque in (240e3, 120e3))
+    assert full.linear
+    assert full.at(full.mesh_force, np.array([120e3, -60e3]))[0] == pytest.approx(half.mesh_force.values[0], rel=1e-3)
+    assert full.at(full.mesh_force, np.array([-60e3]))[0] == pytest.approx(-0.25 * full.mesh_force.values[0])
+
+
+def hub_assembly() -> Assembly:
+    changes = {"bodies.main_shaft.enabled": True, "static_load.torques_N_m": {"main_shaft": 240e3}}
+    gearbox = Gearbox.from_toml(GRC).varied(changes)
+    return Project(gearbox, Path("nowhere"), Choice("bushing", "iso6336")).assembly()
+
+
+def test_loads_of_a_hub_are_held_by_main_bearing_and_carrier():
+    """Forces in balance: what the hub pushes, main bearing and shrink disc take; and a direct solution agrees."""
+    assembly, torque = hub_assembly(), np.array([240e3])
+    sizes = np.array([30e3, 40e3, 20e3, 200e3, 100e3])
+    balance = static_balance(assembly, "main_shaft", torque, 4, hub=sizes)
+    names = [support.name for support in assembly.supports]
+    main, disc = (balance.bearing_load.of(names.index(name)) for name in ("main_bearing", "shrink_disc"))
+    hub = np.array([[10e3, -25e3, 15e3, 150e3, -80e3]])
+    taken = sum(balance.at(one, torque, hub) - balance.at(one, torque) for one in (main, disc))
+    # The shrink disc tells its load in the carrier's axes, which the torque winds up by a milliradian.
+    assert np.abs(taken[0, 0, :3]) == pytest.approx(np.abs(hub[0, :3]), abs=2e-3 * 25e3)
+    wrench = np.zeros(assembly.size)
+    wrench[list(assembly.coordinates["main_shaft"][:5])] = hub[0]
+    direct = locked_equilibrium(assembly, {"main_shaft": 240e3}, ["hss"], assembly.mean_meshes, None, wrench)
+    force = assembly.mesh_states(direct, np.zeros_like(direct), assembly.mean_meshes)[:, FORCE]
+    found = balance.at(balance.mesh_force, torque, hub)[0, 0]
+    assert found == pytest.approx(force, rel=2e-3)
+    assert np.ptp(found[:3]) > 1.2 * np.ptp(
+        balance.mesh_force.values[0, 0, :3]
+    )  # its moment spreads the planets' loads
+
+
+def test_the_law_table_is_solved_on_some_torques(grc):
+    """Between its torques the forces are those of another solution."""
+    gearbox = grc.gearbox
+    assembly = assemble(gearbox, Choice("bushing", "table"), surfaces(gearbox))
+    balance = static_balance(assembly, "carrier", np.array([240e3]), 1)
+    assert not balance.linear and len(balance.torque) == 5
+    direct = static_balance(assembly, "carrier", np.array([150e3]), 1)
+    found = balance.at(balance.mesh_force, np.array([150e3]))[0]
+    assert found == pytest.approx(direct.at(direct.mesh_force, np.array([150e3]))[0], rel=5e-3)
+
+
+def test_loads_of_a_hub_need_a_body_that_stands_in_space(grc):
+    rigid = grc.chosen(variant="rigid").assembly()
+    with pytest.raises(VariantError, match="carrier: has no place in space in the variant rigid"):
+        static_balance(rigid, "carrier", np.array([240e3]), 1, hub=np.array([1.0, 0.0, 0.0, 0.0, 0.0]))
+
+
+def test_channels_of_a_hub_are_read_with_their_sense(tmp_path):
+    """A force that swings with the torque: points split its bins, and their mean is that of the samples."""
+    time = np.arange(400) * 0.1
+    lines = [f"{t:.1f},{100 + 20 * math.sin(t):.6f},1000,{5 * math.cos(2 * t):.6f},{math.sin(3 * t):.6f}" for t in time]
+    content = content_of("time_s,shaft_1_N_m,shaft_1_rpm,side_kN,tilt_kN_m\n" + "\n".join(lines) + "\n", tmp_path)
+    content["loads"]["sources"]["spectrum"] |= {
+        "skip_s": 0.0,
+        "hub_forces": ["side_kN", "-side_kN", "side_kN"],
+        "hub_moments": ["tilt_kN_m", "tilt_kN_m"],
+    }
+    counted = count_loads(Gearbox.from_dict(content, str(tmp_path / "gearbox.toml")))
+    points, source = counted.points, counted.sources[0]
+    assert source.hub[:, 0] == pytest.approx(5e3 * np.cos(2 * time), abs=1e-2)
+    assert source.hub[:, 1] == pytest.approx(-source.hub[:, 0])
+    assert len(points.torque) > 1.5 * len(counted.distribution.hours)
+    assert points.revolutions.sum() == pytest.approx(counted.distribution.revolutions.sum())
+    mean = np.average(points.other, axis=0, weights=points.revolutions)
+    assert mean == pytest.approx(np.average(source.hub, axis=0, weights=source.hours * source.speed), abs=1e-6)
+    by_bin = np.bincount(points.bin, points.hours)
+    assert by_bin == pytest.approx(counted.distribution.hours)
+
+
+def test_planet_bearings_carry_the_couple_of_their_helix(grc):
+    """Radially both bearings of a planet carry two tangential forces and the pair that the axial forces make."""
+    assembly = grc.assembly()
+    balance = static_balance(assembly, "carrier", np.array([240e3]), 1)
+    names = [support.name for support in assembly.supports]
+    load = balance.bearing_load.values[0, 0, names.index("pl_a_1")]
+    half = 240e3 / 3 / 0.308 / 2.0
+    assert math.hypot(load[0], load[1]) == pytest.approx(1.1 * half, rel=0.06)  # 6 to 14 % above, by planet
+    counted = count_loads(grc.gearbox)
+    assert counted.bearings["pl_a_1"] == pytest.approx(99.0 / 39.0)
+
+
+def test_the_verb_tells_what_limits_and_what_that_rests_on(tmp_path, first):
+    case = tmp_path / "gearbox.toml"
+    (tmp_path / "loads.csv").write_text(TABLE)
+    for kept in ("tables", "stress"):
+        shutil.copytree(first.folder / kept, tmp_path / "out" / kept)
+    text = SPUR_CASE + "".join(
+        f'\n[rating.gears.{gear}]\nsigma_H_lim_MPa = 1500.0\nsigma_F_lim_MPa = 500.0\ncurve = "case_hardened"\n'
+        "roughness_um = 4.8\nroot_factor = 1.0\n"
+        for gear in ("pinion", "wheel")
+    )
+    text += "\n[rating]\ndynamic_factor = 1.05\nviscosity_40_mm2_per_s = 320.0\n"
+    text += '\n[loads]\nbody = "shaft_1"\nlife_years = 10.0\nsources.spectrum = '
+    text += '{ file = "loads.csv", hours_per_year = 1000.0 }\n'
+    case.write_text(text)
+    arguments = ["life", str(case), "--variant", "rigid", "--mesh-law", "iso6336", "--out", str(tmp_path / "out")]
+    result = CliRunner().invoke(cli.app, [*arguments, "--json"])
+    assert result.exit_code == 0, result.output
+    told = json.loads(result.stdout)
+    assert [one["flank"] for one in told["flanks"]] == ["pinion + spur", "wheel + spur"]
+    assert told["limits"][0]["damage"] >= told["limits"][-1]["damage"]
+    assert any("variant rigid has none" in line for line in told["unrated"])
+    assert any(line.startswith("K_v = 1.05") for line in told["assumptions"])
+    picture = Path(told["file"]).with_suffix(".png")
+    assert picture.stat().st_size > 10_000
+    data = read_life(Path(told["file"]))
+    _, shares = damage_matrix(data, limits(data))
+    assert shares.sum(axis=1) == pytest.approx(np.ones(len(shares)))
+    shown = CliRunner().invoke(cli.app, arguments)
+    assert "What limits the life of 10 years" in shown.stdout
