@@ -18,6 +18,8 @@ STUDIES, DATASET, PICTURES = "studies", "study.nc", "pictures"
 STUDY_LAYOUT = Layout(
     "study", STUDY, {}, ("title", "study", "case", "case_digest", "input_hash", "points", "failed", "missing")
 )
+UNREAD = ("labels", "loads", "operation", "rating", "report")
+"""Tables of a gearbox file that no figure of a study reads."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +48,9 @@ class StoredStudy:
 
 
 def case_digest(gearbox: Gearbox) -> str:
-    """Hash of all that computed numbers depend on in a case."""
-    return hashlib.sha256(json.dumps(gearbox.computed_content, sort_keys=True).encode()).hexdigest()
+    """Hash of all that the figures of studies depend on in a case."""
+    content = {key: value for key, value in gearbox.content.items() if key not in UNREAD}
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def stored_studies(folder: Path, gearbox: Gearbox) -> Iterator[StoredStudy]:
