@@ -68,6 +68,10 @@ class Words:
         tables = (case.bodies, case.bearings, case.joints, case.meshes, case.couplings)
         return {name for table in tables for name in table if f"{name}_1" not in table and name not in single}
 
+    @cached_property
+    def _meshes(self) -> set[str]:
+        return {mesh.name for mesh in self._gearbox.meshes}
+
     @property
     def labels(self) -> dict[str, str]:
         """Words by name of all that pages draw or list."""
@@ -132,7 +136,8 @@ class Words:
         gathered: dict[str, float] = {}
         for name, share in shares.items():
             itself = name.removesuffix(" itself")
-            words = self.of(self.family(itself)) + (" itself" if itself != name else "")
+            mesh = "mesh " if itself in self._meshes else ""
+            words = mesh + self.of(self.family(itself)) + (" itself" if itself != name else "")
             gathered[words] = gathered.get(words, 0.0) + share
         return dict(sorted(gathered.items(), key=lambda item: -item[1]))
 
