@@ -118,13 +118,13 @@ class Words:
             for motion, share in zip(modes["motion"].to_numpy(), of_body, strict=True):
                 shares[name, str(motion)] = shares.get((name, str(motion)), 0.0) + float(share)
         told = 0.0
-        parts: list[str] = []
+        verbs: dict[str, list[str]] = {}
         for (name, motion), share in sorted(shares.items(), key=lambda item: -item[1]):
-            if parts and (told >= TOLD or share < LEAST_TOLD):
+            if verbs and (told >= TOLD or share < LEAST_TOLD):
                 break
-            parts.append(f"{name} {MOTIONS[motion][name == 'planets']}")
+            verbs.setdefault(name, []).append(MOTIONS[motion][name == "planets"])
             told += share
-        return joined(parts)
+        return joined(f"{name} {joined(own)}" for name, own in verbs.items())
 
     def gives(self, modes: xr.Dataset, index: int) -> dict[str, float]:
         """Shares of strain energy by what gives way, copies of a planet set together, the largest first."""

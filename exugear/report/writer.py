@@ -21,6 +21,7 @@ from exugear.report.parts.run_data import run_data
 from exugear.report.sections.bearings import bearings_section
 from exugear.report.sections.change import change_section
 from exugear.report.sections.gears import gears_section
+from exugear.report.sections.life import life_section
 from exugear.report.sections.modes import modes_section
 from exugear.report.sections.near import near_section
 from exugear.report.sections.ranking import ranking_section
@@ -41,6 +42,7 @@ SECTIONS: Final[tuple[Callable[[Material], Part], ...]] = (
     ranking_section,
     change_section,
     bearings_section,
+    life_section,
     steady_section,
     modes_section,
     near_section,
