@@ -5,6 +5,7 @@
 SHELL := /bin/sh
 PYTHON ?=
 EXTRAS ?= all,dev
+PROJECT_URL ?=
 VENV := .venv
 INSTALLED := $(VENV)/installed
 DOCS_INSTALLED := $(VENV)/installed-docs
@@ -68,18 +69,21 @@ FIND_PYTHON := for candidate in $(if $(PYTHON),"$(PYTHON)",python3 python3.13 py
 	echo "exugear needs Python 3.11, 3.12 or 3.13; found: $$($(or $(PYTHON),python3) --version 2>&1)." >&2; \
 	echo "Install one, or name it: make PYTHON=/path/to/python3.12 TARGET" >&2; exit 1
 
-.PHONY: help demo demo-short test validate benchmarks check check-web vendor-web docs lock clean
+.PHONY: test-browser help demo demo-short test validate benchmarks check check-web vendor-web docs dist wheel-test lock clean
 
 help:
 	@echo "make demo        GRC 750 from gear data to waterfalls, modes and a report, into $(RESULTS)"
 	@echo "make demo-short  the same with 10 positions of the mesh cycle and 4 s of the run-up"
 	@echo "make test        tests and documentation examples"
+	@echo "make test-browser  claims about the report page in a browser, desk and phone; needs chromium"
 	@echo "make validate    the long comparisons with references"
 	@echo "make benchmarks  what all of it costs, into benchmarks/results.md and what README and docs quote"
 	@echo "make check       ruff and mypy"
 	@echo "make check-web   the pages' scripts: linted, types checked; with a node of its own"
 	@echo "make vendor-web  renew the libraries in the pages from npm, at the versions that web/package.json pins"
 	@echo "make docs        the documentation site, with its examples run, into $(SITE)"
+	@echo "make dist        sdist and wheel into dist; PROJECT_URL=https://... makes links and pictures absolute"
+	@echo "make wheel-test  the wheel installed and used on Python 3.11, 3.12 and 3.13, as far as they are found"
 	@echo "make lock        renew requirements.lock from what installs today"
 	@echo "make clean       remove all that make made, results and $(VENV) too"
 
@@ -88,11 +92,11 @@ $(INSTALLED): pyproject.toml requirements.lock
 	$(RUN)/python -c 'import pip' 2>/dev/null || "$$python" -m venv --clear $(VENV) || { \
 		echo "No virtual environment: on Debian and Ubuntu install the package python3-venv." >&2; exit 1; }
 	@echo "Installing exugear[$(EXTRAS)] into $(VENV); this takes a minute or two."
-	@$(PIP) install --constraint requirements.lock --editable ".[$(EXTRAS)]"
+	@$(PIP) install --constraint requirements.lock --config-settings editable_mode=compat --editable ".[$(EXTRAS)]"
 	@touch $@
 
 $(DOCS_INSTALLED): $(INSTALLED)
-	@$(PIP) install --constraint requirements.lock --editable ".[$(EXTRAS),docs]"
+	@$(PIP) install --constraint requirements.lock --config-settings editable_mode=compat --editable ".[$(EXTRAS),docs]"
 	@touch $@
 
 demo: $(INSTALLED)
@@ -109,6 +113,10 @@ demo-short: $(INSTALLED)
 
 test: $(INSTALLED)
 	$(RUN)/python -m pytest $(SIDE_BY_SIDE)
+
+# Pages in a real browser: skipped, and said, where no chromium is.
+test-browser: $(INSTALLED)
+	$(RUN)/python -m pytest -m browser tests/exugear/report
 
 validate: $(INSTALLED)
 	$(RUN)/python -m pytest -m validation $(SIDE_BY_SIDE)
@@ -142,6 +150,13 @@ docs: $(DOCS_INSTALLED)
 	$(RUN)/python docs/tools/check_spelling.py
 	$(call end,$(SITE))
 
+dist: $(INSTALLED)
+	@$(RUN)/python -c 'import build' 2>/dev/null || $(PIP) install build
+	$(RUN)/python packaging/build.py --out dist --url "$(PROJECT_URL)"
+
+wheel-test: dist
+	$(RUN)/python packaging/try_wheel.py dist/exugear-*.whl --constraint requirements.lock
+
 lock:
 	@python=$$($(FIND_PYTHON)) || exit 1; "$$python" -m venv --clear $(VENV)-lock
 	$(VENV)-lock/bin/python -m pip --quiet --quiet install ".[all,dev,docs]"
@@ -151,6 +166,6 @@ lock:
 	rm -rf $(VENV)-lock
 
 clean:
-	rm -rf $(VENV) $(VENV)-lock $(WEB_VENV) web/node_modules results build *.egg-info .pytest_cache .mypy_cache .ruff_cache
+	rm -rf $(VENV) $(VENV)-lock $(WEB_VENV) web/node_modules results build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache
 	rm -rf docs/elsewhere docs/gallery docs/reference/rooms docs/reference/command_line.md examples/results
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

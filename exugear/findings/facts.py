@@ -14,6 +14,8 @@ from exugear.findings.variations import GAIN, BestChange, ModelVariations, best_
 from exugear.findings.words import VARIANTS, Words, figure_text
 from exugear.model.parts import RPM
 
+DAMPING = "mesh damping"
+"""Begin of the label of the parameter that damps."""
 AROUND_RATED = 1.25
 """Speed up to which a resonance counts as one of the rated speed, over that speed."""
 
@@ -174,8 +176,16 @@ def _quieter(group: RunGroup, modes: xr.Dataset, mode: int, variations: Sequence
     if not own:
         return ""
     frequency = float(modes["frequency"][mode])
-    best = max((best_change(variation, frequency) for variation in own), key=lambda change: change.gain)
-    return f" {best_words(best)}"
+    changes = [best_change(variation, frequency) for variation in own]
+    # More damping always helps; whether anything else does is the question.
+    others = [change for change in changes if not change.label.startswith(DAMPING)]
+    said = f" {best_words(max(others, key=lambda change: change.gain))}" if others else ""
+    damping = [change for change in changes if change.label.startswith(DAMPING) and change.gain > 0.0]
+    return said + "".join(
+        f" {change.label} {figure_text(change.value)} instead of {figure_text(change.default)}: "
+        f"−{figure_text(change.gain, 2)} dB."
+        for change in damping
+    ).replace(" mesh", " Mesh")
 
 
 def best_words(best: BestChange) -> str:

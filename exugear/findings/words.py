@@ -68,6 +68,10 @@ class Words:
         tables = (case.bodies, case.bearings, case.joints, case.meshes, case.couplings)
         return {name for table in tables for name in table if f"{name}_1" not in table and name not in single}
 
+    @cached_property
+    def _meshes(self) -> set[str]:
+        return {mesh.name for mesh in self._gearbox.meshes}
+
     @property
     def labels(self) -> dict[str, str]:
         """Words by name of all that pages draw or list."""
@@ -114,13 +118,13 @@ class Words:
             for motion, share in zip(modes["motion"].to_numpy(), of_body, strict=True):
                 shares[name, str(motion)] = shares.get((name, str(motion)), 0.0) + float(share)
         told = 0.0
-        parts: list[str] = []
+        verbs: dict[str, list[str]] = {}
         for (name, motion), share in sorted(shares.items(), key=lambda item: -item[1]):
-            if parts and (told >= TOLD or share < LEAST_TOLD):
+            if verbs and (told >= TOLD or share < LEAST_TOLD):
                 break
-            parts.append(f"{name} {MOTIONS[motion][name == 'planets']}")
+            verbs.setdefault(name, []).append(MOTIONS[motion][name == "planets"])
             told += share
-        return joined(parts)
+        return joined(f"{name} {joined(own)}" for name, own in verbs.items())
 
     def gives(self, modes: xr.Dataset, index: int) -> dict[str, float]:
         """Shares of strain energy by what gives way, copies of a planet set together, the largest first."""
@@ -132,7 +136,8 @@ class Words:
         gathered: dict[str, float] = {}
         for name, share in shares.items():
             itself = name.removesuffix(" itself")
-            words = self.of(self.family(itself)) + (" itself" if itself != name else "")
+            mesh = "mesh " if itself in self._meshes else ""
+            words = mesh + self.of(self.family(itself)) + (" itself" if itself != name else "")
             gathered[words] = gathered.get(words, 0.0) + share
         return dict(sorted(gathered.items(), key=lambda item: -item[1]))
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -31,7 +31,17 @@ from fe_ste.flanks.modifications import (
     radius_at_roll_length_from_tip,
 )
 from fe_ste.flanks.topography import FlankTopography
+from fe_ste.geometry.fitting import (
+    LEAST_ROOT_MARGIN,
+    ROOT_MARGIN,
+    clear_tip_diameter,
+    fitted_tip_diameter,
+    root_margin,
+    shift_beside,
+)
+from fe_ste.geometry.gear_relations import UncheckedGear
 from fe_ste.geometry.gears import BasicRack, Gear, GearPair, Material
+from fe_ste.geometry.pair_relations import UncheckedPair
 from fe_ste.tools.arrays import Floats
 
 DEEPEST_REMOVAL = 0.5
@@ -50,12 +60,75 @@ def gears(origin: Origin) -> dict[str, Gear]:
     CaseError
         A gear that cannot be made, with its key.
     """
-    return part_of_each(lambda name, section: origin.guarded(f"gears.{name}", _gear, name, section), origin.case.gears)
+    plain = {name: _unchecked(name, section) for name, section in origin.case.gears.items()}
+    shifted = {**plain, **part_of_each(partial(_with_shift, origin, plain), _flagged(origin, "shift"))}
+    fitted = {**shifted, **part_of_each(partial(_with_fitted_tip, origin, shifted), _flagged(origin, "tip"))}
+
+    def of_section(name: str, section: GearSection) -> Gear:
+        gear = fitted[name]
+        if section.tip_chamfer_mm:
+            height = gear.outward * section.tip_chamfer_mm * 1e-3
+            gear = replace(gear, tip_form_diameter=2.0 * (gear.tip_radius - height))
+        return origin.guarded(
+            f"gears.{name}", Gear, **{field.name: getattr(gear, field.name) for field in fields(gear)}
+        )
+
+    return part_of_each(of_section, origin.case.gears)
 
 
-def _gear(name: str, section: GearSection) -> Gear:
+def _flagged(origin: Origin, what: Literal["shift", "tip"]) -> dict[str, GearSection]:
+    """Sections of gears whose shift or tip follows from their mates."""
+    key = {"shift": "profile_shift_from_centre_distance", "tip": "fitted_tip"}[what]
+    return {name: section for name, section in origin.case.gears.items() if getattr(section, key)}
+
+
+def _pairs_of(origin: Origin, gears: Mapping[str, UncheckedGear], name: str) -> Iterator[tuple[str, UncheckedPair]]:
+    """Pairs of a gear by name, gear 1 being the external or smaller one."""
+    for pair, section in origin.case.pairs.items():
+        both = [gears[one] for one in (section.pinion, section.gear) if one in gears]
+        if name in (section.pinion, section.gear) and len(both) == 2:
+            first, second = sorted(both, key=lambda gear: (gear.internal, gear.teeth))
+            distance = 1e-3 * section.centre_distance_mm
+            yield pair, UncheckedPair(name=pair, pinion=first, gear=second, centre_distance=distance)
+
+
+def _with_shift(origin: Origin, gears: Mapping[str, UncheckedGear], name: str, section: GearSection) -> UncheckedGear:
+    """Gear with the profile shift that leaves no backlash at the centre distance of its first pair."""
+    key = f"gears.{name}.profile_shift_from_centre_distance"
+    for pair_name, pair in _pairs_of(origin, gears, name):
+        mate = pair.gear if pair.pinion.name == name else pair.pinion
+        if origin.case.gears[mate.name].profile_shift_from_centre_distance:
+            raise origin.fault(f"{key}: {mate.name} of pairs.{pair_name} has no profile_shift either; give one of them")
+        shift = shift_beside(mate, gears[name], pair.centre_distance)
+        if shift is None:
+            raise origin.fault(
+                f"{key}: at pairs.{pair_name}.centre_distance_mm = {1e3 * pair.centre_distance:g} no line of action "
+                "touches both base circles; correct it"
+            )
+        return replace(gears[name], profile_shift=shift)
+    raise origin.fault(f"{key}: the gear is in no pair, whose centre distance would give it; give profile_shift")
+
+
+def _with_fitted_tip(
+    origin: Origin, gears: Mapping[str, UncheckedGear], name: str, section: GearSection
+) -> UncheckedGear:
+    """Gear with its tip shortened as far as all of its mates ask for."""
+    gear = gears[name]
+    try:
+        tips = [
+            fitted_tip_diameter(pair, pair.gear if pair.gear.name == name else pair.pinion)
+            for _, pair in _pairs_of(origin, gears, name)
+        ]
+    except ValueError:
+        return gear  # what makes the pair impossible is told when it is built
+    if not tips:
+        raise origin.fault(f"gears.{name}.fitted_tip: the gear is in no pair that its tip could be fitted to")
+    return replace(gear, tip_diameter=max(tips) if gear.internal else min(tips))
+
+
+def _unchecked(name: str, section: GearSection) -> UncheckedGear:
     """Gear from its section: millimetres to metres, degrees to radians."""
-    gear = Gear(
+    return UncheckedGear(
         name=name,
         teeth=section.teeth,
         normal_module=section.normal_module_mm * 1e-3,
@@ -77,10 +150,20 @@ def _gear(name: str, section: GearSection) -> Gear:
         tip_form_diameter=None if section.tip_form_diameter_mm is None else section.tip_form_diameter_mm * 1e-3,
         root_form_diameter=None if section.root_form_diameter_mm is None else section.root_form_diameter_mm * 1e-3,
     )
-    if not section.tip_chamfer_mm:
-        return gear
-    height = gear.outward * section.tip_chamfer_mm * 1e-3
-    return replace(gear, tip_form_diameter=2.0 * (gear.tip_radius - height))
+
+
+def margins_of_roots(pairs: Iterable[GearPair]) -> Iterator[str]:
+    """Tell tips that come so near to their mate's fillet that contact under load reaches it, and what would not."""
+    for pair in pairs:
+        for tip, mate in ((pair.pinion, pair.gear), (pair.gear, pair.pinion)):
+            margin = root_margin(pair, tip)
+            if margin < LEAST_ROOT_MARGIN * tip.normal_module:
+                clear = 1e3 * clear_tip_diameter(pair, tip, ROOT_MARGIN * tip.normal_module)
+                yield (
+                    f"gears.{tip.name}: its tip touches {mate.name} {1e3 * margin:.3f} mm of roll length above the "
+                    "fillet, which contact under load may reach, and then finds no solution there: "
+                    f"tip_diameter_mm = {clear:.3f} keeps clear, or fitted_tip = true"
+                )
 
 
 def modifications(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, FlankModification]:

@@ -169,6 +169,11 @@ class Gearbox:
             if torsion and bearing.body in self.spinning and bearing.on not in self.spinning:
                 key = f"bearings.{bearing.family}.stiffness"
                 lines.append(f"{key}: torsion {torsion:g} N m/rad holds {bearing.body} back, which turns")
+        lines += gear_parts.margins_of_roots(self.gear_pairs.values())
+        for name, gear in self.gears.items():
+            if gear.is_undercut:
+                start = 2e3 * gear.form_radius
+                lines.append(f"gears.{name}: undercut by its rack; its flank begins at a diameter of {start:.3f} mm")
         return tuple(dict.fromkeys(lines))
 
     def __repr__(self) -> str:

@@ -90,6 +90,8 @@ class GearSection(Section):
     """Helix angle at the reference circle; right hand positive, a ring as the planet that it meshes with."""
     profile_shift: q.ProfileShift = 0.0
     """Profile shift in normal modules; positive for a larger gear, of a ring as well."""
+    profile_shift_from_centre_distance: bool = False
+    """Whether the profile shift is the one that leaves no backlash at the centre distance, beside that of the mate."""
     face_width_mm: q.FaceWidthMm
     """Width of the teeth."""
     held_diameter_mm: q.LengthMm
@@ -100,6 +102,8 @@ class GearSection(Section):
     """Tooth thickness taken off on the reference circle, for backlash."""
     tip_diameter_mm: q.LengthMm | None = None
     """Tip diameter; from rack and profile shift by default."""
+    fitted_tip: bool = False
+    """Whether the tip is shortened as far as mates ask for: the rack's clearance, and room above their fillets."""
     root_diameter_mm: q.LengthMm | None = None
     """Root diameter; from rack and profile shift by default."""
     tip_form_diameter_mm: q.LengthMm | None = None
@@ -119,6 +123,8 @@ class GearSection(Section):
     def _one_tip_form(self) -> GearSection:
         if self.tip_form_diameter_mm is not None and self.tip_chamfer_mm:
             raise ValueError("give tip_form_diameter_mm or tip_chamfer_mm, not both: each says where the flank ends")
+        if self.profile_shift_from_centre_distance and self.profile_shift:
+            raise ValueError("give profile_shift or profile_shift_from_centre_distance = true, not both")
         return self
 
 

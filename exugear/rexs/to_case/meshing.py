@@ -11,8 +11,8 @@ from exugear.rexs.faults import RexsError
 from exugear.rexs.to_case.notes import Entry, Notes, assumed, derived, tidy
 from exugear.rexs.to_case.toothing import Toothing
 from exugear.rexs.tree import Component
+from fe_ste.geometry import fitting
 from fe_ste.geometry.gear_relations import BasicRack, UncheckedGear
-from fe_ste.geometry.involute import involute
 from fe_ste.geometry.pair_relations import UncheckedPair
 
 SHIFT_TOLERANCE = 1e-3
@@ -23,9 +23,6 @@ MARGIN = 1e-4
 """Rounding allowed for where a tool or a tip is replaced, in normal modules."""
 FORM_TOLERANCE = 1e-3
 """Difference of form diameters that says nothing, in normal modules."""
-CLEARANCE = 0.1
-"""Roll length that a tip which the file does not give keeps from its mate's form circle, in normal modules: the
-breadth of the contact under load reaches beyond the path of contact."""
 
 
 @dataclass(frozen=True)
@@ -71,25 +68,19 @@ def centre_distance(stage: Component, apart: float, notes: Notes) -> Entry:
 
 
 def shift_sum(pinion: Toothing, gear: Toothing, distance: float) -> float:
-    """Profile shifts that leave no backlash at a centre distance (mm): x1 + x2, of an internal pair x1 - x2.
-
-    ISO 21771: sum = (z1 + z2) (inv alpha_wt - inv alpha_t) / (2 tan alpha_n), teeth of a ring negative.
+    """Profile shifts that leave no backlash at a centre distance (mm), see `fe_ste.geometry.fitting.shift_sum`.
 
     Raises
     ------
     RexsError
         No working pressure angle belongs to the distance.
     """
-    module, normal = pinion.module.value, math.radians(pinion.pressure_angle.value)
-    helix = math.radians(pinion.helix_angle.value)
-    transverse = math.atan(math.tan(normal) / math.cos(helix))
-    teeth = pinion.teeth - gear.teeth if gear.internal else pinion.teeth + gear.teeth
-    cosine = abs(teeth) * module / math.cos(helix) * math.cos(transverse) / (2.0 * distance)
-    if not 0.0 < cosine < 1.0:
+    total = fitting.shift_sum(unchecked("", pinion), unchecked("", gear), 1e-3 * distance)
+    if total is None:
         raise RexsError(
             f"{pinion.part}, {gear.part}: no line of action touches both base circles at a distance of {distance:g} mm"
         )
-    return teeth * (involute(math.acos(cosine)) - involute(transverse)) / (2.0 * math.tan(normal))
+    return total
 
 
 def with_shifts(gears: Mapping[int, Toothing], stages: Sequence[Stage], notes: Notes) -> dict[int, Toothing]:
@@ -215,18 +206,9 @@ def _tip_bound(gears: Mapping[int, Toothing], stage: Stage, which: int) -> float
     pinion, gear = unchecked("pinion", gears[stage.pinion]), unchecked("gear", gears[stage.gear])
     pair = UncheckedPair(name="", pinion=pinion, gear=gear, centre_distance=1e-3 * stage.distance.value)
     tip = gear if which == stage.gear else pinion
-    mate = pinion if tip is gear else gear
-    if mate.has_relieved_root:
-        return None  # contact ends at its edge
-    if tip is gear:
-        excess = pinion.form_roll_length - pair.pinion_roll_length(gear.tip_form_roll_length)
-    else:
-        excess = pinion.tip_form_roll_length - pair.pinion_roll_length(gear.form_roll_length)
-    clearance = MARGIN if gears[which].tip else CLEARANCE
-    excess += clearance * tip.normal_module
-    if excess <= 0.0:
+    margin = (MARGIN if gears[which].tip else fitting.ROOT_MARGIN) * tip.normal_module
+    diameter = 1e3 * fitting.clear_tip_diameter(pair, tip, margin)
+    if fitting.root_margin(pair, tip) >= margin:
         return None
-    roll = tip.tip_form_roll_length - tip.outward * excess
-    diameter = 2e3 * (math.hypot(tip.base_radius, roll) + tip.outward * 1e-3 * gears[which].chamfer)
     # Rounded to the side that clears.
     return round((math.floor if tip.outward > 0 else math.ceil)(1e4 * diameter) / 1e4, 4)

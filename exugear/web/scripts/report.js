@@ -43,14 +43,17 @@ beginTheme(() => {
   drawCampbell();
   void redrawCharts(false);
 });
-if (hasRuns) {
+function begin() {
   beginSwitches();
-  beginLimit();
-} else beginSwitches();
-beginTables();
-beginModeView();
-beginCampbell();
-recall();
-beginCharts();
-window.addEventListener("beforeprint", () => void redrawCharts(true));
-void drawing.finally(() => document.documentElement.setAttribute("data-ready", ""));
+  if (hasRuns) beginLimit();
+  beginTables();
+  beginModeView();
+  beginCampbell();
+  recall();
+  beginCharts();
+  window.addEventListener("beforeprint", () => void redrawCharts(true));
+  void drawing.finally(() => document.documentElement.setAttribute("data-ready", ""));
+}
+
+// Cards and tables are painted first: they can be read while figures are drawn.
+requestAnimationFrame(() => setTimeout(begin));

@@ -150,3 +150,58 @@ def test_a_computed_inertia_can_be_varied_like_a_given_one() -> None:
     body = assembly.gearbox.body("two")
     assert body.axial == pytest.approx(2.0 * gearbox.body("two").axial)
     assert body.mass == pytest.approx(gearbox.body("two").mass)
+
+
+def test_a_profile_shift_follows_from_the_centre_distance() -> None:
+    gearbox = gearbox_of(
+        ("centre_distance_mm = 75.0", "centre_distance_mm = 75.5"),
+        ("axis_position_mm = [75.0, 0.0]", "axis_position_mm = [75.5, 0.0]"),
+        ("held_diameter_mm = 50.0", "held_diameter_mm = 50.0, profile_shift_from_centre_distance = true"),
+    )
+    pair = gearbox.pairs["spur"].pair
+    assert pair.circumferential_backlash == pytest.approx(0.0, abs=1e-14)
+    assert 0.16 < pair.gear.profile_shift < 0.2
+
+
+def test_shifts_that_nothing_gives_are_refused() -> None:
+    flag = ", profile_shift_from_centre_distance = true }"
+    both = [(f"held_diameter_mm = {bore} }}", f"held_diameter_mm = {bore}{flag}") for bore in ("30.0", "50.0")]
+    with pytest.raises(CaseError, match="wheel of pairs.spur has no profile_shift either; give one of them"):
+        gearbox_of(*both)
+    with pytest.raises(CaseError, match="give profile_shift or profile_shift_from_centre_distance = true, not both"):
+        gearbox_of(("held_diameter_mm = 50.0 }", f"held_diameter_mm = 50.0, profile_shift = 0.1{flag}"))
+    with pytest.raises(CaseError, match="no line of action touches both base circles"):
+        gearbox_of(
+            ("held_diameter_mm = 50.0 }", f"held_diameter_mm = 50.0{flag}"),
+            ("centre_distance_mm = 75.0", "centre_distance_mm = 70.0"),
+        )
+
+
+def test_a_tip_near_a_fillet_is_told_with_one_that_is_clear_and_fits_by_itself() -> None:
+    """The wheel's tip ends 0.03 mm of roll length above the pinion's fillet, which a shallow rack makes high."""
+    pinion = "held_diameter_mm = 30.0, profile_shift = 0.3, rack = { dedendum = 1.1, tip_radius = 0.4 } }"
+    shallow = ("held_diameter_mm = 30.0 }", pinion)
+    wheel = "held_diameter_mm = 50.0, profile_shift = -0.3, tip_diameter_mm = {}"
+    pair = gearbox_of(shallow, ("held_diameter_mm = 50.0", wheel.format(93.0))).pairs["spur"].pair
+    roll = pair.base_tangent_length - pair.pinion.form_roll_length - 0.03e-3
+    near = 2e3 * math.hypot(pair.gear.base_radius, roll)
+    told = gearbox_of(shallow, ("held_diameter_mm = 50.0", wheel.format(near)))
+    line = next(one for one in told.warnings if one.startswith("gears.wheel: its tip touches pinion 0.030 mm"))
+    proposed = float(line.split("tip_diameter_mm = ")[1].split(" ")[0])
+    assert proposed < near
+    fitted = gearbox_of(shallow, ("held_diameter_mm = 50.0", f"{wheel.format(near)}, fitted_tip = true"))
+    assert 2e3 * fitted.gears["wheel"].tip_radius == pytest.approx(proposed, abs=1e-3)
+    assert not any("gears.wheel: its tip" in line for line in fitted.warnings)
+
+
+def test_undercut_is_told_as_a_warning() -> None:
+    gearbox = gearbox_of(
+        (
+            "teeth = 20, normal_module_mm = 3.0, face_width_mm = 15.0, held_diameter_mm = 30.0",
+            "teeth = 12, normal_module_mm = 3.0, face_width_mm = 15.0, held_diameter_mm = 20.0",
+        ),
+        ("centre_distance_mm = 75.0", "centre_distance_mm = 63.0"),
+        ("axis_position_mm = [75.0, 0.0]", "axis_position_mm = [63.0, 0.0]"),
+        ("outer_diameter_mm = 35.0", "outer_diameter_mm = 26.0"),
+    )
+    assert any(line.startswith("gears.pinion: undercut by its rack") for line in gearbox.warnings)
