@@ -10,6 +10,7 @@ import numpy as np
 from exugear.bearings.rolling.rows import BearingError
 from exugear.bearings.support_laws import linear_law, misplaced_factor
 from exugear.bearings.supports import ON_BEARINGS, elastic_names, unsupported
+from exugear.checks.margins import doubts_about_pairs
 from exugear.checks.restraint import free_motion
 from exugear.loads.torque_series import torque_series
 from exugear.model.gearbox import Gearbox
@@ -93,6 +94,7 @@ def remarks(gearbox: Gearbox) -> tuple[str, ...]:
             f"meshes: the train has {train.degrees_of_freedom} degrees of freedom; ratio, orders and speeds of the "
             f"input hold while {others} stand{'s' if len(train.independent) == 2 else ''}"
         )
+    lines += doubts_about_pairs(gearbox)
     return tuple(lines)
 
 

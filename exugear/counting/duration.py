@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fe_ste.tools.arrays import Floats
+from fe_ste.tools.arrays import Floats, Integers
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +82,77 @@ def load_duration(torque: Floats, speed: Floats, hours: Floats, bins: int) -> Du
         hours=total_hours,
         revolutions=revolutions,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class LoadPoints:
+    """Torques with what acts beside them: the bins of a distribution, split where other loads differ.
+
+    Attributes
+    ----------
+    torque : array (points,)
+        N m.
+    other : array (points, n)
+        Loads beside it, means weighted by revolutions.
+    hours, revolutions : array (points,)
+    bin : array (points,)
+        Bin of the distribution that each point lies in.
+    """
+
+    torque: Floats
+    other: Floats
+    hours: Floats
+    revolutions: Floats
+    bin: Integers
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<LoadPoints: {len(self.hours)} points, {self.hours.sum():.6g} h>"
+
+    @property
+    def speed(self) -> Floats:
+        """Mean speed of each point, rad/s, without sign."""
+        return np.asarray(2.0 * np.pi * self.revolutions / (3600.0 * self.hours))
+
+
+def load_points(
+    found: DurationDistribution, value: str, torque: Floats, speed: Floats, hours: Floats, other: Floats, cells: int
+) -> LoadPoints:
+    """Split the bins of a distribution by other loads.
+
+    Parameters
+    ----------
+    found : DurationDistribution
+        Of the same samples.
+    value : str
+        As in `DurationDistribution.torques`.
+    torque, speed, hours : array (samples,)
+        As in `load_duration`.
+    other : array (samples, n)
+        Loads beside the torque.
+    cells : int
+        Cells from the least to the largest of each of them.
+    """
+    torques = found.torques(value)
+    if not other.any():
+        zeros = np.zeros((len(torques), other.shape[1]))
+        return LoadPoints(torques, zeros, found.hours, found.revolutions, np.arange(len(torques)))
+    width = float(np.abs(found.upper - found.lower)[0])
+    side = np.where(torque < 0.0, -1.0, 1.0)
+    place = side * np.minimum(np.floor(np.abs(torque) / width), np.round(np.abs(found.upper).max() / width) - 1.0)
+    number = np.argmin(
+        np.abs((side * width * (np.abs(place) + 0.5))[:, None] - 0.5 * (found.lower + found.upper)), axis=1
+    )
+    span = np.ptp(other, axis=0)
+    cell = np.floor((other - other.min(axis=0)) / np.where(span > 0.0, span, 1.0) * (cells - 1e-9))
+    keys, inverse = np.unique(np.column_stack([number, cell]), axis=0, return_inverse=True)
+    inverse = inverse.ravel()
+    turns = np.abs(speed) * hours * 3600.0 / (2.0 * np.pi)
+    total = np.bincount(inverse, turns).astype(np.float64)
+    means = [np.bincount(inverse, turns * column) / np.where(total > 0.0, total, 1.0) for column in other.T]
+    bins = keys[:, 0].astype(np.int64)
+    lasting = np.bincount(inverse, hours).astype(np.float64)
+    return LoadPoints(torques[bins], np.array(means).T, lasting, total, bins)
 
 
 def equivalent_load(load: Floats, cycles: Floats, exponent: float) -> float:

@@ -21,6 +21,8 @@ from fe_ste.tools.arrays import Floats
 
 OVERLAP = 0.5
 """Share of a window that the next one repeats: enough for what is drawn coarser than the transmission error."""
+SAMPLED = 8
+"""Every which sample tells how much a force swings."""
 MEAN_PART = slice(1, 2)
 """Third of the run whose mean force is told: neither the start nor the fastest."""
 
@@ -86,12 +88,13 @@ def _supports(data: xr.Dataset, run: VariantRun, words: Words) -> Iterator[Chann
         return
     force = data["support_force"].to_numpy()
     names = [str(name) for name in data["support"].to_numpy()]
-    swings = np.hypot(force[..., 0], force[..., 1]).std(axis=0)
+    sample = force[::SAMPLED]
+    swings = np.hypot(sample[..., 0], sample[..., 1]).std(axis=0)
     for place, copies in _standing_for(names, swings, words):
-        own = force[:, place].astype(np.float64)
-        parts = [_waterfall(own[:, axis], data, run) for axis in (0, 1)]
+        own = np.ascontiguousarray(force[:, place].T)
+        parts = [_waterfall(own[axis], data, run) for axis in (0, 1)]
         whole = replace(parts[0], amplitude=np.hypot(parts[0].amplitude, parts[1].amplitude))
-        middle = _middle(own)
+        middle = _middle(own.T.astype(np.float64))
         # The force of a bearing that goes round has no mean in axes that stand still.
         mean = max(math.hypot(*middle[:, :2].mean(axis=0)), 0.0)
         if copies > 1:
@@ -103,10 +106,10 @@ def _supports(data: xr.Dataset, run: VariantRun, words: Words) -> Iterator[Chann
 def _meshes(data: xr.Dataset, run: VariantRun, words: Words) -> Iterator[Channel]:
     force = data["mesh_force"].to_numpy()
     names = [str(name) for name in data["mesh"].to_numpy()]
-    for place, copies in _standing_for(names, force.std(axis=0), words):
-        own = force[:, place].astype(np.float64)
+    for place, copies in _standing_for(names, force[::SAMPLED].std(axis=0), words):
+        own = np.ascontiguousarray(force[:, place])
         told = words.of(words.family(names[place])) if copies > 1 else words.of(names[place])
-        mean = float(_middle(own).mean())
+        mean = float(_middle(own).mean(dtype=np.float64))
         yield Channel(names[place], "mesh", f"mesh {told}", copies, mean, math.nan, _waterfall(own, data, run))
 
 

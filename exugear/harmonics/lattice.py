@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from exugear.harmonics.lines import LineSet, line_set
+from exugear.harmonics.lines import LineSet
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
 
 GROWTH = 1.15
@@ -74,16 +74,15 @@ class Lattice:
         return np.asarray(found)
 
 
-def lattice(lines: LineSet, harmonics: int, combinations: int) -> Lattice:
+def lattice(lines: LineSet, larger: LineSet) -> Lattice:
     """Find a lattice on which all lines of a larger set have slots of their own.
 
     Parameters
     ----------
     lines : LineSet
         Lines of the signals.
-    harmonics, combinations : int
-        Those of the larger set, as of `exugear.harmonics.lines.line_set`; twice those of the lines keep products of
-        two of them apart.
+    larger : LineSet
+        Lines of the same bases; twice the harmonics and combinations keep products of two lines apart.
 
     Raises
     ------
@@ -92,15 +91,15 @@ def lattice(lines: LineSet, harmonics: int, combinations: int) -> Lattice:
 
     Examples
     --------
+    >>> from exugear.harmonics.lines import line_set
     >>> lines = line_set([1.0, 4.7], 2, 2)
-    >>> found = lattice(lines, 4, 4)
+    >>> found = lattice(lines, line_set([1.0, 4.7], 4, 4))
     >>> signal = np.arange(7.0) + 0j
     >>> bool(np.allclose(found.coefficients(found.values(signal)), signal))
     True
     """
     bases = lines.index.shape[1]
-    larger = line_set(np.arange(1.0, bases + 1.0).tolist(), harmonics, combinations).index
-    whole = np.vstack([larger, -larger[1:]])
+    whole = np.vstack([larger.index, -larger.index[1:]])
     rng = np.random.default_rng(1)
     # An odd number: then no slot but that of the mean is its own conjugate.
     samples = len(whole) | 1

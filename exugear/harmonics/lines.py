@@ -76,6 +76,46 @@ class LineSet:
         return np.asarray(np.real(np.tensordot(turning, coefficients, axes=1)))
 
 
+@dataclass(frozen=True)
+class Modulator:
+    """A slow turn of several equal things that puts lines beside those of some bases.
+
+    Attributes
+    ----------
+    order : float
+        Its frequency over that of the reference.
+    of : tuple of int
+        Bases whose lines it modulates.
+    count : int
+        How many things turn.
+    step : int or None
+        What each multiple of the bases adds to the turns of its line, to be taken within half of `count` on either
+        side; None where they follow no rule.
+    """
+
+    order: float
+    of: tuple[int, ...]
+    count: int
+    step: int | None
+
+    def turns(self, line: Integers) -> tuple[int, ...]:
+        """Multiples of the turn beside a line (bases,): by the rule, and of a base alone all of them.
+
+        Examples
+        --------
+        >>> four = Modulator(1.0, (0,), 4, 1)
+        >>> four.turns(np.array([3, 1])), four.turns(np.array([2, 0])), four.turns(np.array([0, 1]))
+        ((-1,), (-2, -1, 0, 1, 2), (0,))
+        """
+        multiple = int(line[list(self.of)].sum())
+        if not np.any(line[list(self.of)]):
+            return (0,)
+        if self.step is None or np.count_nonzero(line) == 1:
+            return tuple(range(-(self.count // 2), self.count // 2 + 1))
+        turns = (multiple * self.step) % self.count
+        return (0 if 2 * turns == self.count else turns - self.count if 2 * turns > self.count else turns,)
+
+
 def line_set(orders: Sequence[float], harmonics: int, combinations: int = 0) -> LineSet:
     """Each base alone up to its harmonics, and combinations of bases with a small sum of multiples.
 
@@ -103,3 +143,36 @@ def line_set(orders: Sequence[float], harmonics: int, combinations: int = 0) -> 
     index = np.array(sorted((tuple(map(int, row)) for row in rows), key=lambda row: float(np.dot(row, bases))))
     index = np.vstack([np.zeros((1, bases.size), dtype=np.int64), index.astype(np.int64).reshape(-1, bases.size)])
     return LineSet(index, index @ bases)
+
+
+def modulated(lines: LineSet, modulators: Sequence[Modulator]) -> LineSet:
+    """Lines with those beside them that slow turns make, whose bases come after the others.
+
+    Parameters
+    ----------
+    lines : LineSet
+    modulators : sequence of Modulator
+
+    Examples
+    --------
+    >>> lines = modulated(line_set([10.0, 47.0], 1), [Modulator(1.0, (0,), 3, 1)])
+    >>> [tuple(row) for row in lines.index.tolist()]
+    [(0, 0, 0), (1, 0, -1), (1, 0, 0), (1, 0, 1), (0, 1, 0)]
+    """
+    own = np.array([modulator.order for modulator in modulators])
+    bases = np.append(_bases(lines), own)
+    rows: set[tuple[int, ...]] = set()
+    for line in lines.index[1:]:
+        for turns in itertools.product(*(modulator.turns(line) for modulator in modulators)):
+            row = np.append(line, np.array(turns, dtype=np.int64))
+            row = row if np.dot(row, bases) >= 0.0 else -row
+            rows.add(tuple(int(n) for n in row))
+    index = np.array(sorted(rows, key=lambda row: float(np.dot(row, bases))), dtype=np.int64)
+    index = np.vstack([np.zeros((1, len(bases)), dtype=np.int64), index.reshape(-1, len(bases))])
+    return LineSet(index, index @ bases)
+
+
+def _bases(lines: LineSet) -> Floats:
+    """Frequencies of the bases of a set, over that of the reference."""
+    units = np.eye(lines.index.shape[1], dtype=np.int64)
+    return np.array([float(lines.orders[np.flatnonzero((lines.index == unit).all(axis=1))[0]]) for unit in units])

@@ -19,7 +19,7 @@ from exugear.bearings.rolling.contact import BearingState, equilibrium
 from exugear.bearings.rolling.life import basic_rating_life, minimum_load, reference_life
 from exugear.bearings.rolling.ratings import equivalent_load, equivalent_static_load
 from exugear.bearings.rolling.rows import BearingError, BearingOfRows, RollerRow, RollingRow
-from exugear.counting.duration import DurationDistribution
+from exugear.life.acting_loads import ActingLoads
 from exugear.life.static_balance import StaticBalance
 from exugear.model.parts import Bearing
 from fe_ste.tools.arrays import Floats
@@ -77,9 +77,7 @@ class BearingLife:
 def bearing_lives(
     supports: tuple[Bearing, ...],
     turns: Mapping[str, float],
-    found: DurationDistribution,
-    torques: Floats,
-    extremes: Floats,
+    acting: ActingLoads,
     balance: StaticBalance,
 ) -> tuple[BearingLife, ...]:
     """Rate all bearings that turn and have catalogue data.
@@ -90,39 +88,36 @@ def bearing_lives(
         In the order of the balance.
     turns : mapping of bearing name to float
         Revolutions per revolution of the loaded body.
-    found : DurationDistribution
-    torques : array (bins,)
-        That stand for the bins, N m.
-    extremes : array
-        Torques that count for static safety alone, with partial factors, N m.
+    acting : ActingLoads
     balance : StaticBalance
     """
     lives = []
     for number, support in enumerate(supports):
         if support.catalogue is None or not turns.get(support.name, 0.0):
             continue
-        loads = balance.at(balance.bearing_load[:, :, number], torques)
-        largest = np.concatenate([[found.upper.max(), found.upper.min()], extremes])
-        worst = balance.at(balance.bearing_load[:, :, number], largest[largest != 0.0])
-        case = _Case(support, balance.bearing_load[:, :, number], balance.bearing_tilt[:, :, number])
-        lives.append(case.life(found, loads, worst, turns[support.name]))
+        case = _Case(support, acting, balance, number)
+        lives.append(case.life(turns[support.name]))
     return tuple(lives)
 
 
 @dataclass(frozen=True)
 class _Case:
-    """One bearing with the loads (t, a, 6) and tilts (t, a, 2) that were solved."""
+    """One bearing, and its number among those of the balance."""
 
     support: Bearing
-    solved: Floats
-    tilts: Floats
+    acting: ActingLoads
+    balance: StaticBalance
+    number: int
 
-    def life(self, found: DurationDistribution, loads: Floats, worst: Floats, turns: float) -> BearingLife:
+    def life(self, turns: float) -> BearingLife:
+        points, carried = self.acting.points, self.balance.bearing_load.of(self.number)
+        loads = self.balance.at(carried, points.torque, points.other)
+        worst = np.concatenate([self.balance.at(carried, *self.acting.worst(sense)) for sense in (1, -1)])
         section = self.support.catalogue
         assert section is not None
         rows = tuple(_sliced(row) for row in catalogue_rows(section))
         ratings = ratings_of(section)
-        revolutions = found.revolutions * turns
+        revolutions = points.revolutions * turns
         share = revolutions[:, None] / loads.shape[1]
         radial = np.hypot(loads[..., 0], loads[..., 1])
         equivalents = np.vectorize(
@@ -131,7 +126,7 @@ class _Case:
         basic = np.vectorize(lambda load: basic_rating_life(ratings.dynamic, load, section.type))(equivalents)
         by_bin = np.sum(share / (1e6 * basic), axis=1)
         damage = float(by_bin.sum())
-        lives, pressure, remarks = self._reference(rows, ratings, worst)
+        lives, pressure, remarks = self._reference(rows, ratings, loads, revolutions, worst)
         reference = math.nan
         if lives is not None:
             by_bin = np.sum(share / (1e6 * _interpolated(lives, radial)), axis=1)
@@ -146,7 +141,7 @@ class _Case:
         if ratings.estimated:
             remarks.append("ratings estimated from its dimensions")
         exponent = 10.0 / 3.0 if section.type.endswith("_roller") else 3.0
-        total, hours = float(revolutions.sum()), float(found.hours.sum())
+        total, hours = float(revolutions.sum()), float(points.hours.sum())
         return BearingLife(
             name=self.support.name,
             revolutions=total,
@@ -160,24 +155,32 @@ class _Case:
             static_safety=ratings.static / static if static else math.inf,
             ratings=ratings,
             remarks=tuple(remarks),
-            by_bin=by_bin,
+            by_bin=self.acting.by_bin(by_bin),
         )
 
     def _reference(
-        self, rows: tuple[RollingRow, ...], ratings: Ratings, worst: Floats
+        self, rows: tuple[RollingRow, ...], ratings: Ratings, loads: Floats, revolutions: Floats, worst: Floats
     ) -> tuple[tuple[Floats, Floats] | None, float, list[str]]:
-        """L10r (millions of revolutions) over radial load (N), the largest pressure (Pa), and remarks."""
-        size = np.hypot(self.solved[..., 0], self.solved[..., 1])
-        t = int(size.max(axis=1).argmax())
-        a = int(np.abs(size[t] - np.mean(size[t] ** 4.0) ** 0.25).argmin())
-        load, tilt, top = self.solved[t, a], self.tilts[t, a], np.hypot(worst[..., 0], worst[..., 1]).max()
+        """L10r (millions of revolutions) over radial load (N), the largest pressure (Pa), and remarks.
+
+        Direction, axial load and tilt keep the proportions that they have at the load and angle nearest to the mean of
+        the fourth power over the revolutions.
+        """
+        size = np.hypot(loads[..., 0], loads[..., 1])
+        mean = np.average(np.mean(size**4.0, axis=1), weights=revolutions) ** 0.25
+        t, a = np.unravel_index(int(np.abs(size - mean).argmin()), size.shape)
+        points = self.acting.points
+        tilts = self.balance.at(
+            self.balance.bearing_tilt.of(self.number), points.torque[t : t + 1], points.other[t : t + 1]
+        )
+        load, tilt, top = loads[t, a], tilts[0, a], np.hypot(worst[..., 0], worst[..., 1]).max()
         if not size[t, a]:
             return None, math.nan, ["carries nothing"]
         holds_axially = any(row.contact_angle for row in rows) or not isinstance(rows[0], RollerRow)
         remarks = []
         if not holds_axially and abs(load[2]) > 0.01 * size[t, a]:
             remarks.append(f"ribs carry up to {1e-3 * abs(load[2]):.3g} kN, which no life counts")
-        points = []
+        solved = []
         for share in LOAD_SHARES:
             factor = share * float(top) / size[t, a]
             force = factor * load[:3] * np.array([1.0, 1.0, float(holds_axially)])
@@ -185,8 +188,8 @@ class _Case:
                 life, pressure = self._life_at(rows, ratings, force, factor * tilt)
             except BearingError as error:
                 return None, math.nan, [*remarks, f"no L10r: {error}"]
-            points.append((share * float(top), life))
-        radial, lives = np.array(points).T
+            solved.append((share * float(top), life))
+        radial, lives = np.array(solved).T
         return (radial, lives), pressure, remarks
 
     def _life_at(

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from exugear.counting.duration import DurationDistribution
+from exugear.life.acting_loads import ActingLoads
 from exugear.life.dynamic_factor import DynamicFactor
 from exugear.life.static_balance import StaticBalance
 from exugear.load_spectrum.exposure import FLANKS, ToothExposure
@@ -119,9 +119,7 @@ def flank_lives(
     gearbox: Gearbox,
     rating: RatingSection,
     teeth: Sequence[ToothExposure],
-    found: DurationDistribution,
-    torques: Floats,
-    extremes: Floats,
+    acting: ActingLoads,
     balance: StaticBalance,
     stresses: Mapping[str, MeshCycleStress],
     dynamic: Mapping[str, DynamicFactor],
@@ -133,11 +131,7 @@ def flank_lives(
     gearbox : Gearbox
     rating : RatingSection
     teeth : sequence of ToothExposure
-    found : DurationDistribution
-    torques : array (bins,)
-        That stand for the bins, N m.
-    extremes : array
-        Torques that count for static safety alone, with partial factors, N m.
+    acting : ActingLoads
     balance : StaticBalance
     stresses : mapping of pair name to MeshCycleStress
     dynamic : mapping of mesh family to DynamicFactor
@@ -149,11 +143,9 @@ def flank_lives(
         if pair.name not in stresses:
             continue
         for sense in (1, -1):
-            worn = np.sign(torques) == sense
-            largest = np.max(sense * np.concatenate([torques, found.upper, extremes]), initial=0.0)
-            if largest > 0.0:
+            if np.any(acting.torques * sense > 0.0):
                 case = _Case(gearbox, rating, tooth, pair, balance, stresses[pair.name], dynamic[tooth.family], sense)
-                lives.append(case.life(found, torques, worn, sense * float(largest)))
+                lives.append(case.life(acting))
     return tuple(lives)
 
 
@@ -170,46 +162,49 @@ class _Case:
     dynamic: DynamicFactor
     sense: int
 
-    def life(self, found: DurationDistribution, torques: Floats, worn: Floats, largest: float) -> FlankLife:
-        tooth, stress = self.tooth, self.stress
-        passed = list(tooth.meshes)
-        hertz, root, _ = self._stresses(torques[worn], self.dynamic.at(found.speed[worn]))
-        # Each turn meets each angle and each mesh once: a bin's cycles are shared evenly among them.
-        share = tooth.cycles / (len(passed) * len(self.balance.angle))
-        cycles = np.broadcast_to((found.revolutions[worn] * share)[:, None, None], hertz.shape)
-        worst_hertz, worst_root, compression = self._stresses(np.array([largest]), np.full(1, self.dynamic.largest))
-        torque, tilt = self._loads(np.array([largest]))
-        force = tangential_force(self.pair.pinion, float(torque.mean()) / self.pair.pinion.base_radius)
-        rated = self._rated(hertz, root, cycles, found.speed[worn], float(worst_hertz.max()), float(worst_root.max()))
-        by_bin = np.zeros((2, len(torques)))
-        by_bin[:, worn] = rated.pop("by_bin")
+    def life(self, acting: ActingLoads) -> FlankLife:
+        tooth, stress, points = self.tooth, self.stress, acting.points
+        worn = np.sign(points.torque) == self.sense
+        speed = points.speed[worn]
+        hertz, root, _ = self._stresses(points.torque[worn], points.other[worn], self.dynamic.at(speed))
+        # Each turn meets each angle and each mesh once: cycles are shared evenly among them.
+        share = tooth.cycles / (len(tooth.meshes) * len(self.balance.angle))
+        cycles = np.broadcast_to((points.revolutions[worn] * share)[:, None, None], hertz.shape)
+        worst_torque, worst_hub = acting.worst(self.sense)
+        worst = self._stresses(worst_torque, worst_hub, np.full(len(worst_torque), self.dynamic.largest))
+        torque, tilt = self._loads(worst_torque, worst_hub)
+        top = int(np.abs(worst_torque).argmax())
+        force = tangential_force(self.pair.pinion, float(torque[top].mean()) / self.pair.pinion.base_radius)
+        rated = self._rated(hertz, root, cycles, speed, float(worst[0].max()), float(worst[1].max()))
+        by_point = np.zeros((2, len(points.torque)))
+        by_point[:, worn] = rated.pop("by_point")
         return FlankLife(
-            contact_by_bin=by_bin[0],
-            root_by_bin=by_bin[1],
+            contact_by_bin=acting.by_bin(by_point[0]),
+            root_by_bin=acting.by_bin(by_point[1]),
             gear=tooth.gear,
             family=tooth.family,
             flank=FLANKS[self.sense * tooth.flank],
-            cycles=float(found.revolutions[worn].sum()) * tooth.cycles,
-            contact_stress=float(worst_hertz.max()),
-            root_stress=float(worst_root.max()),
-            compression=float(compression.min()),
+            cycles=float(points.revolutions[worn].sum()) * tooth.cycles,
+            contact_stress=float(worst[0].max()),
+            root_stress=float(worst[1].max()),
+            compression=float(worst[2].min()),
             nominal_contact=nominal_contact_stress(self.pair, force),
             nominal_root=self._nominal_root(force),
             outside=float(stress.at(stress.outside, 0.0, torque, tilt).max()),
-            face_load=float(stress.at(stress.face_load, 0.0, torque, tilt).max()),
+            face_load=float(stress.at(stress.face_load, 0.0, torque[top], tilt[top]).max()),
             **rated,
         )
 
-    def _loads(self, torques: Floats) -> tuple[Floats, Floats]:
-        """Torque on gear 1 (N m) and misalignment (rad) of each mesh, (torques, angles, meshes)."""
+    def _loads(self, torques: Floats, hub: Floats) -> tuple[Floats, Floats]:
+        """Torque on gear 1 (N m) and misalignment (rad) of each mesh, (loads, angles, meshes)."""
         passed = list(self.tooth.meshes)
-        force = np.abs(self.balance.at(self.balance.mesh_force, torques)[..., passed])
-        tilt = self.balance.at(self.balance.misalignment, torques)[..., passed]
+        force = np.abs(self.balance.at(self.balance.mesh_force, torques, hub)[..., passed])
+        tilt = self.balance.at(self.balance.misalignment, torques, hub)[..., passed]
         return force * self.pair.pinion.base_radius, tilt
 
-    def _stresses(self, torques: Floats, dynamic: Floats) -> tuple[Floats, Floats, Floats]:
-        """Contact stress, root stress and root compression of each mesh, (torques, angles, meshes), Pa."""
-        torque, tilt = self._loads(torques)
+    def _stresses(self, torques: Floats, hub: Floats, dynamic: Floats) -> tuple[Floats, Floats, Floats]:
+        """Contact stress, root stress and root compression of each mesh, (loads, angles, meshes), Pa."""
+        torque, tilt = self._loads(torques, hub)
         torque = torque * dynamic[:, None, None]
         stress, member = self.stress, self.tooth.member
         return (
@@ -234,7 +229,7 @@ class _Case:
         strength = self.rating.gears.get(self.tooth.gear)
         keys = ("contact_damage", "root_damage", "contact_safety", "root_safety", "contact_static", "root_static")
         if strength is None:
-            return {**dict.fromkeys(keys, math.nan), "by_bin": np.nan}
+            return {**dict.fromkeys(keys, math.nan), "by_point": np.nan}
         contact, bending = life_curves(strength)
         allowed = self._contact_strength(strength, speed)[:, None, None]
         both_ways = strength.mean_stress_factor or 1.0
@@ -250,7 +245,7 @@ class _Case:
             static / worst_hertz,
             endured * bending.factors[0] / worst_root,
         )
-        return {**dict(zip(keys, values, strict=True)), "by_bin": np.stack([by_contact, by_root])}
+        return {**dict(zip(keys, values, strict=True)), "by_point": np.stack([by_contact, by_root])}
 
     def _contact_strength(self, strength: StrengthSection, speed: Floats) -> Floats:
         """Pa at a life factor of one, for each speed (rad/s) of the loaded body."""

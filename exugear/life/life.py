@@ -12,6 +12,7 @@ import numpy as np
 from exugear.counting.duration import DurationDistribution
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.fingerprint import input_hash
+from exugear.life.acting_loads import acting_loads
 from exugear.life.bearing_life import BearingLife, bearing_lives
 from exugear.life.dynamic_factor import DynamicFactor
 from exugear.life.gear_life import FlankLife, check_strengths, flank_lives
@@ -21,7 +22,6 @@ from exugear.model.gearbox import Gearbox
 from exugear.model.sections.loads import RatingSection
 from exugear.model.versions import LIFE
 from fe_ste.root_stress.mesh_cycle import MeshCycleStress
-from fe_ste.tools.arrays import Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +30,7 @@ class Life:
 
     Attributes
     ----------
-    variant, mesh_law, edition : str
+    variant, mesh_law, inertias, edition : str
         What the forces are of, and the edition of the standard that gears are rated by.
     counted : CountedLoads
     balance : StaticBalance
@@ -48,6 +48,7 @@ class Life:
 
     variant: str
     mesh_law: str
+    inertias: str
     edition: str
     counted: CountedLoads
     balance: StaticBalance
@@ -150,19 +151,19 @@ def compute_life(
         A static state that is not held.
     """
     gearbox, rating = assembly.gearbox, rating_of(assembly.gearbox)
-    found = counted.distribution
-    torques = found.torques(counted.bin_value)
-    extremes = np.concatenate([np.zeros(0), *_extremes(counted)])
-    covered = np.concatenate([found.upper, extremes])
-    balance = static_balance(assembly, counted.body, covered, rating.carrier_angles, progress)
-    flanks = flank_lives(gearbox, rating, counted.teeth, found, torques, extremes, balance, stresses, dynamic)
-    bearings = bearing_lives(assembly.supports, counted.bearings, found, torques, extremes, balance)
+    found, acting = counted.distribution, acting_loads(counted)
+    balance = static_balance(
+        assembly, counted.body, acting.torques, rating.carrier_angles, progress, 0.5 * acting.hub_sizes
+    )
+    flanks = flank_lives(gearbox, rating, counted.teeth, acting, balance, stresses, dynamic)
+    bearings = bearing_lives(assembly.supports, counted.bearings, acting, balance)
     families: dict[str, list[int]] = {}
     for number, mesh in enumerate(gearbox.meshes):
         families.setdefault(mesh.family, []).append(number)
     return Life(
         variant=assembly.variant,
         mesh_law=assembly.mesh_law,
+        inertias=assembly.inertias,
         edition=rating.edition,
         counted=counted,
         balance=balance,
@@ -175,8 +176,13 @@ def compute_life(
     )
 
 
-def _extremes(counted: CountedLoads) -> list[Floats]:
-    return [np.array([one.torque.min(), one.torque.max()]) for one in counted.sources if one.kind == "extreme"]
+def _hub_in_words(counted: CountedLoads) -> str:
+    if not counted.points.other.any():
+        return "torque alone: no forces or moments of a hub"
+    return (
+        f"forces and moments of a hub on {counted.body} in {len(counted.points.torque)} points; what they add is "
+        "linear in them, at each torque"
+    )
 
 
 def _unrated(assembly: Assembly, counted: CountedLoads, stresses: Mapping[str, MeshCycleStress]) -> list[str]:
@@ -205,7 +211,7 @@ def _assumptions(
 ) -> list[str]:
     count = len(balance.torque)
     lines = [
-        "torque alone: no forces or moments of a hub",
+        _hub_in_words(counted),
         f"static balance at {count} torque{'s' * (count > 1)} and {len(balance.angle)} angles of the carrier, "
         + ("proportional to torque" if balance.linear else "forces over torque linear between these"),
         _dynamic_in_words(rating, dynamic, found) + "; none on bearings",

@@ -10,19 +10,42 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.statics import locked_equilibrium
+from exugear.dynamics.assembly import Assembly, VariantError
+from exugear.dynamics.statics import BalanceError, locked_equilibrium
 from exugear.kernels.meshes import FORCE
 from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
 
 TORQUE_SHARES = (0.1, 0.25, 0.5, 0.75, 1.0)
 """Torques over the largest at which laws that are not linear are solved."""
+NEXT_SHARE = 0.7
+"""Share of the deflections under a torque from which the search under the next smaller one begins."""
 LONGEST_TURN = 0.02
 """Longest step, rad, in which a train is rolled to an angle."""
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """Something of the balance over torques and angles, and what the loads of a hub add to it.
+
+    Attributes
+    ----------
+    values : array (t, a, ...)
+        At the torques of the balance without loads of a hub.
+    by_hub : array (t, 5, a, ...), optional
+        What a unit of each of these adds.
+    """
+
+    values: Floats
+    by_hub: Floats | None = None
+
+    def of(self, number: int) -> Response:
+        """Response of one bearing alone: that number of the axis behind the angles."""
+        return Response(self.values[:, :, number], None if self.by_hub is None else self.by_hub[:, :, :, number])
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,52 +56,63 @@ class StaticBalance:
     ----------
     torque, angle : array (t,), (a,)
         On the loaded body, N m, rising and without zero; of the carrier, rad.
-    mesh_force, misalignment : array (t, a, meshes)
+    mesh_force, misalignment : Response (t, a, meshes)
         F_bt, N, positive on the flank that the static load presses; on tables' flank, rad.
-    bearing_load : array (t, a, bearings, 6)
+    bearing_load : Response (t, a, bearings, 6)
         Force and moment of the shaft on the inner ring in the axes of what the bearing sits on, N and N m.
-    bearing_tilt : array (t, a, bearings, 2)
+    bearing_tilt : Response (t, a, bearings, 2)
         Of the inner ring against the outer one in the same axes, rad.
     linear : bool
-        Whether all that is proportional to torque.
+        Whether all that is proportional to the loads.
     """
 
     torque: Floats
     angle: Floats
-    mesh_force: Floats
-    misalignment: Floats
-    bearing_load: Floats
-    bearing_tilt: Floats
+    mesh_force: Response
+    misalignment: Response
+    bearing_load: Response
+    bearing_tilt: Response
     linear: bool
 
     def __repr__(self) -> str:
         """Return one short line."""
         return f"<StaticBalance: {len(self.torque)} torques, {len(self.angle)} angles, linear: {self.linear}>"
 
-    def at(self, values: Floats, torque: Floats) -> Floats:
-        """Values (t, ...) of these fields at other torques (n,): (n, ...).
+    def at(self, response: Response, torque: Floats, hub: Floats | None = None) -> Floats:
+        """Values of a response at torques (n,) and loads of a hub (n, 5): (n, a, ...).
 
         Values over torque are linear between the torques that were solved, those of the same sign.
         """
+        found = self._over_torque(response.values / _like(self.torque, response.values), torque)
+        found *= _like(torque, found)
+        if hub is not None and response.by_hub is not None and hub.any():
+            slopes = self._over_torque(response.by_hub, torque)
+            found += np.einsum("nh,nh...->n...", hub, slopes)
+        return found
+
+    def _over_torque(self, values: Floats, torque: Floats) -> Floats:
+        """Interpolate values (t, ...) at torques (n,): (n, ...)."""
         found = np.zeros((len(torque), *values.shape[1:]))
         for sign in (1.0, -1.0):
-            wanted = np.sign(torque) == sign
+            wanted = torque >= 0.0 if sign > 0.0 else torque < 0.0
             own = np.sign(self.torque) == sign
             if not own.any():
                 own = ~own  # linear laws need one torque, of either sign
-            nodes, ratios = self.torque[own], values[own] / self.torque[own].reshape(-1, *(1,) * (values.ndim - 1))
-            flat = ratios.reshape(len(nodes), -1)
-            inside = np.array([np.interp(torque[wanted], nodes, column) for column in flat.T]).T
-            found[wanted] = inside.reshape(-1, *values.shape[1:]) * torque[wanted].reshape(
-                -1, *(1,) * (values.ndim - 1)
-            )
+            flat = values[own].reshape(int(own.sum()), -1)
+            inside = np.array([np.interp(torque[wanted], self.torque[own], column) for column in flat.T]).T
+            found[wanted] = inside.reshape(-1, *values.shape[1:])
         return found
 
     def load_sharing(self, meshes: Sequence[int]) -> float:
         """K_gamma of the meshes of a family: largest over mean force at the largest torque, over all angles."""
-        forces = np.abs(self.mesh_force[np.abs(self.torque).argmax()][:, list(meshes)])
+        forces = np.abs(self.mesh_force.values[np.abs(self.torque).argmax()][:, list(meshes)])
         mean = float(forces.mean())
         return float(forces.max()) / mean if mean else 1.0
+
+
+def _like(weights: Floats, values: Floats) -> Floats:
+    """Weights of the first axis, ready to be multiplied with values."""
+    return weights.reshape(-1, *(1,) * (values.ndim - 1))
 
 
 def rolled_coordinates(assembly: Assembly, body: str, angle: float) -> Floats:
@@ -107,6 +141,7 @@ def static_balance(
     torques: Floats,
     angles: int,
     progress: Callable[[int, int], None] | None = None,
+    hub: Floats | None = None,
 ) -> StaticBalance:
     """Solve the static balance of a variant for the range of some torques on a body.
 
@@ -120,32 +155,105 @@ def static_balance(
         Angles of the carrier within its turn; without planets one is all.
     progress : callable, optional
         Called with the number of solved states, and of all.
+    hub : array (5,), optional
+        Sizes of the force along x, y, z (N) and the moment about x and y (N m) on the body: those above zero are solved
+        beside each torque.
 
     Raises
     ------
     BalanceError
         A state that is not held.
+    VariantError
+        Loads of a hub on a body that has no place in space.
     """
     linear = is_linear(assembly)
     solved, turns = _torques(torques, linear), _angles(assembly, angles)
-    shape, meshes, bearings = (len(solved), len(turns)), len(assembly.elements), len(assembly.supports)
-    force, misalignment = np.zeros((2, *shape, meshes))
-    load, tilt = np.zeros((*shape, bearings, 6)), np.zeros((*shape, bearings, 2))
-    flanks = np.array([element.flank for element in assembly.elements])
-    locked = assembly.gearbox.case.static_load.locked
+    wrenches = _wrenches(assembly, body, np.zeros(5) if hub is None else hub)
     carrier = _carrier(assembly)
-    for a, turn in enumerate(turns):
+    states: list[list[list[_State | None]]] = []
+    done = 0
+    for turn in turns:
         about = rolled_coordinates(assembly, carrier, turn) if carrier else np.zeros(assembly.size)
-        for t, torque in enumerate(solved):
-            q = locked_equilibrium(assembly, {body: float(torque)}, locked, assembly.mean_meshes, about)
-            rest = np.zeros_like(q)
-            force[t, a] = assembly.mesh_states(q, rest, assembly.mean_meshes)[:, FORCE]
-            misalignment[t, a] = flanks * assembly.gear_positions(q)[:, 1]
-            if bearings:
-                load[t, a], tilt[t, a] = _inner_rings(assembly, q)
+        row: list[list[_State | None]] = [[] for _ in solved]
+        near: Floats | None = None
+        for t in np.argsort(-np.abs(solved)).tolist():  # from the largest on: where teeth and rollers touch is known
+            torque, before = float(solved[t]), near
+            q = _at_rest(assembly, body, torque, about, None, before)
+            row[t] = [_State.of(assembly, q)]
+            for wrench in wrenches:
+                other = None if wrench is None else _at_rest(assembly, body, torque, about, wrench, q)
+                row[t].append(None if other is None else _State.of(assembly, other))
+            near = about + (q - about) * NEXT_SHARE if not linear else None
+            done += 1
             if progress is not None:
-                progress(a * len(solved) + t + 1, len(solved) * len(turns))
+                progress(done, len(solved) * len(turns))
+        states.append(row)
+    force, misalignment, load, tilt = (_response(states, key, hub) for key in range(4))
     return StaticBalance(solved, turns, force, misalignment, load, tilt, linear)
+
+
+class _State(NamedTuple):
+    """Mesh forces and misalignments, loads and tilts of inner rings at rest."""
+
+    force: Floats
+    misalignment: Floats
+    load: Floats
+    tilt: Floats
+
+    @classmethod
+    def of(cls, assembly: Assembly, q: Floats) -> _State:
+        force = assembly.mesh_states(q, np.zeros_like(q), assembly.mean_meshes)[:, FORCE]
+        flanks = np.array([element.flank for element in assembly.elements])
+        return cls(force, flanks * assembly.gear_positions(q)[:, 1], *_inner_rings(assembly, q))
+
+
+def _at_rest(
+    assembly: Assembly, body: str, torque: float, about: Floats, wrench: Floats | None, near: Floats | None
+) -> Floats:
+    """Coordinates at rest, (size,)."""
+    locked = assembly.gearbox.case.static_load.locked
+    try:
+        return locked_equilibrium(assembly, {body: torque}, locked, assembly.mean_meshes, about, wrench, near)
+    except BalanceError as error:
+        hint = "; tables may end at a smaller load or misalignment: widen the axes of [ste]"
+        needs_axes = LAWS[assembly.mesh_law].needs_axes
+        raise BalanceError(f"under {torque:.6g} N m on {body}: {error}{hint if needs_axes else ''}") from error
+
+
+def _wrenches(assembly: Assembly, body: str, hub: Floats) -> list[Floats | None]:
+    """Generalized forces (size,) of each load of a hub by itself, None for those of no size."""
+    places = assembly.coordinates[body][: len(hub)]
+    if hub.any() and min(places) < 0:
+        raise VariantError(
+            f"loads on {body}: has no place in space in the variant {assembly.variant}, so no forces or moments of a "
+            "hub act on it; name a body on bearings, or take the variant bushing or flexible"
+        )
+    found: list[Floats | None] = []
+    for place, size in zip(places, hub, strict=True):
+        wrench = np.zeros(assembly.size)
+        wrench[place] = size
+        found.append(wrench if size else None)
+    return found
+
+
+def _response(states: list[list[list[_State | None]]], key: int, hub: Floats | None) -> Response:
+    """Gather one part of all states: over torque and angle, and its differences by the loads of a hub."""
+    alone = np.array([[_part(of_torque[0], key) for of_torque in row] for row in states])
+    values = np.swapaxes(alone, 0, 1)
+    if hub is None or not hub.any():
+        return Response(values)
+    slopes = np.zeros((values.shape[0], len(hub), *values.shape[1:]))
+    for a, row in enumerate(states):
+        for t, of_torque in enumerate(row):
+            for n, size in enumerate(hub):
+                if size:
+                    slopes[t, n, a] = (_part(of_torque[n + 1], key) - values[t, a]) / size
+    return Response(values, slopes)
+
+
+def _part(state: _State | None, key: int) -> Floats:
+    assert state is not None
+    return state[key]
 
 
 def is_linear(assembly: Assembly) -> bool:
@@ -178,6 +286,8 @@ def _angles(assembly: Assembly, count: int) -> Floats:
 
 def _inner_rings(assembly: Assembly, q: Floats) -> tuple[Floats, Floats]:
     """Load on the inner ring (bearings, 6) and its tilt (bearings, 2) in the axes of what each bearing sits on."""
+    if not assembly.supports:
+        return np.zeros((0, 6)), np.zeros((0, 2))
     loads = assembly.bearing_loads(q, np.zeros_like(q))
     strains = assembly.support_strains(q)
     # The bearing takes its factor of a deflection, the seat the rest; the outer ring moves the other way.

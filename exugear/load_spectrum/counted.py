@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from exugear.counting.duration import DurationDistribution, equivalent_load
+from exugear.counting.duration import DurationDistribution, LoadPoints, equivalent_load
 from exugear.counting.rainflow import damage_equivalent_range
 from exugear.load_spectrum.exposure import FLANKS, ToothExposure, bearing_turns, tooth_exposures
-from exugear.load_spectrum.sources import LoadSource, distribution, load_sources, section_of, told
+from exugear.load_spectrum.sources import LoadSource, distribution, load_sources, points_of, section_of, told
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import RPM
 
@@ -33,6 +33,8 @@ class CountedLoads:
     sources : tuple of LoadSource
     distribution : DurationDistribution
         Of all sources of fatigue.
+    points : LoadPoints
+        Its bins, split where loads of a hub differ.
     equivalent_ranges : mapping of float to float
         Damage-equivalent range of torque of one cycle a second in the life, by slope, N m; NaN without series.
     teeth : tuple of ToothExposure
@@ -47,6 +49,7 @@ class CountedLoads:
     life_years: float
     sources: tuple[LoadSource, ...]
     distribution: DurationDistribution
+    points: LoadPoints
     equivalent_ranges: Mapping[float, float]
     teeth: tuple[ToothExposure, ...]
     bearings: Mapping[str, float]
@@ -139,6 +142,7 @@ def count_loads(gearbox: Gearbox) -> CountedLoads:
         A source that cannot be used: see `exugear.load_spectrum.sources.load_sources`.
     """
     loads, sources = section_of(gearbox), load_sources(gearbox)
+    found = distribution(gearbox, sources)
     teeth = tooth_exposures(gearbox, loads.body)
     forces = gearbox.train.static_mesh_forces({loads.body: 1.0})
     families: dict[str, float] = {}
@@ -148,7 +152,8 @@ def count_loads(gearbox: Gearbox) -> CountedLoads:
         body=loads.body,
         life_years=loads.life_years,
         sources=sources,
-        distribution=distribution(gearbox, sources),
+        distribution=found,
+        points=points_of(gearbox, sources, found),
         equivalent_ranges={m: _equivalent_range(sources, m) for m in RANGE_EXPONENTS},
         teeth=teeth,
         bearings=bearing_turns(gearbox, loads.body),

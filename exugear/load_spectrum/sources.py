@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from exugear.counting.duration import DurationDistribution, load_duration
+from exugear.counting.duration import DurationDistribution, LoadPoints, load_duration, load_points
 from exugear.load_files.channels import Channels, LoadFileError
 from exugear.load_files.reading import LARGEST_SERIES, SERIES_ENDINGS, decoded, file_content, read_channels
 from exugear.load_files.tables import read_headed
@@ -18,9 +18,13 @@ from exugear.model.gearbox import Gearbox
 from exugear.model.parts import RPM
 from exugear.model.sections.loads import LoadsSection, SourceSection
 from exugear.rexs.faults import RexsError
-from fe_ste.tools.arrays import Floats
+from fe_ste.tools.arrays import Booleans, Floats
 
 HOURS_PER_YEAR = 8766.0
+HUB_LOADS = 5
+"""Loads of a hub beside its torque: force along x, y, z, moment about x and y."""
+HUB_CELLS = 8
+"""Cells of each load of a hub into which the bins of torque are split."""
 SPECTRUM_HEADINGS = ("torque_N_m", "speed_rpm", "hours")
 """Headings of a table of loads that were counted elsewhere; of its hours the shares count."""
 REXS_ENDINGS = (".rexs", ".rexsj", ".rexsz")
@@ -41,6 +45,8 @@ class LoadSource:
         On the loaded body about +z, N m and rad/s; an extreme torque with its partial factor.
     hours : array (samples,)
         Of each sample in the whole of the life; zero for extreme sources.
+    hub : array (samples, 5)
+        Force along x, y, z and moment about x, y on the loaded body, N and N m; zero where the source has none.
     series : bool
         Whether the samples follow each other in time.
     skipped, duration : float
@@ -57,6 +63,7 @@ class LoadSource:
     torque: Floats
     speed: Floats
     hours: Floats
+    hub: Floats
     series: bool
     skipped: float
     duration: float
@@ -107,6 +114,15 @@ def distribution(gearbox: Gearbox, sources: tuple[LoadSource, ...]) -> DurationD
     return load_duration(torque, speed, hours, section_of(gearbox).bins)
 
 
+def points_of(gearbox: Gearbox, sources: tuple[LoadSource, ...], found: DurationDistribution) -> LoadPoints:
+    """Split the bins of the distribution where loads of a hub differ."""
+    worn = [source for source in sources if source.kind == "fatigue"]
+    torque, speed, hours, hub = (
+        np.concatenate([getattr(one, key) for one in worn]) for key in ("torque", "speed", "hours", "hub")
+    )
+    return load_points(found, section_of(gearbox).bin_value, torque, speed, hours, hub, HUB_CELLS)
+
+
 def _read(gearbox: Gearbox, name: str, source: SourceSection) -> LoadSource:
     key, loads = f"loads.sources.{name}", section_of(gearbox)
     path = gearbox.file(f"{key}.file", source.file, LARGEST_SERIES)
@@ -115,17 +131,20 @@ def _read(gearbox: Gearbox, name: str, source: SourceSection) -> LoadSource:
         known = ", ".join((*SERIES_ENDINGS, *REXS_ENDINGS))
         raise gearbox.fault(f"{key}.file = {source.file!r}: files of loads end in {known}")
     skipped = duration = 0.0
+    hub = None
     try:
         table = _table(gearbox, path, loads.body)
         if table is None:
             series = read_channels(path)
-            torque, speed, shares, skipped, duration = _samples(gearbox, key, source, series, loads.body)
+            kept = _kept(gearbox, key, source, series)
+            torque, speed, shares, skipped, duration = _samples(gearbox, key, source, series, loads.body, kept)
+            hub = _hub(source, series)[kept] * (source.partial_factor or 1.0)
         else:
             torque, speed, shares = table
     except (LoadFileError, RexsError) as error:
         raise gearbox.fault(f"{key}.file: {error}") from error
     if table is not None:
-        for superfluous in ("skip_s", "torque", "speed", "events_per_year"):
+        for superfluous in ("skip_s", "torque", "speed", "events_per_year", "hub_forces", "hub_moments"):
             if getattr(source, superfluous) is not None:
                 raise gearbox.fault(f"{key}.{superfluous}: makes no sense for a table of loads; leave it out")
     yearly = source.hours_per_year or 0.0
@@ -140,6 +159,7 @@ def _read(gearbox: Gearbox, name: str, source: SourceSection) -> LoadSource:
         torque=torque * source.torque_factor * (source.partial_factor or 1.0),
         speed=speed * source.speed_factor,
         hours=shares * yearly * loads.life_years,
+        hub=np.zeros((len(torque), HUB_LOADS)) if hub is None else hub,
         series=table is None,
         skipped=skipped,
         duration=duration,
@@ -167,24 +187,43 @@ def _table(gearbox: Gearbox, path: Path, body: str) -> tuple[Floats, Floats, Flo
     return values[:, 0], values[:, 1] * RPM, values[:, 2] / values[:, 2].sum()
 
 
-def _samples(
-    gearbox: Gearbox, key: str, source: SourceSection, series: Channels, body: str
-) -> tuple[Floats, Floats, Floats, float, float]:
-    """Torques, speeds and shares of the samples of a series, and the time that was left out and taken."""
+def _hub(source: SourceSection, series: Channels) -> Floats:
+    """Read forces and moments of the hub (steps, 5), N and N m, zero where the source names no channels."""
+    forces = source.hub_forces or (None,) * 3
+    moments = source.hub_moments or (None,) * 2
+    wanted = [(name, "force") for name in forces] + [(name, "torque") for name in moments]
+    columns = [
+        np.zeros(len(series.time))
+        if name is None
+        else (-1.0 if name.startswith("-") else 1.0) * series.channel(name.removeprefix("-"), quantity)
+        for name, quantity in wanted
+    ]
+    return source.hub_factor * np.array(columns).T
+
+
+def _kept(gearbox: Gearbox, key: str, source: SourceSection, series: Channels) -> Booleans:
+    """Tell which steps of a series are taken: those behind the time that is skipped."""
     if source.skip_s is None:
         raise gearbox.fault(
             f"{key}.skip_s: this key is missing; say how much of the beginning is left out, 0 for nothing"
         )
+    kept: Booleans = np.asarray(series.time >= series.time[0] + source.skip_s)
+    if np.count_nonzero(kept) < 2:
+        length = series.time[-1] - series.time[0]
+        raise gearbox.fault(f"{key}.skip_s = {source.skip_s:g}: leaves nothing of a series of {length:g} s")
+    return kept
+
+
+def _samples(
+    gearbox: Gearbox, key: str, source: SourceSection, series: Channels, body: str, kept: Booleans
+) -> tuple[Floats, Floats, Floats, float, float]:
+    """Torques, speeds and shares of the samples of a series, and the time that was left out and taken."""
     own = {"torque": f"{body}_N_m", "speed": f"{body}_rpm"} if series.path.suffix.lower() == ".csv" else {}
     named = {"torque": source.torque or own.get("torque"), "speed": source.speed or own.get("speed")}
     for quantity, channel in named.items():
         if channel is None:
             shown = ", ".join(series.names[:8])
             raise gearbox.fault(f"{key}.{quantity}: this key is missing; name a channel of the file, such as {shown}")
-    kept = series.time >= series.time[0] + source.skip_s
-    if np.count_nonzero(kept) < 2:
-        length = series.time[-1] - series.time[0]
-        raise gearbox.fault(f"{key}.skip_s = {source.skip_s:g}: leaves nothing of a series of {length:g} s")
     torque, speed = (series.channel(str(named[quantity]), quantity)[kept] for quantity in ("torque", "speed"))
     lasting = np.gradient(series.time[kept])
     duration = float(series.time[-1] - series.time[kept][0])

@@ -48,6 +48,8 @@ class LoadSummary:
         Of the overall input, rad/s; the last without sign.
     rim_speeds : mapping of body name to float
         Speed of the fastest gear's rim on each body with gears at `fastest_speed`, m/s.
+    mesh_frequencies : mapping of mesh name to float
+        Highest mesh frequency of each, Hz.
     mesh_forces : mapping of mesh name to float
         F_bt at the start, N; its sign says which flank of gear 1 carries, as in `Train.static_mesh_forces`.
     flanks : mapping of mesh family to str
@@ -64,6 +66,7 @@ class LoadSummary:
     end_speed: float
     fastest_speed: float
     rim_speeds: Mapping[str, float]
+    mesh_frequencies: Mapping[str, float]
     mesh_forces: Mapping[str, float]
     flanks: Mapping[str, str]
     reversed_flanks: tuple[str, ...]
@@ -152,6 +155,7 @@ def summarise_loads(
         end_speed=float(speeds[-1]),
         fastest_speed=fastest[reference],
         rim_speeds={name: fastest[name] * radius for name, radius in rim_radii(gearbox).items()},
+        mesh_frequencies=_highest_mesh_frequencies(gearbox, spins),
         mesh_forces={mesh.name: float(force) for mesh, force in zip(gearbox.meshes, forces[0], strict=True)},
         flanks=flanks,
         reversed_flanks=reversed_flanks,
@@ -247,6 +251,18 @@ def _speeds(gearbox: Gearbox, case: LoadCase, times: Floats, rates: Floats) -> F
     gained = np.cumsum(0.5 * (rates[1:] + rates[:-1]) * np.diff(times)[:, None], axis=0)
     gained = np.concatenate([np.zeros((1, rates.shape[1])), gained])
     return np.asarray(np.array([start[name] for name in gearbox.spinning]) + gained)
+
+
+def _highest_mesh_frequencies(gearbox: Gearbox, spins: Floats) -> dict[str, float]:
+    """Highest mesh frequency of each mesh (Hz), of spins (times, bodies); a body that is no spin stands."""
+    of_body = dict(zip(gearbox.spinning, spins.T, strict=True))
+    standing = np.zeros(len(spins))
+    return {
+        mesh.name: float(np.abs(of_body.get(mesh.pinion, standing) - of_body.get(mesh.frame, standing)).max())
+        * mesh.pair.pinion.teeth
+        / (2.0 * math.pi)
+        for mesh in gearbox.meshes
+    }
 
 
 def drive_rate(gearbox: Gearbox, case: LoadCase) -> float:

@@ -6,7 +6,9 @@ deflection of mesh n by the frame's coordinates u
     d_n = d_0 + d_c cos theta_n + d_s sin theta_n,   rows g_0 = mean g_n, g_c = 2/N sum g_n cos theta_n, g_s likewise,
 
 and a force F_n in each mesh is a generalized force -(N g_0 F_0 + N/2 g_c F_c + N/2 g_s F_s). Planets that mesh in
-phase have one position in the mesh cycle, so that their stiffness k multiplies each wave by itself.
+phase have one position in the mesh cycle, so that their stiffness k multiplies each wave by itself. Planets out of
+phase have all N waves, and the carrier's angle is a cause of its own: harmonic h of the stiffness carries a wave to
+another, and its line to one beside it, by a whole number of the carrier's turns.
 """
 
 from __future__ import annotations
@@ -18,11 +20,12 @@ from functools import cached_property
 import numpy as np
 
 from exugear.dynamics.assembly import Assembly
+from exugear.harmonics.lines import Modulator
 from exugear.harmonics.products import fourier_coefficients
 from exugear.kernels.coordinates import BODY_SIZE, SPIN
 from exugear.kernels.meshes import FRAME, ROW_SIZE, frame_row
 from exugear.rotating.mean_system import MeanSystem
-from exugear.rotating.rotating_frame import PlanetSet, RotatingFrame, SteadyError
+from exugear.rotating.rotating_frame import PlanetSet, RotatingFrame
 from fe_ste.tools.arrays import Complexes, Floats
 
 SAMPLES = 64
@@ -32,6 +35,22 @@ IN_PHASE = 1e-6
 SAME_BASE = 1e-9
 """Share by which mesh frequencies of one base may differ."""
 WAVES = ("mean", "cosine", "sine")
+"""The first three, which central bodies feel."""
+
+
+def wave_name(number: int, planets: int) -> str:
+    """Name of a wave of a set of planets.
+
+    Examples
+    --------
+    >>> [wave_name(n, 4) for n in range(4)]
+    ['mean', 'cosine', 'sine', 'alternating']
+    """
+    if number < len(WAVES):
+        return WAVES[number]
+    if planets % 2 == 0 and number == planets - 1:
+        return "alternating"
+    return f"{WAVES[2 - number % 2]} {(number + 1) // 2}"
 
 
 @dataclass(frozen=True)
@@ -46,7 +65,7 @@ class MeshWave:
     first : int
         Mesh that stands for the family in the assembly's arrays.
     wave : int
-        0 mean, 1 cosine, 2 sine.
+        0 mean, 1 cosine, 2 sine, and on where planets mesh out of phase.
     weight : float
         What a unit of its force counts in generalized forces.
     base : int
@@ -55,6 +74,8 @@ class MeshWave:
         Mesh cycles per cycle of the base when the input turns about +z: 1 or -1.
     carrier : float
         Turns of the waves per turn of the input.
+    ahead : tuple of float
+        Cycles by which each planet's mesh is ahead of the first's, empty where they are in phase.
     """
 
     name: str
@@ -65,6 +86,7 @@ class MeshWave:
     base: int
     sense: float
     carrier: float
+    ahead: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +119,25 @@ class MeshWaves:
         return _groups(self.system.frame)
 
     @cached_property
+    def carriers(self) -> tuple[tuple[str, Modulator], ...]:
+        """Carriers whose planets mesh out of phase, and the lines that their turns put beside those of the meshes."""
+        found: dict[str, tuple[PlanetSet, set[int], set[int | None]]] = {}
+        for wave in self.waves:
+            planets = self.planets(wave)
+            if wave.ahead and planets is not None and wave.wave == 0:
+                _, bases, steps = found.setdefault(planets.carrier, (planets, set(), set()))
+                bases.add(wave.base)
+                steps.add(_turns_per_cycle(wave, planets))
+        return tuple(
+            (name, Modulator(abs(planets.ratio), tuple(sorted(bases)), planets.waves, *_one_of(steps)))
+            for name, (planets, bases, steps) in found.items()
+        )
+
+    def planets(self, wave: MeshWave) -> PlanetSet | None:
+        """Planets of the meshes of a wave, None of a single mesh."""
+        return next(planets for meshes, planets in self.groups if wave.first in meshes)
+
+    @cached_property
     def weights(self) -> Floats:
         """(m,) array."""
         return np.array([wave.weight for wave in self.waves])
@@ -124,8 +165,9 @@ class MeshWaves:
         """
         rates = np.zeros((len(self.waves),) * 2)
         for n, wave in enumerate(self.waves):
-            if wave.wave == 1:
-                rates[n, n + 1], rates[n + 1, n] = wave.carrier, -wave.carrier
+            if wave.wave % 2 == 1 and n + 1 < len(self.waves) and self.waves[n + 1].wave == wave.wave + 1:
+                turns = (wave.wave + 1) // 2 * wave.carrier
+                rates[n, n + 1], rates[n + 1, n] = turns, -turns
         return rates
 
     def gradients(self, rows: Floats, speed: float) -> Floats:
@@ -179,21 +221,16 @@ class MeshWaves:
                 out[at] = own[0]
                 at += 1
                 continue
-            shapes = planets.shapes(0.0)[0][:, :3]
+            count = sum(self.planets(wave) is planets and wave.first == meshes[0] for wave in self.waves)
+            shapes = planets.shapes(0.0)[0][:, :count]
             norms = (shapes**2).sum(axis=0)
-            out[at : at + 3] = np.tensordot(shapes / norms, own, axes=(0, 0))
-            at += 3
+            out[at : at + count] = np.tensordot(shapes / norms, own, axes=(0, 0))
+            at += count
         return out
 
 
 def mesh_waves(system: MeanSystem) -> MeshWaves:
-    """Mesh waves of a mean system.
-
-    Raises
-    ------
-    SteadyError
-        Planets do not mesh in phase.
-    """
+    """Mesh waves of a mean system."""
     assembly = system.frame.assembly
     gearbox = assembly.gearbox
     frequencies = gearbox.train.mesh_frequencies(2.0 * math.pi)
@@ -208,17 +245,17 @@ def mesh_waves(system: MeanSystem) -> MeshWaves:
             orders.append(order)
             names.append([])
         names[base].append(mesh.family)
-        if planets is not None:
-            _check_phases(assembly, meshes)
         sense = math.copysign(1.0, _cycles_per_turn(system.frame, meshes[0]))
         own = (meshes[0],)
         if planets is None:
             waves.append(MeshWave(mesh.name, mesh.name, *own, 0, 1.0, base, sense, 0.0))
             continue
-        for number, name in enumerate(WAVES):
-            weight = planets.waves * (1.0 if number == 0 else 0.5)
-            label = mesh.family if number == 0 else f"{mesh.family} {name}"
-            waves.append(MeshWave(label, mesh.family, *own, number, weight, base, sense, planets.ratio))
+        ahead = _phases_ahead(assembly, meshes)
+        norms = (planets.shapes(0.0)[0] ** 2).sum(axis=0)
+        for number in range(planets.waves if ahead else len(WAVES)):
+            label = f"{mesh.family} {wave_name(number, planets.waves)}" if number else mesh.family
+            weight = float(norms[number])
+            waves.append(MeshWave(label, mesh.family, *own, number, weight, base, sense, planets.ratio, ahead))
     return MeshWaves(system, tuple(waves), np.array(orders), tuple(", ".join(own) for own in names))
 
 
@@ -255,16 +292,29 @@ def _cycles_per_turn(frame: RotatingFrame, mesh: int) -> float:
     return float(frame.assembly.meshes.cycles[mesh] * relative)
 
 
-def _check_phases(assembly: Assembly, meshes: tuple[int, ...]) -> None:
+def _phases_ahead(assembly: Assembly, meshes: tuple[int, ...]) -> tuple[float, ...]:
+    """Cycles by which each mesh is ahead of the first, empty where all are in phase."""
     phases = assembly.meshes.phase[list(meshes)]
     apart = (phases - phases[0] + 0.5) % 1.0 - 0.5
-    if np.abs(apart).max() > IN_PHASE:
-        mesh = assembly.elements[meshes[0]].mesh
-        raise SteadyError(
-            f"meshes.{mesh.family}: its planets do not mesh in phase (by up to {np.abs(apart).max():.3g} of a cycle), "
-            "so that the carrier's angle is a cause of its own, which the steady response does not take; run the load "
-            "case in time instead"
-        )
+    return tuple(float(own) for own in apart) if np.abs(apart).max() > IN_PHASE else ()
+
+
+def _turns_per_cycle(wave: MeshWave, planets: PlanetSet) -> int | None:
+    """Find the carrier's turns that go with a mesh cycle, None where phases are not those of equally spaced planets.
+
+    Planets that are ahead by multiples of p / N of a cycle carry harmonic h into the wave h p; seen from the frame that
+    wave turns back with the carrier.
+    """
+    ahead, count = np.array(wave.ahead), planets.waves
+    step = round(float(ahead[1]) * count)
+    if np.abs((ahead - step * np.arange(count) / count + 0.5) % 1.0 - 0.5).max() > IN_PHASE:
+        return None
+    return int(-step * wave.sense * math.copysign(1.0, wave.carrier))
+
+
+def _one_of(steps: set[int | None]) -> tuple[int | None]:
+    """Tell the step that all meshes of a carrier have, None where they differ."""
+    return (next(iter(steps)),) if len(steps) == 1 else (None,)
 
 
 def _row(assembly: Assembly, mesh: int, q: Floats, row: Floats) -> tuple[float, Floats]:

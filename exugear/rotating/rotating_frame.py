@@ -65,6 +65,16 @@ class PlanetSet:
         """Number of planets, which is that of waves."""
         return len(self.names)
 
+    def values(self, turned: Floats) -> Floats:
+        """Waves at the planets (..., planets, waves) where the carrier has turned by angles (...), rad."""
+        theta = turned[..., None] + self.angles
+        found = [np.ones_like(theta)]
+        for m in range(1, (self.waves - 1) // 2 + 1):
+            found += [np.cos(m * theta), np.sin(m * theta)]
+        if self.waves % 2 == 0:
+            found.append(np.broadcast_to(np.where(np.arange(self.waves) % 2, -1.0, 1.0), theta.shape))
+        return np.stack(found, axis=-1)
+
     def shapes(self, psi: float) -> Jet:
         """Waves at the planets (planets, waves), and two derivatives by the input's angle psi (rad).
 

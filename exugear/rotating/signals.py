@@ -14,7 +14,7 @@ from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.modes import overall_row
 from exugear.kernels.coordinates import TILT
 from exugear.rotating.mean_system import MeanSystem
-from exugear.rotating.mesh_waves import WAVES, MeshWaves
+from exugear.rotating.mesh_waves import MeshWaves, wave_name
 from exugear.rotating.rotating_frame import PlanetSet
 from fe_ste.tools.arrays import Complexes, Floats
 
@@ -124,7 +124,6 @@ def _support_waves(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> tuple[Flo
     """Matrix from values along global axes (3 supports,) to waves along radius and tangent, and what they are."""
     count = len(assembly.supports)
     turn, labels = np.eye(3 * count), [f"{support.name} {axis}" for support in assembly.supports for axis in AXES]
-    names = [support.name for support in assembly.supports]
     for planets in sets:
         families = sorted({support.family for support in assembly.supports if support.body in planets.names})
         for family in families:
@@ -148,8 +147,5 @@ def _support_waves(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> tuple[Flo
                     for n, support in enumerate(own):
                         row[3 * support : 3 * support + 3] = inverse[wave, n] * radial[n, axis]
                     turn[3 * at + axis] = row
-                    wave_name = WAVES[wave] if wave < len(WAVES) else f"wave {wave}"
-                    labels[3 * at + axis] = f"{family} {wave_name} {PLANET_AXES[axis]}"
-        del families
-    del names
+                    labels[3 * at + axis] = f"{family} {wave_name(wave, planets.waves)} {PLANET_AXES[axis]}"
     return turn, labels

@@ -124,7 +124,8 @@ def waterfall(
     Parameters
     ----------
     values, speed : array_like, shape (n,)
-        Signal and speed of the reference shaft (rad/s), uniformly sampled from time zero on.
+        Signal and speed of the reference shaft (rad/s), uniformly sampled from time zero on. A signal in single
+        precision is analysed so.
     rate : float
         Sampling rate, Hz.
     window_length : float
@@ -155,7 +156,7 @@ def waterfall(
     >>> float(run.frequency[np.argmax(run.amplitude[0])]), round(float(run.amplitude.max()), 6)
     (300.0, 1.0)
     """
-    signal, shaft = np.asarray(values, dtype=np.float64), np.asarray(speed, dtype=np.float64)
+    signal, shaft = np.asarray(values), np.asarray(speed, dtype=np.float64)
     length = round(window_length * rate)
     if signal.shape != shaft.shape or signal.ndim != 1:
         raise ValueError(f"values {signal.shape} and speed {shaft.shape} must be two rows of equal length")

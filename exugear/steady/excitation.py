@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from exugear.harmonics.lattice import Lattice, lattice
 from exugear.harmonics.lines import LineSet
 from exugear.harmonics.products import Product
 from exugear.rotating.mean_system import MeanSystem
@@ -67,12 +68,15 @@ class Gearset:
     ----------
     waves : MeshWaves
     lines : LineSet
+    larger : LineSet
+        Lines that are kept apart where forces are evaluated in time.
     stiffness_harmonics : int
         Highest harmonic of the mesh stiffness.
     """
 
-    def __init__(self, waves: MeshWaves, lines: LineSet, stiffness_harmonics: int) -> None:
+    def __init__(self, waves: MeshWaves, lines: LineSet, larger: LineSet, stiffness_harmonics: int) -> None:
         self.waves, self.lines, self.harmonics = waves, lines, stiffness_harmonics
+        self._larger = larger
         self.parting = LAWS[waves.assembly.mesh_law].loses_contact
         ports, rows = [], []
         for speed in waves.system.speeds:
@@ -87,6 +91,16 @@ class Gearset:
         }
         self._row_names = rows[0].names
         self.signal_names: tuple[SignalName, ...] = (*self._row_names, *mesh_signal_names(waves))
+
+    @cached_property
+    def lattice(self) -> Lattice:
+        """Samples on which forces are evaluated in time."""
+        return lattice(self.lines, self._larger)
+
+    @property
+    def base_names(self) -> tuple[str, ...]:
+        """Names of all bases: meshes, and carriers whose turns put lines beside those of their planets."""
+        return (*self.waves.base_names, *(name for name, _ in self.waves.carriers))
 
     @cached_property
     def mean_waves(self) -> Integers:

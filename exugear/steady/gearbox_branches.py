@@ -9,6 +9,7 @@ import numpy as np
 
 from exugear.harmonics.branches import Scales, trace
 from exugear.rotating.mesh_ports import DEFLECTION
+from exugear.rotating.rotating_frame import SteadyError
 from exugear.steady.nonlinear import Balance
 from exugear.steady.point_solver import PointSolver
 from exugear.steady.stability import growth_at
@@ -71,8 +72,15 @@ def follow_branch(
     ------
     HarmonicBalanceError
         No steady state was found at the first speed, or the branch was lost.
+    SteadyError
+        Planets mesh out of phase.
     """
     gearset, kept = solver.gearset, solver.lattice
+    if gearset.waves.carriers:
+        raise SteadyError(
+            f"branches: planets of {gearset.waves.carriers[0][0]} mesh out of phase, so that the carrier's angle is a "
+            "cause beside the mesh cycle, whose stability is not looked at; leave branches out"
+        )
 
     def balance_at(speed: float) -> Balance:
         return Balance(gearset, gearset.at(speed), kept)

@@ -1,8 +1,7 @@
 """Steady response by mesh forces evaluated in time: the position moves with the vibration, and teeth may part.
 
 Lines become samples on a lattice of the bases' angles, the laws are evaluated there, and their forces become lines
-again. Newton's method solves the balance, each step by GMRES on the tangents along the lattice. Of meshes of planets,
-whose waves turn with the carrier, the mean over its turn counts.
+again. Newton's method solves the balance, each step by GMRES on the tangents along the lattice.
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ import numpy as np
 
 from exugear.harmonics.krylov import HarmonicBalanceError, solve_lines
 from exugear.harmonics.lattice import Lattice
+from exugear.rotating.mesh_places import MeshPlaces, mesh_places
 from exugear.rotating.mesh_ports import BACK, DEFLECTION, FRONT, POSITION
 from exugear.rotating.sampled_laws import LawSamples, sample_stiffness, sample_table
 from exugear.steady.excitation import Gearset, Interface
@@ -26,8 +26,6 @@ BALANCED = 1e-8
 STEP_TOLERANCE = 1e-3
 """Residual of a Newton step's linear equations over that of the balance."""
 MOST_STEPS = 40
-PLACES = 5
-"""Places around a carrier in which the law of its planets' meshes is evaluated: exact for products of four waves."""
 SHORTEST = 1.0 / 64.0
 """Share of a Newton step to which it is halved while it does not lower the residual."""
 
@@ -41,11 +39,14 @@ class Balance:
     gearset : Gearset
     interface : Interface
     lattice : Lattice
+    frozen : bool
+        Whether the position in the mesh cycle moves with the mean speed alone, as at the level `parametric`.
     """
 
     gearset: Gearset
     interface: Interface
     lattice: Lattice
+    frozen: bool = False
 
     @cached_property
     def static(self) -> Complexes:
@@ -55,26 +56,12 @@ class Balance:
         return out
 
     @cached_property
-    def places(self) -> tuple[tuple[int, ...], Floats, Floats]:
-        """Where laws are evaluated: the mean wave of each place, waves to places (u, m), and back to waves (m, u).
+    def places(self) -> MeshPlaces:
+        """Where laws are evaluated."""
+        return self._places(self.lattice.angles)
 
-        A single mesh is one place. Meshes of planets are looked at in places spread evenly over the turn of the
-        carrier, in which the waves add up as they do for a planet there.
-        """
-        waves = self.gearset.waves.waves
-        found: list[int] = []
-        there, back = [], []
-        for n, wave in enumerate(waves):
-            if wave.wave != 0:
-                continue
-            alone = n + 1 == len(waves) or waves[n + 1].wave == 0
-            for angle in [0.0] if alone else 2.0 * np.pi * np.arange(PLACES) / PLACES:
-                row = np.zeros(len(waves))
-                row[n : n + 1 if alone else n + 3] = [1.0] if alone else [1.0, np.cos(angle), np.sin(angle)]
-                found.append(n)
-                there.append(row)
-                back.append(row * (1.0 if alone else np.where(np.arange(len(waves)) == n, 1.0, 2.0) / PLACES))
-        return tuple(found), np.array(there), np.array(back).T
+    def _places(self, angles: Floats) -> MeshPlaces:
+        return mesh_places(self.gearset.waves, self.interface.speed, self.interface.ports.positions, angles)
 
     @cached_property
     def mean_force(self) -> Floats:
@@ -83,43 +70,49 @@ class Balance:
         found[:, DEFLECTION] = self.gearset.waves.mean_stiffness * self.interface.ports.static[:, DEFLECTION]
         return found
 
-    def _turned(self, angles: Floats) -> Floats:
-        """Position in the mesh cycle (s, m) that the mean speed brings, cycles, at angles (s, bases) of the bases."""
-        waves = self.gearset.waves.waves
-        sense = np.where(self.gearset.forward(self.interface.speed), 1.0, -1.0)
-        own = angles[:, [wave.base for wave in waves]]
-        return np.asarray(self.interface.ports.positions + sense * own / (2.0 * np.pi))
-
-    def _stiffness(self, turned: Floats) -> Floats:
-        """Stiffness (3, s, m) of the waves' meshes at positions (s, m), N/m, and two derivatives per cycle.
+    def _stiffness(self, places: MeshPlaces) -> Floats:
+        """Stiffness (3, s, u) in places, N/m, and two derivatives per cycle; none for laws that have tables.
 
         No harmonics stand in it but those of the level `parametric`: others would alias.
         """
-        own = self.gearset.cycle_coefficients
-        rate = 2j * np.pi * np.arange(own.shape[1])
-        twice = np.where(np.arange(own.shape[1]) > 0, 2.0, 1.0)
-        out = np.empty((3, *turned.shape))
-        for n in range(len(own)):
-            waves = np.exp(turned[:, [n]] * rate)
-            out[:, :, n] = np.real([waves @ (twice * own[n] * rate**order) for order in range(3)])
+        if self.gearset.parting:
+            return np.zeros((3, 0, 0))
+        coefficients, positions = self.gearset.cycle_coefficients, places.positions
+        rate = 2j * np.pi * np.arange(coefficients.shape[1])
+        twice = np.where(np.arange(coefficients.shape[1]) > 0, 2.0, 1.0)
+        out = np.empty((3, *positions.shape))
+        for u, n in enumerate(places.means):
+            if u and n == places.means[u - 1] and np.array_equal(positions[:, u], positions[:, u - 1]):
+                out[:, :, u] = out[:, :, u - 1]
+                continue
+            waves = np.exp(positions[:, [u]] * rate)
+            out[:, :, u] = np.real([waves @ (twice * coefficients[n] * rate**order) for order in range(3)])
         return out
 
     @cached_property
-    def _on_lattice(self) -> tuple[Floats, Floats]:
-        """Positions (s, m) on the lattice, and stiffness (3, s, m) there, of laws along a row."""
-        turned = self._turned(self.lattice.angles)
-        return turned, np.zeros((3, 0, 0)) if self.gearset.parting else self._stiffness(turned)
+    def _on_lattice(self) -> Floats:
+        return self._stiffness(self.places)
 
-    def _sample(self, readings: Floats, rates: Floats, at: tuple[Floats, Floats]) -> LawSamples:
-        """Sample the laws in all places: readings and rates (s, u, r), `at` as `_on_lattice`; results (s, u, ...)."""
-        means, waves = self.places[0], self.gearset.waves
+    def _sample(self, readings: Floats, rates: Floats, places: MeshPlaces, stiffness: Floats) -> LawSamples:
+        """Sample the laws in all places: readings and rates (s, u, r), stiffness (3, s, u); results (s, u, ...)."""
+        waves = self.gearset.waves
         if not self.gearset.parting:
-            found = [sample_stiffness(at[1][:, :, n], readings[:, u]) for u, n in enumerate(means)]
+            found = [sample_stiffness(stiffness[:, :, u], readings[:, u]) for u in range(len(places.means))]
         else:
             whole, meshes = readings.copy(), waves.assembly.meshes
-            whole[..., POSITION] += at[0][:, means]
-            found = [sample_table(meshes, waves.waves[n].first, whole[:, u], rates[:, u]) for u, n in enumerate(means)]
+            whole[..., POSITION] += places.positions
+            found = [
+                sample_table(meshes, waves.waves[n].first, whole[:, u], rates[:, u]) for u, n in enumerate(places.means)
+            ]
         return LawSamples(*(np.stack(own, axis=1) for own in zip(*found, strict=True)))
+
+    def _held(self, readings: Complexes, still: Complexes) -> Complexes:
+        """Hold the position of readings at that of others where it does not move with the vibration."""
+        if not self.frozen:
+            return readings
+        held = readings.copy()
+        held[..., POSITION] = still[..., POSITION]
+        return held
 
     def _in_time(self, readings: Complexes) -> tuple[Floats, Floats]:
         """Sample (s, m, r) readings and of their rates, the latter zero where no law asks for them."""
@@ -133,12 +126,12 @@ class Balance:
 
         The last result is the whole forces (s, u, f) in time, in all places.
         """
-        _, there, back = self.places
-        values, rates = self._in_time(readings)
-        sampled = self._sample(there @ values, there @ rates, self._on_lattice)
+        there, back = self.places.there, self.places.back
+        values, rates = self._in_time(self._held(readings, self.static))
+        sampled = self._sample(there @ values, there @ rates, self.places, self._on_lattice)
 
         def change(step: Complexes) -> Complexes:
-            moved, moving = self._in_time(step)
+            moved, moving = self._in_time(self._held(step, np.zeros_like(step)))
             found = np.einsum("sufr,sur->suf", sampled.slope, there @ moved)
             if self.gearset.parting:
                 found += np.einsum("sufr,sur->suf", sampled.damping, there @ moving)
@@ -161,19 +154,19 @@ class Balance:
         (samples, m f, 2 m r) array
             By the readings, then by their rates.
         """
-        _, there, back = self.places
+        there, back, means = self.places.there, self.places.back, self.places.means
         waves, lines = self.gearset.waves, self.lattice.lines
         alone = np.abs(np.delete(lines.index, base, axis=1)).sum(axis=1) == 0
         angles = np.zeros((samples, lines.index.shape[1]))
         angles[:, base] = 2.0 * np.pi * np.arange(samples) / samples
-        turned = self._turned(angles)
-        at = turned, np.zeros((3, 0, 0)) if self.gearset.parting else self._stiffness(turned)
+        places = self._places(angles)
         own = np.where(alone[:, None, None], readings, 0.0)
         rates = rates_of(self.gearset, self.interface, own)
-        along = self._sample(there @ lines.values(own, angles), there @ lines.values(rates, angles), at)
-        values, moving = self._in_time(readings)
-        everywhere = self._sample(there @ values, there @ moving, self._on_lattice)
-        varies = np.array([waves.waves[n].base == base for n in self.places[0]])[:, None, None]
+        values, moving = there @ lines.values(own, angles), there @ lines.values(rates, angles)
+        along = self._sample(values, moving, places, self._stiffness(places))
+        moved, moving = self._in_time(readings)
+        everywhere = self._sample(there @ moved, there @ moving, self.places, self._on_lattice)
+        varies = np.array([waves.waves[n].base == base for n in means])[:, None, None]
         parts = []
         for name, mean in (("slope", waves.mean_stiffness), ("damping", waves.damping)):
             found = np.where(varies, getattr(along, name), getattr(everywhere, name).mean(axis=0))
@@ -208,7 +201,7 @@ class Balance:
 
 
 def nonlinear_response(
-    gearset: Gearset, interface: Interface, lattice: Lattice, start: Complexes | None = None
+    gearset: Gearset, interface: Interface, lattice: Lattice, start: Complexes | None = None, frozen: bool = False
 ) -> tuple[Response, Complexes]:
     """Response by the laws in time, and the readings (n, m, r), from which a neighbouring speed may start.
 
@@ -217,7 +210,7 @@ def nonlinear_response(
     HarmonicBalanceError
         Newton's method found no balance from this start.
     """
-    balance = Balance(gearset, interface, lattice)
+    balance = Balance(gearset, interface, lattice, frozen)
     readings, products = solve_balance(balance, balance.static if start is None else start)
     return response_of_readings(balance, readings, products), readings
 
@@ -261,7 +254,7 @@ def response_of_readings(balance: Balance, readings: Complexes, products: int = 
     deflection = readings[..., DEFLECTION]
     apart = np.zeros(len(waves.waves))
     if gearset.parting:
-        means, _, back = balance.places
+        means, back = balance.places.means, balance.places.back
         force = balance.lattice.coefficients(back @ (whole[..., [FRONT]] - whole[..., [BACK]]))[..., 0]
         free = np.mean((whole[..., FRONT] == 0.0) & (whole[..., BACK] == 0.0), axis=0)
         apart = np.array([free[[own == n for own in means]].mean() if n in means else 0.0 for n in range(len(apart))])

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-
 from exugear.dynamics.assembly import Assembly
 from exugear.harmonics.krylov import HarmonicBalanceError
-from exugear.harmonics.lattice import Lattice, lattice
-from exugear.harmonics.lines import line_set
+from exugear.harmonics.lattice import Lattice
+from exugear.harmonics.lines import line_set, modulated
 from exugear.rotating.mean_system import mean_system
 from exugear.rotating.mesh_waves import mesh_waves
 from exugear.steady.excitation import Gearset, Interface
@@ -21,7 +19,10 @@ from fe_ste.tools.arrays import Complexes, Floats
 def gearset_of(assembly: Assembly, speeds: Floats, harmonics: int = 10, combinations: int = 3) -> Gearset:
     """Gearset of an assembly for speeds of the input (rad/s), with lines as `SteadySettings` says."""
     waves = mesh_waves(mean_system(assembly, speeds))
-    return Gearset(waves, line_set(waves.base_orders.tolist(), harmonics, combinations), 2 * harmonics)
+    orders, modulators = waves.base_orders.tolist(), [own for _, own in waves.carriers]
+    lines = modulated(line_set(orders, harmonics, combinations), modulators)
+    larger = modulated(line_set(orders, 2 * harmonics, 2 * combinations), modulators)
+    return Gearset(waves, lines, larger, 2 * harmonics)
 
 
 class PointSolver:
@@ -35,13 +36,12 @@ class PointSolver:
 
     def __init__(self, gearset: Gearset, settings: SteadySettings) -> None:
         self.gearset, self._level = gearset, settings.level
-        self._guard = 2 * settings.harmonics, 2 * settings.combinations
         self._last: Complexes | None = None
 
-    @cached_property
+    @property
     def lattice(self) -> Lattice:
         """Samples of the level `nonlinear`."""
-        return lattice(self.gearset.lines, *self._guard)
+        return self.gearset.lattice
 
     def forcing(self, interface: Interface) -> Complexes:
         """Find the forces of the meshes (lines, m, f) that vary in the static state, N."""
@@ -53,7 +53,8 @@ class PointSolver:
     def growth(self, low: float, high: float) -> float:
         """Fastest growth of a disturbance between two speeds of the input (rad/s), 1/s."""
         found = [mean_growth(self.gearset)]
-        for candidate in () if self.gearset.parting else candidates(self.gearset, low, high)[:CHECKED]:
+        unknown = self.gearset.parting or self.gearset.waves.carriers
+        for candidate in () if unknown else candidates(self.gearset, low, high)[:CHECKED]:
             balance = Balance(self.gearset, self.gearset.at(candidate.speed), self.lattice)
             found.append(growth_at(balance, balance.static, candidate.base))
         return max(found)
@@ -69,7 +70,7 @@ class PointSolver:
         interface = self.gearset.at(speed)
         if self._level == "linear":
             return linear_response(self.gearset, interface)
-        if self._level == "parametric":
+        if self._level == "parametric" and not self.gearset.waves.carriers:
             return parametric_response(self.gearset, interface)
         return self._in_time(interface)
 
@@ -84,10 +85,11 @@ class PointSolver:
         return response_of_readings(Balance(self.gearset, self.gearset.at(speed), self.lattice), readings)
 
     def _in_time(self, interface: Interface) -> Response:
+        frozen = self._level == "parametric"
         try:
-            found, self._last = nonlinear_response(self.gearset, interface, self.lattice, self._last)
+            found, self._last = nonlinear_response(self.gearset, interface, self.lattice, self._last, frozen)
         except HarmonicBalanceError:
             if self._last is None:
                 raise
-            found, self._last = nonlinear_response(self.gearset, interface, self.lattice, None)
+            found, self._last = nonlinear_response(self.gearset, interface, self.lattice, None, frozen)
         return found

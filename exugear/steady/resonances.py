@@ -108,8 +108,8 @@ def refined(speeds: Floats, found: tuple[Crossing, ...]) -> Floats:
 
 
 def _looked_at(gearset: Gearset) -> list[int]:
-    """Lines of a single base up to the highest harmonic that is looked at."""
-    index = np.abs(gearset.lines.index)
+    """Lines of a single mesh frequency, and those beside it, up to the highest harmonic that is looked at."""
+    index = np.abs(gearset.lines.index[:, : len(gearset.waves.base_orders)])
     alone = (np.count_nonzero(index, axis=1) == 1) & (index.sum(axis=1) <= HARMONICS)
     return [int(line) for line in np.flatnonzero(alone)]
 

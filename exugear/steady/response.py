@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.harmonics.krylov import solve_lines
-from exugear.rotating.mesh_ports import DEFLECTION, MeshPorts
+from exugear.rotating.mesh_places import mesh_places
+from exugear.rotating.mesh_ports import DEFLECTION, POSITION, MeshPorts
 from exugear.steady.excitation import Gearset, Interface
 from fe_ste.tools.arrays import Complexes, Floats
 
@@ -76,6 +77,8 @@ def linear_response(gearset: Gearset, interface: Interface) -> Response:
 
 def transmission_errors(gearset: Gearset, interface: Interface) -> Complexes:
     """Find the forces (n, m, 1) that static transmission errors make of the mean stiffness, N; see there."""
+    if gearset.waves.carriers:
+        return _errors_in_time(gearset, interface.ports, interface.speed)
     errors = _harmonics_of_errors(gearset, interface.ports, interface.speed)
     excess = np.zeros((len(gearset.lines.index), len(errors)), dtype=complex)
     for n, wave in enumerate(gearset.waves.waves):
@@ -89,12 +92,29 @@ def transmission_errors(gearset: Gearset, interface: Interface) -> Complexes:
 
 def transmission_error_line(gearset: Gearset, ports: MeshPorts, speed: float, line: int) -> Complexes:
     """Find the forces (m,) of one line of a single base as `transmission_errors` does for all."""
+    if gearset.waves.carriers:
+        return np.asarray(_errors_in_time(gearset, ports, speed)[line, :, 0])
     multiples = gearset.lines.index[line]
     base = int(np.flatnonzero(multiples)[0])
     harmonic = int(multiples[base])
     own = np.array([wave.base == base for wave in gearset.waves.waves])
     errors = _harmonics_of_errors(gearset, ports, speed)[:, harmonic]
     return np.asarray(-gearset.waves.mean_stiffness * errors * own)
+
+
+def _errors_in_time(gearset: Gearset, ports: MeshPorts, speed: float) -> Complexes:
+    """Find the forces of `transmission_errors` (n, m, 1) where each planet meshes out of phase with the others."""
+    places = mesh_places(gearset.waves, speed, ports.positions, gearset.lattice.angles)
+    deflection, ahead = places.there @ ports.static[:, DEFLECTION], places.there @ ports.static[:, POSITION]
+    mean = gearset.waves.mean_stiffness[list(places.means)]
+    excess = np.empty_like(places.positions)
+    for u, n in enumerate(places.means):
+        harmonics = gearset.cycle_compliances[n]
+        turning = np.exp(2j * np.pi * (places.positions[:, [u]] + ahead[..., [u]]) * np.arange(1, len(harmonics)))
+        excess[:, u] = -(mean[u] ** 2) * deflection[..., u] * 2.0 * (turning @ harmonics[1:]).real
+    found = gearset.lattice.coefficients((places.back @ excess[..., None])[..., 0])
+    found[0] = 0.0
+    return found[..., None]
 
 
 def _harmonics_of_errors(gearset: Gearset, ports: MeshPorts, speed: float) -> Complexes:

@@ -238,7 +238,7 @@ def response_of(
         settings=settings,
         input_hash=settings.hash_with(assembly),
         lines=gearset.lines,
-        base_names=gearset.waves.base_names,
+        base_names=gearset.base_names,
         wave_names=tuple(wave.name for wave in gearset.waves.waves),
         signals=gearset.signal_names,
         solved=solved,

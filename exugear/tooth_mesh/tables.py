@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
+from fe_ste.transmission_error.hertz import pitch_point_pressure
 from fe_ste.transmission_error.table import MeshTable, TableError, TableInput
 
 if TYPE_CHECKING:
@@ -278,6 +279,7 @@ def summarise(request: TableRequest, table: MeshTable) -> dict[str, Any]:
         "ste_peak_to_peak_um": figure(1e6 * (data["ste"].max() - data["ste"].min())),
         "mesh_stiffness_mean_N_per_m": figure(data["mesh_stiffness"].mean()),
         "max_pressure_MPa": figure(1e-6 * data["max_pressure"].max()),
+        "pitch_point_pressure_MPa": 1e-6 * pitch_point_pressure(request.wanted.pair, float(data["torque"])),
         "input_hash": table.input_hash,
     }
 

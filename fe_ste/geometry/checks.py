@@ -17,8 +17,12 @@ from fe_ste.geometry.pair_relations import UncheckedPair
 
 LEAST_TEETH = 5
 """Fewest teeth; below lie worms and pump rotors."""
-LEAST_TIP_THICKNESS = 0.2
-"""Least tooth thickness at the tip circle, normal section, in normal modules."""
+LEAST_TIP_THICKNESS = 0.1
+"""Least tooth thickness at the tip circle, normal section, in normal modules: below, elements there degenerate."""
+USUAL_TIP_THICKNESS = 0.2
+"""What is usual at least; published gears have a little less."""
+LEAST_NECK_THICKNESS = 0.2
+"""Least thickness of what undercut leaves of a tooth, normal section, in normal modules."""
 PRESSURE_ANGLE_RANGE = (math.radians(10.0), math.radians(35.0))
 """Normal pressure angles accepted, rad."""
 LARGEST_HELIX_ANGLE = math.radians(50.0)
@@ -182,13 +186,13 @@ def _check_flank(gear: UncheckedGear) -> None:
     """Refuse a tooth that its root, undercut or not, leaves no flank, and one that undercut leaves too thin a neck."""
     if gear.is_undercut:
         neck = _neck_thickness(gear) / gear.normal_module
-        if neck < LEAST_TIP_THICKNESS:
+        if neck < LEAST_NECK_THICKNESS:
             least = gear.profile_shift - gear.generated_roll_length / gear.normal_module * math.sin(
                 gear.transverse_pressure_angle
             )
             remedy = (
                 f"undercuts the tooth to a neck {max(neck, 0.0):.4f} normal modules thick: at least "
-                f"{LEAST_TIP_THICKNESS} is needed; without undercut it is {least:.4f}"
+                f"{LEAST_NECK_THICKNESS} is needed; without undercut it is {least:.4f}"
             )
             raise _refuse_gear(gear, "profile_shift", f"{gear.profile_shift:g}", remedy)
     if gear.tip_radius <= gear.form_radius:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,10 @@ from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption
 if TYPE_CHECKING:
     from exugear.model.gearbox import Gearbox
     from exugear.model.parts import PairSpec
+
+
+BEYOND = 1.05
+"""Mesh frequencies above this part of the band are told: steps of a run are chosen for the band, and end softly."""
 
 
 def check(case: CaseArgument, files_below: FilesBelowOption = None, as_json: JsonOption = False) -> None:
@@ -39,8 +44,10 @@ def check(case: CaseArgument, files_below: FilesBelowOption = None, as_json: Jso
             say(f"{gearbox.name}: no fault found, ratio {gearbox.train.ratio:.6f}")
             if pairs:
                 print_table("Gear pairs", [_pair_row(pair) for pair in pairs])
+                print_table("Margins of gear 1 and 2", [_margin_row(pair) for pair in pairs])
             if loads:
-                title = f"Load cases, rolling at the overall input {gearbox.case.overall.input}"
+                band = 1e-3 * loads[0]["band_Hz"]
+                title = f"Load cases, rolling at the overall input {gearbox.case.overall.input}; runs keep {band:g} kHz"
                 print_table(title, [_load_row(one) for one in loads], ("loaded flanks",))
             if bearings:
                 print_table("Bearings under the static load", [_bearing_row(one) for one in bearings], ("most by",))
@@ -108,7 +115,9 @@ def _tell_scripts(gearbox: Gearbox) -> None:
 
 
 def _pair_summary(name: str, spec: PairSpec) -> dict[str, Any]:
-    pair = spec.pair
+    from exugear.checks.margins import pair_margins
+
+    pair, margins = spec.pair, pair_margins(spec)
     return {
         "pair": name,
         "teeth": [pair.pinion.teeth, pair.gear.teeth],
@@ -117,6 +126,9 @@ def _pair_summary(name: str, spec: PairSpec) -> dict[str, Any]:
         "transverse_contact_ratio": pair.transverse_contact_ratio,
         "overlap_ratio": pair.overlap_ratio,
         "torque_gear_1_N_m": spec.static_torque,
+        "pitch_point_pressure_MPa": 1e-6 * margins.pitch_point_pressure,
+        "margin_to_form_circle": [None if math.isnan(margin) else margin for margin in margins.form],
+        "tip_thickness_in_modules": list(margins.tip_thickness),
     }
 
 
@@ -128,6 +140,16 @@ def _pair_row(pair: dict[str, Any]) -> dict[str, str]:
         "press. angle\ndeg": f"{pair['pressure_angle_deg']:.3f}",
         "contact ratio\n+ overlap": f"{pair['transverse_contact_ratio']:.3f} + {pair['overlap_ratio']:.3f}",
         "torque 1\nN m": f"{pair['torque_gear_1_N_m']:.1f}",
+    }
+
+
+def _margin_row(pair: dict[str, Any]) -> dict[str, str]:
+    left = ("-" if margin is None else f"{100 * margin:.1f}" for margin in pair["margin_to_form_circle"])
+    return {
+        "pair": pair["pair"],
+        "pressure at pitch\npoint, MPa": f"{pair['pitch_point_pressure_MPa']:.0f}",
+        "left to form circles\n% of the flanks": " / ".join(left),
+        "tips\nnormal modules": " / ".join(f"{tip:.2f}" for tip in pair["tip_thickness_in_modules"]),
     }
 
 
@@ -196,6 +218,7 @@ def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
     from exugear.loads.summary import doubts_about, summarise_loads
     from exugear.model.parts import RPM
     from exugear.runs.extent import check_duration
+    from exugear.runs.runup import BAND
 
     found = []
     with model_errors():
@@ -211,14 +234,26 @@ def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
                     "duration_s": case.duration,
                     "start_speed_rpm": loads.start_speed / RPM,
                     "end_speed_rpm": loads.end_speed / RPM,
+                    "highest_mesh_frequency_Hz": max(loads.mesh_frequencies.values(), default=0.0),
+                    "band_Hz": BAND,
                     "fastest_rim_m_per_s": rim,
                     "fastest_rim_on": body,
                     "loaded_flanks": dict(loads.flanks),
                     "reversed_flanks": list(loads.reversed_flanks),
-                    "doubts": list(doubts_about(loads)),
+                    "doubts": [*doubts_about(loads), *_beyond_band(loads.mesh_frequencies, BAND)],
                 }
             )
     return found
+
+
+def _beyond_band(frequencies: Mapping[str, float], band: float) -> Iterator[str]:
+    """Tell meshes whose frequency a run does not keep."""
+    beyond = [f"{name} {frequency:.0f} Hz" for name, frequency in frequencies.items() if frequency > BEYOND * band]
+    if beyond:
+        yield (
+            f"beyond the band: runs keep frequencies up to {band:g} Hz, and meshes reach {', '.join(beyond[:3])}; in "
+            "Python simulate(..., band=..., sample_rate=...) keeps more"
+        )
 
 
 def _load_row(summary: dict[str, Any]) -> dict[str, str]:
@@ -228,6 +263,7 @@ def _load_row(summary: dict[str, Any]) -> dict[str, str]:
         "load case": summary["load_case"],
         "net torque\nN m": f"{summary['net_torque_N_m']:.6g}" + (" (driven)" if summary["driven"] else ""),
         "end speed\nrpm": f"{summary['end_speed_rpm']:.4g}",
-        "fastest rim\nm/s": f"{summary['fastest_rim_m_per_s']:.3g}",
+        "meshes\nkHz": f"{1e-3 * summary['highest_mesh_frequency_Hz']:.3g}",
+        "rim\nm/s": f"{summary['fastest_rim_m_per_s']:.3g}",
         "loaded flanks": ", ".join(flanks),
     }

@@ -207,7 +207,7 @@ def _tell_tables(
 
 def _ste_row(summary: dict[str, Any]) -> dict[str, str]:
     def shown(key: str, form: str, factor: float = 1.0) -> str:
-        return "-" if summary[key] is None else format(factor * summary[key], form)
+        return "-" if summary.get(key) is None else format(factor * summary[key], form)
 
     solved = summary["states"] - summary["not_converged"]
     return {
@@ -217,5 +217,6 @@ def _ste_row(summary: dict[str, Any]) -> dict[str, str]:
         "peak-peak\nµm": shown("ste_peak_to_peak_um", ".3f"),
         "stiffness\nMN/m": shown("mesh_stiffness_mean_N_per_m", ".1f", 1e-6),
         "pressure\nMPa": shown("max_pressure_MPa", ".0f"),
+        "pitch point\nMPa": shown("pitch_point_pressure_MPa", ".0f"),
         "states\nsolved": f"{solved}/{summary['states']}",
     }

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from exugear.studies.sweep import Shard, Swept
 
 SHOWN_FAILURES = 5
-SHOWN_OF_FRONT = 8
+SHOWN_OF_FRONT = 5
 
 
 class Executor(StrEnum):
@@ -133,9 +133,10 @@ def _laws() -> list[str]:
 
 def _default_folder(study: Study, path: Path) -> Path:
     from exugear.project import default_folder
+    from exugear.results.study_files import STUDIES
 
     stem = path.name.removesuffix(".toml").removesuffix(".study") or "study"
-    return default_folder(study.gearbox.source) / "studies" / stem
+    return default_folder(study.gearbox.source) / STUDIES / stem
 
 
 def _sweep(study: Study, folder: Path, opens: Opens, shard: Shard, merge: bool, retry: bool) -> Swept:
@@ -221,12 +222,14 @@ def _print(study: Study, folder: Path, swept: Swept, summary: dict[str, Any]) ->
 
 
 def _print_front(figures: list[str], study: Study, dataset: xr.Dataset) -> None:
-    """Print the case as it is and what no other point beats, spread over the front."""
+    """Print where a search began, and some of what no other point beats, spread over the front."""
     import numpy as np
 
-    names = [*study.file.parameters, *figures]
     front = dataset.isel(evaluation=dataset["on_front"].to_numpy() == 1).sortby(figures[0])
     shown = sorted({round(n) for n in np.linspace(0, front.sizes["evaluation"] - 1, SHOWN_OF_FRONT)})
-    points = [("as it is", dataset.isel(evaluation=0)), *((f"{n + 1}", front.isel(evaluation=n)) for n in shown)]
-    rows = [{"point": label} | {name: f"{float(point[name]):.4g}" for name in names} for label, point in points]
-    print_table(f"Front of {front.sizes['evaluation']} points", rows)
+    points = {"begun at": dataset.isel(evaluation=0)} | {f"point {n + 1}": front.isel(evaluation=n) for n in shown}
+    rows = [
+        {"": name} | {label: f"{float(point[name]):.4g}".replace("nan", "") for label, point in points.items()}
+        for name in (*figures, *study.file.parameters)
+    ]
+    print_table(f"Front of {front.sizes['evaluation']} points that no other beats", rows)

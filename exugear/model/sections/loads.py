@@ -35,8 +35,15 @@ class SourceSection(Section):
     """Channel of the torque on the body; in tables with commas `BODY_N_m` by default."""
     speed: ChannelName | None = None
     """Channel of the speed of the body; in tables with commas `BODY_rpm` by default."""
+    hub_forces: Annotated[tuple[ChannelName, ChannelName, ChannelName], Field(strict=False)] | None = None
+    """Channels of the force on the body along x, y and z of the gearbox, axes that stand still; `-` before a name turns
+    its sense."""
+    hub_moments: Annotated[tuple[ChannelName, ChannelName], Field(strict=False)] | None = None
+    """Channels of the moments on the body about x and y, likewise."""
     torque_factor: q.ChannelFactor = 1.0
     """Factor on the torque: a sign for the sense of the body, or the scale of another machine."""
+    hub_factor: q.ChannelFactor = 1.0
+    """Factor on forces and moments of the hub."""
     speed_factor: q.ChannelFactor = 1.0
     """Factor on the speed."""
     partial_factor: q.PartialFactor | None = None

@@ -23,10 +23,8 @@ SPEEDS, CHANNEL_SPEEDS = 438, 160
 """Columns of the waterfall of the transmission error, and of other channels."""
 STEP, CHANNEL_STEP = 0.5, 1.5
 """dB per step of a byte."""
-FLOOR = -60.0
-"""dB of the lowest step of the transmission error."""
-CHANNEL_SPAN = 100.0
-"""Span below the highest level (dB) that is kept of another channel."""
+SPAN = 110.0
+"""Span below the highest level (dB) that is kept at least."""
 CHANNEL_LINES = 3
 """Spectral lines of another channel that are drawn as one."""
 CUTS_EVERY = 2
@@ -96,7 +94,7 @@ def _overall(material: Material, spectra: Waterfall) -> dict[str, Any]:
         "name": "overall",
         "words": "Overall transmission error",
         "unit": "µm",
-        **_cells(material, level, spectra, FLOOR, STEP, 1),
+        **_cells(material, level, spectra, _floor(spectra, count), STEP, 1),
         **_cuts(material, spectra, 1),
     }
 
@@ -104,16 +102,20 @@ def _overall(material: Material, spectra: Waterfall) -> dict[str, Any]:
 def _channel(material: Material, channel: Channel) -> dict[str, Any]:
     spectra = channel.spectra
     count = _highest(material, spectra)
-    floor = 10.0 * math.floor((float(spectra.level[:, 2:count].max()) - CHANNEL_SPAN) / 10.0)
     level = pooled(spectra.level[:, :count], spectra.speed, CHANNEL_SPEEDS, CHANNEL_LINES)
     copies = f", 1 of {channel.copies}" if channel.copies > 1 else ""
     return {
         "name": channel.name,
         "words": f"Force: {channel.words}{copies}",
         "unit": "N",
-        **_cells(material, level, spectra, floor, CHANNEL_STEP, CHANNEL_LINES),
+        **_cells(material, level, spectra, _floor(spectra, count), CHANNEL_STEP, CHANNEL_LINES),
         **_cuts(material, spectra, CUTS_EVERY),
     }
+
+
+def _floor(spectra: Waterfall, count: int) -> float:
+    """Level (dB) of the lowest step, a round one."""
+    return 10.0 * math.floor((float(spectra.level[:, 2:count].max()) - SPAN) / 10.0)
 
 
 def _cells(

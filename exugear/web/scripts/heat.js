@@ -60,9 +60,12 @@ export function heatOf(field, other) {
     const beside = other ? columnOf(other, speedOf(field, column)) : 0;
     for (let row = 0; row < field.rows; row++) {
       const level = levelAt(field, column, row);
+      // The lowest step is silence, however quiet the loudest cell.
       const share = other
         ? differenceShare(level, levelAt(other, beside, rowOf(other, frequencyOf(field, row))), top)
-        : (level - (top - SPAN)) / SPAN;
+        : level > field.channel.floor
+          ? (level - (top - SPAN)) / SPAN
+          : 0;
       const colour = 3 * Math.round(255 * within(share, 0, 1));
       const pixel = 4 * ((field.rows - 1 - row) * field.columns + column);
       picture.data[pixel] = colours[colour];

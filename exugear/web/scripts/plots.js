@@ -18,7 +18,8 @@ export function axisOf(label) {
   const line = pageColour("--line");
   return {
     label,
-    labelSize: 22,
+    labelSize: 18,
+    size: 34,
     labelFont: font,
     font,
     stroke: pageColour("--soft"),

@@ -32,7 +32,7 @@ def touching(x):
 def oscillator(harmonics):
     """Residual x - H(w) (F - k f(x) + x) of the lines."""
     lines = line_set([1.0], harmonics)
-    samples = lattice(lines, 4 * harmonics, 0)
+    samples = lattice(lines, line_set([1.0], 4 * harmonics))
     k = stiffness(samples.angles[:, 0])
 
     def residual(x, frequency):

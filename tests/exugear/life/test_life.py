@@ -15,6 +15,11 @@ from typer.testing import CliRunner
 
 from exugear.bearings.rolling.life import basic_rating_life
 from exugear.cli import app as cli
+from exugear.dynamics.assemble import assemble
+from exugear.dynamics.assembly import Assembly, VariantError
+from exugear.dynamics.statics import locked_equilibrium
+from exugear.kernels.meshes import FORCE
+from exugear.life.acting_loads import acting_loads
 from exugear.life.dynamic_factor import stated_factors
 from exugear.life.gear_life import flank_lives
 from exugear.life.life import checked_loads, compute_life, rating_of
@@ -32,6 +37,7 @@ from fe_ste.standards.pitting import nominal_contact_stress
 from fe_ste.standards.tooth_root import root_stress_factors
 
 from ..spur_case import SPUR_CASE
+from ..table_case import surfaces
 
 BASE = 30e-3 * math.cos(math.radians(20.0))
 STRENGTH = {
@@ -97,21 +103,10 @@ def lives(project: Project, stresses: dict[str, MeshCycleStress]) -> dict[str, A
     """Flanks by gear, computed without files."""
     gearbox = project.gearbox
     counted = checked_loads(gearbox)
-    found = counted.distribution
-    torques = found.torques(counted.bin_value)
-    balance = static_balance(project.assembly(), counted.body, found.upper, 12)
-    none = np.zeros(0)
-    rated = flank_lives(
-        gearbox,
-        rating_of(gearbox),
-        counted.teeth,
-        found,
-        torques,
-        none,
-        balance,
-        stresses,
-        stated_factors(gearbox, rating_of(gearbox).dynamic_factor),
-    )
+    acting = acting_loads(counted)
+    balance = static_balance(project.assembly(), counted.body, acting.torques, 12)
+    dynamic = stated_factors(gearbox, rating_of(gearbox).dynamic_factor)
+    rated = flank_lives(gearbox, rating_of(gearbox), counted.teeth, acting, balance, stresses, dynamic)
     return {f"{one.gear} {one.flank}": one for one in rated}
 
 
@@ -255,7 +250,7 @@ def test_planets_change_places_as_the_carrier_turns(grc):
     """
     balance = static_balance(grc.assembly(), "carrier", np.array([240e3]), 3)
     meshes = [number for number, mesh in enumerate(grc.gearbox.meshes) if mesh.family == "sun_planet"]
-    forces = balance.mesh_force[0][:, meshes]
+    forces = balance.mesh_force.values[0][:, meshes]
     assert np.ptp(forces[0]) > 0.01 * forces.mean()
     assert forces[1] == pytest.approx(np.roll(forces[0], -1), rel=3e-3)
     mean = forces.mean()
@@ -277,8 +272,75 @@ def test_linear_laws_are_scaled_and_others_interpolated(grc):
     assembly = grc.assembly()
     full, half = (static_balance(assembly, "carrier", np.array([torque]), 1) for torque in (240e3, 120e3))
     assert full.linear
-    assert full.at(full.mesh_force, np.array([120e3, -60e3]))[0] == pytest.approx(half.mesh_force[0], rel=1e-3)
-    assert full.at(full.mesh_force, np.array([-60e3]))[0] == pytest.approx(-0.25 * full.mesh_force[0])
+    assert full.at(full.mesh_force, np.array([120e3, -60e3]))[0] == pytest.approx(half.mesh_force.values[0], rel=1e-3)
+    assert full.at(full.mesh_force, np.array([-60e3]))[0] == pytest.approx(-0.25 * full.mesh_force.values[0])
+
+
+def hub_assembly() -> Assembly:
+    changes = {"bodies.main_shaft.enabled": True, "static_load.torques_N_m": {"main_shaft": 240e3}}
+    gearbox = Gearbox.from_toml(GRC).varied(changes)
+    return Project(gearbox, Path("nowhere"), Choice("bushing", "iso6336")).assembly()
+
+
+def test_loads_of_a_hub_are_held_by_main_bearing_and_carrier():
+    """Forces in balance: what the hub pushes, main bearing and shrink disc take; and a direct solution agrees."""
+    assembly, torque = hub_assembly(), np.array([240e3])
+    sizes = np.array([30e3, 40e3, 20e3, 200e3, 100e3])
+    balance = static_balance(assembly, "main_shaft", torque, 4, hub=sizes)
+    names = [support.name for support in assembly.supports]
+    main, disc = (balance.bearing_load.of(names.index(name)) for name in ("main_bearing", "shrink_disc"))
+    hub = np.array([[10e3, -25e3, 15e3, 150e3, -80e3]])
+    taken = sum(balance.at(one, torque, hub) - balance.at(one, torque) for one in (main, disc))
+    # The shrink disc tells its load in the carrier's axes, which the torque winds up by a milliradian.
+    assert np.abs(taken[0, 0, :3]) == pytest.approx(np.abs(hub[0, :3]), abs=2e-3 * 25e3)
+    wrench = np.zeros(assembly.size)
+    wrench[list(assembly.coordinates["main_shaft"][:5])] = hub[0]
+    direct = locked_equilibrium(assembly, {"main_shaft": 240e3}, ["hss"], assembly.mean_meshes, None, wrench)
+    force = assembly.mesh_states(direct, np.zeros_like(direct), assembly.mean_meshes)[:, FORCE]
+    found = balance.at(balance.mesh_force, torque, hub)[0, 0]
+    assert found == pytest.approx(force, rel=2e-3)
+    assert np.ptp(found[:3]) > 1.2 * np.ptp(
+        balance.mesh_force.values[0, 0, :3]
+    )  # its moment spreads the planets' loads
+
+
+def test_the_law_table_is_solved_on_some_torques(grc):
+    """Between its torques the forces are those of another solution."""
+    gearbox = grc.gearbox
+    assembly = assemble(gearbox, Choice("bushing", "table"), surfaces(gearbox))
+    balance = static_balance(assembly, "carrier", np.array([240e3]), 1)
+    assert not balance.linear and len(balance.torque) == 5
+    direct = static_balance(assembly, "carrier", np.array([150e3]), 1)
+    found = balance.at(balance.mesh_force, np.array([150e3]))[0]
+    assert found == pytest.approx(direct.at(direct.mesh_force, np.array([150e3]))[0], rel=5e-3)
+
+
+def test_loads_of_a_hub_need_a_body_that_stands_in_space(grc):
+    rigid = grc.chosen(variant="rigid").assembly()
+    with pytest.raises(VariantError, match="carrier: has no place in space in the variant rigid"):
+        static_balance(rigid, "carrier", np.array([240e3]), 1, hub=np.array([1.0, 0.0, 0.0, 0.0, 0.0]))
+
+
+def test_channels_of_a_hub_are_read_with_their_sense(tmp_path):
+    """A force that swings with the torque: points split its bins, and their mean is that of the samples."""
+    time = np.arange(400) * 0.1
+    lines = [f"{t:.1f},{100 + 20 * math.sin(t):.6f},1000,{5 * math.cos(2 * t):.6f},{math.sin(3 * t):.6f}" for t in time]
+    content = content_of("time_s,shaft_1_N_m,shaft_1_rpm,side_kN,tilt_kN_m\n" + "\n".join(lines) + "\n", tmp_path)
+    content["loads"]["sources"]["spectrum"] |= {
+        "skip_s": 0.0,
+        "hub_forces": ["side_kN", "-side_kN", "side_kN"],
+        "hub_moments": ["tilt_kN_m", "tilt_kN_m"],
+    }
+    counted = count_loads(Gearbox.from_dict(content, str(tmp_path / "gearbox.toml")))
+    points, source = counted.points, counted.sources[0]
+    assert source.hub[:, 0] == pytest.approx(5e3 * np.cos(2 * time), abs=1e-2)
+    assert source.hub[:, 1] == pytest.approx(-source.hub[:, 0])
+    assert len(points.torque) > 1.5 * len(counted.distribution.hours)
+    assert points.revolutions.sum() == pytest.approx(counted.distribution.revolutions.sum())
+    mean = np.average(points.other, axis=0, weights=points.revolutions)
+    assert mean == pytest.approx(np.average(source.hub, axis=0, weights=source.hours * source.speed), abs=1e-6)
+    by_bin = np.bincount(points.bin, points.hours)
+    assert by_bin == pytest.approx(counted.distribution.hours)
 
 
 def test_planet_bearings_carry_the_couple_of_their_helix(grc):
@@ -286,7 +348,7 @@ def test_planet_bearings_carry_the_couple_of_their_helix(grc):
     assembly = grc.assembly()
     balance = static_balance(assembly, "carrier", np.array([240e3]), 1)
     names = [support.name for support in assembly.supports]
-    load = balance.bearing_load[0, 0, names.index("pl_a_1")]
+    load = balance.bearing_load.values[0, 0, names.index("pl_a_1")]
     half = 240e3 / 3 / 0.308 / 2.0
     assert math.hypot(load[0], load[1]) == pytest.approx(1.1 * half, rel=0.06)  # 6 to 14 % above, by planet
     counted = count_loads(grc.gearbox)

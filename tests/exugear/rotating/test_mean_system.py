@@ -104,7 +104,6 @@ def test_planets_that_are_equal_already_are_left_alone(assembly):
     [
         ({"bodies.planet.planet_angles_deg": [0.0, 180.0]}, "2 planets"),
         ({"bodies.planet.planet_angles_deg": [0.0, 120.0, 237.0]}, "not equally spaced"),
-        ({"bodies.planet.planet_angles_deg": [0.0, 90.0, 180.0, 270.0]}, "do not mesh in phase"),
     ],
 )
 def test_planets_that_the_frame_cannot_hold_are_refused_with_the_reason(grc, stiffness, changes, said):

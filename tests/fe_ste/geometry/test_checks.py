@@ -237,7 +237,7 @@ REFUSED_GEARS: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "pointed tooth": (
         {"teeth": 12, "profile_shift": 0.75, "held_diameter": 10e-3},
-        r"profile_shift = 0\.75 leaves a tip 0\.\d+ normal modules thick: at least 0\.2 is needed",
+        r"profile_shift = 0\.75 leaves a tip 0\.\d+ normal modules thick: at least 0\.1 is needed",
     ),
 }
 

@@ -1,0 +1,117 @@
+"""How near gear pairs are to what tables refuse or what wears out: form circles, tips, pressure at the pitch point.
+
+From macro geometry and the static load alone, so that it costs nothing before the finite elements do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from exugear.model.gearbox import Gearbox
+from exugear.model.parts import PairSpec
+from fe_ste.geometry.checks import USUAL_TIP_THICKNESS
+from fe_ste.geometry.gears import Gear, GearPair
+from fe_ste.transmission_error.hertz import pitch_point_pressure
+
+LEAST_FORM_MARGIN = 0.02
+"""Part of a flank that should be left between the mate's tip and the form circle.
+
+Positions of a table at which contact comes nearer than 0.01 are not solved, and elastic teeth meet a little before and
+after the path of contact.
+"""
+PROPOSED_MARGIN = 0.025
+"""Part of a flank that a proposed tip diameter leaves."""
+
+
+@dataclass(frozen=True)
+class PairMargins:
+    """Margins of a gear pair.
+
+    Attributes
+    ----------
+    form : (float, float)
+        Of gear 1 and gear 2: roll length from the form circle to where the mate's tip touches, over the roll length of
+        the flank; NaN where the root is relieved on purpose, so that contact may end there.
+    tip_thickness : (float, float)
+        Of both tips in the normal section, in normal modules.
+    pitch_point_pressure : float
+        By Hertz under the static load, Pa; zero where the pair carries none.
+    """
+
+    form: tuple[float, float]
+    tip_thickness: tuple[float, float]
+    pitch_point_pressure: float
+
+
+def pair_margins(spec: PairSpec) -> PairMargins:
+    """Find the margins of a pair.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> margins = pair_margins(gearbox.pairs["high_speed"])
+    >>> bool(min(margins.form) > LEAST_FORM_MARGIN), round(1e-6 * margins.pitch_point_pressure)
+    (True, 842)
+    """
+    pair, torque = spec.pair, spec.static_torque
+    first, second = (gear.tip_thickness / gear.normal_module for gear in (pair.pinion, pair.gear))
+    return PairMargins(
+        form=_form_margins(pair),
+        tip_thickness=(first, second),
+        pitch_point_pressure=pitch_point_pressure(pair, torque) if torque > 0.0 else 0.0,
+    )
+
+
+def _form_margins(pair: GearPair) -> tuple[float, float]:
+    """Margins of both gears, as `PairMargins` has them."""
+    tangent = pair.base_tangent_length
+    on_pinion = pair.pinion_roll_length(pair.gear.tip_roll_length)
+    pinion_tip = pair.pinion.tip_roll_length
+    on_gear = tangent + pinion_tip if pair.gear.internal else tangent - pinion_tip
+    return _margin(pair.pinion, on_pinion), _margin(pair.gear, on_gear)
+
+
+def _margin(gear: Gear, roll_length: float) -> float:
+    if gear.has_relieved_root:
+        return math.nan
+    flank = gear.tip_roll_length - gear.form_roll_length  # negative for a ring, as the numerator is
+    return (roll_length - gear.form_roll_length) / flank
+
+
+def doubts_about_pairs(gearbox: Gearbox) -> Iterator[str]:
+    """Say which margins of pairs at work are small: key, value, and what would be right."""
+    at_work = {mesh.pair.name for mesh in gearbox.meshes}
+    for name, spec in gearbox.pairs.items():
+        if name not in at_work:
+            continue
+        margins, gears = pair_margins(spec), (spec.pair.pinion, spec.pair.gear)
+        for gear, mate, margin in zip(gears, gears[::-1], margins.form, strict=True):
+            if margin < LEAST_FORM_MARGIN and spec.table:
+                key = f"gears.{mate.name}.tip_diameter_mm = {2e3 * mate.tip_radius:.6g}"
+                yield (
+                    f"{key}: its tip comes within {100 * margin:.2g} % of the flank to the form circle of {gear.name}, "
+                    f"and positions of the table of {name} may stay unsolved; "
+                    f"{1e3 * _clear_tip_diameter(spec.pair, mate):.6g} leaves {100 * PROPOSED_MARGIN:g} %"
+                )
+    for name, gear in gearbox.gears.items():
+        thickness = gear.tip_thickness / gear.normal_module
+        if thickness < USUAL_TIP_THICKNESS:
+            yield (
+                f"gears.{name}.tip_diameter_mm = {2e3 * gear.tip_radius:.6g}: leaves a tip {thickness:.3f} normal "
+                f"modules thick; {USUAL_TIP_THICKNESS:g} is the usual least, 0.4 for case-hardened teeth"
+            )
+
+
+def _clear_tip_diameter(pair: GearPair, mate: Gear) -> float:
+    """Tip diameter of a gear, m, that leaves the proposed margin on the other one of its pair."""
+    if mate is pair.gear:
+        other = pair.pinion
+        on_other = other.form_roll_length + PROPOSED_MARGIN * (other.tip_roll_length - other.form_roll_length)
+        roll = on_other + pair.base_tangent_length if mate.internal else pair.base_tangent_length - on_other
+    else:
+        other = pair.gear
+        on_other = other.form_roll_length + PROPOSED_MARGIN * (other.tip_roll_length - other.form_roll_length)
+        roll = pair.pinion_roll_length(on_other)
+    return 2.0 * math.hypot(mate.base_radius, roll)

@@ -1,0 +1,65 @@
+"""What acts on a gearbox, as its parts are rated under it: points of its distribution, and the worst of all."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from exugear.counting.duration import LoadPoints
+from exugear.load_spectrum.counted import CountedLoads
+from fe_ste.tools.arrays import Floats
+
+
+@dataclass(frozen=True, eq=False)
+class ActingLoads:
+    """Loads over a life.
+
+    Attributes
+    ----------
+    points : LoadPoints
+        What wears, with the loads of a hub beside the torque.
+    worst_torque, worst_hub : array (w,), (w, 5)
+        What counts for static safety: the ends of the distribution, and extreme sources with their partial factors;
+        N m, N and N m.
+    bins : int
+        Bins of the distribution that the points belong to.
+    """
+
+    points: LoadPoints
+    worst_torque: Floats
+    worst_hub: Floats
+    bins: int
+
+    @property
+    def torques(self) -> Floats:
+        """All torques, N m."""
+        return np.concatenate([self.points.torque, self.worst_torque])
+
+    @property
+    def hub_sizes(self) -> Floats:
+        """Largest of each load of a hub without sign, (5,)."""
+        return np.asarray(np.abs(np.concatenate([self.points.other, self.worst_hub])).max(axis=0))
+
+    def worst(self, sense: int) -> tuple[Floats, Floats]:
+        """Torques of one sign, points among them, and the loads of a hub beside them."""
+        torque, hub = self.torques, np.concatenate([self.points.other, self.worst_hub])
+        own = torque * sense > 0.0
+        return torque[own], hub[own]
+
+    def by_bin(self, values: Floats) -> Floats:
+        """Sum values of points (points,) into the bins of the distribution, (bins,)."""
+        return np.asarray(np.bincount(self.points.bin, values, self.bins), dtype=np.float64)
+
+
+def acting_loads(counted: CountedLoads) -> ActingLoads:
+    """Gather what acts of counted loads."""
+    found = counted.distribution
+    extremes = [one for one in counted.sources if one.kind == "extreme"]
+    ends = np.array([found.upper.max(), found.upper.min()])
+    return ActingLoads(
+        points=counted.points,
+        worst_torque=np.concatenate([ends, *(one.torque for one in extremes)]),
+        worst_hub=np.concatenate([np.zeros((2, counted.points.other.shape[1])), *(one.hub for one in extremes)]),
+        bins=len(found.hours),
+    )

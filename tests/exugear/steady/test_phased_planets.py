@@ -1,0 +1,93 @@
+"""Planets that mesh out of phase: what cancels, what the carrier's turns put beside the mesh frequency, and runs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from exugear.dynamics.assemble import assemble
+from exugear.model.choice import Choice
+from exugear.rotating.rotating_frame import SteadyError
+from exugear.steady.gearbox_branches import follow_branch
+from exugear.steady.point_solver import PointSolver, gearset_of
+from exugear.steady.response import dissipated_and_given, signals
+from exugear.steady.settings import SpeedRange, SteadySettings
+
+from .test_steady_in_time import apart, solver_of
+
+RANGE = (1.0, 22.5)
+FOUR = {"bodies.planet.planet_angles_deg": [0.0, 90.0, 180.0, 270.0]}
+"""With 21 and 99 teeth each is a quarter of a cycle ahead of the one before."""
+
+
+@pytest.fixture(scope="module")
+def four(grc):
+    return grc.varied(FOUR)
+
+
+@pytest.fixture(scope="module")
+def gearset(four, stiffness):
+    return gearset_of(assemble(four, Choice("bushing"), stiffness), np.array(RANGE))
+
+
+def response_at(gearset, level, speed):
+    return PointSolver(gearset, SteadySettings(SpeedRange(*RANGE, 2), level)).response(speed)
+
+
+def amplitude(gearset, response, line, signal="overall_dte"):
+    place = int(gearset.lines.find(np.array(line))[0])
+    names = [own.name for own in gearset.signal_names]
+    return 2.0 * abs(signals(gearset, response)[place, names.index(signal)])
+
+
+def test_in_torsion_alone_all_harmonics_cancel_but_each_fourth(four, stiffness):
+    """Equal planets spread over a cycle excite the mean wave where their number divides the harmonic (Seager 1975)."""
+    gearset = gearset_of(assemble(four, Choice("rigid"), stiffness), np.array(RANGE))
+    response = response_at(gearset, "parametric", 10.0)
+    found = [amplitude(gearset, response, (n, 0, 0, 0)) for n in range(1, 9)]
+    assert max(found[n - 1] for n in (1, 2, 3, 5, 6, 7)) < 1e-9 * found[3]
+    assert found[3] > 0.0
+
+
+@pytest.mark.parametrize(("harmonic", "turns"), [(1, 1), (3, -1), (5, 1)])
+def test_lateral_forces_stand_one_turn_of_the_carrier_beside_odd_harmonics(gearset, harmonic, turns):
+    """A quarter of a cycle from planet to planet is a wave around the carrier, which turns against it."""
+    response = response_at(gearset, "parametric", 10.0)
+    own, others = (
+        [amplitude(gearset, response, (harmonic, 0, 0, j), "support_force lss_a x") for j in places]
+        for places in ((turns,), sorted({-1, 0, 1} - {turns}))
+    )
+    # What is left comes of bearings that are not alike in all directions, and of static loads that differ.
+    assert own[0] > 10.0 * max(others)
+
+
+@pytest.mark.parametrize("level", ["linear", "parametric", "nonlinear"])
+def test_damping_takes_the_power_that_planets_out_of_phase_give(gearset, level):
+    taken, given = dissipated_and_given(gearset, response_at(gearset, level, 8.0))
+    assert taken > 0.0
+    assert given == pytest.approx(taken, rel=1e-4)
+
+
+def test_levels_agree_on_small_variations(four, stiffness):
+    """A tenth of the variation leaves a hundredth of the difference between both."""
+    differences = []
+    for share in (1e-1, 1e-2):
+        small = {name: k.mean() + share * (k - k.mean()) for name, k in stiffness.items()}
+        gearset = gearset_of(assemble(four, Choice("bushing"), small), np.array(RANGE), 4, 2)
+        linear, full = (signals(gearset, response_at(gearset, level, 10.0)) for level in ("linear", "parametric"))
+        differences.append(np.linalg.norm((full - linear)[1:, 0]))
+    assert differences[1] == pytest.approx(differences[0] / 100.0, rel=0.1)
+
+
+def test_branches_of_planets_out_of_phase_are_refused_with_the_reason(gearset):
+    solver = PointSolver(gearset, SteadySettings(SpeedRange(*RANGE, 2), "nonlinear"))
+    with pytest.raises(SteadyError, match="mesh out of phase"):
+        follow_branch(solver, *RANGE)
+
+
+@pytest.mark.validation
+@pytest.mark.parametrize("speed", [8.0, 18.0])
+def test_planets_out_of_phase_started_on_their_steady_state_stay_there(four, stiffness, speed):
+    """As for planets in phase; combinations beyond the third leave 1e-3 of signals that phasing makes small."""
+    solver = solver_of(assemble(four, Choice("bushing"), stiffness), RANGE, "nonlinear")
+    assert apart(solver, speed, 3.0, 1.0 / 120e3, 2.0)[0] < 2e-3
