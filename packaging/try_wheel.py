@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 VERSIONS = ("3.11", "3.12", "3.13")
-LONGEST = 600
+LONGEST = 1800
 """Seconds that one step may take."""
 GRC = "share/exugear/cases/grc750/gearbox.toml"
 

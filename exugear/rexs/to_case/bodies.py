@@ -269,8 +269,6 @@ def _planet_body(
             f"{model.components[stage]}: no planet_carrier_shaft or planet_pin tells which carrier {shaft} turns on"
         )
     carrier = carriers[0]
-    if carrier.fixed:
-        raise RexsError(f"{model.components[stage]}: a held carrier cannot be imported yet")
     placed = []
     for root, one in members:
         x, y, _ = places.position(one)

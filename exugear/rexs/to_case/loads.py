@@ -128,6 +128,12 @@ def ends_of(model: Model, bodies: Bodies, loads: Sequence[Loads], links: Mapping
         The file does not tell them.
     """
     turning = [body for body in bodies.members if not body.fixed and not body.carrier]
+    links = {body.name: links[body.name] for body in turning if body.name in links}
+    if len(links) < 2:
+        raise RexsError(
+            f"only {', '.join(links) or 'nothing'} can turn in mesh, all else is joined with the casing: "
+            "a gearbox has an input and an output; open one of the connections with the casing"
+        )
     defined = {b.name for b in turning for part in b.parts if part.flag("defines_speed") is True}
     loaded = [
         body.name

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from exugear.checks.readiness import lacking
 from exugear.rexs.containers import read_rexs
 from exugear.rexs.faults import RexsError
 from exugear.rexs.to_case.conversion import to_case
@@ -139,10 +140,10 @@ def test_planets_that_differ_are_refused():
         gearbox_of(with_values(PLANETARY, {248: {"face_width": 40.0}}))
 
 
-def test_a_held_carrier_is_refused_by_name():
+def test_a_train_that_is_held_at_both_ends_is_refused():
     held = Relation("side", 0, {"assembly": 900, "inner_part": 4, "outer_part": 2})
     model = with_relations(with_values(PLANETARY, {}, Component(900, "coupling")), held)
-    with pytest.raises(RexsError, match="planetary_stage 9 .* held carrier cannot be imported"):
+    with pytest.raises(RexsError, match="only shaft_1 can turn in mesh, all else is joined with the casing"):
         gearbox_of(model)
 
 
@@ -258,3 +259,54 @@ def test_a_file_without_torque_gets_one_that_is_marked():
 def test_a_fault_of_the_gearbox_file_names_the_components_it_is_about():
     with pytest.raises(RexsError, match="^pairs.stage_1: .*pairs.stage_1 is cylindrical_stage 6 'Stirnradstufe'"):
         gearbox_of(with_values(SEW, {34: {"root_diameter": 79.0}}))
+
+
+def test_a_carrier_that_is_joined_with_the_casing_makes_a_star():
+    """Both couplings that hold the ring hold the carrier instead: the ring turns at -17/61 of the sun's speed."""
+    held = {one.number for one in PLANETARY.of_type("switchable_coupling")}
+    relations = tuple(
+        dataclasses.replace(one, roles={**one.roles, "inner_part": 4})
+        if one.type == "side" and one.roles.get("assembly") in held
+        else one
+        for one in PLANETARY.relations
+    )
+    gearbox = gearbox_of(dataclasses.replace(PLANETARY, relations=relations))
+    assert gearbox.train.ratio == pytest.approx(-17 / 61, rel=1e-12)
+    assert gearbox.body("housing").fixed
+    assert len(gearbox.meshes) == 6
+    assert lacking(gearbox, "rigid") == ""
+
+
+def stepped() -> Model:
+    """The planetary file with a second gear of 20 teeth on each planet, which meshes with a ring of 59."""
+    components, relations = dict(PLANETARY.components), list(PLANETARY.relations)
+    ring = PLANETARY.of_type("ring_gear")[0].number
+    x, y, z = PLANETARY.components[ring].vector("support_vector")
+    aside = {"support_vector": Attribute((x + 60.0, y, z), "mm"), "number_of_teeth": Attribute("59")}
+    components[ring] = PLANETARY.components[ring].with_attributes(aside)
+    for first in [g for g in PLANETARY.of_type("cylindrical_gear") if g.whole("number_of_teeth") == 22]:
+        number = first.number + 10_000
+        x, y, z = first.vector("support_vector")
+        place = {"support_vector": Attribute((x + 60.0, y, z), "mm"), "number_of_teeth": Attribute("20")}
+        components[number] = dataclasses.replace(first.with_attributes(place), number=number, asked=set())
+        for one in list(relations):
+            roles = dict(one.roles)
+            role = next((role for role, part in roles.items() if part == first.number), None)
+            if role is None:
+                continue
+            if one.type in ("assembly", "flank", "reference"):
+                relations.append(dataclasses.replace(one, roles={**roles, role: number}))
+            elif one.type == "stage" and ring in roles.values():
+                relations[relations.index(one)] = dataclasses.replace(one, roles={**roles, role: number})
+    return dataclasses.replace(PLANETARY, components=components, relations=tuple(relations))
+
+
+def test_stepped_planets_are_imported_with_both_their_gears():
+    """Ring held: 1 / (1 + (22/17) (59/20)) of the sun's speed at the carrier."""
+    gearbox = gearbox_of(stepped())
+    assert gearbox.train.ratio == pytest.approx(1.0 / (1.0 + 22 / 17 * 59 / 20), rel=1e-12)
+    wheels = gearbox.body("planet_1").wheels
+    assert sorted(gearbox.gears[name].teeth for name in wheels) == [20, 22]
+    places = sorted(wheels.values())
+    assert places[1] - places[0] == pytest.approx(0.060)
+    assert len(gearbox.meshes) == 6
