@@ -626,6 +626,20 @@ def steady_section(part: Results) -> str:
     )
 
 
+def loads_section(part: Results) -> str:
+    """Table of the cost of a life."""
+    return "\n".join(
+        [
+            "## A life under turbine data\n",
+            f"{circumstances(part)} {part['minutes']} minutes of turbine data, GRC, variant bushing, tables there "
+            "before: "
+            f"read, counted, static balance at 12 angles, gears, bearings. Processor time, medians of {part['rounds']} "
+            f"rounds; stresses of the pairs, once: {number(part['stresses_s'])} s.\n",
+            table(["loads", "s"], [[row["loads"], number(row["processor_s"])] for row in part["rows"]]),
+        ]
+    )
+
+
 SECTIONS = {
     "startup": startup_section,
     "tables": tables_section,
@@ -634,6 +648,7 @@ SECTIONS = {
     "elastic": elastic_section,
     "bearings": bearings_section,
     "steady": steady_section,
+    "loads": loads_section,
 }
 
 

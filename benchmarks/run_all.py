@@ -76,6 +76,13 @@ def measure_steady(quick: bool) -> dict[str, Any]:
     return steady.measure(quick)
 
 
+def measure_loads(quick: bool) -> dict[str, Any]:
+    """See `loads`."""
+    import loads
+
+    return loads.measure(quick)
+
+
 PARTS: dict[str, Callable[[bool], dict[str, Any]]] = {
     "startup": measure_startup,
     "tables": measure_tables,
@@ -84,6 +91,7 @@ PARTS: dict[str, Callable[[bool], dict[str, Any]]] = {
     "elastic": measure_elastic,
     "bearings": measure_bearings,
     "steady": measure_steady,
+    "loads": measure_loads,
 }
 
 
