@@ -18,13 +18,14 @@ LEFT_OUT = re.compile(
     r"^(`{3,}|~{3,}).*?^\1"  # fenced blocks
     r"|^(?: {4}|\t).*?$"  # indented blocks
     r"|<!--.*?-->"
+    r"|^## Sources.*?^In the code"  # names and abbreviated journals
     r"|\$\$.*?\$\$|\$[^$\n]+\$"
     r"|`+[^`]+`+"
     r"|\]\([^)]*\)|\]: \S+"
     r"|\bhttps?://\S+",
     re.MULTILINE | re.DOTALL,
 )
-WORD = re.compile(r"[A-Za-z][a-z]+(?:'[a-z]+)?\b")
+WORD = re.compile(r"[A-Za-zÀ-ÿ][a-zà-ÿ]+(?:'[a-z]+)?\b")
 """Words of two letters or more; what is written in capitals is a name."""
 
 

@@ -20,6 +20,11 @@ ORDER = (
     "where_it_rings",
     "bearing_stiffness",
     "planet_phasing",
+    "elastic_shaft",
+    "step_housing",
+    "steady_contact_loss",
+    "rexs_file",
+    "compare_designs",
 )
 """Examples from the first steps to the special ones."""
 

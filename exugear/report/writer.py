@@ -28,6 +28,7 @@ from exugear.report.sections.ranking import ranking_section
 from exugear.report.sections.rings import rings_section
 from exugear.report.sections.short import short_section
 from exugear.report.sections.steady import steady_section
+from exugear.report.sections.studies import studies_section
 from exugear.report.sections.trust import trust_section
 from exugear.report.shell import page_body
 from exugear.results.folder import REPORT_FILE, kept_case
@@ -46,6 +47,7 @@ SECTIONS: Final[tuple[Callable[[Material], Part], ...]] = (
     modes_section,
     near_section,
     gears_section,
+    studies_section,
     trust_section,
 )
 """Sections of the page in their order. A new one is a function in ``sections`` and a line here."""

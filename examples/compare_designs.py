@@ -1,0 +1,51 @@
+"""
+Which of two designs is quieter?
+================================
+
+Two designs are run up side by side: a two-stage gearbox as it is, and with tip relief on its second stage.
+"""
+
+# %%
+# The two stages of ``exugear new gearbox.toml --kind parallel``. A design is a varied gearbox: any key of the file can
+# be replaced. Ten positions of the mesh cycle are few, to be quick.
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+
+from exugear import Choice, Gearbox, Project
+from exugear.pictures.run_diagrams import plot_order_levels
+from exugear.spectra.orders import order_lines
+from exugear.spectra.run_spectra import run_waterfall
+from exugear.templates.kinds import template
+
+plain = Gearbox.from_dict(tomllib.loads(template("parallel")))
+relief = {"tip_relief_um": 8.0, "tip_relief_length_mm": 6.0}
+relieved = plain.varied({"gears.pinion_2.modification": relief, "gears.wheel_2.modification": relief})
+designs = {
+    "as it is": Project(plain, Path("results/designs/plain"), Choice("bushing")),
+    "with relief": Project(relieved, Path("results/designs/relieved"), Choice("bushing")),
+}
+
+# %%
+# What the teeth excite: the ripple of the transmission error of each stage.
+
+for name, project in designs.items():
+    for pair, table in project.tables(positions=10).items():
+        ste = table.static_state["ste"]
+        print(f"{name}, {pair}: {1e6 * float(ste.max() - ste.min()):.3f} um peak to peak")
+
+# %%
+# What becomes of it in the gearbox: both run-ups, and the level along the order of each mesh.
+
+spectra = {name: run_waterfall(project.run().path) for name, project in designs.items()}
+lines = order_lines(plain, count=1)
+plot_order_levels(spectra, lines)
+
+# %%
+# The loudest level of each, in dB re 1 um. A relief changes what excites; where the gearbox rings stays where it is.
+
+for name, waterfall in spectra.items():
+    level = 20.0 * np.log10(1e6 * waterfall.amplitude.max())
+    print(f"{name}: {level:.1f} dB")
