@@ -69,12 +69,13 @@ FIND_PYTHON := for candidate in $(if $(PYTHON),"$(PYTHON)",python3 python3.13 py
 	echo "exugear needs Python 3.11, 3.12 or 3.13; found: $$($(or $(PYTHON),python3) --version 2>&1)." >&2; \
 	echo "Install one, or name it: make PYTHON=/path/to/python3.12 TARGET" >&2; exit 1
 
-.PHONY: help demo demo-short test validate benchmarks check check-web vendor-web docs dist wheel-test lock clean
+.PHONY: test-browser help demo demo-short test validate benchmarks check check-web vendor-web docs dist wheel-test lock clean
 
 help:
 	@echo "make demo        GRC 750 from gear data to waterfalls, modes and a report, into $(RESULTS)"
 	@echo "make demo-short  the same with 10 positions of the mesh cycle and 4 s of the run-up"
 	@echo "make test        tests and documentation examples"
+	@echo "make test-browser  claims about the report page in a browser, desk and phone; needs chromium"
 	@echo "make validate    the long comparisons with references"
 	@echo "make benchmarks  what all of it costs, into benchmarks/results.md and what README and docs quote"
 	@echo "make check       ruff and mypy"
@@ -112,6 +113,10 @@ demo-short: $(INSTALLED)
 
 test: $(INSTALLED)
 	$(RUN)/python -m pytest $(SIDE_BY_SIDE)
+
+# Pages in a real browser: skipped, and said, where no chromium is.
+test-browser: $(INSTALLED)
+	$(RUN)/python -m pytest -m browser tests/exugear/report
 
 validate: $(INSTALLED)
 	$(RUN)/python -m pytest -m validation $(SIDE_BY_SIDE)

@@ -25,11 +25,11 @@ from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.runs.extent import SAMPLE_RATE
 from exugear.runs.runup import BAND, simulate
-from exugear.solvers.compiled.methods import ORDERS, Method, adams
 from exugear.solvers.compiled.methods import RUNGE_KUTTA as RK4
+from exugear.solvers.compiled.methods import Method, adams
 from exugear.solvers.compiled.observers import Observer
 from exugear.solvers.compiled.solver import CompiledSystem
-from exugear.solvers.compiled.step import choose_integration
+from exugear.solvers.compiled.step import choose_integration, methods_of
 from exugear.solvers.loads import LoadTable
 
 LOAD = {"carrier": 240e3, "hss": -3000.0}
@@ -41,7 +41,8 @@ FULL_NEWTON = "generalized-alpha, full Newton"
 MODIFIED_NEWTON = "generalized-alpha, modified Newton"
 RUNGE_KUTTA = "RK44 of Exudyn"
 ADAMS = adams(5)
-OWN_METHODS = {method.name: method for method in (RK4, *map(adams, ORDERS))}
+MULTISTEP = methods_of("adams")
+OWN_METHODS = {method.name: method for method in (RK4, *MULTISTEP)}
 """Methods of the compiled solver by name."""
 
 
@@ -216,7 +217,7 @@ def amplitude_errors(gearbox: Gearbox) -> list[dict[str, Any]]:
         exact = {f: excitation_amplitudes(assembly, f / order, 2.5e-6, RK4.name) for f in FREQUENCIES}
         chosen = choose_integration(assembly, SAMPLE_RATE, BAND)
         kinds = [(RK4.name, step) for step in (5e-5, 2.5e-5, STEP, 1.25e-5)]
-        kinds += [(method.name, step) for method in map(adams, ORDERS) for step in (2.5e-5, STEP, 1.25e-5)]
+        kinds += [(method.name, step) for method in MULTISTEP for step in (2.5e-5, STEP, 1.25e-5)]
         others = [(method, STEP) for method in (RUNGE_KUTTA, FULL_NEWTON, MODIFIED_NEWTON)]
         for method, step in [*kinds, *others]:
             errors = [excitation_amplitudes(assembly, f / order, step, method) / exact[f] - 1.0 for f in FREQUENCIES]

@@ -626,6 +626,38 @@ def steady_section(part: Results) -> str:
     )
 
 
+def studies_section(part: Results) -> str:
+    """Tables of studies."""
+    own = part["overhead"]
+    rows = [
+        [
+            row["what"],
+            str(row["points"]),
+            duration(row["wall_1_s"]),
+            duration(row["wall_2_s"]),
+            f"{100 * row['efficiency']:.0f} %",
+            f"{row['memory_MB']:.0f} MB",
+        ]
+        for row in part["efficiency"]
+    ]
+    return "\n".join(
+        [
+            "## Studies\n",
+            f"{circumstances(part)} The same points by one worker process and by two, started and warm; wall "
+            "time, so that two free cores are needed. Efficiency is the first over twice the second.\n",
+            table(["points with", "points", "one process", "two", "efficiency", "peak memory of a worker"], rows),
+            items(
+                [
+                    f"{own['points']} modal points of a small gearbox: {number(own['in_study_ms'])} ms of processor "
+                    f"time each in a study, {number(own['alone_ms'])} ms in a loop of one's own: "
+                    f"{number(own['overhead_ms'])} ms for hash, journal and dataset. To find all of them finished "
+                    f"takes {duration(own['restart_s'])}.",
+                ]
+            ),
+        ]
+    )
+
+
 SECTIONS = {
     "startup": startup_section,
     "tables": tables_section,
@@ -634,6 +666,7 @@ SECTIONS = {
     "elastic": elastic_section,
     "bearings": bearings_section,
     "steady": steady_section,
+    "studies": studies_section,
 }
 
 

@@ -76,6 +76,13 @@ def measure_steady(quick: bool) -> dict[str, Any]:
     return steady.measure(quick)
 
 
+def measure_studies(quick: bool) -> dict[str, Any]:
+    """See `studies`."""
+    import studies
+
+    return studies.measure(quick)
+
+
 PARTS: dict[str, Callable[[bool], dict[str, Any]]] = {
     "startup": measure_startup,
     "tables": measure_tables,
@@ -84,6 +91,7 @@ PARTS: dict[str, Callable[[bool], dict[str, Any]]] = {
     "elastic": measure_elastic,
     "bearings": measure_bearings,
     "steady": measure_steady,
+    "studies": measure_studies,
 }
 
 

@@ -21,8 +21,6 @@ from exugear.kernels.meshes import FORCE, MeshArrays
 from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
 
-DIFFERENCE_STEP = 1e-7
-"""Difference step of the Newton matrices, m and rad: far above round-off, far below any radius."""
 MOST_NEWTON_STEPS = 30
 """Steps after which the search for a balance is given up."""
 LARGEST_RESIDUAL = 1e-9
@@ -115,16 +113,6 @@ def _solved(matrix: Floats, right_hand_side: Floats) -> Floats | None:
             return np.asarray(scipy.linalg.solve(matrix, right_hand_side), dtype=np.float64)
     except (scipy.linalg.LinAlgError, scipy.linalg.LinAlgWarning):
         return None
-
-
-def _by_differences(residual: Callable[[Floats], Floats], steps: Floats) -> Callable[[Floats], Floats]:
-    """Differentiate a residual by central differences, a step for each unknown."""
-
-    def derivative(x: Floats) -> Floats:
-        columns = [(residual(x + e) - residual(x - e)) / (2.0 * e.sum()) for e in np.diag(steps)]
-        return np.array(columns).T
-
-    return derivative
 
 
 def locked_equilibrium(
@@ -358,10 +346,17 @@ def accelerating_start(
             off = [] if driven is None else [size * (rates[driven[0]] - driven[1])]
             return np.concatenate([motions.T @ unbalanced, size * q[pinned], off])
 
-        # The residual is linear in the last unknowns, accelerations and a torque: no step is too long for them.
-        steps = np.full(start.size, 1.0)
-        steps[: motions.shape[1]] = DIFFERENCE_STEP
-        derivative = _by_differences(residual, steps)
+        def derivative(x: Floats) -> Floats:
+            # At rest: what velocities add to the stiffness is small against it, and costs no more than a step or two.
+            stiffness = tangent_stiffness(assembly, split(x)[0], assembly.meshes if meshes is None else meshes)
+            matrix, bends = np.zeros((x.size, x.size)), motions.shape[1]
+            matrix[:bends, :bends] = -motions.T @ stiffness @ motions
+            matrix[bends : bends + len(pinned), :bends] = size * motions[pinned]
+            # The residual is linear in the last unknowns, accelerations and a torque: no step is too long for them.
+            for n, e in enumerate(np.eye(x.size)[bends:], start=bends):
+                matrix[:, n] = 0.5 * (residual(x + e) - residual(x - e))
+            return matrix
+
         return _newton(residual, derivative, start, np.full(start.size, size), "start of the run")
 
     start = np.zeros(unknown + (driven is not None))

@@ -1,37 +1,25 @@
-"""Compiled law of 6x6 connectors (bearings) on arrays of coordinates, with rolling laws in parallel to the matrices.
+"""Law of 6x6 connectors (bearings) on arrays of coordinates, all at once; rolling laws in parallel to the matrices.
 
-Displacement and rate are those of Exudyn's RigidBodySpringDamper. Coordinates are those of
-`exugear.kernels.coordinates`.
+Displacement and rate are those of Exudyn's RigidBodySpringDamper: the second attachment against the first in the first
+body's axes; the rate is not corrected for the turning of those axes. Coordinates are those of
+`exugear.kernels.coordinates`. Nothing is compiled here: states of rest ask for a few hundred evaluations, and the loop
+over time has the law in its own form. Each connector sees its two ends by six coordinates each; the ground has zeros.
 """
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
 from exugear.kernels.coordinates import BODY_SIZE, SPIN, TILT
-from exugear.kernels.rolling import (
-    CAGE_TORQUE,
-    ELASTIC_PART,
-    RollingArrays,
-    no_rolling,
-    rolling_force,
-    rolling_memory,
-    selected_rolling,
-)
+from exugear.kernels.rolling import RollingArrays, no_rolling, rolling_loads, selected_rolling
 from fe_ste.tools.arrays import Floats, Integers
-from fe_ste.tools.compilation import compiled
-from fe_ste.tools.inner_kernels import kept_bundle
 
-ARM, POSITION, VELOCITY, ANGULAR_VELOCITY = range(4)
-"""Rows of `body_point`."""
-DISPLACEMENT, RATE, TRUE_RATE = range(3)
-"""Rows of `connector_motion`."""
-_NONE = np.zeros(0)
-_ROOMS = {"strains": np.zeros((0, 0)), "loads": np.zeros((0, 0)), "f": _NONE, "tangents": np.zeros((0, 0, 0))}
-"""What `pass_connectors` fills, without room for it."""
+_NEXT, _LAST = [1, 2, 0], [2, 0, 1]
+"""Axes after and before x, y, z."""
+_SENSE = np.array([1.0, -1.0])
+"""A connector gives to its first end what it takes from its second."""
 
 
 class ConnectorArrays(NamedTuple):
@@ -69,241 +57,133 @@ class ConnectorArrays(NamedTuple):
         )
 
 
-@compiled
-def rotation(a: float, b: float, spin: float, out: Floats) -> None:
-    """Rotation matrix Rx(a) Ry(b) Rz(spin), (3, 3)."""
-    ca, sa, cb, sb = math.cos(a), math.sin(a), math.cos(b), math.sin(b)
-    cg, sg = math.cos(spin), math.sin(spin)
-    out[0, 0], out[0, 1], out[0, 2] = cb * cg, -cb * sg, sb
-    out[1, 0], out[1, 1], out[1, 2] = ca * sg + sa * sb * cg, ca * cg - sa * sb * sg, -sa * cb
-    out[2, 0], out[2, 1], out[2, 2] = sa * sg - ca * sb * cg, sa * cg + ca * sb * sg, ca * cb
+class _Ends(NamedTuple):
+    """Both ends of connectors: axes of the bodies (..., c, 2, 3, 3), then vectors (..., c, 2, 3), global axes.
 
-
-@compiled
-def body_point(q: Floats, v: Floats, start: int, node: Floats, local: Floats, turn: Floats, out: Floats) -> None:
-    """Move a body-fixed point: turn (3, 3); out (4, 3) = arm, position, velocity, angular velocity."""
-    if start < 0:
-        turn[:] = 0.0
-        out[:] = 0.0
-        for i in range(3):
-            turn[i, i] = 1.0
-            out[ARM, i] = local[i]
-            out[POSITION, i] = node[i] + local[i]
-        return
-    a, b = q[start + TILT], q[start + TILT + 1]
-    rotation(a, b, q[start + SPIN], turn)
-    da, db, dg = v[start + TILT], v[start + TILT + 1], v[start + SPIN]
-    ca, sa, cb, sb = math.cos(a), math.sin(a), math.cos(b), math.sin(b)
-    # Angular velocity in global axes: each angle's rate about the axis that it turns about.
-    wx, wy, wz = da + sb * dg, ca * db - sa * cb * dg, sa * db + ca * cb * dg
-    for i in range(3):
-        out[ARM, i] = turn[i, 0] * local[0] + turn[i, 1] * local[1] + turn[i, 2] * local[2]
-        out[POSITION, i] = node[i] + q[start + i] + out[ARM, i]
-    # Velocity of the point: that of the node and omega x r.
-    r = out[ARM]
-    out[VELOCITY, 0] = v[start] + wy * r[2] - wz * r[1]
-    out[VELOCITY, 1] = v[start + 1] + wz * r[0] - wx * r[2]
-    out[VELOCITY, 2] = v[start + 2] + wx * r[1] - wy * r[0]
-    out[ANGULAR_VELOCITY, 0], out[ANGULAR_VELOCITY, 1], out[ANGULAR_VELOCITY, 2] = wx, wy, wz
-
-
-@compiled
-def connector_motion(
-    q: Floats, v: Floats, n: int, connectors: ConnectorArrays, turn: Floats, arms: Floats, out: Floats
-) -> None:
-    """Fill displacement, rate and change of displacement (3, 6) of connector n, its axes and the arms (2, 3).
-
-    As Exudyn's RigidBodySpringDamper: the second attachment against the first in the first body's axes; the
-    rate is not corrected for the turning of those axes. The third row is the true time derivative of the
-    displacement, which the rate differs from in turning axes and for spinning, tilted bodies.
+    The attachment's arm from the node and its position, m; its velocity, m/s; the body's angular velocity, rad/s.
     """
-    turn1 = np.empty((3, 3))
-    point0, point1 = np.empty((4, 3)), np.empty((4, 3))
-    index, node, local = connectors.bodies[n], connectors.node[n], connectors.local[n]
-    body_point(q, v, index[0], node[0], local[0], turn, point0)
-    body_point(q, v, index[1], node[1], local[1], turn1, point1)
-    # Everything of the second body against the first, seen in the first body's axes.
-    relative = np.zeros((3, 3))
-    out[:] = 0.0
-    for i in range(3):
-        arms[0, i], arms[1, i] = point0[ARM, i], point1[ARM, i]
-        for j in range(3):
-            out[DISPLACEMENT, i] += turn[j, i] * (point1[POSITION, j] - point0[POSITION, j])
-            out[RATE, i] += turn[j, i] * (point1[VELOCITY, j] - point0[VELOCITY, j])
-            out[RATE, TILT + i] += turn[j, i] * (point1[ANGULAR_VELOCITY, j] - point0[ANGULAR_VELOCITY, j])
-            for k in range(3):
-                relative[i, j] += turn[k, i] * turn1[k, j]
+
+    axes: Floats
+    arm: Floats
+    position: Floats
+    velocity: Floats
+    angular_velocity: Floats
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    """Vector products (..., 3)."""
+    product: Floats = a[..., _NEXT] * b[..., _LAST] - a[..., _LAST] * b[..., _NEXT]
+    return product
+
+
+def _times(matrices: Floats, vectors: Floats) -> Floats:
+    """Products of matrices (..., n, n) with vectors (..., n)."""
+    return np.asarray(np.einsum("...ij,...j->...i", matrices, vectors))
+
+
+def _axes(angles: Floats) -> Floats:
+    """Rotation matrices Rx(a) Ry(b) Rz(spin) (..., 3, 3) of angles (..., 3)."""
+    (ca, cb, cg), (sa, sb, sg) = (np.moveaxis(function(angles), -1, 0) for function in (np.cos, np.sin))
+    rows = (
+        (cb * cg, -cb * sg, sb),
+        (ca * sg + sa * sb * cg, ca * cg - sa * sb * sg, -sa * cb),
+        (sa * sg - ca * sb * cg, sa * cg + ca * sb * sg, ca * cb),
+    )
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def _ends(x: Floats, u: Floats, connectors: ConnectorArrays) -> _Ends:
+    """Move both attachments of connectors by local coordinates and their rates x, u (..., c, 2, 6)."""
+    axes = _axes(x[..., TILT:])
+    arm = _times(axes, connectors.local)
+    # Each angle's rate about the axis that it turns about: x, the tilted y, and the body's z.
+    ca, sa = np.cos(x[..., TILT]), np.sin(x[..., TILT])
+    about_y = np.stack([np.zeros_like(ca), ca, sa], axis=-1)
+    omega = about_y * u[..., TILT + 1, None] + axes[..., 2] * u[..., SPIN, None]
+    omega[..., 0] += u[..., TILT]
+    return _Ends(axes, arm, connectors.node + x[..., :TILT] + arm, u[..., :TILT] + _cross(omega, arm), omega)
+
+
+def _strains(ends: _Ends) -> tuple[Floats, Floats]:
+    """Displacement and rate (..., c, 6) of each second end against the first, in the first one's axes."""
+    back, other = ends.axes[..., 0, :, :].swapaxes(-1, -2), ends.axes[..., 1, :, :]
+    place, speed, spin = (_times(back, value[..., 1, :] - value[..., 0, :]) for value in ends[2:])
+    relative = back @ other
     # Rxyz angles of the relative rotation; the sine is clipped, since round-off may carry it past 1.
-    out[DISPLACEMENT, TILT] = math.atan2(-relative[1, 2], relative[2, 2])
-    out[DISPLACEMENT, TILT + 1] = math.asin(min(1.0, max(-1.0, relative[0, 2])))
-    out[DISPLACEMENT, SPIN] = math.atan2(-relative[0, 1], relative[0, 0])
-    # True derivative of the displacement: less what the turning of the axes themselves does to it.
-    spinning = np.zeros(3)
-    for i in range(3):
-        for j in range(3):
-            spinning[i] += turn[j, i] * point0[ANGULAR_VELOCITY, j]
-    d, w = out[DISPLACEMENT], out[RATE]
-    out[TRUE_RATE, 0] = w[0] - spinning[1] * d[2] + spinning[2] * d[1]
-    out[TRUE_RATE, 1] = w[1] - spinning[2] * d[0] + spinning[0] * d[2]
-    out[TRUE_RATE, 2] = w[2] - spinning[0] * d[1] + spinning[1] * d[0]
-    # Rates of the three angles from the angular velocity, by inverting the relation in `body_point`.
-    a, b = d[TILT], d[TILT + 1]
-    across = math.cos(a) * w[SPIN] - math.sin(a) * w[TILT + 1]
-    out[TRUE_RATE, SPIN] = across / math.cos(b)
-    out[TRUE_RATE, TILT + 1] = math.cos(a) * w[TILT + 1] + math.sin(a) * w[SPIN]
-    out[TRUE_RATE, TILT] = w[TILT] - math.sin(b) * out[TRUE_RATE, SPIN]
+    angles = (
+        np.arctan2(-relative[..., 1, 2], relative[..., 2, 2]),
+        np.arcsin(np.clip(relative[..., 0, 2], -1.0, 1.0)),
+        np.arctan2(-relative[..., 0, 1], relative[..., 0, 0]),
+    )
+    return np.concatenate([place, np.stack(angles, axis=-1)], axis=-1), np.concatenate([speed, spin], axis=-1)
 
 
-@compiled
-def turn_between(q: Floats, n: int, connectors: ConnectorArrays) -> float:
-    """Spin of the second body less that of the first, rad, unwrapped; the ground has none."""
-    first, second = connectors.bodies[n]
-    turn = 0.0
-    if second >= 0:
-        turn += q[second + SPIN]
-    if first >= 0:
-        turn -= q[first + SPIN]
-    return turn
+def _loads(x: Floats, u: Floats, connectors: ConnectorArrays) -> tuple[_Ends, Floats, Floats]:
+    """Both ends; force and moment (..., c, 2, 3) taken from the second one, global axes; torque of a cage (..., c).
 
-
-@compiled
-def connector_load(q: Floats, v: Floats, n: int, connectors: ConnectorArrays, arms: Floats, out: Floats) -> float:
-    """Fill force and moment (6,) that connector n takes from its second body, global axes; arms (2, 3).
-
-    Returns the torque of a turning cage: the generalized force that it takes from the second body's spin and gives to
-    that of the first, N m.
+    This torque is the generalized force that the cage takes from the second body's spin and gives to that of the first.
     """
-    turn, motion = np.empty((3, 3)), np.empty((3, BODY_SIZE))
-    connector_motion(q, v, n, connectors, turn, arms, motion)
-    # Force and moment in the first body's axes, then turned into global ones.
-    # Loops, because a product of arrays takes numba two seconds to compile.
-    local = np.zeros(BODY_SIZE)
-    for i in range(BODY_SIZE):
-        for j in range(BODY_SIZE):
-            local[i] += connectors.stiffness[n, i, j] * motion[DISPLACEMENT, j]
-            local[i] += connectors.damping[n, i, j] * motion[RATE, j]
-    torque = 0.0
-    if connectors.rolling.first[n] < connectors.rolling.first[n + 1]:
-        forces = rolling_memory(connectors.rolling)
-        turned = turn_between(q, n, connectors)
-        rolling_force(n, motion[DISPLACEMENT], motion[RATE], turned, connectors.rolling, forces)
-        for i in range(BODY_SIZE):
-            local[i] += forces[ELASTIC_PART + i]
-        torque = forces[CAGE_TORQUE]
-    for i in range(3):
-        out[i] = turn[i, 0] * local[0] + turn[i, 1] * local[1] + turn[i, 2] * local[2]
-        out[3 + i] = turn[i, 0] * local[3] + turn[i, 1] * local[4] + turn[i, 2] * local[5]
-    return torque
+    ends = _ends(x, u, connectors)
+    strain, rate = _strains(ends)
+    local = _times(connectors.stiffness, strain) + _times(connectors.damping, rate)
+    torque = np.zeros(local.shape[:-1])
+    with_rows = np.flatnonzero(np.diff(connectors.rolling.first))
+    if with_rows.size:
+        turned = x[..., 1, SPIN] - x[..., 0, SPIN]
+        rows = np.s_[..., with_rows, :]
+        turned = turned[..., with_rows]
+        forces, torque[..., with_rows] = rolling_loads(with_rows, strain[rows], rate[rows], turned, connectors.rolling)
+        local[rows] += forces
+    vectors = local.reshape(*local.shape[:-1], 2, 3)
+    return ends, vectors @ ends.axes[..., 0, :, :].swapaxes(-1, -2), torque
 
 
-@compiled
-def add_wrench(q: Floats, start: int, sign: float, load: Floats, arm: Floats, f: Floats) -> None:
-    """Add a global force and moment (6,) acting at `arm` from the node to the Rxyz coordinates of a body."""
-    if start < 0:
-        return
-    a, b = q[start + TILT], q[start + TILT + 1]
-    ca, sa, cb, sb = math.cos(a), math.sin(a), math.cos(b), math.sin(b)
-    # Moment about the node: that of the wrench and r x F.
-    mx = sign * (load[3] + arm[1] * load[2] - arm[2] * load[1])
-    my = sign * (load[4] + arm[2] * load[0] - arm[0] * load[2])
-    mz = sign * (load[5] + arm[0] * load[1] - arm[1] * load[0])
-    for i in range(3):
-        f[start + i] += sign * load[i]
+def _forces(x: Floats, ends: _Ends, load: Floats) -> Floats:
+    """Generalized forces (..., c, 2, 6) on both ends of connectors under a force and a moment (..., c, 2, 3)."""
+    force, moment = (_SENSE[:, None] * load[..., None, part, :] for part in range(2))
+    moment = moment + _cross(ends.arm, force)
     # Conjugate to the angles are the moments about x, the tilted y and the body's z.
-    f[start + TILT] += mx
-    f[start + TILT + 1] += ca * my + sa * mz
-    f[start + SPIN] += sb * mx - sa * cb * my + ca * cb * mz
+    about_y = np.cos(x[..., TILT]) * moment[..., 1] + np.sin(x[..., TILT]) * moment[..., 2]
+    about_z = np.sum(ends.axes[..., 2] * moment, axis=-1)
+    angles = np.stack([moment[..., 0], about_y, about_z], axis=-1)
+    return np.concatenate([force, angles], axis=-1)
 
 
-@compiled
-def add_differences(
-    q: Floats, n: int, step: float, connectors: ConnectorArrays, state: Floats, tangents: Floats
-) -> None:
-    """Add minus the derivatives of connector n's forces to tangents (2, size, size), at rest; a cage's torque left out.
-
-    Central differences with `step` by each coordinate, a row, and by its rate; the state (2, size) is q at rest, and is
-    so again. Differences, because axes, arms and angles depend on the coordinates, too.
-    """
-    load, arms = np.empty(BODY_SIZE), np.empty((2, 3))
-    ends = connectors.bodies[n]
-    for k in range(2 * BODY_SIZE):
-        c = ends[k // BODY_SIZE] + k % BODY_SIZE
-        if ends[k // BODY_SIZE] < 0:
-            continue
-        for of_rate in range(2):
-            before = state[of_rate, c]
-            for sign in (-1.0, 1.0):
-                state[of_rate, c] = before + sign * step
-                connector_load(state[0], state[1], n, connectors, arms, load)
-                for i in range(BODY_SIZE):
-                    load[i] *= -sign / (2.0 * step)
-                add_wrench(state[0], ends[0], 1.0, load, arms[0], tangents[of_rate, c])
-                add_wrench(state[0], ends[1], -1.0, load, arms[1], tangents[of_rate, c])
-            state[of_rate, c] = before
+def _places(connectors: ConnectorArrays, size: int) -> Integers:
+    """Coordinates (c, 2, 6) of both ends; those of the ground stand behind the others."""
+    first = np.where(connectors.bodies < 0, size, connectors.bodies)
+    return np.asarray(first[..., None] + np.arange(BODY_SIZE))
 
 
-@compiled
-def pass_connectors(
-    q: Floats,
-    v: Floats,
-    steps: Floats,
-    connectors: ConnectorArrays,
-    strains: Floats,
-    loads: Floats,
-    f: Floats,
-    tangents: Floats,
-) -> None:
-    """Do for all connectors what the functions below say, where there is room for it.
-
-    One function does all, so that the law is compiled once.
-    """
-    turn, motion, arms, load = np.empty((3, 3)), np.empty((3, BODY_SIZE)), np.empty((2, 3)), np.empty(BODY_SIZE)
-    state = np.zeros((2, q.size))
-    for i in range(q.size):
-        state[0, i] = q[i]
-    for n in range(connectors.bodies.shape[0]):
-        if strains.size > 0:
-            connector_motion(q, v, n, connectors, turn, arms, motion)
-            for i in range(BODY_SIZE):
-                strains[n, i] = motion[DISPLACEMENT, i]
-        if f.size > 0 or loads.size > 0:
-            torque = connector_load(q, v, n, connectors, arms, load)
-            for i in range(BODY_SIZE if loads.size > 0 else 0):
-                loads[n, i] = load[i]
-            if f.size > 0:
-                first, second = connectors.bodies[n]
-                add_wrench(q, first, 1.0, load, arms[0], f)
-                add_wrench(q, second, -1.0, load, arms[1], f)
-                if first >= 0:
-                    f[first + SPIN] += torque
-                if second >= 0:
-                    f[second + SPIN] -= torque
-        if tangents.size > 0 and steps[n] > 0.0:
-            add_differences(q, n, steps[n], connectors, state, tangents)
-
-
-def _pass(q: Floats, v: Floats, connectors: ConnectorArrays, steps: Floats = _NONE, **rooms: Floats) -> None:
-    places = (rooms.get(name, none) for name, none in _ROOMS.items())
-    pass_connectors(q, v, steps, kept_bundle(connectors), *places)
+def _local(values: Floats, places: Integers) -> Floats:
+    """Coordinates or rates (size,) of both ends, (c, 2, 6)."""
+    return np.append(values, np.zeros(BODY_SIZE))[places]
 
 
 def add_connector_forces(q: Floats, v: Floats, connectors: ConnectorArrays, f: Floats) -> None:
     """Add the generalized forces of all connectors to f."""
-    _pass(q, v, connectors, f=f)
+    if not connectors.bodies.size:
+        return
+    places = _places(connectors, f.size)
+    with np.errstate(over="ignore", invalid="ignore"):  # a search that fails passes through any number
+        x = _local(q, places)
+        ends, load, torque = _loads(x, _local(v, places), connectors)
+        forces = _forces(x, ends, load)
+        forces[..., SPIN] += _SENSE * torque[..., None]
+        f += np.bincount(places.ravel(), forces.ravel(), f.size + BODY_SIZE)[: f.size]
 
 
 def connector_loads(q: Floats, v: Floats, connectors: ConnectorArrays) -> Floats:
     """Force and moment (c, 6) that each connector takes from its second body, global axes, N and N m."""
-    loads = np.zeros((len(connectors.bodies), BODY_SIZE))
-    _pass(q, v, connectors, loads=loads)
-    return loads
+    places = _places(connectors, q.size)
+    _, load, _ = _loads(_local(q, places), _local(v, places), connectors)
+    return load.reshape(-1, BODY_SIZE)
 
 
 def connector_strains(q: Floats, connectors: ConnectorArrays) -> Floats:
     """Displacement (c, 6) of each connector's second body against the first, in the axes of that, m and rad."""
-    strains = np.zeros((len(connectors.bodies), BODY_SIZE))
-    _pass(q, np.zeros_like(q), connectors, strains=strains)
-    return strains
+    x = _local(q, _places(connectors, q.size))
+    return _strains(_ends(x, np.zeros_like(x), connectors))[0]
 
 
 def add_connector_tangents(
@@ -311,15 +191,29 @@ def add_connector_tangents(
 ) -> None:
     """Add minus the derivatives (size, size) of the connectors' forces to coordinates q and to velocities, at rest.
 
+    By central differences, because axes, arms and angles depend on the coordinates, too. A cage's torque is left out.
+
     Parameters
     ----------
     steps : (c,) array
-        Of the central differences, m or rad, and per second; connectors with 0 are left out.
+        Of the differences, m or rad, and per second; connectors with 0 are left out.
     """
-    tangents = np.zeros((2, q.size, q.size))
-    _pass(q, np.zeros_like(q), connectors, steps, tangents=tangents)
-    stiffness += tangents[0].T
-    damping += tangents[1].T
+    numbers = np.flatnonzero(steps)
+    if not numbers.size:
+        return
+    chosen, ends = connectors if numbers.size == steps.size else connectors.chosen(numbers), 2 * BODY_SIZE
+    places = _places(chosen, q.size).reshape(-1, ends)
+    # One coordinate of each connector at a time goes ahead and back: (coordinate, way, connector, end, coordinate).
+    ways = np.eye(ends)[:, None, None] * np.array([1.0, -1.0])[:, None, None] * steps[numbers, None]
+    ways = ways.reshape(ends, 2, -1, 2, BODY_SIZE)
+    rest = _local(q, places).reshape(-1, 2, BODY_SIZE)
+    for total, (x, u) in ((stiffness, (rest + ways, 0.0 * ways)), (damping, (rest + 0.0 * ways, ways))):
+        moved, load, _ = _loads(x, u, chosen)
+        forces = _forces(x, moved, load).reshape(ends, 2, -1, ends)
+        slopes = (forces[:, 1] - forces[:, 0]) / (2.0 * steps[numbers, None])
+        padded = np.zeros((q.size + BODY_SIZE,) * 2)
+        np.add.at(padded, (places[:, None, :], places[:, :, None]), slopes.transpose(1, 0, 2))
+        total += padded[: q.size, : q.size]
 
 
 def no_connectors() -> ConnectorArrays:

@@ -126,7 +126,7 @@ def stiffness_at(coefficients: Floats, pieces: int, pmc: float) -> tuple[float, 
     return value, slope
 
 
-@compiled
+@kernel
 def frame_row(q: Floats, index: Integers, axis: Floats, row: Floats, gradient: Floats, turning: Floats) -> float:
     """Value of sum W . z with its gradient (13,) and the gradient's derivative to psi (13,) for one mesh."""
     psi = q[index[FRAME]] if index[FRAME] >= 0 else 0.0
@@ -164,7 +164,7 @@ def frame_row(q: Floats, index: Integers, axis: Floats, row: Floats, gradient: F
     return value
 
 
-@compiled
+@kernel
 def error_at(m: int, end: int, angle: float, meshes: MeshArrays) -> tuple[float, float, float]:
     """Error (m) of one gear of mesh m at its angle (rad) seen from the frame, with two derivatives by the angle."""
     pieces = meshes.error_pieces[m, end]
@@ -178,10 +178,11 @@ def error_at(m: int, end: int, angle: float, meshes: MeshArrays) -> tuple[float,
     c = meshes.error[m, end, piece]
     per_rad = pieces / (2.0 * math.pi)
     value: float = c[0] + t * (c[1] + t * (c[2] + t * c[3]))
-    return value, (c[1] + t * (2.0 * c[2] + t * 3.0 * c[3])) * per_rad, (2.0 * c[2] + 6.0 * t * c[3]) * per_rad**2
+    slope = (c[1] + t * (2.0 * c[2] + t * 3.0 * c[3])) * per_rad
+    return value, slope, (2.0 * c[2] + 6.0 * t * c[3]) * per_rad * per_rad
 
 
-@compiled
+@kernel
 def net_deflection(
     q: Floats, m: int, meshes: MeshArrays, row: Floats, side: float, gradient: Floats, turning: Floats, bend: Floats
 ) -> float:
@@ -204,7 +205,7 @@ def net_deflection(
     return value
 
 
-@compiled
+@kernel
 def mesh_pmc(q: Floats, m: int, meshes: MeshArrays) -> float:
     """Position in the mesh cycle of mesh m, unwrapped."""
     spin = q[meshes.coordinates[m, SPIN_1]] if meshes.coordinates[m, SPIN_1] >= 0 else 0.0
@@ -213,7 +214,7 @@ def mesh_pmc(q: Floats, m: int, meshes: MeshArrays) -> float:
     return pmc
 
 
-@compiled
+@kernel
 def row_dot(index: Integers, row: Floats, v: Floats) -> float:
     """Scalar product of a local row (13,) with the state's entries it belongs to."""
     total = 0.0
@@ -223,7 +224,7 @@ def row_dot(index: Integers, row: Floats, v: Floats) -> float:
     return total
 
 
-@compiled
+@kernel
 def relative_spin(v: Floats, index: Integers, end: int) -> float:
     """Spin of a gear of a mesh seen from the mesh's frame; of coordinates or of their rates."""
     spin = v[index[BODY_SIZE * end + SPIN]] if index[BODY_SIZE * end + SPIN] >= 0 else 0.0
@@ -241,7 +242,7 @@ def gear_position(q: Floats, m: int, meshes: MeshArrays, row: Floats, nominal: f
     return value
 
 
-@compiled
+@kernel
 def turn_rows(turning: Floats, bend: Floats, factor: float, out: Floats) -> None:
     """Add factor times the second derivatives of a row's value, (13, 13)."""
     # The value is bilinear in psi and the others: a full row and column of psi, whose corner counts once.
@@ -258,7 +259,7 @@ def turn_rows(turning: Floats, bend: Floats, factor: float, out: Floats) -> None
         out[FRAME, o] -= factor * bend[end]
 
 
-@compiled
+@kernel
 def rate_gradient(v: Floats, index: Integers, turning: Floats, bend: Floats, out: Floats) -> None:
     """Differentiate a row's rate by the coordinates, (13,)."""
     # d(gradient . v)/dq is the second derivative times v: the same pattern as in `turn_rows`.

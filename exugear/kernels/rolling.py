@@ -23,7 +23,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fe_ste.tools.arrays import Floats, Integers
-from fe_ste.tools.compilation import compiled, summing_kernel
+from fe_ste.tools.compilation import kernel, summing_kernel
+from fe_ste.tools.inner_kernels import kept_bundle
 
 ROLLER, BALL, ALIGNED_BALL = range(3)
 """Values of `FORM`."""
@@ -111,13 +112,9 @@ def selected_rolling(rolling: RollingArrays, connectors: Integers) -> RollingArr
     )
 
 
-@compiled
 def rolling_memory(rolling: RollingArrays) -> Floats:
     """Memory for `rolling_forces`, which also holds what it finds."""
-    most = 0
-    for r in range(rolling.layout.shape[0]):
-        most = max(most, rolling.layout[r, COUNT])
-    return np.zeros(TOUCHING + CONTACT_SIZE * most)
+    return np.zeros(TOUCHING + CONTACT_SIZE * int(rolling.layout[:, COUNT].max(initial=0)))
 
 
 @summing_kernel
@@ -459,3 +456,42 @@ def rolling_tangent(n: int, strain: Floats, turn: float, rolling: RollingArrays,
     for i in range(1, 5):
         for j in range(i):
             out[i, j] = out[j, i]
+
+
+@kernel
+def pass_rolling(
+    numbers: Integers,
+    strain: Floats,
+    rate: Floats,
+    turn: Floats,
+    rolling: RollingArrays,
+    memory: Floats,
+    forces: Floats,
+    torques: Floats,
+) -> None:
+    """Fill the elastic and damped forces (k, 6) and cage torques (k,) of connectors with these numbers."""
+    for k in range(numbers.size):
+        rolling_force(numbers[k], strain[k], rate[k], turn[k], rolling, memory)
+        for i in range(6):
+            forces[k, i] = memory[ELASTIC_PART + i]
+        torques[k] = memory[CAGE_TORQUE]
+
+
+def rolling_loads(
+    numbers: Integers, strain: Floats, rate: Floats, turn: Floats, rolling: RollingArrays
+) -> tuple[Floats, Floats]:
+    """Find forces (..., k, 6) and cage torques (..., k) of connectors, see `rolling_force`.
+
+    Parameters
+    ----------
+    numbers : (k,) array
+    strain, rate : (..., k, 6) arrays
+    turn : (..., k) array
+    rolling : RollingArrays
+    """
+    forces, torques = np.empty(strain.shape), np.empty(turn.shape)
+    strains, rates = (np.ascontiguousarray(values).reshape(-1, 6) for values in (strain, rate))
+    every = np.broadcast_to(numbers, turn.shape).flatten()
+    memory, out = rolling_memory(rolling), (forces.reshape(-1, 6), torques.ravel())
+    pass_rolling(every, strains, rates, turn.ravel(), kept_bundle(rolling), memory, *out)
+    return forces, torques

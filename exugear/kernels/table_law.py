@@ -125,7 +125,10 @@ def piece_at(scaled: float, pieces: int) -> int:
     A state that diverges passes through angles that are no numbers, or that no integer can hold: what the processor
     makes of these would read outside the array. Clamping the integer costs nothing; clamping the number, 4 % of a step.
     """
-    return max(0, min(int(scaled), pieces - 1))
+    piece = int(scaled)
+    if piece >= pieces:
+        return pieces - 1
+    return piece if piece > 0 else 0
 
 
 @kernel

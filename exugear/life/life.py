@@ -30,7 +30,7 @@ class Life:
 
     Attributes
     ----------
-    variant, mesh_law, edition : str
+    variant, mesh_law, inertias, edition : str
         What the forces are of, and the edition of the standard that gears are rated by.
     counted : CountedLoads
     balance : StaticBalance
@@ -48,6 +48,7 @@ class Life:
 
     variant: str
     mesh_law: str
+    inertias: str
     edition: str
     counted: CountedLoads
     balance: StaticBalance
@@ -162,6 +163,7 @@ def compute_life(
     return Life(
         variant=assembly.variant,
         mesh_law=assembly.mesh_law,
+        inertias=assembly.inertias,
         edition=rating.edition,
         counted=counted,
         balance=balance,

@@ -39,7 +39,7 @@ _LAYOUT = Layout(
     | {"flank": ("flank",), "bearing": ("bearing",)}
     | {f"flank_{name}": ("flank", "bin") for name in ("contact_by_bin", "root_by_bin")}
     | {"bearing_by_bin": ("bearing", "bin")},
-    ("gearbox", "variant", "mesh_law", "edition", "input_hash", "assumptions", "unrated"),
+    ("gearbox", "variant", "mesh_law", "inertias", "edition", "input_hash", "assumptions", "unrated"),
 )
 
 
@@ -84,6 +84,7 @@ def to_dataset(life: Life, gearbox: str) -> xr.Dataset:
         "gearbox": gearbox,
         "variant": life.variant,
         "mesh_law": life.mesh_law,
+        "inertias": life.inertias,
         "edition": life.edition,
         "body": life.counted.body,
         "life_years": life.counted.life_years,

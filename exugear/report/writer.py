@@ -21,12 +21,14 @@ from exugear.report.parts.run_data import run_data
 from exugear.report.sections.bearings import bearings_section
 from exugear.report.sections.change import change_section
 from exugear.report.sections.gears import gears_section
+from exugear.report.sections.life import life_section
 from exugear.report.sections.modes import modes_section
 from exugear.report.sections.near import near_section
 from exugear.report.sections.ranking import ranking_section
 from exugear.report.sections.rings import rings_section
 from exugear.report.sections.short import short_section
 from exugear.report.sections.steady import steady_section
+from exugear.report.sections.studies import studies_section
 from exugear.report.sections.trust import trust_section
 from exugear.report.shell import page_body
 from exugear.results.folder import REPORT_FILE, kept_case
@@ -40,10 +42,12 @@ SECTIONS: Final[tuple[Callable[[Material], Part], ...]] = (
     ranking_section,
     change_section,
     bearings_section,
+    life_section,
     steady_section,
     modes_section,
     near_section,
     gears_section,
+    studies_section,
     trust_section,
 )
 """Sections of the page in their order. A new one is a function in ``sections`` and a line here."""

@@ -22,8 +22,11 @@ def filtered(rows: Floats, middle: int, column: int, taps: Floats) -> float:
 
 
 @kernel
-def filtered_eight(rows: Floats, middle: int, column: int, taps: Floats) -> Floats:
-    """Eight columns of rows around a middle one, filtered; in two sums, because each addition waits for the last."""
+def filter_eight(rows: Floats, middle: int, column: int, taps: Floats, out: Floats) -> None:
+    """Fill eight columns of out (columns,), from one on, with rows around a middle one, filtered.
+
+    In two sums, because each addition waits for the one before.
+    """
     near, far = eight(rows[middle], column) * taps[0], all_eight(0.0)
     for k in range(1, taps.size - 1, 2):
         near = near + (eight(rows[middle - k], column) + eight(rows[middle + k], column)) * taps[k]
@@ -31,8 +34,7 @@ def filtered_eight(rows: Floats, middle: int, column: int, taps: Floats) -> Floa
     if taps.size % 2 == 0:
         k = taps.size - 1
         near = near + (eight(rows[middle - k], column) + eight(rows[middle + k], column)) * taps[k]
-    total: Floats = near + far
-    return total
+    put(out, column, near + far)
 
 
 @kernel
@@ -44,9 +46,10 @@ def filter_rows(rows: Floats, taps: Floats, factor: int, out: Floats) -> None:
         if columns < SIZE:
             for c in range(columns):
                 out[n, c] = filtered(rows, middle, c, taps)
-        for c in range(0, columns if columns >= SIZE else 0, SIZE):
-            first = min(c, columns - SIZE)  # the last ones lap over those before
-            put(out[n], first, filtered_eight(rows, middle, first, taps))
+            continue
+        for c in range(0, columns, SIZE):
+            last = columns - SIZE  # the last ones lap over those before
+            filter_eight(rows, middle, c if c < last else last, taps, out[n])
 
 
 def low_pass(factor: int, half: int) -> Floats:

@@ -12,18 +12,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from exugear.model.versions import MODES, REDUCTION, RUN, STEADY, STUDY
+from exugear.results.study_files import DATASET, STUDY_LAYOUT
 from exugear.studies.design.sampling import PARAMETER, SIDE
 from exugear.studies.journal import Record
 from exugear.studies.study import Study
-from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
+from fe_ste.tools.sealed import load_dataset, write_dataset
 from fe_ste.tools.versions import TABLE
 
 if TYPE_CHECKING:
     import xarray as xr
 
-DATASET = "study.nc"
-"""Name of the file in the folder of the study."""
-_LAYOUT = Layout("study", STUDY, {}, ("title", "study", "case", "input_hash", "points", "failed", "missing"))
 _PACKAGES = ("exugear", "numpy", "scipy", "numba", "exudyn")
 _LOCAL = "slope_"
 """Before the name of a figure: its local derivative."""
@@ -125,6 +123,7 @@ def _attributes(study: Study, at: list[tuple[tuple[int, ...], Record | None]]) -
         "mesh_law": study.choice.mesh_law,
         "inertias": str(study.choice.inertias),
         "load_case": str(study.choice.load_case),
+        "case_digest": study.case_digest,
         "input_hash": study.case_hash,
         "method_version": STUDY,
         "method_versions": json.dumps(
@@ -182,4 +181,4 @@ def load_study(path: str | Path) -> xr.Dataset:
     Traceback (most recent call last):
     fe_ste.tools.files.FileError: nowhere/study.nc: no such file
     """
-    return load_dataset(Path(path), _LAYOUT)
+    return load_dataset(Path(path), STUDY_LAYOUT)

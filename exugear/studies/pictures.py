@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from exugear.results.study_files import PICTURES
 from exugear.studies.dataset import slopes
 from exugear.studies.design.sampling import PARAMETER, SAMPLE, SIDE
 from exugear.studies.optimisation import EVALUATION
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FOLDER = "pictures"
 _OF_POINTS = ("error", "doubts", "seconds", "memory", "on_front", "step")
 MOST_CURVES = 12
 """Curves of one picture; of more values those spread over their range."""
@@ -57,7 +57,7 @@ def draw_study(dataset: xr.Dataset, folder: Path, minimised: tuple[str, ...] = (
     drawn = []
     with drawing_style():
         for name, draw in _pictures(dataset, minimised):
-            path = folder / FOLDER / f"{name}.png"
+            path = folder / PICTURES / f"{name}.png"
             figure = new_figure(6.4, 4.0)
             figure.suptitle(str(dataset.attrs["title"])[:80], fontsize=9.5)
             draw(figure)

@@ -15,6 +15,7 @@ from exugear.model.gearbox import Gearbox
 from exugear.model.named_files import NOTHING_MORE, Permissions
 from exugear.model.reading import CaseError, fault_line
 from exugear.model.versions import MODES, REDUCTION, RUN, STEADY, STUDY
+from exugear.results.study_files import case_digest
 from exugear.rotating.rotating_frame import SteadyError
 from exugear.steady.settings import SpeedRange, SteadySettings, check_law
 from exugear.studies.design.paths import PathError, changed, check_path
@@ -26,8 +27,6 @@ from exugear.studies.figures.point_results import PointSettings
 from exugear.studies.figures.registry import FIGURES, KeptFigure, kept_figures
 from fe_ste.tools.versions import TABLE
 
-UNREAD = ("name", "report", "loads")
-"""Sections of a case that no figure reads: changing them costs no points."""
 TRIED_VALUES = 200
 """Most values of a list that are tried before the work begins."""
 
@@ -49,6 +48,8 @@ class Study:
     figures : mapping of name to KeptFigure
     design : Design
         All points.
+    case_digest : str
+        Hash of the case without the changes.
 
     Examples
     --------
@@ -72,6 +73,7 @@ class Study:
     settings: PointSettings
     figures: Mapping[str, KeptFigure]
     design: Design
+    case_digest: str
 
     @classmethod
     def from_toml(
@@ -124,7 +126,7 @@ class Study:
                 raise
             raise StudyError(fault_line(source, str(error))) from None
         choice = Choice(**file.choice.model_dump()).of(gearbox)
-        study = cls(file, source, gearbox, choice, settings, kept, design)
+        study = cls(file, source, gearbox, choice, settings, kept, design, case_digest(case))
         study._try_values()
         return study
 
@@ -137,7 +139,8 @@ class Study:
         """SHA-256 of all that every point depends on: the case with its files, choices, figures, versions."""
         content = {
             "versions": [STUDY, TABLE, REDUCTION, MODES, RUN, STEADY],
-            "case": {key: value for key, value in self.gearbox.content.items() if key not in UNREAD},
+            "case": self.gearbox.computed_content,
+            "load": self.gearbox.content["load_cases"].get(self.choice.load_case),
             "files": self._digests(self.gearbox.content),
             "choice": [self.choice.variant, self.choice.mesh_law, self.choice.inertias, self.choice.load_case],
             "settings": [repr(self.settings.steady), self.settings.duration, self.settings.solver],

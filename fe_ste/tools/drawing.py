@@ -9,7 +9,7 @@ import io
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from unicodedata import category
 
 from fe_ste.tools.files import write_file
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 #: Colours that stay apart in print and for colour-blind readers (Okabe and Ito).
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 WARNING_COLOUR = "#D0021B"
+#: Points of an inch that files of pictures have.
+_DPI = 200
 
 
 @contextmanager
@@ -76,6 +78,22 @@ def finish_figure(figure: Figure, path: str | Path | None) -> Figure:
         text.set_text(drawable(text.get_text()))
     if path is not None:
         path, content = Path(path), io.BytesIO()
-        figure.savefig(content, format=path.suffix.removeprefix(".") or None, dpi=200)
+        if path.suffix == ".png":
+            _print_png(figure, content)
+        else:
+            figure.savefig(content, format=path.suffix.removeprefix(".") or None, dpi=_DPI)
         write_file(path, content.getvalue())
     return figure
+
+
+def _print_png(figure: Figure, content: io.BytesIO) -> None:
+    """Write a figure as `savefig` does, which draws everything twice, the first time for the layout alone."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    before = figure.get_dpi()
+    figure.set_dpi(_DPI)
+    try:
+        canvas: Any = FigureCanvasAgg(figure)
+        canvas.print_png(content)
+    finally:
+        figure.set_dpi(before)

@@ -19,6 +19,7 @@ import hashlib
 import operator
 import struct
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -26,12 +27,21 @@ from llvmlite import ir
 from numba.core import cgutils, config, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, Flags
+from numba.core.compiler_machinery import PassManager
 from numba.core.datamodel import models
 from numba.core.registry import CPUDispatcher
+from numba.core.typed_passes import DumpParforDiagnostics, InlineOverloads, NopythonRewrites
 from numba.core.typing.arraydecl import GetItemBuffer, SetItemBuffer
 from numba.core.typing.builtins import BinOpAdd, BinOpMul, BinOpSub
 from numba.core.typing.templates import AttributeTemplate, infer_global
 from numba.core.typing.typeof import typeof
+from numba.core.untyped_passes import (
+    FindLiterallyCalls,
+    InlineClosureLikes,
+    InlineInlinables,
+    LiteralUnroll,
+    WithLifting,
+)
 from numba.extending import NativeValue, infer_getattr, lower_getattr_generic, register_model, unbox
 
 Given = TypeVar("Given", bound=tuple[Any, ...])
@@ -46,6 +56,17 @@ _NO_WRAPPERS = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 _WORDS = ir.IntType(64).as_pointer()
 #: After how many new objects Python looks for garbage while it compiles, which by default takes a tenth of the time.
 _SELDOM = 100_000, 50, 100
+#: Passes of numba that look for expressions of arrays, closures, literals and the like.
+_FOR_ARRAYS = {
+    WithLifting,
+    InlineClosureLikes,
+    InlineInlinables,
+    FindLiterallyCalls,
+    LiteralUnroll,
+    InlineOverloads,
+    NopythonRewrites,
+    DumpParforDiagnostics,
+}
 
 
 # -- kernels -------------------------------------------------------------------------------------------------------
@@ -63,11 +84,15 @@ class Kernel(CPUDispatcher):
 
     def __init__(self, function: Callable[..., object], options: dict[str, Any]) -> None:
         super().__init__(py_func=function, targetoptions=options, pipeline_class=_WholeCompiler)
-        inner = {**options, **_NO_WRAPPERS}
-        # numba's type holds it by a weak reference.
-        self._part = CPUDispatcher(py_func=function, targetoptions=inner, pipeline_class=_PartCompiler)
-        for dispatcher in (self, self._part):
-            cast(Any, dispatcher)._compiler._customize_flags = _Flags
+        cast(Any, self)._compiler._customize_flags = _Flags
+
+    @cached_property
+    def _part(self) -> Any:
+        """What it is for another kernel; made when one asks for it, and kept, since numba's type holds it weakly."""
+        options = {**self.targetoptions, **_NO_WRAPPERS}
+        part: Any = CPUDispatcher(py_func=self.py_func, targetoptions=options, pipeline_class=_PartCompiler)
+        part._compiler._customize_flags = _Flags
+        return part
 
     def compile(self, signature: Any) -> Any:
         """Compile for types of arguments, as numba; Python looks for garbage less often, of which there is none."""
@@ -96,7 +121,20 @@ class _Flags(Flags):
         return self is other or (isinstance(other, Flags) and bool(self._values == other._values))
 
 
-class _WholeCompiler(Compiler):
+class _LeanCompiler(Compiler):
+    """numba's compiler without passes that find nothing in functions that make no arrays: a tenth of the time."""
+
+    def define_pipelines(self) -> list[Any]:
+        pipelines: list[Any] = super().define_pipelines()  # type: ignore[no-untyped-call]
+        if self.state.flags.nrt:
+            return pipelines
+        lean: Any = PassManager("lean")  # type: ignore[no-untyped-call]
+        lean.passes.extend(one for one in pipelines[0].passes if one[0] not in _FOR_ARRAYS)
+        lean.finalize()
+        return [lean]
+
+
+class _WholeCompiler(_LeanCompiler):
     """numba's compiler for what Python calls."""
 
     def __init__(self, typing: Any, target: Any, library: Any, *rest: Any) -> None:
@@ -113,7 +151,7 @@ class _Whole(JITCodeLibrary):
         passes.run(self._final_module, builder)
 
 
-class _PartCompiler(Compiler):
+class _PartCompiler(_LeanCompiler):
     """numba's compiler, whose result is not made machine code."""
 
     def __init__(self, typing: Any, target: Any, library: Any, *rest: Any) -> None:

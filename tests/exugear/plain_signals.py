@@ -14,10 +14,9 @@ import numpy as np
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.modes import overall_row
 from exugear.dynamics.signals import signal_layout
-from exugear.kernels.connectors import connector_load, connector_motion, turn_between
 from exugear.kernels.elastic import elastic_energies, scratch_for
 from exugear.kernels.inertia import kinetic_energies
-from exugear.kernels.meshes import DEFLECTION, ENERGY, FORCE, OUTSIDE, STATE_SIZE
+from exugear.kernels.meshes import DEFLECTION, ENERGY, FORCE, OUTSIDE, ROW_SIZE, STATE_SIZE
 from exugear.kernels.rolling import (
     CAGE_DAMPING,
     CAGE_TORQUE,
@@ -25,11 +24,13 @@ from exugear.kernels.rolling import (
     ELASTIC_PART,
     STORED,
     rolling_forces,
-    rolling_memory,
 )
+from exugear.kernels.table_law import scratch_memory
 from exugear.kernels.turning import turning_energies, turning_memory
 from exugear.model.sections.entries import GROUND
-from exugear.tooth_mesh.laws.forms import pass_meshes
+from exugear.tooth_mesh.laws.forms import MEMORY, pass_meshes
+
+from .plain_connectors import connector_load, connector_motion, memory_for, turn_between
 
 
 def sampled(assembly: Assembly, q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -70,7 +71,9 @@ def energies_of(assembly: Assembly, q: np.ndarray, v: np.ndarray) -> np.ndarray:
 def mesh_states(q, v, meshes, out) -> None:
     """Fill (m, 10): what each mesh does, by the readable laws."""
     none = np.empty((0, 0))
-    pass_meshes(q, v, meshes, meshes.table, out, np.empty(0), none, none)
+    pass_meshes(
+        q, v, meshes, meshes.table, out, np.empty(0), none, none, np.empty((MEMORY, ROW_SIZE)), scratch_memory()
+    )
 
 
 @numba.njit
@@ -152,7 +155,7 @@ def bearing_energies(q, v, connectors, out) -> None:
     couples tilt and translation the elastic force then does a little work of its own, of second order.
     """
     turn, arms, motion = np.empty((3, 3)), np.empty((2, 3)), np.empty((3, 6))
-    forces = rolling_memory(connectors.rolling)
+    forces = memory_for(connectors.rolling)
     for n in range(connectors.bodies.shape[0]):
         connector_motion(q, v, n, connectors, turn, arms, motion)
         elastic = connectors.stiffness[n] @ motion[0]

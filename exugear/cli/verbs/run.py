@@ -109,7 +109,7 @@ def run(
         if not resume:
             make_results_folder(project.folder)
         _check_run_directory(project.run_directory, resume)
-        _tell_doubts(project)
+        _tell_doubts(project, duration)
         compute_missing_tables(project)
         with time_noted(project.folder, _label_of(project, solver, mesh_route)):
             how = {"solver": solver.value, "mesh_route": mesh_route.value, "integrator": integrator}
@@ -180,13 +180,13 @@ def _check_run_directory(directory: Path, resume: bool) -> None:
         raise BadInputError(f"--resume: {reason}; run without it")
 
 
-def _tell_doubts(project: Project) -> None:
+def _tell_doubts(project: Project, duration: float | None) -> None:
     """Say what looks like the wrong sign of a torque."""
     from exugear.loads.summary import doubts_about, summarise_loads
 
     load_case = _load_case(project)
     with model_errors():
-        doubts = doubts_about(summarise_loads(project.gearbox, load_case))
+        doubts = doubts_about(summarise_loads(project.gearbox, load_case, project.choice.inertias, duration))
     for doubt in doubts:
         note(f"load_cases.{load_case.name}: {doubt}", style="yellow")
 

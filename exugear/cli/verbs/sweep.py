@@ -133,9 +133,10 @@ def _laws() -> list[str]:
 
 def _default_folder(study: Study, path: Path) -> Path:
     from exugear.project import default_folder
+    from exugear.results.study_files import STUDIES
 
     stem = path.name.removesuffix(".toml").removesuffix(".study") or "study"
-    return default_folder(study.gearbox.source) / "studies" / stem
+    return default_folder(study.gearbox.source) / STUDIES / stem
 
 
 def _sweep(study: Study, folder: Path, opens: Opens, shard: Shard, merge: bool, retry: bool) -> Swept:

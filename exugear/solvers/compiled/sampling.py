@@ -228,7 +228,7 @@ def observe_joints(
     for j in range(joints.host.size):
         if joints.planet[j, 0] > 0.0:  # held on its orbit
             c, s = work.turns[joints.slot[j], COSINE], work.turns[joints.slot[j], SINE]
-            pull = joints.planet[j, 0] * v[joints.carrier[j]] ** 2
+            pull = joints.planet[j, 0] * v[joints.carrier[j]] * v[joints.carrier[j]]
             forces[3 * j] -= pull * (c * joints.planet[j, 1] - s * joints.planet[j, 2])
             forces[3 * j + 1] -= pull * (s * joints.planet[j, 1] + c * joints.planet[j, 2])
         if joints.host[j] >= 0:  # hands its force on to the joint of the body that it sits on
@@ -242,12 +242,14 @@ def observe_bodies(q: Floats, v: Floats, bodies: Bodies, work: Work, energy: Flo
     for n in range(bodies.mass.size):
         o, sb, cb = bodies.start[n], work.frames[n, SIN_B], work.frames[n, COS_B]
         square = v[o] * v[o] + v[o + 1] * v[o + 1] + v[o + 2] * v[o + 2]
-        tilting = (v[o + TILT] * cb) ** 2 + v[o + TILT + 1] * v[o + TILT + 1]
+        turning = v[o + TILT] * cb
+        tilting = turning * turning + v[o + TILT + 1] * v[o + TILT + 1]
         spin = v[o + SPIN] + v[o + TILT] * sb
         twice = bodies.mass[n] * square + bodies.transverse[n] * tilting + bodies.axial[n] * spin * spin
         energy[KINETIC] += 0.5 * twice
     for n in range(bodies.spin.size):
-        energy[KINETIC] += 0.5 * bodies.spin_inertia[n] * v[bodies.spin[n]] ** 2
+        spin = v[bodies.spin[n]]
+        energy[KINETIC] += 0.5 * bodies.spin_inertia[n] * spin * spin
 
 
 @kernel
@@ -255,8 +257,9 @@ def observe_springs(q: Floats, v: Floats, stride: int, springs: Springs, energy:
     """Add elastic energy and damping power of the torsional springs (see `take_sample`)."""
     for n in range(springs.ends.shape[0]):
         i, j = springs.ends[n, 0], springs.ends[n, 1]
-        energy[ELASTIC] += 0.5 * springs.stiffness[n] * (q[j] - q[i]) ** 2
-        energy[DISSIPATED] += stride * springs.damping[n] * (v[j] - v[i]) ** 2
+        twist, rate = q[j] - q[i], v[j] - v[i]
+        energy[ELASTIC] += 0.5 * springs.stiffness[n] * twist * twist
+        energy[DISSIPATED] += stride * springs.damping[n] * rate * rate
 
 
 @kernel

@@ -33,13 +33,17 @@ from exugear.kernels.meshes import (
     row_dot,
     turn_rows,
 )
-from exugear.kernels.table_law import NOMINAL_DEFLECTION, TableArrays
+from exugear.kernels.table_law import NOMINAL_DEFLECTION, Scratch, TableArrays, scratch_memory
 from exugear.tooth_mesh.laws.line_of_action import stiffness_law
-from exugear.tooth_mesh.laws.table import TABLE_FORM, add_table_tangent, table_force
+from exugear.tooth_mesh.laws.table import TABLE_FORM, TABLE_MEMORY, add_table_tangent, table_force
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.compilation import compiled, kernel
-from fe_ste.tools.inner_kernels import kept_bundle
+from fe_ste.tools.compilation import kernel
+from fe_ste.tools.inner_kernels import bundle, kept_bundle
 
+STATE, ACTING, ACTING_TURNING, GRADIENT, TURNING, BEND, SLOPE, BY_Q = range(8)
+BY_V, OF_TABLE = BY_Q + ROW_SIZE, BY_Q + 2 * ROW_SIZE
+MEMORY = OF_TABLE + TABLE_MEMORY
+"""Rows of the memory of `pass_meshes`, (`MEMORY`, 13): vectors of a mesh, and derivatives of its force."""
 _NOTHING, _NO_ROWS = np.zeros(0), np.zeros((0, 0))
 """No room for what `pass_meshes` fills."""
 
@@ -52,10 +56,10 @@ def row_law(
     return stiffness_law(coefficients, pieces, delta, pmc, cycling)
 
 
-@compiled
-def row_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, out: Floats, acting: Floats) -> None:
+@kernel
+def row_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Floats, out: Floats, acting: Floats) -> None:
     """Fill the state of a mesh with a law along a row, as in `mesh_state`, and its negative generalized force (13,)."""
-    gradient, turning, bend = np.empty(ROW_SIZE), np.empty(ROW_SIZE), np.empty(2)
+    gradient, turning, bend = memory[GRADIENT], memory[TURNING], memory[BEND]
     index = meshes.coordinates[m]
     # What deflects, and how fast.
     delta = meshes.table.nominal[m, NOMINAL_DEFLECTION]
@@ -77,16 +81,15 @@ def row_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, out: Floats, act
     out[CYCLE_POWER] = cycle_power
     out[OTHER_POWER] = force * (row_dot(index, acting, v) - rate)
     out[OUTSIDE] = 0.0
-    acting *= force
+    for i in range(ROW_SIZE):
+        acting[i] *= force
 
 
-@compiled
-def add_row_tangent(q: Floats, v: Floats, m: int, meshes: MeshArrays, jq: Floats, jv: Floats) -> None:
+@kernel
+def add_row_tangent(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Floats, jq: Floats, jv: Floats) -> None:
     """Add the derivatives of the negative force of a mesh with a law along a row, (13, 13)."""
-    gradient, turning, bend = np.empty(ROW_SIZE), np.empty(ROW_SIZE), np.empty(2)
-    acting, acting_turning = np.empty(ROW_SIZE), np.empty(ROW_SIZE)
-    slope = np.empty(ROW_SIZE)
-    index = meshes.coordinates[m]
+    gradient, turning, bend, slope = memory[GRADIENT], memory[TURNING], memory[BEND], memory[SLOPE]
+    acting, acting_turning, index = memory[ACTING], memory[ACTING_TURNING], meshes.coordinates[m]
     delta = meshes.table.nominal[m, NOMINAL_DEFLECTION]
     delta += net_deflection(q, m, meshes, meshes.deflection[m], 1.0, gradient, turning, bend)
     elastic, k, by_pmc, _, _ = row_law(
@@ -96,8 +99,8 @@ def add_row_tangent(q: Floats, v: Floats, m: int, meshes: MeshArrays, jq: Floats
     force = elastic + c * row_dot(index, gradient, v)
     # Slope of the scalar force: of the damper's rate, of the deflection, and of pmc by both its angles.
     rate_gradient(v, index, turning, bend, slope)
-    slope *= c
-    slope += k * gradient
+    for i in range(ROW_SIZE):
+        slope[i] = c * slope[i] + k * gradient[i]
     slope[SPIN_1] += by_pmc * meshes.cycles[m]
     slope[FRAME] -= by_pmc * meshes.cycles[m]
     # Product rule: the row times the force's slope, and the row's own turning times the force.
@@ -109,7 +112,7 @@ def add_row_tangent(q: Floats, v: Floats, m: int, meshes: MeshArrays, jq: Floats
     turn_rows(acting_turning, bend, force, jq)
 
 
-@compiled
+@kernel
 def pass_meshes(
     q: Floats,
     v: Floats,
@@ -119,20 +122,23 @@ def pass_meshes(
     f: Floats,
     jq: Floats,
     jv: Floats,
+    memory: Floats,
+    law_memory: Scratch | None,
 ) -> None:
     """Do for all meshes what the functions below say, where there is room for it.
 
-    One function does all, so that the laws are compiled once. `table` is that of `acting_table`.
+    One function does all, so that the laws are compiled once. `table` is that of `acting_table`, and the memory
+    of its law is there with it; `memory` is (`MEMORY`, 13).
     """
-    state, acting = np.empty(STATE_SIZE), np.empty(ROW_SIZE)
-    local_q, local_v = np.empty((ROW_SIZE, ROW_SIZE)), np.empty((ROW_SIZE, ROW_SIZE))
+    state, acting = memory[STATE], memory[ACTING]
+    local_q, local_v, of_table = memory[BY_Q:BY_V], memory[BY_V:OF_TABLE], memory[OF_TABLE:]
     for m in range(meshes.coordinates.shape[0]):
         index = meshes.coordinates[m]
         if f.size > 0 or states.size > 0:
             if meshes.form[m] == TABLE_FORM:
-                table_force(q, v, m, meshes, table, state, acting)
+                table_force(q, v, m, meshes, table, of_table, law_memory, state, acting)
             else:
-                row_force(q, v, m, meshes, state, acting)
+                row_force(q, v, m, meshes, memory, state, acting)
             for i in range(STATE_SIZE if states.size > 0 else 0):
                 states[m, i] = state[i]
             for i in range(ROW_SIZE):
@@ -144,9 +150,9 @@ def pass_meshes(
                     local_q[i, j], local_v[i, j] = 0.0, 0.0
             if meshes.form[m] == TABLE_FORM:
                 for side in (1, -1):
-                    add_table_tangent(q, v, m, side, meshes, table, local_q, local_v)
+                    add_table_tangent(q, v, m, side, meshes, table, of_table, law_memory, local_q, local_v)
             else:
-                add_row_tangent(q, v, m, meshes, local_q, local_v)
+                add_row_tangent(q, v, m, meshes, memory, local_q, local_v)
             for i in range(ROW_SIZE):
                 for j in range(ROW_SIZE):
                     if index[i] >= 0 and index[j] >= 0:
@@ -164,16 +170,22 @@ def _bundles(meshes: MeshArrays) -> tuple[MeshArrays, TableArrays | None]:
     return kept_bundle(meshes), None if table is None else kept_bundle(table)
 
 
+def _pass(q: Floats, v: Floats, meshes: MeshArrays, states: Floats, f: Floats, jq: Floats, jv: Floats) -> None:
+    bundled, table = _bundles(meshes)
+    law_memory = None if table is None else bundle(scratch_memory())
+    pass_meshes(q, v, bundled, table, states, f, jq, jv, np.empty((MEMORY, ROW_SIZE)), law_memory)
+
+
 def add_mesh_forces(q: Floats, v: Floats, meshes: MeshArrays, f: Floats) -> None:
     """Add the generalized forces of all meshes to f, shape of q."""
-    pass_meshes(q, v, *_bundles(meshes), _NO_ROWS, f, _NO_ROWS, _NO_ROWS)
+    _pass(q, v, meshes, _NO_ROWS, f, _NO_ROWS, _NO_ROWS)
 
 
 def add_mesh_jacobian(q: Floats, v: Floats, meshes: MeshArrays, jq: Floats, jv: Floats) -> None:
     """Add d f/dq and d f/dv of `add_mesh_forces` to jq and jv, each (n, n)."""
-    pass_meshes(q, v, *_bundles(meshes), _NO_ROWS, _NOTHING, jq, jv)
+    _pass(q, v, meshes, _NO_ROWS, _NOTHING, jq, jv)
 
 
 def mesh_state(q: Floats, v: Floats, meshes: MeshArrays, out: Floats) -> None:
     """Fill (m, 10): what each mesh does; columns as named in `exugear.kernels.meshes`."""
-    pass_meshes(q, v, *_bundles(meshes), out, _NOTHING, _NO_ROWS, _NO_ROWS)
+    _pass(q, v, meshes, out, _NOTHING, _NO_ROWS, _NO_ROWS)

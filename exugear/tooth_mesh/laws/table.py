@@ -51,7 +51,6 @@ from exugear.kernels.meshes import (
     STIFFNESS,
     MeshArrays,
     frame_row,
-    gear_position,
     mesh_pmc,
     net_deflection,
     rate_gradient,
@@ -76,7 +75,6 @@ from exugear.kernels.table_law import (
     ORDERS,
     Scratch,
     TableArrays,
-    scratch_memory,
     surface_law,
     surface_tangent,
 )
@@ -87,11 +85,14 @@ from exugear.tooth_mesh.law import Law, MeshData, TableFlanks
 from exugear.tooth_mesh.placement import MeshError, ToothContact, line_of_action_row, position_rows
 from exugear.tooth_mesh.tables import fitting_table, table_path, without_table
 from fe_ste.tools.arrays import Floats, Integers
-from fe_ste.tools.compilation import compiled, kernel
+from fe_ste.tools.compilation import kernel
 from fe_ste.transmission_error.surface import InterpolationError, SteSurface, axis_weights, slope_axis_weights
 from fe_ste.transmission_error.table import TableError
 
 TABLE_FORM = 1
+GRADIENT, TURNING, BEND, CHANGING, PUSH, GRADIENTS = range(6)
+SLOPES, SECOND, TABLE_MEMORY = GRADIENTS + 4, GRADIENTS + 8, GRADIENTS + 12
+"""Rows of the memory of `table_force` and `add_table_tangent`, (`TABLE_MEMORY`, 13)."""
 
 
 class Table(Law):
@@ -137,7 +138,7 @@ def _surface_of(mesh: Mesh, data: MeshData) -> SteSurface:
     return data
 
 
-@compiled
+@kernel
 def flank_of(side: int, m: int, meshes: MeshArrays, table: TableArrays) -> tuple[Floats, Floats, float, float, float]:
     """Rows of deflection and misalignment, deflection at zero coordinates, phase and cycles of one flank (1, -1)."""
     deflection = table.nominal[m, NOMINAL_DEFLECTION]
@@ -148,20 +149,36 @@ def flank_of(side: int, m: int, meshes: MeshArrays, table: TableArrays) -> tuple
     return table.back[m], table.back_misalignment[m], offset, table.back_phase[m], -meshes.cycles[m]
 
 
-@compiled
+@kernel
+def position_by(
+    q: Floats, m: int, meshes: MeshArrays, row: Floats, nominal: float, gradient: Floats, changing: Floats
+) -> float:
+    """Centre distance (m) or misalignment (rad) of mesh m by its row, whose gradient and change stay behind."""
+    value: float = nominal + frame_row(q, meshes.coordinates[m], meshes.axis[m], row, gradient, changing)
+    return value
+
+
+@kernel
 def table_force(
-    q: Floats, v: Floats, m: int, meshes: MeshArrays, table: TableArrays | None, out: Floats, acting: Floats
+    q: Floats,
+    v: Floats,
+    m: int,
+    meshes: MeshArrays,
+    table: TableArrays | None,
+    rows: Floats,
+    law_memory: Scratch | None,
+    out: Floats,
+    acting: Floats,
 ) -> None:
     """Fill the state of a mesh with a table, as in `mesh_state`, and its generalized force, negative (13,).
 
     `table` is None in a system without tables: nothing of their law is compiled then.
     """
-    if table is None:
+    if table is None or law_memory is None:
         return
-    memory = scratch_memory()
-    gradient, turning, bend = np.empty(ROW_SIZE), np.empty(ROW_SIZE), np.empty(2)
-    index, axis = meshes.coordinates[m], meshes.axis[m]
-    centre = gear_position(q, m, meshes, table.centre[m], table.nominal[m, NOMINAL_DISTANCE])
+    gradient, turning, bend, changing, push = rows[GRADIENT], rows[TURNING], rows[BEND], rows[CHANGING], rows[PUSH]
+    index = meshes.coordinates[m]
+    centre = position_by(q, m, meshes, table.centre[m], table.nominal[m, NOMINAL_DISTANCE], gradient, changing)
     spin, cycling = relative_spin(q, index, 0), relative_spin(v, index, 0)
     pmc = mesh_pmc(q, m, meshes)
     out[:] = 0.0
@@ -178,18 +195,20 @@ def table_force(
             continue
         # The table is that of the flank +1: on the other one it is seen from the other end of the gear.
         sense = side * table.sense[m]
-        misalignment = sense * gear_position(q, m, meshes, misalignment_row, table.nominal[m, NOMINAL_MISALIGNMENT])
+        nominal = table.nominal[m, NOMINAL_MISALIGNMENT]
+        misalignment = sense * position_by(q, m, meshes, misalignment_row, nominal, push, changing)
         pmc = phase + cycles * spin
-        surface_law(delta, pmc, centre, misalignment, m, table, 0, ORDERS.shape[0], memory)
-        law = memory.law
+        surface_law(delta, pmc, centre, misalignment, m, table, 0, ORDERS.shape[0], law_memory)
+        law = law_memory.law
         # Damping goes with the tangent stiffness, so that it fades as the teeth part.
         damping = table.damping_time[m] * law[LAW_STIFFNESS]
         force = law[LAW_FORCE] + damping * rate
         for i in range(ROW_SIZE):
             acting[i] += force * gradient[i]
         # Push between the axes and moment of misalignment, as one row.
-        push = law[LAW_BY_DISTANCE] * table.centre[m] + law[LAW_BY_MISALIGNMENT] * sense * misalignment_row
-        frame_row(q, index, axis, push, gradient, turning)
+        for i in range(FRAME):
+            push[i] = law[LAW_BY_DISTANCE] * table.centre[m, i] + law[LAW_BY_MISALIGNMENT] * sense * misalignment_row[i]
+        frame_row(q, index, meshes.axis[m], push, gradient, turning)
         for i in range(ROW_SIZE):
             acting[i] += gradient[i]
         out[STIFFNESS] += law[LAW_STIFFNESS]
@@ -200,44 +219,55 @@ def table_force(
         out[OUTSIDE] = max(out[OUTSIDE], law[LAW_OUTSIDE])
 
 
-@compiled
+@kernel
 def add_table_tangent(
-    q: Floats, v: Floats, m: int, side: int, meshes: MeshArrays, table: TableArrays | None, jq: Floats, jv: Floats
+    q: Floats,
+    v: Floats,
+    m: int,
+    side: int,
+    meshes: MeshArrays,
+    table: TableArrays | None,
+    rows: Floats,
+    law_memory: Scratch | None,
+    jq: Floats,
+    jv: Floats,
 ) -> None:
     """Add the derivatives of the negative force of one flank of a mesh with a table, (13, 13); None as there."""
-    if table is None:
+    if table is None or law_memory is None:
         return
-    memory = scratch_memory()
     index, axis = meshes.coordinates[m], meshes.axis[m]
     row, misalignment_row, offset, phase, cycles = flank_of(side, m, meshes, table)
     # Gradients of the four arguments of the law: delta, centre distance, misalignment, pmc.
-    gradients, slopes = np.zeros((4, ROW_SIZE)), np.zeros((4, ROW_SIZE))
-    turning, bend, changing = np.empty(ROW_SIZE), np.empty(2), np.empty(ROW_SIZE)
+    gradients, slopes, second = rows[GRADIENTS:SLOPES], rows[SLOPES:SECOND], rows[SECOND:TABLE_MEMORY]
+    turning, bend, changing, tilting = rows[TURNING], rows[BEND], rows[CHANGING], rows[PUSH]
     delta = offset + net_deflection(q, m, meshes, row, float(side), gradients[0], turning, bend)
     if delta <= table.lowest[m]:
         return
     centre = table.nominal[m, NOMINAL_DISTANCE] + frame_row(q, index, axis, table.centre[m], gradients[1], changing)
     sense = side * table.sense[m]
-    tilting = sense * misalignment_row
+    for i in range(FRAME):
+        tilting[i] = sense * misalignment_row[i]
     misalignment = sense * table.nominal[m, NOMINAL_MISALIGNMENT]
     misalignment += frame_row(q, index, axis, tilting, gradients[2], changing)
     pmc = phase + cycles * relative_spin(q, index, 0)
+    gradients[3, :] = 0.0
     gradients[3, SPIN_1], gradients[3, FRAME] = cycles, -cycles
-    piece, t = surface_law(delta, pmc, centre, misalignment, m, table, 0, ORDERS.shape[0], memory)
+    piece, t = surface_law(delta, pmc, centre, misalignment, m, table, 0, ORDERS.shape[0], law_memory)
     if t < 0.0:
         return
-    second = np.empty((4, 4))
-    surface_tangent(t, piece, m, table, memory, second)
-    law, time = memory.law, table.damping_time[m]
+    surface_tangent(t, piece, m, table, law_memory, second)
+    law, time = law_memory.law, table.damping_time[m]
     rate = row_dot(index, gradients[0], v)
     # Slopes of F, U_a and U_gamma over the coordinates, by the chain rule; those of the damping go with F.
-    for a in range(3):
-        for b in range(4):
-            slopes[a] += second[a, b] * gradients[b]
     rate_gradient(v, index, turning, bend, changing)
-    for b in range(4):
-        slopes[0] += time * rate * second[3, b] * gradients[b]
-    slopes[0] += time * law[LAW_STIFFNESS] * changing
+    for i in range(ROW_SIZE):
+        for a in range(3):
+            slopes[a, i] = 0.0
+            for b in range(4):
+                slopes[a, i] += second[a, b] * gradients[b, i]
+        for b in range(4):
+            slopes[0, i] += time * rate * second[3, b] * gradients[b, i]
+        slopes[0, i] += time * law[LAW_STIFFNESS] * changing[i]
     for a in range(3):
         for i in range(ROW_SIZE):
             for j in range(ROW_SIZE):
@@ -248,8 +278,9 @@ def add_table_tangent(
     # The rows turn with the frame: second derivatives of all three times what acts along them.
     turn_rows(turning, bend, law[LAW_FORCE] + time * law[LAW_STIFFNESS] * rate, jq)
     bend[:] = 0.0
-    push = law[LAW_BY_DISTANCE] * table.centre[m] + law[LAW_BY_MISALIGNMENT] * tilting
-    frame_row(q, index, axis, push, gradients[0], turning)
+    for i in range(FRAME):
+        tilting[i] = law[LAW_BY_DISTANCE] * table.centre[m, i] + law[LAW_BY_MISALIGNMENT] * tilting[i]
+    frame_row(q, index, axis, tilting, gradients[0], turning)
     turn_rows(turning, bend, 1.0, jq)
 
 

@@ -43,10 +43,8 @@ beginTheme(() => {
   drawCampbell();
   void redrawCharts(false);
 });
-if (hasRuns) {
-  beginSwitches();
-  beginLimit();
-} else beginSwitches();
+beginSwitches();
+if (hasRuns) beginLimit();
 beginTables();
 beginModeView();
 beginCampbell();

@@ -16,6 +16,9 @@ export const state = {
   limit: 0,
 };
 
+/** Stands for the loudest resonance: no place, so that it falls back to it. */
+const LOUDEST = -2;
+
 /** @type {((changed: Set<string>) => void)[]} */
 const listeners = [];
 
@@ -74,7 +77,9 @@ function mendRuns(group, choice) {
   const channels = variant.channels.map((channel) => channel.name);
   if (state.view === "difference" || !channels.includes(state.channel)) state.channel = "overall";
   const count = variant.resonances.length;
-  if (!(Number.isInteger(state.resonance) && state.resonance >= -1 && state.resonance < count)) state.resonance = 0;
+  if (!(Number.isInteger(state.resonance) && state.resonance >= -1 && state.resonance < count)) {
+    state.resonance = loudestOf(variant);
+  }
   if (!count) state.resonance = -1;
   const top = fastest(group);
   if (!(state.limit > 0 && state.limit <= top)) state.limit = top;
@@ -83,6 +88,15 @@ function mendRuns(group, choice) {
   if (moved) followResonance(variant, choice);
   if (!state.lines.length && pageData.lines.length) state.lines = [0];
 }
+
+/**
+ * Place of the loudest resonance that every window shows; of the loudest, if none is so steady.
+ * @param {import("./page_data.js").VariantData} variant
+ */
+const loudestOf = (variant) => Math.max(0, variant.resonances.findIndex((own) => own.steady));
+
+/** Choose the loudest resonance of what is chosen otherwise. @param {Partial<State>} choice */
+export const chooseLoudest = (choice) => choose({ ...choice, resonance: LOUDEST });
 
 /**
  * A resonance brings its mode and its order along.
@@ -122,5 +136,5 @@ export function recall() {
   }
   const lines = given.get("lines");
   if (lines) told.lines = lines.split(",").map(Number);
-  choose({ group: pageData.groups[0]?.name ?? "", variant: "", resonance: 0, ...told });
+  choose({ group: pageData.groups[0]?.name ?? "", variant: "", resonance: LOUDEST, ...told });
 }

@@ -2,7 +2,7 @@
 import { fillChoices, find, make, need, say } from "./dom.js";
 import { saveJson } from "./downloads.js";
 import { pageData } from "./page_data.js";
-import { choose, chosenGroup, chosenVariant, state } from "./state.js";
+import { choose, chooseLoudest, chosenGroup, chosenVariant, state } from "./state.js";
 
 /** Fill what is chosen among. */
 export function drawSwitches() {
@@ -12,12 +12,12 @@ export function drawSwitches() {
   const box = find("group");
   if (box) {
     const words = pageData.groups.map((own) => /** @type {[string, string]} */ ([own.name, groupWords(own)]));
-    fillChoices(box, words, state.group, (name) => choose({ group: name, resonance: 0 }));
+    fillChoices(box, words, state.group, (name) => chooseLoudest({ group: name }));
   }
   const variants = Object.entries(group.variants).map(
     ([name, own]) => /** @type {[string, string]} */ ([name, sentenceCase(own.words)]),
   );
-  const select = (/** @type {string} */ name) => choose({ variant: name, view: "variant", resonance: 0 });
+  const select = (/** @type {string} */ name) => chooseLoudest({ variant: name, view: "variant" });
   fillChoices(need("variant"), variants, state.variant, select);
   const views = [...variants];
   if (variants.length > 1) views.push(["difference", "Difference"]);

@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 from exugear.cli.app import app
 from exugear.studies.dataset import load_study
 
+from ..spur_case import COARSE_INPUT
 from ..study_case import written_case
 
 STUDY = """
@@ -120,3 +121,22 @@ def test_bad_input_is_told_and_nothing_written(study, old, new, words):
 def test_options_that_do_not_go_together_are_refused(study, options, words):
     outcome = sweep(study, *options)
     assert outcome.exit_code == 2 and words in outcome.stderr
+
+
+def test_a_report_shows_the_studies_of_its_folder(study, monkeypatch):
+    monkeypatch.setattr("exugear.tooth_mesh.tables.TableInput", COARSE_INPUT)
+    results = study.parent / "results"
+    swept = CliRunner().invoke(
+        app, ["sweep", str(study), "--workers", "1", "--out", str(results / "studies" / "seats")]
+    )
+    assert swept.exit_code == 0, swept.stderr
+    case = str(study.parent / "spur.toml")
+    modes = CliRunner().invoke(
+        app, ["modes", case, "--variant", "rigid", "--mesh-law", "iso6336", "--out", str(results)]
+    )
+    assert modes.exit_code == 0, modes.stderr
+    outcome = CliRunner().invoke(app, ["report", str(results)])
+    assert outcome.exit_code == 0, outcome.stderr
+    page = (results / "report.html").read_text(encoding="utf-8")
+    assert ">Studies<" in page and ">seats<" in page and 'alt="damping"' in page and "data:image/png;base64" in page
+    assert "changed since" not in page

@@ -16,17 +16,18 @@ import pytest
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.signals import signal_layout
 from exugear.dynamics.statics import accelerating_start
-from exugear.kernels.connectors import pass_connectors
-from exugear.kernels.meshes import STATE_SIZE
+from exugear.kernels.meshes import ROW_SIZE, STATE_SIZE
 from exugear.kernels.springs import add_spring_forces
+from exugear.kernels.table_law import scratch_memory
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.solvers.compiled.solver import CompiledSystem
 from exugear.solvers.compiled.step import choose_integration
 from exugear.solvers.loads import LoadTable
-from exugear.tooth_mesh.laws.forms import pass_meshes
+from exugear.tooth_mesh.laws.forms import MEMORY, pass_meshes
 
 from ..assembled import assembled
+from ..plain_connectors import add_forces
 from ..plain_signals import energies_of, sampled
 
 LOAD = {"carrier": 240e3, "hss": -3000.0}
@@ -42,9 +43,10 @@ passes through; so the limit is lower, and the law's account has one in terms of
 def mesh_powers(q, v, mesh, damping, out):
     """Fill (samples, 4) of one mesh: power into the bodies, damped, that of k(PMC) (W); elastic energy (J)."""
     f, state, none = np.empty(q.shape[1]), np.empty((1, STATE_SIZE)), np.empty((0, 0))
+    memory = np.empty((MEMORY, ROW_SIZE))
     for n in range(q.shape[0]):
         f[:] = 0.0
-        pass_meshes(q[n], v[n], mesh, mesh.table, state, f, none, none)
+        pass_meshes(q[n], v[n], mesh, mesh.table, state, f, none, none, memory, scratch_memory())
         out[n, 0] = np.dot(f, v[n])
         out[n, 1] = damping * state[0, 1] ** 2
         out[n, 2] = -state[0, 7]
@@ -54,10 +56,10 @@ def mesh_powers(q, v, mesh, damping, out):
 @numba.njit
 def bearing_powers(q, v, bearing, out):
     """Fill (samples,): power of one bearing into its bodies, W."""
-    f, none, no_tangents = np.empty(q.shape[1]), np.empty((0, 0)), np.empty((0, 0, 0))
+    f = np.empty(q.shape[1])
     for n in range(q.shape[0]):
         f[:] = 0.0
-        pass_connectors(q[n], v[n], np.empty(0), bearing, none, none, f, no_tangents)
+        add_forces(q[n], v[n], bearing, f)
         out[n] = np.dot(f, v[n])
 
 

@@ -12,10 +12,11 @@ import scipy.optimize
 
 from exugear.bearings.rolling.potential import rolling_arrays
 from exugear.bearings.rolling.rows import RollingRow
-from exugear.kernels.connectors import ConnectorArrays, add_connector_forces, pass_connectors
+from exugear.kernels.connectors import ConnectorArrays, add_connector_forces
 from exugear.kernels.inertia import InertiaArrays, accelerations, kinetic_energies
 from exugear.kernels.rolling import STORED, rolling_forces, rolling_memory, rolling_tangent
 
+from ..plain_connectors import add_forces
 from ..rolling_case import BALLS, CYLINDRICAL
 
 STEP = 1 / 60e3
@@ -96,13 +97,13 @@ def integrated(q, v, steps, connectors, inertia, pull):
     """States (steps + 1, 12) by the classical Runge-Kutta method."""
     out = np.empty((steps + 1, 12))
     out[0, :6], out[0, 6:] = q, v
-    rates, f, none = np.empty((4, 12)), np.empty(6), np.empty((0, 0))
+    rates, f = np.empty((4, 12)), np.empty(6)
     for n in range(steps):
         for stage in range(4):
             share = 0.0 if stage == 0 else STEP if stage == 3 else 0.5 * STEP
             state = out[n] + share * rates[stage - 1] if stage > 0 else out[n].copy()
             f[:] = pull
-            pass_connectors(state[:6], state[6:], np.empty(0), connectors, none, none, f, np.empty((0, 0, 0)))
+            add_forces(state[:6], state[6:], connectors, f)
             rates[stage, :6] = state[6:]
             accelerations(state[:6], state[6:], inertia, f, rates[stage, 6:])
         out[n + 1] = out[n] + STEP / 6.0 * (rates[0] + 2.0 * rates[1] + 2.0 * rates[2] + rates[3])

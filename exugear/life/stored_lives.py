@@ -1,0 +1,67 @@
+"""Lives in a results folder that belong to its case."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.fingerprint import input_hash
+from exugear.life.life import checked_loads, life_hash, rating_of
+from exugear.life.life_file import read_life
+from exugear.model.choice import Choice
+from exugear.model.gearbox import Gearbox
+from exugear.model.reading import CaseError
+from fe_ste.tools.files import FileError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@dataclass(frozen=True)
+class StoredLife:
+    """A file of a life.
+
+    Attributes
+    ----------
+    path : Path
+    data : xarray.Dataset or None
+        None where it does not belong to the case.
+    reason : str
+        Why it does not.
+    """
+
+    path: Path
+    data: xr.Dataset | None
+    reason: str = ""
+
+
+def stored_lives(
+    gearbox: Gearbox, folder: Path, assembled: Callable[[Choice], Assembly], tables: Mapping[str, str]
+) -> Iterator[StoredLife]:
+    """Read all lives of a folder.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+        Case of the folder.
+    folder : Path
+    assembled : callable
+        Gives the equations of a choice.
+    tables : mapping of pair name to str
+        Hashes of the tables that fit the case.
+    """
+    for path in sorted(folder.glob("*/*/life.nc")):
+        try:
+            data = read_life(path)
+            assembly = assembled(Choice(*(str(data.attrs[key]) for key in ("variant", "mesh_law", "inertias"))))
+            run = rating_of(gearbox).dynamic_factor_run
+            of_run = input_hash(assembly, run) if run is not None else ""
+            digest = life_hash(assembly, checked_loads(gearbox), tables, of_run)
+        except (FileError, CaseError, KeyError) as error:
+            yield StoredLife(path, None, str(error))
+            continue
+        fits = data.attrs["input_hash"] == digest
+        yield StoredLife(path, data if fits else None, "" if fits else "was computed from another input")

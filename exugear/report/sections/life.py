@@ -1,0 +1,113 @@
+"""Section "How long it lasts": damages of gears and bearings under the loads of a life, and what limits it."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import math
+
+import xarray as xr
+
+from exugear.findings.context import choice_of, words_of
+from exugear.life.life_diagrams import draw_life
+from exugear.life.life_file import limits
+from exugear.life.stored_lives import stored_lives
+from exugear.report.parts.material import Material, Part
+from exugear.web import pieces
+
+WORDS = (
+    "Loads of the gearbox file over its life, through the balance at rest of the variant and the contact of its teeth "
+    "by finite elements. Damage is Miner's sum: one is worn out. S is the factor on stress at which it is one; lives "
+    "of bearings are basic, without lubricant and cleanliness."
+)
+
+WIDTH = 850
+"""Of the picture, pixels."""
+
+
+def life_section(material: Material) -> Part:
+    """List what parts bear over the life, for each variant that was rated."""
+    context = material.context
+    if context.gearbox.case.loads is None:
+        return Part("")
+    tables = {name: table.input_hash for name, table in material.results.tables.items()}
+    content = []
+    for stored in stored_lives(context.gearbox, context.folder, context.assembled, tables):
+        if stored.data is None:
+            context.notes.left_out.append(f"{context.name_of(stored.path)}: {stored.reason}")
+        else:
+            content.append(_of_variant(stored.data))
+            worst = limits(stored.data)[0]
+            context.notes.statements.append(
+                f"{words_of(choice_of(stored.data.attrs))}: in {float(stored.data.attrs['life_years']):g} years "
+                f"{worst[0]} wears most, damage {worst[2]:.3g} ({worst[1]})."
+            )
+    if not content:
+        return Part("")
+    html = pieces.section("How long it lasts", pieces.paragraph(WORDS, "note"), *content, name="life")
+    return Part(html, {}, "How long it lasts", "life")
+
+
+def _of_variant(data: xr.Dataset) -> str:
+    name = words_of(choice_of(data.attrs))
+    label = f"life-{data.attrs['variant']}-{data.attrs['mesh_law']}"
+    rested = [*json.loads(data.attrs["assumptions"]), *json.loads(data.attrs["unrated"])]
+    return (
+        pieces.element("h3", pieces.text(f"{name}, gears by {data.attrs['edition']}"))
+        + _picture(data, f"What limits the life, {name}")
+        + pieces.table(_flank_rows(data), caption=f"Gears, {name}", name=f"{label}-gears", sortable=True)
+        + pieces.table(_bearing_rows(data), caption=f"Bearings, {name}", name=f"{label}-bearings", sortable=True)
+        + pieces.folded("What that rests on, and what has no life", pieces.bullets(rested))
+    )
+
+
+def _picture(data: xr.Dataset, words: str) -> str:
+    content = io.BytesIO()
+    draw_life(data).savefig(content, format="png", dpi=130)
+    source = f"data:image/png;base64,{base64.b64encode(content.getvalue()).decode()}"
+    return pieces.element("div", pieces.element("img", src=source, alt=words, width=WIDTH), class_="scroll")
+
+
+def _flank_rows(data: xr.Dataset) -> list[dict[str, object]]:
+    columns = {
+        "sigma_H / MPa": ("contact_stress", 1e-6, ".0f"),
+        "sigma_H0, ISO / MPa": ("nominal_contact", 1e-6, ".0f"),
+        "outside the path / %": ("outside", 100.0, ".1f"),
+        "pitting damage": ("contact_damage", 1.0, ".3g"),
+        "S_H": ("contact_safety", 1.0, ".2f"),
+        "sigma_F / MPa": ("root_stress", 1e-6, ".0f"),
+        "sigma_F0, ISO / MPa": ("nominal_root", 1e-6, ".0f"),
+        "root damage": ("root_damage", 1.0, ".3g"),
+        "S_F": ("root_safety", 1.0, ".2f"),
+        "static S_H": ("contact_static", 1.0, ".2f"),
+        "static S_F": ("root_static", 1.0, ".2f"),
+    }
+    return _rows(data, "flank", "gear, flank, mesh", columns)
+
+
+def _bearing_rows(data: xr.Dataset) -> list[dict[str, object]]:
+    columns = {
+        "largest load / kN": ("largest_load", 1e-3, ".4g"),
+        "equivalent load / kN": ("equivalent", 1e-3, ".4g"),
+        "L10 / h": ("basic_hours", 1.0, ".3g"),
+        "L10r / h": ("reference_hours", 1.0, ".3g"),
+        "damage by L10r": ("reference_damage", 1.0, ".3g"),
+        "pressure / MPa": ("pressure", 1e-6, ".0f"),
+        "S_0": ("static_safety", 1.0, ".2f"),
+    }
+    return _rows(data, "bearing", "bearing", columns)
+
+
+def _rows(
+    data: xr.Dataset, name: str, first: str, columns: dict[str, tuple[str, float, str]]
+) -> list[dict[str, object]]:
+    return [
+        {first: label, **{title: _told(data, name, place, *column) for title, column in columns.items()}}
+        for place, label in enumerate(data[name].to_numpy().tolist())
+    ]
+
+
+def _told(data: xr.Dataset, name: str, place: int, key: str, factor: float, form: str) -> str:
+    value = factor * float(data[f"{name}_{key}"][place])
+    return "" if math.isnan(value) else "no end" if math.isinf(value) else format(value, form)

@@ -1,0 +1,48 @@
+"""The section of the report on lives: what fits the case is shown, what does not is left out and told."""
+
+from __future__ import annotations
+
+import tomllib
+
+import pytest
+
+from exugear.model.choice import Choice
+from exugear.model.gearbox import Gearbox
+from exugear.project import Project
+from exugear.report.writer import write_report
+
+from ..spur_case import COARSE_INPUT, SPUR_CASE
+
+LOADS = {"body": "shaft_1", "life_years": 10.0, "sources": {"s": {"file": "loads.csv", "hours_per_year": 1000.0}}}
+STRENGTH = {
+    "sigma_H_lim_MPa": 1500.0,
+    "sigma_F_lim_MPa": 500.0,
+    "curve": "case_hardened",
+    "roughness_um": 4.8,
+    "root_factor": 1.0,
+}
+
+
+@pytest.fixture
+def project(tmp_path, monkeypatch) -> Project:
+    monkeypatch.setattr("exugear.tooth_mesh.tables.TableInput", COARSE_INPUT)
+    (tmp_path / "loads.csv").write_text("torque_N_m,speed_rpm,hours\n100,1500,3\n200,1000,1\n")
+    content = tomllib.loads(SPUR_CASE)
+    rating = {"dynamic_factor": 1.0, "viscosity_40_mm2_per_s": 320.0, "gears": {"pinion": STRENGTH}}
+    gearbox = Gearbox.from_dict(content | {"loads": LOADS, "rating": rating}, str(tmp_path / "gearbox.toml"))
+    return Project(gearbox, tmp_path / "out", Choice("bushing", "line_of_action"))
+
+
+def test_a_report_tells_what_limits_the_life_and_leaves_out_what_does_not_fit(project):
+    project.life()
+    report = write_report(project.folder)
+    page = report.path.read_text(encoding="utf-8")
+    section = page[page.index('<section id="life"') :]
+    assert "pinion + spur" in section and "S_H" in section and "data:image/png;base64," in section
+    assert "bearing_1: given by its stiffness alone" in section
+    assert any("pinion + spur wears most" in line for line in report.statements)
+    other = project.gearbox.varied({"rating.dynamic_factor": 1.3})
+    Project(other, project.folder, project.choice).keep_case()
+    again = write_report(project.folder)
+    assert any("life.nc: was computed from another input" in line for line in again.left_out)
+    assert '<section id="life"' not in again.path.read_text(encoding="utf-8")
