@@ -13,11 +13,12 @@ import tomllib
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from exugear import Choice, Gearbox, Project
-from exugear.pictures.run_diagrams import plot_order_levels
 from exugear.spectra.orders import order_lines
 from exugear.spectra.run_spectra import run_waterfall
+from exugear.spectra.waterfall import line_level
 from exugear.templates.kinds import template
 
 plain = Gearbox.from_dict(tomllib.loads(template("parallel")))
@@ -41,7 +42,13 @@ for name, project in designs.items():
 
 spectra = {name: run_waterfall(project.run().path) for name, project in designs.items()}
 lines = order_lines(plain, count=1)
-plot_order_levels(spectra, lines)
+figure = Figure(figsize=(9.0, 3.4), layout="constrained")
+for panel, line in zip(figure.subplots(1, len(lines)), lines, strict=True):
+    for name, waterfall in spectra.items():
+        panel.plot(waterfall.speed * 30.0 / np.pi, line_level(waterfall, line), label=name)
+    panel.set(title=line.name, xlabel="input speed / rpm", ylabel="level / dB re 1 um")
+    panel.grid(True)
+    panel.legend()
 
 # %%
 # The loudest level of each, in dB re 1 um. A relief changes what excites; where the gearbox rings stays where it is.
