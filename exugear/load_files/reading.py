@@ -24,7 +24,7 @@ def read_channels(path: str | Path) -> Channels:
 
     Examples
     --------
-    >>> series = read_channels("tests/exugear/load_files/data/oc3_hywind_test1.outb")
+    >>> series = read_channels("cases/grc750/loads/oc3_hywind_test1.outb")
     >>> series
     <Channels of oc3_hywind_test1.outb: 4 over 6001 steps>
     >>> round(float(series.channel("LSShftTq", "torque").mean()), 1)

@@ -84,7 +84,7 @@ def bearing_turns(gearbox: Gearbox, body: str) -> dict[str, float]:
     A planet turns on its pin by the teeth of the ring over its own per turn of the carrier:
 
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
-    >>> round(bearing_turns(gearbox, "carrier")["pl_a_planet_1"], 6), round(99 / 39, 6)
+    >>> round(bearing_turns(gearbox, "carrier")["pl_a_1"], 6), round(99 / 39, 6)
     (2.538462, 2.538462)
     """
     spins = gearbox.train.rolling_speeds(body, 1.0)

@@ -28,7 +28,7 @@ from exugear.model.parts import (
     stiffness_matrix,
 )
 from exugear.model.reading import CaseError, parse_case, read_toml, shortened
-from exugear.model.sections.case import CaseFile, SteSection
+from exugear.model.sections.case import CaseFile, SteSection, labels_in_use
 from exugear.model.sections.quantities import unusual_values
 from exugear.train.train import Train
 from fe_ste.flanks.modifications import FlankModification
@@ -105,6 +105,8 @@ class Gearbox:
     def varied(self, changes: Mapping[str, Any]) -> Gearbox:
         """Build a new, checked gearbox with some keys replaced; keys are dotted paths of the file.
 
+        Labels of entries that are gone go with them.
+
         Raises
         ------
         CaseError
@@ -125,6 +127,7 @@ class Gearbox:
                 if not isinstance(section, dict):
                     raise self.fault(f"{dotted}: {parent!r} is not a section")
             section[key] = value
+        content["labels"] = labels_in_use(content)
         return Gearbox.from_dict(content, self.source, self.permissions)
 
     def fault(self, text: str) -> CaseError:

@@ -54,7 +54,7 @@ def mass_properties(tubes: Iterable[Tube]) -> MassProperties:
     Examples
     --------
     >>> disc = mass_properties([Tube(start=0.0, length=0.1, outer=0.2, inner=0.0, density=7850.0)])
-    >>> round(disc.mass, 3), round(disc.axial, 5), round(disc.transverse, 5), disc.centre
+    >>> round(disc.mass, 3), round(disc.axial, 5), round(disc.transverse, 5), round(disc.centre, 5)
     (24.662, 0.12331, 0.08221, 0.05)
     """
     return together(_of_one(tube) for tube in tubes)

@@ -7,7 +7,8 @@ checks them against each other.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
@@ -176,6 +177,12 @@ Label = Annotated[Text, Field(min_length=1, max_length=80)]
 """Words for a name: short, since tables and diagrams hold them."""
 _NAMED = ("bodies", "bearings", "joints", "mounts", "couplings", "meshes", "pairs", "gears", "load_cases", "pins")
 """Tables whose entries may have a label."""
+
+
+def labels_in_use(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Labels in the content of a gearbox file whose entries are there."""
+    known = {name for table in _NAMED for name in content.get(table, {})}
+    return {name: words for name, words in content.get("labels", {}).items() if name in known}
 
 
 class CaseFile(Section):

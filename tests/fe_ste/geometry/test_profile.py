@@ -131,7 +131,9 @@ def least_rack_clearance(gear: Gear, points: Floats) -> Floats:
 
 
 def sampled_profile(gear: Gear, profile: ToothProfile) -> Floats:
-    radius = np.linspace(profile.form_radius, min(profile.tip_radius, gear.reference_radius), 20)
+    # A large shift lifts the form circle above the reference circle.
+    top = min(profile.tip_radius, max(gear.reference_radius, 1.01 * profile.form_radius))
+    radius = np.linspace(profile.form_radius, top, 20)
     root = np.linspace(polar(profile.fillet)[1][-1], 0.5 * gear.angular_pitch, 5)
     land = profile.root_radius * np.column_stack((np.cos(root), np.sin(root)))
     return np.vstack((profile.flank(radius), profile.fillet, land))
