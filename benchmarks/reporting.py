@@ -626,7 +626,6 @@ def steady_section(part: Results) -> str:
     )
 
 
-<<<<<<< HEAD
 def loads_section(part: Results) -> str:
     """Table of the cost of a life."""
     return "\n".join(
@@ -637,7 +636,10 @@ def loads_section(part: Results) -> str:
             f"read, counted, static balance at 12 angles, gears, bearings. Processor time, medians of {part['rounds']} "
             f"rounds; stresses of the pairs, once: {number(part['stresses_s'])} s.\n",
             table(["loads", "s"], [[row["loads"], number(row["processor_s"])] for row in part["rows"]]),
-=======
+        ]
+    )
+
+
 def studies_section(part: Results) -> str:
     """Tables of studies."""
     own = part["overhead"]
@@ -666,7 +668,6 @@ def studies_section(part: Results) -> str:
                     f"takes {duration(own['restart_s'])}.",
                 ]
             ),
->>>>>>> 80e64981fb6b4cc34e48af50989d71a7f71344aa
         ]
     )
 
@@ -679,11 +680,8 @@ SECTIONS = {
     "elastic": elastic_section,
     "bearings": bearings_section,
     "steady": steady_section,
-<<<<<<< HEAD
     "loads": loads_section,
-=======
     "studies": studies_section,
->>>>>>> 80e64981fb6b4cc34e48af50989d71a7f71344aa
 }
 
 

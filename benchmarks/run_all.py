@@ -76,19 +76,18 @@ def measure_steady(quick: bool) -> dict[str, Any]:
     return steady.measure(quick)
 
 
-<<<<<<< HEAD
 def measure_loads(quick: bool) -> dict[str, Any]:
     """See `loads`."""
     import loads
 
     return loads.measure(quick)
-=======
+
+
 def measure_studies(quick: bool) -> dict[str, Any]:
     """See `studies`."""
     import studies
 
     return studies.measure(quick)
->>>>>>> 80e64981fb6b4cc34e48af50989d71a7f71344aa
 
 
 PARTS: dict[str, Callable[[bool], dict[str, Any]]] = {
@@ -99,11 +98,8 @@ PARTS: dict[str, Callable[[bool], dict[str, Any]]] = {
     "elastic": measure_elastic,
     "bearings": measure_bearings,
     "steady": measure_steady,
-<<<<<<< HEAD
     "loads": measure_loads,
-=======
     "studies": measure_studies,
->>>>>>> 80e64981fb6b4cc34e48af50989d71a7f71344aa
 }
 
 
