@@ -77,7 +77,7 @@ def try_wheel(python: str, wheel: Path, constraint: Path | None) -> None:
         for kind in ("pair", "planetary"):
             run(home, exugear, "new", f"{kind}.toml", "--kind", kind)
             run(home, exugear, "check", f"{kind}.toml")
-        run(home, exugear, "ste", "pair.toml", "--positions", "2", "--out", "results")
+        run(home, exugear, "ste", "pair.toml", "--positions", "8", "--out", "results")
         run(home, exugear, "check", home / "env" / GRC)
 
 
