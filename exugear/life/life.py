@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,6 +41,8 @@ class Life:
     bearings : tuple of BearingLife
     unrated : tuple of str
         Why parts have no life.
+    shortfalls : tuple of str
+        Flanks and roots whose safety is less than `[rating]` asks for.
     assumptions : tuple of str
         What the figures rest on.
     input_hash : str
@@ -56,6 +59,7 @@ class Life:
     flanks: tuple[FlankLife, ...]
     bearings: tuple[BearingLife, ...]
     unrated: tuple[str, ...]
+    shortfalls: tuple[str, ...]
     assumptions: tuple[str, ...]
     input_hash: str
 
@@ -171,9 +175,27 @@ def compute_life(
         flanks=flanks,
         bearings=bearings,
         unrated=tuple(_unrated(assembly, counted, stresses)),
+        shortfalls=tuple(shortfalls(rating, flanks)),
         assumptions=tuple(_assumptions(rating, counted, found, balance, stresses, dynamic)),
         input_hash=digest,
     )
+
+
+def shortfalls(rating: RatingSection, flanks: Iterable[FlankLife]) -> Iterator[str]:
+    """Tell which flanks and roots have less safety, over the life or under the largest load, than is asked for.
+
+    Parameters
+    ----------
+    rating : RatingSection
+        Its `least_S_H` and `least_S_F`; nothing is asked for without.
+    flanks : iterable of FlankLife
+    """
+    for one in flanks:
+        of_flank, of_root = (one.contact_safety, one.contact_static), (one.root_safety, one.root_static)
+        for name, found, asked in (("S_H", of_flank, rating.least_S_H), ("S_F", of_root, rating.least_S_F)):
+            least = min((value for value in found if not math.isnan(value)), default=math.inf)
+            if asked is not None and least < asked:
+                yield f"{one.gear} {one.flank} {one.family}: {name} = {least:.2f}, {asked:g} is asked for"
 
 
 def _hub_in_words(counted: CountedLoads) -> str:

@@ -102,9 +102,9 @@ def _tell(data: xr.Dataset) -> None:
     if worst:
         rows = [{"limits": part, "by": kind, "damage": f"{damage:.3g}"} for part, kind, damage in worst]
         print_table(f"What limits the life of {float(data.attrs['life_years']):g} years", rows)
-    for key in ("assumptions", "unrated"):
+    for key, style in (("assumptions", ""), ("unrated", "yellow"), ("shortfalls", "red")):
         for line in json.loads(data.attrs[key]):
-            note(line, style="yellow" if key == "unrated" else "")
+            note(line, style=style)
 
 
 def _contact_rows(data: xr.Dataset) -> list[dict[str, str]]:

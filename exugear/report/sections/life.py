@@ -52,9 +52,10 @@ def life_section(material: Material) -> Part:
 def _of_variant(data: xr.Dataset) -> str:
     name = words_of(choice_of(data.attrs))
     label = f"life-{data.attrs['variant']}-{data.attrs['mesh_law']}"
-    rested = [*json.loads(data.attrs["assumptions"]), *json.loads(data.attrs["unrated"])]
+    rested = [line for key in ("assumptions", "unrated") for line in json.loads(data.attrs[key])]
     return (
         pieces.element("h3", pieces.text(f"{name}, gears by {data.attrs['edition']}"))
+        + "".join(pieces.paragraph(f"Too little safety: {line}.") for line in json.loads(data.attrs["shortfalls"]))
         + _picture(data, f"What limits the life, {name}")
         + pieces.table(_flank_rows(data), caption=f"Gears, {name}", name=f"{label}-gears", sortable=True)
         + pieces.table(_bearing_rows(data), caption=f"Bearings, {name}", name=f"{label}-bearings", sortable=True)

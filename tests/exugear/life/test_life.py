@@ -22,7 +22,7 @@ from exugear.kernels.meshes import FORCE
 from exugear.life.acting_loads import acting_loads
 from exugear.life.dynamic_factor import stated_factors
 from exugear.life.gear_life import flank_lives
-from exugear.life.life import checked_loads, compute_life, rating_of
+from exugear.life.life import checked_loads, compute_life, rating_of, shortfalls
 from exugear.life.life_diagrams import damage_matrix
 from exugear.life.life_file import limits, read_life
 from exugear.life.pair_stresses import pair_stresses
@@ -31,6 +31,7 @@ from exugear.load_spectrum.counted import count_loads
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
+from exugear.model.sections.loads import RatingSection
 from exugear.project import Project
 from fe_ste.root_stress.mesh_cycle import MeshCycleStress
 from fe_ste.standards.pitting import nominal_contact_stress
@@ -153,6 +154,17 @@ def test_safety_is_the_factor_on_stress_at_which_the_damage_is_one(tmp_path, str
         scaled = f"torque_N_m,speed_rpm,hours\n{100 * factor:.9g},1500,3\n{200 * factor:.9g},1000,1\n"
         more = lives(spur_project(tmp_path, scaled), stresses)["pinion +"]
         assert getattr(more, damage) == pytest.approx(1.0, rel=1e-3)
+
+
+def test_safeties_below_what_is_asked_for_are_named(tmp_path, stresses):
+    flanks = [*lives(spur_project(tmp_path, TABLE), stresses).values()]
+    least = min(min(one.contact_safety, one.contact_static) for one in flanks)
+    asked = {"dynamic_factor": 1.0, "viscosity_40_mm2_per_s": 320.0}
+    assert not list(shortfalls(RatingSection(**asked), flanks))
+    assert not list(shortfalls(RatingSection(**asked, least_S_H=0.999 * least), flanks))
+    told = list(shortfalls(RatingSection(**asked, least_S_H=1.001 * least), flanks))
+    assert len(told) == 1
+    assert f"S_H = {least:.2f}" in told[0]
 
 
 def test_bins_do_the_damage_of_the_series(tmp_path, stresses):
