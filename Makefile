@@ -151,7 +151,6 @@ docs: $(DOCS_INSTALLED)
 	$(call end,$(SITE))
 
 dist: $(INSTALLED)
-	@$(RUN)/python -c 'import build' 2>/dev/null || $(PIP) install build
 	$(RUN)/python packaging/build.py --out dist --url "$(PROJECT_URL)"
 
 wheel-test: dist
