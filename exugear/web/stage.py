@@ -36,13 +36,15 @@ def stage_data(
         Modes in which elastic bodies deform; in the others they move as a whole, which takes less room.
     """
     bodies = drawn_bodies(assembly)
-    points = np.concatenate([body.shape.surface.points for body in bodies])
+    # A rotor of stated inertias has no shape to draw: the stage is empty then.
+    points = np.concatenate([np.zeros((0, 3)), *(body.shape.surface.points for body in bodies)])
+    low, high = (points.min(axis=0), points.max(axis=0)) if bodies else (np.zeros(3), np.ones(3))
     modes = [drawn_mode(assembly, bodies, shapes[:, n], n in deformed) for n in range(shapes.shape[1])]
     fields = {place: n for n, place in enumerate(p for p, body in enumerate(bodies) if body.field is not None)}
     return {
         "bodies": _bodies(bodies, labels, arrays),
-        "centre": rounded_list(0.5 * (points.min(axis=0) + points.max(axis=0)), 6),
-        "diagonal": rounded(float(np.linalg.norm(np.ptp(points, axis=0))), 6),
+        "centre": rounded_list(0.5 * (low + high), 6),
+        "diagonal": rounded(float(np.linalg.norm(high - low)), 6),
         "amplitude": LARGEST,
         "motions": arrays.add(np.array([mode.motions for mode in modes], dtype="f4")),
         "deformed": {

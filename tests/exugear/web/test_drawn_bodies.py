@@ -20,6 +20,7 @@ from exugear.web.drawn_bodies import drawn_bodies, drawn_mode, turn_between
 from exugear.web.mode_page import write_mode_page
 from exugear.web.stage import stage_data
 
+from .. import gear_trains
 from ..assembled import assembled
 from ..spur_case import SPUR_CASE
 
@@ -37,6 +38,13 @@ def elastic():
     content["bearings"]["bearing_1"]["z_mm"] = 40.0
     content["elasticity"] = {"band_Hz": 12e3, "limit_Hz": 30e3}
     return assembled(Gearbox.from_dict(content), Choice("flexible"), {"spur": 3e8})
+
+
+def test_a_rotor_of_stated_inertias_has_an_empty_stage():
+    assembly = assembled(Gearbox.from_dict(gear_trains.rotor()), Choice("bushing"), {})
+    stage = stage_data(assembly, np.eye(assembly.size)[:, :2], {}, ArrayStore(), ())
+    assert stage["bodies"] == []
+    assert stage["diagonal"] > 0.0
 
 
 def test_planets_are_drawn_from_one_shape():
