@@ -46,7 +46,7 @@ UNITS: dict[str, Unit] = {
     "deg": Unit("angle", _TURN / 360.0),
     "rad": Unit("angle", 1.0),
 }
-"""Units that are understood, as `plain_unit` writes them, without capitals: no file writes mN for a millinewton."""
+"""Units that are understood, as `plain_unit` writes them, without capitals."""
 SI_NAMES = {"torque": "N m", "force": "N", "speed": "rad/s", "time": "s", "angle": "rad"}
 USUAL_NAMES = {"torque": "kN-m", "force": "kN", "speed": "rpm", "time": "s", "angle": "deg"}
 """Units that a message names as examples."""
@@ -65,11 +65,13 @@ def plain_unit(text: str) -> str:
 
 
 def unit_of(text: str) -> Unit | None:
-    """Look up a unit; None for one that is not understood.
+    """Look up a unit; None for one that is not understood, millinewtons among them: they are not meganewtons.
 
     Examples
     --------
-    >>> unit_of("(kN·m)"), unit_of("furlong")
-    (Unit(quantity='torque', factor=1000.0), None)
+    >>> unit_of("(kN·m)"), unit_of("furlong"), unit_of("mNm")
+    (Unit(quantity='torque', factor=1000.0), None, None)
     """
+    if text.strip(" ()[]").startswith("mN"):
+        return None
     return UNITS.get(plain_unit(text))
