@@ -69,7 +69,9 @@ def build(out: Path, url: str) -> list[Path]:
         for name, changed in (("README.md", with_links), ("pyproject.toml", with_urls)):
             path = copy / name
             path.write_text(changed(path.read_text(encoding="utf-8"), url), encoding="utf-8")
-        subprocess.run([sys.executable, "-m", "build", "--outdir", str(out.resolve()), str(copy)], check=True, cwd=copy.parent)
+        command = [sys.executable, "-m", "build", "--outdir", str(out.resolve()), str(copy)]
+        # Elsewhere than here, where a folder build would stand before the package of that name.
+        subprocess.run(command, check=True, cwd=copy.parent)
     return sorted(out.iterdir())
 
 
