@@ -426,9 +426,17 @@ def bodies_of_forces(assembly: Assembly) -> dict[str, str]:
     return {"mesh_bodies": "; ".join(meshes), "support_bodies": "; ".join(supports)}
 
 
+STEADY_CHANGE = 1e-3
+"""Change of kinetic energy, over the kinetic energy, below which a run counts as one at constant speed."""
+
+
 def energy_residual(data: xr.Dataset | Mapping[str, Floats]) -> float:
-    """Part of the change of kinetic energy that the account of a run does not explain; NaN without a change."""
+    """Energy that the account of a run does not explain, over the change of kinetic energy; NaN if nothing moves.
+
+    At constant speed the change says nothing: below `STEADY_CHANGE` of the kinetic energy, that itself is the measure.
+    """
     change = {term: float(data[term][-1] - data[term][0]) for term in BALANCE_TERMS}
     explained = sum(value for term, value in change.items() if term != "work_of_loads")
-    kinetic = change["kinetic_energy"]
-    return (change["work_of_loads"] - explained) / kinetic if kinetic else math.nan
+    kinetic, last = change["kinetic_energy"], float(data["kinetic_energy"][-1])
+    scale = kinetic if abs(kinetic) > STEADY_CHANGE * last else last
+    return (change["work_of_loads"] - explained) / scale if scale else math.nan

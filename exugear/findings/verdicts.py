@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -91,7 +92,7 @@ def verdicts_of(context: Context, group: RunGroup, figures: RunFigures) -> tuple
 
 def _of_run(run: VariantRun, figures: RunFigures) -> list[Verdict]:
     residual, (pulling, apart, outside) = abs(figures.residual), figures.times
-    verdicts = [Verdict(residual < ENERGY, f"energy adds up to {residual:.0e}")]
+    verdicts = [] if math.isnan(residual) else [Verdict(residual < ENERGY, f"energy adds up to {residual:.0e}")]
     doubtful = verdict_of(run.attributes)
     if doubtful:
         verdicts.append(Verdict(False, f"the run is not to be trusted: {doubtful}"))
