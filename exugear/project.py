@@ -279,7 +279,7 @@ class Project:
         if any(request.stored is None for request in self.life_tables()):
             self.tables(grid=LAWS[self.choice.mesh_law].needs_axes)
         requests = self.life_tables()
-        tables = {request.name: request.wanted.hash for request in requests}
+        tables = {request.name: request.stored.input_hash for request in requests if request.stored is not None}
         rating = rating_of(self.gearbox)
         dynamic = factors(assembly, rating, self.folder, counted.body)
         digest = life_hash(assembly, counted, tables, source_hash(assembly, rating, self.folder))
