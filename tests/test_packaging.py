@@ -40,7 +40,8 @@ def test_a_type_checker_elsewhere_finds_both_packages_in_the_editable_install(tm
     if not any(file.suffix == ".pth" for file in distribution("exugear").files or ()):
         pytest.skip("exugear is not installed as editable here")
     script = tmp_path / "use.py"
-    script.write_text("import exugear\nfrom fe_ste.tools.versions import TABLE\nnumber: str = TABLE\n", encoding="utf-8")
+    wrong = "import exugear\nfrom fe_ste.tools.versions import TABLE\nnumber: str = TABLE\n"
+    script.write_text(wrong, encoding="utf-8")
     # All of exugear would take half a minute: that it is found is enough.
     (tmp_path / "mypy.ini").write_text("[mypy]\n[mypy-exugear.*]\nfollow_imports = skip\n", encoding="utf-8")
     environment = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "MYPYPATH")}

@@ -141,7 +141,7 @@ def _unchecked(name: str, section: GearSection) -> UncheckedGear:
         rack=BasicRack(section.rack.addendum, section.rack.dedendum, section.rack.tip_radius),
         tip_diameter=None if section.tip_diameter_mm is None else section.tip_diameter_mm * 1e-3,
         root_diameter=None if section.root_diameter_mm is None else section.root_diameter_mm * 1e-3,
-        tooth_thinning=section.tooth_thinning_mm * 1e-3,
+        tooth_thinning=sum(thinning_range(section)) / 2.0,
         material=Material(
             youngs_modulus=section.material.youngs_modulus_GPa * 1e9,
             poissons_ratio=section.material.poissons_ratio,
@@ -150,6 +150,15 @@ def _unchecked(name: str, section: GearSection) -> UncheckedGear:
         tip_form_diameter=None if section.tip_form_diameter_mm is None else section.tip_form_diameter_mm * 1e-3,
         root_form_diameter=None if section.root_form_diameter_mm is None else section.root_form_diameter_mm * 1e-3,
     )
+
+
+def thinning_range(section: GearSection) -> tuple[float, float]:
+    """Least and greatest thinning of a gear's teeth, transverse section, m; both are the same without allowances."""
+    allowances = section.tooth_thickness
+    if allowances is None:
+        return section.tooth_thinning_mm * 1e-3, section.tooth_thinning_mm * 1e-3
+    transverse = -1e-6 / math.cos(math.radians(section.helix_angle_deg))
+    return transverse * allowances.upper_allowance_um, transverse * allowances.lower_um
 
 
 def margins_of_roots(pairs: Iterable[GearPair]) -> Iterator[str]:

@@ -171,6 +171,32 @@ class UncheckedGear:
         return (0.5 * math.pi + shift - self.tooth_thinning / self.transverse_module) / self.teeth
 
     @property
+    def normal_tooth_thickness(self) -> float:
+        """Tooth thickness on the reference circle in the normal section, m (ISO 21771: s_n less the thinning)."""
+        return 2.0 * self.reference_radius * self.reference_half_angle * math.cos(self.helix_angle)
+
+    @property
+    def usual_span(self) -> int:
+        """Number of teeth over which `span_measurement` touches external flanks nearest to their middle."""
+        middle = self.reference_radius + self.normal_module * self.profile_shift
+        half_length = math.sqrt(max(middle**2 - self.base_radius**2, 0.0)) * math.cos(self.base_helix_angle)
+        pitch = self.transverse_base_pitch * math.cos(self.base_helix_angle)
+        return max(2, round((2.0 * half_length - self.span_measurement(0)) / pitch))
+
+    def span_measurement(self, teeth: int) -> float:
+        """Distance of parallel planes that touch opposite external flanks, m (ISO 21771: base tangent length W_k).
+
+        The base pitches between the teeth and the thickness of one at the base circle, normal to the flanks.
+
+        Parameters
+        ----------
+        teeth : int
+            How many are between the planes, k.
+        """
+        thickness = 2.0 * self.base_radius * self.half_angle(self.base_radius)
+        return ((teeth - 1) * self.transverse_base_pitch + thickness) * math.cos(self.base_helix_angle)
+
+    @property
     def tip_thickness(self) -> float:
         """Tooth thickness at the tip circle in the normal section, m."""
         helix_angle = math.atan(self.tip_radius / self.reference_radius * math.tan(self.helix_angle))

@@ -77,6 +77,39 @@ class ModificationSection(Section):
         return self
 
 
+class ToothThicknessSection(Section):
+    """Allowances of the tooth thickness on the reference circle, normal section, negative (DIN 3967: A_sne, A_sni).
+
+    Teeth are computed with their mean: it thins them by its amount over the cosine of the helix angle in the transverse
+    section. The ends give the least and the greatest backlash that `exugear check` tells.
+    """
+
+    upper_allowance_um: q.AllowanceUm
+    """Upper allowance, nearer to zero: of the thickest tooth."""
+    lower_allowance_um: q.AllowanceUm | None = None
+    """Lower allowance, of the thinnest tooth; or the next key."""
+    tolerance_um: q.AllowanceRangeUm | None = None
+    """Tolerance, the upper less the lower allowance (DIN 3967: T_sn), instead of the lower one."""
+
+    @model_validator(mode="after")
+    def _two_ends(self) -> ToothThicknessSection:
+        if (self.lower_allowance_um is None) == (self.tolerance_um is None):
+            raise ValueError("give one of lower_allowance_um and tolerance_um beside upper_allowance_um")
+        if self.lower_allowance_um is not None and self.lower_allowance_um > self.upper_allowance_um:
+            raise ValueError(
+                f"lower_allowance_um = {self.lower_allowance_um:g} must not be above upper_allowance_um = "
+                f"{self.upper_allowance_um:g}: both are negative"
+            )
+        return self
+
+    @property
+    def lower_um(self) -> float:
+        """Lower allowance, given or by the tolerance."""
+        if self.lower_allowance_um is not None:
+            return self.lower_allowance_um
+        return self.upper_allowance_um - (self.tolerance_um or 0.0)
+
+
 class GearSection(Section):
     """One toothed wheel; helix angle signed, right hand positive."""
 
@@ -100,6 +133,8 @@ class GearSection(Section):
     """Whether it is a ring with teeth inside."""
     tooth_thinning_mm: q.ThinningMm = 0.0
     """Tooth thickness taken off on the reference circle, for backlash."""
+    tooth_thickness: ToothThicknessSection | None = None
+    """Allowances of the tooth thickness instead."""
     tip_diameter_mm: q.LengthMm | None = None
     """Tip diameter; from rack and profile shift by default."""
     fitted_tip: bool = False
@@ -125,6 +160,8 @@ class GearSection(Section):
             raise ValueError("give tip_form_diameter_mm or tip_chamfer_mm, not both: each says where the flank ends")
         if self.profile_shift_from_centre_distance and self.profile_shift:
             raise ValueError("give profile_shift or profile_shift_from_centre_distance = true, not both")
+        if self.tooth_thickness is not None and self.tooth_thinning_mm:
+            raise ValueError("give tooth_thinning_mm or a [.tooth_thickness] table, not both: each thins the teeth")
         return self
 
 

@@ -254,7 +254,7 @@ def _entries(model: Model, gear: Toothing, z: float, sections: Sequence[Cylinder
         "profile_shift": gear.shift or assumed(0.0, ""),
         "face_width_mm": gear.face_width,
         "held_diameter_mm": _held(gear, z, sections),
-        "tooth_thinning_mm": gear.thinning,
+        **({"tooth_thickness": gear.allowances} if gear.allowances else {"tooth_thinning_mm": gear.thinning}),
     }
     if gear.tip is not None:
         entries["tip_diameter_mm"] = gear.tip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -35,6 +36,8 @@ class Toothing:
     tip, root : Entry, optional
         Diameters as far as they are given.
     dedendum, tip_radius, thinning : Entry
+    allowances : Entry, optional
+        Table of the tooth thickness's allowances, where the file gives them; `thinning` is then their mean.
     chamfer : float
         Radial, mm.
     root_form : Entry, optional
@@ -54,6 +57,7 @@ class Toothing:
     dedendum: Entry
     tip_radius: Entry
     thinning: Entry
+    allowances: Entry | None
     chamfer: float
     root_form: Entry | None
     internal: bool
@@ -72,6 +76,8 @@ def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes
     flank = _flank(model, gear)
     tool = _tool(model, gear)
     chamfer = (flank.quantity("tooth_tip_chamfer", "mm") if flank else None) or 0.0
+    angle, helix = _pressure_angle(gear, flank), _helix_angle(gear, mates)
+    allowances = _allowances(gear, math.radians(angle.value), math.radians(helix.value), internal)
     teeth = abs(gear.whole("number_of_teeth") or 0)
     if not teeth:
         raise RexsError(f"{gear}: number_of_teeth is missing")
@@ -79,15 +85,16 @@ def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes
         part=gear,
         teeth=teeth,
         module=read(tidy(module), "normal_module"),
-        pressure_angle=_pressure_angle(gear, flank),
-        helix_angle=_helix_angle(gear, mates),
+        pressure_angle=angle,
+        helix_angle=helix,
         face_width=read(needed(gear.quantity("face_width", "mm"), gear, "face_width"), "face_width"),
         shift=_shift(flank, internal),
         tip=_tip(gear, teeth * module, notes),
         root=_diameter(gear, "root_diameter"),
         dedendum=_of_tool(tool, internal, "addendum_coefficient_reference_profile", 1.25),
         tip_radius=_rounded(_of_tool(tool, internal, "tip_corner_radius_factor_reference_profile", 0.38)),
-        thinning=_thinning(gear, module),
+        thinning=_thinning(gear, module, allowances, math.radians(helix.value)),
+        allowances=allowances,
         chamfer=_chamfer(gear, chamfer),
         root_form=_diameter(gear, "root_form_diameter"),
         internal=internal,
@@ -189,10 +196,31 @@ def _rounded(radius: Entry) -> Entry:
     return assumed(LEAST_RADIUS, f"the file says {radius.value:g}, a corner too sharp for the tooth model")
 
 
-def _thinning(gear: Component, module: float) -> Entry:
-    ends = [gear.quantity(f"chordal_transverse_tooth_thickness_{end}_deviation", "mm") for end in ("upper", "lower")]
-    if ends[0] is not None and ends[1] is not None:
-        return read(tidy(max(0.0, -0.5 * (ends[0] + ends[1]))), "mean of the tooth thickness deviations")
+def _allowances(gear: Component, angle: float, helix: float, internal: bool) -> Entry | None:
+    """Give the tooth thickness's allowances in the normal section, um: of a thickness or of the base tangent length.
+
+    DIN 3967: A_sn = A_st cos(beta), and A_W = A_sn cos(alpha_n) for external gears; chords and arcs differ by less than
+    a part in a thousand. `angle` and `helix` in rad. None if they are not given, or would thicken the teeth.
+    """
+    sources = {
+        "chordal_tooth_thickness_{}_deviation": 1.0,
+        "chordal_transverse_tooth_thickness_{}_deviation": math.cos(helix),
+        "{}_backlash_allowance_referenced_to_span": 1.0 / math.cos(angle),
+    }
+    for key, factor in list(sources.items())[: 2 if internal else 3]:
+        upper, lower = (gear.quantity(key.format(end), "mm") for end in ("upper", "lower"))
+        if upper is not None and lower is not None and lower <= upper <= 0.0:
+            ends = {"upper": upper, "lower": lower}
+            table = {f"{end}_allowance_um": tidy(round(1e3 * factor * one, 6)) for end, one in ends.items()}
+            return read(table, key.format("upper and lower"))
+    return None
+
+
+def _thinning(gear: Component, module: float, allowances: Entry | None, helix: float) -> Entry:
+    """Thinning in the transverse section, mm."""
+    if allowances is not None:
+        mean = 0.5e-3 * sum(allowances.value.values())
+        return read(tidy(-mean / math.cos(helix)), "mean of the tooth thickness allowances")
     series = gear.text("tooth_thickness_deviation_tolerance_series_din_3967_1978")
     why = f"the file gives only the tolerance {series}" if series not in ("", "False") else "the file gives none"
     return assumed(tidy(round(THINNING * module, 6)), f"{THINNING:g} normal modules; {why}")

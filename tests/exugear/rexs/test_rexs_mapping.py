@@ -310,3 +310,41 @@ def test_stepped_planets_are_imported_with_both_their_gears():
     places = sorted(wheels.values())
     assert places[1] - places[0] == pytest.approx(0.060)
     assert len(gearbox.meshes) == 6
+
+
+@pytest.mark.parametrize(
+    ("given", "factor"),
+    [
+        ({"chordal_tooth_thickness_{}_deviation": "mm"}, 1.0),
+        ({"chordal_transverse_tooth_thickness_{}_deviation": "mm"}, None),
+        ({"{}_backlash_allowance_referenced_to_span": "mum"}, 1.0 / math.cos(math.radians(20.0))),
+    ],
+)
+def test_tooth_thickness_allowances_become_those_of_the_normal_section(given, factor):
+    """DIN 3967: A_st = A_sn / cos(beta), A_W = A_sn cos(alpha_n); teeth have the mean."""
+    ((key, unit),) = given.items()
+    number = next(part.number for part in SEW.of_type("cylindrical_gear"))
+    scale = 1.0 if unit == "mm" else 1e3
+    values = {
+        key.format(end): Attribute(amount * scale, unit) for end, amount in (("upper", -0.054), ("lower", -0.084))
+    }
+    part = SEW.components[number]
+    made = to_case(with_values(SEW, {}, dataclasses.replace(part, attributes={**part.attributes, **values})), "case")
+    sections = [one for one in made.gearbox.case.gears.items() if one[1].tooth_thickness is not None]
+    assert len(sections) == 1
+    name, section = sections[0]
+    gear = made.gearbox.gears[name]
+    factor = math.cos(gear.helix_angle) if factor is None else factor
+    assert section.tooth_thickness.upper_allowance_um == pytest.approx(-54.0 * factor, rel=1e-6)
+    assert section.tooth_thickness.lower_allowance_um == pytest.approx(-84.0 * factor, rel=1e-6)
+    full = dataclasses.replace(gear, tooth_thinning=0.0)
+    thinner = full.normal_tooth_thickness - gear.normal_tooth_thickness
+    assert thinner == pytest.approx(69e-6 * factor, rel=1e-6)
+    assert section.tooth_thinning_mm == 0.0
+
+
+def test_allowances_that_would_thicken_teeth_are_not_taken():
+    number = next(part.number for part in SEW.of_type("cylindrical_gear"))
+    values = {f"chordal_tooth_thickness_{end}_deviation": 0.02 for end in ("upper", "lower")}
+    sections = gearbox_of(with_values(SEW, {number: values})).case.gears.values()
+    assert all(one.tooth_thickness is None and one.tooth_thinning_mm > 0.0 for one in sections)
