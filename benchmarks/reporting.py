@@ -759,7 +759,7 @@ def amplitudes(results: Results) -> str:
 
 
 QUOTES = {"in_short": in_short, "amplitudes": amplitudes}
-QUOTED = ("README.md", "docs/validation.md")
+QUOTED = ("README.md", "docs/quality/dynamics.md")
 """Documents that have figures between marks."""
 
 
