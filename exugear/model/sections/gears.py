@@ -21,6 +21,31 @@ class RackSection(Section):
     """Radius at the tip of the tool's tooth, in normal modules: it makes the root fillet."""
 
 
+class CutterSection(Section):
+    """Pinion-type cutter that generates the root fillet of a ring; without it this is an arc of the rack's radius.
+
+    Its normal module, pressure angle and helix angle are those of the ring. Give its tip by one of two keys, or by
+    neither: it then reaches the root circle of the ring, which `root_diameter_mm` or the rack says.
+    """
+
+    teeth: q.Teeth
+    """Number of its teeth (z_0)."""
+    tip_radius: q.RackRadius
+    """Radius that rounds the tips of its teeth in the transverse section, in normal modules (rho_a0*)."""
+    profile_shift: q.ProfileShift = 0.0
+    """Its profile shift (x_0) in normal modules; it falls as the cutter is ground again."""
+    addendum: q.RackHeight | None = None
+    """Height of its teeth above its reference line (h_a0*) in normal modules."""
+    tip_diameter_mm: q.LengthMm | None = None
+    """Its tip diameter (d_a0) instead."""
+
+    @model_validator(mode="after")
+    def _one_tip(self) -> CutterSection:
+        if self.addendum is not None and self.tip_diameter_mm is not None:
+            raise ValueError("give addendum or tip_diameter_mm, not both: each says how far the cutter's teeth reach")
+        return self
+
+
 class MaterialSection(Section):
     """Elastic material of a gear."""
 
@@ -102,13 +127,6 @@ class ToothThicknessSection(Section):
             )
         return self
 
-    @property
-    def lower_um(self) -> float:
-        """Lower allowance, given or by the tolerance."""
-        if self.lower_allowance_um is not None:
-            return self.lower_allowance_um
-        return self.upper_allowance_um - (self.tolerance_um or 0.0)
-
 
 class GearSection(Section):
     """One toothed wheel; helix angle signed, right hand positive."""
@@ -149,6 +167,8 @@ class GearSection(Section):
     """Where the flank ends at the root (d_Ff), if before its fillet begins, as after grinding. Contact ends there."""
     rack: RackSection = RackSection()
     """Basic rack, ISO 53 A by default."""
+    cutter: CutterSection | None = None
+    """Cutter of a ring, which makes its root fillet."""
     material: MaterialSection = MaterialSection()
     """Elastic material, steel by default."""
     modification: ModificationSection | None = None
@@ -162,6 +182,11 @@ class GearSection(Section):
             raise ValueError("give profile_shift or profile_shift_from_centre_distance = true, not both")
         if self.tooth_thickness is not None and self.tooth_thinning_mm:
             raise ValueError("give tooth_thinning_mm or a [.tooth_thickness] table, not both: each thins the teeth")
+        if self.cutter is not None and not self.internal:
+            raise ValueError("a cutter makes rings (internal = true); the root of other gears is cut by their rack")
+        own_tip = self.cutter is not None and {"addendum", "tip_diameter_mm"} & self.cutter.model_fields_set
+        if own_tip and self.root_diameter_mm is not None:
+            raise ValueError(f"root_diameter_mm follows from cutter.{min(own_tip)}: leave one of them out")
         return self
 
 

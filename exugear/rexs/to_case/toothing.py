@@ -38,6 +38,8 @@ class Toothing:
     dedendum, tip_radius, thinning : Entry
     allowances : Entry, optional
         Table of the tooth thickness's allowances, where the file gives them; `thinning` is then their mean.
+    cutter : Entry, optional
+        Table of the cutter of a ring, as far as the file gives one.
     chamfer : float
         Radial, mm.
     root_form : Entry, optional
@@ -58,6 +60,7 @@ class Toothing:
     tip_radius: Entry
     thinning: Entry
     allowances: Entry | None
+    cutter: Entry | None
     chamfer: float
     root_form: Entry | None
     internal: bool
@@ -95,6 +98,7 @@ def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes
         tip_radius=_rounded(_of_tool(tool, internal, "tip_corner_radius_factor_reference_profile", 0.38)),
         thinning=_thinning(gear, module, allowances, math.radians(helix.value)),
         allowances=allowances,
+        cutter=_cutter(gear, tool, module) if internal else None,
         chamfer=_chamfer(gear, chamfer),
         root_form=_diameter(gear, "root_form_diameter"),
         internal=internal,
@@ -179,13 +183,34 @@ def _tip(gear: Component, reference: float, notes: Notes) -> Entry | None:
     return None
 
 
+def _cutter(gear: Component, tool: Component | None, module: float) -> Entry | None:
+    """Cutter of a ring; its tip counts where the file gives the ring no root diameter."""
+    teeth = tool.whole("number_of_teeth") if tool else None
+    if tool is None or tool.type != "cutter_wheel_tool" or not teeth:
+        return None
+    radius = tool.quantity("tip_corner_radius_cutter", "mm")
+    factor = tool.quantity("tip_corner_radius_factor_reference_profile") if radius is None else radius / module
+    rounded = _rounded(assumed(LEAST_RADIUS, "none given") if factor is None else read(tidy(factor), ""))
+    shift = tool.quantity("addendum_modification_coefficient")
+    cutter = {"teeth": abs(teeth), "tip_radius": rounded.value, "profile_shift": tidy(shift or 0.0)}
+    tip, addendum = tool.quantity("tip_diameter", "mm"), tool.quantity("addendum_coefficient_reference_profile")
+    if not gear.quantity("root_diameter", "mm"):
+        if tip:
+            cutter["tip_diameter_mm"] = tidy(abs(tip))
+        elif addendum:
+            cutter["addendum"] = tidy(addendum)
+    said = [f"tip radius: {' '.join(rounded.comment.split())}"] if rounded.kind else []
+    said += ["profile shift: A none given"] if shift is None else []
+    return read(cutter, "; ".join([f"number_of_teeth, tip and its radius of {tool}", *said]))
+
+
 def _of_tool(tool: Component | None, internal: bool, key: str, usual: float) -> Entry:
     """Factor of the tool that makes the root: of a rack, which an internal gear has none of."""
     value = tool.quantity(key) if tool else None
     if tool is None or value is None or value < 0.0:
         return assumed(usual, "the file gives no tool")
     if internal:
-        return assumed(tidy(value), f"{key} of {tool}: the fillet is an arc instead of that cut by the wheel")
+        return assumed(tidy(value), f"{key} of {tool}, for an arc as fillet where no cutter is given")
     return read(tidy(value), f"{key} of {tool}")
 
 

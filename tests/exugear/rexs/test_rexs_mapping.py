@@ -14,6 +14,7 @@ from exugear.rexs.containers import read_rexs
 from exugear.rexs.faults import RexsError
 from exugear.rexs.to_case.conversion import to_case
 from exugear.rexs.tree import Attribute, Component, Model, Relation
+from fe_ste.geometry.involute import inverse_involute, involute
 
 DATA = Path(__file__).parent / "data"
 SEW = read_rexs(DATA / "SEW_3-stage_cylindrical_gearbox_1.0.rexs")
@@ -348,3 +349,25 @@ def test_allowances_that_would_thicken_teeth_are_not_taken():
     values = {f"chordal_tooth_thickness_{end}_deviation": 0.02 for end in ("upper", "lower")}
     sections = gearbox_of(with_values(SEW, {number: values})).case.gears.values()
     assert all(one.tooth_thickness is None and one.tooth_thinning_mm > 0.0 for one in sections)
+
+
+def test_the_cutter_of_a_ring_becomes_one_that_cuts_its_root():
+    """By hand: a_0 of 61 and 23 teeth from the ring's shift, its root circle a_0 + r_a0; d_a0 = 4 (23 + 2.5) mm."""
+    made = to_case(PLANETARY, "case")
+    (name,) = [name for name, one in made.gearbox.gears.items() if one.internal]
+    ring, section = made.gearbox.gears[name], made.gearbox.case.gears[name]
+    assert section.cutter is not None
+    assert (section.cutter.teeth, section.cutter.addendum, section.cutter.profile_shift) == (23, 1.25, 0.0)
+    shift = 2.0 * ring.profile_shift * math.tan(math.radians(20.0)) + ring.tooth_thinning / 4e-3
+    angle = inverse_involute(involute(math.radians(20.0)) + shift / (61 - 23))
+    distance = 0.5 * 4e-3 * (61 - 23) * math.cos(math.radians(20.0)) / math.cos(angle)
+    assert ring.root_radius == pytest.approx(distance + 0.5 * 4e-3 * 25.5, rel=1e-12)
+    assert "a corner too sharp" in next(line for line in made.text.splitlines() if line.startswith("cutter"))
+
+
+def test_a_cutter_that_cannot_make_the_ring_is_left_out_and_told():
+    made = to_case(with_values(PLANETARY, {85: {"number_of_teeth": 60}}), "case")
+    assert all(one.cutter is None for one in made.gearbox.gears.values())
+    assert any(
+        "its cutter is left out, the fillet is an arc instead; cutter.teeth = 60 trims" in one for one in made.changed
+    )
