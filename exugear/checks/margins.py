@@ -100,7 +100,7 @@ def backlash_range(gearbox: Gearbox, pair: GearPair) -> tuple[float, float, floa
     --------
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
     >>> [round(1e6 * play) for play in backlash_range(gearbox, gearbox.gear_pairs["high_speed"])]
-    [200, 200, 200]
+    [201, 201, 201]
     """
     given, across = pair.circumferential_backlash, 1.0 / math.cos(pair.working_pressure_angle)
     ends = [0.0, 0.0]
