@@ -17,7 +17,7 @@ from exugear.model.reading import CaseError
 from exugear.model.sections.entries import GROUND
 from exugear.report.parts.charts import Axis, Curve, chart
 from exugear.report.parts.material import Material, Part, model_name
-from exugear.results.run_file import load_run
+from exugear.results.run_file import read_run
 from exugear.spectra.orders import OrderLine, order_lines
 from exugear.spectra.run_spectra import VariantRun
 from exugear.spectra.sweeps import TOO_FAST, run_up_cut, sweep_rate, sweep_severity
@@ -315,9 +315,8 @@ def _curves(data: xr.Dataset, runs: Sequence[VariantRun], line: OrderLine) -> li
     branches = settings_of(data.attrs).branches
     curves = branch_curves(speed, level, data["growth"].to_numpy()) if branches else [Curve("steady", speed, level)]
     for run in runs:
-        stored = load_run(run.path, ("time", "overall_dte", "input_speed"))
-        time, values, speed = (stored[name].to_numpy() for name in ("time", "overall_dte", "input_speed"))
-        cut = run_up_cut(time, values, speed, line)
+        stored, _ = read_run(run.path, ("time", "overall_dte", "input_speed"))
+        cut = run_up_cut(stored["time"], stored["overall_dte"], stored["input_speed"], line)
         label = f"run-up {run.attributes['load_case']}"
         curves.append(Curve(label, np.abs(cut.speed) / RPM, _level(np.abs(cut.amplitude)), "dashed"))
     return curves
@@ -352,8 +351,8 @@ def _level(amplitude: Floats) -> Floats:
 
 def _unit_rate(run: VariantRun) -> float:
     """Rate at which order one sweeps in a run, Hz/s."""
-    stored = load_run(run.path, ("time", "input_speed"))
-    return sweep_rate(stored["time"].to_numpy(), stored["input_speed"].to_numpy(), 1.0)
+    stored, _ = read_run(run.path, ("time", "input_speed"))
+    return sweep_rate(stored["time"], stored["input_speed"], 1.0)
 
 
 def _row(peak: Peak, data: xr.Dataset, rates: dict[str, float]) -> dict[str, object]:
