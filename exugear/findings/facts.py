@@ -85,11 +85,12 @@ def facts_of(
     return tuple(fact for fact in facts if fact is not None)
 
 
-def facts_of_response(response: xr.Dataset) -> tuple[Fact, ...]:
+def facts_of_response(words: Words, response: xr.Dataset) -> tuple[Fact, ...]:
     """Tell the fact of a steady response that no run-up of its choice stands beside.
 
     Parameters
     ----------
+    words : Words
     response : Dataset
         As `exugear.steady.steady_file.load_response` reads it.
     """
@@ -98,7 +99,7 @@ def facts_of_response(response: xr.Dataset) -> tuple[Fact, ...]:
         return ()
     level = 20.0 * math.log10(top.amplitude / 1e-6)
     said = (
-        f"Excited by {top.line}. The overall transmission error swings by {amplitude_text(level)} "
+        f"Excited by {words.told(top.line)}. The overall transmission error swings by {amplitude_text(level)} "
         f"({figure_text(level)} dB) at constant speed."
     )
     beside = f"at {speed_text(top.speed)}, {VARIANTS[choice_of(response.attrs).variant]}"

@@ -18,11 +18,12 @@ from exugear.model.reading import CaseError
 from exugear.model.sections.entries import GROUND
 from exugear.report.parts.charts import Axis, Curve, chart
 from exugear.report.parts.material import Material, Part, model_name
-from exugear.results.run_file import load_run
+from exugear.results.run_file import read_run
 from exugear.spectra.orders import OrderLine, order_lines
 from exugear.spectra.run_spectra import VariantRun
 from exugear.spectra.sweeps import TOO_FAST, run_up_cut, sweep_rate, sweep_severity
 from exugear.steady.peaks import Peak, line_name, peaks, planet_sidebands, sidebands
+from exugear.steady.steady_file import settings_of
 from exugear.web import pieces
 from fe_ste.tools.arrays import Floats
 
@@ -119,6 +120,8 @@ def _order_charts(
         "Level of the overall transmission error along the orders: at steady speed, and as run-ups show it, cut with "
         "the window that suits their sweep."
     )
+    if settings_of(data.attrs).branches:
+        words += " Branches go back at their folds; states on dashed parts do not last."
     return pieces.paragraph(words, "note") + pieces.element("div", "".join(figures), class_="grid")
 
 
@@ -335,18 +338,41 @@ def _place(data: xr.Dataset, line: OrderLine) -> int | None:
 def _curves(data: xr.Dataset, runs: Sequence[VariantRun], line: OrderLine) -> list[Curve]:
     place = _place(data, line)
     amplitude = data["amplitude"].to_numpy()[:, place, 0].astype(np.float64)
-    level = _level(amplitude)
+    speed, level = np.abs(data["speed"].to_numpy()) / RPM, _level(amplitude)
     quiet, curves = float(level.min()) - BELOW, []
     for run in runs:
-        stored = load_run(run.path, ("time", "overall_dte", "input_speed"))
-        time, values, speed = (stored[name].to_numpy() for name in ("time", "overall_dte", "input_speed"))
-        cut = run_up_cut(time, values, speed, line)
+        stored, _ = read_run(run.path, ("time", "overall_dte", "input_speed"))
+        cut = run_up_cut(stored["time"], stored["overall_dte"], stored["input_speed"], line)
         label = f"run-up {run.attributes['load_case']}"
         cut_level = _level(np.abs(cut.amplitude))
         heard = np.where(cut_level > quiet, cut_level, np.nan)
         curves.append(Curve(label, np.abs(cut.speed) / RPM, heard, "dashed"))
     # Above the others: what shows of a run-up is where it departs.
-    return [*curves, Curve("steady", np.abs(data["speed"].to_numpy()) / RPM, level)]
+    if settings_of(data.attrs).branches:
+        return [*curves, *branch_curves(speed, level, data["growth"].to_numpy())]
+    return [*curves, Curve("steady", speed, level)]
+
+
+def branch_curves(speed: Floats, level: Floats, growth: Floats) -> list[Curve]:
+    """Parts of a branch that goes back at its folds: no part has two values at a speed, or changes its stability.
+
+    Parameters
+    ----------
+    speed, level, growth : (n,) arrays
+        Along the branch; what grows (1/s) is unstable.
+    """
+    stable = ~(growth > 0.0)
+    rising = np.diff(speed) >= 0.0
+    # A part ends where the next step turns back, and where the next point is of the other stability.
+    turns = np.flatnonzero(rising[1:] != rising[:-1]) + 1
+    ends = np.unique(np.concatenate([turns, np.flatnonzero(stable[1:] != stable[:-1]) + 1, [len(speed) - 1]]))
+    curves, first = [], 0
+    for number, last in enumerate(ends, start=1):
+        part = slice(first, last + 1)
+        kind, style = ("stable", "line") if stable[part].mean() > 0.5 else ("unstable", "dashed")
+        curves.append(Curve(f"{kind}: part {number}", speed[part], level[part], style))
+        first = int(last)
+    return curves
 
 
 def _level(amplitude: Floats) -> Floats:
@@ -356,8 +382,8 @@ def _level(amplitude: Floats) -> Floats:
 
 def _unit_rate(run: VariantRun) -> float:
     """Rate at which order one sweeps in a run, Hz/s."""
-    stored = load_run(run.path, ("time", "input_speed"))
-    return sweep_rate(stored["time"].to_numpy(), stored["input_speed"].to_numpy(), 1.0)
+    stored, _ = read_run(run.path, ("time", "input_speed"))
+    return sweep_rate(stored["time"], stored["input_speed"], 1.0)
 
 
 def _row(material: Material, peak: Peak, data: xr.Dataset, rates: dict[str, float]) -> dict[str, object]:

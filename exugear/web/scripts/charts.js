@@ -138,8 +138,8 @@ function paintMarks(plot, chart) {
 /** @param {Curve[]} curves */
 function legendOf(curves) {
   const legend = make("p", { class: "legend" });
-  // Many thin lines are of one kind: the first of each is told.
-  const told = curves.filter((curve, place) => curves.findIndex((own) => kindOf(own) === kindOf(curve)) === place);
+  // Many lines are of one kind: the first of each is told.
+  const told = curves.filter((curve, place) => firstOfKind(curves, curve) === place);
   for (const curve of told) {
     const sign = make("i", { class: `sign ${curve.style}` });
     sign.style.borderColor = colourOf(curves, curves.indexOf(curve));
@@ -161,4 +161,7 @@ function colourOf(curves, number) {
 }
 
 /** @param {Curve} curve */
-const kindOf = (curve) => curve.label.split(": mode ")[0];
+const kindOf = (curve) => curve.label.split(/: (?:mode|part) /)[0];
+
+/** Place of the first curve of the same kind; a kind has one colour. @param {Curve[]} curves @param {Curve} curve */
+const firstOfKind = (curves, curve) => curves.findIndex((own) => kindOf(own) === kindOf(curve));
