@@ -16,6 +16,6 @@ RUN = 4
 #: Life of gears and bearings (`exugear.life`, and the root stress of `fe_ste.root_stress`).
 LIFE = 1
 #: Steady responses (`exugear.steady`, and all that modes rest on).
-STEADY = 3
+STEADY = 4
 #: Points of studies (`exugear.studies`: their figures; what these rest on has its own version).
 STUDY = 1
