@@ -15,7 +15,7 @@ from exugear.spectra.comparison import AbsenceRule, Comparison, compare, only_in
 from exugear.spectra.orders import order_lines
 from exugear.spectra.resonances import Pick
 from exugear.spectra.run_spectra import Finding, VariantRun
-from exugear.spectra.waterfall import Waterfall, line_level
+from exugear.spectra.waterfall import Waterfall
 from exugear.spectra.windows import OtherWindow, other_windows, stays_absent, survives
 
 STIFF_TO_SOFT = ("rigid", "bushing", "flexible")
@@ -176,5 +176,5 @@ def _ranked(
 
 def _level_at(spectra: Waterfall, peak: Pick) -> float:
     near = np.abs(peak.line.frequency(spectra.speed) - peak.frequency) <= peak.resolution
-    level = line_level(spectra, peak.line)[near]
+    level = spectra.along(peak.line)[near]
     return float(np.max(level, initial=-np.inf, where=np.isfinite(level))) if np.isfinite(level).any() else float("nan")

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from exugear.model.parts import RPM
-from exugear.results.run_file import load_run
+from exugear.results.run_file import read_run as read_arrays
 from exugear.spectra.mode_report import mobility_shares
 from exugear.spectra.orders import OrderLine
 from exugear.spectra.resonances import (
@@ -94,12 +94,12 @@ def run_signals(path: str | Path) -> RunSignals:
     FileError
         The run is missing or damaged.
     """
-    data = load_run(path, _NAMES)
-    time, speed, overall = (data[name].to_numpy() for name in _NAMES)
+    data, attributes = read_arrays(Path(path), _NAMES)
+    time, speed, overall = (data[name] for name in _NAMES)
     if time.size < 2:
         raise ValueError(f"{path}: holds {time.size} samples, too few for a spectrum; run for longer")
     span = float(np.ptp(time))
-    return RunSignals(Path(path), data.attrs, (time.size - 1) / span, span, speed, overall)
+    return RunSignals(Path(path), attributes, (time.size - 1) / span, span, speed, overall)
 
 
 def run_waterfall(path: str | Path, window_length: float | None = None) -> Waterfall:
