@@ -647,6 +647,7 @@ def studies_section(part: Results) -> str:
         [
             row["what"],
             str(row["points"]),
+            duration(row["wall_here_s"]),
             duration(row["wall_1_s"]),
             duration(row["wall_2_s"]),
             f"{100 * row['efficiency']:.0f} %",
@@ -657,9 +658,10 @@ def studies_section(part: Results) -> str:
     return "\n".join(
         [
             "## Studies\n",
-            f"{circumstances(part)} The same points by one worker process and by two, started and warm; wall "
-            "time, so that two free cores are needed. Efficiency is the first over twice the second.\n",
-            table(["points with", "points", "one process", "two", "efficiency", "peak memory of a worker"], rows),
+            f"{circumstances(part)} The same points without workers, by one worker and by two, started and warm; "
+            "wall time, so that two free cores are needed. A worker uses one core, a study without workers may use "
+            "a second one in part. Efficiency is the time of one worker over twice that of two.\n",
+            table(["points with", "points", "no worker", "one", "two", "efficiency", "peak memory of a worker"], rows),
             items(
                 [
                     f"{own['points']} modal points of a small gearbox: {number(own['in_study_ms'])} ms of processor "
@@ -759,7 +761,7 @@ def amplitudes(results: Results) -> str:
 
 
 QUOTES = {"in_short": in_short, "amplitudes": amplitudes}
-QUOTED = ("README.md", "docs/validation.md")
+QUOTED = ("README.md", "docs/quality/dynamics.md")
 """Documents that have figures between marks."""
 
 

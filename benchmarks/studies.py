@@ -1,8 +1,9 @@
 """What studies cost: overhead of a point, and what a second core brings for tables, runs and modes.
 
-Measured by ``python benchmarks/run_all.py --part studies``. Efficiency is the wall time of one process over twice that
-of two, the points, their number and the loading of workers being the same; it needs two free cores. Overhead is
-processor time of a study beside that of its points by themselves.
+Measured by ``python benchmarks/run_all.py --part studies``. Efficiency is the wall time of one worker over twice that
+of two, the points, their number and the loading of workers being the same; it needs two free cores. A worker uses one
+core; the same study without workers may use a second one in part, and is measured beside. Overhead is processor time
+of a study beside that of its points by themselves.
 """
 
 from __future__ import annotations
@@ -83,10 +84,11 @@ def bare(task: Any, points: list[Any]) -> None:
 
 
 def efficiency(name: str, of: Study, warm: Study) -> dict[str, Any]:
-    """Wall time of a study by one worker process and by two, workers warm and started before."""
+    """Wall time of a study without workers, by one and by two, workers warm and started before."""
     walls = {}
-    for workers in (1, 2):
-        with tempfile.TemporaryDirectory() as folder, Kept(_in_processes(workers)) as kept:
+    for workers in (0, 1, 2):
+        opens = _in_processes(workers) if workers else processes(1)
+        with tempfile.TemporaryDirectory() as folder, Kept(opens) as kept:
             sweep(warm, Path(folder) / "warm", kept.opened)
             start = time.perf_counter()
             swept = sweep(of, Path(folder) / "out", kept.opened)
@@ -97,6 +99,7 @@ def efficiency(name: str, of: Study, warm: Study) -> dict[str, Any]:
     return {
         "what": name,
         "points": len(of.design.points),
+        "wall_here_s": walls[0],
         "wall_1_s": walls[1],
         "wall_2_s": walls[2],
         "efficiency": walls[1] / (2.0 * walls[2]),

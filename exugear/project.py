@@ -265,7 +265,6 @@ class Project:
         progress : callable, optional
             Called with the number of static states that are solved, and of all.
         """
-        from exugear.life.dynamic_factor import factors
         from exugear.life.life import (
             checked_loads,
             compute_life,
@@ -274,17 +273,16 @@ class Project:
         )  # root stress, which a run needs not
         from exugear.life.life_file import stored_life, write_life
         from exugear.life.pair_stresses import pair_stresses
+        from exugear.life.response_factors import factors, source_hash
 
         counted, assembly = checked_loads(self.gearbox), self.assembly()
         if any(request.stored is None for request in self.life_tables()):
             self.tables(grid=LAWS[self.choice.mesh_law].needs_axes)
         requests = self.life_tables()
-        tables = {request.name: request.wanted.hash for request in requests}
-        rating, run = rating_of(self.gearbox), None
-        if rating.dynamic_factor_run is not None:
-            run = self.chosen(load_case=rating.dynamic_factor_run).run_path
-        dynamic = factors(assembly, rating, run, counted.body)
-        digest = life_hash(assembly, counted, tables, input_hash(assembly, rating.dynamic_factor_run) if run else "")
+        tables = {request.name: request.stored.input_hash for request in requests if request.stored is not None}
+        rating = rating_of(self.gearbox)
+        dynamic = factors(assembly, rating, self.folder, counted.body)
+        digest = life_hash(assembly, counted, tables, source_hash(assembly, rating, self.folder))
         kept = stored_life(self.life_path, digest)
         if kept is not None:
             return kept

@@ -15,8 +15,7 @@ PAGE = Path(__file__).parent.parent / "reference" / "command_line.md"
 HEAD = """# Command line
 
 Every verb with its arguments and options, written by the program itself: `exugear VERB --help` says the same. How the
-verbs follow each other stands in [the user guide](../user_guide.md#the-whole-of-it), and what their [exit
-codes](../user_guide.md#the-whole-of-it) mean.
+verbs follow each other stands in [verbs](verbs.md), and what their exit codes mean.
 """
 
 

@@ -74,6 +74,8 @@ class Signal(Variable):
         that is added up: in which samples it passes.
     laws : {"all", "table", "bilateral"}
         Mesh laws that have it: all, the law `table`, or all others. A time that a law has not got is zero.
+    on_bearings : bool
+        Whether only variants on bearings have it; of ideal joints `exugear.dynamics.support_loads` derives it.
     stored : bool
         Whether it stands in the file; other signals are for the formulas alone.
     is_power : bool
@@ -83,6 +85,7 @@ class Signal(Variable):
     filled_by: tuple[str, ...] = ()
     formula: Callable[[SignalLayout, Floats], Floats | Booleans] | None = None
     laws: Literal["all", "table", "bilateral"] = "all"
+    on_bearings: bool = False
     stored: bool = True
     is_power: bool = False
 
@@ -154,6 +157,16 @@ SIGNALS = (
         sign_convention="on the body, along the global axis",
         kind="f4",
         filled_by=("observe_supports", "observe_joints"),
+    ),
+    Signal(
+        "support_moment",
+        ("time", "support", "axis"),
+        "N m",
+        "moment of the support on the same body, about its seat there",
+        sign_convention="on the body, about the global axis",
+        kind="f4",
+        filled_by=("observe_supports",),
+        on_bearings=True,
     ),
     Signal(
         "pulling_time",
@@ -296,15 +309,16 @@ ENERGIES = tuple(name for name in BALANCE_TERMS if name not in POWERS)
 """Terms of the account that are observed as they are."""
 
 
-def signals_of(tabled: bool) -> tuple[Signal, ...]:
-    """Rows of `SIGNALS` that a run with the law `table`, or with another, has.
+def signals_of(tabled: bool, jointed: bool = False) -> tuple[Signal, ...]:
+    """Rows of `SIGNALS` that a run with the law `table`, or with another, has on bearings, or on ideal joints.
 
     Examples
     --------
     >>> {signal.name for signal in signals_of(True)} - {signal.name for signal in signals_of(False)} >= {"misalignment"}
     True
     """
-    return tuple(signal for signal in SIGNALS if signal.laws in ("all", "table" if tabled else "bilateral"))
+    laws = ("all", "table" if tabled else "bilateral")
+    return tuple(signal for signal in SIGNALS if signal.laws in laws and not (jointed and signal.on_bearings))
 
 
 @dataclass(frozen=True, eq=False)
@@ -330,7 +344,7 @@ class SignalLayout:
     >>> layout.values("support_force", samples)
     array([[[ 6.,  7.,  8.]],
     <BLANKLINE>
-           [[21., 22., 23.]]])
+           [[24., 25., 26.]]])
     """
 
     signals: tuple[Signal, ...]
@@ -371,7 +385,7 @@ class SignalLayout:
         --------
         >>> names = {"mesh": tuple("abcdefgh"), "support": tuple("abcdefghijkl"), "axis": AXES}
         >>> SignalLayout(signals_of(False), names, radius=0.1).sample_bytes
-        240
+        384
         """
         stored = (signal for signal in self.signals if signal.is_sampled and signal.stored)
         return sum(np.dtype(signal.kind).itemsize * math.prod(self.shape(signal)) for signal in stored)
@@ -409,7 +423,7 @@ def signal_layout(assembly: Assembly) -> SignalLayout:
     gearbox = assembly.gearbox
     joints = tuple(joint.name for joint in gearbox.joints) if assembly.variant == "rigid" else ()
     return SignalLayout(
-        signals_of(LAWS[assembly.mesh_law].signals_positions),
+        signals_of(LAWS[assembly.mesh_law].signals_positions, assembly.variant == "rigid"),
         {"mesh": assembly.mesh_names, "support": assembly.connector_names or joints, "axis": AXES},
         gearbox.output_radius,
     )

@@ -6,17 +6,18 @@ Of the copies of a planet set one stands for all: the one whose force swings mos
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-import xarray as xr
+from numpy.typing import NDArray
 
 from exugear.findings.words import Words
-from exugear.results.run_file import load_run
+from exugear.results.run_file import read_run
 from exugear.spectra.orders import OrderLine
 from exugear.spectra.run_spectra import VariantRun
-from exugear.spectra.waterfall import Waterfall, line_level, waterfall
+from exugear.spectra.waterfall import Waterfall, waterfall
 from fe_ste.tools.arrays import Floats
 
 OVERLAP = 0.5
@@ -25,6 +26,9 @@ SAMPLED = 8
 """Every which sample tells how much a force swings."""
 MEAN_PART = slice(1, 2)
 """Third of the run whose mean force is told: neither the start nor the fastest."""
+
+_Signals = Mapping[str, NDArray[Any]]
+"""Variables of a run by their names."""
 
 
 @dataclass(frozen=True)
@@ -78,16 +82,13 @@ class LoudestOrder:
 
 def channels_of(run: VariantRun, words: Words) -> Iterator[Channel]:
     """Compute the channels of a run-up, bearings and joints first."""
-    data = load_run(run.path, ("time", "input_speed", "mesh_force", "support_force"))
+    data, _ = read_run(run.path, ("time", "input_speed", "support", "mesh", "mesh_force", "support_force"))
     yield from _supports(data, run, words)
     yield from _meshes(data, run, words)
 
 
-def _supports(data: xr.Dataset, run: VariantRun, words: Words) -> Iterator[Channel]:
-    if "support_force" not in data or not data.sizes.get("support"):
-        return
-    force = data["support_force"].to_numpy()
-    names = [str(name) for name in data["support"].to_numpy()]
+def _supports(data: _Signals, run: VariantRun, words: Words) -> Iterator[Channel]:
+    force, names = data["support_force"], [str(name) for name in data["support"]]
     sample = force[::SAMPLED]
     swings = np.hypot(sample[..., 0], sample[..., 1]).std(axis=0)
     for place, copies in _standing_for(names, swings, words):
@@ -103,9 +104,8 @@ def _supports(data: xr.Dataset, run: VariantRun, words: Words) -> Iterator[Chann
         yield Channel(names[place], "support", told, copies, mean, float(middle[:, 2].mean()), whole)
 
 
-def _meshes(data: xr.Dataset, run: VariantRun, words: Words) -> Iterator[Channel]:
-    force = data["mesh_force"].to_numpy()
-    names = [str(name) for name in data["mesh"].to_numpy()]
+def _meshes(data: _Signals, run: VariantRun, words: Words) -> Iterator[Channel]:
+    force, names = data["mesh_force"], [str(name) for name in data["mesh"]]
     for place, copies in _standing_for(names, force[::SAMPLED].std(axis=0), words):
         own = np.ascontiguousarray(force[:, place])
         told = words.of(words.family(names[place])) if copies > 1 else words.of(names[place])
@@ -126,8 +126,8 @@ def _middle(values: Floats) -> Floats:
     return values[MEAN_PART.start * third : MEAN_PART.stop * third] if third else values
 
 
-def _waterfall(values: Floats, data: xr.Dataset, run: VariantRun) -> Waterfall:
-    time, speed = data["time"].to_numpy(), data["input_speed"].to_numpy()
+def _waterfall(values: Floats, data: _Signals, run: VariantRun) -> Waterfall:
+    time, speed = data["time"], data["input_speed"]
     rate = (time.size - 1) / float(np.ptp(time))
     return waterfall(
         values, speed, rate, window_length=run.spectra.window_length, overlap=OVERLAP, reference=1.0, unit="N"
@@ -136,7 +136,7 @@ def _waterfall(values: Floats, data: xr.Dataset, run: VariantRun) -> Waterfall:
 
 def loudest_order(spectra: Waterfall, lines: Sequence[OrderLine]) -> LoudestOrder | None:
     """Find where a waterfall is loudest along its orders; None where no order lies in its band."""
-    levels = np.array([line_level(spectra, line) for line in lines]).reshape(len(lines), spectra.time.size)
+    levels = np.array([spectra.along(line) for line in lines]).reshape(len(lines), spectra.time.size)
     if not np.isfinite(levels).any():
         return None
     line, frame = divmod(int(np.nanargmax(levels)), levels.shape[1])

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import xarray as xr
 
-from exugear.findings.context import REFERENCE_VARIANT, Context
+from exugear.findings.context import REFERENCE_VARIANT, Context, choice_of
 from exugear.findings.groups import RankedResonance, RunGroup
 from exugear.findings.levers import Lever, levers_of
 from exugear.findings.variations import GAIN, BestChange, ModelVariations, best_change
 from exugear.findings.words import VARIANTS, Words, figure_text
 from exugear.model.parts import RPM
+from exugear.spectra.orders import order_lines
+from exugear.steady.peaks import peaks
 
 DAMPING = "mesh damping"
 """Begin of the label of the parameter that damps."""
 AROUND_RATED = 1.25
 """Speed up to which a resonance counts as one of the rated speed, over that speed."""
+
+LOUDER = 1.0
+"""dB by which a resonance that the run-up does not show is louder than those that it shows, to be told first."""
 
 
 @dataclass(frozen=True)
@@ -77,35 +83,82 @@ def facts_of(
     return tuple(fact for fact in facts if fact is not None)
 
 
+def facts_of_response(response: xr.Dataset) -> tuple[Fact, ...]:
+    """Tell the fact of a steady response that no run-up of its choice stands beside.
+
+    Parameters
+    ----------
+    response : Dataset
+        As `exugear.steady.steady_file.load_response` reads it.
+    """
+    top = next(iter(peaks(response)), None)
+    if top is None:
+        return ()
+    level = 20.0 * math.log10(top.amplitude / 1e-6)
+    said = (
+        f"Excited by {top.line}. The overall transmission error swings by {amplitude_text(level)} "
+        f"({figure_text(level)} dB) at constant speed."
+    )
+    beside = f"at {speed_text(top.speed)}, {VARIANTS[choice_of(response.attrs).variant]}"
+    return (Fact("Loudest resonance", frequency_text(top.frequency), beside, said, "steady"),)
+
+
 def _loudest(context: Context, words: Words, group: RunGroup) -> Fact | None:
     top = group.loudest
     if top is None:
         highest = max(float(run.spectra.speed.max()) for run in group.runs.values())
         said = f"No resonance stands out up to {speed_text(highest)} with every window."
         return Fact("Loudest resonance", "none", "that stands out", said, "ranking")
+    unseen = _unseen(context, words, group, top)
+    if unseen is not None:
+        return unseen
     peak, modes = top.peak, group.runs[group.main].modes
     moves = "" if top.finding.mode is None or modes is None else f": {words.moves(modes, top.finding.mode)}"
     said = (
         f"Excited by {words.line_sentence(peak.line)}. The overall transmission error swings by "
-        f"{amplitude_text(peak.level)} ({figure_text(peak.level)} dB){moves}.{_against_rated(context, group)}"
+        f"{amplitude_text(top.loudness)} ({figure_text(top.loudness)} dB){_how(top)}{moves}."
+        f"{_against_rated(context, group)}"
     )
-    beside = f"at {speed_text(peak.speed)}, {VARIANTS[group.main]}"
-    return Fact("Loudest resonance", frequency_text(top.finding.resonance.frequency), beside, said, "rings")
+    beside = f"at {speed_text(top.speed)}, {VARIANTS[group.main]}"
+    return Fact("Loudest resonance", frequency_text(top.frequency), beside, said, "rings")
+
+
+def _unseen(context: Context, words: Words, group: RunGroup, top: RankedResonance) -> Fact | None:
+    """Tell of a resonance that is louder at constant speed than all that the run-up tells apart, if there is one."""
+    levels = group.constant.get(group.main)
+    found = None if levels is None else levels.highest(order_lines(context.gearbox))
+    if found is None or found[1].level < top.loudness + LOUDER:
+        return None
+    line, at = found
+    said = (
+        f"Excited by {words.line_sentence(line)}. The overall transmission error swings by {amplitude_text(at.level)} "
+        f"({figure_text(at.level)} dB) at constant speed. The run-up is too fast to tell it from what is near: the "
+        f"loudest there is {frequency_text(top.finding.resonance.frequency)} with {amplitude_text(top.peak.level)}."
+    )
+    beside = f"at {speed_text(at.speed)}, {VARIANTS[group.main]}"
+    return Fact("Loudest resonance", frequency_text(at.frequency), beside, said, "steady")
+
+
+def _how(own: RankedResonance) -> str:
+    """Tell what a level was read from, where there are both."""
+    if own.constant is None:
+        return ""
+    return f" at constant speed, {amplitude_text(own.peak.level)} in the run-up"
 
 
 def _against_rated(context: Context, group: RunGroup) -> str:
     rated = context.gearbox.case.operation.rated_speed_rpm
     if rated is None or group.loudest is None:
         return ""
-    times = abs(group.loudest.peak.speed) / RPM / rated
+    times = abs(group.loudest.speed) / RPM / rated
     if times <= AROUND_RATED:
         return f" That is {figure_text(times, 2)} times the rated speed."
     near = next((own for own in group.ranked[group.main] if own.steady and _is_near_rated(own, rated)), None)
     said = "nothing stands out"
     if near is not None:
-        frequency = frequency_text(near.finding.resonance.frequency)
-        level = amplitude_text(near.peak.level)
-        said = f"the loudest is {frequency} at {speed_text(near.peak.speed)} with {level}"
+        frequency = frequency_text(near.frequency)
+        level = amplitude_text(near.loudness)
+        said = f"the loudest is {frequency} at {speed_text(near.speed)} with {level}"
     return (
         f" That is {figure_text(times, 2)} times the rated speed; up to {100.0 * (AROUND_RATED - 1.0):.0f} % over "
         f"rated {said}."
@@ -113,7 +166,7 @@ def _against_rated(context: Context, group: RunGroup) -> str:
 
 
 def _is_near_rated(own: RankedResonance, rated: float) -> bool:
-    return abs(own.peak.speed) / RPM <= AROUND_RATED * rated
+    return own.speed / RPM <= AROUND_RATED * rated
 
 
 def _compliance(group: RunGroup) -> Fact | None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from exugear.findings.constant_speed import ConstantSpeed, Highest, truest_of
 from exugear.findings.context import REFERENCE_VARIANT, Context
 from exugear.findings.stored import StoredResults, run_key
 from exugear.model.choice import Choice
@@ -14,7 +15,7 @@ from exugear.spectra.comparison import AbsenceRule, Comparison, compare, only_in
 from exugear.spectra.orders import order_lines
 from exugear.spectra.resonances import Pick
 from exugear.spectra.run_spectra import Finding, VariantRun
-from exugear.spectra.waterfall import Waterfall, line_level
+from exugear.spectra.waterfall import Waterfall
 from exugear.spectra.windows import OtherWindow, other_windows, stays_absent, survives
 
 STIFF_TO_SOFT = ("rigid", "bushing", "flexible")
@@ -34,17 +35,40 @@ class RankedResonance:
         Variants that lack it, judged at its loudest peak and with every window.
     elsewhere : mapping of variant to float
         Highest level (dB) of the other variants at its loudest peak; NaN where they did not go there.
+    constant : Highest or None
+        Its loudest peak at constant speed; None where no steady response goes there.
     """
 
     finding: Finding
     steady: bool
     lacking: tuple[str, ...]
     elsewhere: Mapping[str, float]
+    constant: Highest | None
 
     @property
     def peak(self) -> Pick:
         """Its loudest peak."""
         return self.finding.strongest
+
+    @property
+    def loudness(self) -> float:
+        """Level (dB) that it is ranked by: at constant speed where that is known, else in the run-up."""
+        return self.peak.level if self.constant is None else self.constant.level
+
+    @property
+    def frequency(self) -> float:
+        """Frequency where it is loudest, Hz."""
+        return self.finding.resonance.frequency if self.constant is None else self.constant.frequency
+
+    @property
+    def speed(self) -> float:
+        """Speed of the input where it is loudest, without sign, rad/s."""
+        return abs(self.peak.speed) if self.constant is None else self.constant.speed
+
+    @property
+    def missed(self) -> float:
+        """By how many dB the run-up shows it below its level at constant speed; 0 where that is not known."""
+        return 0.0 if self.constant is None else self.constant.level - self.peak.level
 
 
 @dataclass(frozen=True)
@@ -60,6 +84,8 @@ class RunGroup:
         The loudest first.
     comparisons : mapping of variant to Comparison
         Of each other variant with the stiff reference.
+    constant : mapping of variant to ConstantSpeed
+        Levels at constant speed of those that have a steady response.
     """
 
     load_case: str
@@ -68,6 +94,7 @@ class RunGroup:
     runs: Mapping[str, VariantRun]
     ranked: Mapping[str, tuple[RankedResonance, ...]]
     comparisons: Mapping[str, Comparison]
+    constant: Mapping[str, ConstantSpeed]
 
     @property
     def name(self) -> str:
@@ -105,27 +132,29 @@ def run_groups(context: Context, results: StoredResults) -> tuple[RunGroup, ...]
         gathered.setdefault(run_key(run.attributes), []).append(run)
     default = context.gearbox.case.default_inertias
     keys = sorted(gathered, key=lambda key: (key[2] != default, key))
-    return tuple(_group(context, key, gathered[key]) for key in keys)
+    return tuple(_group(context, key, gathered[key], results) for key in keys)
 
 
-def _group(context: Context, key: tuple[str, str, str], runs: Sequence[VariantRun]) -> RunGroup:
+def _group(context: Context, key: tuple[str, str, str], runs: Sequence[VariantRun], results: StoredResults) -> RunGroup:
     lines = order_lines(context.gearbox)
     context.tell(f"other windows, {', '.join(key)}")
     ordered = sorted(runs, key=lambda run: STIFF_TO_SOFT.index(run.variant))
     windows = other_windows(ordered, lines)
     by_variant = {run.variant: run for run in ordered}
-    ranked = {variant: _ranked(by_variant, variant, windows) for variant in by_variant}
+    levels = {variant: truest_of(results.steady, Choice(variant, *key[1:])) for variant in by_variant}
+    constant = {variant: own for variant, own in levels.items() if own is not None}
+    ranked = {variant: _ranked(by_variant, variant, windows, levels[variant]) for variant in by_variant}
     reference = by_variant.get(REFERENCE_VARIANT)
     comparisons = {
         variant: compare(run, reference)
         for variant, run in by_variant.items()
         if reference is not None and run is not reference
     }
-    return RunGroup(*key, by_variant, ranked, comparisons)
+    return RunGroup(*key, by_variant, ranked, comparisons, constant)
 
 
 def _ranked(
-    runs: Mapping[str, VariantRun], variant: str, windows: Sequence[OtherWindow]
+    runs: Mapping[str, VariantRun], variant: str, windows: Sequence[OtherWindow], constant: ConstantSpeed | None
 ) -> tuple[RankedResonance, ...]:
     run, rule = runs[variant], AbsenceRule()
     others = {name: other.spectra for name, other in runs.items() if name != variant}
@@ -138,11 +167,14 @@ def _ranked(
             if only_in_first([peak], spectra, rule) and stays_absent(peak, variant, name, windows)
         )
         elsewhere = {name: _level_at(spectra, peak) for name, spectra in others.items()}
-        ranked.append(RankedResonance(finding, survives(peak, variant, windows), lacking, elsewhere))
-    return tuple(sorted(ranked, key=lambda own: -own.peak.level))
+        level = None if constant is None else constant.near(peak.line, peak.frequency, peak.resolution)
+        if level is not None:
+            finding = run.located(finding, level.frequency)
+        ranked.append(RankedResonance(finding, survives(peak, variant, windows), lacking, elsewhere, level))
+    return tuple(sorted(ranked, key=lambda own: -own.loudness))
 
 
 def _level_at(spectra: Waterfall, peak: Pick) -> float:
     near = np.abs(peak.line.frequency(spectra.speed) - peak.frequency) <= peak.resolution
-    level = line_level(spectra, peak.line)[near]
+    level = spectra.along(peak.line)[near]
     return float(np.max(level, initial=-np.inf, where=np.isfinite(level))) if np.isfinite(level).any() else float("nan")

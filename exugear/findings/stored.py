@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -56,11 +56,15 @@ class StoredResults:
         return bool(self.tables or self.modes or self.runs or self.steady)
 
 
-def stored_results(context: Context) -> StoredResults:
-    """Read all results that belong to the case of the folder; what does not is noted as left out."""
-    tables = _stored_tables(context)
-    modes = dict(_stored_modes(context))
-    return StoredResults(tables, modes, list(_stored_runs(context, modes)), list(_stored_steady(context)))
+def stored_models(context: Context) -> StoredResults:
+    """Read the tables and modes that belong to the case of the folder, which is soon done; note what does not."""
+    return StoredResults(_stored_tables(context), dict(_stored_modes(context)), ())
+
+
+def with_responses(context: Context, models: StoredResults) -> StoredResults:
+    """Add the runs and steady responses that belong to the case of the folder; what does not is noted as left out."""
+    runs = list(_stored_runs(context, models.modes))
+    return replace(models, runs=runs, steady=list(_stored_steady(context)))
 
 
 def _stored_steady(context: Context) -> Iterator[xr.Dataset]:
@@ -136,6 +140,11 @@ def _fitting_signals(context: Context, path: Path) -> tuple[RunSignals, float] |
     except ValueError as error:
         context.notes.left_out.append(f"{context.name_of(path)}: {error}")
     return None
+
+
+def bytes_of_runs(context: Context) -> int:
+    """Size of the runs in the folder that ended."""
+    return sum(path.stat().st_size for path in _run_files(context.folder) if path.is_file())
 
 
 def _run_files(folder: Path) -> list[Path]:

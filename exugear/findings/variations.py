@@ -7,23 +7,33 @@ all modes within an octave.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
 from exugear.bearings.rolling.rows import BearingError
-from exugear.dynamics.sensitivity import ParameterVariation, assumed_parameters, vary_parameter
+from exugear.dynamics.sensitivity import Parameter, ParameterVariation, assumed_parameters, vary_parameter
 from exugear.dynamics.statics import BalanceError
 from exugear.findings.context import REFERENCE_VARIANT, Context
 from exugear.model.choice import Choice
+from exugear.model.named_files import Permissions
+from exugear.results.folder import kept_case
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.workers import stop_if_asked
 
 OCTAVE = 2.0
 """Reach around a frequency, as a ratio, to both sides."""
 GAIN = 3.0
 """Least gain (dB) that is called one."""
+
+Figures = tuple[Floats, Floats, Floats, Floats]
+"""Frequency, share, amplification and damping ratio of a `ParameterVariation`."""
+VariedModels = Mapping[Choice, Mapping[str, Figures | str]]
+"""By model and label of the parameter, its figures or why there are none."""
 
 
 @dataclass(frozen=True)
@@ -76,22 +86,65 @@ class BestChange:
     gain: float
 
 
-def model_variations(context: Context, modes: Mapping[Choice, xr.Dataset]) -> tuple[ModelVariations, ...]:
-    """Vary what was assumed in the compliant models, or in the only one there is; the default inertia set first."""
+def begin_variations(context: Context, modes: Mapping[Choice, xr.Dataset], executor: Executor) -> Future[VariedModels]:
+    """Have all models varied by an executor, which may be another process, while this one reads run-ups."""
+    below = context.gearbox.permissions.below
+    return executor.submit(varied_models, context.folder, below, _models_to_vary(context, modes))
+
+
+def varied_models(folder: Path, files_below: Path | None, models: Sequence[Choice]) -> VariedModels:
+    """Vary what was assumed in models of the case that a folder keeps: for `begin_variations`."""
+    context = Context(folder, kept_case(folder, Permissions(below=files_below)), None, lambda what: None)
+    return {model: {own.label: _figures(own) for own in _parameters(context, model)} for model in models}
+
+
+def model_variations(
+    context: Context, modes: Mapping[Choice, xr.Dataset], begun: Future[VariedModels] | None = None
+) -> tuple[ModelVariations, ...]:
+    """Vary what was assumed in the compliant models, or in the only one there is; the default inertia set first.
+
+    Parameters
+    ----------
+    context : Context
+    modes : mapping of Choice to xarray.Dataset
+        Of the models that there are.
+    begun : Future, optional
+        What `begin_variations` gave.
+    """
+    models = _models_to_vary(context, modes)
+    for model in models:
+        context.tell(f"variations of {model.variant}, {model.inertias}")
+    known = {} if begun is None else begun.result()
+    return tuple(ModelVariations(model, _variations(context, model, known.get(model, {}))) for model in models)
+
+
+def _models_to_vary(context: Context, modes: Mapping[Choice, xr.Dataset]) -> list[Choice]:
     models = [model for model in modes if model.variant != REFERENCE_VARIANT] or list(modes)
-    models.sort(key=lambda model: model.inertias != context.gearbox.case.default_inertias)
-    return tuple(ModelVariations(model, _variations(context, model)) for model in models)
+    return sorted(models, key=lambda model: model.inertias != context.gearbox.case.default_inertias)
 
 
-def _variations(context: Context, model: Choice) -> tuple[ParameterVariation, ...]:
-    context.tell(f"variations of {model.variant}, {model.inertias}")
+def _parameters(context: Context, model: Choice) -> tuple[Parameter, ...]:
     stiffness = context.stiffness(model.mesh_law)
+    return assumed_parameters(context.gearbox, model, stiffness, context.bodies_of(model))
+
+
+def _figures(parameter: Parameter) -> Figures | str:
+    """Vary a parameter; the reason where an assumption leaves the range in which bearings balance."""
+    try:
+        found = vary_parameter(parameter, stop_if_asked)
+    except (BalanceError, BearingError) as error:
+        return str(error)
+    return found.frequency, found.share, found.amplification, found.damping_ratio
+
+
+def _variations(context: Context, model: Choice, known: Mapping[str, Figures | str]) -> tuple[ParameterVariation, ...]:
     variations = []
-    for parameter in assumed_parameters(context.gearbox, model, stiffness, context.bodies_of(model)):
-        try:
-            variations.append(vary_parameter(parameter))
-        except (BalanceError, BearingError) as error:  # an assumption may leave the range in which bearings balance
-            context.notes.left_out.append(f"sensitivity to {parameter.label}: {error}")
+    for parameter in _parameters(context, model):
+        figures = known[parameter.label] if parameter.label in known else _figures(parameter)
+        if isinstance(figures, str):
+            context.notes.left_out.append(f"sensitivity to {parameter.label}: {figures}")
+        else:
+            variations.append(ParameterVariation(parameter, *figures))
     return tuple(variations)
 
 

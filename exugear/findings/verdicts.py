@@ -12,7 +12,7 @@ from exugear.findings.context import Context
 from exugear.findings.groups import RunGroup
 from exugear.findings.words import VARIANTS, figure_text
 from exugear.model.parts import RPM
-from exugear.results.run_file import load_run
+from exugear.results.run_file import read_run
 from exugear.runs.trust import verdict_of
 from exugear.spectra.run_spectra import VariantRun
 
@@ -66,8 +66,8 @@ class RunFigures:
 
 def run_figures(run: VariantRun) -> RunFigures:
     """Read the figures of a run."""
-    data = load_run(run.path, ("time", *MESH_TIMES, *BALANCE_TERMS))
-    times = tuple(float(np.max(data[name].to_numpy(), initial=0.0)) for name in MESH_TIMES)
+    data, _ = read_run(run.path, ("time", *MESH_TIMES, *BALANCE_TERMS))
+    times = tuple(float(np.max(data[name], initial=0.0)) for name in MESH_TIMES)
     return RunFigures(energy_residual(data), times, float(data["time"][-1]))
 
 

@@ -1,4 +1,4 @@
-"""The dynamic factor K_v of meshes over speed: as stated, or from the forces of a run-up.
+"""The dynamic factor K_v of meshes over speed: as stated, or from the forces of a run.
 
 In a run it is the largest over the mean force of a mesh within a few mesh cycles. Longer windows would count what the
 carrier's turn does to load sharing, and what the load itself does, which the static balance has.
@@ -6,7 +6,6 @@ carrier's turn does to load sharing, and what the load itself does, which the st
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +14,7 @@ import numpy as np
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.fingerprint import input_hash
 from exugear.model.gearbox import Gearbox
+from exugear.model.parts import RPM
 from exugear.model.sections.loads import RatingSection
 from exugear.results.run_file import read_run
 from fe_ste.tools.arrays import Floats
@@ -38,11 +38,14 @@ class DynamicFactor:
         rad/s without sign, rising; factors.
     least : float
         Factor below which none is taken.
+    source : str
+        What it is of, in words.
     """
 
     speed: Floats
     value: Floats
     least: float = 1.0
+    source: str = ""
 
     def __repr__(self) -> str:
         """Return one short line."""
@@ -64,7 +67,8 @@ class DynamicFactor:
 
 def stated_factors(gearbox: Gearbox, value: float) -> dict[str, DynamicFactor]:
     """One factor for all mesh families and speeds."""
-    return {mesh.family: DynamicFactor(np.zeros(1), np.full(1, value)) for mesh in gearbox.meshes}
+    one = DynamicFactor(np.zeros(1), np.full(1, value), source="as stated")
+    return {mesh.family: one for mesh in gearbox.meshes}
 
 
 def factors_of_run(assembly: Assembly, rating: RatingSection, path: Path, body: str) -> dict[str, DynamicFactor]:
@@ -104,7 +108,9 @@ def factors_of_run(assembly: Assembly, rating: RatingSection, path: Path, body: 
             raise gearbox.fault(f"{key}: {path} holds no window of {CYCLES:g} mesh cycles of {mesh.name}")
         instants, values = windows
         found.setdefault(mesh.family, []).append((ratio * np.interp(instants, arrays["time"], speed), values))
-    return {family: _merged(parts, rating.least_dynamic_factor or 1.0) for family, parts in found.items()}
+    every = np.concatenate([speeds for parts in found.values() for speeds, _ in parts]) / RPM
+    source = f"the run {rating.dynamic_factor_run} over {every.min():.4g} to {every.max():.4g} rpm of {body}"
+    return {family: merged(parts, rating.least_dynamic_factor or 1.0, source) for family, parts in found.items()}
 
 
 def window_factors(time: Floats, frequency: Floats, force: Floats) -> tuple[Floats, Floats] | None:
@@ -138,16 +144,8 @@ def window_factors(time: Floats, frequency: Floats, force: Floats) -> tuple[Floa
     return middles[kept], (largest * counts / np.where(sums > 0.0, sums, 1.0))[kept]
 
 
-def _merged(parts: list[tuple[Floats, Floats]], least: float) -> DynamicFactor:
-    """Factors of all meshes of a family as one, by speed."""
+def merged(parts: list[tuple[Floats, Floats]], least: float, source: str) -> DynamicFactor:
+    """Speeds (rad/s) and factors of all meshes of a family as one, by speed."""
     speed, value = (np.concatenate([part[place] for part in parts]) for place in (0, 1))
     order = np.argsort(speed)
-    return DynamicFactor(speed[order], value[order], least)
-
-
-def factors(assembly: Assembly, rating: RatingSection, path: Path | None, body: str) -> Mapping[str, DynamicFactor]:
-    """Factors as a gearbox file wants them; see `factors_of_run` for the errors."""
-    if rating.dynamic_factor is not None:
-        return stated_factors(assembly.gearbox, rating.dynamic_factor)
-    assert path is not None
-    return factors_of_run(assembly, rating, path, body)
+    return DynamicFactor(speed[order], value[order], least, source)

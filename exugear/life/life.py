@@ -15,11 +15,12 @@ from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.fingerprint import input_hash
 from exugear.life.acting_loads import acting_loads
 from exugear.life.bearing_life import BearingLife, bearing_lives
-from exugear.life.dynamic_factor import DynamicFactor
+from exugear.life.dynamic_factor import WITHIN, DynamicFactor
 from exugear.life.gear_life import FlankLife, check_strengths, flank_lives
 from exugear.life.static_balance import StaticBalance, static_balance
 from exugear.load_spectrum.counted import CountedLoads, count_loads
 from exugear.model.gearbox import Gearbox
+from exugear.model.parts import RPM
 from exugear.model.sections.loads import RatingSection
 from exugear.model.versions import LIFE
 from fe_ste.root_stress.mesh_cycle import MeshCycleStress
@@ -110,7 +111,7 @@ def life_hash(assembly: Assembly, counted: CountedLoads, tables: Mapping[str, st
     tables : mapping of pair name to str
         Hashes of the tables' inputs.
     run : str
-        Hash of the input of the run that gives K_v.
+        Hash of the input of the run or the steady response that gives K_v.
     """
     case = assembly.gearbox.content
     content = {
@@ -255,4 +256,12 @@ def _dynamic_in_words(rating: RatingSection, dynamic: Mapping[str, DynamicFactor
     if rating.dynamic_factor is not None:
         return f"K_v = {rating.dynamic_factor:g} on all meshes as stated"
     values = ", ".join(f"{family} {float(one.at(found.speed).max()):.3f}" for family, one in dynamic.items())
-    return f"K_v of the run {rating.dynamic_factor_run}, at least {rating.least_dynamic_factor:g}: {values}"
+    first = next(iter(dynamic.values()))
+    lowest, highest = np.abs(found.speed).min() / RPM, np.abs(found.speed).max() / RPM
+    slow, fast = first.speed[0] / RPM, first.speed[-1] / RPM
+    beyond = (
+        ""
+        if slow <= lowest * (1.0 + WITHIN) and highest <= fast * (1.0 + WITHIN)
+        else (f" (loads turn from {lowest:.4g} to {highest:.4g} rpm; beyond its speeds that of its end is taken)")
+    )
+    return f"K_v of {first.source}{beyond}, at least {rating.least_dynamic_factor:g}: {values}"

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.fingerprint import input_hash
 from exugear.life.life import checked_loads, life_hash, rating_of
 from exugear.life.life_file import read_life
+from exugear.life.response_factors import source_hash
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
@@ -57,9 +57,8 @@ def stored_lives(
         try:
             data = read_life(path)
             assembly = assembled(Choice(*(str(data.attrs[key]) for key in ("variant", "mesh_law", "inertias"))))
-            run = rating_of(gearbox).dynamic_factor_run
-            of_run = input_hash(assembly, run) if run is not None else ""
-            digest = life_hash(assembly, checked_loads(gearbox), tables, of_run)
+            source = source_hash(assembly, rating_of(gearbox), folder)
+            digest = life_hash(assembly, checked_loads(gearbox), tables, source)
         except (FileError, CaseError, KeyError) as error:
             yield StoredLife(path, None, str(error))
             continue

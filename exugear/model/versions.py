@@ -12,10 +12,10 @@ REDUCTION = 1
 #: Eigenmodes (`exugear.dynamics.modes`, and the laws and matrices of `exugear.dynamics.assembly`).
 MODES = 2
 #: Runs in time (`exugear.runs`, both solvers, the laws, signals and filters).
-RUN = 3
+RUN = 4
 #: Life of gears and bearings (`exugear.life`, and the root stress of `fe_ste.root_stress`).
 LIFE = 1
 #: Steady responses (`exugear.steady`, and all that modes rest on).
-STEADY = 3
+STEADY = 4
 #: Points of studies (`exugear.studies`: their figures; what these rest on has its own version).
 STUDY = 1

@@ -6,14 +6,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 from exugear.findings.context import Context
 from exugear.findings.groups import run_groups
-from exugear.findings.stored import stored_results
-from exugear.findings.variations import model_variations
+from exugear.findings.stored import bytes_of_runs, stored_models, with_responses
+from exugear.findings.variations import begin_variations, model_variations
 from exugear.findings.words import Words
 from exugear.model.named_files import Permissions
 from exugear.report.parts.material import Material, Part, lines_of
@@ -53,6 +54,8 @@ SECTIONS: Final[tuple[Callable[[Material], Part], ...]] = (
 """Sections of the page in their order. A new one is a function in ``sections`` and a line here."""
 LIBRARIES: Final = ("uPlot.iife.min.js", "three.min.js")
 """Vendored libraries that the page needs."""
+WORTH_A_PROCESS: Final = 3e7
+"""Bytes of run-ups that take longer to analyse than another process takes to start, a second or two."""
 
 
 class ReportError(ValueError):
@@ -83,6 +86,7 @@ def write_report(
     target: float | None = None,
     tell: Callable[[str], None] | None = None,
     files_below: Path | None = None,
+    executor: Executor | None = None,
 ) -> Report:
     """Write ``report.html`` from what a results folder holds: tables, runs, modes, steady responses.
 
@@ -97,6 +101,8 @@ def write_report(
     files_below : Path, optional
         A further folder that files may lie in which the gearbox file names. Scripts among them never run: what they
         would make must be kept in the folder.
+    executor : Executor, optional
+        Works beside this process where that saves time, such as `fe_ste.tools.workers.Workers`.
 
     Returns
     -------
@@ -113,7 +119,7 @@ def write_report(
     gearbox = kept_case(folder, Permissions(below=files_below))
     reference = gearbox.case.report.reference_frequency_Hz if target is None else target
     context = Context(folder, gearbox, reference, tell or (lambda what: None))
-    material = _material(context)
+    material = _material(context, executor)
     parts = [section(material) for section in SECTIONS]
     # The body comes last: sections note what its head tells.
     body = page_body(material, parts)
@@ -125,13 +131,17 @@ def write_report(
     return Report(path, tuple(context.notes.statements), tuple(context.notes.left_out))
 
 
-def _material(context: Context) -> Material:
-    results = stored_results(context)
+def _material(context: Context, executor: Executor | None) -> Material:
+    models = stored_models(context)
+    begun = None
+    if executor is not None and models.modes and bytes_of_runs(context) > WORTH_A_PROCESS:
+        begun = begin_variations(context, models.modes, executor)
+    results = with_responses(context, models)
     if not results:
         reasons = context.notes.left_out or ["no files"]
         raise ReportError("\n".join([f"{context.folder}: nothing here belongs to its case", *reasons]))
     groups = run_groups(context, results)
-    variations = model_variations(context, results.modes)
+    variations = model_variations(context, results.modes, begun)
     words = Words(context.gearbox)
     material = Material(context, results, words, groups, variations, lines_of(context), ArrayStore())
     return replace(material, run_data=run_data(material))

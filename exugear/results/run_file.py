@@ -217,7 +217,13 @@ def read_run(path: Path, names: Iterable[str]) -> tuple[dict[str, NDArray[Any]],
         unknown = sorted(set(names) - set(run.variables))
         if unknown:
             raise FileError(f"{path}: holds no {unknown[0]}")
-        return {name: np.asarray(run.variables[name][...]) for name in names}, dict(run.attrs)
+        return {name: _values(run.variables[name]) for name in names}, dict(run.attrs)
+
+
+def _values(variable: h5netcdf.Variable) -> NDArray[Any]:
+    """Values of a variable; texts as Python's."""
+    values = np.asarray(variable[...])
+    return np.array([text.decode() for text in values], dtype=str) if values.dtype == object else values
 
 
 def _load_pieces(folder: Path, wanted: list[str] | None) -> xr.Dataset:

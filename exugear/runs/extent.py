@@ -72,7 +72,7 @@ def check_disk(
         )
 
 
-def sample_bytes(meshes: int, supports: int, tabled: bool) -> int:
+def sample_bytes(meshes: int, supports: int, tabled: bool, jointed: bool = False) -> int:
     """Size of one sample on disk, of a run with so many meshes and supports.
 
     Parameters
@@ -80,14 +80,18 @@ def sample_bytes(meshes: int, supports: int, tabled: bool) -> int:
     meshes, supports : int
     tabled : bool
         Whether its mesh law is `table`, which has further signals.
+    jointed : bool
+        Whether supports are ideal joints, which have fewer.
 
     Examples
     --------
     >>> sample_bytes(meshes=8, supports=12, tabled=False)
+    384
+    >>> sample_bytes(meshes=8, supports=12, tabled=False, jointed=True)
     240
     """
     names = {"mesh": ("",) * meshes, "support": ("",) * supports, "axis": AXES}
-    return SignalLayout(signals_of(tabled), names, radius=1.0).sample_bytes
+    return SignalLayout(signals_of(tabled, jointed), names, radius=1.0).sample_bytes
 
 
 def too_fine(step: float, total: float, sample_rate: float) -> str:

@@ -1,13 +1,14 @@
 """What a run leaves behind: its states turned into signals, filtered, judged and written piece by piece.
 
 Two buffers take turns: while a solver fills one, a second thread filters, judges and writes the other. Its verdict is
-heard when the next buffer is full, whichever thread is faster, so that a run depends on no clock.
+heard when the next buffer is full, whichever thread is faster, so that a run depends on no clock. A worker of a study
+shares the cores with others and does both in turn; the results are the same.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from exugear.runs.start import RunStart
 from exugear.runs.trust import PULLING
 from exugear.solvers.compiled.observers import Observer
 from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.threads import second_thread
 
 FLUSH_INTERVAL = 0.25
 """Simulated time between writes to disk, s."""
@@ -132,7 +134,7 @@ class Recorder:
         rows = buffer_rows(wanted, size, self._layout.count)
         self.buffer, self._spare = (StateBuffer(rows, size, self._layout.count) for _ in range(2))
         self._stopped = self._judge.stop
-        self._writer = ThreadPoolExecutor(1)
+        self._writer = second_thread()
         self._writing: Future[float] | None = None
 
     def __enter__(self) -> Recorder:

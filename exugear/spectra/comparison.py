@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from textwrap import shorten
@@ -12,7 +12,7 @@ import numpy as np
 
 from exugear.spectra.resonances import Pick, peaks_on_line
 from exugear.spectra.run_spectra import Finding, VariantRun
-from exugear.spectra.waterfall import Waterfall, line_level
+from exugear.spectra.waterfall import Waterfall
 from fe_ste.tools.notebook import html_table
 
 
@@ -57,19 +57,18 @@ def only_in_first(picks: Iterable[Pick], other: Waterfall, rule: AbsenceRule | N
     tuple of Pick
         Peaks that satisfy the rule; a peak where the second run has no data does not.
     """
-    stated = rule or AbsenceRule()
-    return tuple(pick for pick in picks if _is_absent(pick, other, stated))
+    stated, asked = rule or AbsenceRule(), tuple(picks)
+    peaks = {line: peaks_on_line(other, line, stated.prominence) for line in {pick.line for pick in asked}}
+    return tuple(pick for pick in asked if _is_absent(pick, other, peaks[pick.line], stated))
 
 
-def _is_absent(pick: Pick, other: Waterfall, rule: AbsenceRule) -> bool:
-    frequency, level = pick.line.frequency(other.speed), line_level(other, pick.line)
+def _is_absent(pick: Pick, other: Waterfall, peaks: Sequence[Pick], rule: AbsenceRule) -> bool:
+    """Tell whether a peak is absent from another run, of which the peaks on the same order line are given."""
+    frequency, level = pick.line.frequency(other.speed), other.along(pick.line)
     near = np.isfinite(level) & (np.abs(frequency - pick.frequency) <= pick.resolution)
     if not np.any(near):
         return False
-    same_place = any(
-        abs(peak.frequency - pick.frequency) <= max(pick.resolution, peak.resolution)
-        for peak in peaks_on_line(other, pick.line, rule.prominence)
-    )
+    same_place = any(abs(peak.frequency - pick.frequency) <= max(pick.resolution, peak.resolution) for peak in peaks)
     return not same_place and float(level[near].max()) <= pick.level - rule.margin
 
 

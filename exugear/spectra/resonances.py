@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from exugear.model.parts import RPM
 from exugear.spectra.orders import OrderLine
-from exugear.spectra.waterfall import Waterfall, line_level
+from exugear.spectra.waterfall import Waterfall
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.notebook import html_table
 
@@ -75,7 +75,7 @@ def pick_resonances(
     [120]
     """
     searched = tuple(lines)
-    highest = max((_highest(line_level(spectra, line)) for line in searched), default=0.0)
+    highest = max((_highest(spectra.along(line)) for line in searched), default=0.0)
     picks = (pick for line in searched for pick in peaks_on_line(spectra, line, prominence))
     return tuple(pick for pick in picks if pick.level > highest - depth)
 
@@ -86,7 +86,7 @@ def _highest(level: Floats) -> float:
 
 def peaks_on_line(spectra: Waterfall, line: OrderLine, prominence: float) -> list[Pick]:
     """Find the peaks of a least prominence (dB) along one order line, in order of time."""
-    level = line_level(spectra, line)
+    level = spectra.along(line)
     usable = np.flatnonzero(np.isfinite(level))
     if usable.size < 3:
         return []
@@ -95,12 +95,14 @@ def peaks_on_line(spectra: Waterfall, line: OrderLine, prominence: float) -> lis
     apart = max(1.0, float(np.median(resolution[usable]) / pace)) if pace > 0.0 else 1.0
     peaks, properties = scipy.signal.find_peaks(level[usable], prominence=prominence, distance=apart)
     return [
-        _pick_at(spectra, line, level, int(usable[peak]), float(height))
+        _pick_at(spectra, line, level, resolution, int(usable[peak]), float(height))
         for peak, height in zip(peaks, properties["prominences"], strict=True)
     ]
 
 
-def _pick_at(spectra: Waterfall, line: OrderLine, level: Floats, frame: int, prominence: float) -> Pick:
+def _pick_at(
+    spectra: Waterfall, line: OrderLine, level: Floats, resolution: Floats, frame: int, prominence: float
+) -> Pick:
     """Refine a peak by the parabola through its frame and both neighbours."""
     before, here, after = level[frame - 1 : frame + 2]
     curvature = before - 2.0 * here + after
@@ -115,7 +117,7 @@ def _pick_at(spectra: Waterfall, line: OrderLine, level: Floats, frame: int, pro
         frequency=float(line.frequency(speed)),
         level=float(here - 0.25 * (before - after) * offset),
         prominence=prominence,
-        resolution=float(np.interp(position, frames, spectra.resolution(line))),
+        resolution=float(np.interp(position, frames, resolution)),
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from exugear.model.parts import RPM
-from exugear.results.run_file import load_run
+from exugear.results.run_file import read_run as read_arrays
 from exugear.spectra.mode_report import mobility_shares
 from exugear.spectra.orders import OrderLine
 from exugear.spectra.resonances import (
@@ -25,11 +25,13 @@ from exugear.spectra.resonances import (
 )
 from exugear.spectra.spectrum import sweep_matched_window
 from exugear.spectra.waterfall import Waterfall, waterfall
-from fe_ste.tools.arrays import Floats
+from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.notebook import html_table
 
 LEAST_SHARE = 1e-5
 """Modes with a smaller share of the overall transmission error's mobility are no match for a resonance of it."""
+SHIFT = 0.01
+"""Share of a frequency by which a resonance and its mode differ: turning shafts and stiffness at the load shift it."""
 
 LONGEST_WINDOW = 0.25
 """Part of a run that a window has at most: one whose speed hardly changes would want a longer one than the run."""
@@ -92,12 +94,12 @@ def run_signals(path: str | Path) -> RunSignals:
     FileError
         The run is missing or damaged.
     """
-    data = load_run(path, _NAMES)
-    time, speed, overall = (data[name].to_numpy() for name in _NAMES)
+    data, attributes = read_arrays(Path(path), _NAMES)
+    time, speed, overall = (data[name] for name in _NAMES)
     if time.size < 2:
         raise ValueError(f"{path}: holds {time.size} samples, too few for a spectrum; run for longer")
     span = float(np.ptp(time))
-    return RunSignals(Path(path), data.attrs, (time.size - 1) / span, span, speed, overall)
+    return RunSignals(Path(path), attributes, (time.size - 1) / span, span, speed, overall)
 
 
 def run_waterfall(path: str | Path, window_length: float | None = None) -> Waterfall:
@@ -200,15 +202,30 @@ class VariantRun:
         resonances = group_by_frequency(self.picks if picks is None else picks)
         if self.modes is None:
             return tuple(Finding(resonance, None, math.nan, "") for resonance in resonances)
-        visible = np.flatnonzero(mobility_shares(self.modes) >= LEAST_SHARE)
-        frequency, name = (self.modes[key].to_numpy()[visible] for key in ("frequency", "name"))
-        matches = match_eigenfrequencies(resonances, frequency)
+        visible = self._seen_modes(self.modes)
+        matches = match_eigenfrequencies(resonances, self.modes["frequency"].to_numpy()[visible])
         return tuple(
-            Finding(resonance, None, math.nan, "")
-            if match is None
-            else Finding(resonance, int(visible[match]), float(frequency[match]), str(name[match]))
+            self._finding(resonance, None if match is None else int(visible[match]))
             for resonance, match in zip(resonances, matches, strict=True)
         )
+
+    def located(self, finding: Finding, frequency: float) -> Finding:
+        """Return a resonance with the mode nearest to where a steady response shows it, Hz, instead of the run-up."""
+        if self.modes is None:
+            return finding
+        visible = self._seen_modes(self.modes)
+        apart = np.abs(self.modes["frequency"].to_numpy()[visible] - frequency)
+        nearest = None if not apart.size or apart.min() > SHIFT * frequency else int(visible[np.argmin(apart)])
+        return self._finding(finding.resonance, nearest)
+
+    @staticmethod
+    def _seen_modes(modes: xr.Dataset) -> Integers:
+        return np.flatnonzero(mobility_shares(modes) >= LEAST_SHARE)
+
+    def _finding(self, resonance: Resonance, mode: int | None) -> Finding:
+        if mode is None or self.modes is None:
+            return Finding(resonance, None, math.nan, "")
+        return Finding(resonance, mode, float(self.modes["frequency"][mode]), str(self.modes["name"].to_numpy()[mode]))
 
 
 def read_run(

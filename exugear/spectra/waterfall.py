@@ -80,6 +80,17 @@ class Waterfall:
         """Level in dB, shape (n, m); silence ends 200 dB below the reference."""
         return 20.0 * np.log10(np.maximum(self.amplitude / self.reference, 1e-10))
 
+    @cached_property
+    def _along(self) -> dict[OrderLine, Floats]:
+        """Levels along the order lines that were asked for."""
+        return {}
+
+    def along(self, line: OrderLine) -> Floats:
+        """Level (dB) along an order line as `line_level` finds it, shape (n,); each line is looked for once."""
+        if line not in self._along:
+            self._along[line] = line_level(self, line)
+        return self._along[line]
+
     @property
     def description(self) -> str:
         """Window, overlap and reference in words, for captions."""

@@ -26,6 +26,8 @@ BALANCED = 1e-8
 STEP_TOLERANCE = 1e-3
 """Residual of a Newton step's linear equations over that of the balance."""
 MOST_STEPS = 40
+PATIENCE, STALLED = 6, 0.5
+"""Newton steps over which the residual has to fall to this share, or the search is given up."""
 SHORTEST = 1.0 / 64.0
 """Share of a Newton step to which it is halved while it does not lower the residual."""
 
@@ -193,6 +195,10 @@ class Balance:
         found[0] += self.mean_force
         return found
 
+    def missing(self, readings: Complexes) -> Complexes:
+        """Find what is missing to the balance (n, m, r)."""
+        return readings - self.static - self.answer(self.forces(readings)[0])
+
     def answer(self, excess: Complexes) -> Complexes:
         """Find the readings -G F (n, m, r) under forces (n, m, f)."""
         shape = self.interface.readings.shape
@@ -221,9 +227,13 @@ def solve_balance(balance: Balance, readings: Complexes) -> tuple[Complexes, int
     excess, change, _ = balance.forces(readings)
     missing = readings - balance.static - balance.answer(excess)
     error, products = float(np.linalg.norm(missing)), 0
+    before = [np.inf] * PATIENCE
     for _ in range(MOST_STEPS):
         if error <= BALANCED * size:
             return readings, products
+        if error > STALLED * before[-PATIENCE]:
+            break
+        before.append(error)
         step, took = solve_lines(
             lambda own, change=change: own - balance.answer(change(own)),  # type: ignore[misc]
             -missing,

@@ -106,9 +106,20 @@ def growth_at(balance: Balance, readings: Complexes, base: int) -> float:
     # Rates of the waves as their meshes see them: those in the frame, and what the turning carries along.
     carried = speed * np.tensordot(gearset.waves.partners, ports.readings, axes=1).reshape(-1, size)
     reads = np.block([[rows, np.zeros_like(rows)], [carried, rows]])
-    found = exponents(np.vstack([np.eye(size, 2 * size, size), lower]), pushes, reads, varying, period)
-    rolling = np.argsort(np.abs(np.exp(found * period) - 1.0))[:ROLLING]
+    found, shapes = exponents(np.vstack([np.eye(size, 2 * size, size), lower]), pushes, reads, varying, period)
+    # Free rolling neither grows nor decays but for what the losses change with the speed: it is known by its shape.
+    assembly = gearset.waves.assembly
+    turning = assembly.rolling_velocity(np.zeros(assembly.size), system.frame.speeds)
+    along = system.mass @ np.linalg.solve(system.frame.matrices(0.0)[0], turning)
+    moved = shapes[:size]
+    energy = np.sqrt(np.abs(np.sum(moved.conj() * (system.mass @ moved), axis=0)))
+    rolling = np.argsort(-np.abs(along @ moved) / np.maximum(energy, 1e-300))[:ROLLING]
     return float(np.delete(found, rolling).real.max())
+
+
+def growth_of_state(balance: Balance, readings: Complexes) -> float:
+    """Fastest growth of a disturbance of a steady state over the bases, 1/s; parameters as of `growth_at`."""
+    return max(growth_at(balance, readings, base) for base in range(len(balance.gearset.waves.base_orders)))
 
 
 def mean_growth(gearset: Gearset) -> float:

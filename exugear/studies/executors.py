@@ -15,7 +15,7 @@ from typing import Any, Protocol, Self
 
 from exugear.studies.batches import Task, Work
 from exugear.studies.journal import Record
-from fe_ste.tools.threads import available_cores
+from fe_ste.tools.threads import AtOnce, available_cores
 from fe_ste.tools.workers import Workers
 
 CONNECT_SECONDS = 30.0
@@ -53,18 +53,9 @@ Opens = Callable[[], AbstractContextManager[Pool]]
 """Starts workers; called again after workers were lost."""
 
 
-class _Here:
-    """Executor that computes when it is asked to, in this process."""
-
-    def submit(self, fn: Callable[..., list[Record]], /, *args: Any) -> Future[list[Record]]:
-        future: Future[list[Record]] = Future()
-        future.set_result(fn(*args))
-        return future
-
-
 @contextmanager
 def _here() -> Iterator[Pool]:
-    yield Pool(_Here(), 1)
+    yield Pool(AtOnce(), 1)
 
 
 def processes(workers: int | None = None) -> Opens:

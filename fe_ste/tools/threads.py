@@ -11,7 +11,7 @@ import multiprocessing
 import os
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
@@ -49,8 +49,7 @@ def side_by_side(function: Callable[[Item], Result], items: Iterable[Item]) -> l
     [1, 2]
     """
     given = list(items)
-    beside_another = getattr(_here, "beside", False)
-    if len(given) < 2 or available_cores() == 1 or multiprocessing.parent_process() or beside_another:
+    if len(given) < 2 or not _second_core() or getattr(_here, "beside", False):
         return [function(item) for item in given]
 
     def beside(item: Item) -> Result:
@@ -72,6 +71,44 @@ def both(first: Callable[[], Result], second: Callable[[], Other]) -> tuple[Resu
     calls: list[Callable[[], Any]] = [first, second]
     one, other = side_by_side(lambda call: call(), calls)
     return one, other
+
+
+class AtOnce(Executor):
+    """Executor that computes when it is asked to, in the thread that asks.
+
+    Examples
+    --------
+    >>> AtOnce().submit(abs, -1).result()
+    1
+    """
+
+    def submit(self, function: Callable[..., Result], /, *given: Any, **named: Any) -> Future[Result]:
+        """Call a function; its error waits in the future, as with other executors."""
+        future: Future[Result] = Future()
+        try:
+            future.set_result(function(*given, **named))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+
+def second_thread() -> Executor:
+    """Return a thread beside this one, or none where it would take from others what it gains.
+
+    That is where there is one core only, and in a worker process, which shares the cores with others.
+
+    Examples
+    --------
+    >>> with second_thread() as thread:
+    ...     thread.submit(abs, -1).result()
+    1
+    """
+    return ThreadPoolExecutor(1) if _second_core() else AtOnce()
+
+
+def _second_core() -> bool:
+    """Whether a core is likely to be free for a second thread."""
+    return available_cores() > 1 and multiprocessing.parent_process() is None
 
 
 def available_cores() -> int:

@@ -47,7 +47,8 @@ def sampled(assembly: Assembly, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     if assembly.variant == "rigid":
         joint_signals(q, v, assembly.meshes, *joint_arrays(assembly), out[:, layout["support_force"]])
     else:
-        bearing_signals(q, v, assembly.connectors, out[:, layout["support_force"]])
+        loads = out[:, layout["support_force"]], out[:, layout["support_moment"]]
+        bearing_signals(q, v, assembly.connectors, *loads)
     if "misalignment" in layout:
         nominal = [element.mesh.centre_distance for element in assembly.elements]
         for row, x, u in zip(out, q, v, strict=True):
@@ -89,14 +90,15 @@ def mesh_signals(q, v, meshes, out) -> None:
 
 
 @numba.njit
-def bearing_signals(q, v, connectors, out) -> None:
-    """Fill (samples, 3 c): force of each bearing on its body (N), global axes."""
+def bearing_signals(q, v, connectors, out, moments) -> None:
+    """Fill (samples, 3 c) each: force (N) and moment (N m) of each bearing on its body, global axes."""
     load, arms = np.empty(6), np.empty((2, 3))
     for n in range(q.shape[0]):
         for c in range(connectors.bodies.shape[0]):
             connector_load(q[n], v[n], c, connectors, arms, load)
             for i in range(3):
                 out[n, 3 * c + i] = -load[i]
+                moments[n, 3 * c + i] = -load[3 + i]
 
 
 @numba.njit

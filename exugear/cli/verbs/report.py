@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Annotated
 
@@ -9,7 +11,7 @@ import typer
 
 from exugear.cli.case import check_files_below
 from exugear.cli.console import note, print_json, print_table, progress_bar, say
-from exugear.cli.errors import BadInputError, exit_codes, model_errors
+from exugear.cli.errors import BadInputError, exit_codes, interruption, model_errors
 from exugear.cli.options import FilesBelowOption, JsonOption
 
 
@@ -36,12 +38,25 @@ def report(
         if not folder.is_dir():
             raise BadInputError(f"{folder}: no such folder; name the one that `exugear run` wrote into")
         try:
-            with time_noted(folder, "report"), model_errors(), progress_bar() as bar:
+            with time_noted(folder, "report"), model_errors(), progress_bar() as bar, _beside() as executor:
                 task = bar.add_task("report", total=None)
-                written = write_report(folder, near, lambda what: bar.update(task, description=what), files_below)
+
+                def tell(what: str) -> None:
+                    interruption.check()
+                    bar.update(task, description=what)
+
+                written = write_report(folder, near, tell, files_below, executor)
         except (CaseError, ReportError) as error:
             raise BadInputError(error) from error
         _tell_report(folder, written.path, written.statements, written.left_out, as_json)
+
+
+def _beside() -> AbstractContextManager[Executor | None]:
+    """Another process to work beside this one, where there is a core for it; it starts when it is given work."""
+    from fe_ste.tools.threads import available_cores
+    from fe_ste.tools.workers import Workers
+
+    return Workers(1) if available_cores() > 1 else nullcontext()
 
 
 def _tell_report(

@@ -137,8 +137,9 @@ def _check_extent(project: Project, duration: float | None, folder: Path) -> Non
     from exugear.tooth_mesh.laws.registry import LAWS
 
     gearbox, load_case = project.gearbox, _load_case(project)
-    supports = gearbox.joints if project.choice.variant == Variant.rigid else gearbox.bearings
-    size = sample_bytes(len(gearbox.meshes), len(supports), LAWS[project.choice.mesh_law].signals_positions)
+    jointed, tabled = project.choice.variant == Variant.rigid, LAWS[project.choice.mesh_law].signals_positions
+    supports = gearbox.joints if jointed else gearbox.bearings
+    size = sample_bytes(len(gearbox.meshes), len(supports), tabled, jointed)
     with model_errors():
         check_duration(gearbox, load_case, duration)
         check_disk(gearbox, load_case, folder, duration, sample_bytes=size)

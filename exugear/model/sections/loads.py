@@ -117,11 +117,13 @@ class RatingSection(Section):
     edition: Literal["ISO 6336:2006"] = "ISO 6336:2006"
     """Edition of the standard, named in every output."""
     dynamic_factor: q.LoadFactorK | None = None
-    """K_v of all meshes, as stated; or the next two keys."""
+    """K_v of all meshes, as stated; or one of the next two keys and the least one."""
     dynamic_factor_run: Name | None = None
     """Load case whose run gives K_v over speed: largest over mean force of each mesh within 20 cycles."""
+    dynamic_factor_steady: Literal["linear", "parametric", "nonlinear"] | None = None
+    """Level of the steady response that gives K_v over speed, by the same windows."""
     least_dynamic_factor: q.LoadFactorK | None = None
-    """Least K_v beside a run: without errors of the wheels a run has too little."""
+    """Least K_v beside a run or a response: without errors of the wheels these have too little."""
     viscosity_40_mm2_per_s: q.Viscosity
     """Kinematic viscosity of the oil at 40 degrees Celsius."""
     carrier_angles: q.CarrierAngles = 12
@@ -135,7 +137,10 @@ class RatingSection(Section):
 
     @model_validator(mode="after")
     def _dynamic_factor(self) -> RatingSection:
-        of_run = (self.dynamic_factor_run is not None, self.least_dynamic_factor is not None)
-        if (self.dynamic_factor is not None) == all(of_run) or (self.dynamic_factor is not None and any(of_run)):
-            raise ValueError("give dynamic_factor, or dynamic_factor_run and least_dynamic_factor")
+        sources = (self.dynamic_factor, self.dynamic_factor_run, self.dynamic_factor_steady)
+        stated, least = self.dynamic_factor is not None, self.least_dynamic_factor is not None
+        if sum(one is not None for one in sources) != 1 or stated == least:
+            raise ValueError(
+                "give dynamic_factor, or one of dynamic_factor_run and dynamic_factor_steady with least_dynamic_factor"
+            )
         return self

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exugear.spectra.orders import OrderLine
-from exugear.spectra.waterfall import Waterfall, line_level
+from exugear.spectra.waterfall import Waterfall
 from fe_ste.tools.arrays import Floats
 
 NO_LEVEL = -32768
@@ -61,5 +61,16 @@ def level_bytes(level: Floats, floor: float, step: float) -> NDArray[np.uint8]:
 
 def cut_levels(spectra: Waterfall, lines: Sequence[OrderLine]) -> NDArray[Any]:
     """Level along each order (frames, lines), tenths of a dB; `NO_LEVEL` where there is none."""
-    levels = np.array([line_level(spectra, line) for line in lines]).reshape(len(lines), spectra.time.size).T
+    levels = np.array([spectra.along(line) for line in lines]).reshape(len(lines), spectra.time.size).T
+    return tenths(levels)
+
+
+def tenths(levels: Floats) -> NDArray[Any]:
+    """Levels (dB) as tenths of a dB; `NO_LEVEL` where there is none.
+
+    Examples
+    --------
+    >>> tenths(np.array([-3.21, np.nan])).tolist()
+    [-32, -32768]
+    """
     return np.where(np.isfinite(levels), np.round(10.0 * levels), NO_LEVEL).astype("i2")

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from exugear.findings.channels import Channel, channels_of, loudest_order
+from exugear.findings.constant_speed import ConstantSpeed
 from exugear.findings.groups import RankedResonance, RunGroup
 from exugear.findings.words import VARIANTS, figure_text, percentages
 from exugear.model.parts import RPM
 from exugear.report.parts.material import Material, model_name
-from exugear.report.parts.pooling import cut_levels, level_bytes, pooled
+from exugear.report.parts.pooling import cut_levels, level_bytes, pooled, tenths
 from exugear.spectra.orders import OrderLine
 from exugear.spectra.run_spectra import VariantRun
 from exugear.spectra.waterfall import Waterfall
@@ -76,6 +77,7 @@ def _variant(material: Material, group: RunGroup, run: VariantRun) -> dict[str, 
         "window": run.spectra.description,
         "channels": [_overall(material, run.spectra), *(_channel(material, channel) for channel in channels)],
         "loudest": {channel.name: _loudest(material, channel) for channel in channels if channel.kind == "support"},
+        "constant": _constant(material, group.constant.get(run.variant)),
         "resonances": [_resonance(material, group, run, own) for own in group.ranked[run.variant]],
     }
 
@@ -140,6 +142,19 @@ def _cuts(material: Material, spectra: Waterfall, every: int) -> dict[str, Any]:
     }
 
 
+def _constant(material: Material, own: ConstantSpeed | None) -> dict[str, Any] | None:
+    """Levels along the orders at constant speed, for the cuts of the overall transmission error."""
+    if own is None:
+        return None
+    along = [own.along(line) for line in material.lines]
+    nothing = np.full(own.speed.size, np.nan)
+    levels = np.array([nothing if one is None else one for one in along]).reshape(len(along), own.speed.size).T
+    return {
+        "cuts": material.arrays.add(tenths(levels), differences=True),
+        "speeds": material.arrays.add((own.speed / RPM).astype("f4")),
+    }
+
+
 def _loudest(material: Material, channel: Channel) -> dict[str, Any] | None:
     """Figures of a bearing for its table."""
     found = loudest_order(channel.spectra, material.lines)
@@ -174,11 +189,13 @@ def _facts(material: Material, group: RunGroup, run: VariantRun, own: RankedReso
     """Terms and words of a resonance for the panel beside the waterfall."""
     words, peak = material.words, own.peak
     others = list(dict.fromkeys(p.line for p in own.finding.resonance.picks[1:] if p.line != peak.line))[:ALSO]
+    at = own.constant
+    at_constant = "" if at is None else f"; at constant speed {figure_text(at.level)} dB at {at.frequency:.1f} Hz"
     facts = [
         [
             "Level",
             f"{figure_text(peak.level)} dB = ±{figure_text(10.0 ** (peak.level / 20.0), 2)} µm, "
-            f"{figure_text(peak.prominence, 2)} dB above its surroundings",
+            f"{figure_text(peak.prominence, 2)} dB above its surroundings{at_constant}",
         ],
         ["Excited by", f"{words.line_sentence(peak.line)} (order {figure_text(peak.line.order, 4)})"],
     ]

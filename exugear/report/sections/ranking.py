@@ -15,6 +15,9 @@ from exugear.web.pieces import Cell
 
 SHOWN_SPAN = 60.0
 """dB below the loudest at which the bar of a level ends."""
+BUILT_UP = 3.0
+"""dB below the level at constant speed from which a run-up counts as too fast for a resonance."""
+AT_CONSTANT = "Constant speed / dB, Hz"
 
 
 def ranking_section(material: Material) -> Part:
@@ -61,7 +64,9 @@ def _rules() -> str:
     return (
         "A resonance is a peak that stands at least 6 dB above its surroundings along an order; peaks of several "
         f"orders at one frequency are one. Absent, judged at its loudest peak: {AbsenceRule().description}, with every "
-        f"window. Unsteady: not shown with every length of the window, {factors} times that of the diagrams."
+        f"window. Unsteady: not shown with every length of the window, {factors} times that of the diagrams. Where a "
+        "steady response is there, levels at constant speed rank: a run-up that is too fast for a resonance shows it "
+        f"too low, and is marked where it lacks {BUILT_UP:g} dB or more."
     )
 
 
@@ -92,7 +97,7 @@ def _others(group: RunGroup, variant: str) -> list[str]:
 
 def _row(material: Material, group: RunGroup, run: VariantRun, number: int, own: RankedResonance) -> dict[str, object]:
     finding, peak = own.finding, own.peak
-    loudest = group.ranked[run.variant][0].peak.level
+    loudest = group.ranked[run.variant][0].loudness
     frequency = f"{finding.resonance.frequency:.0f} ± {finding.resonance.resolution:.0f}"
     choice = f"resonance:{group.name}:{run.variant}:{number - 1}"
     matched = finding.mode is not None and run.modes is not None
@@ -101,10 +106,12 @@ def _row(material: Material, group: RunGroup, run: VariantRun, number: int, own:
         "Frequency / Hz": Cell(frequency, finding.resonance.frequency, choice),
         "Speed / rpm": Cell(figure_text(finding.speed, 4), finding.speed),
         "Excited by": material.words.line(peak.line),
-        "Level / dB": Cell(f"{peak.level:.1f}", peak.level, bar=1.0 - (loudest - peak.level) / SHOWN_SPAN),
-        "± µm": Cell(figure_text(10.0 ** (peak.level / 20.0), 2), peak.level),
-        "Prominence / dB": Cell(figure_text(peak.prominence, 2), peak.prominence),
+        "Level / dB": _level(own, loudest),
     }
+    if run.variant in group.constant:
+        row[AT_CONSTANT] = _at_constant(own, loudest)
+    row["± µm"] = Cell(figure_text(10.0 ** (own.loudness / 20.0), 2), own.loudness)
+    row["Prominence / dB"] = Cell(figure_text(peak.prominence, 2), peak.prominence)
     for name, key in zip((n for n in group.runs if n != run.variant), _others(group, run.variant), strict=True):
         level = own.elsewhere[name]
         if name in own.lacking:
@@ -117,6 +124,24 @@ def _row(material: Material, group: RunGroup, run: VariantRun, number: int, own:
     row["What moves; what gives"] = _story(material, run, own)
     row["Windows"] = Cell("all" if own.steady else "unsteady", float(own.steady), tag="good" if own.steady else "mind")
     return row
+
+
+def _level(own: RankedResonance, loudest: float) -> Cell:
+    """Level of the run-up; marked where it is too fast."""
+    level = own.peak.level
+    if own.constant is None:
+        return Cell(f"{level:.1f}", level, bar=1.0 - (loudest - level) / SHOWN_SPAN)
+    if own.missed >= BUILT_UP:
+        return Cell(f"{level:.1f} too fast", level, tag="mind")
+    return Cell(f"{level:.1f}", level)
+
+
+def _at_constant(own: RankedResonance, loudest: float) -> Cell:
+    """Level at constant speed, and the frequency where it is highest."""
+    at = own.constant
+    if at is None:
+        return Cell("–", -1e4)
+    return Cell(f"{at.level:.1f}, {at.frequency:.0f} Hz", at.level, bar=1.0 - (loudest - at.level) / SHOWN_SPAN)
 
 
 def _story(material: Material, run: VariantRun, own: RankedResonance) -> str:

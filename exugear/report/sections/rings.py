@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from exugear.findings.groups import RunGroup
 from exugear.findings.words import VARIANTS, figure_text
+from exugear.model.parts import RPM
 from exugear.report.parts.material import Material, Part
 from exugear.web import pieces
 from exugear.web.stage_figure import stage_figure
@@ -46,8 +47,5 @@ def _without_scripts(words: str) -> str:
 def _in_words(groups: Sequence[RunGroup]) -> str:
     group = groups[0]
     loudest = [own for own in group.ranked[group.main] if own.steady][:3]
-    told = [
-        f"{own.finding.resonance.frequency:.0f} Hz at {own.finding.speed:.1f} rpm, {figure_text(own.peak.level)} dB"
-        for own in loudest
-    ]
+    told = [f"{own.frequency:.0f} Hz at {own.speed / RPM:.1f} rpm, {figure_text(own.loudness)} dB" for own in loudest]
     return f"Loudest, {VARIANTS[group.main]}: {'; '.join(told) or 'nothing stands out'}."

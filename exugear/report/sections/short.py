@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from exugear.findings.facts import Fact, facts_of
+from exugear.findings.facts import Fact, facts_of, facts_of_response
 from exugear.findings.groups import RunGroup
 from exugear.findings.verdicts import Verdict, run_figures, verdicts_of
 from exugear.report.parts.material import Material, Part, only_for
@@ -23,9 +23,7 @@ def short_section(material: Material) -> Part:
         context.notes.statements.extend(f"{several}{verdict.line}." for verdict in verdicts)
         content.append(only_for(_group(material, group, facts, verdicts), group.name))
     if not content:
-        content = [
-            pieces.paragraph("No run-up of this case is here: `exugear run` makes one, and the page tells more.")
-        ]
+        content = [_without_run_ups(material)]
     return Part(pieces.section("In short", *content, name="short"), {}, "In short", "short")
 
 
@@ -38,6 +36,16 @@ def _group(material: Material, group: RunGroup, facts: Sequence[Fact], verdicts:
         pieces.paragraph(scope, "note")
         + pieces.element("div", "".join(map(_card, facts)), class_="cards")
         + verdict_list(verdicts)
+    )
+
+
+def _without_run_ups(material: Material) -> str:
+    """Tell what steady responses know, and what tells more."""
+    facts = [fact for data in material.results.steady for fact in facts_of_response(data)]
+    material.context.notes.statements.extend(fact.line for fact in facts)
+    cards = pieces.element("div", "".join(map(_card, facts)), class_="cards") if facts else ""
+    return cards + pieces.paragraph(
+        "No run-up of this case is here: `exugear run` makes one, and the page tells more.", "note" if facts else ""
     )
 
 

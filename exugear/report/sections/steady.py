@@ -17,11 +17,12 @@ from exugear.model.reading import CaseError
 from exugear.model.sections.entries import GROUND
 from exugear.report.parts.charts import Axis, Curve, chart
 from exugear.report.parts.material import Material, Part, model_name
-from exugear.results.run_file import load_run
+from exugear.results.run_file import read_run
 from exugear.spectra.orders import OrderLine, order_lines
 from exugear.spectra.run_spectra import VariantRun
 from exugear.spectra.sweeps import TOO_FAST, run_up_cut, sweep_rate, sweep_severity
 from exugear.steady.peaks import Peak, line_name, peaks, planet_sidebands, sidebands
+from exugear.steady.steady_file import settings_of
 from exugear.web import pieces
 from fe_ste.tools.arrays import Floats
 
@@ -96,7 +97,7 @@ def _order_charts(
         html, spec = chart(
             f"{name}-{number}",
             material.words.line(line),
-            "Thick: steady. Dashed: run-ups, cut with the window that suits their sweep.",
+            "Dashed: run-ups, cut with the window that suits their sweep, and states that do not last.",
             f"Overall transmission error along {material.words.line_sentence(line)}.",
             _curves(data, runs, line),
             [Axis(f"{material.input_words} speed / rpm"), Axis("level / dB re 1 µm")],
@@ -310,13 +311,36 @@ def _place(data: xr.Dataset, line: OrderLine) -> int | None:
 def _curves(data: xr.Dataset, runs: Sequence[VariantRun], line: OrderLine) -> list[Curve]:
     place = _place(data, line)
     amplitude = data["amplitude"].to_numpy()[:, place, 0].astype(np.float64)
-    curves = [Curve("steady", np.abs(data["speed"].to_numpy()) / RPM, _level(amplitude))]
+    speed, level = np.abs(data["speed"].to_numpy()) / RPM, _level(amplitude)
+    branches = settings_of(data.attrs).branches
+    curves = branch_curves(speed, level, data["growth"].to_numpy()) if branches else [Curve("steady", speed, level)]
     for run in runs:
-        stored = load_run(run.path, ("time", "overall_dte", "input_speed"))
-        time, values, speed = (stored[name].to_numpy() for name in ("time", "overall_dte", "input_speed"))
-        cut = run_up_cut(time, values, speed, line)
+        stored, _ = read_run(run.path, ("time", "overall_dte", "input_speed"))
+        cut = run_up_cut(stored["time"], stored["overall_dte"], stored["input_speed"], line)
         label = f"run-up {run.attributes['load_case']}"
         curves.append(Curve(label, np.abs(cut.speed) / RPM, _level(np.abs(cut.amplitude)), "dashed"))
+    return curves
+
+
+def branch_curves(speed: Floats, level: Floats, growth: Floats) -> list[Curve]:
+    """Parts of a branch that goes back at its folds: no part has two values at a speed, or changes its stability.
+
+    Parameters
+    ----------
+    speed, level, growth : (n,) arrays
+        Along the branch; what grows (1/s) is unstable.
+    """
+    stable = ~(growth > 0.0)
+    rising = np.diff(speed) >= 0.0
+    # A part ends where the next step turns back, and where the next point is of the other stability.
+    turns = np.flatnonzero(rising[1:] != rising[:-1]) + 1
+    ends = np.unique(np.concatenate([turns, np.flatnonzero(stable[1:] != stable[:-1]) + 1, [len(speed) - 1]]))
+    curves, first = [], 0
+    for number, last in enumerate(ends, start=1):
+        part = slice(first, last + 1)
+        kind, style = ("stable", "line") if stable[part].mean() > 0.5 else ("unstable", "dashed")
+        curves.append(Curve(f"{kind}: part {number}", speed[part], level[part], style))
+        first = int(last)
     return curves
 
 
@@ -327,8 +351,8 @@ def _level(amplitude: Floats) -> Floats:
 
 def _unit_rate(run: VariantRun) -> float:
     """Rate at which order one sweeps in a run, Hz/s."""
-    stored = load_run(run.path, ("time", "input_speed"))
-    return sweep_rate(stored["time"].to_numpy(), stored["input_speed"].to_numpy(), 1.0)
+    stored, _ = read_run(run.path, ("time", "input_speed"))
+    return sweep_rate(stored["time"], stored["input_speed"], 1.0)
 
 
 def _row(peak: Peak, data: xr.Dataset, rates: dict[str, float]) -> dict[str, object]:

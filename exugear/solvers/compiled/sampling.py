@@ -65,12 +65,14 @@ from fe_ste.tools.octets import SIZE, all_eight, eight, put, sum_of
 class Columns(NamedTuple):
     """First column of each signal that a kernel here fills; -1 where a run does not hold it.
 
-    The fields have the names of the signals. Signals of each mesh take one column a mesh, forces of supports three.
+    The fields have the names of the signals. Signals of each mesh take one column a mesh, forces and moments of
+    supports three each.
     """
 
     mesh_dte: int
     mesh_force: int
     support_force: int
+    support_moment: int
     centre_distance_change: int
     misalignment: int
     outside_table: int
@@ -111,14 +113,16 @@ def true_rate(strain: Floats, rate: Floats, first_body: Floats, out: Floats) -> 
 
 @kernel
 def observe_supports(connectors: Connectors, work: Work, columns: Columns, sample: Floats) -> None:
-    """Fill the force of each bearing on its body (N), global axes."""
+    """Fill force (N) and moment (N m) of each bearing on its body, global axes."""
     for n in range(connectors.ends.shape[0]):
         turn, support = work.frames[connectors.ends[n, 0]], work.supports[n]
-        x, y, z = support[SUPPORT_LOAD], support[SUPPORT_LOAD + 1], support[SUPPORT_LOAD + 2]
-        first = columns.support_force + 3 * connectors.number[n]
-        sample[first] = -(turn[0] * x + turn[1] * y + turn[2] * z)
-        sample[first + 1] = -(turn[3] * x + turn[4] * y + turn[5] * z)
-        sample[first + 2] = -(turn[6] * x + turn[7] * y + turn[8] * z)
+        for part in range(2):
+            place = SUPPORT_LOAD + 3 * part
+            x, y, z = support[place], support[place + 1], support[place + 2]
+            first = (columns.support_moment if part else columns.support_force) + 3 * connectors.number[n]
+            sample[first] = -(turn[0] * x + turn[1] * y + turn[2] * z)
+            sample[first + 1] = -(turn[3] * x + turn[4] * y + turn[5] * z)
+            sample[first + 2] = -(turn[6] * x + turn[7] * y + turn[8] * z)
 
 
 @kernel

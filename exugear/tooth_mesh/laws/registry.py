@@ -22,7 +22,7 @@ class LawProperties:
     Attributes
     ----------
     name : as on the command line; the law's file has the same name
-    description : one line for the command line and the user guide
+    description : one line for the command line and the page of choices
     has_force : False where gears only roll and no mesh has a force
     needs_tables : whether it reads tables of the static transmission error
     needs_axes : whether these are to be tables over load, centre distance and misalignment

@@ -101,14 +101,14 @@ function optionsOf(chart, curves) {
     axes,
     series: [
       {},
-      ...curves.map((curve, number) => ({
+      ...curves.map((curve) => ({
         label: curve.label,
         scale: curve.right ? "right" : "y",
-        stroke: curve.style === "thin" ? pageColour("--soft") : curveColour(number),
+        stroke: curve.style === "thin" ? pageColour("--soft") : curveColour(firstOfKind(curves, curve)),
         width: curve.style === "points" ? 0 : curve.style === "thin" ? 1 : 2,
         dash: curve.style === "dashed" ? [6, 4] : [],
         spanGaps: true,
-        points: { show: curve.style === "points" || curve.x.length < 3, size: 6, fill: curveColour(number) },
+        points: { show: curve.style === "points" || curve.x.length < 3, size: 6, fill: curveColour(firstOfKind(curves, curve)) },
       })),
     ],
     hooks: { draw: [(plot) => paintMarks(plot, chart)] },
@@ -135,8 +135,8 @@ function paintMarks(plot, chart) {
 /** @param {Curve[]} curves */
 function legendOf(curves) {
   const legend = make("p", { class: "legend" });
-  // Many thin lines are of one kind: the first of each is told.
-  const told = curves.filter((curve, place) => curves.findIndex((own) => kindOf(own) === kindOf(curve)) === place);
+  // Many lines are of one kind: the first of each is told.
+  const told = curves.filter((curve, place) => firstOfKind(curves, curve) === place);
   for (const curve of told) {
     const sign = make("i", { class: `sign ${curve.style}` });
     const colour = curve.style === "thin" ? pageColour("--soft") : curveColour(curves.indexOf(curve));
@@ -147,4 +147,7 @@ function legendOf(curves) {
 }
 
 /** @param {Curve} curve */
-const kindOf = (curve) => curve.label.split(": mode ")[0];
+const kindOf = (curve) => curve.label.split(/: (?:mode|part) /)[0];
+
+/** Place of the first curve of the same kind; a kind has one colour. @param {Curve[]} curves @param {Curve} curve */
+const firstOfKind = (curves, curve) => curves.findIndex((own) => kindOf(own) === kindOf(curve));

@@ -12,7 +12,9 @@ const NO_LEVEL = -32768;
 const DEPTH = 70;
 let asked = 0;
 
-/** @typedef {{label: string, line: number, main: boolean, speeds: number[], levels: (number | null)[]}} Cut */
+/** @typedef {{label: string, line: number, main: boolean, constant: boolean, speeds: number[], levels: (number | null)[]}} Cut */
+/** @typedef {{cuts: ArrayReference, speeds: ArrayReference}} Source */
+/** @typedef {import("./page_data.js").ArrayReference} ArrayReference */
 
 /** @returns {HTMLElement} */
 const box = () => /** @type {HTMLElement} */ (need("cuts").querySelector(".plot"));
@@ -28,20 +30,40 @@ export async function drawCuts() {
     const channel = variant.channels.find((one) => one.name === state.channel);
     // Another channel may be one that only the chosen variant has.
     if (!channel) continue;
-    const speeds = Array.from(await unpack(channel.speeds));
-    const levels = await unpack(channel.cuts);
-    for (const line of state.lines) {
-      const along = speeds.map((_, frame) => {
-        const level = levels[frame * pageData.lines.length + line];
-        return level === NO_LEVEL ? null : level / 10;
-      });
-      const label = `${pageData.lines[line].short}, ${variant.words}`;
-      cuts.push({ label, line, main: name === state.variant, speeds, levels: along });
-    }
+    const main = name === state.variant;
+    cuts.push(...(await cutsOf(channel, { words: variant.words, main, constant: false })));
+    if (main && variant.constant && state.channel === "overall")
+      cuts.push(...(await cutsOf(variant.constant, { words: "constant speed", main, constant: true })));
   }
   if (mine !== asked) return;
   draw(cuts);
   drawChips();
+}
+
+/**
+ * Cuts of the chosen orders from what holds levels of all.
+ * @param {Source} source @param {{words: string, main: boolean, constant: boolean}} kind @returns {Promise<Cut[]>}
+ */
+async function cutsOf(source, { words, main, constant }) {
+  const speeds = Array.from(await unpack(source.speeds));
+  const levels = await unpack(source.cuts);
+  return state.lines.map((line) => {
+    const along = speeds.map((_, frame) => {
+      const level = levels[frame * pageData.lines.length + line];
+      return level === NO_LEVEL ? null : level / 10;
+    });
+    return { label: `${pageData.lines[line].short}, ${words}`, line, main, constant, speeds, levels: along };
+  });
+}
+
+/** How a cut is drawn, in words and in dashes. @param {Cut} cut @returns {string} */
+const styleOf = (cut) => (cut.constant ? "Dotted" : cut.main ? "Thick" : "Dashed");
+
+/** @param {Cut} cut @param {boolean} single @returns {number[]} */
+function dashesOf(cut, single) {
+  if (cut.constant) return [2, 2];
+  if (!cut.main) return [5, 4];
+  return single ? [] : dashOf(cut.line);
 }
 
 /** @param {Cut[]} cuts */
@@ -67,9 +89,9 @@ function draw(cuts) {
         {},
         ...cuts.map((cut, number) => ({
           label: cut.label,
-          stroke: single ? curveColour(cut.main ? 0 : number + 1) : lineColour(cut.line),
-          width: cut.main ? 2 : 1.2,
-          dash: cut.main ? (single ? [] : dashOf(cut.line)) : [5, 4],
+          stroke: single ? curveColour(cut.main && !cut.constant ? 0 : number + 1) : lineColour(cut.line),
+          width: cut.main && !cut.constant ? 2 : 1.2,
+          dash: dashesOf(cut, single),
           spanGaps: true,
           points: { show: false },
         })),
@@ -80,7 +102,7 @@ function draw(cuts) {
     bounds,
   );
   const caption = need("cuts").querySelector(".hint");
-  if (caption) caption.textContent = cuts.map((cut) => `${cut.main ? "Thick" : "Dashed"}: ${cut.label}`).join(". ");
+  if (caption) caption.textContent = cuts.map((cut) => `${styleOf(cut)}: ${cut.label}`).join(". ");
   addTools(need("cuts").querySelector(".tools"), () => "Level along the orders", {
     rows: () => cutRows(cuts, joined),
     canvas: () => /** @type {HTMLCanvasElement} */ (box().querySelector("canvas")),

@@ -20,7 +20,7 @@ from ..case_mutations import toml_text
 from ..gear_trains import KINDS
 from ..spur_case import COARSE_INPUT
 
-GUIDE = Path(__file__).parents[3] / "docs" / "user_guide.md"
+GUIDE = Path(__file__).parents[3] / "docs" / "reference" / "gear_trains.md"
 HEAD = "| Kind | Tables | Modes | Runs | Steady response | Report |"
 QUICK = ("planetary, carrier held", "differential")
 """Kinds that every run of the tests takes through all verbs; the others take two minutes."""
@@ -31,7 +31,7 @@ def exugear(*arguments: object) -> Any:
 
 
 def told() -> dict[str, str]:
-    """Rows of the table in the user guide by kind."""
+    """Rows of the table in the page of gear trains by kind."""
     lines = GUIDE.read_text(encoding="utf-8").split(HEAD)[1].splitlines()
     rows = itertools.takewhile(lambda line: line.startswith("|"), lines[2:])
     return {row.split("|")[1].strip(): row for row in rows}

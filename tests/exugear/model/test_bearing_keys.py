@@ -127,7 +127,7 @@ def test_the_non_linear_law_takes_a_catalogue_without_loads(content: Content) ->
 def test_keys_of_a_type_alone_name_types_that_exist() -> None:
     known = set().union(*(types for types, _ in TYPES_OF_KEYS.values()))
     assert all(types for types, _ in TYPES_OF_KEYS.values())
-    assert known <= set(Path("docs/user_guide.md").read_text(encoding="utf-8").replace("`", " ").split())
+    assert known <= set(Path("docs/reference/bearings.md").read_text(encoding="utf-8").replace("`", " ").split())
 
 
 @pytest.mark.parametrize(("distance", "said"), [(0.0, "0 mm away"), (7.0, "7 mm away"), (17.0, None)])

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import html
 import json
+import pickle
 import re
 import shutil
 import tomllib
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ import xarray as xr
 from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.modes import eigenmodes
 from exugear.dynamics.signals import energy_residual
+from exugear.findings.variations import begin_variations
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
@@ -95,6 +98,26 @@ def test_cards_and_checks_on_the_page_are_the_sentences_of_the_command_line(resu
     assert len(checks) >= 4
     for line in checks:
         assert line.split(": ", 1)[1].removesuffix(".") in page
+
+
+def test_an_executor_beside_changes_nothing_on_the_page(results, monkeypatch):
+    """What another process works out comes back as it would be here, and can go from one process to another."""
+    alone = write_report(results, target=1000.0).path.read_bytes()
+    monkeypatch.setattr("exugear.report.writer.WORTH_A_PROCESS", 0)
+    carried: list[object] = []
+
+    def begun(*arguments):
+        future = begin_variations(*arguments)
+        carried.append(future)
+        return future
+
+    monkeypatch.setattr("exugear.report.writer.begin_variations", begun)
+    with ThreadPoolExecutor(1) as executor:
+        beside = write_report(results, target=1000.0, executor=executor).path.read_bytes()
+    assert beside == alone
+    models = pickle.loads(pickle.dumps(carried[0].result()))
+    assert [choice.variant for choice in models] == ["bushing"]
+    assert all(not isinstance(figures, str) for figures in models[Choice("bushing", LAW, "disc")].values())
 
 
 def test_flexible_runs_alone_are_reported_with_the_reductions_that_are_kept(results, tmp_path, monkeypatch):

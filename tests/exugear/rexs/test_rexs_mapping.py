@@ -14,6 +14,7 @@ from exugear.rexs.containers import read_rexs
 from exugear.rexs.faults import RexsError
 from exugear.rexs.to_case.conversion import to_case
 from exugear.rexs.tree import Attribute, Component, Model, Relation
+from fe_ste.geometry.involute import inverse_involute, involute
 
 DATA = Path(__file__).parent / "data"
 SEW = read_rexs(DATA / "SEW_3-stage_cylindrical_gearbox_1.0.rexs")
@@ -310,3 +311,63 @@ def test_stepped_planets_are_imported_with_both_their_gears():
     places = sorted(wheels.values())
     assert places[1] - places[0] == pytest.approx(0.060)
     assert len(gearbox.meshes) == 6
+
+
+@pytest.mark.parametrize(
+    ("given", "factor"),
+    [
+        ({"chordal_tooth_thickness_{}_deviation": "mm"}, 1.0),
+        ({"chordal_transverse_tooth_thickness_{}_deviation": "mm"}, None),
+        ({"{}_backlash_allowance_referenced_to_span": "mum"}, 1.0 / math.cos(math.radians(20.0))),
+    ],
+)
+def test_tooth_thickness_allowances_become_those_of_the_normal_section(given, factor):
+    """DIN 3967: A_st = A_sn / cos(beta), A_W = A_sn cos(alpha_n); teeth have the mean."""
+    ((key, unit),) = given.items()
+    number = next(part.number for part in SEW.of_type("cylindrical_gear"))
+    scale = 1.0 if unit == "mm" else 1e3
+    values = {
+        key.format(end): Attribute(amount * scale, unit) for end, amount in (("upper", -0.054), ("lower", -0.084))
+    }
+    part = SEW.components[number]
+    made = to_case(with_values(SEW, {}, dataclasses.replace(part, attributes={**part.attributes, **values})), "case")
+    sections = [one for one in made.gearbox.case.gears.items() if one[1].tooth_thickness is not None]
+    assert len(sections) == 1
+    name, section = sections[0]
+    gear = made.gearbox.gears[name]
+    factor = math.cos(gear.helix_angle) if factor is None else factor
+    assert section.tooth_thickness.upper_allowance_um == pytest.approx(-54.0 * factor, rel=1e-6)
+    assert section.tooth_thickness.lower_allowance_um == pytest.approx(-84.0 * factor, rel=1e-6)
+    full = dataclasses.replace(gear, tooth_thinning=0.0)
+    thinner = full.normal_tooth_thickness - gear.normal_tooth_thickness
+    assert thinner == pytest.approx(69e-6 * factor, rel=1e-6)
+    assert section.tooth_thinning_mm == 0.0
+
+
+def test_allowances_that_would_thicken_teeth_are_not_taken():
+    number = next(part.number for part in SEW.of_type("cylindrical_gear"))
+    values = {f"chordal_tooth_thickness_{end}_deviation": 0.02 for end in ("upper", "lower")}
+    sections = gearbox_of(with_values(SEW, {number: values})).case.gears.values()
+    assert all(one.tooth_thickness is None and one.tooth_thinning_mm > 0.0 for one in sections)
+
+
+def test_the_cutter_of_a_ring_becomes_one_that_cuts_its_root():
+    """By hand: a_0 of 61 and 23 teeth from the ring's shift, its root circle a_0 + r_a0; d_a0 = 4 (23 + 2.5) mm."""
+    made = to_case(PLANETARY, "case")
+    (name,) = [name for name, one in made.gearbox.gears.items() if one.internal]
+    ring, section = made.gearbox.gears[name], made.gearbox.case.gears[name]
+    assert section.cutter is not None
+    assert (section.cutter.teeth, section.cutter.addendum, section.cutter.profile_shift) == (23, 1.25, 0.0)
+    shift = 2.0 * ring.profile_shift * math.tan(math.radians(20.0)) + ring.tooth_thinning / 4e-3
+    angle = inverse_involute(involute(math.radians(20.0)) + shift / (61 - 23))
+    distance = 0.5 * 4e-3 * (61 - 23) * math.cos(math.radians(20.0)) / math.cos(angle)
+    assert ring.root_radius == pytest.approx(distance + 0.5 * 4e-3 * 25.5, rel=1e-12)
+    assert "a corner too sharp" in next(line for line in made.text.splitlines() if line.startswith("cutter"))
+
+
+def test_a_cutter_that_cannot_make_the_ring_is_left_out_and_told():
+    made = to_case(with_values(PLANETARY, {85: {"number_of_teeth": 60}}), "case")
+    assert all(one.cutter is None for one in made.gearbox.gears.values())
+    assert any(
+        "its cutter is left out, the fillet is an arc instead; cutter.teeth = 60 trims" in one for one in made.changed
+    )

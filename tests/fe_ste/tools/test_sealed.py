@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from fe_ste.tools import sealed
 from fe_ste.tools.files import FileError, replacement
 from fe_ste.tools.sealed import (
     ErrorKeeper,
@@ -161,3 +163,33 @@ def test_two_writers_of_one_file_and_a_reader_see_whole_files_only(tmp_path: Pat
     assert [writer.returncode for writer in writers] == [0, 0]
     assert read <= {0.0, float(DATA["a"].std())}
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_file_is_read_once_to_check_it_until_it_changes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that was checked long after its last change is taken as it is; a change that restores its times is seen."""
+    path = tmp_path / "a.bin"
+    write_sealed(path, bytes(4000))
+    monkeypatch.setattr("fe_ste.tools.sealed.SETTLED", -1.0)  # as if it had been written long ago
+    taken: list[int] = []
+    original = sealed.hashlib.sha256
+    monkeypatch.setattr(sealed.hashlib, "sha256", lambda *content: taken.append(1) or original(*content))
+    assert read_sealed(path) == read_sealed(path) == bytes(4000)
+    assert len(taken) == 1
+    before = path.stat()
+    with path.open("r+b") as file:
+        file.write(b"1")
+    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+    with pytest.raises(FileError, match="is damaged"):
+        read_sealed(path)
+
+
+def test_a_file_of_this_moment_is_checked_each_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Clocks of files are coarse: two changes within a tick look like one."""
+    path = tmp_path / "a.bin"
+    write_sealed(path, bytes(4000))
+    taken: list[int] = []
+    original = sealed.hashlib.sha256
+    monkeypatch.setattr(sealed.hashlib, "sha256", lambda *content: taken.append(1) or original(*content))
+    monkeypatch.setattr("fe_ste.tools.sealed.SETTLED", 3600.0)
+    assert read_sealed(path) == read_sealed(path)
+    assert len(taken) == 2

@@ -11,7 +11,7 @@ import pytest
 
 import fe_ste.tools.threads
 from fe_ste.elimination.dense import add_product
-from fe_ste.tools.threads import one_dense_thread, side_by_side
+from fe_ste.tools.threads import AtOnce, one_dense_thread, second_thread, side_by_side
 
 
 @pytest.fixture
@@ -46,6 +46,26 @@ def test_one_core_one_item_a_worker_and_what_is_beside_another_take_no_threads(m
         assert threads_of(2) == {threading.get_ident()}
     monkeypatch.setattr(fe_ste.tools.threads, "available_cores", lambda: 1)
     assert threads_of(2) == {threading.get_ident()}
+
+
+def test_a_second_thread_is_none_on_one_core_and_in_a_worker(monkeypatch: pytest.MonkeyPatch) -> None:
+    def thread() -> int:
+        with second_thread() as own:
+            return own.submit(threading.get_ident).result()
+
+    monkeypatch.setattr(fe_ste.tools.threads, "available_cores", lambda: 2)
+    assert thread() != threading.get_ident()
+    with monkeypatch.context() as in_worker:
+        in_worker.setattr(multiprocessing, "parent_process", lambda: object())
+        assert thread() == threading.get_ident()
+    monkeypatch.setattr(fe_ste.tools.threads, "available_cores", lambda: 1)
+    assert thread() == threading.get_ident()
+
+
+def test_what_fails_at_once_is_raised_when_the_result_is_asked_for() -> None:
+    failed = AtOnce().submit(int, "two")
+    with pytest.raises(ValueError, match="two"):
+        failed.result()
 
 
 def test_an_error_of_one_is_raised(two_cores: None) -> None:

@@ -1,7 +1,7 @@
 """Transmission error of the GRC 750 kW pairs at the default mesh: refinement, smoothness, ISO 6336, slices.
 
 `make validate` refines the high-speed pair, the one that changes most; EXUGEAR_REFINE_ALL=1 refines all four, some
-minutes each. The figures stand in docs/validation.md.
+minutes each. The figures stand in docs/quality/transmission_error.md.
 """
 
 from __future__ import annotations

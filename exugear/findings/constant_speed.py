@@ -1,0 +1,116 @@
+"""Levels along orders at constant speed: a run-up that gives a resonance no time to build up shows it too low."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from exugear.findings.context import choice_of
+from exugear.model.choice import Choice
+from exugear.spectra.orders import OrderLine
+from exugear.steady.peaks import BESIDE, SAME_ORDER
+from exugear.steady.settings import LEVELS
+from exugear.steady.steady_file import settings_of
+from fe_ste.tools.arrays import Floats
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+FAINTEST = 1e-12
+"""Amplitude (m) below which a level is no lower."""
+
+
+@dataclass(frozen=True)
+class Highest:
+    """Where an order is loudest at constant speed.
+
+    Attributes
+    ----------
+    level : float
+        dB re 1 µm.
+    speed : float
+        Of the input without sign, rad/s.
+    frequency : float
+        Hz.
+    """
+
+    level: float
+    speed: float
+    frequency: float
+
+
+@dataclass(frozen=True)
+class ConstantSpeed:
+    """Overall transmission error along the orders of a steady response.
+
+    Attributes
+    ----------
+    speed : (n,) array
+        Of the input without sign, rad/s, ascending.
+    orders : (lines,) array
+        Periods per turn of the input.
+    level : (n, lines) array
+        dB re 1 µm.
+    """
+
+    speed: Floats
+    orders: Floats
+    level: Floats
+
+    def along(self, line: OrderLine) -> Floats | None:
+        """Level at each speed, dB re 1 µm; None if the response has no such order."""
+        place = int(np.argmin(np.abs(self.orders - line.order)))
+        same = abs(self.orders[place] - line.order) < SAME_ORDER * line.order
+        return self.level[:, place] if same else None
+
+    def near(self, line: OrderLine, frequency: float, resolution: float) -> Highest | None:
+        """Return where an order is loudest within what a run-up resolves about a frequency (both Hz).
+
+        None if the response does not go there. The sweep shifts a peak besides, by up to a few percent.
+        """
+        along, frequencies = self.along(line), line.frequency(self.speed)
+        there = np.flatnonzero(np.abs(frequencies - frequency) <= max(BESIDE * frequency, resolution))
+        if along is None or not there.size:
+            return None
+        place = int(there[np.argmax(along[there])])
+        return Highest(float(along[place]), float(self.speed[place]), float(frequencies[place]))
+
+    def highest(self, lines: Iterable[OrderLine]) -> tuple[OrderLine, Highest] | None:
+        """Return the order that is loudest of all, and where; None if the response has none of them."""
+        found: list[tuple[OrderLine, Highest]] = []
+        for line in lines:
+            along = self.along(line)
+            if along is not None:
+                place = int(np.argmax(along))
+                frequency = float(line.frequency(self.speed[place : place + 1])[0])
+                found.append((line, Highest(float(along[place]), float(self.speed[place]), frequency)))
+        return max(found, key=lambda own: own[1].level, default=None)
+
+
+def constant_speed_of(response: xr.Dataset) -> ConstantSpeed:
+    """Take the levels of the overall transmission error out of a steady response.
+
+    Parameters
+    ----------
+    response : Dataset
+        As `exugear.steady.steady_file.load_response` reads it.
+    """
+    speed = np.abs(response["speed"].to_numpy())
+    rising = np.argsort(speed, kind="stable")
+    signals = [str(name) for name in response["signal"].to_numpy()]
+    amplitude = response["amplitude"].to_numpy()[rising, :, signals.index("overall_dte")].astype(np.float64)
+    level = 20.0 * np.log10(np.maximum(amplitude, FAINTEST) / 1e-6)
+    return ConstantSpeed(speed[rising], response["order"].to_numpy(), level)
+
+
+def truest_of(responses: Iterable[xr.Dataset], choice: Choice) -> ConstantSpeed | None:
+    """Levels of a choice by the response that leaves least out; None if there is none over a range of speeds.
+
+    Branches are no function of speed and are left to the section on steady responses.
+    """
+    own = [data for data in responses if choice_of(data.attrs) == choice and not settings_of(data.attrs).branches]
+    best = max(own, key=lambda data: LEVELS.index(data.attrs["level"]), default=None)
+    return None if best is None else constant_speed_of(best)
