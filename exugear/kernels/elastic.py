@@ -82,7 +82,7 @@ class ElasticMotion(NamedTuple):
     Attributes
     ----------
     first : (b + 1,) first entry of each block in `coordinate`, `spin` and `momentum`
-    count : (b,) coordinates of each block
+    sizes : (b,) coordinates of each block
     coordinate, spin, momentum : as in `ElasticArrays`; what fills them up is a block's first coordinate and zeros
     turning, partner, damping_time : as in `ElasticArrays`
     square : (b,) first entry of each block in `stiffness`, `mass` and `inverse`
@@ -92,7 +92,7 @@ class ElasticMotion(NamedTuple):
     """
 
     first: Integers
-    count: Integers
+    sizes: Integers
     coordinate: Integers
     spin: Floats
     momentum: Floats
@@ -131,7 +131,7 @@ def elastic_motion(elastic: ElasticArrays) -> ElasticMotion:
     gyroscopic, begins = laid_out(rectangular_tiles(rectangle(b)) for b in range(sizes.size))
     return ElasticMotion(
         first=first,
-        count=sizes,
+        sizes=sizes,
         coordinate=coordinate,
         spin=spin,
         momentum=momentum,
@@ -220,7 +220,7 @@ def set_elastic_motion(
         for i in range(0, size, SIZE):
             put(found, i, all_eight(0.0))
         add_symmetric(elastic.inverse, square, size, sums, found)
-        for i in range(elastic.count[b]):
+        for i in range(elastic.sizes[b]):
             out[elastic.coordinate[first + i]] = found[i]
     return damped
 

@@ -162,7 +162,8 @@ def _lower_eight_at(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         ir.Constant(_VECTOR, ir.Undefined),
     )
     kinds = ir.FunctionType(_VECTOR, [argument.type for argument in arguments])
-    gather = cgutils.get_or_insert_function(builder.module, kinds, "llvm.masked.gather.v8f64.v8p0")
+    declared: Any = cgutils.get_or_insert_function
+    gather = declared(builder.module, kinds, "llvm.masked.gather.v8f64.v8p0")
     return builder.call(gather, arguments)
 
 
@@ -196,10 +197,10 @@ def _lower_sum(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 
 def _lower_sums(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     # Neighbouring numbers of two octets first, then halves of what stands in groups of two.
-    rows = list(args)
-    rows = [_fold(builder, *rows[n : n + 2], [0, 8, 2, 10, 4, 12, 6, 14], 1) for n in range(0, SIZE, 2)]
+    rows, pairs, halves = list(args), [0, 8, 2, 10, 4, 12, 6, 14], [0, 1, 4, 5, 8, 9, 12, 13]
+    rows = [_fold(builder, rows[n], rows[n + 1], pairs, 1) for n in range(0, SIZE, 2)]
     while len(rows) > 1:
-        rows = [_fold(builder, *rows[n : n + 2], [0, 1, 4, 5, 8, 9, 12, 13], 2) for n in range(0, len(rows), 2)]
+        rows = [_fold(builder, rows[n], rows[n + 1], halves, 2) for n in range(0, len(rows), 2)]
     return rows[0]
 
 
