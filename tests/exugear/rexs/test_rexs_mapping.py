@@ -183,9 +183,29 @@ def test_modifications_that_differ_between_the_flanks_are_refused_and_unknown_on
     )
     with pytest.raises(RexsError, match="left and right flank differ in tip_relief"):
         gearbox_of(one_sided)
-    slopes = (Relation("reference", 0, {"origin": number, "referenced": 900}) for number in (361, 362))
-    made = to_case(with_relations(with_values(SEW, {}, Component(900, "helix_slope")), *slopes), "case")
-    assert any("helix_slope 900 of cylindrical_gear 23" in line for line in made.changed)
+    end_relief = (Relation("reference", 0, {"origin": number, "referenced": 900}) for number in (361, 362))
+    made = to_case(with_relations(with_values(SEW, {}, Component(900, "end_relief_datum_face")), *end_relief), "case")
+    assert any("end_relief_datum_face 900 of cylindrical_gear 23" in line for line in made.changed)
+
+
+@pytest.mark.parametrize(
+    ("kind", "key"),
+    [("helix_slope", "helix_slope_um"), ("profile_slope", "profile_slope_um"), ("profile_twist", "twist_um")],
+)
+@pytest.mark.parametrize("amount", [0.012, 0.0])
+def test_a_slope_whose_sign_is_not_known_becomes_a_zero_to_be_set(kind: str, key: str, amount: float):
+    part = Component(900, kind, attributes={kind: Attribute(amount, "mm")})
+    flanks = (Relation("reference", 0, {"origin": number, "referenced": 900}) for number in (361, 362))
+    made = to_case(with_relations(with_values(SEW, {}, part), *flanks), "case")
+    lines = [line for line in made.text.splitlines() if line.startswith(key)]
+    told = [line for line in made.changed if kind in line]
+    if amount:
+        assert "SET IT: 12 um" in lines[0]
+        assert "its amount of 12 um is not taken" in told[0]
+    else:
+        assert not lines
+        assert not told
+    assert getattr(made.gearbox.modifications["gear_1"], key.removesuffix("_um")) == 0.0
 
 
 def test_a_soft_coupling_joins_spins_and_a_stiff_one_makes_one_body():
