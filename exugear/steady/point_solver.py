@@ -33,8 +33,10 @@ LEGS = 4
 """Legs of a run in time, after each of which Newton's method is tried."""
 NEAR = 0.1
 """Difference of amplitudes from those of a run in time, over the vibration, up to which both are one state."""
-GROWING = 0.005
-"""Growth in a period of the slowest base above which a state does not last: below it a leg of a run shows none."""
+GROWING = 0.02
+"""Growth in a period of the slowest base above which a state does not last: below it a run shows little of it."""
+PUSHED = 1.02
+"""Factor on the motion of an unstable state from which a run begins."""
 
 
 def gearset_of(assembly: Assembly, speeds: Floats, harmonics: int = 10, combinations: int = 3) -> Gearset:
@@ -169,14 +171,14 @@ class PointSolver:
 
     def _settled(self, speed: float, unstable: PartingState | None, reason: str) -> PartingState:
         """Find the state to which a run in time settles that begins at the last one, or at an unstable one."""
-        gearset = self.gearset.finer
-        interface, begin = gearset.at(speed), unstable or self.state
+        begin = unstable or self.state
+        gearset = begin.gearset if begin else self.gearset
+        interface = gearset.at(speed)
         verdict = cannot_settle(gearset.system)
         if not verdict:
             motion = np.zeros((len(gearset.lines.orders), gearset.system.size), dtype=complex)
             if begin is not None:
-                own = begin.response.motion
-                motion[begin.gearset.places_in(gearset)] = own
+                motion = PUSHED * begin.response.motion
             rows = interface.ports.readings[:, DEFLECTION]
             run = SettlingRun(gearset.system, gearset.lines, rows, gearset.waves.base_orders, speed, motion)
             for _ in range(LEGS):
@@ -236,4 +238,4 @@ def _refined(gearset: Gearset, speed: float, start: Complexes | None) -> Parting
         readings, took = solve_balance(balance, more)
         products += took
         response = response_of_readings(balance, readings, products)
-    return PartingState(gearset, readings, response, growth_of_state(balance, readings))
+    return PartingState(gearset, readings, response, growth_of_state(balance, readings, bool(response.apart.any())))

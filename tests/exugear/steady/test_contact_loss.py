@@ -125,7 +125,7 @@ def test_a_state_that_is_said_to_be_unstable_does_not_last():
     rows = state.response.interface.ports.readings[:, DEFLECTION]
     run = SettlingRun(gearset.system, gearset.lines, rows, gearset.waves.base_orders, speed, state.response.motion)
     outside = [run.leg().outside for _ in range(4)]
-    assert state.growth * 2.0 * np.pi / (TEETH * speed) > 0.005
+    assert state.growth * 2.0 * np.pi / (TEETH * speed) > 0.02
     assert outside[-1] > 0.3
 
 
