@@ -385,6 +385,8 @@ def test_the_verb_tells_what_limits_and_what_that_rests_on(tmp_path, first):
     result = CliRunner().invoke(cli.app, [*arguments, "--json"])
     assert result.exit_code == 0, result.output
     told = json.loads(result.stdout)
+    (relief,) = told["reliefs"]
+    assert relief.startswith("spur: up to ") and relief.endswith("its flanks need tip relief")
     assert [one["flank"] for one in told["flanks"]] == ["pinion + spur", "wheel + spur"]
     assert told["limits"][0]["damage"] >= told["limits"][-1]["damage"]
     assert any("variant rigid has none" in line for line in told["unrated"])
