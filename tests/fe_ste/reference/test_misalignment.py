@@ -1,4 +1,4 @@
-"""Load along the face under misalignment: full contact of finite elements, a table's contact, and what a rating reads."""
+"""Load along the face under misalignment: full contact of finite elements, contact of a table, what a rating reads."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from fe_ste.transmission_error.face_load import face_load_factor
 from fe_ste.transmission_error.search import hertz_half_width, least_contact_length, normal_load
 from fe_ste.transmission_error.transmission_error import static_transmission_error
 
-SPUR = Gear(name="spur", teeth=50, normal_module=3e-3, face_width=20e-3, held_diameter=100e-3)
+SPUR = Gear(name="spur", teeth=50, normal_module=3e-3, face_width=20e-3, held_diameter=134e-3)
 PAIR = GearPair(name="spur", pinion=SPUR, gear=SPUR, centre_distance=150e-3)
 TORQUE = 340.0
-OPENING = 15e-6
+OPENING = 10e-6
 """At the +z end over the face width, m: half of what the teeth approach under the torque."""
-MESH = ContactMesh(layers=6, contact_elements=4, growth=0.8, thickness=6, fillet=3, root=2, rim=10, far_flank=4)
+MESH = ContactMesh(layers=6, contact_elements=4, growth=0.8, thickness=6, fillet=3, root=2, rim=4, far_flank=4)
 
 
 @pytest.fixture(scope="module")
@@ -60,14 +60,12 @@ def test_load_along_the_face_is_that_of_the_full_contact_of_tilted_gears(complia
     states = static_transmission_error(compliance, TORQUE, positions=1, misalignment=[misalignment]).squeeze()
     width = PAIR.face_width
     centre = float(z @ load / load.sum())
+    print(centre / width, float(states["load_centre"]) / width, float(states["ste"]))
     assert centre < -0.1 * width
     assert float(states["load_centre"]) == pytest.approx(centre, abs=0.01 * width)
     axial, line = states["axial_position"].to_numpy(), states["line_load"].sum("tooth").to_numpy()
     nearer = load[z < -1e-9].sum() + 0.5 * load[np.abs(z) <= 1e-9].sum()
     assert line[axial < 0.0].sum() / line.sum() == pytest.approx(nearer / load.sum(), abs=0.02)
-    print(
-        centre / width, float(states["load_centre"]) / width, nearer / load.sum(), line[axial < 0.0].sum() / line.sum()
-    )
 
 
 def test_what_a_rating_reads_between_misalignments_is_the_contact_there(compliance):
