@@ -60,7 +60,6 @@ def test_load_along_the_face_is_that_of_the_full_contact_of_tilted_gears(complia
     states = static_transmission_error(compliance, TORQUE, positions=1, misalignment=[misalignment]).squeeze()
     width = PAIR.face_width
     centre = float(z @ load / load.sum())
-    print(centre / width, float(states["load_centre"]) / width, float(states["ste"]))
     assert centre < -0.1 * width
     assert float(states["load_centre"]) == pytest.approx(centre, abs=0.01 * width)
     axial, line = states["axial_position"].to_numpy(), states["line_load"].sum("tooth").to_numpy()
