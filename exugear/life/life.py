@@ -16,7 +16,7 @@ from exugear.dynamics.fingerprint import input_hash
 from exugear.life.acting_loads import acting_loads
 from exugear.life.bearing_life import BearingLife, bearing_lives
 from exugear.life.dynamic_factor import WITHIN, DynamicFactor
-from exugear.life.gear_life import FlankLife, check_strengths, flank_lives
+from exugear.life.gear_life import FlankLife, beyond_tables, check_strengths, flank_lives
 from exugear.life.static_balance import AngleStore, StaticBalance, static_balance
 from exugear.load_spectrum.counted import CountedLoads, count_loads
 from exugear.model.gearbox import Gearbox
@@ -187,7 +187,10 @@ def compute_life(
         unrated=tuple(_unrated(assembly, counted, stresses)),
         shortfalls=tuple(shortfalls(rating, flanks)),
         reliefs=tuple(needs_of_relief(flanks)),
-        assumptions=tuple(_assumptions(rating, counted, found, balance, stresses, dynamic)),
+        assumptions=(
+            *_assumptions(rating, counted, found, balance, stresses, dynamic),
+            *beyond_tables(gearbox, acting, balance, stresses),
+        ),
         input_hash=digest,
     )
 
