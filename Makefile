@@ -92,11 +92,11 @@ $(INSTALLED): pyproject.toml requirements.lock
 	$(RUN)/python -c 'import pip' 2>/dev/null || "$$python" -m venv --clear $(VENV) || { \
 		echo "No virtual environment: on Debian and Ubuntu install the package python3-venv." >&2; exit 1; }
 	@echo "Installing exugear[$(EXTRAS)] into $(VENV); this takes a minute or two."
-	@$(PIP) install --constraint requirements.lock --config-settings editable_mode=compat --editable ".[$(EXTRAS)]"
+	@$(PIP) install --constraint requirements.lock --editable ".[$(EXTRAS)]"
 	@touch $@
 
 $(DOCS_INSTALLED): $(INSTALLED)
-	@$(PIP) install --constraint requirements.lock --config-settings editable_mode=compat --editable ".[$(EXTRAS),docs]"
+	@$(PIP) install --constraint requirements.lock --editable ".[$(EXTRAS),docs]"
 	@touch $@
 
 demo: $(INSTALLED)

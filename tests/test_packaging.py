@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import tomllib
+from importlib.metadata import distribution
 from pathlib import Path
+
+import pytest
 
 ROOT = Path(__file__).parent.parent
 
@@ -25,3 +31,29 @@ def test_every_file_beside_the_modules_is_installed_with_them():
     }
     assert {file.suffix for file in files} >= {".toml", ".js", ".css", ".three"}
     assert files == installed
+
+
+def test_a_type_checker_elsewhere_finds_both_packages_in_the_editable_install(tmp_path):
+    """As an editor runs it: in a folder of its own, with nothing but the environment; a wrong type is told."""
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert settings["tool"]["distutils"]["editable_wheel"]["mode"] == "compat"
+    if not any(file.suffix == ".pth" for file in distribution("exugear").files or ()):
+        pytest.skip("exugear is not installed as editable here")
+    script = tmp_path / "use.py"
+    wrong = "import exugear\nfrom fe_ste.tools.versions import TABLE\nnumber: str = TABLE\n"
+    script.write_text(wrong, encoding="utf-8")
+    # All of exugear would take half a minute: that it is found is enough.
+    (tmp_path / "mypy.ini").write_text("[mypy]\n[mypy-exugear.*]\nfollow_imports = skip\n", encoding="utf-8")
+    environment = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "MYPYPATH")}
+    told = subprocess.run(
+        [sys.executable, "-m", "mypy", "--cache-dir", str(tmp_path / "cache"), script.name],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    ).stdout
+    assert told.splitlines()[:-1] == [
+        'use.py:3: error: Incompatible types in assignment (expression has type "int", variable has type "str")  '
+        "[assignment]"
+    ]

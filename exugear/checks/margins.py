@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from exugear.model.gear_parts import thinning_range
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import PairSpec
 from fe_ste.geometry.checks import USUAL_TIP_THICKNESS
@@ -62,6 +63,53 @@ def pair_margins(spec: PairSpec) -> PairMargins:
         tip_thickness=(first, second),
         pitch_point_pressure=pitch_point_pressure(pair, torque) if torque > 0.0 else 0.0,
     )
+
+
+@dataclass(frozen=True)
+class ThicknessRange:
+    """What allowances of the tooth thickness make of a gear, from the thinnest to the thickest tooth.
+
+    Attributes
+    ----------
+    thickness : (float, float)
+        On the reference circle, normal section, m.
+    span_teeth : int, optional
+        Number of teeth of the base tangent; None for internal gears.
+    span : (float, float)
+        Base tangent length over them, m; zero for internal gears.
+    """
+
+    thickness: tuple[float, float]
+    span_teeth: int | None
+    span: tuple[float, float]
+
+
+def thickness_range(gearbox: Gearbox, name: str) -> ThicknessRange:
+    """Tooth thickness of a gear within its allowances, and the base tangent length that an inspector finds."""
+    gear = gearbox.gears[name]
+    thick, thin = (replace(gear, tooth_thinning=thinning) for thinning in thinning_range(gearbox.case.gears[name]))
+    count = None if gear.internal else gear.usual_span
+    spans = (0.0, 0.0) if count is None else (thin.span_measurement(count), thick.span_measurement(count))
+    return ThicknessRange((thin.normal_tooth_thickness, thick.normal_tooth_thickness), count, spans)
+
+
+def backlash_range(gearbox: Gearbox, pair: GearPair) -> tuple[float, float, float]:
+    """Least, computed and greatest backlash of a pair on its working circles, m: of the thickest and thinnest teeth.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> [round(1e6 * play) for play in backlash_range(gearbox, gearbox.gear_pairs["high_speed"])]
+    [201, 201, 201]
+    """
+    given, across = pair.circumferential_backlash, 1.0 / math.cos(pair.working_pressure_angle)
+    ends = [0.0, 0.0]
+    for gear in (pair.pinion, pair.gear):
+        # Thickness and radius grow alike along the involute: the base circle's share, on the working circle.
+        thinnings = thinning_range(gearbox.case.gears[gear.name])
+        share = math.cos(gear.transverse_pressure_angle) * across
+        ends = [end + share * (one - gear.tooth_thinning) for end, one in zip(ends, thinnings, strict=True)]
+    return given + ends[0], given, given + ends[1]
 
 
 def _form_margins(pair: GearPair) -> tuple[float, float]:

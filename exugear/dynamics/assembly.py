@@ -35,10 +35,10 @@ from exugear.kernels.table_law import NOMINAL_DEFLECTION
 from exugear.kernels.travelling import (
     TravellingArrays,
     follow,
+    place_travelling,
     share_travelling_forces,
     travelling_memory,
     travelling_tangent,
-    weigh_travelling,
 )
 from exugear.kernels.turning import TurningArrays
 from exugear.model.choice import Choice
@@ -295,8 +295,8 @@ class Assembly:
         add_mesh_forces(x, u, meshes, f)
         if self.travelling.first.size:
             shares = travelling_memory(self.travelling)
-            weigh_travelling(x, self.travelling, shares)
-            share_travelling_forces(x, self.travelling, shares, f)
+            place_travelling(x, u, self.travelling, shares)
+            share_travelling_forces(self.travelling, shares, f)
         return f[: self.size]
 
     def mesh_jacobians(self, q: Floats, v: Floats, meshes: MeshArrays | None = None) -> tuple[Floats, Floats]:

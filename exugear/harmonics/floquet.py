@@ -28,8 +28,10 @@ def kicks_needed(fastest: float, period: float) -> int:
     return int(np.ceil(PER_FASTEST * fastest * period))
 
 
-def exponents(constant: Floats, pushes: Floats, reads: Floats, varying: Floats, period: float) -> Complexes:
-    """Floquet exponents (n,) of a system, 1/s, the fastest growing first.
+def exponents(
+    constant: Floats, pushes: Floats, reads: Floats, varying: Floats, period: float
+) -> tuple[Complexes, Complexes]:
+    """Floquet exponents (n,) of a system, 1/s, the fastest growing first, and the shapes (n, n) that grow, by columns.
 
     Parameters
     ----------
@@ -48,7 +50,7 @@ def exponents(constant: Floats, pushes: Floats, reads: Floats, varying: Floats, 
     --------
     A constant part that decays, and nothing that varies:
 
-    >>> exponents(-np.eye(1), np.ones((1, 1)), np.ones((1, 1)), np.zeros((4, 1, 1)), 2.0).real.round(12)
+    >>> exponents(-np.eye(1), np.ones((1, 1)), np.ones((1, 1)), np.zeros((4, 1, 1)), 2.0)[0].real.round(12)
     array([-1.])
     """
     kicks = len(varying)
@@ -58,6 +60,7 @@ def exponents(constant: Floats, pushes: Floats, reads: Floats, varying: Floats, 
     for own in varying:
         total = total - pushes @ (step * own @ (reads @ total))
         total = advance @ total
-    multipliers = np.asarray(scipy.linalg.eigvals(total), dtype=complex)
+    multipliers, shapes = scipy.linalg.eig(total)
     found = np.log(np.where(multipliers == 0.0, 1e-300, multipliers)) / period
-    return np.asarray(found[np.argsort(-found.real)])
+    order = np.argsort(-found.real)
+    return np.asarray(found[order], dtype=complex), np.asarray(shapes[:, order], dtype=complex)

@@ -74,7 +74,7 @@ class Lattice:
         return np.asarray(found)
 
 
-def lattice(lines: LineSet, larger: LineSet) -> Lattice:
+def lattice(lines: LineSet, larger: LineSet, least: int = 0) -> Lattice:
     """Find a lattice on which all lines of a larger set have slots of their own.
 
     Parameters
@@ -83,6 +83,8 @@ def lattice(lines: LineSet, larger: LineSet) -> Lattice:
         Lines of the signals.
     larger : LineSet
         Lines of the same bases; twice the harmonics and combinations keep products of two lines apart.
+    least : int
+        Samples at least.
 
     Raises
     ------
@@ -102,7 +104,7 @@ def lattice(lines: LineSet, larger: LineSet) -> Lattice:
     whole = np.vstack([larger.index, -larger.index[1:]])
     rng = np.random.default_rng(1)
     # An odd number: then no slot but that of the mean is its own conjugate.
-    samples = len(whole) | 1
+    samples = max(len(whole), least) | 1
     while samples < 200 * len(whole):
         for _ in range(TRIES if bases > 1 else 1):
             generator = np.append(1, rng.integers(2, samples, size=bases - 1)).astype(np.int64)

@@ -16,6 +16,7 @@ import numpy as np
 from exugear.kernels.products import (
     add_rows,
     add_symmetric,
+    add_symmetric_with_form,
     filled_up,
     laid_out,
     rectangular_tiles,
@@ -24,7 +25,7 @@ from exugear.kernels.products import (
 )
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import kernel, summing_kernel
-from fe_ste.tools.octets import SIZE, aligned_zeros, all_eight, put
+from fe_ste.tools.octets import SIZE, aligned_zeros, all_eight, eight, eight_at, put, sum_of
 
 
 class ElasticArrays(NamedTuple):
@@ -76,11 +77,14 @@ def scratch_for(elastic: ElasticArrays | ElasticMotion) -> Floats:
 
 
 class ElasticMotion(NamedTuple):
-    """The same blocks arranged for speed.
+    """The same blocks arranged for speed, each filled up to a multiple of eight coordinates.
 
     Attributes
     ----------
-    first, coordinate, spin, momentum, turning, partner, damping_time : as in `ElasticArrays`
+    first : (b + 1,) first entry of each block in `coordinate`, `spin` and `momentum`
+    sizes : (b,) coordinates of each block
+    coordinate, spin, momentum : as in `ElasticArrays`; what fills them up is a block's first coordinate and zeros
+    turning, partner, damping_time : as in `ElasticArrays`
     square : (b,) first entry of each block in `stiffness`, `mass` and `inverse`
     stiffness, mass, inverse : tiles of -K, M and the inverse of M, see `exugear.kernels.products`
     across : (b,) first entry of each block in `gyroscopic`
@@ -88,6 +92,7 @@ class ElasticMotion(NamedTuple):
     """
 
     first: Integers
+    sizes: Integers
     coordinate: Integers
     spin: Floats
     momentum: Floats
@@ -106,6 +111,13 @@ def elastic_motion(elastic: ElasticArrays) -> ElasticMotion:
     """Arrange all blocks for `set_elastic_motion`."""
     sizes = np.diff(elastic.first)
     across = np.where(elastic.partner >= 0, sizes[elastic.partner], 0)
+    first = np.cumsum([0, *(filled_up(int(n)) for n in sizes)]).astype(np.int64)
+    places = np.concatenate([np.arange(n) + begin for n, begin in zip(sizes, first, strict=False)] or [np.zeros(0)])
+    kept = places.astype(np.int64)
+    coordinate = np.repeat(elastic.coordinate[elastic.first[:-1]], np.diff(first))
+    coordinate[kept] = elastic.coordinate
+    spin, momentum = np.zeros((2, first[-1]))
+    spin[kept], momentum[kept] = elastic.spin, elastic.momentum
 
     def squares(matrices: Floats, sign: float) -> tuple[Floats, Integers]:
         blocks = (matrices[begin : begin + n**2].reshape(n, n) for begin, n in zip(elastic.square, sizes, strict=True))
@@ -118,10 +130,11 @@ def elastic_motion(elastic: ElasticArrays) -> ElasticMotion:
     stiffness, square = squares(elastic.stiffness, -1.0)
     gyroscopic, begins = laid_out(rectangular_tiles(rectangle(b)) for b in range(sizes.size))
     return ElasticMotion(
-        first=elastic.first,
-        coordinate=elastic.coordinate,
-        spin=elastic.spin,
-        momentum=elastic.momentum,
+        first=first,
+        sizes=sizes,
+        coordinate=coordinate,
+        spin=spin,
+        momentum=momentum,
         turning=elastic.turning,
         partner=elastic.partner,
         damping_time=elastic.damping_time,
@@ -149,67 +162,67 @@ def row_product(matrix: Floats, begin: int | np.uint64, given: Floats, count: in
 
 
 @kernel
-def gather_deformation(b: int, q: Floats, v: Floats, time: float, elastic: ElasticMotion, out: Floats) -> int:
-    """Fill q + time v of block b without the common turning, as `deformation`, and zeros behind; return the size."""
-    at = np.uint64  # places without a sign spare the question whether they count from the end: a third of the time
-    first, count = at(elastic.first[b]), at(elastic.first[b + 1] - elastic.first[b])
-    size = (count + at(SIZE - 1)) // at(SIZE) * at(SIZE)
-    common = q[at(elastic.coordinate[first])] * elastic.spin[first]
-    for i in range(count):
-        j = at(elastic.coordinate[first + i])
-        out[i] = (q[j] - common * elastic.spin[first + i]) + time * v[j]
-    for i in range(count, size):
-        out[i] = 0.0
-    return int(size)
+def gather_deformation(b: int, q: Floats, v: Floats, time: float, elastic: ElasticMotion, out: Floats) -> None:
+    """Fill q + time v of block b without the common turning, as `deformation`.
+
+    What is behind is of no account: rows and columns of the matrices are zero there.
+    """
+    first = elastic.first[b]
+    common = q[elastic.coordinate[first]] * elastic.spin[first]
+    for i in range(first, elastic.first[b + 1], SIZE):
+        strained = eight_at(q, elastic.coordinate, i) - eight(elastic.spin, i) * common
+        put(out, i - first, strained + eight_at(v, elastic.coordinate, i) * time)
 
 
 @kernel
-def add_gyroscopic(b: int, size: int, v: Floats, elastic: ElasticMotion, given: Floats, sums: Floats) -> None:
+def add_gyroscopic(b: int, v: Floats, elastic: ElasticMotion, given: Floats, sums: Floats) -> None:
     """Add the gyroscopic forces of block b, if any, to sums; they come from the other plane's velocities."""
     partner = elastic.partner[b]
     if partner < 0:
         return
     block = elastic.turning[b]
-    speed = 0.0
-    for i in range(elastic.first[block], elastic.first[block + 1]):
-        speed += elastic.momentum[i] * v[elastic.coordinate[i]]
-    first = elastic.first[partner]
-    count = elastic.first[partner + 1] - first
-    across = (count + SIZE - 1) // SIZE * SIZE
-    for i in range(count):
-        given[i] = speed * v[elastic.coordinate[first + i]]
-    for i in range(count, across):
-        given[i] = 0.0
-    add_rows(elastic.gyroscopic, elastic.across[b], size, across, given, sums)
+    turning = all_eight(0.0)
+    for i in range(elastic.first[block], elastic.first[block + 1], SIZE):
+        turning = turning + eight(elastic.momentum, i) * eight_at(v, elastic.coordinate, i)
+    speed, first = sum_of(turning), elastic.first[partner]
+    for i in range(first, elastic.first[partner + 1], SIZE):
+        put(given, i - first, eight_at(v, elastic.coordinate, i) * speed)
+    rows, columns = elastic.first[b + 1] - elastic.first[b], elastic.first[partner + 1] - first
+    add_rows(elastic.gyroscopic, elastic.across[b], rows, columns, given, sums)
 
 
 @kernel
 def set_elastic_motion(
-    q: Floats, v: Floats, f: Floats, elastic: ElasticMotion | None, scratch: Floats, out: Floats
-) -> None:
+    q: Floats, v: Floats, f: Floats, with_power: bool, elastic: ElasticMotion | None, scratch: Floats, out: Floats
+) -> float:
     """Fill the accelerations of all elastic bodies under generalized forces f, their own forces left out, into out.
 
-    As `add_elastic_forces` and `set_elastic_accelerations` together. `scratch` is that of `scratch_for`. Nothing is
-    done without elastic bodies (None).
+    As `add_elastic_forces` and `set_elastic_accelerations` together. `scratch` is that of `scratch_for`. Returns the
+    power that the bodies damp (W) if asked for, else 0. Nothing is done without elastic bodies (None).
     """
+    damped = 0.0
     if elastic is None:
-        return
-    at = np.uint64
+        return damped
     given, sums, found = scratch[0], scratch[1], scratch[2]
     for b in range(elastic.turning.size):
-        first, count = at(elastic.first[b]), at(elastic.first[b + 1] - elastic.first[b])
-        size = gather_deformation(b, q, v, elastic.damping_time[b], elastic, given)
-        for i in range(count):
-            sums[i] = f[at(elastic.coordinate[first + i])]
-        for i in range(count, at(size)):
-            sums[i] = 0.0
-        add_symmetric(elastic.stiffness, elastic.square[b], size, given, sums)
-        add_gyroscopic(b, size, v, elastic, given, sums)
+        first, square = elastic.first[b], elastic.square[b]
+        size, time = elastic.first[b + 1] - first, elastic.damping_time[b]
+        gather_deformation(b, q, v, time, elastic, given)
+        for i in range(0, size, SIZE):
+            put(sums, i, eight_at(f, elastic.coordinate, first + i))
+        if with_power:
+            # Damping is a time times the stiffness: its power is that of the rates, without the common turning.
+            gather_deformation(b, v, v, 0.0, elastic, found)
+            damped -= time * add_symmetric_with_form(elastic.stiffness, square, size, given, sums, found)
+        else:
+            add_symmetric(elastic.stiffness, square, size, given, sums)
+        add_gyroscopic(b, v, elastic, given, sums)
         for i in range(0, size, SIZE):
             put(found, i, all_eight(0.0))
-        add_symmetric(elastic.inverse, elastic.square[b], size, sums, found)
-        for i in range(count):
-            out[at(elastic.coordinate[first + i])] = found[i]
+        add_symmetric(elastic.inverse, square, size, sums, found)
+        for i in range(elastic.sizes[b]):
+            out[elastic.coordinate[first + i]] = found[i]
+    return damped
 
 
 @kernel
@@ -218,29 +231,16 @@ def motion_energies(q: Floats, v: Floats, elastic: ElasticMotion | None, scratch
     kinetic, stored = 0.0, 0.0
     if elastic is None:
         return kinetic, stored
-    given, sums = scratch[0], scratch[1]
+    given = scratch[0]
     for b in range(elastic.turning.size):
-        begin = elastic.square[b]
-        size = gather_deformation(b, q, v, 0.0, elastic, given)
-        stored -= 0.5 * square_form(elastic.stiffness, begin, size, given, sums)
-        for i in range(elastic.first[b], elastic.first[b + 1]):
-            given[i - elastic.first[b]] = v[elastic.coordinate[i]]
-        kinetic += 0.5 * square_form(elastic.mass, begin, size, given, sums)
+        first, square = elastic.first[b], elastic.square[b]
+        size = elastic.first[b + 1] - first
+        gather_deformation(b, q, v, 0.0, elastic, given)
+        stored -= 0.5 * square_form(elastic.stiffness, square, size, given)
+        for i in range(0, size, SIZE):
+            put(given, i, eight_at(v, elastic.coordinate, first + i))
+        kinetic += 0.5 * square_form(elastic.mass, square, size, given)
     return kinetic, stored
-
-
-@kernel
-def damped_power(v: Floats, elastic: ElasticMotion | None, scratch: Floats) -> float:
-    """Power that all elastic bodies damp (W), as of `elastic_energies`; None: no such bodies."""
-    damped = 0.0
-    if elastic is None:
-        return damped
-    for b in range(elastic.turning.size):
-        # Damping is a time times the stiffness: its power is that of the rates, without the common turning.
-        size = gather_deformation(b, v, v, 0.0, elastic, scratch[0])
-        form = square_form(elastic.stiffness, elastic.square[b], size, scratch[0], scratch[1])
-        damped -= elastic.damping_time[b] * form
-    return damped
 
 
 @kernel

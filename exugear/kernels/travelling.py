@@ -22,12 +22,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from exugear.kernels.coordinates import BODY_SIZE, TILT
+from exugear.kernels.coordinates import AXIAL, BODY_SIZE, SPIN, TILT
+from exugear.kernels.products import filled_up
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import compiled, kernel
+from fe_ste.tools.octets import SIZE, all_eight, eight, put
 
-COSINE, SINE, WEIGHT, SLOPE = range(4)
-"""Columns of what a sector shares with a travelling seat: direction from its middle, weight and derivative of it."""
+AXIS_X, AXIS_Y, WEIGHT, COSINE, SINE, SLOPE, SLOPE_COSINE, SLOPE_SINE, TRAVEL, SUMS = range(10)
+"""Rows of a seat's memory. By sector: direction of its middle from the seat at zero angle; its weight in the seat's
+motion, that of its motion along and across; the derivatives of these three by the seat's angle. Then the derivative of
+the seat's motion, and sums."""
+NUMBER_OF_SUMS = 9
 
 
 class TravellingArrays(NamedTuple):
@@ -57,107 +62,130 @@ def no_travelling() -> TravellingArrays:
     return TravellingArrays(none, none, np.zeros(0), none, np.zeros((0, 0), dtype=np.int64), np.zeros((0, 0, 2)))
 
 
-@kernel
-def sector_weight(cosine: float, sine: float, count: int) -> tuple[float, float]:
-    """Weight of a sector and its derivative (1/rad) at an angle from its middle, given by cosine and sine.
-
-    Examples
-    --------
-    >>> sector_weight(1.0, 0.0, 9)
-    (1.0, 0.0)
-    """
-    weight, slope = 1.0, 0.0
-    # cos n d and sin n d by turning on from n - 1: one cosine and sine serve all waves.
-    c, s = 1.0, 0.0
-    for n in range(1, (count - 1) // 2 + 1):
-        c, s = c * cosine - s * sine, s * cosine + c * sine
-        weight += 2.0 * c
-        slope -= 2.0 * n * s
-    return weight / count, slope / count
-
-
 def travelling_memory(seats: TravellingArrays) -> Floats:
-    """Memory (t, s, 4) for `weigh_travelling`."""
-    return np.zeros((*seats.sectors.shape, 4))
+    """Memory (t, rows, s or more) for `place_travelling`, with the directions of all sectors."""
+    count, sectors = seats.sectors.shape
+    memory = np.zeros((count, SUMS + NUMBER_OF_SUMS, filled_up(max(sectors, 1))))
+    x, y = np.moveaxis(seats.axes, -1, 0)
+    c, s = np.cos(seats.angle)[:, None], np.sin(seats.angle)[:, None]
+    memory[:, AXIS_X, :sectors], memory[:, AXIS_Y, :sectors] = c * x + s * y, c * y - s * x
+    return memory
 
 
 @kernel
-def weigh_travelling(q: Floats, seats: TravellingArrays | None, shares: Floats) -> None:
-    """Fill what each sector has to do with each travelling seat, if any: see the columns of `shares`."""
-    if seats is None:
-        return
-    for t in range(seats.first.size):
-        angle = seats.angle[t] + q[seats.frame[t]]
-        c, s = math.cos(angle), math.sin(angle)
-        for k in range(seats.number[t]):
-            # Angle from the sector's middle to the seat, by the difference of the two directions.
-            x, y, share = seats.axes[t, k, 0], seats.axes[t, k, 1], shares[t, k]
-            share[COSINE], share[SINE] = c * x + s * y, s * x - c * y
-            share[WEIGHT], share[SLOPE] = sector_weight(share[COSINE], share[SINE], seats.number[t])
+def weigh_sectors(c: float, s: float, count: int, memory: Floats) -> None:
+    """Fill what each of `count` sectors has to do with a seat; c and s are those of the angle it has travelled."""
+    for k in range(0, memory.shape[1], SIZE):
+        # Angle from the sector's middle to the seat, by the difference of the two directions.
+        x, y = eight(memory[AXIS_X], k), eight(memory[AXIS_Y], k)
+        cosine, sine = x * c + y * s, x * s - y * c
+        # cos n d and sin n d by turning on from n - 1: one cosine and sine serve all waves.
+        weight, slope, of_n, of_n_across = all_eight(1.0), all_eight(0.0), all_eight(1.0), all_eight(0.0)
+        for n in range(1, (count - 1) // 2 + 1):
+            of_n, of_n_across = of_n * cosine - of_n_across * sine, of_n_across * cosine + of_n * sine
+            weight, slope = weight + of_n * 2.0, slope - of_n_across * (2.0 * n)
+        weight, slope = weight * (1.0 / count), slope * (1.0 / count)
+        put(memory[WEIGHT], k, weight)
+        put(memory[COSINE], k, weight * cosine)
+        put(memory[SINE], k, weight * sine)
+        put(memory[SLOPE], k, slope)
+        put(memory[SLOPE_COSINE], k, slope * cosine - weight * sine)
+        put(memory[SLOPE_SINE], k, slope * sine + weight * cosine)
+
+
+@kernel
+def sum_sectors(t: int, q: Floats, v: Floats, seats: TravellingArrays, memory: Floats) -> None:
+    """Fill the sums for seat t: of the sectors' motions by weight, along and across; derivatives; the same of rates."""
+    a = all_eight(0.0)
+    b, c, d, e, f, g, h, i = a, a, a, a, a, a, a, a
+    for k in range(seats.number[t]):
+        j = seats.sectors[t, k]
+        place, rate = eight(q, j), eight(v, j)  # the last two of these are of the next seat and not looked at
+        weight, cosine, sine = memory[WEIGHT, k], memory[COSINE, k], memory[SINE, k]
+        a, b, c = a + place * weight, b + place * cosine, c + place * sine
+        d, e = d + place * memory[SLOPE, k], e + place * memory[SLOPE_COSINE, k]
+        f = f + place * memory[SLOPE_SINE, k]
+        g, h, i = g + rate * weight, h + rate * cosine, i + rate * sine
+    put(memory[SUMS], 0, a)
+    put(memory[SUMS + 1], 0, b)
+    put(memory[SUMS + 2], 0, c)
+    put(memory[SUMS + 3], 0, d)
+    put(memory[SUMS + 4], 0, e)
+    put(memory[SUMS + 5], 0, f)
+    put(memory[SUMS + 6], 0, g)
+    put(memory[SUMS + 7], 0, h)
+    put(memory[SUMS + 8], 0, i)
+
+
+@kernel
+def turned_sum(memory: Floats, row: int, i: int) -> float:
+    """Entry i of a motion from its sums by weight, along and across, which stand in three rows."""
+    if i % TILT == AXIAL:
+        return float(memory[row, i])
+    if i % TILT == 0:
+        return float(memory[row + 1, i] - memory[row + 2, i + 1])
+    return float(memory[row + 2, i - 1] + memory[row + 1, i])
 
 
 @kernel
 def place_travelling(q: Floats, v: Floats, seats: TravellingArrays | None, shares: Floats) -> None:
-    """Fill coordinates and rates of all travelling seats, if any, from those of the sectors."""
+    """Fill coordinates and rates of all travelling seats, if any, from those of the sectors, and what each shares."""
     if seats is None:
         return
+    c, s, last = 1.0, 0.0, -1
     for t in range(seats.first.size):
-        o, speed = seats.first[t], v[seats.frame[t]]
+        o, frame, memory = seats.first[t], seats.frame[t], shares[t]
+        if frame != last:  # seats that travel together need one cosine and sine
+            c, s, last = math.cos(q[frame]), math.sin(q[frame]), frame
+        weigh_sectors(c, s, seats.number[t], memory)
+        sum_sectors(t, q, v, seats, memory)
         for i in range(BODY_SIZE):
-            q[o + i], v[o + i] = 0.0, 0.0
-        for k in range(seats.number[t]):
-            share, j = shares[t, k], seats.sectors[t, k]
-            cosine, sine, weight, slope = share[COSINE], share[SINE], share[WEIGHT], share[SLOPE]
-            # Translations, then angles: the sector's motion turned on by that angle, its share, and what the share
-            # and the turning change as the seat travels.
-            for i in (0, TILT):
-                x, y = cosine * q[j + i] - sine * q[j + i + 1], sine * q[j + i] + cosine * q[j + i + 1]
-                ux, uy = cosine * v[j + i] - sine * v[j + i + 1], sine * v[j + i] + cosine * v[j + i + 1]
-                q[o + i] += weight * x
-                q[o + i + 1] += weight * y
-                q[o + i + 2] += weight * q[j + i + 2]
-                v[o + i] += weight * ux + speed * (slope * x - weight * y)
-                v[o + i + 1] += weight * uy + speed * (slope * y + weight * x)
-                v[o + i + 2] += weight * v[j + i + 2] + speed * slope * q[j + i + 2]
+            memory[TRAVEL, i] = turned_sum(memory, SUMS + 3, i)
+            q[o + i] = turned_sum(memory, SUMS, i)
+            v[o + i] = turned_sum(memory, SUMS + 6, i) + v[frame] * memory[TRAVEL, i]
 
 
 @kernel
-def share_travelling_forces(q: Floats, seats: TravellingArrays | None, shares: Floats, f: Floats) -> None:
-    """Move the generalized forces on all travelling seats to their sectors and to the angle they travel with."""
+def share_travelling_forces(seats: TravellingArrays | None, shares: Floats, f: Floats) -> None:
+    """Move the generalized forces on all travelling seats to their sectors and to the angle they travel with.
+
+    Where the seats are is what `place_travelling` left in `shares`.
+    """
     if seats is None:
         return
     for t in range(seats.first.size):
-        o, frame = seats.first[t], seats.frame[t]
-        travelling = 0.0  # power of the forces as the seat travels, per rad/s: the force on the frame's angle
+        o, memory = seats.first[t], shares[t]
+        power = 0.0  # of the forces as the seat travels, per rad/s: the force on the frame's angle
+        for i in range(BODY_SIZE):
+            power += f[o + i] * memory[TRAVEL, i]
+        x, y, z, a, b, c = f[o], f[o + 1], f[o + 2], f[o + 3], f[o + 4], f[o + 5]
         for k in range(seats.number[t]):
-            share, j = shares[t, k], seats.sectors[t, k]
-            cosine, sine, weight, slope = share[COSINE], share[SINE], share[WEIGHT], share[SLOPE]
-            for i in (0, TILT):
-                # The transposed map: turned back, times the share.
-                fx, fy = cosine * f[o + i] + sine * f[o + i + 1], cosine * f[o + i + 1] - sine * f[o + i]
-                fz = f[o + i + 2]
-                f[j + i] += weight * fx
-                f[j + i + 1] += weight * fy
-                f[j + i + 2] += weight * fz
-                travelling += slope * (fx * q[j + i] + fy * q[j + i + 1] + fz * q[j + i + 2])
-                travelling += weight * (fy * q[j + i] - fx * q[j + i + 1])
-        f[frame] += travelling
+            # The transposed map: turned back, times the share.
+            j, weight, cosine, sine = seats.sectors[t, k], memory[WEIGHT, k], memory[COSINE, k], memory[SINE, k]
+            f[j] += cosine * x + sine * y
+            f[j + 1] += cosine * y - sine * x
+            f[j + AXIAL] += weight * z
+            f[j + TILT] += cosine * a + sine * b
+            f[j + TILT + 1] += cosine * b - sine * a
+            f[j + SPIN] += weight * c
+        f[seats.frame[t]] += power
         for i in range(BODY_SIZE):
             f[o + i] = 0.0
 
 
-@compiled
 def follow(q: Floats, v: Floats, seats: TravellingArrays) -> tuple[Floats, Floats]:
     """States (n, size + 6 t + 1) with those of the travelling seats and one that stays zero behind (n, size)."""
-    size, extended = q.shape[1], q.shape[1] + BODY_SIZE * seats.first.size + 1
-    x, u = np.zeros((len(q), extended)), np.zeros((len(q), extended))
-    x[:, :size], u[:, :size] = q, v
-    count, sectors = seats.sectors.shape
-    shares = np.zeros((count, sectors, 4))
-    for n in range(len(q)):
-        weigh_travelling(x[n], seats, shares)
-        place_travelling(x[n], u[n], seats, shares)
+    following = ((0, 0), (0, BODY_SIZE * seats.first.size + 1))
+    x, u = np.pad(q, following), np.pad(v, following)
+    place_all(x, u, seats, travelling_memory(seats))
     return x, u
+
+
+@compiled
+def place_all(x: Floats, u: Floats, seats: TravellingArrays, shares: Floats) -> None:
+    """Place the travelling seats of states (n, size + 6 t + 1)."""
+    for n in range(len(x)):
+        place_travelling(x[n], u[n], seats, shares)
 
 
 class TravellingTangent(NamedTuple):

@@ -30,10 +30,10 @@ import math
 from typing import NamedTuple
 
 from exugear.kernels.coordinates import AXIAL, BODY_SIZE, SPIN, TILT
-from exugear.kernels.products import add_rows, add_symmetric, square_form
+from exugear.kernels.products import add_rows, add_symmetric, add_symmetric_with_form, square_form
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import kernel
-from fe_ste.tools.octets import SIZE, aligned_zeros
+from fe_ste.tools.octets import SIZE, aligned_zeros, eight, put
 
 
 class TurningArrays(NamedTuple):
@@ -74,9 +74,9 @@ class TurningArrays(NamedTuple):
 
 
 def turning_memory(turning: TurningArrays) -> Floats:
-    """Memory (6, n) that the functions below work in, for the largest body."""
+    """Memory (7, n) that the functions below work in, for the largest body."""
     size = int(turning.columns.max(initial=SIZE))
-    return aligned_zeros(6 * size).reshape(6, size)
+    return aligned_zeros(7 * size).reshape(7, size)
 
 
 @kernel
@@ -126,28 +126,33 @@ def deformation_rates(b: int, moved: Floats, rates: Floats, speed: float, turnin
 
 @kernel
 def set_turning_motion(
-    q: Floats, v: Floats, f: Floats, turning: TurningArrays | None, memory: Floats, out: Floats
-) -> None:
+    q: Floats, v: Floats, f: Floats, with_power: bool, turning: TurningArrays | None, memory: Floats, out: Floats
+) -> float:
     """Fill the accelerations of all bodies under generalized forces f, their own forces left out, into out.
 
-    Nothing without such bodies (None).
+    Returns the power that they damp (W) if asked for, else 0. Nothing without such bodies (None).
     """
+    damped = 0.0
     if turning is None:
-        return
-    moved, rates, given = memory[0], memory[1], memory[2]
+        return damped
+    moved, rates, given, deforming = memory[0], memory[1], memory[2], memory[6]
     elastic, apparent, total = memory[3], memory[4], memory[5]
     for b in range(turning.begin.size):
         begin, first, size, columns = turning.begin[b], turning.first[b], turning.size[b], turning.columns[b]
         c, s, speed = to_body_frame(b, q, v, turning, moved, rates)
-        deformation_rates(b, moved, rates, speed, turning, given)
-        for i in range(size):
-            given[i] = moved[i] + turning.damping_time[b] * given[i]
+        deformation_rates(b, moved, rates, speed, turning, deforming)
+        time, square = turning.damping_time[b], turning.square[b]
+        for i in range(0, columns, SIZE):
+            put(given, i, eight(moved, i) + eight(deforming, i) * time)
         # Elastic and apparent forces; the reaction on the frame's angle gathers what they take from its power.
         for i in range(columns):
             elastic[i] = 0.0
             apparent[i] = speed * turning.pull[first + i] if i < size else 0.0
             total[i] = 0.0
-        add_symmetric(turning.stiffness, turning.square[b], columns, given, elastic)
+        if with_power:
+            damped -= time * add_symmetric_with_form(turning.stiffness, square, columns, given, elastic, deforming)
+        else:
+            add_symmetric(turning.stiffness, square, columns, given, elastic)
         add_rows(turning.coriolis, turning.across[b], columns, columns, rates, apparent)
         reaction = 0.0
         for i in range(size):
@@ -165,7 +170,7 @@ def set_turning_motion(
         # Accelerations along the frame's axes, then in global ones: R (dw/dt + Omega S w).
         for i in range(columns):
             given[i] = 0.0
-        add_symmetric(turning.inverse, turning.square[b], columns, total, given)
+        add_symmetric(turning.inverse, square, columns, total, given)
         for i in range(size):
             out[begin + i] = given[i]
         for n in range(turning.seats[b]):
@@ -176,45 +181,43 @@ def set_turning_motion(
                 out[begin + i], out[begin + i + 1] = c * x - s * y, s * x + c * y
             for axis in range(3):
                 out[begin + BODY_SIZE * n + axis] += turning.gravity[b, axis]
+    return damped
 
 
 @kernel
-def turning_energies(
-    q: Floats, v: Floats, turning: TurningArrays | None, memory: Floats
-) -> tuple[float, float, float, float]:
-    """Kinetic and elastic energy (J) of all bodies, the power that they damp, and that of their weight (W)."""
+def turning_energies(q: Floats, v: Floats, turning: TurningArrays | None, memory: Floats) -> tuple[float, float]:
+    """Kinetic and elastic energy (J) of all bodies."""
     kinetic, stored = 0.0, 0.0
     if turning is None:
-        return kinetic, stored, 0.0, 0.0
-    moved, rates, product = memory[0], memory[1], memory[4]
+        return kinetic, stored
+    moved, rates = memory[0], memory[1]
     for b in range(turning.begin.size):
         first, columns, square = turning.first[b], turning.columns[b], turning.square[b]
         _, _, speed = to_body_frame(b, q, v, turning, moved, rates)
-        stored -= 0.5 * square_form(turning.stiffness, square, columns, moved, product)
+        stored -= 0.5 * square_form(turning.stiffness, square, columns, moved)
         for i in range(turning.size[b]):
             rates[i] += speed * turning.spin[first + i]
-        kinetic += 0.5 * square_form(turning.mass, square, columns, rates, product)
-    damped, weight = turning_powers(q, v, turning, memory)
-    return kinetic, stored, damped, weight
+        kinetic += 0.5 * square_form(turning.mass, square, columns, rates)
+    return kinetic, stored
 
 
 @kernel
-def turning_powers(q: Floats, v: Floats, turning: TurningArrays | None, memory: Floats) -> tuple[float, float]:
-    """Power that all bodies damp, and that of their weight (W)."""
-    damped, weight = 0.0, 0.0
+def turning_weight_power(q: Floats, v: Floats, turning: TurningArrays | None, memory: Floats) -> float:
+    """Power of the weight of all bodies (W)."""
+    weight = 0.0
     if turning is None:
-        return damped, weight
-    moved, rates, given, product = memory[0], memory[1], memory[2], memory[4]
+        return weight
+    moved, rates = memory[0], memory[1]
     for b in range(turning.begin.size):
-        first, columns, square = turning.first[b], turning.columns[b], turning.square[b]
-        c, s, speed = to_body_frame(b, q, v, turning, moved, rates)
-        deformation_rates(b, moved, rates, speed, turning, given)
-        damped -= turning.damping_time[b] * square_form(turning.stiffness, square, columns, given, product)
-        # Power of the weight: gravity in the frame times the momentum along its axes.
         gx, gy, gz = turning.gravity[b, 0], turning.gravity[b, 1], turning.gravity[b, 2]
+        if gx == 0.0 and gy == 0.0 and gz == 0.0:
+            continue
+        first = turning.first[b]
+        c, s, speed = to_body_frame(b, q, v, turning, moved, rates)
+        # Gravity in the frame times the momentum along its axes.
         x, y = c * gx + s * gy, c * gy - s * gx
         for i in range(turning.size[b]):
             momentum = x * turning.moving[0, first + i] + y * turning.moving[1, first + i]
             momentum += gz * turning.moving[2, first + i]
             weight += (rates[i] + speed * turning.spin[first + i]) * momentum
-    return damped, weight
+    return weight

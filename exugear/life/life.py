@@ -17,7 +17,7 @@ from exugear.life.acting_loads import acting_loads
 from exugear.life.bearing_life import BearingLife, bearing_lives
 from exugear.life.dynamic_factor import WITHIN, DynamicFactor
 from exugear.life.gear_life import FlankLife, check_strengths, flank_lives
-from exugear.life.static_balance import StaticBalance, static_balance
+from exugear.life.static_balance import AngleStore, StaticBalance, static_balance
 from exugear.load_spectrum.counted import CountedLoads, count_loads
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import RPM
@@ -133,6 +133,7 @@ def compute_life(
     dynamic: Mapping[str, DynamicFactor],
     digest: str,
     progress: Callable[[int, int], None] | None = None,
+    store: AngleStore | None = None,
 ) -> Life:
     """Rate gears and bearings of a variant under the loads of its gearbox file.
 
@@ -149,6 +150,8 @@ def compute_life(
         Of `life_hash`.
     progress : callable, optional
         Called with the number of solved static states, and of all.
+    store : AngleStore, optional
+        Keeps solved angles of the carrier.
 
     Raises
     ------
@@ -158,7 +161,7 @@ def compute_life(
     gearbox, rating = assembly.gearbox, rating_of(assembly.gearbox)
     found, acting = counted.distribution, acting_loads(counted)
     balance = static_balance(
-        assembly, counted.body, acting.torques, rating.carrier_angles, progress, 0.5 * acting.hub_sizes
+        assembly, counted.body, acting.torques, rating.carrier_angles, progress, 0.5 * acting.hub_sizes, store
     )
     flanks = flank_lives(gearbox, rating, counted.teeth, acting, balance, stresses, dynamic)
     bearings = bearing_lives(assembly.supports, counted.bearings, acting, balance)
@@ -247,6 +250,11 @@ def _assumptions(
         "Z_W = Z_X = 1; S-N curves go on beyond their last point: no load is without damage",
         "lives of bearings are basic: lubricant, cleanliness, ribs and cages are left out",
     ]
+    if balance.outside:
+        lines.append(
+            f"outside their tables under some load: {', '.join(balance.outside)}; tables go on in a straight line "
+            "there; widen the axes of [ste]"
+        )
     if np.any(found.torque < 0.0):
         lines.append("reversed torque presses the other flanks; teeth there are taken as the mirror of these")
     return [*lines, *counted.remarks]

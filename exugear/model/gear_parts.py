@@ -31,6 +31,7 @@ from fe_ste.flanks.modifications import (
     radius_at_roll_length_from_tip,
 )
 from fe_ste.flanks.topography import FlankTopography
+from fe_ste.geometry.cutter import PinionCutter
 from fe_ste.geometry.fitting import (
     LEAST_ROOT_MARGIN,
     ROOT_MARGIN,
@@ -141,7 +142,7 @@ def _unchecked(name: str, section: GearSection) -> UncheckedGear:
         rack=BasicRack(section.rack.addendum, section.rack.dedendum, section.rack.tip_radius),
         tip_diameter=None if section.tip_diameter_mm is None else section.tip_diameter_mm * 1e-3,
         root_diameter=None if section.root_diameter_mm is None else section.root_diameter_mm * 1e-3,
-        tooth_thinning=section.tooth_thinning_mm * 1e-3,
+        tooth_thinning=sum(thinning_range(section)) / 2.0,
         material=Material(
             youngs_modulus=section.material.youngs_modulus_GPa * 1e9,
             poissons_ratio=section.material.poissons_ratio,
@@ -149,7 +150,34 @@ def _unchecked(name: str, section: GearSection) -> UncheckedGear:
         ),
         tip_form_diameter=None if section.tip_form_diameter_mm is None else section.tip_form_diameter_mm * 1e-3,
         root_form_diameter=None if section.root_form_diameter_mm is None else section.root_form_diameter_mm * 1e-3,
+        cutter=_cutter(section),
     )
+
+
+def _cutter(section: GearSection) -> PinionCutter | None:
+    """Cutter of a ring; from an addendum d_a0 = m_n (z_0 / cos(beta) + 2 (x_0 + h_a0*))."""
+    cutter = section.cutter
+    if cutter is None:
+        return None
+    tip_mm = cutter.tip_diameter_mm
+    if cutter.addendum is not None:
+        reference = cutter.teeth / math.cos(math.radians(section.helix_angle_deg))
+        tip_mm = section.normal_module_mm * (reference + 2.0 * (cutter.profile_shift + cutter.addendum))
+    return PinionCutter(
+        cutter.teeth, cutter.tip_radius, cutter.profile_shift, None if tip_mm is None else 1e-3 * tip_mm
+    )
+
+
+def thinning_range(section: GearSection) -> tuple[float, float]:
+    """Least and greatest thinning of a gear's teeth, transverse section, m; both are the same without allowances."""
+    allowances = section.tooth_thickness
+    if allowances is None:
+        return section.tooth_thinning_mm * 1e-3, section.tooth_thinning_mm * 1e-3
+    upper, lower = allowances.upper_allowance_um, allowances.lower_allowance_um
+    if lower is None:
+        lower = upper - (allowances.tolerance_um or 0.0)
+    transverse = -1e-6 / math.cos(math.radians(section.helix_angle_deg))
+    return transverse * upper, transverse * lower
 
 
 def margins_of_roots(pairs: Iterable[GearPair]) -> Iterator[str]:

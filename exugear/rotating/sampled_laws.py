@@ -26,11 +26,11 @@ from exugear.rotating.mesh_ports import BACK, BACK_TILT, CENTRE, FRONT, TILT
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import compiled
 
-TOUCHING = 1.0e-6
+TOUCHING = 0.25e-6
 """Approach over which the damping of teeth that touch sets in, m.
 
-By the law itself it jumps at first touch, by 4 % of the load in the GRC: no balance of smooth lines ends there. A
-thousandth of the response is what the ramp costs.
+By the law itself it jumps at first touch, by 4 % of the load in the GRC: no balance of smooth lines ends there. The
+ramp costs a thousandth of the response, mostly in its phase.
 """
 TABLE_READINGS, TABLE_FORCES = 6, 5
 

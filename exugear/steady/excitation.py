@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from exugear.harmonics.lattice import Lattice, lattice
-from exugear.harmonics.lines import LineSet
+from exugear.harmonics.lines import LineSet, line_set, modulated
 from exugear.harmonics.products import Product
 from exugear.rotating.mean_system import MeanSystem
 from exugear.rotating.mesh_ports import DEFLECTION, POSITION, MeshPorts, mesh_ports
@@ -17,6 +18,9 @@ from exugear.rotating.mesh_waves import MeshWaves
 from exugear.rotating.signals import SignalName, SignalRows, mesh_signal_names, signal_rows
 from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
+
+SAMPLES_PER_HARMONIC = 16
+"""Samples over a mesh period at least where teeth part, over the harmonics: kinks want more than products of lines."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,16 +71,17 @@ class Gearset:
     Parameters
     ----------
     waves : MeshWaves
-    lines : LineSet
-    larger : LineSet
-        Lines that are kept apart where forces are evaluated in time.
-    stiffness_harmonics : int
-        Highest harmonic of the mesh stiffness.
+    harmonics : int
+        Of each mesh frequency. The mesh stiffness has twice as many.
+    combinations : int
+        Largest sum of multiples of several mesh frequencies.
     """
 
-    def __init__(self, waves: MeshWaves, lines: LineSet, larger: LineSet, stiffness_harmonics: int) -> None:
-        self.waves, self.lines, self.harmonics = waves, lines, stiffness_harmonics
-        self._larger = larger
+    def __init__(self, waves: MeshWaves, harmonics: int, combinations: int) -> None:
+        self.waves, self.harmonics = waves, 2 * harmonics
+        self.line_harmonics, self.combinations = harmonics, combinations
+        # Lines of the larger set are kept apart where forces are evaluated in time.
+        self.lines, self._larger = _line_sets(waves, harmonics, combinations)
         self.parting = LAWS[waves.assembly.mesh_law].loses_contact
         ports, rows = [], []
         for speed in waves.system.speeds:
@@ -95,7 +100,22 @@ class Gearset:
     @cached_property
     def lattice(self) -> Lattice:
         """Samples on which forces are evaluated in time."""
-        return lattice(self.lines, self._larger)
+        least = SAMPLES_PER_HARMONIC * self.line_harmonics if self.parting else 0
+        return lattice(self.lines, self._larger, least)
+
+    @cached_property
+    def finer(self) -> Gearset:
+        """The same with twice the harmonics of each mesh frequency, and the same combinations of several."""
+        other = copy.copy(self)
+        for name in ("lattice", "products", "finer"):
+            other.__dict__.pop(name, None)
+        other.line_harmonics = 2 * self.line_harmonics
+        other.lines, other._larger = _line_sets(self.waves, other.line_harmonics, self.combinations)
+        return other
+
+    def places_in(self, other: Gearset) -> Integers:
+        """Places (n,) of the lines among those of another, which has them all."""
+        return other.lines.find(self.lines.index)[0]
 
     @property
     def base_names(self) -> tuple[str, ...]:
@@ -188,3 +208,10 @@ class Gearset:
         ahead = self.system.at(self._ports["static"], speed)[:, POSITION]
         rate = 2j * math.pi * np.where(self.forward(speed), 1.0, -1.0)[:, None] * np.arange(coefficients.shape[1])
         return np.asarray(ahead[:, None] * rate * coefficients)
+
+
+def _line_sets(waves: MeshWaves, harmonics: int, combinations: int) -> tuple[LineSet, LineSet]:
+    """Lines of given harmonics and combinations, and those of twice as many."""
+    orders, modulators = waves.base_orders.tolist(), [own for _, own in waves.carriers]
+    lines, larger = (modulated(line_set(orders, n * harmonics, n * combinations), modulators) for n in (1, 2))
+    return lines, larger

@@ -12,7 +12,7 @@ from exugear.rotating.mesh_ports import DEFLECTION
 from exugear.rotating.rotating_frame import SteadyError
 from exugear.steady.nonlinear import Balance
 from exugear.steady.point_solver import PointSolver
-from exugear.steady.stability import growth_at
+from exugear.steady.stability import growth_of_state
 from fe_ste.tools.arrays import Booleans, Complexes, Floats
 
 LONGEST = 0.4
@@ -87,16 +87,15 @@ def follow_branch(
 
     def residual(readings: Complexes, speed: float) -> tuple[Complexes, Callable[[Complexes], Complexes]]:
         balance = balance_at(speed)
-        excess, change, _ = balance.forces(readings)
-        missing = readings - balance.static - balance.answer(excess)
-        return missing, lambda step: step - balance.answer(change(step))
+        excess, tangent, _ = balance.forces(readings)
+        return readings - balance.static - balance.answer(excess), tangent.missing
 
     start = solver.readings(first)
     size = float(np.linalg.norm(start[0, :, DEFLECTION]))
     scales = Scales(0.1 * size, 0.01 * abs(first))
     found = trace(residual, start, first, last, scales, step=0.1 * LONGEST, longest=LONGEST, progress=progress)
     growth = [
-        max(growth_at(balance_at(float(speed)), readings, base) for base in range(len(gearset.waves.base_orders)))
+        growth_of_state(balance_at(float(speed)), readings, gearset.parting)
         for speed, readings in zip(found.parameter, found.lines, strict=True)
     ]
     return SteadyBranch(found.parameter, found.lines, np.array(growth), tuple(fold for _, fold in found.folds))

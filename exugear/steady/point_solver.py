@@ -1,28 +1,85 @@
-"""Steady states one speed after the other, at any level."""
+"""Steady states one speed after the other, at any level.
+
+Where teeth may part, a state that Newton's method finds is refined by more harmonics until they change nothing, and its
+stability looked at. Where none is found near the last one, or it is unstable, the gearbox runs in time from there: it
+settles to the state that it jumps to, or to none, which is said in words.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from exugear.dynamics.assembly import Assembly
 from exugear.harmonics.krylov import HarmonicBalanceError
 from exugear.harmonics.lattice import Lattice
-from exugear.harmonics.lines import line_set, modulated
 from exugear.rotating.mean_system import mean_system
+from exugear.rotating.mesh_ports import DEFLECTION
 from exugear.rotating.mesh_waves import mesh_waves
+from exugear.settling.settled import Leg, SettlingRun, cannot_settle
 from exugear.steady.excitation import Gearset, Interface
-from exugear.steady.nonlinear import Balance, nonlinear_response, response_of_readings
+from exugear.steady.nonlinear import Balance, nonlinear_response, response_of_readings, solve_balance
 from exugear.steady.response import Response, linear_response, parametric_response, transmission_errors
 from exugear.steady.settings import SteadySettings
-from exugear.steady.stability import CHECKED, candidates, growth_at, mean_growth
+from exugear.steady.stability import CHECKED, candidates, growth_at, growth_of_state, mean_growth
 from fe_ste.tools.arrays import Complexes, Floats
+
+FINE_ENOUGH = 5e-4
+"""Residual of the balance with twice the harmonics, over the vibration, up to which the present ones do."""
+MOST_REFINED = 2
+"""Times that harmonics are doubled at most."""
+LEGS = 4
+"""Legs of a run in time, after each of which Newton's method is tried."""
+NEAR = 0.1
+"""Difference of amplitudes from those of a run in time, over the vibration, up to which both are one state."""
+GROWING = 0.02
+"""Growth in a period of the slowest base above which a state does not last: below it a run shows little of it."""
+PUSHED = 1.02
+"""Factor on the motion of an unstable state from which a run begins."""
 
 
 def gearset_of(assembly: Assembly, speeds: Floats, harmonics: int = 10, combinations: int = 3) -> Gearset:
     """Gearset of an assembly for speeds of the input (rad/s), with lines as `SteadySettings` says."""
-    waves = mesh_waves(mean_system(assembly, speeds))
-    orders, modulators = waves.base_orders.tolist(), [own for _, own in waves.carriers]
-    lines = modulated(line_set(orders, harmonics, combinations), modulators)
-    larger = modulated(line_set(orders, 2 * harmonics, 2 * combinations), modulators)
-    return Gearset(waves, lines, larger, 2 * harmonics)
+    return Gearset(mesh_waves(mean_system(assembly, speeds)), harmonics, combinations)
+
+
+@dataclass(frozen=True, eq=False)
+class PartingState:
+    """A steady state of a gearbox whose teeth may part.
+
+    Attributes
+    ----------
+    gearset : Gearset
+        With the lines that it took.
+    readings : (n, m, r) complex array
+        What the laws read.
+    response : Response
+    growth : float
+        Fastest growth of a disturbance, 1/s.
+    remark : str
+        What is to be said of it, empty if nothing.
+    """
+
+    gearset: Gearset
+    readings: Complexes
+    response: Response
+    growth: float
+    remark: str = ""
+
+    def on(self, gearset: Gearset, interface: Interface | None = None) -> PartingState:
+        """Return the state in the lines of another gearset, which are some of its own."""
+        if gearset is self.gearset:
+            return self
+        old, at = self.response, gearset.places_in(self.gearset)
+        response = replace(
+            old,
+            interface=interface or gearset.at(old.interface.speed),
+            deflection=old.deflection[at],
+            excess=old.excess[at],
+            force=old.force[at],
+        )
+        return replace(self, gearset=gearset, readings=self.readings[at], response=response)
 
 
 class PointSolver:
@@ -37,6 +94,7 @@ class PointSolver:
     def __init__(self, gearset: Gearset, settings: SteadySettings) -> None:
         self.gearset, self._level = gearset, settings.level
         self._last: Complexes | None = None
+        self.state: PartingState | None = None
 
     @property
     def lattice(self) -> Lattice:
@@ -72,10 +130,14 @@ class PointSolver:
             return linear_response(self.gearset, interface)
         if self._level == "parametric" and not self.gearset.waves.carriers:
             return parametric_response(self.gearset, interface)
+        if self.gearset.parting:
+            return self._parting(speed).on(self.gearset, interface).response
         return self._in_time(interface)
 
     def readings(self, speed: float) -> Complexes:
         """Find what the mesh laws read (n, m, r) at a speed of the input (rad/s), at the level `nonlinear`."""
+        if self.gearset.parting:
+            return self._parting(speed).on(self.gearset).readings
         self._in_time(self.gearset.at(speed))
         assert self._last is not None
         return self._last
@@ -93,3 +155,87 @@ class PointSolver:
                 raise
             found, self._last = nonlinear_response(self.gearset, interface, self.lattice, None, frozen)
         return found
+
+    def _parting(self, speed: float) -> PartingState:
+        """Find the state at a speed: that near the last one if it is stable, else where a run in time settles."""
+        last, found, reason = self.state, None, ""
+        try:
+            found = _refined(last.gearset if last else self.gearset, speed, last.readings if last else None)
+        except HarmonicBalanceError as error:
+            reason = str(error)
+        if found is None or self._grows(found):
+            found = self._settled(speed, found, reason)
+        # Where no tooth parts the usual lines will do again.
+        self.state = found if found.response.apart.any() else found.on(self.gearset)
+        return self.state
+
+    def _settled(self, speed: float, unstable: PartingState | None, reason: str) -> PartingState:
+        """Find the state to which a run in time settles that begins at the last one, or at an unstable one."""
+        begin = unstable or self.state
+        gearset = begin.gearset if begin else self.gearset
+        interface = gearset.at(speed)
+        verdict = cannot_settle(gearset.system)
+        if not verdict:
+            motion = np.zeros((len(gearset.lines.orders), gearset.system.size), dtype=complex)
+            if begin is not None:
+                motion = PUSHED * begin.response.motion
+            rows = interface.ports.readings[:, DEFLECTION]
+            run = SettlingRun(gearset.system, gearset.lines, rows, gearset.waves.base_orders, speed, motion)
+            for _ in range(LEGS):
+                leg = run.leg()
+                if leg is None:
+                    verdict = "the motion in time is not finite"
+                    break
+                verdict = leg.verdict
+                found = _near(gearset, interface, leg)
+                if found is not None and not self._grows(found):
+                    return found
+                unstable = found or unstable
+        if unstable is None:
+            raise HarmonicBalanceError(f"{reason}; {verdict}")
+        grows = f"unstable, a disturbance grows by {unstable.growth:.3g} 1/s"
+        return replace(unstable, remark=f"{grows}; {verdict}")
+
+    def _grows(self, state: PartingState) -> bool:
+        """Tell whether a disturbance of a state grows within a run in time."""
+        slowest = abs(state.response.interface.speed) * float(self.gearset.waves.base_orders.min())
+        return state.growth * 2.0 * np.pi / slowest > GROWING
+
+
+def _near(gearset: Gearset, interface: Interface, leg: Leg) -> PartingState | None:
+    """Find the state near what a run in time settled to."""
+    ports = interface.ports
+    moved = leg.motion.copy()
+    moved[0] -= gearset.system.static_at(interface.speed)
+    readings = np.moveaxis(np.tensordot(ports.readings, moved, axes=(2, 1)), 2, 0)
+    readings[0] += ports.static
+    try:
+        found = _refined(gearset, interface.speed, readings)
+    except HarmonicBalanceError:
+        return None
+    own = found.on(gearset)
+    # Phases hang on the last of the damping, to which the drive of the run adds.
+    difference = np.linalg.norm((np.abs(own.readings) - np.abs(readings))[1:, :, DEFLECTION])
+    return found if difference < NEAR * np.linalg.norm(readings[1:, :, DEFLECTION]) else None
+
+
+def _refined(gearset: Gearset, speed: float, start: Complexes | None) -> PartingState:
+    """Solve at a speed, from given readings or the static state, with more and more harmonics until they do."""
+    balance = Balance(gearset, gearset.at(speed), gearset.lattice)
+    readings, products = solve_balance(balance, balance.static if start is None else start)
+    response = response_of_readings(balance, readings, products)
+    for _ in range(MOST_REFINED):
+        if not response.apart.any():
+            break
+        finer = gearset.finer
+        ahead = Balance(finer, finer.at(speed), finer.lattice)
+        more = np.zeros_like(ahead.static)
+        more[gearset.places_in(finer)] = readings
+        size = float(np.linalg.norm(readings[1:, :, DEFLECTION]))
+        if float(np.linalg.norm(ahead.missing(more)[..., DEFLECTION])) < FINE_ENOUGH * size:
+            break
+        gearset, balance = finer, ahead
+        readings, took = solve_balance(balance, more)
+        products += took
+        response = response_of_readings(balance, readings, products)
+    return PartingState(gearset, readings, response, growth_of_state(balance, readings, bool(response.apart.any())))

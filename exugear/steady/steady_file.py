@@ -38,11 +38,12 @@ _LAYOUT = Layout(
         "drive_torque": ("point",),
         "energy_error": ("point",),
         "growth": ("point",),
+        "remark": ("point",),
         "apart_share": ("point", "mesh_wave"),
     }
     | {name: (name,) for name in ("base", "signal", "mesh_wave")}
     | LAYOUT,
-    ("gearbox", "variant", "mesh_law", "inertias", "level", "input_hash", "growth_rate"),
+    ("gearbox", "variant", "mesh_law", "inertias", "level", "input_hash", "growth_rate", "unsolved"),
 )
 
 
@@ -74,7 +75,8 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
         "units": (("signal",), np.array([own.units for own in response.signals], dtype=object), {}),
         "drive_torque": (("point",), solved.drive_torque, {"units": "N m"}),
         "energy_error": (("point",), solved.energy_error, {"units": "1"}),
-        "growth": (("point",), solved.growth, {"units": "1/s", "long_name": "fastest growth along a branch"}),
+        "growth": (("point",), solved.growth, {"units": "1/s", "long_name": "fastest growth of a disturbance"}),
+        "remark": (("point",), solved.remark.astype(object), {}),
         "apart_share": (("point", "mesh_wave"), solved.apart, {"units": "1", "long_name": "share of time apart"}),
     }
     variables |= response.campbell.variables()
@@ -98,6 +100,7 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
         "planet_spread": response.planet_spread,
         "contributions": json.dumps([{"line": line, **asdict(own)} for line, own in response.contributions]),
         "folds": json.dumps(response.folds),
+        "unsolved": json.dumps([{"speed": speed, "reason": reason} for speed, reason in response.unsolved]),
         "crossings": json.dumps([asdict(crossing) for crossing in response.crossings]),
     }
     return xr.Dataset(variables, coordinates, attributes)

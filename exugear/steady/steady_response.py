@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from exugear.campbell.campbell import Campbell, campbell_of, modes_over_speed
 from exugear.campbell.mode_tracks import ModeTracks
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
+from exugear.harmonics.krylov import HarmonicBalanceError
 from exugear.harmonics.lines import LineSet
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
@@ -27,7 +28,7 @@ from exugear.steady.resonances import HARMONICS, Crossing, crossings, refined
 from exugear.steady.response import Response, dissipated_and_given, signals
 from exugear.steady.settings import SteadySettings, check_law, usual_speeds
 from exugear.tooth_mesh.law import MeshData
-from fe_ste.tools.arrays import Complexes, Floats
+from fe_ste.tools.arrays import Booleans, Complexes, Floats, Texts
 from fe_ste.tools.notebook import html_table, value_range
 
 
@@ -50,7 +51,9 @@ class Solved:
     apart : (points, waves) array
         Share of time in which the teeth of each mesh wave are apart.
     growth : (points,) array
-        Fastest growth of a disturbance along a branch, 1/s; NaN elsewhere.
+        Fastest growth of a disturbance, 1/s, along a branch and where teeth may part; NaN elsewhere.
+    remark : (points,) array of str
+        What is to be said of a point, or why there is none: its numbers are NaN then.
     """
 
     speed: Floats
@@ -60,6 +63,11 @@ class Solved:
     products: Floats
     apart: Floats
     growth: Floats
+    remark: Texts
+
+    def part(self, which: slice | Booleans) -> Solved:
+        """Take some of the points."""
+        return Solved(**{own.name: getattr(self, own.name)[which] for own in fields(self)})
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +87,8 @@ class SteadyResponse:
     signals : tuple of SignalName
     solved : Solved
         Points in ascending order of speed, or along a branch.
+    unsolved : tuple of (float, str)
+        Speeds at which no steady state was found, rad/s, and why.
     crossings : tuple of Crossing
         Where lines meet modes, the strongest first.
     contributions : tuple of (int, Contributions)
@@ -86,8 +96,8 @@ class SteadyResponse:
     folds : tuple of float
         Speeds at which a branch turns back, rad/s.
     growth_rate : float
-        Fastest growth of any disturbance over the speeds, 1/s: of the mean system, and where two modes and a mesh
-        frequency work together.
+        Fastest growth of any disturbance over the speeds, 1/s: of the mean system, where two modes and a mesh frequency
+        work together, and of the points where teeth may part.
     planet_spread : float
         Largest change of planet bearings' stiffness that made the planets equal, over that stiffness.
     campbell : Campbell
@@ -102,6 +112,7 @@ class SteadyResponse:
     wave_names: tuple[str, ...]
     signals: tuple[SignalName, ...]
     solved: Solved
+    unsolved: tuple[tuple[float, str], ...]
     crossings: tuple[Crossing, ...]
     contributions: tuple[tuple[int, Contributions], ...]
     folds: tuple[float, ...]
@@ -151,6 +162,8 @@ EXPLAINED = 20
 """Crossings whose peaks are taken apart."""
 SLOWEST_BRANCH = 0.01
 """Share of the fastest speed at which a branch from standstill begins."""
+LONGEST_REMARK = 300
+"""Letters of a remark."""
 Kept = Callable[[Solved], None]
 
 
@@ -233,6 +246,10 @@ def response_of(
         solved, folds = _along_branch(solver, settings.speeds.first, settings.speeds.last, told)
     else:
         solved = _solve(solver, refined(even, found), known, told, keep, keep_every)
+    there = np.isfinite(solved.drive_torque)
+    if not there.any():
+        raise HarmonicBalanceError(str(solved.remark[0]))
+    fastest = np.fmax.reduce(solved.growth, initial=-np.inf)
     return SteadyResponse(
         assembly=gearset.waves.assembly,
         settings=settings,
@@ -241,11 +258,12 @@ def response_of(
         base_names=gearset.base_names,
         wave_names=tuple(wave.name for wave in gearset.waves.waves),
         signals=gearset.signal_names,
-        solved=solved,
+        solved=solved.part(there),
+        unsolved=tuple(zip(solved.speed[~there].tolist(), solved.remark[~there].tolist(), strict=True)),
         crossings=found,
         contributions=() if gearset.parting else _contributions(gearset, found),
         folds=folds,
-        growth_rate=solver.growth(float(even.min()), float(even.max())),
+        growth_rate=float(np.fmax(solver.growth(float(even.min()), float(even.max())), fastest)),
         planet_spread=gearset.system.planet_spread,
         campbell=campbell_of(gearset.system, tracks),
     )
@@ -273,22 +291,35 @@ def _solve(
     gearset = solver.gearset
     out = _empty(gearset, speeds)
     if known is not None:
-        for name in ("amplitude", "drive_torque", "energy_error", "products", "apart", "growth"):
-            getattr(out, name)[:count] = getattr(known, name)[:count]
+        for own in fields(Solved):
+            getattr(out, own.name)[:count] = getattr(known, own.name)[:count]
     kept, done = time.monotonic(), count
     try:
         for n in range(count, len(speeds)):
-            _fill(out, n, gearset, solver.response(float(speeds[n])))
+            _solve_one(out, n, solver)
             done = n + 1
             progress(done, len(speeds))
             if keep is not None and time.monotonic() - kept > keep_every:
-                keep(_first(out, done))
+                keep(out.part(slice(done)))
                 kept = time.monotonic()
     except KeyboardInterrupt:
         if keep is not None and done:
-            keep(_first(out, done))
+            keep(out.part(slice(done)))
         raise
     return out
+
+
+def _solve_one(out: Solved, n: int, solver: PointSolver) -> None:
+    """Solve point n, or enter why it has no steady state; the others do not suffer from that."""
+    try:
+        _fill(out, n, solver.gearset, solver.response(float(out.speed[n])))
+    except HarmonicBalanceError as error:
+        for values in (out.amplitude, out.drive_torque, out.energy_error, out.apart):
+            values[n] = np.nan
+        out.remark[n] = str(error)[:LONGEST_REMARK]
+        return
+    if solver.state is not None:
+        out.growth[n], out.remark[n] = solver.state.growth, solver.state.remark[:LONGEST_REMARK]
 
 
 def _contributions(gearset: Gearset, found: tuple[Crossing, ...]) -> tuple[tuple[int, Contributions], ...]:
@@ -327,6 +358,7 @@ def _empty(gearset: Gearset, speeds: Floats) -> Solved:
         products=np.zeros(points),
         apart=np.zeros((points, len(gearset.waves.waves))),
         growth=np.full(points, np.nan),
+        remark=np.zeros(points, dtype=f"<U{LONGEST_REMARK}"),
     )
 
 
@@ -344,15 +376,3 @@ def _same_beginning(known: Floats, speeds: Floats) -> int:
     """Count the points that are known already."""
     count = min(len(known), len(speeds))
     return count if np.array_equal(known[:count], speeds[:count]) else 0
-
-
-def _first(solved: Solved, count: int) -> Solved:
-    return Solved(
-        solved.speed[:count],
-        solved.amplitude[:count],
-        solved.drive_torque[:count],
-        solved.energy_error[:count],
-        solved.products[:count],
-        solved.apart[:count],
-        solved.growth[:count],
-    )

@@ -10,6 +10,7 @@ import numbers
 
 import numpy as np
 
+from fe_ste.geometry.cutter import PinionCutter
 from fe_ste.geometry.fillet import root_fillet
 from fe_ste.geometry.gear_relations import ROUNDING, UncheckedGear
 from fe_ste.geometry.involute import involute
@@ -52,9 +53,11 @@ def check_gear(gear: UncheckedGear) -> None:
     """
     _check_values(gear)
     _check_circles(gear)
-    if gear.internal:
+    if gear.cutter is not None:
+        _check_cutter(gear, gear.cutter)
+    elif gear.internal:
         _check_internal_space(gear)
-    else:
+    if not gear.internal:
         _check_generating_rack(gear)
         _check_flank(gear)
     _check_form_circles(gear)
@@ -224,12 +227,78 @@ def _check_form_circles(gear: UncheckedGear) -> None:
         raise _refuse_gear(gear, "tip_form_diameter", _mm(2.0 * gear.tip_form_radius), remedy)
 
 
-def _check_internal_space(gear: UncheckedGear) -> None:
-    """Refuse a tip without involute, a space closed at the root, a fillet higher than the tooth."""
+def _check_cutter(gear: UncheckedGear, cutter: PinionCutter) -> None:
+    """Refuse a cutter that cannot make the gear, or that spoils its tips."""
+    if not gear.internal:
+        raise _refuse_gear(gear, "cutter", f"{cutter!r}", "is for internal gears: that of external ones is the rack")
+    most = gear.teeth - 1
+    if not isinstance(cutter.teeth, numbers.Integral) or not LEAST_TEETH <= cutter.teeth <= most:
+        remedy = f"must be a whole number from {LEAST_TEETH} to {most}, below the teeth of the gear"
+        raise _refuse_gear(gear, "cutter.teeth", f"{cutter.teeth!r}", remedy)
+    if not _is_number(cutter.tip_radius) or cutter.tip_radius < 0.0:
+        raise _refuse_gear(
+            gear, "cutter.tip_radius", f"{cutter.tip_radius!r}", "must be a finite number, zero or above"
+        )
+    if not _is_number(cutter.profile_shift) or math.isnan(gear.cutting_distance):
+        remedy = "leaves no centre distance at which it generates these teeth: values nearer to the gear's are needed"
+        raise _refuse_gear(gear, "cutter.profile_shift", f"{cutter.profile_shift!r}", remedy)
+    if gear.root_diameter is not None and cutter.tip_diameter is not None:
+        remedy = "says the root diameter, too: leave it or root_diameter out"
+        raise _refuse_gear(gear, "cutter.tip_diameter", _mm(cutter.tip_diameter), remedy)
+    _check_cutter_tooth(gear, cutter)
+    _check_flank_of_ring(gear)
+    _check_trimmed_tips(gear)
+
+
+def _check_cutter_tooth(gear: UncheckedGear, cutter: PinionCutter) -> None:
+    """Refuse a cutter whose tip is below its involute or pointed, and a rounding that does not fit on it."""
+    cut, module = gear.cutter_tip_cut, gear.normal_module
+    tip = 2.0 * cut.cutter_tip_radius
+    key = "cutter.tip_diameter" if cutter.tip_diameter is not None else "root_diameter"
+    value = _mm(tip) if cutter.tip_diameter is not None else _mm(2.0 * gear.root_radius)
+    if cut.cutter_tip_radius <= cut.cutter_base_radius or not cut.largest_rounding >= 0.0:
+        which = "pointed" if cut.cutter_tip_radius > cut.cutter_base_radius else "without an involute"
+        remedy = f"makes a cutter with a tip diameter of {_mm(tip)}, whose teeth are {which} there: another is needed"
+        raise _refuse_gear(gear, key, value, remedy)
+    if cut.rounding > cut.largest_rounding + LENGTH_TOLERANCE * module:
+        remedy = f"does not fit on the cutter's tip: at most {cut.largest_rounding / module:.4f}, a full round"
+        raise _refuse_gear(gear, "cutter.tip_radius", f"{cutter.tip_radius:g}", remedy)
+
+
+def _check_flank_of_ring(gear: UncheckedGear) -> None:
+    """Refuse tips inside the base circle, and a cutter that leaves no involute."""
+    _check_tip_outside_base(gear)
+    if gear.form_radius <= gear.tip_radius:
+        remedy = f"leaves no involute: it must lie below the form diameter of {_mm(2.0 * gear.form_radius)}"
+        raise _refuse_gear(gear, "tip_diameter", _mm(2.0 * gear.tip_radius), remedy)
+
+
+def _check_trimmed_tips(gear: UncheckedGear) -> None:
+    """Refuse a cutter that takes something off the tips: below its involute, or beside the line of action."""
+    cut, tip, count = gear.cutter_tip_cut, gear.tip_radius, gear.cutter.teeth if gear.cutter else 0
+    if gear.tip_roll_length < cut.tangent_length:
+        bound = 2.0 * math.hypot(gear.base_radius, cut.tangent_length)
+        remedy = (
+            f"reaches below the involute of the cutter, whose {count} teeth then trim the tips: "
+            f"above {_mm(bound)}, or a cutter of more teeth, is needed"
+        )
+        raise _refuse_gear(gear, "tip_diameter", _mm(2.0 * tip), remedy)
+    gap = cut.tip_corner_gap(tip, gear.half_angle(tip))
+    if gap < -FILLET_TOLERANCE * gear.normal_module:
+        remedy = f"trims the gear's tips by {_mm(-gap)} as it rolls out of the mesh: a cutter of fewer teeth is needed"
+        raise _refuse_gear(gear, "cutter.teeth", f"{count}", remedy)
+
+
+def _check_tip_outside_base(gear: UncheckedGear) -> None:
     if gear.tip_radius <= gear.base_radius:
         base = _mm(2.0 * gear.base_radius)
         remedy = f"lies inside the base circle, where no involute is: it must be above {base}"
         raise _refuse_gear(gear, "tip_diameter", _mm(2.0 * gear.tip_radius), remedy)
+
+
+def _check_internal_space(gear: UncheckedGear) -> None:
+    """Refuse a tip without involute, a space closed at the root, a fillet higher than the tooth."""
+    _check_tip_outside_base(gear)
     if gear.half_angle(gear.root_radius) >= 0.5 * gear.angular_pitch:
         remedy = "lies beyond the point where the flanks of a tooth space meet: a smaller one is needed"
         raise _refuse_gear(gear, "root_diameter", _mm(2.0 * gear.root_radius), remedy)
@@ -374,9 +443,10 @@ def _check_fillet_clearance(pair: UncheckedPair) -> None:
         gap = corner_to_fillet_gap(pair, tip, mate)
         if gap < -FILLET_TOLERANCE * tip.normal_module:
             word = "larger" if tip.internal else "smaller"
+            tool = "rack" if mate.cutter is None else "cutter"
             remedy = (
                 f"interferes with the root fillet of '{mate.name}', its corner cuts {_mm(-gap)} into it: "
-                f"a {word} one, or a smaller rack.tip_radius of '{mate.name}', is needed"
+                f"a {word} one, or a smaller {tool}.tip_radius of '{mate.name}', is needed"
             )
             raise _refuse_pair(pair, f"tip_diameter of '{tip.name}'", _mm(2.0 * tip.tip_radius), remedy)
 

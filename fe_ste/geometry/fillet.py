@@ -1,7 +1,7 @@
 """Root fillet of a tooth in the transverse section.
 
-External teeth get the fillet that a rack with a rounded tip generates (`fe_ste.geometry.trochoid`); internal teeth get
-an arc that touches the flank and the root circle.
+External teeth get the fillet that a rack with a rounded tip generates (`fe_ste.geometry.trochoid`); internal teeth
+that of their cutter (`fe_ste.geometry.cutter`), or, without one, an arc that touches the flank and the root circle.
 """
 
 from __future__ import annotations
@@ -29,7 +29,11 @@ def root_fillet(gear: UncheckedGear, parameter: Floats) -> Floats:
     array, shape (n, 2)
         x, y in m.
     """
-    return _internal_fillet(gear, parameter) if gear.internal else _generated_fillet(gear, parameter)
+    if not gear.internal:
+        return _generated_fillet(gear, parameter)
+    if gear.cutter is not None:
+        return cartesian(*gear.cutter_tip_cut.polar(parameter))
+    return _internal_fillet(gear, parameter)
 
 
 def _generated_fillet(gear: UncheckedGear, parameter: Floats) -> Floats:

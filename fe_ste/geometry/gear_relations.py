@@ -13,13 +13,14 @@ from typing import Any, Literal, overload
 
 import numpy as np
 
+from fe_ste.geometry.cutter import CutterTipCut, PinionCutter, cutting_distance
 from fe_ste.geometry.involute import involute
 from fe_ste.geometry.trochoid import RackTipCut
 from fe_ste.tools.arrays import Floats
 
 ROUNDING = 1e-9
 """Rounding allowed for when lengths are compared, in normal modules."""
-LATER_INPUTS = frozenset(("tip_form_diameter", "root_form_diameter", "common_face_width"))
+LATER_INPUTS = frozenset(("tip_form_diameter", "root_form_diameter", "common_face_width", "cutter"))
 """Inputs of gears and pairs that came after files with hashes of the others."""
 
 
@@ -94,6 +95,7 @@ class UncheckedGear:
     material: Material = Material()
     tip_form_diameter: float | None = None
     root_form_diameter: float | None = None
+    cutter: PinionCutter | None = None
 
     @property
     def outward(self) -> int:
@@ -145,6 +147,8 @@ class UncheckedGear:
         """Radius of the root circle, m."""
         if self.root_diameter is not None:
             return 0.5 * self.root_diameter
+        if self.cutter is not None and self.cutter.tip_diameter is not None:
+            return self.cutting_distance + 0.5 * self.cutter.tip_diameter
         depth = self.outward * self.rack.dedendum - self.profile_shift
         return self.reference_radius - self.normal_module * depth
 
@@ -169,6 +173,32 @@ class UncheckedGear:
         """Polar half angle of the tooth at the reference circle, rad."""
         shift = 2.0 * self.outward * self.profile_shift * math.tan(self.normal_pressure_angle)
         return (0.5 * math.pi + shift - self.tooth_thinning / self.transverse_module) / self.teeth
+
+    @property
+    def normal_tooth_thickness(self) -> float:
+        """Tooth thickness on the reference circle in the normal section, m (ISO 21771: s_n less the thinning)."""
+        return 2.0 * self.reference_radius * self.reference_half_angle * math.cos(self.helix_angle)
+
+    @property
+    def usual_span(self) -> int:
+        """Number of teeth over which `span_measurement` touches external flanks nearest to their middle."""
+        middle = self.reference_radius + self.normal_module * self.profile_shift
+        half_length = math.sqrt(max(middle**2 - self.base_radius**2, 0.0)) * math.cos(self.base_helix_angle)
+        pitch = self.transverse_base_pitch * math.cos(self.base_helix_angle)
+        return max(2, round((2.0 * half_length - self.span_measurement(0)) / pitch))
+
+    def span_measurement(self, teeth: int) -> float:
+        """Distance of parallel planes that touch opposite external flanks, m (ISO 21771: base tangent length W_k).
+
+        The base pitches between the teeth and the thickness of one at the base circle, normal to the flanks.
+
+        Parameters
+        ----------
+        teeth : int
+            How many are between the planes, k.
+        """
+        thickness = 2.0 * self.base_radius * self.half_angle(self.base_radius)
+        return ((teeth - 1) * self.transverse_base_pitch + thickness) * math.cos(self.base_helix_angle)
 
     @property
     def tip_thickness(self) -> float:
@@ -230,9 +260,11 @@ class UncheckedGear:
         """Roll length at which the involute meets the root fillet, m.
 
         External: where the generating rack's straight flank ends, or where its tip has cut the involute away.
-        Internal: the centre of the fillet lies on the involute shifted by the fillet radius into the tooth
-        space, which is an involute of the same base circle.
+        Internal: where the involute of the cutter ends. Without one the centre of the fillet lies on the involute
+        shifted by the fillet radius into the tooth space, which is an involute of the same base circle.
         """
+        if self.internal and self.cutter is not None:
+            return self.cutter_tip_cut.form_roll_length
         if self.internal:
             radius = self.fillet_radius
             return radius + math.sqrt((self.root_radius - radius) ** 2 - self.base_radius**2)
@@ -259,6 +291,33 @@ class UncheckedGear:
             helix_angle=self.helix_angle,
             rounding=self.fillet_radius,
             half_land=self.rack_tip_half_land,
+        )
+
+    @property
+    def cutting_distance(self) -> float:
+        """Centre distance at which the cutter generates an internal gear, m; NaN if there is no cutter or distance."""
+        if self.cutter is None:
+            return math.nan
+        thickness = 0.5 * math.pi + 2.0 * self.cutter.profile_shift * math.tan(self.normal_pressure_angle)
+        thickness += self.teeth * self.reference_half_angle
+        return cutting_distance(
+            self.teeth, self.cutter.teeth, thickness, self.transverse_pressure_angle, self.transverse_module
+        )
+
+    @cached_property
+    def cutter_tip_cut(self) -> CutterTipCut:
+        """Curve that the rounded tip of its cutter cuts into the root of an internal gear."""
+        assert self.cutter is not None
+        ratio = self.cutter.teeth / self.teeth
+        half_angle = 0.5 * math.pi + 2.0 * self.cutter.profile_shift * math.tan(self.normal_pressure_angle)
+        return CutterTipCut(
+            base_radius=self.base_radius,
+            cutter_base_radius=ratio * self.base_radius,
+            centre_distance=self.cutting_distance,
+            cutter_tip_radius=self.root_radius - self.cutting_distance,
+            rounding=self.cutter.tip_radius * self.normal_module,
+            cutter_base_half_angle=half_angle / self.cutter.teeth + involute(self.transverse_pressure_angle),
+            half_pitch_angle=0.5 * self.angular_pitch,
         )
 
     @property

@@ -10,11 +10,12 @@ import math
 from dataclasses import dataclass
 
 from fe_ste.geometry.checks import check_gear, check_gear_pair
+from fe_ste.geometry.cutter import PinionCutter
 from fe_ste.geometry.gear_relations import BasicRack, Material, UncheckedGear
 from fe_ste.geometry.pair_relations import UncheckedPair
 from fe_ste.tools.notebook import html_table, value_range
 
-__all__ = ["BasicRack", "Gear", "GearPair", "Material"]
+__all__ = ["BasicRack", "Gear", "GearPair", "Material", "PinionCutter"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,6 +61,9 @@ class Gear(UncheckedGear):
         while the elastic tooth reaches to the tip.
     root_form_diameter : float, optional
         Where the flank ends towards the root, m, if that is before the root fillet begins. Contact ends there.
+    cutter : PinionCutter, optional
+        Pinion-type cutter that generates the root fillet of an internal gear; an arc of the rack's tip radius if not
+        given. The root circle follows from the cutter's tip diameter where it has one.
 
     Raises
     ------

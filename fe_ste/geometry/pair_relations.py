@@ -149,6 +149,12 @@ class UncheckedPair:
         return self.gear.outward * (self.centre_distance - self.gear.tip_radius) - self.pinion.root_radius
 
     @property
+    def normal_backlash(self) -> float:
+        """Play between the back flanks along their normal, m (ISO 21771: j_bn)."""
+        across = math.cos(self.working_pressure_angle) * math.cos(self.pinion.base_helix_angle)
+        return self.circumferential_backlash * across
+
+    @property
     def circumferential_backlash(self) -> float:
         """Play between the back flanks along the working circles, transverse section, m."""
         r_1, r_2 = self.pinion_working_radius, self.gear_working_radius

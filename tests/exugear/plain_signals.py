@@ -26,7 +26,7 @@ from exugear.kernels.rolling import (
     rolling_forces,
 )
 from exugear.kernels.table_law import scratch_memory
-from exugear.kernels.turning import turning_energies, turning_memory
+from exugear.kernels.turning import set_turning_motion, turning_energies, turning_memory
 from exugear.model.sections.entries import GROUND
 from exugear.tooth_mesh.laws.forms import MEMORY, pass_meshes
 
@@ -218,8 +218,10 @@ def add_elastic_signals(q, v, elastic, scratch, out) -> None:
 @numba.njit
 def add_turning_signals(q, v, turning, memory, out) -> None:
     """Add the same of elastic bodies in turning frames."""
+    unused = np.zeros(q.shape[1])
     for n in range(q.shape[0]):
-        kinetic, stored, damped, _ = turning_energies(q[n], v[n], turning, memory)
+        kinetic, stored = turning_energies(q[n], v[n], turning, memory)
+        damped = set_turning_motion(q[n], v[n], np.zeros(q.shape[1]), True, turning, memory, unused)
         out[n, 0] += kinetic
         out[n, 1] += stored
         out[n, 2] += damped

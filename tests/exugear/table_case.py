@@ -11,15 +11,15 @@ LOADS = np.array([0.05, 0.2, 0.5, 1.0, 1.5, 2.0])
 STIFFNESS = {"sun_planet": 3.77e9, "ring_planet": 4.85e9, "intermediate": 3.07e9, "high_speed": 1.93e9}
 
 
-def surface_of(gearbox: Gearbox, name: str, positions: int = 50) -> SteSurface:
-    """Table of a pair around its centre distance, up to twice its static load."""
+def surface_of(gearbox: Gearbox, name: str, positions: int = 50, variation: float = 1.0) -> SteSurface:
+    """Table of a pair around its centre distance, up to twice its static load; `variation` times 5 % over the cycle."""
     mesh = next(mesh for mesh in gearbox.meshes if mesh.pair.name == name)
     static = abs(gearbox.train.static_mesh_forces()[mesh.name])
     centre = mesh.centre_distance + np.linspace(-2e-4, 2e-4, 5)
     misalignment = np.linspace(-4e-4, 4e-4, 5)
     force = static * LOADS
     cycle = 2.0 * np.pi * np.arange(positions) / positions
-    shape = 1.0 + 0.05 * np.cos(cycle + 0.3) + 0.02 * np.cos(2 * cycle + 1.1)
+    shape = 1.0 + variation * (0.05 * np.cos(cycle + 0.3) + 0.02 * np.cos(2 * cycle + 1.1))
     p = shape[:, None, None, None]
     c = (centre - mesh.centre_distance)[None, :, None, None] / 2e-4
     a = misalignment[None, None, :, None] / 4e-4

@@ -14,7 +14,6 @@ from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption
 
 if TYPE_CHECKING:
     from exugear.model.gearbox import Gearbox
-    from exugear.model.parts import PairSpec
 
 
 BEYOND = 1.05
@@ -29,7 +28,8 @@ def check(case: CaseArgument, files_below: FilesBelowOption = None, as_json: Jso
 
         gearbox = _read(case, files_below, as_json)
         _tell_scripts(gearbox)
-        pairs = [_pair_summary(name, spec) for name, spec in gearbox.pairs.items()]
+        pairs = [_pair_summary(gearbox, name) for name in gearbox.pairs]
+        thicknesses = _thickness_summaries(gearbox)
         loads = _load_summaries(gearbox)
         variants = {variant: lacking(gearbox, variant) for variant in USER_VARIANTS}
         steady = _steady_lacks(gearbox, variants)
@@ -37,6 +37,7 @@ def check(case: CaseArgument, files_below: FilesBelowOption = None, as_json: Jso
         warnings = [*remarks(gearbox), *doubts]
         if as_json:
             summary = {"case": str(case), "name": gearbox.name, "ratio": gearbox.train.ratio, "pairs": pairs}
+            summary["tooth_thickness"] = thicknesses
             found = {"bearings": bearings, "load_cases": loads, "variants": variants, "steady": steady}
             found["warnings"] = warnings
             print_json({**summary, **found})
@@ -45,6 +46,8 @@ def check(case: CaseArgument, files_below: FilesBelowOption = None, as_json: Jso
             if pairs:
                 print_table("Gear pairs", [_pair_row(pair) for pair in pairs])
                 print_table("Margins of gear 1 and 2", [_margin_row(pair) for pair in pairs])
+            if thicknesses:
+                print_table("Tooth thickness within its allowances", [_thickness_row(one) for one in thicknesses])
             if loads:
                 band = 1e-3 * loads[0]["band_Hz"]
                 title = f"Load cases, rolling at the overall input {gearbox.case.overall.input}; runs keep {band:g} kHz"
@@ -114,9 +117,10 @@ def _tell_scripts(gearbox: Gearbox) -> None:
                 )
 
 
-def _pair_summary(name: str, spec: PairSpec) -> dict[str, Any]:
-    from exugear.checks.margins import pair_margins
+def _pair_summary(gearbox: Gearbox, name: str) -> dict[str, Any]:
+    from exugear.checks.margins import backlash_range, pair_margins
 
+    spec = gearbox.pairs[name]
     pair, margins = spec.pair, pair_margins(spec)
     return {
         "pair": name,
@@ -129,6 +133,8 @@ def _pair_summary(name: str, spec: PairSpec) -> dict[str, Any]:
         "pitch_point_pressure_MPa": 1e-6 * margins.pitch_point_pressure,
         "margin_to_form_circle": [None if math.isnan(margin) else margin for margin in margins.form],
         "tip_thickness_in_modules": list(margins.tip_thickness),
+        "backlash_um": [1e6 * play for play in backlash_range(gearbox, pair)],
+        "normal_backlash_um": 1e6 * pair.normal_backlash,
     }
 
 
@@ -149,7 +155,42 @@ def _margin_row(pair: dict[str, Any]) -> dict[str, str]:
         "pair": pair["pair"],
         "pressure at pitch\npoint, MPa": f"{pair['pitch_point_pressure_MPa']:.0f}",
         "left to form circles\n% of the flanks": " / ".join(left),
+        "backlash\num": _play(pair["backlash_um"]),
         "tips\nnormal modules": " / ".join(f"{tip:.2f}" for tip in pair["tip_thickness_in_modules"]),
+    }
+
+
+def _play(ends: list[float]) -> str:
+    least, given, most = ends
+    return f"{given:.0f}" if most - least < 1.0 else f"{given:.0f} ({least:.0f} to {most:.0f})"
+
+
+def _thickness_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
+    """Sum up the tooth thickness of gears that have allowances of it."""
+    from exugear.checks.margins import thickness_range
+
+    found = []
+    for name, section in gearbox.case.gears.items():
+        if section.tooth_thickness is not None:
+            one = thickness_range(gearbox, name)
+            found.append(
+                {
+                    "gear": name,
+                    "normal_tooth_thickness_mm": [1e3 * end for end in one.thickness],
+                    "span_teeth": one.span_teeth,
+                    "base_tangent_length_mm": [1e3 * end for end in one.span] if one.span_teeth else None,
+                }
+            )
+    return found
+
+
+def _thickness_row(one: dict[str, Any]) -> dict[str, str]:
+    span = one["base_tangent_length_mm"]
+    return {
+        "gear": one["gear"],
+        "normal thickness\nmm": "{:.3f} to {:.3f}".format(*one["normal_tooth_thickness_mm"]),
+        "teeth of\nthe span": str(one["span_teeth"] or "-"),
+        "base tangent length\nmm": "{:.3f} to {:.3f}".format(*span) if span else "-",
     }
 
 

@@ -120,8 +120,7 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
 
     path, found = project.steady_path(settings), [peak for peak in peaks(data) if peak.amplitude > LEAST_AMPLITUDE]
     growth = float(data.attrs["growth_rate"])
-    if growth > 0.0:
-        note(f"Unstable: disturbances grow by up to {growth:.3g} 1/s; no steady state lasts", style="yellow")
+    _tell_of_stability(data, growth)
     if not found:
         note(f"Nothing resonates: by the mesh law {data.attrs['mesh_law']} hardly anything excites the gearbox")
     if as_json:
@@ -132,6 +131,11 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
                 "speeds": int(data.sizes["point"]),
                 "lines": int(data.sizes["line"]),
                 "growth_rate_1_per_s": growth,
+                "unsolved": [
+                    {"speed_rpm": own["speed"] / RPM, "reason": own["reason"]}
+                    for own in json.loads(data.attrs["unsolved"])
+                ],
+                "unstable_points": int((data["growth"] > 0.0).sum()),
                 "largest_energy_error": float(abs(data["energy_error"]).max()),
                 "folds_rpm": [fold / RPM for fold in json.loads(data.attrs["folds"])],
                 "planet_spread": float(data.attrs["planet_spread"]),
@@ -146,6 +150,21 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
         print_table(title, shown)
     fastest = float(abs(data["speed"]).max()) / RPM
     say(f"{data.sizes['point']} speeds up to {fastest:.4g} rpm, slowest decay {-growth:.3g} 1/s, in {path}")
+
+
+def _tell_of_stability(data: xr.Dataset, growth: float) -> None:
+    """Say which speeds have no steady state, and where it does not last."""
+    from exugear.model.parts import RPM
+
+    for missing in json.loads(data.attrs["unsolved"]):
+        note(f"{missing['speed'] / RPM:.4g} rpm: {missing['reason']}", style="yellow")
+    for speed, remark in zip(data["speed"].values, data["remark"].values, strict=True):
+        if remark:
+            note(f"{float(speed) / RPM:.4g} rpm: {remark}", style="yellow")
+    if growth > 0.0:
+        speeds = data["speed"].values[data["growth"].values == growth]
+        where = f" (at {float(speeds[0]) / RPM:.4g} rpm)" if speeds.size else ""
+        note(f"Unstable: disturbances grow by up to {growth:.3g} 1/s{where}; no steady state lasts", style="yellow")
 
 
 def _summary(peak: Peak) -> dict[str, Any]:

@@ -21,6 +21,31 @@ class RackSection(Section):
     """Radius at the tip of the tool's tooth, in normal modules: it makes the root fillet."""
 
 
+class CutterSection(Section):
+    """Pinion-type cutter that generates the root fillet of a ring; without it this is an arc of the rack's radius.
+
+    Its normal module, pressure angle and helix angle are those of the ring. Give its tip by one of two keys, or by
+    neither: it then reaches the root circle of the ring, which `root_diameter_mm` or the rack says.
+    """
+
+    teeth: q.Teeth
+    """Number of its teeth (z_0)."""
+    tip_radius: q.RackRadius
+    """Radius that rounds the tips of its teeth in the transverse section, in normal modules (rho_a0*)."""
+    profile_shift: q.ProfileShift = 0.0
+    """Its profile shift (x_0) in normal modules; it falls as the cutter is ground again."""
+    addendum: q.RackHeight | None = None
+    """Height of its teeth above its reference line (h_a0*) in normal modules."""
+    tip_diameter_mm: q.LengthMm | None = None
+    """Its tip diameter (d_a0) instead."""
+
+    @model_validator(mode="after")
+    def _one_tip(self) -> CutterSection:
+        if self.addendum is not None and self.tip_diameter_mm is not None:
+            raise ValueError("give addendum or tip_diameter_mm, not both: each says how far the cutter's teeth reach")
+        return self
+
+
 class MaterialSection(Section):
     """Elastic material of a gear."""
 
@@ -77,6 +102,32 @@ class ModificationSection(Section):
         return self
 
 
+class ToothThicknessSection(Section):
+    """Allowances of the tooth thickness on the reference circle, normal section, negative (DIN 3967: A_sne, A_sni).
+
+    Teeth are computed with their mean: it thins them by its amount over the cosine of the helix angle in the transverse
+    section. The ends give the least and the greatest backlash that `exugear check` tells.
+    """
+
+    upper_allowance_um: q.AllowanceUm
+    """Upper allowance, nearer to zero: of the thickest tooth."""
+    lower_allowance_um: q.AllowanceUm | None = None
+    """Lower allowance, of the thinnest tooth; or the next key."""
+    tolerance_um: q.AllowanceRangeUm | None = None
+    """Tolerance, the upper less the lower allowance (DIN 3967: T_sn), instead of the lower one."""
+
+    @model_validator(mode="after")
+    def _two_ends(self) -> ToothThicknessSection:
+        if (self.lower_allowance_um is None) == (self.tolerance_um is None):
+            raise ValueError("give one of lower_allowance_um and tolerance_um beside upper_allowance_um")
+        if self.lower_allowance_um is not None and self.lower_allowance_um > self.upper_allowance_um:
+            raise ValueError(
+                f"lower_allowance_um = {self.lower_allowance_um:g} must not be above upper_allowance_um = "
+                f"{self.upper_allowance_um:g}: both are negative"
+            )
+        return self
+
+
 class GearSection(Section):
     """One toothed wheel; helix angle signed, right hand positive."""
 
@@ -100,6 +151,8 @@ class GearSection(Section):
     """Whether it is a ring with teeth inside."""
     tooth_thinning_mm: q.ThinningMm = 0.0
     """Tooth thickness taken off on the reference circle, for backlash."""
+    tooth_thickness: ToothThicknessSection | None = None
+    """Allowances of the tooth thickness instead."""
     tip_diameter_mm: q.LengthMm | None = None
     """Tip diameter; from rack and profile shift by default."""
     fitted_tip: bool = False
@@ -114,6 +167,8 @@ class GearSection(Section):
     """Where the flank ends at the root (d_Ff), if before its fillet begins, as after grinding. Contact ends there."""
     rack: RackSection = RackSection()
     """Basic rack, ISO 53 A by default."""
+    cutter: CutterSection | None = None
+    """Cutter of a ring, which makes its root fillet."""
     material: MaterialSection = MaterialSection()
     """Elastic material, steel by default."""
     modification: ModificationSection | None = None
@@ -125,6 +180,13 @@ class GearSection(Section):
             raise ValueError("give tip_form_diameter_mm or tip_chamfer_mm, not both: each says where the flank ends")
         if self.profile_shift_from_centre_distance and self.profile_shift:
             raise ValueError("give profile_shift or profile_shift_from_centre_distance = true, not both")
+        if self.tooth_thickness is not None and self.tooth_thinning_mm:
+            raise ValueError("give tooth_thinning_mm or a [.tooth_thickness] table, not both: each thins the teeth")
+        if self.cutter is not None and not self.internal:
+            raise ValueError("a cutter makes rings (internal = true); the root of other gears is cut by their rack")
+        own_tip = self.cutter is not None and {"addendum", "tip_diameter_mm"} & self.cutter.model_fields_set
+        if own_tip and self.root_diameter_mm is not None:
+            raise ValueError(f"root_diameter_mm follows from cutter.{min(own_tip)}: leave one of them out")
         return self
 
 

@@ -14,6 +14,7 @@ from exugear.rexs.to_case.meshing import (
     unchecked,
     with_clear_tips,
     with_form_circles,
+    with_possible_cutter,
     with_shifts,
 )
 from exugear.rexs.to_case.modifications import modification_of
@@ -88,7 +89,7 @@ def teeth_of(model: Model, places: Places, bodies: Bodies, notes: Notes) -> Teet
     notes.faults.tell()
     _check_equal_planets(model, bodies, first, gears, notes)
     gears = with_shifts(gears, stages, notes)
-    gears = {number: with_form_circles(gear, notes) for number, gear in gears.items()}
+    gears = {number: with_form_circles(with_possible_cutter(gear, notes), notes) for number, gear in gears.items()}
     gears = with_clear_tips(gears, stages, notes)
     owners = {number: body for number in gears if (body := bodies.of(model.components[number])) is not None}
     lost = [str(gears[number].part) for number in gears if number not in owners]
@@ -254,7 +255,7 @@ def _entries(model: Model, gear: Toothing, z: float, sections: Sequence[Cylinder
         "profile_shift": gear.shift or assumed(0.0, ""),
         "face_width_mm": gear.face_width,
         "held_diameter_mm": _held(gear, z, sections),
-        "tooth_thinning_mm": gear.thinning,
+        **({"tooth_thickness": gear.allowances} if gear.allowances else {"tooth_thinning_mm": gear.thinning}),
     }
     if gear.tip is not None:
         entries["tip_diameter_mm"] = gear.tip
@@ -268,6 +269,8 @@ def _entries(model: Model, gear: Toothing, z: float, sections: Sequence[Cylinder
     tip = "addendum: tip_diameter_mm counts" if gear.tip is not None else "addendum: A"
     parts = (tip, f"dedendum: {gear.dedendum.comment}", f"tip radius: {gear.tip_radius.comment}")
     entries["rack"] = Entry(rack, "; ".join(" ".join(part.split()) for part in parts))
+    if gear.cutter is not None:
+        entries["cutter"] = gear.cutter
     material = material_of(model, gear.part)
     table = material_table(material)
     if table is not None:

@@ -12,6 +12,8 @@ from exugear.rexs.to_case.notes import Entry, Notes, assumed, derived, tidy
 from exugear.rexs.to_case.toothing import Toothing
 from exugear.rexs.tree import Component
 from fe_ste.geometry import fitting
+from fe_ste.geometry.checks import GeometryError, check_gear
+from fe_ste.geometry.cutter import PinionCutter
 from fe_ste.geometry.gear_relations import BasicRack, UncheckedGear
 from fe_ste.geometry.pair_relations import UncheckedPair
 
@@ -157,10 +159,38 @@ def unchecked(name: str, gear: Toothing) -> UncheckedGear:
         root_diameter=1e-3 * gear.root.value if gear.root else None,
         tooth_thinning=1e-3 * gear.thinning.value,
         root_form_diameter=1e-3 * gear.root_form.value if gear.root_form else None,
+        cutter=_cutter(gear),
     )
     if not gear.chamfer:
         return plain
     return dataclasses.replace(plain, tip_form_diameter=2.0 * (plain.tip_radius - 1e-3 * plain.outward * gear.chamfer))
+
+
+def _cutter(gear: Toothing) -> PinionCutter | None:
+    """Build the cutter of a ring."""
+    if gear.cutter is None:
+        return None
+    given, tip = gear.cutter.value, gear.cutter.value.get("tip_diameter_mm")
+    if "addendum" in given:
+        reference = given["teeth"] / math.cos(math.radians(gear.helix_angle.value))
+        tip = gear.module.value * (reference + 2.0 * (given["profile_shift"] + given["addendum"]))
+    return PinionCutter(
+        given["teeth"], given["tip_radius"], given["profile_shift"], None if tip is None else 1e-3 * tip
+    )
+
+
+def with_possible_cutter(gear: Toothing, notes: Notes) -> Toothing:
+    """Leave out a cutter that cannot make the ring as the file describes it, and say why."""
+    if gear.cutter is None:
+        return gear
+    made = unchecked("", gear)
+    try:
+        check_gear(dataclasses.replace(made, held_diameter=10.0 * made.reference_radius))
+    except GeometryError as error:
+        why = str(error).removeprefix("gear '': ")
+        notes.changed.append(f"{gear.part}: its cutter is left out, the fillet is an arc instead; {why}")
+        return dataclasses.replace(gear, cutter=None)
+    return gear
 
 
 def with_form_circles(gear: Toothing, notes: Notes) -> Toothing:

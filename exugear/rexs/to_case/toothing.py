@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -35,6 +36,10 @@ class Toothing:
     tip, root : Entry, optional
         Diameters as far as they are given.
     dedendum, tip_radius, thinning : Entry
+    allowances : Entry, optional
+        Table of the tooth thickness's allowances, where the file gives them; `thinning` is then their mean.
+    cutter : Entry, optional
+        Table of the cutter of a ring, as far as the file gives one.
     chamfer : float
         Radial, mm.
     root_form : Entry, optional
@@ -54,6 +59,8 @@ class Toothing:
     dedendum: Entry
     tip_radius: Entry
     thinning: Entry
+    allowances: Entry | None
+    cutter: Entry | None
     chamfer: float
     root_form: Entry | None
     internal: bool
@@ -72,6 +79,8 @@ def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes
     flank = _flank(model, gear)
     tool = _tool(model, gear)
     chamfer = (flank.quantity("tooth_tip_chamfer", "mm") if flank else None) or 0.0
+    angle, helix = _pressure_angle(gear, flank), _helix_angle(gear, mates)
+    allowances = _allowances(gear, math.radians(angle.value), math.radians(helix.value), internal)
     teeth = abs(gear.whole("number_of_teeth") or 0)
     if not teeth:
         raise RexsError(f"{gear}: number_of_teeth is missing")
@@ -79,15 +88,17 @@ def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes
         part=gear,
         teeth=teeth,
         module=read(tidy(module), "normal_module"),
-        pressure_angle=_pressure_angle(gear, flank),
-        helix_angle=_helix_angle(gear, mates),
+        pressure_angle=angle,
+        helix_angle=helix,
         face_width=read(needed(gear.quantity("face_width", "mm"), gear, "face_width"), "face_width"),
         shift=_shift(flank, internal),
         tip=_tip(gear, teeth * module, notes),
         root=_diameter(gear, "root_diameter"),
         dedendum=_of_tool(tool, internal, "addendum_coefficient_reference_profile", 1.25),
         tip_radius=_rounded(_of_tool(tool, internal, "tip_corner_radius_factor_reference_profile", 0.38)),
-        thinning=_thinning(gear, module),
+        thinning=_thinning(gear, module, allowances, math.radians(helix.value)),
+        allowances=allowances,
+        cutter=_cutter(gear, tool, module) if internal else None,
         chamfer=_chamfer(gear, chamfer),
         root_form=_diameter(gear, "root_form_diameter"),
         internal=internal,
@@ -172,13 +183,34 @@ def _tip(gear: Component, reference: float, notes: Notes) -> Entry | None:
     return None
 
 
+def _cutter(gear: Component, tool: Component | None, module: float) -> Entry | None:
+    """Cutter of a ring; its tip counts where the file gives the ring no root diameter."""
+    teeth = tool.whole("number_of_teeth") if tool else None
+    if tool is None or tool.type != "cutter_wheel_tool" or not teeth:
+        return None
+    radius = tool.quantity("tip_corner_radius_cutter", "mm")
+    factor = tool.quantity("tip_corner_radius_factor_reference_profile") if radius is None else radius / module
+    rounded = _rounded(assumed(LEAST_RADIUS, "none given") if factor is None else read(tidy(factor), ""))
+    shift = tool.quantity("addendum_modification_coefficient")
+    cutter = {"teeth": abs(teeth), "tip_radius": rounded.value, "profile_shift": tidy(shift or 0.0)}
+    tip, addendum = tool.quantity("tip_diameter", "mm"), tool.quantity("addendum_coefficient_reference_profile")
+    if not gear.quantity("root_diameter", "mm"):
+        if tip:
+            cutter["tip_diameter_mm"] = tidy(abs(tip))
+        elif addendum:
+            cutter["addendum"] = tidy(addendum)
+    said = [f"tip radius: {' '.join(rounded.comment.split())}"] if rounded.kind else []
+    said += ["profile shift: A none given"] if shift is None else []
+    return read(cutter, "; ".join([f"number_of_teeth, tip and its radius of {tool}", *said]))
+
+
 def _of_tool(tool: Component | None, internal: bool, key: str, usual: float) -> Entry:
     """Factor of the tool that makes the root: of a rack, which an internal gear has none of."""
     value = tool.quantity(key) if tool else None
     if tool is None or value is None or value < 0.0:
         return assumed(usual, "the file gives no tool")
     if internal:
-        return assumed(tidy(value), f"{key} of {tool}: the fillet is an arc instead of that cut by the wheel")
+        return assumed(tidy(value), f"{key} of {tool}, for an arc as fillet where no cutter is given")
     return read(tidy(value), f"{key} of {tool}")
 
 
@@ -189,10 +221,31 @@ def _rounded(radius: Entry) -> Entry:
     return assumed(LEAST_RADIUS, f"the file says {radius.value:g}, a corner too sharp for the tooth model")
 
 
-def _thinning(gear: Component, module: float) -> Entry:
-    ends = [gear.quantity(f"chordal_transverse_tooth_thickness_{end}_deviation", "mm") for end in ("upper", "lower")]
-    if ends[0] is not None and ends[1] is not None:
-        return read(tidy(max(0.0, -0.5 * (ends[0] + ends[1]))), "mean of the tooth thickness deviations")
+def _allowances(gear: Component, angle: float, helix: float, internal: bool) -> Entry | None:
+    """Give the tooth thickness's allowances in the normal section, um: of a thickness or of the base tangent length.
+
+    DIN 3967: A_sn = A_st cos(beta), and A_W = A_sn cos(alpha_n) for external gears; chords and arcs differ by less than
+    a part in a thousand. `angle` and `helix` in rad. None if they are not given, or would thicken the teeth.
+    """
+    sources = {
+        "chordal_tooth_thickness_{}_deviation": 1.0,
+        "chordal_transverse_tooth_thickness_{}_deviation": math.cos(helix),
+        "{}_backlash_allowance_referenced_to_span": 1.0 / math.cos(angle),
+    }
+    for key, factor in list(sources.items())[: 2 if internal else 3]:
+        upper, lower = (gear.quantity(key.format(end), "mm") for end in ("upper", "lower"))
+        if upper is not None and lower is not None and lower <= upper <= 0.0:
+            ends = {"upper": upper, "lower": lower}
+            table = {f"{end}_allowance_um": tidy(round(1e3 * factor * one, 6)) for end, one in ends.items()}
+            return read(table, key.format("upper and lower"))
+    return None
+
+
+def _thinning(gear: Component, module: float, allowances: Entry | None, helix: float) -> Entry:
+    """Thinning in the transverse section, mm."""
+    if allowances is not None:
+        mean = 0.5e-3 * sum(allowances.value.values())
+        return read(tidy(-mean / math.cos(helix)), "mean of the tooth thickness allowances")
     series = gear.text("tooth_thickness_deviation_tolerance_series_din_3967_1978")
     why = f"the file gives only the tolerance {series}" if series not in ("", "False") else "the file gives none"
     return assumed(tidy(round(THINNING * module, 6)), f"{THINNING:g} normal modules; {why}")

@@ -211,7 +211,9 @@ class Work(NamedTuple):
     rolling : (m,) see `exugear.kernels.rolling.rolling_forces`
     mesh : memory of the meshes' laws
     series : (s,) line of each torque series that was used last
-    shares : (t, s, 4) see `exugear.kernels.travelling.weigh_travelling`
+    shares : memory of the travelling seats, see `exugear.kernels.travelling`
+    damped : (2,) power that elastic bodies damp, and those in turning frames, at the last evaluation that asked for it
+        (W)
     scratch, memory : memory of the elastic bodies, and of those in turning frames
     """
 
@@ -233,5 +235,6 @@ class Work(NamedTuple):
     mesh: MeshMemory
     series: Integers
     shares: Floats
+    damped: Floats
     scratch: Floats
     memory: Floats

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from exugear.kernels.coordinates import SPIN, TILT
 from exugear.kernels.elastic import set_elastic_motion
-from exugear.kernels.travelling import place_travelling, share_travelling_forces, weigh_travelling
+from exugear.kernels.travelling import place_travelling, share_travelling_forces
 from exugear.kernels.turning import set_turning_motion
 from exugear.solvers.compiled.arrays import (
     ANGLE,
@@ -93,14 +93,14 @@ def set_accelerations(v: Floats, bodies: Bodies, work: Work) -> None:
 
 
 @kernel
-def evaluate(t: float, q: Floats, v: Floats, equations: Equations, work: Work) -> None:
+def evaluate(t: float, q: Floats, v: Floats, with_power: bool, equations: Equations, work: Work) -> None:
     """Fill `work.rate` with the accelerations at time t (s) and state q, v (e,).
 
-    What bodies, meshes and connectors do there is left in `work.frames`, `work.mesh.states` and `work.supports`.
+    What bodies, meshes and connectors do there is left in `work.frames`, `work.mesh.states` and `work.supports`; what
+    elastic bodies damp in `work.damped` if asked for with the power.
     """
     bodies, places, force = equations.bodies, equations.places, work.force
     place_bodies(q, v, bodies, work)
-    weigh_travelling(q, equations.travelling, work.shares)
     place_travelling(q, v, equations.travelling, work.shares)
     gather_places(q, v, places, work)
     set_loads(t, q, v, equations.loads, work.series, force)
@@ -108,7 +108,7 @@ def evaluate(t: float, q: Floats, v: Floats, equations: Equations, work: Work) -
     add_meshes(q, v, equations.meshes, work)
     add_springs(q, v, equations.springs, force)
     add_loads_of_places(bodies, places, work)
-    share_travelling_forces(q, equations.travelling, work.shares, force)
+    share_travelling_forces(equations.travelling, work.shares, force)
     set_accelerations(v, bodies, work)
-    set_elastic_motion(q, v, force, equations.elastic, work.scratch, work.rate)
-    set_turning_motion(q, v, force, equations.turning, work.memory, work.rate)
+    work.damped[0] = set_elastic_motion(q, v, force, with_power, equations.elastic, work.scratch, work.rate)
+    work.damped[1] = set_turning_motion(q, v, force, with_power, equations.turning, work.memory, work.rate)

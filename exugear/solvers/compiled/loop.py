@@ -160,6 +160,7 @@ def advance(
         at_once = given or n < 0 or multistep
         parts = START_PARTS if points > 0 and not at_once else 1
         h, end = step / parts, times[n] if given else (first + n + 1) * step
+        due = n < out_signals.shape[0] and (given or (first + n + 1) % stride == 0)
         for part in range(parts):
             begin = (first + n) * step + part * h
             for stage in range(LAST_STAGE if at_once else 0, LAST_STAGE + 1):
@@ -174,7 +175,7 @@ def advance(
                     predict(step, method, past, work)
                 else:
                     runge_kutta_stage(stage, h, past, work)
-                evaluate(at, work.stage_q, work.stage_v, equations, work)
+                evaluate(at, work.stage_q, work.stage_v, due, equations, work)
             if given:
                 continue
             if multistep:
@@ -188,7 +189,8 @@ def advance(
             if not copy_state(work, out_q[n], out_v[n]):
                 return n
         if n < out_signals.shape[0]:
-            q, v, due = work.stage_q, work.stage_v, stride if (first + n + 1) % stride == 0 else 0
-            take_sample(end, q, v, equations, work, columns, due, given, out_signals[n], out_energies[n])
+            q, v = work.stage_q, work.stage_v
+            stood_for = stride if due else 0
+            take_sample(end, q, v, equations, work, columns, stood_for, given, out_signals[n], out_energies[n])
     done: int = steps
     return done

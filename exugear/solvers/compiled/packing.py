@@ -326,7 +326,8 @@ def work_for(equations: Equations, q: Floats, v: Floats) -> Work:
             row=np.zeros(FRAME),
         ),
         series=equations.loads.first[:-1].copy(),
-        shares=np.zeros((0, 0, 4)) if equations.travelling is None else travelling_memory(equations.travelling),
+        shares=np.zeros((0, 0, 0)) if equations.travelling is None else travelling_memory(equations.travelling),
+        damped=np.zeros(2),
         scratch=np.zeros((3, 0)) if equations.elastic is None else scratch_for(equations.elastic),
-        memory=np.zeros((6, 0)) if equations.turning is None else turning_memory(equations.turning),
+        memory=np.zeros((7, 0)) if equations.turning is None else turning_memory(equations.turning),
     )

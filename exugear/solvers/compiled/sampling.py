@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from exugear.dynamics.signals import SignalLayout
 from exugear.kernels.coordinates import AXIAL, BODY_SIZE, PADDED, PADDED_TILT, SPIN, TILT
-from exugear.kernels.elastic import damped_power, motion_energies
+from exugear.kernels.elastic import motion_energies
 from exugear.kernels.fast_meshes import (
     DISSIPATED,
     ELASTIC,
@@ -32,7 +32,7 @@ from exugear.kernels.fast_meshes import (
 )
 from exugear.kernels.rolling import CAGE_DAMPING, DAMPED_PART, ELASTIC_PART, STORED, RollingArrays, rolling_forces
 from exugear.kernels.table_law import TableArrays
-from exugear.kernels.turning import turning_energies, turning_powers
+from exugear.kernels.turning import turning_energies, turning_weight_power
 from exugear.solvers.compiled.arrays import (
     COS_B,
     COSINE,
@@ -275,12 +275,11 @@ def observe_elastic_bodies(
         kinetic, stored = motion_energies(q, v, equations.elastic, work.scratch)
         energy[KINETIC] += kinetic
         energy[ELASTIC] += stored
-        kinetic, stored, _, _ = turning_energies(q, v, equations.turning, work.memory)
+        kinetic, stored = turning_energies(q, v, equations.turning, work.memory)
         energy[KINETIC] += kinetic
         energy[ELASTIC] += stored
-    damped, weight = turning_powers(q, v, equations.turning, work.memory)
-    energy[OF_LOADS] += stride * weight
-    energy[DISSIPATED] += stride * (damped + damped_power(v, equations.elastic, work.scratch))
+    energy[OF_LOADS] += stride * turning_weight_power(q, v, equations.turning, work.memory)
+    energy[DISSIPATED] += stride * (work.damped[0] + work.damped[1])
 
 
 @kernel

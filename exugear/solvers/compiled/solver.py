@@ -91,7 +91,7 @@ class CompiledSystem:
 
     def accelerations(self, time: float = 0.0) -> Floats:
         """Accelerations (size,) at the present state and a time (s)."""
-        evaluate(time, self._work.q, self._work.v, self._bundle, self._memory)
+        evaluate(time, self._work.q, self._work.v, False, self._bundle, self._memory)
         return self._work.rate[: self._size].copy()
 
     def advance(

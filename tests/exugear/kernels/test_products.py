@@ -5,7 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from exugear.kernels.products import add_rows, add_symmetric, filled_up, laid_out, rectangular_tiles, symmetric_tiles
+from exugear.kernels.products import (
+    add_rows,
+    add_symmetric,
+    add_symmetric_with_form,
+    filled_up,
+    laid_out,
+    rectangular_tiles,
+    square_form,
+    symmetric_tiles,
+)
 
 
 def filled(values: np.ndarray) -> np.ndarray:
@@ -21,6 +30,20 @@ def test_tiles_of_half_a_symmetric_matrix_give_its_product(size: int) -> None:
     x, y = filled(random.normal(size=size)), np.ones(filled_up(size))
     add_symmetric(tiles, int(begins[1]), filled_up(size), x, y)
     assert y[:size] == pytest.approx(1.0 + matrices[1] @ x[:size], abs=1e-12)
+
+
+@pytest.mark.parametrize("size", [1, 8, 15, 41])
+def test_a_form_taken_beside_a_product_is_that_of_the_matrix(size: int) -> None:
+    """Against NumPy; sums of at most 41^2 products of the size of one."""
+    random = np.random.default_rng(size)
+    matrix = random.normal(size=(size, size))
+    matrix += matrix.T
+    tiles, rows = symmetric_tiles(matrix), filled_up(size)
+    x, u, y = filled(random.normal(size=size)), filled(random.normal(size=size)), np.ones(rows)
+    beside = add_symmetric_with_form(tiles, 0, rows, x, y, u)
+    alone = square_form(tiles, 0, rows, u)
+    assert y[:size] == pytest.approx(1.0 + matrix @ x[:size], abs=1e-12)
+    assert (beside, alone) == pytest.approx((u[:size] @ matrix @ u[:size],) * 2, abs=1e-11)
 
 
 def test_tiles_of_any_matrix_give_its_product() -> None:

@@ -16,10 +16,10 @@ from exugear.bodies.finite_elements.turned_section import Shaft
 from exugear.kernels.travelling import (
     TravellingArrays,
     follow,
+    place_travelling,
     share_travelling_forces,
     travelling_memory,
     travelling_tangent,
-    weigh_travelling,
 )
 from fe_ste.elimination.sparse import factorise
 from fe_ste.geometry.gears import Material
@@ -90,7 +90,7 @@ def test_rates_are_the_derivatives_of_motions(seats: TravellingArrays) -> None:
 
 def shares_at(x: np.ndarray, seats: TravellingArrays) -> np.ndarray:
     shares = travelling_memory(seats)
-    weigh_travelling(x, seats, shares)
+    place_travelling(x.copy(), np.zeros_like(x), seats, shares)
     return shares
 
 
@@ -100,7 +100,7 @@ def test_forces_do_the_same_work_on_sectors_and_frame(seats: TravellingArrays) -
     force = np.random.default_rng(5).normal(size=x.size)
     force[-1] = 0.0  # what stays zero takes no force
     shared = force.copy()
-    share_travelling_forces(x, seats, shares_at(x, seats), shared)
+    share_travelling_forces(seats, shares_at(x, seats), shared)
     assert not shared[SIZE:].any()
     assert shared @ u == pytest.approx(force @ u, rel=1e-13)
 
@@ -113,7 +113,7 @@ def test_tangent_is_the_derivative_of_a_law_on_travelling_seats(seats: Travellin
     def forces(q: np.ndarray, v: np.ndarray) -> np.ndarray:
         x, u = (values[0] for values in follow(q[None], v[None], seats))
         f = stiffness @ x + damping @ u
-        share_travelling_forces(x, seats, shares_at(x, seats), f)
+        share_travelling_forces(seats, shares_at(x, seats), f)
         return f[:SIZE]
 
     q, v = state()

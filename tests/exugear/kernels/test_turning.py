@@ -18,7 +18,12 @@ from exugear.bodies.reduced_body import ReducedBody, RigidInertia
 from exugear.bodies.reduction import with_rigid_inertia
 from exugear.bodies.solids import SolidModel, gyroscopic_matrix, reduce_matrices, reduce_solid
 from exugear.bodies.turning_frame import TurningBody, turning_arrays
-from exugear.kernels.turning import set_turning_motion, turning_energies, turning_memory
+from exugear.kernels.turning import (
+    set_turning_motion,
+    turning_energies,
+    turning_memory,
+    turning_weight_power,
+)
 from fe_ste.geometry.gears import Material
 
 STEEL = Material(210e9, 0.3, 7850.0)
@@ -69,11 +74,15 @@ class Motion:
 
     def accelerations(self, q: np.ndarray, v: np.ndarray, f: np.ndarray) -> np.ndarray:
         out = np.zeros_like(q)
-        set_turning_motion(q, v, f, self.arrays, self.memory, out)
+        set_turning_motion(q, v, f, False, self.arrays, self.memory, out)
         return out
 
     def energies(self, q: np.ndarray, v: np.ndarray) -> tuple[float, float, float, float]:
-        return turning_energies(q, v, self.arrays, self.memory)
+        """Kinetic and elastic energy, power damped, power of the weight."""
+        kinetic, stored = turning_energies(q, v, self.arrays, self.memory)
+        weight = turning_weight_power(q, v, self.arrays, self.memory)
+        damped = set_turning_motion(q, v, 0.0 * q, True, self.arrays, self.memory, 0.0 * q)
+        return kinetic, stored, damped, weight
 
 
 def integrated(
@@ -97,7 +106,7 @@ def test_compiled_accelerations_are_those_of_the_plain_law(body: TurningBody) ->
     states = [at_random(one, angle, speed) for one, angle, speed in ((body, 40.3, 7.0), (other, -7.1, -30.0))]
     q, v, f = (np.concatenate([np.zeros(4), *values, np.zeros(6)]) for values in zip(*states, strict=True))
     found = np.full_like(q, np.nan)
-    set_turning_motion(q, v, f, arrays, turning_memory(arrays), found)
+    set_turning_motion(q, v, f, False, arrays, turning_memory(arrays), found)
     expected = [
         one.accelerations(*state[:2], state[2] + one.forces(*state[:2]))
         for one, state in zip((body, other), states, strict=True)

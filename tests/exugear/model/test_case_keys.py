@@ -74,6 +74,11 @@ def test_every_key_is_read(read_keys: set[tuple[str, str]], tmp_path: Path) -> N
     contents = bases(tmp_path)
     contents |= {"waves": gear_trains.pair(), "values": gear_trains.pair()}
     contents["values"]["pairs"]["helical"]["stiffness"] = {"over_cycle_N_per_m": [4e8, 3e8, 4e8]}
+    thinned = next(iter(contents["values"]["gears"].values()))
+    del thinned["tooth_thinning_mm"]
+    thinned["tooth_thickness"] = {"upper_allowance_um": -20.0, "tolerance_um": 20.0}
+    ring = next(gear for gear in contents["planetary"]["gears"].values() if gear.get("internal"))
+    ring["cutter"] = {"teeth": 30, "tip_radius": 0.2, "addendum": 1.25}
     contents["spur"]["ste"] = {"method": "nonlinear", "positions": 8}
     for kind in get_args(connections.BearingType):
         catalogue_rows(connections.CatalogueSection(type=kind, bore_mm=50.0, outer_diameter_mm=90.0, width_mm=20.0))

@@ -14,6 +14,7 @@ from exugear.rexs.containers import read_rexs
 from exugear.rexs.faults import RexsError
 from exugear.rexs.to_case.conversion import to_case
 from exugear.rexs.tree import Attribute, Component, Model, Relation
+from fe_ste.geometry.involute import inverse_involute, involute
 
 DATA = Path(__file__).parent / "data"
 SEW = read_rexs(DATA / "SEW_3-stage_cylindrical_gearbox_1.0.rexs")
@@ -182,9 +183,29 @@ def test_modifications_that_differ_between_the_flanks_are_refused_and_unknown_on
     )
     with pytest.raises(RexsError, match="left and right flank differ in tip_relief"):
         gearbox_of(one_sided)
-    slopes = (Relation("reference", 0, {"origin": number, "referenced": 900}) for number in (361, 362))
-    made = to_case(with_relations(with_values(SEW, {}, Component(900, "helix_slope")), *slopes), "case")
-    assert any("helix_slope 900 of cylindrical_gear 23" in line for line in made.changed)
+    end_relief = (Relation("reference", 0, {"origin": number, "referenced": 900}) for number in (361, 362))
+    made = to_case(with_relations(with_values(SEW, {}, Component(900, "end_relief_datum_face")), *end_relief), "case")
+    assert any("end_relief_datum_face 900 of cylindrical_gear 23" in line for line in made.changed)
+
+
+@pytest.mark.parametrize(
+    ("kind", "key"),
+    [("helix_slope", "helix_slope_um"), ("profile_slope", "profile_slope_um"), ("profile_twist", "twist_um")],
+)
+@pytest.mark.parametrize("amount", [0.012, 0.0])
+def test_a_slope_whose_sign_is_not_known_becomes_a_zero_to_be_set(kind: str, key: str, amount: float):
+    part = Component(900, kind, attributes={kind: Attribute(amount, "mm")})
+    flanks = (Relation("reference", 0, {"origin": number, "referenced": 900}) for number in (361, 362))
+    made = to_case(with_relations(with_values(SEW, {}, part), *flanks), "case")
+    lines = [line for line in made.text.splitlines() if line.startswith(key)]
+    told = [line for line in made.changed if kind in line]
+    if amount:
+        assert "SET IT: 12 um" in lines[0]
+        assert "its amount of 12 um is not taken" in told[0]
+    else:
+        assert not lines
+        assert not told
+    assert getattr(made.gearbox.modifications["gear_1"], key.removesuffix("_um")) == 0.0
 
 
 def test_a_soft_coupling_joins_spins_and_a_stiff_one_makes_one_body():
@@ -310,3 +331,63 @@ def test_stepped_planets_are_imported_with_both_their_gears():
     places = sorted(wheels.values())
     assert places[1] - places[0] == pytest.approx(0.060)
     assert len(gearbox.meshes) == 6
+
+
+@pytest.mark.parametrize(
+    ("given", "factor"),
+    [
+        ({"chordal_tooth_thickness_{}_deviation": "mm"}, 1.0),
+        ({"chordal_transverse_tooth_thickness_{}_deviation": "mm"}, None),
+        ({"{}_backlash_allowance_referenced_to_span": "mum"}, 1.0 / math.cos(math.radians(20.0))),
+    ],
+)
+def test_tooth_thickness_allowances_become_those_of_the_normal_section(given, factor):
+    """DIN 3967: A_st = A_sn / cos(beta), A_W = A_sn cos(alpha_n); teeth have the mean."""
+    ((key, unit),) = given.items()
+    number = next(part.number for part in SEW.of_type("cylindrical_gear"))
+    scale = 1.0 if unit == "mm" else 1e3
+    values = {
+        key.format(end): Attribute(amount * scale, unit) for end, amount in (("upper", -0.054), ("lower", -0.084))
+    }
+    part = SEW.components[number]
+    made = to_case(with_values(SEW, {}, dataclasses.replace(part, attributes={**part.attributes, **values})), "case")
+    sections = [one for one in made.gearbox.case.gears.items() if one[1].tooth_thickness is not None]
+    assert len(sections) == 1
+    name, section = sections[0]
+    gear = made.gearbox.gears[name]
+    factor = math.cos(gear.helix_angle) if factor is None else factor
+    assert section.tooth_thickness.upper_allowance_um == pytest.approx(-54.0 * factor, rel=1e-6)
+    assert section.tooth_thickness.lower_allowance_um == pytest.approx(-84.0 * factor, rel=1e-6)
+    full = dataclasses.replace(gear, tooth_thinning=0.0)
+    thinner = full.normal_tooth_thickness - gear.normal_tooth_thickness
+    assert thinner == pytest.approx(69e-6 * factor, rel=1e-6)
+    assert section.tooth_thinning_mm == 0.0
+
+
+def test_allowances_that_would_thicken_teeth_are_not_taken():
+    number = next(part.number for part in SEW.of_type("cylindrical_gear"))
+    values = {f"chordal_tooth_thickness_{end}_deviation": 0.02 for end in ("upper", "lower")}
+    sections = gearbox_of(with_values(SEW, {number: values})).case.gears.values()
+    assert all(one.tooth_thickness is None and one.tooth_thinning_mm > 0.0 for one in sections)
+
+
+def test_the_cutter_of_a_ring_becomes_one_that_cuts_its_root():
+    """By hand: a_0 of 61 and 23 teeth from the ring's shift, its root circle a_0 + r_a0; d_a0 = 4 (23 + 2.5) mm."""
+    made = to_case(PLANETARY, "case")
+    (name,) = [name for name, one in made.gearbox.gears.items() if one.internal]
+    ring, section = made.gearbox.gears[name], made.gearbox.case.gears[name]
+    assert section.cutter is not None
+    assert (section.cutter.teeth, section.cutter.addendum, section.cutter.profile_shift) == (23, 1.25, 0.0)
+    shift = 2.0 * ring.profile_shift * math.tan(math.radians(20.0)) + ring.tooth_thinning / 4e-3
+    angle = inverse_involute(involute(math.radians(20.0)) + shift / (61 - 23))
+    distance = 0.5 * 4e-3 * (61 - 23) * math.cos(math.radians(20.0)) / math.cos(angle)
+    assert ring.root_radius == pytest.approx(distance + 0.5 * 4e-3 * 25.5, rel=1e-12)
+    assert "a corner too sharp" in next(line for line in made.text.splitlines() if line.startswith("cutter"))
+
+
+def test_a_cutter_that_cannot_make_the_ring_is_left_out_and_told():
+    made = to_case(with_values(PLANETARY, {85: {"number_of_teeth": 60}}), "case")
+    assert all(one.cutter is None for one in made.gearbox.gears.values())
+    assert any(
+        "its cutter is left out, the fillet is an arc instead; cutter.teeth = 60 trims" in one for one in made.changed
+    )

@@ -379,3 +379,62 @@ def test_helices_of_mates_run_along_each_other(any_grc_pair: GearPair) -> None:
     assert math.tan(any_grc_pair.working_helix_angle) / any_grc_pair.pinion_working_radius == pytest.approx(
         on_reference, rel=1e-13
     )
+
+
+# --- inspection -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("degrees", [0.0, 14.0, -30.0])
+@pytest.mark.parametrize(("teeth", "shift", "span"), [(21, 0.35, 3), (50, 0.0, 6), (99, -0.4, 11)])
+def test_base_tangent_length_is_the_formula_of_the_standard(
+    degrees: float, teeth: int, shift: float, span: int
+) -> None:
+    """DIN 3960, 3.7: W_k = m_n cos(a_n) (pi (k - 1/2) + z inv(a_t)) + 2 x m_n sin(a_n) + A_sn cos(a_n)."""
+    helix, allowance = math.radians(degrees), -120e-6
+    gear = spur(
+        teeth=teeth,
+        profile_shift=shift,
+        helix_angle=helix,
+        held_diameter=30e-3,
+        tooth_thinning=-allowance / math.cos(helix),
+    )
+    angle, transverse = gear.normal_pressure_angle, gear.transverse_pressure_angle
+    turned = math.pi * (span - 0.5) + teeth * involute(transverse)
+    expected = 3e-3 * (math.cos(angle) * turned + 2.0 * shift * math.sin(angle)) + allowance * math.cos(angle)
+    assert gear.span_measurement(span) == pytest.approx(expected, rel=1e-13)
+    thickness = 3e-3 * (0.5 * math.pi + 2.0 * shift * math.tan(angle)) + allowance
+    assert gear.normal_tooth_thickness == pytest.approx(thickness, rel=1e-13)
+
+
+@pytest.mark.parametrize(("teeth", "shift"), [(21, 0.35), (50, 0.0), (99, -0.4)])
+def test_the_usual_span_touches_the_flanks_on_their_involute(teeth: int, shift: float) -> None:
+    gear = spur(teeth=teeth, profile_shift=shift, held_diameter=30e-3)
+    touched = math.hypot(gear.base_radius, 0.5 * gear.span_measurement(gear.usual_span))
+    assert gear.form_radius < touched < gear.tip_radius
+    middle = gear.reference_radius + 3e-3 * shift
+    others = [abs(math.hypot(gear.base_radius, 0.5 * gear.span_measurement(k)) - middle) for k in range(2, 20)]
+    assert abs(touched - middle) == pytest.approx(min(others), abs=1e-5)  # counted along the tangent, not the radius
+
+
+@pytest.mark.parametrize("internal", [False, True])
+def test_balls_find_the_thickness_that_is_computed(internal: bool) -> None:
+    """DIN 3960, 3.9: a ball that touches both flanks of a space sits at inv(a_K) = inv(a_t) -+ eta + D_M / d_b."""
+    gear = (ring if internal else spur)(tooth_thinning=80e-6, profile_shift=0.2)
+    ball, sign = 1.7 * 3e-3, gear.outward
+    half_space = 0.5 * gear.angular_pitch - gear.reference_half_angle
+    # The ball's centre lies where its distance along the normal from each flank is its radius.
+    value = involute(gear.transverse_pressure_angle) + sign * (0.5 * ball / gear.base_radius - half_space)
+    centre = gear.base_radius / math.cos(inverse_involute(value))
+    flank = np.linspace(gear.form_radius, gear.tip_radius, 20001)
+    angle = 0.5 * gear.angular_pitch - gear.half_angle(flank)  # from the middle of the space
+    distance = np.sqrt(centre**2 + flank**2 - 2.0 * centre * flank * np.cos(angle))
+    assert distance.min() == pytest.approx(0.5 * ball, abs=1e-9)  # squared step of the samples over the ball's radius
+
+
+def test_backlash_along_the_normal_is_that_of_two_thinned_teeth_at_their_reference_circles() -> None:
+    """At the reference centre distance j_bn is the sum of the normal thinnings times cos(alpha_n)."""
+    helix = math.radians(15.0)
+    gear = spur(helix_angle=helix, tooth_thinning=70e-6)
+    both = pair(gear, gear.mirrored(), 50 * 3e-3 / math.cos(helix))
+    expected = 2.0 * 70e-6 * math.cos(helix) * math.cos(gear.normal_pressure_angle)
+    assert both.normal_backlash == pytest.approx(expected, rel=1e-9)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fe_ste.tools.arrays import Floats
+from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import kernel
-from fe_ste.tools.octets import all_eight, eight, put, sum_of
+from fe_ste.tools.octets import all_eight, eight, eight_at, put, sum_of, sums_of
 
 
 def mixed(a: Floats, b: Floats, factor: float, out: Floats) -> float:
@@ -30,3 +30,23 @@ def test_compiled_octets_are_arrays_to_round_off() -> None:
     assert found == pytest.approx(expected, abs=1e-14)
     assert not found[:2].any()
     assert not found[10:].any()
+
+
+def gathered(a: Floats, places: Integers, out: Floats) -> None:
+    """Entries from anywhere, and sums of eight octets at once."""
+    rows = eight_at(a, places, 1), eight(a, 0), eight(a, 3) * 0.5
+    put(out, 0, rows[0])
+    put(out, 8, sums_of(rows[0], rows[1], rows[2], rows[0] + rows[1], rows[1], rows[2], rows[0], rows[2] * 2.0))
+
+
+compiled_gathered = kernel(gathered)
+
+
+def test_gathered_octets_and_their_sums_are_those_of_arrays() -> None:
+    random = np.random.default_rng(5)
+    a, places = random.normal(size=16), random.integers(0, 16, size=12)
+    found, expected = np.zeros((2, 16))
+    compiled_gathered(a, places, found)
+    gathered(a, places, expected)
+    assert (found[:8] == a[places[1:9]]).all()
+    assert found == pytest.approx(expected, abs=1e-13)  # sums of eight numbers of the size of one, in another order

@@ -1,0 +1,156 @@
+"""Steady states of a spur pair whose teeth part, against runs in time of the compiled solver at constant speed."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from exugear.dynamics.assemble import assemble
+from exugear.harmonics.krylov import HarmonicBalanceError
+from exugear.model.choice import Choice
+from exugear.model.gearbox import Gearbox
+from exugear.rotating.mesh_ports import DEFLECTION
+from exugear.settling.settled import SettlingRun
+from exugear.steady.point_solver import PointSolver, gearset_of
+from exugear.steady.response import signals
+from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear.steady.steady_response import response_of
+
+from .. import table_case
+from ..spur_case import SPUR_CASE
+from .test_steady_in_time import fitted
+
+TEETH = 20
+TOUGH = {
+    "lightly loaded, on bearings": ("bushing", {"torque": 20.0}),
+    "reversed torque, on bearings": ("bushing", {"torque": -100.0, "mesh_time": 2e-6}),
+    "hardly damped, spins alone": ("rigid", {"mesh_time": 1e-6}),
+    "tight backlash, spins alone": ("rigid", {"mesh_time": 2e-6, "thinning": 0.008}),
+    "hardly loaded, on bearings": ("bushing", {"torque": 5.0}),
+}
+
+
+def spur(torque=100.0, mesh_time=4e-6, thinning=0.03):
+    case = tomllib.loads(SPUR_CASE)
+    case["static_load"]["torques_N_m"]["shaft_1"] = torque
+    case["damping"] = {"mesh_time_s": mesh_time, "bearing_time_s": 4e-6}
+    for gear in case["gears"].values():
+        gear["tooth_thinning_mm"] = thinning
+    return Gearbox.from_dict(case)
+
+
+@dataclass(frozen=True)
+class Tough:
+    """A pair near the resonance of its teeth."""
+
+    assembly: object
+    solver: PointSolver
+    resonance: float
+
+    def swept(self, *shares):
+        """States at speeds over that of the resonance, each from the one before."""
+        for share in shares:
+            self.solver.response(share * self.resonance)
+        return self.solver.state
+
+
+def tough(name):
+    variant, changes = TOUGH[name]
+    gearbox = spur(**changes)
+    before = dict(table_case.STIFFNESS)
+    table_case.STIFFNESS["spur"] = 3e8
+    surface = table_case.surface_of(gearbox, "spur", variation=3.0)
+    table_case.STIFFNESS.clear()
+    table_case.STIFFNESS.update(before)
+    assembly = assemble(gearbox, Choice(variant, "table"), {"spur": surface})
+    gearset = gearset_of(assembly, np.array([50.0, 2000.0]))
+    solver = PointSolver(gearset, SteadySettings(SpeedRange(50.0, 2000.0, 2), "nonlinear"))
+    return Tough(assembly, solver, float(gearset.system.eigenvalues(100.0).imag.max()) / TEETH)
+
+
+UP = np.arange(0.7, 1.2, 0.04)
+
+
+@pytest.mark.parametrize("name", list(TOUGH)[:4])
+def test_every_speed_through_a_resonance_with_contact_loss_has_a_state(name):
+    """Upwards the pair jumps to the branch on which teeth part, downwards it stays there longer."""
+    own, found = tough(name), []
+    for shares in (UP, UP[::-1]):
+        own.solver.state = None
+        found.append([float(own.swept(share).response.apart[0]) for share in shares])
+    up, down = np.array(found[0]), np.array(found[1][::-1])
+    assert up.max() > 0.2
+    assert up[0] == 0.0
+    assert (down >= up - 0.02).all()
+    assert (down > up + 0.2).any()
+
+
+# Amplitudes to 1e-3 and lines to 2e-3 are asked for at resonances.
+@pytest.mark.parametrize(
+    ("name", "share"),
+    [
+        ("lightly loaded, on bearings", 1.0),
+        ("reversed torque, on bearings", 0.94),
+        ("hardly damped, spins alone", 0.96),
+        ("tight backlash, spins alone", 0.96),
+    ],
+)
+def test_a_run_in_time_stays_on_a_state_with_contact_loss(name, share):
+    """Constant torques, 300 mesh periods, lines over the later half, at 1/300 of a period or 1/240 kHz."""
+    own = tough(name)
+    state = own.swept(*np.arange(1.16, share - 1e-9, -0.04))
+    assert state.response.apart[0] > 0.2
+    period = 2.0 * np.pi / (TEETH * share * own.resonance)
+    step = min(period / 300.0, 1.0 / 240e3)
+    duration = 8000 * step * max(1, round(300.0 * period / step / 8000))
+    speed, lines = fitted(state, state.response, duration, step, 0.5 * duration)
+    own.solver.response(speed)
+    again = own.solver.state.on(state.gearset)
+    known = 2.0 * signals(again.gearset, again.response)[1:, 0]
+    size = np.linalg.norm(known)
+    assert np.linalg.norm(abs(lines) - abs(known)) < 1e-3 * size
+    assert np.linalg.norm(lines - known) < 2e-3 * size
+
+
+def test_a_state_that_is_said_to_be_unstable_does_not_last():
+    """The branch with contact loss of a hardly loaded pair: a run leaves it for a motion that is in no line."""
+    own = tough("hardly loaded, on bearings")
+    own.solver._settled = lambda speed, state, reason: state
+    shares = np.arange(1.16, 0.95, -0.04)
+    state = own.swept(*shares)
+    gearset, speed = state.gearset, float(shares[-1] * own.resonance)
+    rows = state.response.interface.ports.readings[:, DEFLECTION]
+    run = SettlingRun(gearset.system, gearset.lines, rows, gearset.waves.base_orders, speed, state.response.motion)
+    outside = [run.leg().outside for _ in range(4)]
+    assert state.growth * 2.0 * np.pi / (TEETH * speed) > 0.02
+    assert outside[-1] > 0.3
+
+
+def test_what_does_not_repeat_is_told_in_words():
+    """Upwards past the fold the hardly loaded pair finds no state that lasts."""
+    own = tough("hardly loaded, on bearings")
+    with pytest.raises(HarmonicBalanceError, match=r"rad/s.*residual.*does not repeat \(\d+ % of its vibration"):
+        own.swept(0.86, 0.9)
+
+
+def test_speeds_without_a_state_leave_the_others(monkeypatch):
+    own = tough("hardly damped, spins alone")
+    solve = PointSolver.response
+
+    def respond(solver, speed):
+        if 0.9 < speed / own.resonance < 0.94:
+            raise HarmonicBalanceError("irregular")
+        return solve(solver, speed)
+
+    monkeypatch.setattr(PointSolver, "response", respond)
+    speeds = SpeedRange(0.8 * own.resonance, 1.2 * own.resonance, 11)
+    found = response_of(own.assembly, SteadySettings(speeds, "nonlinear", at_resonances=False))
+    assert [reason for _, reason in found.unsolved] == ["irregular"]
+    assert len(found.solved.speed) == 10
+    assert np.isfinite(found.solved.amplitude).all()
+    # Growth is told at every speed.
+    assert (found.solved.growth < 0.0).all()
+    assert found.growth_rate >= found.solved.growth.max()
