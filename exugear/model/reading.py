@@ -136,10 +136,13 @@ def readable(content: Mapping[str, Any]) -> CaseFile:
     while before != (count := sum(map(len, found.values()))):
         before = count
         lost = {table: set(written[table]) - set(entries) for table, entries in found.items()}
+        for table in set(_JUDGED) & set(content):
+            if not isinstance(content[table], Mapping):
+                lost[table].add("")  # whatever was meant there
         pairs = found["pairs"].items()
         known, carriers = set(found["gears"]), set(found["bodies"])
         found["pairs"] = {name: one for name, one in pairs if not lost["gears"] or {one.pinion, one.gear} <= known}
-        broken = [written["pairs"][name] for name in lost["pairs"] if isinstance(written["pairs"][name], Mapping)]
+        broken = [one for name, one in written["pairs"].items() if name in lost["pairs"] and isinstance(one, Mapping)]
         mates = {str(one.get(end)) for one in broken for end in ("pinion", "gear")}
         found["gears"] = {
             name: one

@@ -80,8 +80,8 @@ def test_torsion_and_stretching_are_those_of_tapered_bars() -> None:
     shaft = Shaft([ShaftSection(length, first, 0.0, second)], STEEL, [SeatBand("a", 0.0), SeatBand("b", length)])
     torsion = 3.0 * math.pi * SHEAR * (second - first) / (32.0 * length * (first**-3 - second**-3))
     stretching = math.pi * STEEL.youngs_modulus * first * second / (4.0 * length)
-    assert stiffness_between_ends(shaft, "torsion") == pytest.approx(torsion, rel=1.5e-3)
-    assert stiffness_between_ends(shaft, "stretching") == pytest.approx(stretching, rel=1e-2)
+    assert stiffness_between_ends(shaft, "torsion") == pytest.approx(torsion, rel=1e-3)
+    assert stiffness_between_ends(shaft, "stretching") == pytest.approx(stretching, rel=1e-3)
 
 
 def test_many_short_cylinders_come_near_the_cone_from_below() -> None:
@@ -94,7 +94,7 @@ def test_many_short_cylinders_come_near_the_cone_from_below() -> None:
         steps = [ShaftSection(0.2 / count, 0.06 + 0.04 * (n + 0.5) / count) for n in range(count)]
         stepped = Shaft(steps, STEEL, seats, MeshSize(grading=1))
         lacking.append(1.0 - stiffness_between_ends(stepped, "torsion") / whole)
-    assert 0.0 < lacking[1] < lacking[0] < 0.2
+    assert 0.0 < lacking[1] < lacking[0] < 0.02
 
 
 def test_cylinders_are_meshed_as_before() -> None:
