@@ -16,7 +16,7 @@ from exugear.dynamics.fingerprint import input_hash
 from exugear.life.acting_loads import acting_loads
 from exugear.life.bearing_life import BearingLife, bearing_lives
 from exugear.life.dynamic_factor import WITHIN, DynamicFactor
-from exugear.life.gear_life import FlankLife, check_strengths, flank_lives
+from exugear.life.gear_life import FlankLife, beyond_tables, check_strengths, flank_lives
 from exugear.life.static_balance import AngleStore, StaticBalance, static_balance
 from exugear.load_spectrum.counted import CountedLoads, count_loads
 from exugear.model.gearbox import Gearbox
@@ -24,6 +24,9 @@ from exugear.model.parts import RPM
 from exugear.model.sections.loads import RatingSection
 from exugear.model.versions import LIFE
 from fe_ste.root_stress.mesh_cycle import MeshCycleStress
+
+LEAST_OUTSIDE = 0.01
+"""Share of the load outside the path of contact below which no relief is asked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +47,8 @@ class Life:
         Why parts have no life.
     shortfalls : tuple of str
         Flanks and roots whose safety is less than `[rating]` asks for.
+    reliefs : tuple of str
+        Pairs that carry load outside their path of contact: what relief of their tips would take away.
     assumptions : tuple of str
         What the figures rest on.
     input_hash : str
@@ -61,6 +66,7 @@ class Life:
     bearings: tuple[BearingLife, ...]
     unrated: tuple[str, ...]
     shortfalls: tuple[str, ...]
+    reliefs: tuple[str, ...]
     assumptions: tuple[str, ...]
     input_hash: str
 
@@ -180,7 +186,11 @@ def compute_life(
         bearings=bearings,
         unrated=tuple(_unrated(assembly, counted, stresses)),
         shortfalls=tuple(shortfalls(rating, flanks)),
-        assumptions=tuple(_assumptions(rating, counted, found, balance, stresses, dynamic)),
+        reliefs=tuple(needs_of_relief(flanks)),
+        assumptions=(
+            *_assumptions(rating, counted, found, balance, stresses, dynamic),
+            *beyond_tables(gearbox, acting, balance, stresses),
+        ),
         input_hash=digest,
     )
 
@@ -200,6 +210,19 @@ def shortfalls(rating: RatingSection, flanks: Iterable[FlankLife]) -> Iterator[s
             least = min((value for value in found if not math.isnan(value)), default=math.inf)
             if asked is not None and least < asked:
                 yield f"{one.gear} {one.flank} {one.family}: {name} = {least:.2f}, {asked:g} is asked for"
+
+
+def needs_of_relief(flanks: Iterable[FlankLife]) -> Iterator[str]:
+    """Tell which pairs need relief of their tips: those that carry more than `LEAST_OUTSIDE` outside their path."""
+    largest: dict[str, float] = {}
+    for one in flanks:
+        largest[one.family] = max(one.outside, largest.get(one.family, 0.0))
+    for family, share in largest.items():
+        if share > LEAST_OUTSIDE:
+            yield (
+                f"{family}: up to {100.0 * share:.1f} % of its load lies outside the path of contact, where tip edges "
+                "dig in and no stress is rated: its flanks need tip relief"
+            )
 
 
 def _hub_in_words(counted: CountedLoads) -> str:
@@ -235,10 +258,10 @@ def _assumptions(
     stresses: Mapping[str, MeshCycleStress],
     dynamic: Mapping[str, DynamicFactor],
 ) -> list[str]:
-    count = len(balance.torque)
+    count, turns = len(balance.torque), len(balance.angle)
     lines = [
         _hub_in_words(counted),
-        f"static balance at {count} torque{'s' * (count > 1)} and {len(balance.angle)} angles of the carrier, "
+        f"static balance at {count} torque{'s' * (count > 1)} and {turns} angle{'s' * (turns > 1)} of the carrier, "
         + ("proportional to torque" if balance.linear else "forces over torque linear between these"),
         _dynamic_in_words(rating, dynamic, found) + "; none on bearings",
         "face and transverse load factors are in the stresses of the contact of finite elements"

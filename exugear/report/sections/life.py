@@ -68,6 +68,7 @@ def _of_variant(material: Material, data: xr.Dataset) -> str:
         + "".join(
             pieces.paragraph(f"Too little safety: {told(line)}.") for line in json.loads(data.attrs["shortfalls"])
         )
+        + "".join(pieces.paragraph(f"{told(line)}.") for line in json.loads(data.attrs["reliefs"]))
         + _picture(data, f"What limits the life, {name}")
         + pieces.table(_flank_rows(data), caption=f"Gears, {name}", name=f"{label}-gears", sortable=True)
         + pieces.table(_bearing_rows(data), caption=f"Bearings, {name}", name=f"{label}-bearings", sortable=True)
@@ -87,6 +88,7 @@ def _flank_rows(data: xr.Dataset) -> list[dict[str, object]]:
         "σ_H / MPa": ("contact_stress", 1e-6, ".0f"),
         "σ_H0, ISO / MPa": ("nominal_contact", 1e-6, ".0f"),
         "outside the path / %": ("outside", 100.0, ".1f"),
+        "K_Hbeta": ("face_load", 1.0, ".3f"),
         "pitting damage": ("contact_damage", 1.0, ".3g"),
         "S_H": ("contact_safety", 1.0, ".2f"),
         "σ_F / MPa": ("root_stress", 1e-6, ".0f"),
