@@ -248,17 +248,18 @@ class Tangent:
         """Change of what is missing to the balance (n, m, r) with one of the readings."""
         return step - self.balance.answer(self(step))
 
-    def solved(self, missing: Complexes) -> tuple[Complexes, int]:
-        """Step of Newton's method (n, m, r), and the products that it took.
+    def solved(self, right: Complexes, tolerance: float = STEP_TOLERANCE) -> tuple[Complexes, int]:
+        """Solve for readings (n, m, r) that change what is missing by `right`, and count the products that it takes.
 
         The balance of each line by itself, solved exactly, leaves GMRES what varying laws do between lines.
         """
-        inverse = np.linalg.inv(self.balance.averaged(self.sampled))
+        inverse, lengths = np.linalg.inv(self.balance.averaged(self.sampled)), self.balance.gearset.lengths
 
         def alone(values: Complexes) -> Complexes:
-            return np.asarray(inverse @ values.reshape(len(values), -1, 1)).reshape(values.shape)
+            return np.asarray(lengths * (inverse @ values.reshape(len(values), -1, 1)).reshape(values.shape))
 
-        return solve_lines(lambda own: alone(self.missing(own)), alone(-missing), STEP_TOLERANCE)
+        found, products = solve_lines(lambda own: alone(self.missing(own / lengths)), alone(right), tolerance)
+        return found / lengths, products
 
 
 def nonlinear_response(
@@ -279,9 +280,10 @@ def nonlinear_response(
 def solve_balance(balance: Balance, readings: Complexes) -> tuple[Complexes, int]:
     """Solve the balance by Newton's method from given readings; the number of products that it took."""
     size = float(np.linalg.norm(balance.static[..., DEFLECTION]))
+    lengths, products = balance.gearset.lengths, 0
     excess, tangent, _ = balance.forces(readings)
     missing = readings - balance.static - balance.answer(excess)
-    error, products = float(np.linalg.norm(missing)), 0
+    error = float(np.linalg.norm(lengths * missing))
     before = [np.inf] * PATIENCE
     for _ in range(MOST_STEPS):
         if error <= BALANCED * size:
@@ -289,14 +291,14 @@ def solve_balance(balance: Balance, readings: Complexes) -> tuple[Complexes, int
         if error > STALLED * before[-PATIENCE]:
             break
         before.append(error)
-        step, took = tangent.solved(missing)
+        step, took = tangent.solved(-missing)
         products += took
         share = 1.0
         while True:
             ahead = readings + share * step
             excess, tangent, _ = balance.forces(ahead)
             missing = ahead - balance.static - balance.answer(excess)
-            new = float(np.linalg.norm(missing))
+            new = float(np.linalg.norm(lengths * missing))
             if new < error or share < SHORTEST:
                 break
             share *= 0.5

@@ -134,17 +134,32 @@ class PointSolver:
             return self._parting(speed).on(self.gearset, interface).response
         return self._in_time(interface)
 
+    @property
+    def branch_gearset(self) -> Gearset:
+        """Gearset whose lines a branch has: twice the harmonics where teeth may part."""
+        return self.gearset.finer if self.gearset.parting else self.gearset
+
     def readings(self, speed: float) -> Complexes:
-        """Find what the mesh laws read (n, m, r) at a speed of the input (rad/s), at the level `nonlinear`."""
+        """Find what the mesh laws read (n, m, r) at a speed of the input (rad/s), in the lines of a branch."""
         if self.gearset.parting:
-            return self._parting(speed).on(self.gearset).readings
+            state, gearset = self._parting(speed), self.branch_gearset
+            if state.gearset is not self.gearset:
+                return state.on(gearset).readings
+            found = np.zeros((len(gearset.lines.orders), *state.readings.shape[1:]), dtype=complex)
+            found[self.gearset.places_in(gearset)] = state.readings
+            return found
         self._in_time(self.gearset.at(speed))
         assert self._last is not None
         return self._last
 
     def response_to(self, readings: Complexes, speed: float) -> Response:
-        """Response at a speed of the input (rad/s) where what the mesh laws read (n, m, r) is known."""
-        return response_of_readings(Balance(self.gearset, self.gearset.at(speed), self.lattice), readings)
+        """Response at a speed of the input (rad/s) where what the mesh laws read (n, m, r) is known, on a branch."""
+        gearset, interface = self.branch_gearset, self.gearset.at(speed)
+        own = gearset.at(speed) if gearset is not self.gearset else interface
+        found = response_of_readings(Balance(gearset, own, gearset.lattice), readings)
+        if gearset is self.gearset:
+            return found
+        return PartingState(gearset, readings, found, np.nan).on(self.gearset, interface).response
 
     def _in_time(self, interface: Interface) -> Response:
         frozen = self._level == "parametric"
