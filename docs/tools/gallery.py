@@ -23,6 +23,7 @@ ORDER = (
     "elastic_shaft",
     "step_housing",
     "steady_contact_loss",
+    "turbine_loads",
     "rexs_file",
     "compare_designs",
 )

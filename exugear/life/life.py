@@ -174,6 +174,8 @@ def compute_life(
     families: dict[str, list[int]] = {}
     for number, mesh in enumerate(gearbox.meshes):
         families.setdefault(mesh.family, []).append(number)
+    sharing = {family: balance.load_sharing(numbers) for family, numbers in families.items()}
+    several = {family: sharing[family] for family, numbers in families.items() if len(numbers) > 1}
     return Life(
         variant=assembly.variant,
         mesh_law=assembly.mesh_law,
@@ -181,7 +183,7 @@ def compute_life(
         edition=rating.edition,
         counted=counted,
         balance=balance,
-        load_sharing={family: balance.load_sharing(numbers) for family, numbers in families.items()},
+        load_sharing=sharing,
         flanks=flanks,
         bearings=bearings,
         unrated=tuple(_unrated(assembly, counted, stresses)),
@@ -189,6 +191,7 @@ def compute_life(
         reliefs=tuple(needs_of_relief(flanks)),
         assumptions=(
             *_assumptions(rating, counted, found, balance, stresses, dynamic),
+            *(f"K_gamma of {family} = {value:.3f}, in the forces of each mesh" for family, value in several.items()),
             *beyond_tables(gearbox, acting, balance, stresses),
         ),
         input_hash=digest,

@@ -156,6 +156,14 @@ def test_safety_is_the_factor_on_stress_at_which_the_damage_is_one(tmp_path, str
         assert getattr(more, damage) == pytest.approx(1.0, rel=1e-3)
 
 
+def test_load_sharing_of_planets_is_told(grc):
+    counted = checked_loads(grc.gearbox)
+    life = compute_life(grc.assembly(), counted, {}, stated_factors(grc.gearbox, 1.05), "")
+    (line,) = (one for one in life.assumptions if one.startswith("K_gamma of sun_planet"))
+    assert f"{life.load_sharing['sun_planet']:.3f}" in line
+    assert not any(one.startswith("K_gamma of high_speed") for one in life.assumptions)
+
+
 def test_misalignment_beyond_a_table_is_told(grc):
     """Stresses of a table from -10 to 10 um over the face, under a balance that tilts gears by more."""
     gearbox = grc.gearbox
