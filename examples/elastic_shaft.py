@@ -13,6 +13,8 @@ its shape and compares it with a rigid one.
 import tomllib
 from pathlib import Path
 
+from matplotlib.figure import Figure
+
 from exugear import Choice, Gearbox, Project, static_state
 from exugear.dynamics.modes import counterparts
 from exugear.templates.kinds import template
@@ -51,11 +53,20 @@ for name, project in {"rigid shafts": before, "elastic middle shaft": after}.ite
         print(f"{name}, {mesh}: {1e6 * tilt * width:6.2f} um")
 
 # %%
-# Modes of both. Bending of the shaft brings modes down, and adds some.
+# Modes of both: on the left with rigid shafts, on the right with the elastic one. A line joins modes that are alike in
+# shape; what stands alone on the right is the bending of the shaft.
 
 old, new = before.modes(), after.modes()
 place, share = counterparts(old, new)
+figure = Figure(figsize=(7.0, 4.2), layout="constrained")
+panel = figure.subplots()
 for number, frequency in enumerate(old.frequency):
     if 1.0 < frequency < 3000.0:
         other = new.frequency[place[number]] if share[number] > 0.5 else float("nan")
+        panel.plot((0.0, 1.0), (frequency, other), color="C0", linewidth=1.0)
         print(f"{frequency:7.0f} Hz -> {other:7.0f} Hz  {old.names[number]}")
+for side, modes in enumerate((old, new)):
+    shown = modes.frequency[(modes.frequency > 1.0) & (modes.frequency < 3000.0)]
+    panel.plot([side] * len(shown), shown, "_", color="C1", markersize=26.0, markeredgewidth=2.0)
+panel.set(xlim=(-0.3, 1.3), xticks=(0.0, 1.0), ylabel="eigenfrequency / Hz")
+panel.set_xticklabels(("rigid shafts", "elastic middle shaft"))

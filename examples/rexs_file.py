@@ -11,6 +11,8 @@ names its source and each assumption is marked.
 
 from pathlib import Path
 
+from matplotlib.figure import Figure
+
 from exugear import Choice, Project
 from exugear.rexs.containers import read_rexs
 from exugear.rexs.to_case.conversion import to_case
@@ -56,3 +58,13 @@ project = Project(filled, case.parent, Choice("bushing", "iso6336"))
 modes = project.modes()
 for number in abs(modes.overall).argsort()[::-1][:6]:
     print(f"{modes.frequency[number]:7.1f} Hz  {modes.names[number]}")
+
+# %%
+# How strongly the overall transmission error answers to each mode, per error of the mesh that excites it most.
+
+figure = Figure(figsize=(7.0, 3.6), layout="constrained")
+panel = figure.subplots()
+elastic = modes.frequency > 1.0
+panel.stem(modes.frequency[elastic], modes.amplification.max(axis=1)[elastic], basefmt=" ")
+panel.set(xlim=(0.0, 8000.0), xlabel="eigenfrequency / Hz", ylabel="amplification")
+panel.grid(True)

@@ -256,7 +256,8 @@ class Project:
     ) -> xr.Dataset:
         """Rate gears and bearings under the loads of the file, written to `life_path`; one that fits is taken as it is.
 
-        Tables that are missing are computed first.
+        Tables that are missing are computed first. What is stopped leaves tables, stresses of pairs and solved
+        angles of the carrier, and goes on from there.
 
         Parameters
         ----------
@@ -265,6 +266,7 @@ class Project:
         progress : callable, optional
             Called with the number of static states that are solved, and of all.
         """
+        from exugear.life.kept_angles import KeptAngles
         from exugear.life.life import (
             checked_loads,
             compute_life,
@@ -289,8 +291,11 @@ class Project:
         self.keep_case()
         with time_noted(self.folder, f"life, {self.choice.variant}, {self.choice.mesh_law}"):
             stresses = pair_stresses(requests, self.folder, begin)
-            life = compute_life(assembly, counted, stresses, dynamic, digest, progress)
-            return write_life(self.life_path, life, self.gearbox.name)
+            angles = KeptAngles(self.life_path.with_suffix(".partial.npz"), digest)
+            life = compute_life(assembly, counted, stresses, dynamic, digest, progress, angles)
+            data = write_life(self.life_path, life, self.gearbox.name)
+            angles.discard()
+            return data
 
     @property
     def life_path(self) -> Path:

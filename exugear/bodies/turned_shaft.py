@@ -8,6 +8,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -68,8 +69,14 @@ class ShaftModel:
     @property
     def key(self) -> str:
         """SHA-256 of these inputs and of the version of the method that reduces them."""
-        text = json.dumps({"method_version": REDUCTION, **asdict(self)}, sort_keys=True)
+        inputs = asdict(self, dict_factory=_without_ends_of_cylinders)
+        text = json.dumps({"method_version": REDUCTION, **inputs}, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _without_ends_of_cylinders(items: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return inputs as they were before there were cones, so that what is stored of cylinders keeps its hash."""
+    return {key: one for key, one in items if one is not None or not key.endswith("_diameter_end")}
 
 
 def reduce_shaft(model: ShaftModel) -> ReducedBody:

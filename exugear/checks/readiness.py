@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
+from typing import Any
 
 import numpy as np
 
+from exugear.bearings.rolling.catalogue import catalogue_rows
 from exugear.bearings.rolling.rows import BearingError
 from exugear.bearings.support_laws import linear_law, misplaced_factor
 from exugear.bearings.supports import ON_BEARINGS, elastic_names, unsupported
@@ -15,7 +17,7 @@ from exugear.checks.restraint import free_motion
 from exugear.loads.torque_series import torque_series
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Bearing
-from exugear.model.reading import CaseError
+from exugear.model.reading import CaseError, fault_line, readable
 from exugear.tooth_mesh.placement import MeshError, loaded_flanks, tooth_places
 
 MOST_STATES = 200_000
@@ -44,6 +46,16 @@ def check_parts(gearbox: Gearbox) -> None:
             faults += error.faults
     if faults:
         raise CaseError(*faults)
+
+
+def faults_of_bearings(content: Mapping[str, Any], source: str) -> Iterator[str]:
+    """Tell rolling bearings whose data do not fit, in content that may have other faults."""
+    for name, section in readable(content).bearings.items():
+        if section.catalogue is not None:
+            try:
+                catalogue_rows(section.catalogue)
+            except BearingError as error:
+                yield fault_line(source, f"bearings.{name}.catalogue: {error}")
 
 
 def lacking(gearbox: Gearbox, variant: str) -> str:

@@ -18,14 +18,18 @@ if TYPE_CHECKING:
 
 def read_gearbox(case: Path, files_below: Path | None = None, scripts: bool = False, *, tell: bool = True) -> Gearbox:
     """Read a gearbox file for a verb, with what the user permits it, and try all its parts; tell what is unusual."""
-    from exugear.checks.readiness import check_parts
+    from exugear.checks.readiness import check_parts, faults_of_bearings
     from exugear.model.gearbox import Gearbox
     from exugear.model.named_files import Permissions
-    from exugear.model.reading import CaseError
+    from exugear.model.reading import CaseError, read_toml
 
     check_files_below(files_below)
     try:
-        gearbox = Gearbox.from_toml(case, Permissions(scripts, files_below))
+        content = read_toml(case)
+        try:
+            gearbox = Gearbox.from_dict(content, str(case), Permissions(scripts, files_below))
+        except CaseError as error:
+            raise CaseError(*error.faults, *faults_of_bearings(content, str(case))) from None
         check_parts(gearbox)
     except CaseError as error:
         raise BadInputError(error) from error

@@ -205,7 +205,9 @@ def assumed_parameters(
     first = base.connectors.rolling.first
     if planets and not any(first[number + 1] > first[number] for number in planets):  # rows have no such factor
         parameters.append(
-            Parameter("planet bearings / default", FRACTIONS, 1.0, lambda x: scaled_bearings(base, planets, x))
+            Parameter(
+                "stiffness of planet bearings / default", FRACTIONS, 1.0, lambda x: scaled_bearings(base, planets, x)
+            )
         )
     body = gearbox.body(gearbox.case.overall.output, inertias)
     sets = [gearbox.body(body.name, name).axial for name in gearbox.inertia_sets]

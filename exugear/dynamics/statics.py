@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
+from typing import Protocol
 
 import numpy as np
 import scipy.linalg
@@ -25,16 +26,42 @@ MOST_NEWTON_STEPS = 30
 """Steps after which the search for a balance is given up."""
 LARGEST_RESIDUAL = 1e-9
 """Share of the load at which a residual that stops falling is round-off."""
+ROUNDINGS = 10.0
+"""Times that places near 1 m are rounded on their way to a force."""
 EASING_SHARES = (0.1, 1e-3, 0.0)
 """Shares of the stiffness of non-linear bearings that act beside their rows, one search after the other."""
 HOLDING_SHARES = (1e-6, 1e-4, 1e-2)
 """The same in Newton's matrix alone, each where the one before fails: it holds bearings that carry nothing."""
+CLOSING_SHARES = (1.0, 0.1, 1e-2, 1e-3, 1e-5, 0.0)
+"""Shares of the stiffness of linear teeth that act beside tables where teeth that are apart hold nothing."""
 SHORTEST_STEP = 1e-4
 """Share of a step of Newton's method to which it is halved while it does not lower the residual."""
 
 
 class BalanceError(RuntimeError):
     """No state in balance was found."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Beside:
+    """Linear teeth that act beside those of a law, by a share of their stiffness."""
+
+    share: float
+    meshes: MeshArrays
+
+    def forces(self, assembly: Assembly, q: Floats) -> Floats:
+        return np.asarray(self.share * assembly.mesh_forces(q, np.zeros(assembly.size), self.meshes))
+
+    def stiffness(self, assembly: Assembly, q: Floats) -> Floats:
+        return np.asarray(-self.share * assembly.mesh_jacobians(q, np.zeros(assembly.size), self.meshes)[0])
+
+
+class _Solve(Protocol):
+    """Search for a balance of an assembly, with other meshes than its own or with linear ones beside them."""
+
+    def __call__(
+        self, assembly: Assembly, start: Floats, meshes: MeshArrays | None, beside: _Beside | None = None
+    ) -> Floats: ...
 
 
 @dataclass(frozen=True)
@@ -72,7 +99,7 @@ def _newton(
     sums of spring forces, and rounding of places near 1 m is what these cannot resolve: under a small load that is
     more of it than under a large one, and no step can make it less.
     """
-    x, solution, best = start, start, np.inf
+    x, solution, best, rounded = start, start, np.inf, False
     if not x.size:
         return x
     rounding = np.zeros_like(x)
@@ -83,12 +110,12 @@ def _newton(
             break
         stalled = error > 0.5 * best
         if error < best:
-            solution, best = x, error
-        small = best < LARGEST_RESIDUAL or bool(np.all(np.abs(r) <= rounding))
+            solution, best, rounded = x, error, bool(np.all(np.abs(r) <= rounding))
+        small = best < LARGEST_RESIDUAL or rounded
         if error == 0.0 or (stalled and small):
             return solution
         matrix = derivative(x)
-        rounding = np.abs(matrix) @ np.full(x.size, np.finfo(float).eps)
+        rounding = np.abs(matrix) @ np.full(x.size, ROUNDINGS * np.finfo(float).eps)
         step = _solved(matrix / scale[:, None], -r / scale)
         if step is None:
             raise BalanceError(f"{what}: the stiffness matrix is singular; a body may move without resistance")
@@ -150,19 +177,22 @@ def locked_equilibrium(
     held = [assembly.spin[name] for name in _held(assembly, torques, locked)]
     free = assembly.motions @ scipy.linalg.null_space(assembly.motions[held])
     applied = assembly.torque_vector(torques) + (0.0 if other_loads is None else other_loads)
-    rest = np.zeros(assembly.size)
+    rest, loads = np.zeros(assembly.size), np.append(applied, assembly.weight)
     origin = rest if about is None else about
 
-    def solve(assembly: Assembly, start: Floats, meshes: MeshArrays | None) -> Floats:
+    def solve(assembly: Assembly, start: Floats, meshes: MeshArrays | None, beside: _Beside | None = None) -> Floats:
         def residual(x: Floats) -> Floats:
-            return free.T @ (assembly.forces(origin + free @ x, rest, meshes) + applied)
+            aid = 0.0 if beside is None else beside.forces(assembly, origin + free @ x)
+            return free.T @ (assembly.forces(origin + free @ x, rest, meshes) + aid + applied)
 
         def derivative(held: Assembly, x: Floats) -> Floats:
             stiffness = tangent_stiffness(held, origin + free @ x, held.meshes if meshes is None else meshes)
+            if beside is not None:
+                stiffness = stiffness + beside.stiffness(held, origin + free @ x)
             return np.asarray(-free.T @ stiffness @ free)
 
         def search(share: float) -> Floats:
-            held, scale = assembly.eased(share), np.full(start.size, _load_scale(applied))
+            held, scale = assembly.eased(share), np.full(start.size, _load_scale(loads))
             return _newton(residual, partial(derivative, held), start, scale, "static state")
 
         *shares, last = HOLDING_SHARES if assembly.has_rows else HOLDING_SHARES[:1]
@@ -264,17 +294,26 @@ def _from_linear(
     assembly: Assembly,
     start: Floats,
     to_coordinates: Callable[[Floats], Floats],
-    solve: Callable[[Assembly, Floats, MeshArrays | None], Floats],
+    solve: _Solve,
     meshes: MeshArrays | None,
 ) -> Floats:
     """Solve for linear bearings and teeth, then let their own laws take over.
 
-    Rows of rolling elements that are apart hold nothing, nor do table flanks: the search begins where they touch.
+    Rows of rolling elements that are apart hold nothing, nor do table flanks: the search begins where they touch. Under
+    a small load linear teeth do not close what tables have between their flanks: then they act beside these, less and
+    less, so that flanks touch long before they are gone.
     """
     linear = assembly.with_linear_supports()
-    x = _touching(linear, start, to_coordinates, solve)
-    for stage in (linear, *(assembly.eased(share) for share in EASING_SHARES)) if assembly.has_rows else (assembly,):
-        x = solve(stage, x, meshes)
+    x, teeth = _touching(linear, start, to_coordinates, solve)
+    try:
+        x = solve(linear, x, meshes)
+    except BalanceError:
+        if teeth is None:
+            raise
+        for share in CLOSING_SHARES:
+            x = solve(linear, x, meshes, _Beside(share, teeth) if share else None)
+    for share in EASING_SHARES if assembly.has_rows else ():
+        x = solve(assembly.eased(share), x, meshes)
     return x
 
 
@@ -282,15 +321,19 @@ def _touching(
     assembly: Assembly,
     start: Floats,
     to_coordinates: Callable[[Floats], Floats],
-    solve: Callable[[Assembly, Floats, MeshArrays | None], Floats],
-) -> Floats:
-    """Begin where linear teeth would be, on the flanks that they press: table flanks that are apart hold nothing."""
+    solve: _Solve,
+) -> tuple[Floats, MeshArrays | None]:
+    """Begin where linear teeth would be, on the flanks that they press; these teeth, where they may part."""
     if not LAWS[assembly.mesh_law].loses_contact:
-        return start
-    x = solve(assembly, start, assembly.linear_meshes())
+        return start, None
+    teeth = assembly.linear_meshes()
+    x = solve(assembly, start, teeth)
     q = to_coordinates(x)
-    reversed_flanks = assembly.mesh_states(q, np.zeros_like(q), assembly.linear_meshes())[:, FORCE] < 0.0
-    return solve(assembly, x, assembly.linear_meshes(reversed_flanks)) if reversed_flanks.any() else x
+    reversed_flanks = assembly.mesh_states(q, np.zeros_like(q), teeth)[:, FORCE] < 0.0
+    if reversed_flanks.any():
+        teeth = assembly.linear_meshes(reversed_flanks)
+        x = solve(assembly, x, teeth)
+    return x, teeth
 
 
 def _load_scale(applied: Floats) -> float:
@@ -337,18 +380,22 @@ def accelerating_start(
         rates = dict(zip(train.spins, (modes @ x[motions.shape[1] : unknown]).tolist(), strict=True))
         return motions @ x[: motions.shape[1]], rates, 0.0 if driven is None else size * float(x[-1])
 
-    def solve(assembly: Assembly, start: Floats, meshes: MeshArrays | None) -> Floats:
+    def solve(assembly: Assembly, start: Floats, meshes: MeshArrays | None, beside: _Beside | None = None) -> Floats:
         def residual(x: Floats) -> Floats:
             q, rates, torque = split(x)
             v = assembly.rolling_velocity(q, speeds)
             needed = assembly.inertia_forces(q, v, assembly.rolling_acceleration(q, speeds, rates))
             unbalanced = assembly.forces(q, v, meshes) + applied + torque * direction - needed
+            if beside is not None:
+                unbalanced = unbalanced + beside.forces(assembly, q)
             off = [] if driven is None else [size * (rates[driven[0]] - driven[1])]
             return np.concatenate([motions.T @ unbalanced, size * q[pinned], off])
 
         def derivative(x: Floats) -> Floats:
             # At rest: what velocities add to the stiffness is small against it, and costs no more than a step or two.
             stiffness = tangent_stiffness(assembly, split(x)[0], assembly.meshes if meshes is None else meshes)
+            if beside is not None:
+                stiffness = stiffness + beside.stiffness(assembly, split(x)[0])
             matrix, bends = np.zeros((x.size, x.size)), motions.shape[1]
             matrix[:bends, :bends] = -motions.T @ stiffness @ motions
             matrix[bends : bends + len(pinned), :bends] = size * motions[pinned]

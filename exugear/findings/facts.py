@@ -19,6 +19,8 @@ from exugear.steady.peaks import peaks
 
 DAMPING = "mesh damping"
 """Begin of the label of the parameter that damps."""
+NO_GAIN = 0.1
+"""Gain (dB) below which a change makes no difference."""
 AROUND_RATED = 1.25
 """Speed up to which a resonance counts as one of the rated speed, over that speed."""
 
@@ -83,11 +85,12 @@ def facts_of(
     return tuple(fact for fact in facts if fact is not None)
 
 
-def facts_of_response(response: xr.Dataset) -> tuple[Fact, ...]:
+def facts_of_response(words: Words, response: xr.Dataset) -> tuple[Fact, ...]:
     """Tell the fact of a steady response that no run-up of its choice stands beside.
 
     Parameters
     ----------
+    words : Words
     response : Dataset
         As `exugear.steady.steady_file.load_response` reads it.
     """
@@ -96,7 +99,7 @@ def facts_of_response(response: xr.Dataset) -> tuple[Fact, ...]:
         return ()
     level = 20.0 * math.log10(top.amplitude / 1e-6)
     said = (
-        f"Excited by {top.line}. The overall transmission error swings by {amplitude_text(level)} "
+        f"Excited by {words.told(top.line)}. The overall transmission error swings by {amplitude_text(level)} "
         f"({figure_text(level)} dB) at constant speed."
     )
     beside = f"at {speed_text(top.speed)}, {VARIANTS[choice_of(response.attrs).variant]}"
@@ -208,7 +211,7 @@ def _lever(words: Words, group: RunGroup, variations: Sequence[ModelVariations])
     said = f"It holds {100.0 * stiffest.share:.0f} % of the strain energy of the loudest mode."
     if heaviest is not None:
         said += f" 10 % more inertia of {heaviest.what}: {shift_text(heaviest)}."
-    said += _quieter(group, modes, top.finding.mode, variations)
+    said += _quieter(words, group, modes, top.finding.mode, variations)
     return Fact("What moves it", shift_text(stiffest), f"for 10 % more stiffness of {stiffest.what}", said, "change")
 
 
@@ -224,7 +227,7 @@ def shift_text(lever: Lever) -> str:
     return f"{sign}{figure_text(abs(lever.shift), 2)} Hz"
 
 
-def _quieter(group: RunGroup, modes: xr.Dataset, mode: int, variations: Sequence[ModelVariations]) -> str:
+def _quieter(words: Words, group: RunGroup, modes: xr.Dataset, mode: int, variations: Sequence[ModelVariations]) -> str:
     own = next((one.variations for one in variations if one.choice == group.choice(group.main)), ())
     if not own:
         return ""
@@ -232,21 +235,22 @@ def _quieter(group: RunGroup, modes: xr.Dataset, mode: int, variations: Sequence
     changes = [best_change(variation, frequency) for variation in own]
     # More damping always helps; whether anything else does is the question.
     others = [change for change in changes if not change.label.startswith(DAMPING)]
-    said = f" {best_words(max(others, key=lambda change: change.gain))}" if others else ""
+    said = f" {best_words(words, max(others, key=lambda change: change.gain))}" if others else ""
     damping = [change for change in changes if change.label.startswith(DAMPING) and change.gain > 0.0]
     return said + "".join(
-        f" {change.label} {figure_text(change.value)} instead of {figure_text(change.default)}: "
-        f"−{figure_text(change.gain, 2)} dB."
+        f" With {words.change(change.label, change.value, change.default)}: −{figure_text(change.gain, 2)} dB."
         for change in damping
-    ).replace(" mesh", " Mesh")
+    )
 
 
-def best_words(best: BestChange) -> str:
-    """Say whether the best change is worth it."""
-    change = f"{best.label} {figure_text(best.value)} instead of {figure_text(best.default)}"
+def best_words(words: Words, best: BestChange) -> str:
+    """Say whether the best change of a parameter is worth it."""
+    change = words.change(best.label, best.value, best.default)
+    if best.gain < NO_GAIN:
+        return "Makes no difference to what lies within an octave of it."
     if best.gain < GAIN:
         return (
             f"Nothing that was varied makes what lies within an octave of it {GAIN:g} dB quieter: where the mode "
-            f"fades, another takes over. Most is won by {change}: {figure_text(best.gain, 2)} dB."
+            f"fades, another takes over. The most, {figure_text(best.gain, 2)} dB, comes by {change}."
         )
     return f"What lies within an octave of it becomes {figure_text(best.gain, 2)} dB quieter by {change}."

@@ -92,7 +92,11 @@ def verdicts_of(context: Context, group: RunGroup, figures: RunFigures) -> tuple
 
 def _of_run(run: VariantRun, figures: RunFigures) -> list[Verdict]:
     residual, (pulling, apart, outside) = abs(figures.residual), figures.times
-    verdicts = [] if math.isnan(residual) else [Verdict(residual < ENERGY, f"energy adds up to {residual:.0e}")]
+    verdicts = (
+        []
+        if math.isnan(residual)
+        else [Verdict(residual < ENERGY, f"the balance of energy closes within {100.0 * residual:.1g} %")]
+    )
     doubtful = verdict_of(run.attributes)
     if doubtful:
         verdicts.append(Verdict(False, f"the run is not to be trusted: {doubtful}"))

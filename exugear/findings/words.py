@@ -31,6 +31,8 @@ TOLD, LEAST_TOLD = 0.8, 0.1
 GIVES = 2
 """Elements that are told to give way."""
 _COPY = re.compile(r"^(.*)_(\d+)$")
+_OF = re.compile(r"(?<= of )\w+")
+_NAME = re.compile(r"\w+(?:-\w+)*")
 
 
 class Words:
@@ -56,6 +58,38 @@ class Words:
             return f"{self._labels[copy[1]]} {copy[2]}"
         return name.replace("_", " ")
 
+    def told(self, text: str) -> str:
+        """Text with words for all names of the case that stand in it, such as of a line or of what moves.
+
+        Examples
+        --------
+        >>> words = Words(Gearbox.from_toml("cases/grc750/gearbox.toml"))
+        >>> words.told("2 x high_speed"), words.told("lss axial 94 %; strained: lss_bc 99 %")
+        ('2 × high-speed', 'low-speed shaft axial 94 %; strained: low-speed bearing B/C 99 %')
+        """
+        named = _NAME.sub(lambda found: self.of(found[0]) if self.family(found[0]) in self._named else found[0], text)
+        return named.replace(" x ", " × ")
+
+    def parameter(self, label: str) -> str:
+        """Label of a parameter with words for the body that it is of."""
+        return _OF.sub(lambda found: self.told(found[0]), label)
+
+    def change(self, label: str, value: float, default: float) -> str:
+        """Say what a parameter is changed to, such as "mesh damping time 16 instead of 4 µs".
+
+        Examples
+        --------
+        >>> words = Words(Gearbox.from_toml("cases/grc750/gearbox.toml"))
+        >>> words.change("stiffness of planet bearings / default", 2.8, 1.0)
+        '2.8 times the stiffness of planet bearings'
+        >>> words.change("axial inertia of hss / kg m²", 0.05, 0.1)
+        'axial inertia of high-speed shaft 0.05 instead of 0.1 kg m²'
+        """
+        name, _, unit = self.parameter(label).partition(" / ")
+        if unit == "default":
+            return f"{figure_text(value)} times the {name}"
+        return f"{name} {figure_text(value)} instead of {figure_text(default)} {unit}".rstrip()
+
     def family(self, name: str) -> str:
         """Name that the copies of a planet set share."""
         copy = _COPY.match(name)
@@ -67,6 +101,11 @@ class Words:
         single = {mesh.name for mesh in self._gearbox.meshes} | set(self._gearbox.named_bodies)
         tables = (case.bodies, case.bearings, case.joints, case.meshes, case.couplings)
         return {name for table in tables for name in table if f"{name}_1" not in table and name not in single}
+
+    @cached_property
+    def _named(self) -> set[str]:
+        case = self._gearbox.case
+        return {*self.labels, *case.labels, *case.couplings, *case.joints}
 
     @cached_property
     def _meshes(self) -> set[str]:

@@ -8,14 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from exugear.harmonics.krylov import HarmonicBalanceError, solve_lines
 from fe_ste.tools.arrays import Complexes, Floats
 
-Residual = Callable[[Complexes, float], tuple[Complexes, Callable[[Complexes], Complexes]]]
-"""Residual of lines at a parameter, and the map of small changes of the lines to its own."""
+Residual = Callable[[Complexes, float], tuple[Complexes, Any]]
+"""Residual of lines at a parameter, and how it follows small changes of them: a map, or what `Solve` knows to solve."""
+Solve = Callable[[Any, Complexes, float], Complexes]
+"""Small change of the lines for a change of the residual, to an error over the size of the latter."""
 SOLVED = 1e-9
 """Residual over the scale of the lines that counts as solved."""
 STEP_TOLERANCE = 1e-4
@@ -77,6 +80,7 @@ def trace(
     step: float,
     longest: float,
     most: int = 2000,
+    solve: Solve | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Branch:
     """Follow a branch from one value of the parameter until it passes another, or comes back past the first.
@@ -93,6 +97,8 @@ def trace(
         First and longest step along the branch, in scales.
     most : int
         Points at most.
+    solve : callable, optional
+        Solution of the linear equations; GMRES as it stands by default.
     progress : callable, optional
         Called with the parameter of each point.
 
@@ -101,12 +107,13 @@ def trace(
     HarmonicBalanceError
         No solution at `first`, or none near the branch with steps a thousandth of the first.
     """
-    lines, parameters = [_at(residual, start, first, scales)], [first]
+    solve = solve or _by_gmres
+    lines, parameters = [_at(residual, solve, start, first, scales)], [first]
     sense, length = np.sign(last - first), step
     tangent_lines, tangent_parameter = np.zeros_like(start), sense * scales.parameter
     while len(parameters) < most:
         ahead = lines[-1] + length * tangent_lines, parameters[-1] + length * tangent_parameter
-        found = _corrected(residual, ahead, (tangent_lines, tangent_parameter), scales)
+        found = _corrected(residual, solve, ahead, (tangent_lines, tangent_parameter), scales)
         if found is None:
             length *= 0.5
             if length < 1e-3 * step:
@@ -129,18 +136,22 @@ def _size(values: Complexes) -> float:
     return float(np.linalg.norm(values.ravel()))
 
 
-def _at(residual: Residual, lines: Complexes, parameter: float, scales: Scales) -> Complexes:
+def _by_gmres(change: Callable[[Complexes], Complexes], right: Complexes, tolerance: float) -> Complexes:
+    return solve_lines(change, right, tolerance)[0]
+
+
+def _at(residual: Residual, solve: Solve, lines: Complexes, parameter: float, scales: Scales) -> Complexes:
     """Solution at a parameter by Newton's method."""
     for _ in range(5 * MOST_CORRECTIONS):
         missing, change = residual(lines, parameter)
         if _size(missing) <= SOLVED * scales.lines:
             return lines
-        lines = lines + solve_lines(change, -missing, STEP_TOLERANCE)[0]
+        lines = lines + solve(change, -missing, STEP_TOLERANCE)
     raise HarmonicBalanceError(f"branch: no solution at {parameter:.6g}, where it was to begin")
 
 
 def _corrected(
-    residual: Residual, ahead: tuple[Complexes, float], tangent: tuple[Complexes, float], scales: Scales
+    residual: Residual, solve: Solve, ahead: tuple[Complexes, float], tangent: tuple[Complexes, float], scales: Scales
 ) -> tuple[Complexes, float, int] | None:
     """Solution on the plane through a predicted point across the tangent, None where there is none near."""
     y, p = ahead
@@ -157,7 +168,7 @@ def _corrected(
         small = DIFFERENCE * scales.parameter
         slope = (residual(y, p + small)[0] - missing) / small
         try:
-            step, turn = (solve_lines(change, right, STEP_TOLERANCE)[0] for right in (-missing, -slope))
+            step, turn = (solve(change, right, STEP_TOLERANCE) for right in (-missing, -slope))
         except HarmonicBalanceError:
             return None
         off = float(np.real(np.vdot(along, ahead[0] - y))) + by_parameter * (ahead[1] - p)

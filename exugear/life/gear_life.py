@@ -8,7 +8,7 @@ that of line loads inside the path of contact, root stress that of gauges on the
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -112,6 +112,27 @@ def check_strengths(
         if (len(flanks) > 1 or reversed_too) and strength.mean_stress_factor is None:
             raise gearbox.fault(
                 f"rating.gears.{name}.mean_stress_factor: this key is missing; teeth of {name} bend both ways"
+            )
+
+
+def beyond_tables(
+    gearbox: Gearbox, acting: ActingLoads, balance: StaticBalance, stresses: Mapping[str, MeshCycleStress]
+) -> Iterator[str]:
+    """Tell of pairs whose misalignment leaves the axis of their tables, where stresses are those at its end."""
+    hub = np.concatenate([acting.points.other, acting.worst_hub])
+    tilts = balance.at(balance.misalignment, acting.torques, hub)
+    for name, stress in stresses.items():
+        if len(stress.misalignment) < 2:
+            continue
+        own = [number for number, mesh in enumerate(gearbox.meshes) if mesh.pair.name == name]
+        width = gearbox.gear_pairs[name].face_width
+        reached = float(np.abs(tilts[..., own]).max())
+        low, high = stress.misalignment[[0, -1]]
+        if tilts[..., own].min() < low or tilts[..., own].max() > high:
+            yield (
+                f"{name}: its misalignment reaches {1e6 * reached * width:.3g} um over the face, its table has "
+                f"{1e6 * low * width:.3g} to {1e6 * high * width:.3g}: stresses beyond are those at the end; widen "
+                "misalignment_um of [ste]"
             )
 
 

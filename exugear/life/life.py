@@ -16,14 +16,17 @@ from exugear.dynamics.fingerprint import input_hash
 from exugear.life.acting_loads import acting_loads
 from exugear.life.bearing_life import BearingLife, bearing_lives
 from exugear.life.dynamic_factor import WITHIN, DynamicFactor
-from exugear.life.gear_life import FlankLife, check_strengths, flank_lives
-from exugear.life.static_balance import StaticBalance, static_balance
+from exugear.life.gear_life import FlankLife, beyond_tables, check_strengths, flank_lives
+from exugear.life.static_balance import AngleStore, StaticBalance, static_balance
 from exugear.load_spectrum.counted import CountedLoads, count_loads
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import RPM
 from exugear.model.sections.loads import RatingSection
 from exugear.model.versions import LIFE
 from fe_ste.root_stress.mesh_cycle import MeshCycleStress
+
+LEAST_OUTSIDE = 0.01
+"""Share of the load outside the path of contact below which no relief is asked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +47,8 @@ class Life:
         Why parts have no life.
     shortfalls : tuple of str
         Flanks and roots whose safety is less than `[rating]` asks for.
+    reliefs : tuple of str
+        Pairs that carry load outside their path of contact: what relief of their tips would take away.
     assumptions : tuple of str
         What the figures rest on.
     input_hash : str
@@ -61,6 +66,7 @@ class Life:
     bearings: tuple[BearingLife, ...]
     unrated: tuple[str, ...]
     shortfalls: tuple[str, ...]
+    reliefs: tuple[str, ...]
     assumptions: tuple[str, ...]
     input_hash: str
 
@@ -133,6 +139,7 @@ def compute_life(
     dynamic: Mapping[str, DynamicFactor],
     digest: str,
     progress: Callable[[int, int], None] | None = None,
+    store: AngleStore | None = None,
 ) -> Life:
     """Rate gears and bearings of a variant under the loads of its gearbox file.
 
@@ -149,6 +156,8 @@ def compute_life(
         Of `life_hash`.
     progress : callable, optional
         Called with the number of solved static states, and of all.
+    store : AngleStore, optional
+        Keeps solved angles of the carrier.
 
     Raises
     ------
@@ -158,7 +167,7 @@ def compute_life(
     gearbox, rating = assembly.gearbox, rating_of(assembly.gearbox)
     found, acting = counted.distribution, acting_loads(counted)
     balance = static_balance(
-        assembly, counted.body, acting.torques, rating.carrier_angles, progress, 0.5 * acting.hub_sizes
+        assembly, counted.body, acting.torques, rating.carrier_angles, progress, 0.5 * acting.hub_sizes, store
     )
     flanks = flank_lives(gearbox, rating, counted.teeth, acting, balance, stresses, dynamic)
     bearings = bearing_lives(assembly.supports, counted.bearings, acting, balance)
@@ -177,7 +186,11 @@ def compute_life(
         bearings=bearings,
         unrated=tuple(_unrated(assembly, counted, stresses)),
         shortfalls=tuple(shortfalls(rating, flanks)),
-        assumptions=tuple(_assumptions(rating, counted, found, balance, stresses, dynamic)),
+        reliefs=tuple(needs_of_relief(flanks)),
+        assumptions=(
+            *_assumptions(rating, counted, found, balance, stresses, dynamic),
+            *beyond_tables(gearbox, acting, balance, stresses),
+        ),
         input_hash=digest,
     )
 
@@ -197,6 +210,19 @@ def shortfalls(rating: RatingSection, flanks: Iterable[FlankLife]) -> Iterator[s
             least = min((value for value in found if not math.isnan(value)), default=math.inf)
             if asked is not None and least < asked:
                 yield f"{one.gear} {one.flank} {one.family}: {name} = {least:.2f}, {asked:g} is asked for"
+
+
+def needs_of_relief(flanks: Iterable[FlankLife]) -> Iterator[str]:
+    """Tell which pairs need relief of their tips: those that carry more than `LEAST_OUTSIDE` outside their path."""
+    largest: dict[str, float] = {}
+    for one in flanks:
+        largest[one.family] = max(one.outside, largest.get(one.family, 0.0))
+    for family, share in largest.items():
+        if share > LEAST_OUTSIDE:
+            yield (
+                f"{family}: up to {100.0 * share:.1f} % of its load lies outside the path of contact, where tip edges "
+                "dig in and no stress is rated: its flanks need tip relief"
+            )
 
 
 def _hub_in_words(counted: CountedLoads) -> str:
@@ -232,10 +258,10 @@ def _assumptions(
     stresses: Mapping[str, MeshCycleStress],
     dynamic: Mapping[str, DynamicFactor],
 ) -> list[str]:
-    count = len(balance.torque)
+    count, turns = len(balance.torque), len(balance.angle)
     lines = [
         _hub_in_words(counted),
-        f"static balance at {count} torque{'s' * (count > 1)} and {len(balance.angle)} angles of the carrier, "
+        f"static balance at {count} torque{'s' * (count > 1)} and {turns} angle{'s' * (turns > 1)} of the carrier, "
         + ("proportional to torque" if balance.linear else "forces over torque linear between these"),
         _dynamic_in_words(rating, dynamic, found) + "; none on bearings",
         "face and transverse load factors are in the stresses of the contact of finite elements"
@@ -247,6 +273,11 @@ def _assumptions(
         "Z_W = Z_X = 1; S-N curves go on beyond their last point: no load is without damage",
         "lives of bearings are basic: lubricant, cleanliness, ribs and cages are left out",
     ]
+    if balance.outside:
+        lines.append(
+            f"outside their tables under some load: {', '.join(balance.outside)}; tables go on in a straight line "
+            "there; widen the axes of [ste]"
+        )
     if np.any(found.torque < 0.0):
         lines.append("reversed torque presses the other flanks; teeth there are taken as the mirror of these")
     return [*lines, *counted.remarks]

@@ -39,7 +39,18 @@ _LAYOUT = Layout(
     | {"flank": ("flank",), "bearing": ("bearing",)}
     | {f"flank_{name}": ("flank", "bin") for name in ("contact_by_bin", "root_by_bin")}
     | {"bearing_by_bin": ("bearing", "bin")},
-    ("gearbox", "variant", "mesh_law", "inertias", "edition", "input_hash", "assumptions", "unrated", "shortfalls"),
+    (
+        "gearbox",
+        "variant",
+        "mesh_law",
+        "inertias",
+        "edition",
+        "input_hash",
+        "assumptions",
+        "unrated",
+        "shortfalls",
+        "reliefs",
+    ),
 )
 
 
@@ -92,6 +103,7 @@ def to_dataset(life: Life, gearbox: str) -> xr.Dataset:
         "assumptions": json.dumps(life.assumptions),
         "unrated": json.dumps(life.unrated),
         "shortfalls": json.dumps(life.shortfalls),
+        "reliefs": json.dumps(life.reliefs),
         "bearing_remarks": json.dumps({one.name: one.remarks for one in life.bearings if one.remarks}),
         "input_hash": life.input_hash,
         "method_version": LIFE,
@@ -170,6 +182,7 @@ def summary(dataset: xr.Dataset) -> dict[str, Any]:
         "assumptions": json.loads(dataset.attrs["assumptions"]),
         "unrated": json.loads(dataset.attrs["unrated"]),
         "shortfalls": json.loads(dataset.attrs["shortfalls"]),
+        "reliefs": json.loads(dataset.attrs["reliefs"]),
         "remarks": json.loads(dataset.attrs["bearing_remarks"]),
     }  # fmt: skip
 

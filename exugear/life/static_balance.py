@@ -10,20 +10,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import partial
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from exugear.dynamics.assembly import Assembly, VariantError
 from exugear.dynamics.statics import BalanceError, locked_equilibrium
-from exugear.kernels.meshes import FORCE
+from exugear.kernels.meshes import FORCE, OUTSIDE
 from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
 
 TORQUE_SHARES = (0.1, 0.25, 0.5, 0.75, 1.0)
 """Torques over the largest at which laws that are not linear are solved."""
-NEXT_SHARE = 0.7
-"""Share of the deflections under a torque from which the search under the next smaller one begins."""
 LONGEST_TURN = 0.02
 """Longest step, rad, in which a train is rolled to an angle."""
 
@@ -64,6 +63,9 @@ class StaticBalance:
         Of the inner ring against the outer one in the same axes, rad.
     linear : bool
         Whether all that is proportional to the loads.
+    outside : tuple of str
+        Meshes whose load, centre distance or misalignment lies outside their table in some of these states, where
+        that goes on in a straight line.
     """
 
     torque: Floats
@@ -73,6 +75,7 @@ class StaticBalance:
     bearing_load: Response
     bearing_tilt: Response
     linear: bool
+    outside: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         """Return one short line."""
@@ -110,6 +113,32 @@ class StaticBalance:
         return float(forces.max()) / mean if mean else 1.0
 
 
+class States(NamedTuple):
+    """What is kept of states at rest (...): at one angle over torques and loads of a hub, the first of these none.
+
+    Attributes
+    ----------
+    force, misalignment : array (..., meshes)
+    load, tilt : array (..., bearings, 6), (..., bearings, 2)
+    outside : array (..., meshes)
+        1 where load, centre distance or misalignment lies outside the table.
+    """
+
+    force: Floats
+    misalignment: Floats
+    load: Floats
+    tilt: Floats
+    outside: Floats
+
+    @classmethod
+    def of(cls, assembly: Assembly, q: Floats) -> States:
+        """Take them from coordinates (size,) at rest."""
+        meshes = assembly.mesh_states(q, np.zeros_like(q), assembly.mean_meshes)
+        flanks = np.array([element.flank for element in assembly.elements])
+        tilts = flanks * assembly.gear_positions(q)[:, 1]
+        return cls(meshes[:, FORCE], tilts, *_inner_rings(assembly, q), meshes[:, OUTSIDE])
+
+
 def _like(weights: Floats, values: Floats) -> Floats:
     """Weights of the first axis, ready to be multiplied with values."""
     return weights.reshape(-1, *(1,) * (values.ndim - 1))
@@ -135,6 +164,16 @@ def rolled_coordinates(assembly: Assembly, body: str, angle: float) -> Floats:
     return q
 
 
+class AngleStore(Protocol):
+    """What keeps solved angles of the carrier, so that a computation that was stopped goes on behind them."""
+
+    def stored(self, number: int) -> States | None:
+        """States of an angle by its number, None where they are not there."""
+
+    def store(self, number: int, states: States) -> None:
+        """Keep the states of an angle."""
+
+
 def static_balance(
     assembly: Assembly,
     body: str,
@@ -142,6 +181,7 @@ def static_balance(
     angles: int,
     progress: Callable[[int, int], None] | None = None,
     hub: Floats | None = None,
+    store: AngleStore | None = None,
 ) -> StaticBalance:
     """Solve the static balance of a variant for the range of some torques on a body.
 
@@ -158,6 +198,8 @@ def static_balance(
     hub : array (5,), optional
         Sizes of the force along x, y, z (N) and the moment about x and y (N m) on the body: those above zero are solved
         beside each torque.
+    store : AngleStore, optional
+        Where each angle goes when it is solved, and where those that were solved before are taken from.
 
     Raises
     ------
@@ -166,45 +208,61 @@ def static_balance(
     VariantError
         Loads of a hub on a body that has no place in space.
     """
-    linear = is_linear(assembly)
+    linear, sizes = is_linear(assembly), np.zeros(5) if hub is None else hub
     solved, turns = _torques(torques, linear), _angles(assembly, angles)
-    wrenches = _wrenches(assembly, body, np.zeros(5) if hub is None else hub)
+    wrenches = _wrenches(assembly, body, sizes)
+    found: list[States] = []
+    for number, turn in enumerate(turns):
+        count = partial(_told, progress, number * len(solved), len(turns) * len(solved))
+        states = None if store is None else store.stored(number)
+        if states is None:
+            states = _at_angle(assembly, body, solved, float(turn), wrenches, count)
+            if store is not None:
+                store.store(number, states)
+        count(len(solved))
+        found.append(states)
+    force, misalignment, load, tilt = (_response([states[key] for states in found], sizes) for key in range(4))
+    left = np.any([states.outside for states in found], axis=(0, 1, 2))
+    outside = tuple(np.array(assembly.mesh_names)[left].tolist())
+    return StaticBalance(solved, turns, force, misalignment, load, tilt, linear, outside)
+
+
+def _told(progress: Callable[[int, int], None] | None, before: int, total: int, done: int) -> None:
+    if progress is not None:
+        progress(before + done, total)
+
+
+def _at_angle(
+    assembly: Assembly,
+    body: str,
+    torques: Floats,
+    turn: float,
+    wrenches: Sequence[Floats | None],
+    count: Callable[[int], None],
+) -> States:
+    """Solve all torques, and each load of a hub beside them, at one angle of the carrier."""
     carrier = _carrier(assembly)
-    states: list[list[list[_State | None]]] = []
-    done = 0
-    for turn in turns:
-        about = rolled_coordinates(assembly, carrier, turn) if carrier else np.zeros(assembly.size)
-        row: list[list[_State | None]] = [[] for _ in solved]
-        near: Floats | None = None
-        for t in np.argsort(-np.abs(solved)).tolist():  # from the largest on: where teeth and rollers touch is known
-            torque, before = float(solved[t]), near
-            q = _at_rest(assembly, body, torque, about, None, before)
-            row[t] = [_State.of(assembly, q)]
-            for wrench in wrenches:
-                other = None if wrench is None else _at_rest(assembly, body, torque, about, wrench, q)
-                row[t].append(None if other is None else _State.of(assembly, other))
-            near = about + (q - about) * NEXT_SHARE if not linear else None
-            done += 1
-            if progress is not None:
-                progress(done, len(solved) * len(turns))
-        states.append(row)
-    force, misalignment, load, tilt = (_response(states, key, hub) for key in range(4))
-    return StaticBalance(solved, turns, force, misalignment, load, tilt, linear)
+    about = rolled_coordinates(assembly, carrier, turn) if carrier else np.zeros(assembly.size)
+    rows: list[list[States]] = [[] for _ in torques]
+    before: dict[float, list[tuple[float, Floats]]] = {1.0: [], -1.0: []}
+    for done, t in enumerate(np.argsort(-np.abs(torques)).tolist()):  # the largest first: it closes all clearances
+        count(done)
+        torque = float(torques[t])
+        known = before[math.copysign(1.0, torque)]  # the other flanks of a torque of the other sign tell nothing
+        q = _at_rest(assembly, body, torque, about, None, _ahead(known, torque))
+        alone = States.of(assembly, q)
+        beside = (None if one is None else _at_rest(assembly, body, torque, about, one, q) for one in wrenches)
+        rows[t] = [alone, *(alone if one is None else States.of(assembly, one) for one in beside)]
+        known.append((torque, q))
+    return States(*(np.array([[one[key] for one in row] for row in rows]) for key in range(len(States._fields))))
 
 
-class _State(NamedTuple):
-    """Mesh forces and misalignments, loads and tilts of inner rings at rest."""
-
-    force: Floats
-    misalignment: Floats
-    load: Floats
-    tilt: Floats
-
-    @classmethod
-    def of(cls, assembly: Assembly, q: Floats) -> _State:
-        force = assembly.mesh_states(q, np.zeros_like(q), assembly.mean_meshes)[:, FORCE]
-        flanks = np.array([element.flank for element in assembly.elements])
-        return cls(force, flanks * assembly.gear_positions(q)[:, 1], *_inner_rings(assembly, q))
+def _ahead(known: Sequence[tuple[float, Floats]], torque: float) -> Floats | None:
+    """Coordinates from which the search under a torque begins: straight through the last two states, or the last."""
+    if len(known) < 2:
+        return known[-1][1] if known else None
+    (first, one), (second, other) = known[-2:]
+    return np.asarray(other + (other - one) * (torque - second) / (second - first))
 
 
 def _at_rest(
@@ -236,24 +294,14 @@ def _wrenches(assembly: Assembly, body: str, hub: Floats) -> list[Floats | None]
     return found
 
 
-def _response(states: list[list[list[_State | None]]], key: int, hub: Floats | None) -> Response:
-    """Gather one part of all states: over torque and angle, and its differences by the loads of a hub."""
-    alone = np.array([[_part(of_torque[0], key) for of_torque in row] for row in states])
-    values = np.swapaxes(alone, 0, 1)
-    if hub is None or not hub.any():
+def _response(parts: Sequence[Floats], sizes: Floats) -> Response:
+    """One part of the states of all angles, over torque and angle, and its differences by the loads of a hub."""
+    together = np.stack(parts, axis=2)  # torque, load of the hub, angle
+    values = np.ascontiguousarray(together[:, 0])
+    if not sizes.any():
         return Response(values)
-    slopes = np.zeros((values.shape[0], len(hub), *values.shape[1:]))
-    for a, row in enumerate(states):
-        for t, of_torque in enumerate(row):
-            for n, size in enumerate(hub):
-                if size:
-                    slopes[t, n, a] = (_part(of_torque[n + 1], key) - values[t, a]) / size
-    return Response(values, slopes)
-
-
-def _part(state: _State | None, key: int) -> Floats:
-    assert state is not None
-    return state[key]
+    steps = np.where(sizes > 0.0, sizes, 1.0).reshape(-1, *(1,) * (values.ndim - 1))
+    return Response(values, (together[:, 1:] - values[:, None]) / steps)
 
 
 def is_linear(assembly: Assembly) -> bool:

@@ -52,8 +52,14 @@ def read_headed(path: Path, text: str) -> tuple[tuple[str, ...], Floats]:
     except csv.Error as error:
         raise LoadFileError(f"{path}: cannot be read as a table with commas ({error})") from None
     if len(lines) < 2:
-        raise LoadFileError(f"{path}: expected a line of headings and lines of numbers")
+        found = "has headings alone" if lines else "is empty"
+        raise LoadFileError(f"{path}: {found}; expected a line of headings and lines of numbers")
     headings = tuple(cell.strip() for cell in lines[0])
+    if len(headings) == 1:
+        raise LoadFileError(f"{path}: its headings are {headings[0][:60]!r}; columns are separated by commas")
+    twice = next((one for one in headings if headings.count(one) > 1), None)
+    if twice is not None:
+        raise LoadFileError(f"{path}: two columns are called {twice!r}; each needs a name of its own")
     return headings, _numbers(path, lines[1:], len(headings), 2)
 
 

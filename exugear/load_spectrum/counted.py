@@ -96,9 +96,10 @@ class CountedLoads:
     def part_rows(self) -> list[dict[str, Any]]:
         """Cycles of teeth by gear and flank, revolutions of bearings, and what meshes carry at the largest torque."""
         found, rows = self.distribution, []
-        largest = float(np.abs(found.torque).max())
         for sense in (1, -1):
-            turns = float(found.revolutions[np.sign(found.torque) == sense].sum())
+            own = np.sign(found.torque) == sense
+            turns = float(found.revolutions[own].sum())
+            largest = float(np.abs(found.torque[own]).max(initial=0.0))
             for tooth in self.teeth if turns else ():
                 rows.append(
                     {

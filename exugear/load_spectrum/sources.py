@@ -27,6 +27,8 @@ HUB_CELLS = 8
 """Cells of each load of a hub into which the bins of torque are split."""
 SPECTRUM_HEADINGS = ("torque_N_m", "speed_rpm", "hours")
 """Headings of a table of loads that were counted elsewhere; of its hours the shares count."""
+LARGEST_TORQUE = 1e9
+"""N m: no gearbox sees more, and damages beyond are no numbers."""
 REXS_ENDINGS = (".rexs", ".rexsj", ".rexsz")
 
 
@@ -111,6 +113,8 @@ def distribution(gearbox: Gearbox, sources: tuple[LoadSource, ...]) -> DurationD
     if not worn:
         raise gearbox.fault("loads.sources: none is of kind 'fatigue'; without one no part wears")
     torque, speed, hours = (np.concatenate([getattr(one, key) for one in worn]) for key in ("torque", "speed", "hours"))
+    if not np.any(torque * speed * hours):
+        raise gearbox.fault("loads.sources: no source of fatigue has torque, speed and hours at once: no part wears")
     return load_duration(torque, speed, hours, section_of(gearbox).bins)
 
 
@@ -150,13 +154,19 @@ def _read(gearbox: Gearbox, name: str, source: SourceSection) -> LoadSource:
     yearly = source.hours_per_year or 0.0
     if source.events_per_year is not None:
         yearly = source.events_per_year * duration / 3600.0
+    torque = torque * source.torque_factor * (source.partial_factor or 1.0)
+    if np.abs(torque).max() > LARGEST_TORQUE:
+        raise gearbox.fault(
+            f"{key}: its largest torque is {np.abs(torque).max():.3g} N m; up to {LARGEST_TORQUE:g} N m can be meant; "
+            "look at its unit and at torque_factor"
+        )
     return LoadSource(
         name=name,
         kind=source.kind,
         case=source.case,
         path=path,
         digest=hashlib.sha256(file_content(path)).hexdigest(),
-        torque=torque * source.torque_factor * (source.partial_factor or 1.0),
+        torque=torque,
         speed=speed * source.speed_factor,
         hours=shares * yearly * loads.life_years,
         hub=np.zeros((len(torque), HUB_LOADS)) if hub is None else hub,
@@ -182,8 +192,12 @@ def _table(gearbox: Gearbox, path: Path, body: str) -> tuple[Floats, Floats, Flo
             f"{path}: headings {','.join(headings)[:80]}; a series begins with time_s, a table of counted loads has "
             f"{','.join(SPECTRUM_HEADINGS)}"
         )
-    if not np.all(np.isfinite(values)) or np.any(values[:, 2] < 0.0) or not values[:, 2].sum() > 0.0:
-        raise LoadFileError(f"{path}: every line needs three finite numbers, hours not negative and not all zero")
+    bad = np.flatnonzero(~(np.isfinite(values).all(axis=1) & (values[:, 2] >= 0.0)))
+    if bad.size:
+        told = ",".join(f"{value:g}" for value in values[bad[0]])
+        raise LoadFileError(f"{path}: line {bad[0] + 2} has {told}; needs three finite numbers, hours not negative")
+    if not values[:, 2].sum() > 0.0:
+        raise LoadFileError(f"{path}: all hours are 0; they are the shares of the time of each line")
     return values[:, 0], values[:, 1] * RPM, values[:, 2] / values[:, 2].sum()
 
 

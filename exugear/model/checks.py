@@ -50,7 +50,7 @@ class Check:
 
 
 def check(checks: Iterable[Check]) -> None:
-    """Run all checks in their order but those that need one which failed, or which could not be run.
+    """Run all checks as `faults_of` does.
 
     Raises
     ------
@@ -61,6 +61,13 @@ def check(checks: Iterable[Check]) -> None:
     --------
     >>> check([Check("gears", lambda: None), Check("pairs", lambda: None, ("gears",))])
     """
+    faults = faults_of(checks)
+    if faults:
+        raise CaseError(*faults)
+
+
+def faults_of(checks: Iterable[Check]) -> list[str]:
+    """Faults of all checks in their order, but those that need one which failed, or which could not be run."""
     faults: list[str] = []
     failed: set[str] = set()
     for one in checks:
@@ -72,8 +79,7 @@ def check(checks: Iterable[Check]) -> None:
         except CaseError as error:
             faults += error.faults
             failed.add(one.name)
-    if faults:
-        raise CaseError(*faults)
+    return faults
 
 
 def faults_of_bodies(case: CaseFile) -> Iterator[str]:

@@ -27,7 +27,7 @@ from exugear.model.parts import (
     WheelDeviation,
     stiffness_matrix,
 )
-from exugear.model.reading import CaseError, parse_case, read_toml, shortened
+from exugear.model.reading import CaseError, parse_case, read_toml, readable, shortened
 from exugear.model.sections.case import CaseFile, SteSection, labels_in_use
 from exugear.model.sections.quantities import unusual_values
 from exugear.train.train import Train
@@ -98,7 +98,12 @@ class Gearbox:
         CaseError
             Anything wrong with the content, as in :meth:`from_toml`.
         """
-        gearbox = cls(parse_case(dict(content), source), source, content, permissions)
+        try:
+            case = parse_case(dict(content), source)
+        except CaseError as error:
+            rest = cls(readable(content), source, content, permissions)
+            raise CaseError(*error.faults, *checks.faults_of(_checks_of_entries(rest))) from None
+        gearbox = cls(case, source, content, permissions)
         checks.check(_checks_of(gearbox))
         return gearbox
 
@@ -375,6 +380,15 @@ class Gearbox:
             key = f"ste.centre_distance_offsets_um: {offset:g}"
             self._origin.guarded(key, static.with_centre_distance, distance)
         return distances
+
+
+ALONE = ("bodies", "masses", "gears", "stiffness", "supports", "modifications", "pairs")
+"""Checks of entries that make sense where others of the file cannot be read."""
+
+
+def _checks_of_entries(gearbox: Gearbox) -> tuple[checks.Check, ...]:
+    """List the checks of what could be read of a file with faults of writing."""
+    return tuple(one for one in _checks_of_parts(gearbox) if one.name in ALONE)
 
 
 def _checks_of(gearbox: Gearbox) -> tuple[checks.Check, ...]:

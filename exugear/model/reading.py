@@ -6,6 +6,7 @@ import difflib
 import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -110,6 +111,65 @@ def parse_case(content: dict[str, Any], source: str) -> CaseFile:
     except ValidationError as error:
         faults = error.errors(include_url=False)
     raise CaseError(*(fault_line(source, text) for text in _described(faults, content)))
+
+
+def readable(content: Mapping[str, Any]) -> CaseFile:
+    """Entries of faulty content that can be judged all the same: valid by themselves, and so is what they rest on.
+
+    A gear whose shift or tip follows from its pairs rests on these; a pair on its gears, a body on its gears and its
+    carrier. What an entry names and nobody wrote is a fault of it where all of that table can be read.
+
+    Returns
+    -------
+    CaseFile
+        With the tables of gears, pairs, bodies, bearings and mounts alone; other keys that are needed are not there.
+
+    Examples
+    --------
+    >>> gear = {"teeth": 20, "normal_module_mm": 2.0, "face_width_mm": 9.0, "held_diameter_mm": 20.0}
+    >>> list(readable({"name": 3, "gears": {"one": gear, "two": {**gear, "teeth": "20"}}}).gears)
+    ['one']
+    """
+    found = {table: _valid_entries(content, table) for table in _JUDGED}
+    written = {table: content[table] if isinstance(content.get(table), Mapping) else {} for table in _JUDGED}
+    before = -1
+    while before != (count := sum(map(len, found.values()))):
+        before = count
+        lost = {table: set(written[table]) - set(entries) for table, entries in found.items()}
+        for table in set(_JUDGED) & set(content):
+            if not isinstance(content[table], Mapping):
+                lost[table].add("")  # whatever was meant there
+        pairs = found["pairs"].items()
+        known, carriers = set(found["gears"]), set(found["bodies"])
+        found["pairs"] = {name: one for name, one in pairs if not lost["gears"] or {one.pinion, one.gear} <= known}
+        broken = [one for name, one in written["pairs"].items() if name in lost["pairs"] and isinstance(one, Mapping)]
+        mates = {str(one.get(end)) for one in broken for end in ("pinion", "gear")}
+        found["gears"] = {
+            name: one
+            for name, one in found["gears"].items()
+            if name not in mates or not (one.profile_shift_from_centre_distance or one.fitted_tip)
+        }
+        found["bodies"] = {
+            name: one
+            for name, one in found["bodies"].items()
+            if (not lost["gears"] or set(one.wheels_z_mm) <= known)
+            and (not lost["bodies"] or one.carrier is None or one.carrier in carriers)
+        }
+    return CaseFile.model_construct(None, **found)
+
+
+_JUDGED = ("gears", "pairs", "bodies", "bearings", "mounts")
+"""Tables whose entries are judged one by one."""
+
+
+def _valid_entries(content: Mapping[str, Any], table: str) -> dict[str, Any]:
+    """Entries of a table that are valid by themselves."""
+    model = _inner(_inner(CaseFile, table), "")
+    entries, found = content.get(table, {}), {}
+    for name, entry in entries.items() if isinstance(entries, Mapping) else ():
+        with suppress(ValidationError):
+            found[name] = model.model_validate(entry)
+    return found
 
 
 def _described(faults: list[Any], content: dict[str, Any]) -> Iterator[str]:

@@ -20,11 +20,11 @@ from fe_ste.tools.arrays import Complexes, Floats
 
 PERIODS = 80
 """Periods of the slowest base in one leg of a run; lines are fitted over its second half."""
-STEPS_PER_PERIOD = 150.0
+STEPS_PER_PERIOD = 100.0
 """Steps in a period of the fastest base at least."""
 STEPS_PER_RADIAN = 1.2
 """Steps in a radian of the fastest motion at least: the Runge-Kutta method is stable at 0.4."""
-MOST_STEPS = 200_000
+MOST_STEPS = 60_000
 """Steps in a leg at most."""
 HELD, HELD_LATER = 0.005, 0.0005
 """Natural frequency of rolling on the spring of the drive, over the slowest base: in the first leg, and later ones.

@@ -12,8 +12,9 @@ import numpy as np
 from exugear.harmonics.lattice import Lattice, lattice
 from exugear.harmonics.lines import LineSet, line_set, modulated
 from exugear.harmonics.products import Product
+from exugear.kernels.meshes import SPIN_1
 from exugear.rotating.mean_system import MeanSystem
-from exugear.rotating.mesh_ports import DEFLECTION, POSITION, MeshPorts, mesh_ports
+from exugear.rotating.mesh_ports import BACK_TILT, DEFLECTION, POSITION, TILT, MeshPorts, mesh_ports
 from exugear.rotating.mesh_waves import MeshWaves
 from exugear.rotating.signals import SignalName, SignalRows, mesh_signal_names, signal_rows
 from exugear.tooth_mesh.laws.registry import LAWS
@@ -147,6 +148,17 @@ class Gearset:
     def products(self) -> tuple[Product, ...]:
         """Product with the stiffness of each base."""
         return tuple(Product(self.lines, base, self.harmonics) for base in range(len(self.waves.base_orders)))
+
+    @cached_property
+    def lengths(self) -> Floats:
+        """What a reading (m, r) counts as a length: metres as they are, cycles and angles by the base pitch, m."""
+        meshes, firsts = self.waves.assembly.meshes, [wave.first for wave in self.waves.waves]
+        pitch = np.abs(meshes.deflection[firsts, SPIN_1] / meshes.cycles[firsts])
+        found = np.ones(self._ports["static"].shape[1:])
+        found[:, POSITION] = pitch
+        if self.parting:
+            found[:, [TILT, BACK_TILT]] = pitch[:, None]
+        return found
 
     def forward(self, speed: float) -> Booleans:
         """Tell which waves' meshes (m,) run through their cycles forward at a speed of the input."""

@@ -10,13 +10,13 @@ import numpy as np
 from exugear.harmonics.branches import Scales, trace
 from exugear.rotating.mesh_ports import DEFLECTION
 from exugear.rotating.rotating_frame import SteadyError
-from exugear.steady.nonlinear import Balance
+from exugear.steady.nonlinear import Balance, Tangent
 from exugear.steady.point_solver import PointSolver
-from exugear.steady.stability import growth_at
+from exugear.steady.stability import growth_of_state
 from fe_ste.tools.arrays import Booleans, Complexes, Floats
 
 LONGEST = 0.4
-"""Longest step along a branch: over the size of the vibration at its start, and in hundredths of the speed."""
+"""Longest step along a branch: in tenths of the static deflections, and in hundredths of the speed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +75,7 @@ def follow_branch(
     SteadyError
         Planets mesh out of phase.
     """
-    gearset, kept = solver.gearset, solver.lattice
+    gearset = solver.branch_gearset
     if gearset.waves.carriers:
         raise SteadyError(
             f"branches: planets of {gearset.waves.carriers[0][0]} mesh out of phase, so that the carrier's angle is a "
@@ -83,20 +83,36 @@ def follow_branch(
         )
 
     def balance_at(speed: float) -> Balance:
-        return Balance(gearset, gearset.at(speed), kept)
+        return Balance(gearset, gearset.at(speed), gearset.lattice)
 
-    def residual(readings: Complexes, speed: float) -> tuple[Complexes, Callable[[Complexes], Complexes]]:
-        balance = balance_at(speed)
-        excess, change, _ = balance.forces(readings)
-        missing = readings - balance.static - balance.answer(excess)
-        return missing, lambda step: step - balance.answer(change(step))
+    # The unknowns are lengths: a mesh cycle and a radian count as a base pitch.
+    lengths = gearset.lengths
+
+    def residual(scaled: Complexes, speed: float) -> tuple[Complexes, Tangent]:
+        balance, readings = balance_at(speed), scaled / lengths
+        excess, tangent, _ = balance.forces(readings)
+        return lengths * (readings - balance.static - balance.answer(excess)), tangent
+
+    def solve(tangent: Tangent, right: Complexes, tolerance: float) -> Complexes:
+        return lengths * tangent.solved(right / lengths, tolerance)[0]
 
     start = solver.readings(first)
     size = float(np.linalg.norm(start[0, :, DEFLECTION]))
     scales = Scales(0.1 * size, 0.01 * abs(first))
-    found = trace(residual, start, first, last, scales, step=0.1 * LONGEST, longest=LONGEST, progress=progress)
+    found = trace(
+        residual,
+        lengths * start,
+        first,
+        last,
+        scales,
+        step=0.1 * LONGEST,
+        longest=LONGEST,
+        solve=solve,
+        progress=progress,
+    )
+    readings = found.lines / lengths
     growth = [
-        max(growth_at(balance_at(float(speed)), readings, base) for base in range(len(gearset.waves.base_orders)))
-        for speed, readings in zip(found.parameter, found.lines, strict=True)
+        growth_of_state(balance_at(float(speed)), own, gearset.parting)
+        for speed, own in zip(found.parameter, readings, strict=True)
     ]
-    return SteadyBranch(found.parameter, found.lines, np.array(growth), tuple(fold for _, fold in found.folds))
+    return SteadyBranch(found.parameter, readings, np.array(growth), tuple(fold for _, fold in found.folds))

@@ -6,7 +6,6 @@ again. Newton's method solves the balance, each step by GMRES on the tangents al
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -123,7 +122,7 @@ class Balance:
             return values, np.zeros_like(values)
         return values, self.lattice.values(rates_of(self.gearset, self.interface, readings))
 
-    def forces(self, readings: Complexes) -> tuple[Complexes, Callable[[Complexes], Complexes], Floats]:
+    def forces(self, readings: Complexes) -> tuple[Complexes, Tangent, Floats]:
         """Find the forces (n, m, f) beyond the mean system, and how they follow small changes of the readings.
 
         The last result is the whole forces (s, u, f) in time, in all places.
@@ -131,16 +130,38 @@ class Balance:
         there, back = self.places.there, self.places.back
         values, rates = self._in_time(self._held(readings, self.static))
         sampled = self._sample(there @ values, there @ rates, self.places, self._on_lattice)
-
-        def change(step: Complexes) -> Complexes:
-            moved, moving = self._in_time(self._held(step, np.zeros_like(step)))
-            found = np.einsum("sufr,sur->suf", sampled.slope, there @ moved)
-            if self.gearset.parting:
-                found += np.einsum("sufr,sur->suf", sampled.damping, there @ moving)
-            return np.asarray(self.lattice.coefficients(back @ found) - self._mean_slopes(step))
-
         whole = back @ sampled.force
-        return self.lattice.coefficients(whole) - self._mean_part(readings), change, sampled.force
+        return self.lattice.coefficients(whole) - self._mean_part(readings), Tangent(self, sampled), sampled.force
+
+    def change(self, sampled: LawSamples, step: Complexes) -> Complexes:
+        """Find how the forces (n, m, f) follow a small change (n, m, r) of the readings that were sampled."""
+        there, back = self.places.there, self.places.back
+        moved, moving = self._in_time(self._held(step, np.zeros_like(step)))
+        found = np.einsum("sufr,sur->suf", sampled.slope, there @ moved)
+        if self.gearset.parting:
+            found += np.einsum("sufr,sur->suf", sampled.damping, there @ moving)
+        return np.asarray(self.lattice.coefficients(back @ found) - self._mean_slopes(step))
+
+    def averaged(self, sampled: LawSamples) -> Complexes:
+        """Balance (n, m r, m r) of each line by itself, laws at their mean slopes over time: what couples no lines."""
+        there, back = self.places.there, self.places.back
+        waves = self.gearset.waves
+        n, m, r = self.static.shape
+        means = []
+        for slopes, mean in ((sampled.slope, waves.mean_stiffness), (sampled.damping, waves.damping)):
+            if there.ndim == 2:
+                found = np.einsum("mu,ufr,uw->mfwr", back, slopes.mean(axis=0), there)
+            else:
+                found = np.einsum("smu,sufr,suw->mfwr", back, slopes, there, optimize=True) / len(slopes)
+            if slopes is sampled.slope or self.gearset.parting:
+                at = np.arange(m)
+                found[at, DEFLECTION, at, DEFLECTION] -= mean
+            means.append(found.reshape(-1, m * r))
+        unit = np.eye(m * r)
+        # Rates of the waves as their meshes see them: their own, and what the turning carries along.
+        carried = self.interface.speed * np.kron(waves.partners, np.eye(r))
+        forces = means[0] + means[1] @ (1j * self.interface.frequencies[:, None, None] * unit + carried)
+        return np.asarray(unit + self.interface.readings.reshape(n, m * r, -1) @ forces)
 
     def tangents_along(self, readings: Complexes, base: int, samples: int) -> Floats:
         """Slopes of the forces beyond the mean system along the angle of one base, the meshes of others at their mean.
@@ -206,6 +227,41 @@ class Balance:
         return np.asarray(-(matrix @ excess.reshape(shape[0], -1, 1))).reshape(shape[:3])
 
 
+@dataclass(frozen=True, eq=False)
+class Tangent:
+    """How the balance follows small changes of the readings.
+
+    Attributes
+    ----------
+    balance : Balance
+    sampled : LawSamples
+    """
+
+    balance: Balance
+    sampled: LawSamples
+
+    def __call__(self, step: Complexes) -> Complexes:
+        """Change of the forces (n, m, f) with one of the readings (n, m, r)."""
+        return self.balance.change(self.sampled, step)
+
+    def missing(self, step: Complexes) -> Complexes:
+        """Change of what is missing to the balance (n, m, r) with one of the readings."""
+        return step - self.balance.answer(self(step))
+
+    def solved(self, right: Complexes, tolerance: float = STEP_TOLERANCE) -> tuple[Complexes, int]:
+        """Solve for readings (n, m, r) that change what is missing by `right`, and count the products that it takes.
+
+        The balance of each line by itself, solved exactly, leaves GMRES what varying laws do between lines.
+        """
+        inverse, lengths = np.linalg.inv(self.balance.averaged(self.sampled)), self.balance.gearset.lengths
+
+        def alone(values: Complexes) -> Complexes:
+            return np.asarray(lengths * (inverse @ values.reshape(len(values), -1, 1)).reshape(values.shape))
+
+        found, products = solve_lines(lambda own: alone(self.missing(own / lengths)), alone(right), tolerance)
+        return found / lengths, products
+
+
 def nonlinear_response(
     gearset: Gearset, interface: Interface, lattice: Lattice, start: Complexes | None = None, frozen: bool = False
 ) -> tuple[Response, Complexes]:
@@ -224,9 +280,10 @@ def nonlinear_response(
 def solve_balance(balance: Balance, readings: Complexes) -> tuple[Complexes, int]:
     """Solve the balance by Newton's method from given readings; the number of products that it took."""
     size = float(np.linalg.norm(balance.static[..., DEFLECTION]))
-    excess, change, _ = balance.forces(readings)
+    lengths, products = balance.gearset.lengths, 0
+    excess, tangent, _ = balance.forces(readings)
     missing = readings - balance.static - balance.answer(excess)
-    error, products = float(np.linalg.norm(missing)), 0
+    error = float(np.linalg.norm(lengths * missing))
     before = [np.inf] * PATIENCE
     for _ in range(MOST_STEPS):
         if error <= BALANCED * size:
@@ -234,18 +291,14 @@ def solve_balance(balance: Balance, readings: Complexes) -> tuple[Complexes, int
         if error > STALLED * before[-PATIENCE]:
             break
         before.append(error)
-        step, took = solve_lines(
-            lambda own, change=change: own - balance.answer(change(own)),  # type: ignore[misc]
-            -missing,
-            STEP_TOLERANCE,
-        )
+        step, took = tangent.solved(-missing)
         products += took
         share = 1.0
         while True:
             ahead = readings + share * step
-            excess, change, _ = balance.forces(ahead)
+            excess, tangent, _ = balance.forces(ahead)
             missing = ahead - balance.static - balance.answer(excess)
-            new = float(np.linalg.norm(missing))
+            new = float(np.linalg.norm(lengths * missing))
             if new < error or share < SHORTEST:
                 break
             share *= 0.5

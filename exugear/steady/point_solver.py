@@ -33,8 +33,10 @@ LEGS = 4
 """Legs of a run in time, after each of which Newton's method is tried."""
 NEAR = 0.1
 """Difference of amplitudes from those of a run in time, over the vibration, up to which both are one state."""
-GROWING = 0.005
-"""Growth in a period of the slowest base above which a state does not last: below it a leg of a run shows none."""
+GROWING = 0.02
+"""Growth in a period of the slowest base above which a state does not last: below it a run shows little of it."""
+PUSHED = 1.02
+"""Factor on the motion of an unstable state from which a run begins."""
 
 
 def gearset_of(assembly: Assembly, speeds: Floats, harmonics: int = 10, combinations: int = 3) -> Gearset:
@@ -132,17 +134,32 @@ class PointSolver:
             return self._parting(speed).on(self.gearset, interface).response
         return self._in_time(interface)
 
+    @property
+    def branch_gearset(self) -> Gearset:
+        """Gearset whose lines a branch has: twice the harmonics where teeth may part."""
+        return self.gearset.finer if self.gearset.parting else self.gearset
+
     def readings(self, speed: float) -> Complexes:
-        """Find what the mesh laws read (n, m, r) at a speed of the input (rad/s), at the level `nonlinear`."""
+        """Find what the mesh laws read (n, m, r) at a speed of the input (rad/s), in the lines of a branch."""
         if self.gearset.parting:
-            return self._parting(speed).on(self.gearset).readings
+            state, gearset = self._parting(speed), self.branch_gearset
+            if state.gearset is not self.gearset:
+                return state.on(gearset).readings
+            found = np.zeros((len(gearset.lines.orders), *state.readings.shape[1:]), dtype=complex)
+            found[self.gearset.places_in(gearset)] = state.readings
+            return found
         self._in_time(self.gearset.at(speed))
         assert self._last is not None
         return self._last
 
     def response_to(self, readings: Complexes, speed: float) -> Response:
-        """Response at a speed of the input (rad/s) where what the mesh laws read (n, m, r) is known."""
-        return response_of_readings(Balance(self.gearset, self.gearset.at(speed), self.lattice), readings)
+        """Response at a speed of the input (rad/s) where what the mesh laws read (n, m, r) is known, on a branch."""
+        gearset, interface = self.branch_gearset, self.gearset.at(speed)
+        own = gearset.at(speed) if gearset is not self.gearset else interface
+        found = response_of_readings(Balance(gearset, own, gearset.lattice), readings)
+        if gearset is self.gearset:
+            return found
+        return PartingState(gearset, readings, found, np.nan).on(self.gearset, interface).response
 
     def _in_time(self, interface: Interface) -> Response:
         frozen = self._level == "parametric"
@@ -169,14 +186,14 @@ class PointSolver:
 
     def _settled(self, speed: float, unstable: PartingState | None, reason: str) -> PartingState:
         """Find the state to which a run in time settles that begins at the last one, or at an unstable one."""
-        gearset = self.gearset.finer
-        interface, begin = gearset.at(speed), unstable or self.state
+        begin = unstable or self.state
+        gearset = begin.gearset if begin else self.gearset
+        interface = gearset.at(speed)
         verdict = cannot_settle(gearset.system)
         if not verdict:
             motion = np.zeros((len(gearset.lines.orders), gearset.system.size), dtype=complex)
             if begin is not None:
-                own = begin.response.motion
-                motion[begin.gearset.places_in(gearset)] = own
+                motion = PUSHED * begin.response.motion
             rows = interface.ports.readings[:, DEFLECTION]
             run = SettlingRun(gearset.system, gearset.lines, rows, gearset.waves.base_orders, speed, motion)
             for _ in range(LEGS):
@@ -236,4 +253,4 @@ def _refined(gearset: Gearset, speed: float, start: Complexes | None) -> Parting
         readings, took = solve_balance(balance, more)
         products += took
         response = response_of_readings(balance, readings, products)
-    return PartingState(gearset, readings, response, growth_of_state(balance, readings))
+    return PartingState(gearset, readings, response, growth_of_state(balance, readings, bool(response.apart.any())))

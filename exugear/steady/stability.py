@@ -7,6 +7,7 @@ exponents of the whole system at one speed, one base at a time, the meshes of ot
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,8 +20,8 @@ from exugear.steady.excitation import Gearset
 from exugear.steady.nonlinear import Balance
 from fe_ste.tools.arrays import Complexes
 
-PARTING_KICKS = 1000
-"""Kicks per period at least where teeth part, so that the instants at which they do are met."""
+SMOOTH_KICKS, PARTING_KICKS = 400, 1000
+"""Kicks per period at least, and where teeth part, so that the instants at which they do are met."""
 ROLLING = 2
 """Multipliers of free rolling, which are one: angle and speed."""
 CHECKED = 3
@@ -78,7 +79,7 @@ def candidates(gearset: Gearset, low: float, high: float) -> tuple[Candidate, ..
     return tuple(sorted(found, key=lambda candidate: -candidate.growth))
 
 
-def growth_at(balance: Balance, readings: Complexes, base: int) -> float:
+def growth_at(balance: Balance, readings: Complexes, base: int, least: int = SMOOTH_KICKS) -> float:
     """Fastest growth of a disturbance of a steady state, 1/s, by Floquet exponents over one period of a base.
 
     Parameters
@@ -89,14 +90,15 @@ def growth_at(balance: Balance, readings: Complexes, base: int) -> float:
         What the laws read in the steady state.
     base : int
         Base that varies.
+    least : int
+        Kicks per period at least.
     """
     gearset, interface = balance.gearset, balance.interface
     system, ports = gearset.system, interface.ports
     size, speed = system.size, interface.speed
     period = 2.0 * np.pi / (abs(speed) * float(gearset.waves.base_orders[base]))
     values = system.eigenvalues(speed)
-    kicks = kicks_needed(float(np.abs(values).max()) / 2.0 / np.pi, period)
-    kicks = max(kicks, PARTING_KICKS) if gearset.parting else kicks
+    kicks = max(kicks_needed(float(np.abs(values).max()) / 2.0 / np.pi, period), least)
     varying = balance.tangents_along(readings, base, kicks)
     lower = np.linalg.solve(system.mass, np.hstack([-system.stiffness_at(speed), -system.damping_at(speed)]))
     pushes = np.vstack(
@@ -106,7 +108,13 @@ def growth_at(balance: Balance, readings: Complexes, base: int) -> float:
     # Rates of the waves as their meshes see them: those in the frame, and what the turning carries along.
     carried = speed * np.tensordot(gearset.waves.partners, ports.readings, axes=1).reshape(-1, size)
     reads = np.block([[rows, np.zeros_like(rows)], [carried, rows]])
-    found, shapes = exponents(np.vstack([np.eye(size, 2 * size, size), lower]), pushes, reads, varying, period)
+    # Meshes of other bases do not vary: they belong to the constant part.
+    own = np.array([wave.base == base for wave in gearset.waves.waves])
+    pushed, read = np.repeat(own, ports.forces.shape[1]), np.tile(np.repeat(own, ports.readings.shape[1]), 2)
+    constant = np.vstack([np.eye(size, 2 * size, size), lower])
+    constant -= pushes[:, ~pushed] @ varying[0][np.ix_(~pushed, ~read)] @ reads[~read]
+    varying, pushes, reads = varying[:, pushed][:, :, read], pushes[:, pushed], reads[read]
+    found, shapes = exponents(constant, pushes, reads, varying, period)
     # Free rolling neither grows nor decays but for what the losses change with the speed: it is known by its shape.
     assembly = gearset.waves.assembly
     turning = assembly.rolling_velocity(np.zeros(assembly.size), system.frame.speeds)
@@ -117,9 +125,16 @@ def growth_at(balance: Balance, readings: Complexes, base: int) -> float:
     return float(np.delete(found, rolling).real.max())
 
 
-def growth_of_state(balance: Balance, readings: Complexes) -> float:
-    """Fastest growth of a disturbance of a steady state over the bases, 1/s; parameters as of `growth_at`."""
-    return max(growth_at(balance, readings, base) for base in range(len(balance.gearset.waves.base_orders)))
+def growth_of_state(balance: Balance, readings: Complexes, parted: bool) -> float:
+    """Fastest growth of a disturbance of a steady state over the bases, 1/s.
+
+    Parameters as of `growth_at`; `parted` tells whether its teeth part. NaN where planets mesh out of phase: the
+    carrier's angle is then a cause beside the mesh cycle.
+    """
+    if balance.gearset.waves.carriers:
+        return math.nan
+    least = PARTING_KICKS if parted else SMOOTH_KICKS
+    return max(growth_at(balance, readings, base, least) for base in range(len(balance.gearset.waves.base_orders)))
 
 
 def mean_growth(gearset: Gearset) -> float:

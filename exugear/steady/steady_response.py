@@ -289,6 +289,10 @@ def _solve(
     """Solve all speeds, beginning with what is known of them."""
     count = 0 if known is None else _same_beginning(known.speed, speeds)
     gearset = solver.gearset
+    if known is not None and gearset.parting:
+        count = _in_contact(known, count)
+        if count:
+            solver.response(float(speeds[count - 1]))
     out = _empty(gearset, speeds)
     if known is not None:
         for own in fields(Solved):
@@ -370,6 +374,12 @@ def _fill(out: Solved, n: int, gearset: Gearset, response: Response) -> None:
     out.drive_torque[n], out.products[n] = response.torque, response.products
     out.apart[n] = response.apart
     out.energy_error[n] = (taken - given) / max(abs(taken), abs(given), 1e-300)
+
+
+def _in_contact(known: Solved, count: int) -> int:
+    """Count the known points up to the last at which all teeth touch: states hang on those before, from there anew."""
+    touching = np.isfinite(known.drive_torque[:count]) & ~known.apart[:count].any(axis=1)
+    return int(np.flatnonzero(touching)[-1]) + 1 if touching.any() else 0
 
 
 def _same_beginning(known: Floats, speeds: Floats) -> int:

@@ -188,6 +188,11 @@ def section(title: str, *content: str, level: int = 2, name: str = "") -> str:
     return element("section", heading + joined, id=name, aria_labelledby=f"{name}-heading")
 
 
+def picture(source: str, words: str, width: int) -> str:
+    """Make a picture on white ground, as wide as given or as the window, whatever the colours of the page."""
+    return element("div", element("img", src=source, alt=words, width=width), class_="panel picture")
+
+
 def figure(name: str, title: str, hint: str, words: str, kind: str = "") -> str:
     """Make the frame of a figure that a script draws.
 

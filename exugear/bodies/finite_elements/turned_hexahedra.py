@@ -48,8 +48,8 @@ def turned_hexahedra(shaft: Shaft, around: int = 8) -> Any:
     """
     if around < 8 or around % 8:
         raise SolidError(f"{around} elements around a shaft: it must be a multiple of 8")
-    corners = np.asarray(shaft.mesh.p)[:, np.asarray(shaft.mesh.t)]
-    radii, heights = (np.unique(np.round(np.asarray(line) / SAME)) * SAME for line in shaft.mesh.p)
+    corners = np.asarray(shaft.lines.p)[:, np.asarray(shaft.lines.t)]
+    radii, heights = (np.unique(np.round(np.asarray(line) / SAME)) * SAME for line in shaft.lines.p)
     middle = corners.mean(axis=1)
     rings, layers = np.searchsorted(radii, middle[0]) - 1, np.searchsorted(heights, middle[1]) - 1
     on_axis = bool(radii[0] < SAME)
@@ -67,7 +67,17 @@ def turned_hexahedra(shaft: Shaft, around: int = 8) -> Any:
 
     mesh = skfem.MeshHex2.from_mesh(skfem_mesh(logical, numbers.reshape(-1, 8)))
     circles = np.concatenate([[0.0], radii[1:]]) if on_axis else np.concatenate([[0.0], radii])
-    return skfem.MeshHex2(_to_circles(np.asarray(mesh.doflocs), circles), mesh.t)
+    return skfem.MeshHex2(_tapered(shaft, _to_circles(np.asarray(mesh.doflocs), circles)), mesh.t)
+
+
+def _tapered(shaft: Shaft, points: Floats) -> Floats:
+    """Move points (3, n) of a shaft of cylinders out or in to those of its cones."""
+    if shaft.mesh is shaft.lines:
+        return points
+    x, y, z = points
+    cylinder = np.hypot(x, y)
+    scale = shaft.tapers.radius(cylinder, z) / np.where(cylinder > 0.0, cylinder, 1.0)
+    return np.vstack([x * scale, y * scale, z])
 
 
 def _square_rings(around: int, levels: int) -> tuple[Floats, Integers, Integers]:

@@ -35,6 +35,7 @@ from exugear.bodies.finite_elements.shaft_sections import (
     check_sections,
     locate,
 )
+from exugear.bodies.finite_elements.tapers import Tapers
 from fe_ste.geometry.gears import Material
 from fe_ste.tools.arrays import Booleans, Floats, Integers, SparseMatrix
 
@@ -126,10 +127,13 @@ class Shaft:
         self._ends = np.concatenate([[0.0], np.cumsum([section.length for section in sections])])
         check_sections(self.sections)
         self._bands = [self._locate(seat) for seat in self.seats]
+        self.tapers = Tapers(self.sections)
         radii, heights = self._lines()
-        self.mesh = _half_section(radii, heights, self._solid)
+        self.lines = _half_section(radii, heights, self._solid)
+        self.mesh = self._tapered(self.lines)
         self.basis = skfem.Basis(self.mesh, skfem.ElementQuad2(), intorder=INTEGRATION_ORDER)
         self.nodes: Floats = np.asarray(self.basis.doflocs)
+        self._cylinder = self._radii_among_cylinders()
 
     @property
     def length(self) -> float:
@@ -138,30 +142,42 @@ class Shaft:
 
     def section_under(self, seat: SeatBand) -> ShaftSection:
         """Return the section that a seat lies on: the thicker one where it is a plane between two."""
-        return self._locate(seat)[0]
+        return self.sections[self._locate(seat)[0]]
 
     def _solid(self, r: Floats, z: Floats) -> Booleans:
         """Tell which points of the half-section are steel."""
         number = np.clip(np.searchsorted(self._ends, z) - 1, 0, len(self.sections) - 1)
-        outer = np.array([section.outer_diameter for section in self.sections])[number]
-        inner = np.array([section.inner_diameter for section in self.sections])[number]
-        return (2.0 * r < outer) & (2.0 * r > inner)
+        return np.asarray((r < self.tapers.outer[number]) & (r > self.tapers.inner[number]))
 
-    def _locate(self, seat: SeatBand) -> tuple[ShaftSection, float, float]:
+    def _tapered(self, lines: Any) -> Any:
+        """Mesh of the half-section from that of the cylinders which stand for it."""
+        if not any(section.is_cone for section in self.sections):
+            return lines
+        r, z = np.asarray(lines.p)
+        return skfem.MeshQuad(np.stack([self.tapers.radius(r, z), z]), lines.t)
+
+    def _radii_among_cylinders(self) -> Floats:
+        """Radius of each node among the cylinders that stand for the sections."""
+        if self.mesh is self.lines:
+            return np.asarray(self.nodes[0])
+        same = skfem.Basis(self.lines, skfem.ElementQuad2(), intorder=INTEGRATION_ORDER)
+        return np.asarray(same.doflocs[0])
+
+    def _locate(self, seat: SeatBand) -> tuple[int, float, float]:
         return locate(self.sections, seat)
 
     def _lines(self) -> tuple[Floats, Floats]:
         """Lines of the mesh over the radius and along the axis, closing in on re-entrant corners."""
         shoulder_z, corner_r = set(), set()
         for number, (left, right) in enumerate(zip(self.sections[:-1], self.sections[1:], strict=True), start=1):
-            if abs(left.outer_diameter - right.outer_diameter) > SAME:
-                corner_r.add(min(left.outer_diameter, right.outer_diameter) / 2.0)
+            if abs(left.outer_end - right.outer_diameter) > SAME:
+                corner_r.add(self.tapers.cylinder_at(number, min(left.outer_end, right.outer_diameter) / 2.0))
                 shoulder_z.add(float(self._ends[number]))
-            if abs(left.inner_diameter - right.inner_diameter) > SAME:
-                corner_r.add(max(left.inner_diameter, right.inner_diameter) / 2.0)
+            if abs(left.inner_end - right.inner_diameter) > SAME:
+                corner_r.add(self.tapers.cylinder_at(number, max(left.inner_end, right.inner_diameter) / 2.0))
                 shoulder_z.add(float(self._ends[number]))
         edges = [edge for _, low, high in self._bands for edge in (low, high)]
-        radii = [d / 2.0 for s in self.sections for d in (s.outer_diameter, s.inner_diameter)]
+        radii = [*self.tapers.outer, *self.tapers.inner]
         return (
             _graded_line(radii, corner_r, self.size.radial, self.size.grading),
             _graded_line([*self._ends, *edges], shoulder_z, self.size.axial, self.size.grading),
@@ -285,14 +301,18 @@ class Shaft:
                 rows.append(row.T.ravel())
         return np.array(rows).reshape(len(rows), fields * self.nodes.shape[1])
 
-    def _surface(self, seat: SeatBand, section: ShaftSection, low: float, high: float) -> tuple[Integers, Floats]:
-        """Nodes of a seat's surface and their share of its area, by Simpson's rule over each element's edge."""
-        r, z = self.nodes
+    def _surface(self, seat: SeatBand, section: int, low: float, high: float) -> tuple[Integers, Floats]:
+        """Nodes of a seat's surface and their share of its area, by Simpson's rule over each element's edge.
+
+        On a cone their share of its length, so that the seat's centre stays in its middle.
+        """
+        (r, z), cylinder = self.nodes, self._cylinder
+        outer, inner = self.tapers.outer[section], self.tapers.inner[section]
         if seat.width > 0.0:
-            on = (np.abs(r - section.outer_diameter / 2.0) < SAME) & (z > low - SAME) & (z < high + SAME)
+            on = (np.abs(cylinder - outer) < SAME) & (z > low - SAME) & (z < high + SAME)
         else:
             on = np.abs(z - seat.z) < SAME
-            on &= (r < section.outer_diameter / 2.0 + SAME) & (r > section.inner_diameter / 2.0 - SAME)
+            on &= (cylinder < outer + SAME) & (cylinder > inner - SAME)
         along = z if seat.width > 0.0 else r
         nodes = np.flatnonzero(on)
         nodes = nodes[np.argsort(along[nodes])]
@@ -300,7 +320,8 @@ class Shaft:
         weight = np.zeros(nodes.size)
         for offset, share in ((0, 1.0), (1, 4.0), (2, 1.0)):
             weight[offset : offset + 2 * edges.size - 1 : 2] += share / 6.0 * edges
-        return nodes, weight * r[nodes]
+        on_cone = seat.width > 0.0 and self.sections[section].is_cone
+        return nodes, weight if on_cone else weight * r[nodes]
 
     def outline(self) -> Outline:
         """Boundary of the half-section, the axis left out."""

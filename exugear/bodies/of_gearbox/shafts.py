@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from exugear.bearings.supports import mounts_at_work
-from exugear.bodies.finite_elements.shaft_sections import MeshSize, SeatBand, ShaftSection
+from exugear.bodies.finite_elements.shaft_sections import MeshSize, SeatBand, ShaftError, ShaftSection
 from exugear.bodies.finite_elements.solid_seats import SolidSeat
 from exugear.bodies.finite_elements.turned_hexahedra import turned_hexahedra
 from exugear.bodies.finite_elements.turned_section import Shaft
@@ -16,8 +16,8 @@ from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Body
 from exugear.model.sections.bodies import ShaftSectionSection, ShapeSection
 
-CONE_STEPS = 8
-"""Cylinders that stand for a cone."""
+POINT = 0.01
+"""Bore over that of the other end where a conical bore has its point: elements cannot begin in one."""
 TORQUE_SEAT = "torque"
 """Name of the seat where torques and couplings act."""
 SOLID_SIZE = MeshSize(0.05, 0.05, 1)
@@ -50,7 +50,7 @@ def shaft_model(gearbox: Gearbox, name: str) -> ShaftModel:
         raise gearbox.fault(f"{key}.blanks.{unknown}: no such seat; seats are {', '.join(names)}")
     return ShaftModel(
         name=name,
-        sections=tuple(cylinder for section in shape.sections for cylinder in cylinders_of(section)),
+        sections=tuple(map(_section_of, shape.sections)),
         material=material_of(shape.material),
         origin=(*body.axis, start),
         seats=seats,
@@ -60,17 +60,22 @@ def shaft_model(gearbox: Gearbox, name: str) -> ShaftModel:
     )
 
 
-def cylinders_of(section: ShaftSectionSection) -> Iterator[ShaftSection]:
-    """Cylinders of a piece of a shaft; those of a cone have its mean diameters."""
-    ends = (section.outer_diameter_end_mm, section.inner_diameter_end_mm)
-    starts = (section.outer_diameter_mm, section.inner_diameter_mm)
-    count = CONE_STEPS if any(end is not None for end in ends) else 1
-    for step in range(count):
-        share = (step + 0.5) / count
-        outer, inner = (
-            start if end is None else start + share * (end - start) for start, end in zip(starts, ends, strict=True)
-        )
-        yield ShaftSection(1e-3 * section.length_mm / count, 1e-3 * outer, 1e-3 * inner)
+def _section_of(section: ShaftSectionSection) -> ShaftSection:
+    """Piece of a shaft, m."""
+    outer_end, inner, inner_end = (
+        section.outer_diameter_end_mm,
+        section.inner_diameter_mm,
+        section.inner_diameter_end_mm,
+    )
+    if inner_end is not None:
+        inner, inner_end = max(inner, POINT * inner_end), max(inner_end, POINT * inner)
+    return ShaftSection(
+        1e-3 * section.length_mm,
+        1e-3 * section.outer_diameter_mm,
+        1e-3 * inner,
+        None if outer_end is None else 1e-3 * outer_end,
+        None if inner_end is None else 1e-3 * inner_end,
+    )
 
 
 def _seats(gearbox: Gearbox, body: Body, shape: ShapeSection) -> Iterator[tuple[str, float, float]]:
@@ -100,6 +105,8 @@ def solid_of_shaft(model: ShaftModel, size: MeshSize = SOLID_SIZE) -> SolidModel
     x, y, z = model.origin
     for seat in model.seats:
         section = shaft.section_under(seat)
+        if section.is_cone:
+            raise ShaftError(f"seat {seat.name}: it lies on a cone, and seats of a solid are cylinders")
         hole = section.inner_diameter / 2.0 if seat.width == 0.0 else 0.0
         seats.append(SolidSeat(seat.name, (x, y, z + seat.z), section.outer_diameter / 2.0, seat.width, hole))
     return SolidModel(

@@ -102,7 +102,7 @@ def _tell(data: xr.Dataset) -> None:
     if worst:
         rows = [{"limits": part, "by": kind, "damage": f"{damage:.3g}"} for part, kind, damage in worst]
         print_table(f"What limits the life of {float(data.attrs['life_years']):g} years", rows)
-    for key, style in (("assumptions", ""), ("unrated", "yellow"), ("shortfalls", "red")):
+    for key, style in (("assumptions", ""), ("unrated", "yellow"), ("reliefs", "yellow"), ("shortfalls", "red")):
         for line in json.loads(data.attrs[key]):
             note(line, style=style)
 

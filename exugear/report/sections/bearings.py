@@ -19,11 +19,14 @@ from exugear.findings.context import choice_of, words_of
 from exugear.findings.words import VARIANTS, figure_text
 from exugear.model.parts import RPM
 from exugear.report.parts.material import Material, Part, only_for
+from exugear.steady.peaks import line_name
 from exugear.web import pieces
 from exugear.web.pieces import Cell
 
 LIFTS = 1.0
 """Swing over the mean force from which a linear bearing is said to have to lift off."""
+NOISE = 1e-3
+"""Share of the mean transverse force below which an axial force is told as none."""
 SEATS = 12
 """Seats whose accelerations are listed."""
 
@@ -82,13 +85,18 @@ def _force_row(group: str, variant: str, name: str, figures: Mapping[str, Any], 
     return {
         "bearing or joint": Cell(f"{figures['words']}{copies}", choice=f"channel:{group}:{variant}:{name}"),
         "mean / kN": Cell(figure_text(1e-3 * mean), mean),
-        "axial / kN": Cell(figure_text(1e-3 * figures["axial"]), figures["axial"]),
+        "axial / kN": Cell(figure_text(_without_noise(1e-3 * figures["axial"], mean)), figures["axial"]),
         "swings by ± / kN": Cell(figure_text(1e-3 * amplitude), amplitude, bar=amplitude / largest),
         "of the mean / %": Cell(figure_text(100.0 * share, 2) if math.isfinite(share) else "–", min(share, 1e9)),
         "loudest order": figures["line"],
         "at / rpm": Cell(figure_text(figures["speed"], 4), figures["speed"]),
         "at / Hz": Cell(f"{figures['frequency']:.0f}", figures["frequency"]),
     }
+
+
+def _without_noise(value: float, mean: float) -> float:
+    """Force (kN) beside a mean one (N): zero where only rounding and start-up are left."""
+    return value if abs(value) > NOISE * 1e-3 * mean else 0.0
 
 
 def _accelerations(material: Material, data: xr.Dataset) -> str:
@@ -109,6 +117,7 @@ def _accelerations(material: Material, data: xr.Dataset) -> str:
                 "acceleration / (m/s²)": Cell(
                     figure_text(float(amplitude[point, line, seat])), float(amplitude[point, line, seat])
                 ),
+                "order": _line_words(material, data, int(line) + 1),
                 "at / rpm": Cell(figure_text(speed / RPM, 4), speed),
                 "at / Hz": Cell(f"{float(data['order'][line + 1]) * speed / (2.0 * np.pi):.0f}"),
             }
@@ -116,7 +125,17 @@ def _accelerations(material: Material, data: xr.Dataset) -> str:
     title = (
         f"Accelerations of the seats: steady response of {words_of(choice_of(data.attrs))}, level {data.attrs['level']}"
     )
-    return pieces.element("h3", pieces.text(title)) + pieces.table(rows, caption=title, sortable=True)
+    words = (
+        f"Largest amplitude of a single order over all speeds, the {SEATS} largest; x, y and z are the axes of the "
+        "gearbox. Seats of a planet set move as waves around the carrier: mean, cosine and sine."
+    )
+    table = pieces.table(rows, ("order",), caption=title, name=f"seats-{'-'.join(title.split()[7:])}", sortable=True)
+    return pieces.element("h3", pieces.text(title)) + pieces.paragraph(words, "note") + table
+
+
+def _line_words(material: Material, data: xr.Dataset, line: int) -> str:
+    bases = tuple(str(name) for name in data["base"].to_numpy())
+    return material.words.told(line_name(tuple(int(n) for n in data["index"][line].to_numpy()), bases))
 
 
 def _seat_words(material: Material, signal: str) -> str:

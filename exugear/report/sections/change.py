@@ -78,19 +78,20 @@ def _variations(
     for number, variation in enumerate(own.variations):
         parameter, seen = variation.parameter, guarded(variation, frequency)
         best = best_change(variation, frequency)
-        told.append(f"{_label(material, parameter.label)}: {best_words(best)}")
+        label = material.words.parameter(parameter.label)
+        told.append(f"{label.partition(' / ')[0]}: {best_words(material.words, best)}")
         values = np.array(parameter.values)
         html, data = chart(
             f"variation-{group.name}-{number}",
-            _label(material, parameter.label),
+            label,
             f"{_range(seen.frequency)} Hz; amplification {_range(seen.amplification)}",
-            best_words(best),
+            best_words(material.words, best),
             [
                 Curve("this mode / Hz", values, seen.frequency),
                 Curve("its amplification", values, seen.amplification, "dashed", True),
                 Curve("loudest within an octave", values, seen.loudest, "thin", True),
             ],
-            [Axis(parameter.label, parameter.logarithmic), Axis("Hz"), Axis("amplification")],
+            [Axis(label, parameter.logarithmic), Axis("Hz"), Axis("amplification")],
             material.arrays,
             [(parameter.default, "used")],
         )
@@ -107,13 +108,6 @@ def _variations(
         + pieces.paragraph(words, "note")
         + pieces.element("div", "".join(figures), class_="grid")
         + pieces.bullets(told)
-    )
-
-
-def _label(material: Material, label: str) -> str:
-    """Label of a parameter with the words for the body that it names."""
-    return " ".join(
-        material.words.of(word) if word in material.context.gearbox.named_bodies else word for word in label.split(" ")
     )
 
 

@@ -10,18 +10,26 @@ import math
 import xarray as xr
 
 from exugear.findings.context import choice_of, words_of
+from exugear.findings.words import figure_text
 from exugear.life.life_diagrams import draw_life
 from exugear.life.life_file import limits
 from exugear.life.stored_lives import stored_lives
 from exugear.report.parts.material import Material, Part
 from exugear.web import pieces
+from exugear.web.pieces import Cell
 
 WORDS = (
     "Loads of the gearbox file over its life, through the balance at rest of the variant and the contact of its teeth "
-    "by finite elements. Damage is Miner's sum: one is worn out. S is the factor on stress at which it is one; lives "
-    "of bearings are basic, without lubricant and cleanliness."
+    "by finite elements. Damage is Miner's sum: one is worn out. Lives of bearings are basic, without lubricant and "
+    "cleanliness; L10 is by ISO 281, L10r by ISO/TS 16281.",
+    "σ_H is the largest contact stress, σ_F the largest stress at the tooth root, σ_H0 and σ_F0 the nominal ones of "
+    "ISO 6336-2 and -3. S_H and S_F are the factors on stress at which the damage is one; the static ones stand for "
+    "extreme loads. Outside the path: share of the load that edges of tips carry. + is the flank that faces the sense "
+    "of +z rotation. S_0: static rating over the largest load.",
 )
 
+LEAST_DAMAGE = 1e-6
+"""Damages below this are told as such."""
 WIDTH = 850
 """Of the picture, pixels."""
 
@@ -37,29 +45,34 @@ def life_section(material: Material) -> Part:
         if stored.data is None:
             context.notes.left_out.append(f"{context.name_of(stored.path)}: {stored.reason}")
         else:
-            content.append(_of_variant(stored.data))
+            content.append(_of_variant(material, stored.data))
             worst = limits(stored.data)[0]
             context.notes.statements.append(
                 f"{words_of(choice_of(stored.data.attrs))}: in {float(stored.data.attrs['life_years']):g} years "
-                f"{worst[0]} wears most, damage {worst[2]:.3g} ({worst[1]})."
+                f"{material.words.told(worst[0])} wears most, damage {worst[2]:.3g} ({worst[1]})."
             )
     if not content:
         return Part("")
-    html = pieces.section("How long it lasts", pieces.paragraph(WORDS, "note"), *content, name="life")
+    html = pieces.section("How long it lasts", *(pieces.paragraph(own, "note") for own in WORDS), *content, name="life")
     return Part(html, {}, "How long it lasts", "life")
 
 
-def _of_variant(data: xr.Dataset) -> str:
+def _of_variant(material: Material, data: xr.Dataset) -> str:
+    told = material.words.told
+    data = data.assign_coords({key: [told(str(own)) for own in data[key].to_numpy()] for key in ("flank", "bearing")})
     name = words_of(choice_of(data.attrs))
     label = f"life-{data.attrs['variant']}-{data.attrs['mesh_law']}"
     rested = [line for key in ("assumptions", "unrated") for line in json.loads(data.attrs[key])]
     return (
-        pieces.element("h3", pieces.text(f"{name}, gears by {data.attrs['edition']}"))
-        + "".join(pieces.paragraph(f"Too little safety: {line}.") for line in json.loads(data.attrs["shortfalls"]))
+        pieces.element("h3", pieces.text(f"{name[0].upper()}{name[1:]}, gears by {data.attrs['edition']}"))
+        + "".join(
+            pieces.paragraph(f"Too little safety: {told(line)}.") for line in json.loads(data.attrs["shortfalls"])
+        )
+        + "".join(pieces.paragraph(f"{told(line)}.") for line in json.loads(data.attrs["reliefs"]))
         + _picture(data, f"What limits the life, {name}")
         + pieces.table(_flank_rows(data), caption=f"Gears, {name}", name=f"{label}-gears", sortable=True)
         + pieces.table(_bearing_rows(data), caption=f"Bearings, {name}", name=f"{label}-bearings", sortable=True)
-        + pieces.folded("What that rests on, and what has no life", pieces.bullets(rested))
+        + pieces.folded("What that rests on, and what has no life", pieces.bullets(map(told, rested)))
     )
 
 
@@ -67,18 +80,19 @@ def _picture(data: xr.Dataset, words: str) -> str:
     content = io.BytesIO()
     draw_life(data).savefig(content, format="png", dpi=130)
     source = f"data:image/png;base64,{base64.b64encode(content.getvalue()).decode()}"
-    return pieces.element("div", pieces.element("img", src=source, alt=words, width=WIDTH), class_="scroll")
+    return pieces.picture(source, words, WIDTH)
 
 
 def _flank_rows(data: xr.Dataset) -> list[dict[str, object]]:
     columns = {
-        "sigma_H / MPa": ("contact_stress", 1e-6, ".0f"),
-        "sigma_H0, ISO / MPa": ("nominal_contact", 1e-6, ".0f"),
+        "σ_H / MPa": ("contact_stress", 1e-6, ".0f"),
+        "σ_H0, ISO / MPa": ("nominal_contact", 1e-6, ".0f"),
         "outside the path / %": ("outside", 100.0, ".1f"),
+        "K_Hbeta": ("face_load", 1.0, ".3f"),
         "pitting damage": ("contact_damage", 1.0, ".3g"),
         "S_H": ("contact_safety", 1.0, ".2f"),
-        "sigma_F / MPa": ("root_stress", 1e-6, ".0f"),
-        "sigma_F0, ISO / MPa": ("nominal_root", 1e-6, ".0f"),
+        "σ_F / MPa": ("root_stress", 1e-6, ".0f"),
+        "σ_F0, ISO / MPa": ("nominal_root", 1e-6, ".0f"),
         "root damage": ("root_damage", 1.0, ".3g"),
         "S_F": ("root_safety", 1.0, ".2f"),
         "static S_H": ("contact_static", 1.0, ".2f"),
@@ -109,6 +123,12 @@ def _rows(
     ]
 
 
-def _told(data: xr.Dataset, name: str, place: int, key: str, factor: float, form: str) -> str:
+def _told(data: xr.Dataset, name: str, place: int, key: str, factor: float, form: str) -> Cell | str:
     value = factor * float(data[f"{name}_{key}"][place])
-    return "" if math.isnan(value) else "no end" if math.isinf(value) else format(value, form)
+    if math.isnan(value):
+        return "–"
+    if math.isinf(value):
+        return "no end"
+    if key.endswith("damage") and value < LEAST_DAMAGE:
+        return Cell(f"below {LEAST_DAMAGE:g}", value)
+    return Cell(figure_text(float(format(value, form))) if key.endswith("hours") else format(value, form), value)

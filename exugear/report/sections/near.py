@@ -116,7 +116,7 @@ def _match_row(material: Material, found: ModelMatch, target: float) -> dict[str
     return {
         "variant": found.model.variant,
         "inertias": f"{found.model.inertias} ({found.model.mesh_law})",
-        "assumption": f"{found.assumption}, default {match.parameter.default:g}",
+        "assumption": material.words.change(match.parameter.label, match.value, match.parameter.default),
         "frequency / Hz": f"{mode.frequency:.0f}",
         "share / %": f"{100 * mode.share:.1f}",
         "amplification": f"{mode.amplification:.2f} ({material.words.of(mode.mesh)})",

@@ -41,7 +41,7 @@ def _group(material: Material, group: RunGroup, facts: Sequence[Fact], verdicts:
 
 def _without_run_ups(material: Material) -> str:
     """Tell what steady responses know, and what tells more."""
-    facts = [fact for data in material.results.steady for fact in facts_of_response(data)]
+    facts = [fact for data in material.results.steady for fact in facts_of_response(material.words, data)]
     material.context.notes.statements.extend(fact.line for fact in facts)
     cards = pieces.element("div", "".join(map(_card, facts)), class_="cards") if facts else ""
     return cards + pieces.paragraph(

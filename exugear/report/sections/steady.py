@@ -11,6 +11,7 @@ import xarray as xr
 
 from exugear.campbell.campbell import Campbell, campbell_from
 from exugear.findings.context import Context, choice_of, words_of
+from exugear.findings.words import figure_text
 from exugear.loads.summary import summarise_loads
 from exugear.model.parts import RPM
 from exugear.model.reading import CaseError
@@ -39,6 +40,8 @@ OTHER_KIND = "other"
 """Kind of modes that no planet set carries, in the legend."""
 WHIRLING = 0.3
 """Whirl from which its sense is told."""
+BELOW = 6.0
+"""Levels (dB) below the lowest steady one at which a cut out of a run-up shows noise."""
 SAME_SPEED = 0.02
 """Share of the speed within which a peak belongs to the crossing of its line with a mode."""
 
@@ -61,7 +64,7 @@ def _response(material: Material, data: xr.Dataset, charts: dict[str, Any]) -> s
     context.tell(f"steady response, {label}")
     found = peaks(data)[:SHOWN]
     rates = {str(run.attributes["load_case"]): _unit_rate(run) for run in own}
-    rows = [_row(peak, data, rates) for peak in found]
+    rows = [_row(material, peak, data, rates) for peak in found]
     lost = [row for row in rows if any(value == TELL_FAST for value in row.values())]
     note = ""
     if lost:
@@ -73,13 +76,21 @@ def _response(material: Material, data: xr.Dataset, charts: dict[str, Any]) -> s
         pieces.alert("Unstable", [f"disturbances grow by up to {growth:.3g} 1/s"]) if growth > 0.0 else "",
         note,
         _order_charts(material, data, own, f"steady-{level}-{model_name(choice)}", charts),
-        pieces.table(rows, ("line",), caption=f"Peaks of the steady response, {label}", sortable=True),
-        _contributions_table(data),
+        pieces.element("h4", f"Loudest peaks: the first {len(rows)}"),
+        pieces.table(
+            rows,
+            ("line",),
+            caption=f"Peaks of the steady response, {label}",
+            name=f"peaks-{level}-{model_name(choice)}",
+            sortable=True,
+        ),
+        _contributions_table(material, data, f"made-by-{level}-{model_name(choice)}"),
         _campbell(material, data, f"campbell-{level}-{model_name(choice)}", label, charts),
-        _sidebands_table(context, data, peaks(data)),
+        _sidebands_table(material, data, peaks(data)),
         pieces.paragraph(
             f"Slowest decay of a disturbance {-growth:.3g} 1/s. A run-up is called too fast for a resonance where "
-            f"f' / (2 pi zeta^2 f^2) is above {TOO_FAST:g}: the peak does not build up.",
+            f"f′ / (2π ζ² f²) is above {TOO_FAST:g}: the peak does not build up. f is the frequency of the peak, "
+            "f′ its rate in the run-up, ζ the damping of the mode that is met there; – where no mode is known.",
             "note",
         ),
     ]
@@ -97,7 +108,7 @@ def _order_charts(
         html, spec = chart(
             f"{name}-{number}",
             material.words.line(line),
-            "Dashed: run-ups, cut with the window that suits their sweep, and states that do not last.",
+            "",
             f"Overall transmission error along {material.words.line_sentence(line)}.",
             _curves(data, runs, line),
             [Axis(f"{material.input_words} speed / rpm"), Axis("level / dB re 1 µm")],
@@ -105,30 +116,43 @@ def _order_charts(
         )
         figures.append(html)
         charts.update(spec)
-    return pieces.element("div", "".join(figures), class_="grid")
+    words = (
+        "Level of the overall transmission error along the orders: at steady speed, and as run-ups show it, cut with "
+        "the window that suits their sweep."
+    )
+    if settings_of(data.attrs).branches:
+        words += " Branches go back at their folds; states on dashed parts do not last."
+    return pieces.paragraph(words, "note") + pieces.element("div", "".join(figures), class_="grid")
 
 
-def _contributions_table(data: xr.Dataset) -> str:
+def _contributions_table(material: Material, data: xr.Dataset, name: str) -> str:
     """Table of what makes the strongest resonances at the level `linear`."""
+    told = material.words.told
     bases, index = tuple(str(name) for name in data["base"].to_numpy()), data["index"].to_numpy()
     rows = []
     for own in json.loads(data.attrs["contributions"]):
         line, speed = own["line"], abs(float(own["speed"]))
         rows.append(
             {
-                "line": line_name(tuple(int(n) for n in index[line]), bases),
+                "line": told(line_name(tuple(int(n) for n in index[line]), bases)),
                 "speed / rpm": f"{speed / RPM:.2f}",
-                "excited by": _shares(own["meshes"].items()),
+                "excited by": told(_shares(own["meshes"].items())),
                 "carried by": _shares((f"{frequency:.1f} Hz", share) for frequency, share in own["modes"]),
-                "per stiffness of": _slopes_of(own["supports"]),
-                "per inertia of": _slopes_of(own["bodies"]),
+                "per stiffness of": told(_slopes_of(own["supports"])),
+                "per inertia of": told(_slopes_of(own["bodies"])),
             }
         )
     if not rows:
         return ""
     said = "What makes resonances: shares of the amplitude, and its relative change per relative change of a parameter"
     return pieces.folded(
-        said, pieces.table(rows, ("line", "excited by", "carried by", "per stiffness of", "per inertia of"))
+        said,
+        pieces.table(
+            rows,
+            ("line", "excited by", "carried by", "per stiffness of", "per inertia of"),
+            caption="What makes resonances",
+            name=name,
+        ),
     )
 
 
@@ -161,20 +185,22 @@ def _campbell(material: Material, data: xr.Dataset, name: str, label: str, chart
     html, spec = chart(
         name,
         "Modes over speed",
-        "Dashed: mesh orders.",
+        "Lines across: modes, by type. Dashed: mesh orders. Dots: crossings that excite.",
         caption,
         curves,
         [Axis(f"{material.input_words} speed / rpm"), Axis("frequency / Hz")],
         material.arrays,
     )
     charts.update(spec)
-    rows = _mode_rows(diagram, data, crossings)
+    rows = _mode_rows(material, diagram, data, crossings)
     return (
         html
         + _speed_ranges(material.context)
         + pieces.folded(
             "Modes over speed and the crossing that excites each most: share of the largest peak of a signal",
-            pieces.table(rows, ("type", "strongest crossing", "what moves"), caption=caption, sortable=True),
+            pieces.table(
+                rows, ("type", "strongest crossing", "what moves"), caption=caption, name=f"{name}-modes", sortable=True
+            ),
         )
     )
 
@@ -200,7 +226,7 @@ def _ranges(context: Context) -> dict[str, tuple[float, float]]:
 
 
 def _mode_rows(
-    diagram: Campbell, data: xr.Dataset, crossings: Sequence[Mapping[str, float]]
+    material: Material, diagram: Campbell, data: xr.Dataset, crossings: Sequence[Mapping[str, float]]
 ) -> list[dict[str, object]]:
     """Rows of the modes, those that are excited most first."""
     bases, index = tuple(str(name) for name in data["base"].to_numpy()), data["index"].to_numpy()
@@ -225,18 +251,19 @@ def _mode_rows(
             "whirl": "forward" if whirl > WHIRLING else "backward" if whirl < -WHIRLING else "",
             "strongest crossing": "",
             "share / %": "",
-            "what moves": diagram.names[mode],
+            "what moves": material.words.told(diagram.names[mode]),
         }
         if met is not None:
             line = line_name(tuple(int(n) for n in index[int(met["line"])]), bases)
-            row["strongest crossing"] = f"{line} at {abs(met['speed']) / RPM:.1f} rpm"
+            row["strongest crossing"] = f"{material.words.told(line)} at {abs(met['speed']) / RPM:.1f} rpm"
             row["share / %"] = f"{100.0 * met['share']:.1f}"
         rows.append(row)
     return rows
 
 
-def _sidebands_table(context: Context, data: xr.Dataset, found: Sequence[Peak]) -> str:
+def _sidebands_table(material: Material, data: xr.Dataset, found: Sequence[Peak]) -> str:
     """Table of the lines beside the loudest peaks, each with its cause."""
+    context, told = material.context, material.words.told
     carriers = _carriers(context)
     loudest: dict[str, Peak] = {}
     for peak in found:
@@ -247,21 +274,21 @@ def _sidebands_table(context: Context, data: xr.Dataset, found: Sequence[Peak]) 
         for band in bands:
             rows.append(
                 {
-                    "peak": f"{peak.line} at {abs(peak.speed) / RPM:.1f} rpm",
+                    "peak": f"{told(peak.line)} at {abs(peak.speed) / RPM:.1f} rpm",
                     "peak / Hz": f"{peak.frequency:.1f}",
-                    "beside it": band.line,
+                    "beside it": told(band.line.replace("mesh_force ", "force of mesh ")),
                     "at / Hz": f"{band.frequency:.1f}",
                     "apart / Hz": f"{band.frequency - peak.frequency:+.2f}",
                     "amplitude": _amplitude(band.line, band.amplitude),
                     "share / %": f"{100.0 * band.share:.1f}",
-                    "cause": band.cause,
+                    "cause": told(band.cause),
                 }
             )
     if not rows:
         return ""
     said = "Sidebands of the loudest peaks and their causes: lines at the speed of the peak that other meshes or the "
     table = pieces.table(rows, ("beside it", "cause"))
-    return pieces.folded(f"{said}turning planets make", pieces.paragraph(_passages(context, carriers)) + table)
+    return pieces.folded(f"{said}turning planets make", pieces.paragraph(told(_passages(context, carriers))) + table)
 
 
 def _passages(context: Context, carriers: Mapping[str, tuple[str, float]]) -> str:
@@ -312,14 +339,18 @@ def _curves(data: xr.Dataset, runs: Sequence[VariantRun], line: OrderLine) -> li
     place = _place(data, line)
     amplitude = data["amplitude"].to_numpy()[:, place, 0].astype(np.float64)
     speed, level = np.abs(data["speed"].to_numpy()) / RPM, _level(amplitude)
-    branches = settings_of(data.attrs).branches
-    curves = branch_curves(speed, level, data["growth"].to_numpy()) if branches else [Curve("steady", speed, level)]
+    quiet, curves = float(level.min()) - BELOW, []
     for run in runs:
         stored, _ = read_run(run.path, ("time", "overall_dte", "input_speed"))
         cut = run_up_cut(stored["time"], stored["overall_dte"], stored["input_speed"], line)
         label = f"run-up {run.attributes['load_case']}"
-        curves.append(Curve(label, np.abs(cut.speed) / RPM, _level(np.abs(cut.amplitude)), "dashed"))
-    return curves
+        cut_level = _level(np.abs(cut.amplitude))
+        heard = np.where(cut_level > quiet, cut_level, np.nan)
+        curves.append(Curve(label, np.abs(cut.speed) / RPM, heard, "dashed"))
+    # Above the others: what shows of a run-up is where it departs.
+    if settings_of(data.attrs).branches:
+        return [*curves, *branch_curves(speed, level, data["growth"].to_numpy())]
+    return [*curves, Curve("steady", speed, level)]
 
 
 def branch_curves(speed: Floats, level: Floats, growth: Floats) -> list[Curve]:
@@ -355,18 +386,18 @@ def _unit_rate(run: VariantRun) -> float:
     return sweep_rate(stored["time"], stored["input_speed"], 1.0)
 
 
-def _row(peak: Peak, data: xr.Dataset, rates: dict[str, float]) -> dict[str, object]:
+def _row(material: Material, peak: Peak, data: xr.Dataset, rates: dict[str, float]) -> dict[str, object]:
     damping = _damping(peak, data)
     row: dict[str, object] = {
-        "line": peak.line,
+        "line": material.words.told(peak.line),
         "speed / rpm": f"{abs(peak.speed) / RPM:.2f}",
         "frequency / Hz": f"{peak.frequency:.1f}",
-        "amplitude / µm": f"{1e6 * peak.amplitude:.3f}",
+        "amplitude / µm": figure_text(1e6 * peak.amplitude),
         "damping / %": "–" if damping is None else f"{100.0 * damping:.3f}",
     }
     for load_case, rate in rates.items():
         too_fast = damping is not None and sweep_severity(peak.frequency, damping, rate * peak.order) > TOO_FAST
-        row[f"run {load_case}"] = "–" if damping is None else TELL_FAST if too_fast else "slow enough"
+        row[f"run-up {load_case}"] = "–" if damping is None else TELL_FAST if too_fast else "slow enough"
     return row
 
 

@@ -11,6 +11,8 @@ from exugear.web import pieces
 
 LARGEST_PICTURE = 2_000_000
 """Bytes of a picture that a page takes in."""
+WIDTH = 640
+"""Of a picture, pixels."""
 
 
 def studies_section(material: Material) -> Part:
@@ -35,4 +37,4 @@ def _study(study: StoredStudy) -> str:
 def _picture(path: Path) -> str:
     content = base64.b64encode(path.read_bytes()).decode("ascii")
     words = path.stem.replace("_", " ")
-    return pieces.element("img", src=f"data:image/png;base64,{content}", alt=words, width=640)
+    return pieces.picture(f"data:image/png;base64,{content}", words, WIDTH)

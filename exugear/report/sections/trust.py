@@ -6,6 +6,7 @@ import json
 import platform
 from collections.abc import Iterator, Mapping
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,18 @@ GLOSSARY = {
     "variant": "How shafts are held: on ideal joints (rigid), on bearings (bushing), with elastic bodies (flexible).",
     "first-order shift": "Change of a frequency for a small change of a parameter, the shape of the mode held.",
     "inertia set": "One of the sets of masses and inertias that the case gives its bodies.",
+    "mesh law": "How the force of a mesh follows from the motion of its gears; line_of_action: along the line on which "
+    "flanks push each other, with a stiffness that varies over the mesh cycle.",
+    "housing factor": "Share of a deflection that the bearing takes where its seat yields, too; 1 is a rigid housing.",
+    "unsteady": "Of a resonance: shown with one length of the spectra's window and not with others.",
+    "steady response": "Vibration at constant speed: what a run-up would show if it were infinitely slow.",
+    "Campbell diagram": "Eigenfrequencies over speed, with the orders that may excite them.",
+    "whirl": "Motion of a shaft's axis on a circle, forward or backward against its turn.",
+    "sideband": "Line beside a loud one, at the distance of another frequency such as the carrier's.",
+    "L10, L10r": "Rating life that nine bearings of ten reach: by ISO 281, and by ISO/TS 16281 from the loads of all "
+    "rolling elements.",
+    "damage": "Miner's sum: cycles that occur over those that each load allows. One is worn out.",
+    "S_H, S_F": "Factor on the stress of the flank, or of the tooth root, at which the damage is one.",
 }
 """Words of the field that the page uses."""
 
@@ -73,8 +86,10 @@ def _assumptions(material: Material) -> str:
         "Modes: linearised at the static load, mesh stiffness averaged over the mesh cycle.",
         *_elastic_words(material),
     ]
+    # The page goes to others: folders of this machine are nobody's business.
+    file = "/".join(Path(gearbox.source).parts[-2:])
     return pieces.bullets(listed) + pieces.paragraph(
-        f"Sources and confidence of all inputs: {gearbox.source} and the README beside it.", "note"
+        f"Sources of all inputs: the comments of {file}, and what lies beside it.", "note"
     )
 
 

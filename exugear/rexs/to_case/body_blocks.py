@@ -152,6 +152,8 @@ def _shape(model: Model, body: Body, sections: Sequence[Cylinder], notes: Notes)
     pieces = [
         {"length_mm": one.length, "outer_diameter_mm": one.outer}
         | ({"inner_diameter_mm": one.inner} if one.inner else {})
+        | ({"outer_diameter_end_mm": one.outer_end} if one.outer_end not in (None, one.outer) else {})
+        | ({"inner_diameter_end_mm": one.inner_end} if one.inner_end not in (None, one.inner) else {})
         for one in sections
     ]
     entries = {

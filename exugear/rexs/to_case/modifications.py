@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from exugear.rexs.faults import RexsError
 from exugear.rexs.to_case.meshing import unchecked
-from exugear.rexs.to_case.notes import Entry, Notes, derived, read, tidy
+from exugear.rexs.to_case.notes import Entry, Notes, assumed, derived, read, tidy
 from exugear.rexs.to_case.toothing import EQUAL, Toothing
 from exugear.rexs.tree import Component, Model
 
@@ -24,6 +24,12 @@ MODIFICATIONS = (
     "end_relief_non_datum_face",
     "topographical_modification",
 )
+UNSIGNED = {"helix_slope": "helix_slope_um", "profile_slope": "profile_slope_um", "profile_twist": "twist_um"}
+"""Modifications by the attribute of their amount, and the key that it would be.
+
+Database and schema of REXS (1.2 to 2.0.0) allow both signs and call it an amount; which end of the flank a positive one
+takes material off, no public text says. The wrong sign would be worse than none.
+"""
 SHAPES = {"linear": "linear", "parabolic": "parabolic", "circular": "parabolic"}
 """Shapes of a relief, REXS to ours; a circle and its parabola differ by the square of depth over length."""
 
@@ -38,7 +44,7 @@ def modification_of(model: Model, gear: Toothing, notes: Notes) -> dict[str, Ent
     """
     left, right = (_by_type(model, gear.part, side) for side in ("left", "right"))
     for kind, part in {**right, **left}.items():
-        if kind not in READ:
+        if kind not in READ and kind not in UNSIGNED:
             notes.changed.append(f"{part} of {gear.part}: not imported; give it in [gears.NAME.modification]")
     entries: dict[str, Entry] = {}
     for kind in READ:
@@ -51,7 +57,24 @@ def modification_of(model: Model, gear: Toothing, notes: Notes) -> dict[str, Ent
         if not found:
             notes.changed.append(f"{one} of {gear.part}: not imported, its numbers say nothing that can be read here")
         entries |= found
-    return entries
+    return entries | dict(_blanks(gear, left, right, notes))
+
+
+def _blanks(
+    gear: Toothing, left: dict[str, Component], right: dict[str, Component], notes: Notes
+) -> Iterator[tuple[str, Entry]]:
+    """Slopes that the file gives, as zeros to be set: their signs are not known. Those of zero need no word."""
+    for kind, key in UNSIGNED.items():
+        part = left.get(kind) or right.get(kind)
+        amounts = [one[kind].quantity(kind, "mm") for one in (left, right) if kind in one]
+        if part is None or not any(amounts):
+            continue
+        said = ", ".join(dict.fromkeys(f"{_um(one):g} um" for one in amounts if one))
+        notes.changed.append(
+            f"{part} of {gear.part}: its amount of {said} is not taken, as REXS does not say which end a positive one "
+            f"takes material off; set {key} in [gears.NAME.modification], which does"
+        )
+        yield key, assumed(0.0, f"SET IT: {said} by {part}, the end unknown")
 
 
 def _by_type(model: Model, gear: Component, side: str) -> dict[str, Component]:

@@ -14,11 +14,10 @@ from exugear.rexs.to_case.notes import Notes, needed, tidy
 from exugear.rexs.to_case.places import Places
 from exugear.rexs.to_case.toothing import Toothing, is_rigid, material_of
 from exugear.rexs.tree import Component, Model
+from fe_ste.geometry.cylinders import Tube, mass_properties
 
 STEEL = 7850.0
 """Density assumed where the file gives none, kg/m3."""
-CONE_STEPS = 8
-"""Cylinders that stand for a cone."""
 LEVELLED = 0.1
 """Largest step of the diameter under a seat that is filled, over the diameter."""
 OVERHANG = 0.2
@@ -29,7 +28,10 @@ TOUCHING = 1e-4
 
 @dataclass(frozen=True)
 class Cylinder:
-    """Hollow cylinder about the z axis, mm and kg/m3, `aside` from the axis of its body (mm)."""
+    """Hollow cylinder or cone about the z axis, mm and kg/m3, `aside` from the axis of its body (mm).
+
+    A cone has diameters at its end that are others than where it begins.
+    """
 
     start: float
     length: float
@@ -37,16 +39,54 @@ class Cylinder:
     inner: float
     density: float
     aside: float = 0.0
+    outer_end: float | None = None
+    inner_end: float | None = None
 
     @property
-    def middle(self) -> float:
-        """Middle along z, mm."""
-        return self.start + 0.5 * self.length
+    def tube(self) -> Tube:
+        """The same in m."""
+        outer_end, inner_end = (None if end is None else 1e-3 * end for end in (self.outer_end, self.inner_end))
+        return Tube(
+            start=1e-3 * self.start,
+            length=1e-3 * self.length,
+            outer=1e-3 * self.outer,
+            inner=1e-3 * self.inner,
+            density=self.density,
+            outer_end=outer_end,
+            inner_end=inner_end,
+            aside=1e-3 * self.aside,
+        )
+
+    @property
+    def outers(self) -> tuple[float, float]:
+        """Outer diameters at both ends, mm."""
+        return self.outer, self.outer if self.outer_end is None else self.outer_end
+
+    @property
+    def inners(self) -> tuple[float, float]:
+        """Inner diameters at both ends, mm."""
+        return self.inner, self.inner if self.inner_end is None else self.inner_end
 
     @property
     def mass(self) -> float:
         """Mass, kg."""
-        return 1e-9 * self.density * 0.25 * math.pi * (self.outer**2 - self.inner**2) * self.length
+        return mass_properties([self.tube]).mass
+
+    @property
+    def is_cone(self) -> bool:
+        """Whether a diameter changes along it."""
+        return self.outer_end is not None or self.inner_end is not None
+
+    def part(self, start: float, stop: float) -> Cylinder:
+        """Return what lies between two places, mm."""
+        if not self.is_cone:
+            return dataclasses.replace(self, start=start, length=tidy(stop - start))
+        shares = [(place - self.start) / self.length for place in (start, stop)]
+        outer, outer_end, inner, inner_end = (
+            tidy(round(low + share * (high - low), 9)) for low, high in (self.outers, self.inners) for share in shares
+        )
+        ends = {"outer": outer, "outer_end": outer_end, "inner": inner, "inner_end": inner_end}
+        return dataclasses.replace(self, start=start, length=tidy(stop - start), **ends)
 
 
 @dataclass(frozen=True)
@@ -68,18 +108,8 @@ def inertia_of(cylinders: Iterable[Cylinder]) -> Inertia:
     >>> round(disc.mass, 3), round(disc.axial, 5), round(disc.transverse, 5), disc.centre
     (24.662, 0.12331, 0.08221, 50.0)
     """
-    parts = [one for one in cylinders if one.mass > 0.0]
-    mass = sum(one.mass for one in parts)
-    if mass <= 0.0:
-        return Inertia(0.0, 0.0, 0.0, 0.0)
-    centre = sum(one.mass * one.middle for one in parts) / mass
-    axial = transverse = 0.0
-    for one in parts:
-        squares = 1e-6 * (one.outer**2 + one.inner**2)
-        axial += one.mass * (squares / 8.0 + 1e-6 * one.aside**2)
-        transverse += one.mass * (squares / 16.0 + 1e-6 * (one.length**2 / 12.0 + 0.5 * one.aside**2))
-        transverse += one.mass * 1e-6 * (one.middle - centre) ** 2
-    return Inertia(mass, axial, transverse, centre)
+    found = mass_properties(one.tube for one in cylinders)
+    return Inertia(found.mass, found.axial, found.transverse, 1e3 * found.centre)
 
 
 def sections_of(model: Model, places: Places, shaft: Component, body: Body, notes: Notes) -> list[Cylinder]:
@@ -103,14 +133,21 @@ def sections_of(model: Model, places: Places, shaft: Component, body: Body, note
     aside = math.dist((x, y), body.axis)
     pieces: list[Cylinder] = []
     for section in owned:
-        for start, length, outer, inner in _pieces(section, len(owned), notes):
+        for start, length, outers, inners in _pieces(section, len(owned), notes):
             begin = origin + (start if sense > 0 else -start - length)
-            pieces.append(Cylinder(tidy(round(begin, 6)), tidy(length), outer, inner, density, round(aside, 6)))
+            (outer, outer_end), (inner, inner_end) = (
+                pair if sense > 0 or pair[1] is None else (pair[1], pair[0]) for pair in (outers, inners)
+            )
+            place = tidy(round(begin, 6)), tidy(length)
+            pieces.append(Cylinder(*place, outer, inner, density, round(aside, 6), outer_end, inner_end))
     return sorted(pieces, key=lambda one: one.start)
 
 
-def _pieces(section: Component, count: int, notes: Notes) -> list[tuple[float, float, float, float]]:
-    """(start, length, outer, inner) of a section, mm; a cone as steps of its mean diameters."""
+_Ends = tuple[float, float | None]
+
+
+def _pieces(section: Component, count: int, notes: Notes) -> list[tuple[float, float, _Ends, _Ends]]:
+    """(start, length, outer, inner) of a section along u, mm: diameters at its beginning, of a cone at its end, too."""
     if not section.attributes:
         notes.ignored.append(f"{section}: has no values")
         return []
@@ -127,14 +164,8 @@ def _pieces(section: Component, count: int, notes: Notes) -> list[tuple[float, f
     if length <= 0.0 or min(begin, end) <= 0.0 or bore >= begin or bore_end >= end:
         raise RexsError(f"{section}: length and diameters of {length:g}, {begin:g} and {bore:g} mm make no section")
     if begin == end and bore == bore_end:
-        return [(start, length, begin, bore)]
-    notes.changed.append(f"{section}: a cone, taken as {CONE_STEPS} steps")
-    step = length / CONE_STEPS
-    shares = [(number + 0.5) / CONE_STEPS for number in range(CONE_STEPS)]
-    return [
-        (start + number * step, step, tidy(begin + share * (end - begin)), tidy(bore + share * (bore_end - bore)))
-        for number, share in enumerate(shares)
-    ]
+        return [(start, length, (begin, None), (bore, None))]
+    return [(start, length, (begin, end), (bore, bore_end))]
 
 
 def _density(model: Model, part: Component, notes: Notes) -> float:
@@ -158,7 +189,9 @@ def seat_diameter(sections: Sequence[Cylinder], z: float, width: float, internal
     under = [one for one in sections if one.start < high - TOUCHING and one.start + one.length > low + TOUCHING]
     if not under:
         return None
-    return min(one.inner for one in under) if internal else max(one.outer for one in under)
+    return (
+        min(end for one in under for end in one.inners) if internal else max(end for one in under for end in one.outers)
+    )
 
 
 def gear_tube(model: Model, gear: Toothing, z: float, seat: float | None, aside: float, notes: Notes) -> Cylinder:
@@ -181,7 +214,7 @@ def plate(model: Model, places: Places, part: Component, notes: Notes) -> Cylind
 
 
 def levelled(sections: Sequence[Cylinder], seats: Iterable[tuple[str, float, float]], notes: Notes) -> list[Cylinder]:
-    """Fill grooves and small shoulders under seats, which the elastic shaft wants of one diameter.
+    """Fill grooves and small shoulders under seats, which the elastic shaft wants on one cylinder or cone.
 
     Parameters
     ----------
@@ -196,12 +229,12 @@ def levelled(sections: Sequence[Cylinder], seats: Iterable[tuple[str, float, flo
         pieces = _lengthened(pieces, name, (low, high), notes)
         pieces = [part for piece in pieces for part in _cut(piece, (low, high))]
         under = [one for one in pieces if low - TOUCHING < one.start and one.start + one.length < high + TOUCHING]
-        outers = [one.outer for one in under]
-        if len(set(outers)) < 2 or min(outers) < (1.0 - LEVELLED) * max(outers):
+        outers = [end for one in under for end in one.outers]
+        if len(under) < 2 or len(set(outers)) < 2 or min(outers) < (1.0 - LEVELLED) * max(outers):
             continue
         least, most = min(outers), max(outers)
         notes.changed.append(f"{name}: shaft of {least:g} to {most:g} mm under it taken as {most:g}")
-        pieces = [dataclasses.replace(one, outer=max(outers)) if one in under else one for one in pieces]
+        pieces = [dataclasses.replace(one, outer=most, outer_end=None) if one in under else one for one in pieces]
     return _merged(pieces)
 
 
@@ -226,7 +259,7 @@ def _cut(piece: Cylinder, places: Sequence[float]) -> Iterator[Cylinder]:
     end = piece.start + piece.length
     inside = [place for place in places if piece.start + TOUCHING < place < end - TOUCHING]
     for start, stop in itertools.pairwise([piece.start, *inside, end]):
-        yield dataclasses.replace(piece, start=start, length=tidy(stop - start))
+        yield piece.part(start, stop) if inside else dataclasses.replace(piece, length=tidy(stop - start))
 
 
 def _merged(pieces: Sequence[Cylinder]) -> list[Cylinder]:
@@ -235,7 +268,7 @@ def _merged(pieces: Sequence[Cylinder]) -> list[Cylinder]:
     for piece in pieces:
         last = joined[-1] if joined else None
         alike = last is not None and dataclasses.replace(last, start=piece.start, length=piece.length) == piece
-        if last is not None and alike and abs(last.start + last.length - piece.start) <= TOUCHING:
+        if last is not None and alike and not piece.is_cone and abs(last.start + last.length - piece.start) <= TOUCHING:
             joined[-1] = dataclasses.replace(last, length=tidy(last.length + piece.length))
         else:
             joined.append(piece)

@@ -77,7 +77,10 @@ function rangeOf(columns) {
     low = Math.min(low, value);
     high = Math.max(high, value);
   }
-  return low < high ? [low, high] : [low - 0.5, high + 0.5];
+  if (low === high) return [low - 0.5, high + 0.5];
+  // What changes by less than a hundredth is to look as if it stood still.
+  const lacking = 0.01 * Math.max(Math.abs(low), Math.abs(high)) - (high - low);
+  return lacking > 0 ? [low - lacking / 2, high + lacking / 2] : [low, high];
 }
 
 /** @param {[number, number]} range @returns {[number, number]} */
@@ -101,14 +104,14 @@ function optionsOf(chart, curves) {
     axes,
     series: [
       {},
-      ...curves.map((curve) => ({
+      ...curves.map((curve, number) => ({
         label: curve.label,
         scale: curve.right ? "right" : "y",
-        stroke: curve.style === "thin" ? pageColour("--soft") : curveColour(firstOfKind(curves, curve)),
+        stroke: colourOf(curves, number),
         width: curve.style === "points" ? 0 : curve.style === "thin" ? 1 : 2,
         dash: curve.style === "dashed" ? [6, 4] : [],
         spanGaps: true,
-        points: { show: curve.style === "points" || curve.x.length < 3, size: 6, fill: curveColour(firstOfKind(curves, curve)) },
+        points: { show: curve.style === "points" || curve.x.length < 3, size: 6, fill: colourOf(curves, number) },
       })),
     ],
     hooks: { draw: [(plot) => paintMarks(plot, chart)] },
@@ -139,11 +142,22 @@ function legendOf(curves) {
   const told = curves.filter((curve, place) => firstOfKind(curves, curve) === place);
   for (const curve of told) {
     const sign = make("i", { class: `sign ${curve.style}` });
-    const colour = curve.style === "thin" ? pageColour("--soft") : curveColour(curves.indexOf(curve));
-    sign.style.borderColor = colour;
+    sign.style.borderColor = colourOf(curves, curves.indexOf(curve));
     legend.append(make("span", {}, sign, kindOf(curve)));
   }
   return legend;
+}
+
+/**
+ * A colour for each kind of curve; thin ones are told apart only if there are several kinds of them.
+ * @param {Curve[]} curves
+ * @param {number} number
+ */
+function colourOf(curves, number) {
+  const kinds = [...new Set(curves.map(kindOf))];
+  const thin = new Set(curves.filter((curve) => curve.style === "thin").map(kindOf));
+  const curve = curves[number];
+  return curve.style === "thin" && thin.size < 2 ? pageColour("--soft") : curveColour(kinds.indexOf(kindOf(curve)));
 }
 
 /** @param {Curve} curve */

@@ -80,7 +80,7 @@ def test_the_housing_factor_counts_only_where_there_are_bearings(spur):
 
 
 def test_planet_bearings_of_the_grc_are_those_between_planets_and_carrier(grc, stiffness):
-    base = parameter(grc, "bushing", "planet bearings", stiffness).build(1.0)
+    base = parameter(grc, "bushing", "stiffness of planet bearings", stiffness).build(1.0)
     places = planet_bearings(grc, base)
     assert [base.connector_names[place] for place in places] == [f"pl_{row}_{n}" for row in "ab" for n in (1, 2, 3)]
     doubled = scaled_bearings(base, places, 2.0).connectors

@@ -12,7 +12,9 @@ import xarray as xr
 from exugear.findings.constant_speed import constant_speed_of, truest_of
 from exugear.findings.facts import facts_of_response
 from exugear.findings.groups import RankedResonance
+from exugear.findings.words import Words
 from exugear.model.choice import Choice
+from exugear.model.gearbox import Gearbox
 from exugear.spectra.orders import OrderLine
 from exugear.steady.settings import SpeedRange, SteadySettings
 
@@ -101,6 +103,6 @@ def test_a_mode_is_that_of_the_exact_frequency_not_of_the_run_up_s(runs):
 
 
 def test_without_a_run_up_the_loudest_is_told_by_the_response():
-    (fact,) = facts_of_response(response())
+    (fact,) = facts_of_response(Words(Gearbox.from_toml("cases/grc750/gearbox.toml")), response())
     assert fact.figure == "790 Hz"
     assert "Excited by mesh." in fact.sentence and "±201 µm" in fact.sentence

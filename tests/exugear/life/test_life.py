@@ -21,7 +21,7 @@ from exugear.dynamics.statics import locked_equilibrium
 from exugear.kernels.meshes import FORCE
 from exugear.life.acting_loads import acting_loads
 from exugear.life.dynamic_factor import stated_factors
-from exugear.life.gear_life import flank_lives
+from exugear.life.gear_life import beyond_tables, flank_lives
 from exugear.life.life import checked_loads, compute_life, rating_of, shortfalls
 from exugear.life.life_diagrams import damage_matrix
 from exugear.life.life_file import limits, read_life
@@ -154,6 +154,25 @@ def test_safety_is_the_factor_on_stress_at_which_the_damage_is_one(tmp_path, str
         scaled = f"torque_N_m,speed_rpm,hours\n{100 * factor:.9g},1500,3\n{200 * factor:.9g},1000,1\n"
         more = lives(spur_project(tmp_path, scaled), stresses)["pinion +"]
         assert getattr(more, damage) == pytest.approx(1.0, rel=1e-3)
+
+
+def test_misalignment_beyond_a_table_is_told(grc):
+    """Stresses of a table from -10 to 10 um over the face, under a balance that tilts gears by more."""
+    gearbox = grc.gearbox
+    counted = count_loads(gearbox)
+    acting, balance = acting_loads(counted), static_balance(grc.assembly(), "carrier", np.array([240e3]), 1)
+    pair = gearbox.gear_pairs["high_speed"]
+    flat = np.ones((1, 2))
+    for opening, told in ((10e-6, 1), (1e-3, 0)):
+        stress = MeshCycleStress(
+            torque=np.ones(1),
+            misalignment=np.array([-opening, opening]) / pair.face_width,
+            **dict.fromkeys(("hertz", "pitch_hertz", "outside", "face_load"), flat),
+            **dict.fromkeys(("root", "compression"), np.ones((1, 2, 2))),
+        )
+        lines = list(beyond_tables(gearbox, acting, balance, {"high_speed": stress}))
+        assert len(lines) == told
+        assert all(line.startswith("high_speed: its misalignment reaches") for line in lines)
 
 
 def test_safeties_below_what_is_asked_for_are_named(tmp_path, stresses):
@@ -385,6 +404,8 @@ def test_the_verb_tells_what_limits_and_what_that_rests_on(tmp_path, first):
     result = CliRunner().invoke(cli.app, [*arguments, "--json"])
     assert result.exit_code == 0, result.output
     told = json.loads(result.stdout)
+    (relief,) = told["reliefs"]
+    assert relief.startswith("spur: up to ") and relief.endswith("its flanks need tip relief")
     assert [one["flank"] for one in told["flanks"]] == ["pinion + spur", "wheel + spur"]
     assert told["limits"][0]["damage"] >= told["limits"][-1]["damage"]
     assert any("variant rigid has none" in line for line in told["unrated"])

@@ -78,6 +78,23 @@ def test_a_torque_reversal_loads_the_other_flanks(tmp_path):
     counted = count_loads(loaded(tmp_path, "torque_N_m,speed_rpm,hours\n1000,10,3\n-500,10,1\n"))
     parts = {row["part"]: row["cycles"] for row in counted.part_rows()}
     assert parts["hs_pinion, flank -"] == pytest.approx(3.0 * parts["hs_pinion, flank +"])
+    forces = {row["part"]: row["force_kN"] for row in counted.part_rows()}
+    assert forces["hs_pinion, flank -"] == pytest.approx(2.0 * forces["hs_pinion, flank +"])
+
+
+@pytest.mark.parametrize("line", ["0,10,1", "100,0,1"])
+def test_loads_that_wear_nothing_are_refused(tmp_path, line):
+    with pytest.raises(CaseError, match="no source of fatigue has torque, speed and hours at once"):
+        count_loads(loaded(tmp_path, f"torque_N_m,speed_rpm,hours\n{line}\n"))
+
+
+def test_revolutions_backwards_count_as_those_forwards(tmp_path):
+    """What matters to a flank is that it is loaded once more; which flank, the sign of the torque says."""
+    one, other = (
+        count_loads(loaded(tmp_path, f"torque_N_m,speed_rpm,hours\n1000,{speed},3\n-500,10,1\n")).part_rows()
+        for speed in (10, -10)
+    )
+    assert one == other
 
 
 def test_load_cases_of_a_rexs_file():
@@ -106,7 +123,14 @@ HEADED = "time_s,carrier_N_m,carrier_rpm\n"
         ("time_s,carrier_N_m\n0,1\n1,1\n2,1\n", {"skip_s": 0.0}, "no channel 'carrier_rpm'"),
         ("time_s,carrier_kN,carrier_rpm\n0,1,1\n1,1,1\n2,1,1\n", {"skip_s": 0.0, "torque": "carrier_kN"}, "unit 'kN'"),
         ("torque_N_m,hours\n1,1\n2,2\n", {}, "headings torque_N_m,hours"),
-        ("torque_N_m,speed_rpm,hours\n1,1,1\n2,2,-2\n", {}, "hours not negative"),
+        ("torque_N_m,speed_rpm,hours\n1,1,1\n2,2,-2\n", {}, "line 3 has 2,2,-2; .*hours not negative"),
+        ("torque_N_m,speed_rpm,hours\n1,nan,1\n", {}, "line 2 has 1,nan,1"),
+        ("torque_N_m,speed_rpm,hours\n1,1,0\n", {}, "all hours are 0"),
+        ("torque_N_m,speed_rpm,hours\n1e12,1,1\n", {}, "largest torque is 1e.12 N m; up to 1e.09"),
+        ("torque_N_m,speed_rpm,hours\n", {}, "has headings alone"),
+        ("torque_N_m;speed_rpm;hours\n1;1;1\n", {}, "separated by commas"),
+        ("torque_N_m,speed_rpm,speed_rpm\n1,1,1\n", {}, "two columns are called 'speed_rpm'"),
+        ("", {}, "is empty"),
         ("torque_N_m,speed_rpm,hours\n1,1,1\n", {"skip_s": 3.0}, "skip_s: makes no sense for a table"),
         ("torque_N_m,speed_rpm,hours\n1,1,1\n", {"hours_per_year": 8766.0, "file": "missing.csv"}, "no such file"),
     ],

@@ -421,6 +421,45 @@ def test_faults_that_have_nothing_to_do_with_each_other_are_told_at_once(tmp_pat
     assert list(caught.value.faults) == faults
 
 
+def test_faults_of_writing_hide_no_faults_of_what_could_be_read(tmp_path: Path) -> None:
+    """A misspelt key of one gear, a missing table: another gear, a bearing and a matrix are judged all the same."""
+    content = gear_trains.planetary("ring")
+    content["gears"]["planet"]["theeth"] = 3
+    content["gears"]["sun"]["profile_shift"] = 3.0
+    del content["static_load"]
+    first = next(iter(content["bearings"].values()))
+    first.pop("stiffness", None)
+    first["catalogue"] = {
+        "type": "cylindrical_roller", "bore_mm": 50.0, "outer_diameter_mm": 90.0, "width_mm": 20.0,
+        "element_count": 60, "element_diameter_mm": 13.0, "radial_load_kN": 1.0,
+    }  # fmt: skip
+    file = tmp_path / "case.toml"
+    file.write_text(toml_text(content), encoding="utf-8")
+    outcome = exugear("check", file, "--json")
+    assert outcome.exit_code == 2
+    faults = json.loads(outcome.stdout)["faults"]
+    assert [fault.split(": ")[1] for fault in faults[:2]] == ["static_load", "gears.planet.theeth = 3"]
+    assert any(": gears.sun: " in fault for fault in faults)
+    assert any(".catalogue: " in fault for fault in faults)
+    # What rests on the planet is left alone: its pairs, and the body that carries it.
+    assert not any(f": {key}" in fault for fault in faults for key in ("pairs.", "bodies.", "meshes."))
+
+
+def test_a_gear_that_follows_from_a_pair_is_left_alone_where_the_pair_cannot_be_read(case: Any) -> None:
+    with pytest.raises(CaseError) as caught:
+        case("spur", gears__pinion__profile_shift=0.0, gears__pinion__profile_shift_from_centre_distance=True,
+             pairs__spur__centre_distance_mm="far")  # fmt: skip
+    assert len(caught.value.faults) == 1
+    assert "pairs.spur.centre_distance_mm = 'far': must be a number" in caught.value.faults[0]
+
+
+@pytest.mark.parametrize("gears", [3, {"pinion": 4}, {"pinion": {"teeth": []}}])
+def test_tables_that_are_none_are_told_and_nothing_more(case: Any, gears: Any) -> None:
+    with pytest.raises(CaseError, match="gears") as caught:
+        case("spur", gears=gears)
+    assert not any("no such gear" in fault for fault in caught.value.faults)
+
+
 def test_a_seat_beside_its_shaft_makes_the_variant_flexible_impossible() -> None:
     gearbox = Gearbox.from_dict(gear_trains.pair()).varied({"bodies.input.shape.start_z_mm": -20.0})
     with pytest.raises(CaseError, match=r"bodies.input.shape: seat") as caught:

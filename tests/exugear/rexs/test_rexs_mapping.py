@@ -183,9 +183,29 @@ def test_modifications_that_differ_between_the_flanks_are_refused_and_unknown_on
     )
     with pytest.raises(RexsError, match="left and right flank differ in tip_relief"):
         gearbox_of(one_sided)
-    slopes = (Relation("reference", 0, {"origin": number, "referenced": 900}) for number in (361, 362))
-    made = to_case(with_relations(with_values(SEW, {}, Component(900, "helix_slope")), *slopes), "case")
-    assert any("helix_slope 900 of cylindrical_gear 23" in line for line in made.changed)
+    end_relief = (Relation("reference", 0, {"origin": number, "referenced": 900}) for number in (361, 362))
+    made = to_case(with_relations(with_values(SEW, {}, Component(900, "end_relief_datum_face")), *end_relief), "case")
+    assert any("end_relief_datum_face 900 of cylindrical_gear 23" in line for line in made.changed)
+
+
+@pytest.mark.parametrize(
+    ("kind", "key"),
+    [("helix_slope", "helix_slope_um"), ("profile_slope", "profile_slope_um"), ("profile_twist", "twist_um")],
+)
+@pytest.mark.parametrize("amount", [0.012, 0.0])
+def test_a_slope_whose_sign_is_not_known_becomes_a_zero_to_be_set(kind: str, key: str, amount: float):
+    part = Component(900, kind, attributes={kind: Attribute(amount, "mm")})
+    flanks = (Relation("reference", 0, {"origin": number, "referenced": 900}) for number in (361, 362))
+    made = to_case(with_relations(with_values(SEW, {}, part), *flanks), "case")
+    lines = [line for line in made.text.splitlines() if line.startswith(key)]
+    told = [line for line in made.changed if kind in line]
+    if amount:
+        assert "SET IT: 12 um" in lines[0]
+        assert "its amount of 12 um is not taken" in told[0]
+    else:
+        assert not lines
+        assert not told
+    assert getattr(made.gearbox.modifications["gear_1"], key.removesuffix("_um")) == 0.0
 
 
 def test_a_soft_coupling_joins_spins_and_a_stiff_one_makes_one_body():
@@ -239,15 +259,42 @@ def test_a_bearing_of_a_kind_without_law_is_a_blank_with_its_name():
     assert any("axial_grooved_ball_bearing has no law here" in line for line in made.changed)
 
 
-def test_a_cone_has_the_mass_of_steps_that_follow_it():
-    """Eight steps of mean diameters: volume of a frustum 25 to 20 mm, (a2 + ab + b2)/3, to a part in 10^4."""
+def test_a_cone_is_one_with_its_mass_and_its_shape():
+    """Volume of a frustum from 25 to 24 mm: (a2 + ab + b2) / 3; the mass has six digits in the file."""
     plain = gearbox_of(SEW).body("shaft_1").mass
     section = next(part for part in SEW.related("assembly", "assembly", 4, "part") if part.number == 388)
     length = section.quantity("length", "mm")
     coned = gearbox_of(with_values(SEW, {388: {"outer_diameter_end": 24.0}}))
     steel = 7850e-9 * math.pi / 4.0 * length
     expected = plain + steel * ((25.0**2 + 25.0 * 24.0 + 24.0**2) / 3.0 - 25.0**2)
-    assert coned.body("shaft_1").mass == pytest.approx(expected, rel=1e-2)
+    assert coned.body("shaft_1").mass == pytest.approx(expected, rel=2e-5)
+    cones = [one for one in shape_of(coned, "shaft_1").sections if one.outer_diameter_end_mm is not None]
+    assert (cones[0].outer_diameter_mm, cones[-1].outer_diameter_end_mm) == (25.0, 24.0)
+    # What a seat lies on is levelled; the rest follows without a step.
+    assert all(one.outer_diameter_end_mm < one.outer_diameter_mm for one in cones)
+
+
+def test_a_cone_of_a_shaft_that_points_the_other_way_is_turned_round():
+    length = 59.5
+    parts = [p for p in SEW.related("assembly", "assembly", 5, "part") if p.type == "shaft_section"]
+    cone = parts[-1]
+    ends = {"outer_diameter_begin": 20.0, "outer_diameter_end": 16.0}
+    ahead = with_values(SEW, {cone.number: ends})
+    sections = {
+        part.number: {
+            "u_coordinate_on_shaft": length
+            - part.quantity("u_coordinate_on_shaft", "mm")
+            - part.quantity("length", "mm")
+        }
+        for part in parts
+    }
+    sections[cone.number] |= {"outer_diameter_begin": 16.0, "outer_diameter_end": 20.0}
+    x, y, z = SEW.components[5].vector("support_vector")
+    turned = {5: {"support_vector": (x + length, y, z), "u_axis_vector": (-1.0, 0.0, 0.0)}}
+    one, other = (gearbox_of(model).body("shaft_2") for model in (ahead, with_values(SEW, {**sections, **turned})))
+    assert other.mass == pytest.approx(one.mass)
+    assert other.centre_of_mass_z == pytest.approx(one.centre_of_mass_z)
+    assert one.mass != gearbox_of(SEW).body("shaft_2").mass
 
 
 def test_a_file_without_torque_gets_one_that_is_marked():

@@ -6,11 +6,12 @@ import math
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from fe_ste.elasticity.hexmesh import MeshSettings, sector_mesh
 from fe_ste.geometry.gears import BasicRack, Gear, GearPair
 from fe_ste.root_stress.gauges import gauge_columns, gauge_places
-from fe_ste.root_stress.mesh_cycle import hertz_stress
+from fe_ste.root_stress.mesh_cycle import hertz_stress, mesh_cycle_stress
 from fe_ste.root_stress.root import RootGauges, root_gauges
 from fe_ste.standards.pitting import nominal_contact_stress
 from fe_ste.standards.tooth_root import form_and_correction
@@ -99,3 +100,28 @@ def test_hertz_stress_at_the_pitch_point_is_that_of_iso_6336_2():
     found = hertz_stress(pair, line_load, np.array([pair.path_pitch_point]))[0]
     ratio = math.sqrt((4.0 - pair.transverse_contact_ratio) / 3.0)
     assert found * ratio == pytest.approx(nominal_contact_stress(pair, force), rel=1e-6)
+
+
+@pytest.mark.parametrize("member", [0, 1])
+def test_tip_edges_that_dig_in_above_a_fillet_bend_less_than_loads_at_the_tip(gauges, member):
+    """All load on a twelfth of the face at one end of the path: what it presses in beside a gauge is no bending."""
+    pair = fzg_c()
+    axial = (np.arange(12) - 5.5) / 12.0 * WIDTH
+    load = np.zeros((1, 1, 1, 1, 1, 12))
+    load[..., -1] = 1e6
+    deep, tip = (pair.path_start, pair.path_end)[:: -1 if member else 1]
+
+    def root(path: float) -> float:
+        pmc = (path - pair.path_pitch_point) / pair.transverse_base_pitch
+        names = ("pmc", "torque", "centre_distance", "misalignment", "tooth", "axial_position")
+        coordinates = {
+            "pmc": [pmc],
+            "torque": [100.0],
+            "centre_distance": [pair.centre_distance],
+            "misalignment": [0.0],
+        }
+        states = xr.Dataset({"line_load": (names, load)}, {**coordinates, "tooth": [0.0], "axial_position": axial})
+        return float(mesh_cycle_stress(pair, states, gauges).root[0, 0, member])
+
+    assert root(deep) < root(tip)  # five times as much if gauges read loads beside them
+    assert root(deep) == pytest.approx(root(pair.path_pitch_point), rel=0.15)
