@@ -273,12 +273,13 @@ def tangents(frame: RotatingFrame, psi: float, speed: float, u: Floats) -> tuple
 
     The input turns at `speed` (rad/s).
     """
-    damping = _slopes(lambda step: _residual(frame, psi, speed, u, step), len(u), RATE_STEP)
+    here = np.tile(u, (len(u), 1))
+    damping = _slopes(lambda steps: _residuals(frame, psi, speed, here, steps), len(u), RATE_STEP)
     return damping, _stiffness(frame, psi, speed, u)
 
 
 def _stiffness(frame: RotatingFrame, psi: float, speed: float, u: Floats) -> Floats:
-    return _slopes(lambda step: _residual(frame, psi, speed, u + step), len(u), PLACE_STEP)
+    return _slopes(lambda steps: _residuals(frame, psi, speed, u + steps, None), len(u), PLACE_STEP)
 
 
 def _mass(frame: RotatingFrame, psi: float, u: Floats) -> Floats:
@@ -290,9 +291,19 @@ def _mass(frame: RotatingFrame, psi: float, u: Floats) -> Floats:
     return np.asarray(t.T @ np.array(columns).T)
 
 
+def _residuals(frame: RotatingFrame, psi: float, speed: float, u: Floats, du: Floats | None) -> Floats:
+    """Return `_residual` at several coordinates and velocities (n, size) at once: bearings have much in common."""
+    assembly, t = frame.assembly, frame.matrices(psi)[0]
+    states = [frame.state(psi, speed, own, None if du is None else du[n]) for n, own in enumerate(u)]
+    q, v, _ = (np.array(values) for values in zip(*states, strict=True))
+    needed = np.array([assembly.inertia_forces(*state) for state in states])
+    return np.asarray((needed - assembly.forces(q, v, frame.mean_meshes)) @ t)
+
+
 def _slopes(function: Callable[[Floats], Floats], size: int, step: float) -> Floats:
-    columns = [(function(e) - function(-e)) / (2.0 * step) for e in step * np.eye(size)]
-    return np.array(columns).T
+    """Derivatives (size, size) by central differences of a function of several steps (n, size) at once."""
+    steps = step * np.eye(size)
+    return np.asarray((function(steps) - function(-steps)).T / (2.0 * step))
 
 
 def _static(
