@@ -301,7 +301,7 @@ def _residuals(frame: RotatingFrame, psi: float, speed: float, u: Floats, du: Fl
 
 
 def _slopes(function: Callable[[Floats], Floats], size: int, step: float) -> Floats:
-    """Derivatives (size, size) by central differences of a function of several steps (n, size) at once."""
+    """Take derivatives (size, size) by central differences of a function of several steps (n, size) at once."""
     steps = step * np.eye(size)
     return np.asarray((function(steps) - function(-steps)).T / (2.0 * step))
 
