@@ -90,6 +90,13 @@ def measure_studies(quick: bool) -> dict[str, Any]:
     return studies.measure(quick)
 
 
+def measure_report(quick: bool) -> dict[str, Any]:
+    """See `report_page`."""
+    import report_page
+
+    return report_page.measure(quick)
+
+
 PARTS: dict[str, Callable[[bool], dict[str, Any]]] = {
     "startup": measure_startup,
     "tables": measure_tables,
@@ -100,6 +107,7 @@ PARTS: dict[str, Callable[[bool], dict[str, Any]]] = {
     "steady": measure_steady,
     "loads": measure_loads,
     "studies": measure_studies,
+    "report": measure_report,
 }
 
 

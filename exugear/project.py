@@ -28,8 +28,6 @@ from exugear.results.run_file import FINAL_NAME
 from exugear.runs.outcome import Run
 from exugear.runs.run_folder import run_directory
 from exugear.runs.runup import simulate
-from exugear.steady.settings import SteadySettings, usual_speeds
-from exugear.steady.steady_file import steady_path, stored_or_computed
 from exugear.tooth_mesh.law import MeshData
 from exugear.tooth_mesh.laws.registry import LAWS
 from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
@@ -41,6 +39,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from exugear.report.writer import Report
+    from exugear.steady.settings import SteadySettings
 
 
 @dataclass(frozen=True)
@@ -229,6 +228,9 @@ class Project:
         progress : callable, optional
             Called with the number of speeds that are solved, and of all.
         """
+        from exugear.steady.settings import SteadySettings, usual_speeds  # which a run needs not
+        from exugear.steady.steady_file import stored_or_computed
+
         settings = settings or SteadySettings(usual_speeds(self.gearbox))
         assembly, choice = self.assembly(), self.choice
         self.keep_case()
@@ -237,6 +239,8 @@ class Project:
 
     def steady_path(self, settings: SteadySettings) -> Path:
         """File of the steady response."""
+        from exugear.steady.steady_file import steady_path
+
         return steady_path(self.folder, self.choice, settings)
 
     def bearings(self) -> tuple[BearingDuty, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 import json
 from pathlib import Path
 from types import ModuleType
@@ -15,12 +15,9 @@ FOLDER = ROOT / "benchmarks"
 
 @pytest.fixture(scope="module")
 def reporting() -> ModuleType:
-    specification = importlib.util.spec_from_file_location("reporting", FOLDER / "reporting.py")
-    assert specification is not None
-    assert specification.loader is not None
-    module = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(module)
-    return module
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(FOLDER)  # as for the scripts, which import each other by their names
+        return importlib.import_module("reporting")
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +57,7 @@ def test_stored_accuracy_is_what_is_asked_for(results: dict) -> None:
 
 def test_every_part_says_what_it_ran_on(results: dict) -> None:
     parts = {"startup", "tables", "dynamics", "grids", "elastic", "bearings", "steady", "loads", "studies"}
-    assert set(results) == parts
+    assert parts <= set(results)
     for part in results.values():
         assert part["load_at_start"] >= 0.0
         assert part["cores_busy_before"] is None or part["cores_busy_before"] >= 0.0

@@ -10,7 +10,7 @@ from exugear.web import pieces
 
 def page_body(material: Material, parts: Sequence[Part]) -> str:
     """Put the sections together: warnings first, then what was found, then what is left out."""
-    gearbox, notes = material.context.gearbox, material.context.notes
+    notes = material.context.notes
     warning = "Runs that are not to be trusted; what follows shows them all the same"
     head = pieces.element(
         "header",
@@ -22,9 +22,8 @@ def page_body(material: Material, parts: Sequence[Part]) -> str:
     main = pieces.element(
         "main", above + _sets(material) + "".join(part.html for part in parts) + left_out, id="content"
     )
-    foot = pieces.element(
-        "footer", pieces.paragraph(f"Made by exugear from {gearbox.source}. This page asks nothing of any network.")
-    )
+    told = f"Made by exugear from {material.file_words}. This page asks nothing of any network."
+    foot = pieces.element("footer", pieces.paragraph(told))
     skip = pieces.element("a", "Skip to the content", class_="skip", href="#content")
     live = pieces.element("p", "", id="said", class_="toast", role="status", aria_live="polite")
     tip = pieces.element("p", "", id="tip", class_="tip", hidden=True)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from concurrent.futures import Future
+from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -26,6 +29,9 @@ if TYPE_CHECKING:
 
 #: Fewer positions of the mesh cycle would not show the harmonics that dynamics ask of a table.
 LEAST_TABLE_POSITIONS = 8
+
+#: Pictures of teeth that take longer than another process takes to start: a second or so each.
+WORTH_A_PROCESS = 3
 
 
 class Method(StrEnum):
@@ -67,7 +73,6 @@ def ste(
     the others and serve to check them; dynamics do not use them.
     """
     with exit_codes():
-        from exugear.pictures.tables import draw_curves
         from exugear.results.folder import time_noted
         from exugear.tooth_mesh.tables import stored_tables
 
@@ -84,7 +89,9 @@ def ste(
             tables = compute_tables(requests)
         with time_noted(folder, "pictures of the tables"):
             beside = stored_tables(gearbox, folder, positions)
-            pictures = draw_curves({**beside, **tables}, folder) + _draw_contacts(requests, tables, folder)
+            with _curves_beside({**beside, **tables}, folder, requests) as curves:
+                contacts = _draw_contacts(requests, tables, folder)
+            pictures = curves.result() + contacts
         _tell_tables(case, folder, requests, tables, pictures, as_json)
 
 
@@ -159,6 +166,25 @@ def _compute_reference(request: ReferenceRequest, bar: Progress, task: TaskID) -
         return request.compute(at_iteration)
     except GeometryError as error:
         raise BadInputError(f"pairs.{request.name}: {error}") from error
+
+
+@contextmanager
+def _curves_beside(
+    tables: dict[str, MeshTable], folder: Path, requests: list[TableRequest]
+) -> Iterator[Future[list[Path]]]:
+    """Draw the curves of all tables, in another process where this one has some pictures of teeth to draw meanwhile."""
+    from exugear.pictures.tables import contact_picture, draw_curves
+    from fe_ste.tools.threads import available_cores
+    from fe_ste.tools.workers import Workers
+
+    new = sum(not (request.stored and contact_picture(request.name, folder).exists()) for request in requests)
+    if new >= WORTH_A_PROCESS and available_cores() > 1:
+        with Workers(1) as executor:
+            yield executor.submit(draw_curves, tables, folder)
+        return
+    drawn: Future[list[Path]] = Future()
+    drawn.set_result(draw_curves(tables, folder))
+    yield drawn
 
 
 def _draw_contacts(requests: list[TableRequest], tables: dict[str, MeshTable], folder: Path) -> list[Path]:

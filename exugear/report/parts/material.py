@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from exugear.findings.context import Context
@@ -50,6 +51,11 @@ class Material:
     def input_words(self) -> str:
         """Words for the overall input, whose speed all figures are over."""
         return self.words.of(self.context.gearbox.case.overall.input)
+
+    @property
+    def file_words(self) -> str:
+        """Gearbox file with its folder; the page goes to others, and where that lies is nobody's business."""
+        return "/".join(Path(self.context.gearbox.source).parts[-2:])
 
 
 def lines_of(context: Context) -> tuple[OrderLine, ...]:

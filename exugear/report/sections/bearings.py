@@ -27,7 +27,11 @@ LIFTS = 1.0
 """Swing over the mean force from which a linear bearing is said to have to lift off."""
 NOISE = 1e-3
 """Share of the mean transverse force below which an axial force is told as none."""
+NOISE_OF_ALL = 1e-5
+"""Share of the largest force of all bearings below which a force is told as none."""
 SEATS = 12
+QUIET = 1e-3
+"""Share of the largest acceleration below which none is listed."""
 """Seats whose accelerations are listed."""
 
 
@@ -54,6 +58,11 @@ def _forces(material: Material, group: str, variant: str, own: Mapping[str, Any]
     if not loudest:
         return ""
     largest = max(figures["amplitude"] for figures in loudest.values())
+    felt = NOISE_OF_ALL * max(max(figures["amplitude"], figures["mean"] or 0.0) for figures in loudest.values())
+    loudest = {
+        name: {**figures, **{kind: _above(figures[kind], felt) for kind in ("mean", "amplitude")}}
+        for name, figures in loudest.items()
+    }
     rows = [_force_row(group, variant, name, figures, largest) for name, figures in loudest.items()]
     caption = f"Transverse forces {VARIANTS[variant]}"
     lifting = [
@@ -94,6 +103,11 @@ def _force_row(group: str, variant: str, name: str, figures: Mapping[str, Any], 
     }
 
 
+def _above(force: float | None, felt: float) -> float:
+    """Force, or none where it is no more than rounding beside the other bearings' forces."""
+    return force if force and force > felt else 0.0
+
+
 def _without_noise(value: float, mean: float) -> float:
     """Force (kN) beside a mean one (N): zero where only rounding and start-up are left."""
     return value if abs(value) > NOISE * 1e-3 * mean else 0.0
@@ -109,6 +123,8 @@ def _accelerations(material: Material, data: xr.Dataset) -> str:
     order = np.argsort(-amplitude.max(axis=(0, 1)))[:SEATS]
     rows = []
     for seat in order:
+        if not amplitude[..., seat].max() > QUIET * amplitude.max():
+            break
         point, line = np.unravel_index(int(np.argmax(amplitude[..., seat])), amplitude.shape[:2])
         speed = abs(float(data["speed"][point]))
         rows.append(

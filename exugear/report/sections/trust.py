@@ -6,7 +6,6 @@ import json
 import platform
 from collections.abc import Iterator, Mapping
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -86,10 +85,8 @@ def _assumptions(material: Material) -> str:
         "Modes: linearised at the static load, mesh stiffness averaged over the mesh cycle.",
         *_elastic_words(material),
     ]
-    # The page goes to others: folders of this machine are nobody's business.
-    file = "/".join(Path(gearbox.source).parts[-2:])
     return pieces.bullets(listed) + pieces.paragraph(
-        f"Sources of all inputs: the comments of {file}, and what lies beside it.", "note"
+        f"Sources of all inputs: the comments of {material.file_words}, and what lies beside it.", "note"
     )
 
 

@@ -32,6 +32,16 @@ function crossingsOf(model) {
   );
 }
 
+/**
+ * Frequencies to show where no order meets a mode: how far the orders reach, and the first mode beyond.
+ * @param {import("./page_data.js").ModelData} model
+ */
+function outOfReach(model) {
+  const seen = model.modes.filter((mode) => mode.seen && mode.frequency > 0).map((mode) => mode.frequency);
+  const reached = pageData.lines.map((line) => (line.order * model.fastest) / 60);
+  return [...reached, ...(seen.length ? [Math.min(...seen)] : [])];
+}
+
 /** Draw the diagram of the chosen model. */
 export function drawCampbell() {
   const figure = find("campbell");
@@ -41,7 +51,8 @@ export function drawCampbell() {
   /** @type {HTMLSelectElement} */ (need("model")).value = state.model;
   const crossings = crossingsOf(model);
   const loud = crossings.filter((crossing) => crossing.size > 0.02);
-  const highest = 1.2 * Math.max(100, ...(loud.length ? loud : crossings).map((crossing) => crossing.frequency));
+  const met = (loud.length ? loud : crossings).map((crossing) => crossing.frequency);
+  const highest = 1.2 * Math.max(100, ...(met.length ? met : outOfReach(model)));
   /** @type {import("./plots.js").Bounds} */
   const bounds = { x: [0, model.fastest], y: [0, highest] };
   const plot = drawPlot(box, optionsOf(model, crossings), [[0, model.fastest], [0, highest]], bounds);

@@ -27,9 +27,18 @@ export function beginCharts() {
 
 /** Draw those anew that were drawn, such as with other colours; before printing all of them. @param {boolean} all */
 export async function redrawCharts(all) {
+  const drawn = [];
   for (const name of Object.keys(pageData.charts)) {
     const box = find(name)?.querySelector(".plot");
-    if (box && (all || plotIn(box))) await drawChart(name);
+    if (box && (all || plotIn(box))) drawn.push(drawChart(name));
+  }
+  await Promise.all(drawn);
+}
+
+/** Unpack what figures are drawn of, one after the other. */
+export async function unpackCharts() {
+  for (const { curves } of Object.values(pageData.charts)) {
+    for (const curve of curves) await Promise.all([unpack(curve.x), unpack(curve.y)]);
   }
 }
 

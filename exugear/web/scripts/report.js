@@ -1,6 +1,6 @@
 // The report: all parts begun, and told what changes.
 import { beginCampbell, drawCampbell } from "./campbell.js";
-import { beginCharts, redrawCharts } from "./charts.js";
+import { beginCharts, redrawCharts, unpackCharts } from "./charts.js";
 import { drawCuts } from "./cuts.js";
 import { drawDetail } from "./detail.js";
 import { find } from "./dom.js";
@@ -38,11 +38,14 @@ async function redraw(changed) {
 let drawing = Promise.resolve();
 onChange((changed) => (drawing = redraw(changed)));
 
-beginTheme(() => {
+/** Draw all figures anew, in the colours of now. @param {boolean} all also those that were not in view so far */
+function recolour(all) {
   if (hasRuns) void Promise.all([drawWaterfall(), drawCuts()]);
   drawCampbell();
-  void redrawCharts(false);
-});
+  void redrawCharts(all);
+}
+
+beginTheme(recolour);
 function begin() {
   beginSwitches();
   if (hasRuns) beginLimit();
@@ -51,8 +54,11 @@ function begin() {
   beginCampbell();
   recall();
   beginCharts();
-  window.addEventListener("beforeprint", () => void redrawCharts(true));
-  void drawing.finally(() => document.documentElement.setAttribute("data-ready", ""));
+  void drawing.finally(() => {
+    document.documentElement.setAttribute("data-ready", "");
+    // Nobody waits for a stream while a page is printed: what figures are drawn of is unpacked before.
+    setTimeout(() => void unpackCharts(), 2000);
+  });
 }
 
 // Cards and tables are painted first: they can be read while figures are drawn.

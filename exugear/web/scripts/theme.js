@@ -1,7 +1,7 @@
 // Dark or light colours, kept for the next time.
 import { find } from "./dom.js";
 
-/** @param {() => void} redraw what was drawn in the colours before */
+/** @param {(all: boolean) => void} redraw what was drawn in the colours before, or all there is */
 export function beginTheme(redraw) {
   const root = document.documentElement;
   const button = find("theme");
@@ -14,7 +14,18 @@ export function beginTheme(redraw) {
       // Kept or not, the page has its colours.
     }
     tell();
-    redraw();
+    redraw(false);
   });
   tell();
+  // Paper is white: figures are drawn for it, and afterwards as they were.
+  let before = root.dataset.theme;
+  window.addEventListener("beforeprint", () => {
+    before = root.dataset.theme;
+    root.dataset.theme = "light";
+    redraw(true);
+  });
+  window.addEventListener("afterprint", () => {
+    root.dataset.theme = before;
+    redraw(false);
+  });
 }

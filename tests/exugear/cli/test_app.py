@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import gc
 import json
 import shutil
 import signal
@@ -19,7 +20,7 @@ import xarray
 from typer.testing import CliRunner
 
 from exugear.cli import case_verbs, verbs
-from exugear.cli.app import VERBS, app
+from exugear.cli.app import OBJECTS_OF_A_START, VERBS, app, garbage_seldom_looked_for
 from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption
 from exugear.model.gearbox import Gearbox
 from exugear.tooth_mesh.tables import requested_tables
@@ -236,6 +237,16 @@ def test_a_damaged_table_is_computed_again(spur_case, tmp_path):
     assert "spur.nc" in request.replaces
 
 
+def test_another_process_draws_the_same_curves(computed, tmp_path, monkeypatch):
+    case, out, _ = computed
+    shutil.copytree(out / "tables", tmp_path / "tables")
+    monkeypatch.setattr("exugear.cli.verbs.ste.WORTH_A_PROCESS", 0)
+    outcome = exugear("ste", case, "--positions", 8, "--out", tmp_path)
+    assert outcome.exit_code == 0, outcome.stderr
+    for name in ("ste.png", "load_share_spur.png"):
+        assert (tmp_path / "pictures" / name).read_bytes() == (out / "pictures" / name).read_bytes()
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
@@ -334,3 +345,14 @@ def test_work_after_a_stopped_one_is_not_stopped():
         signal.raise_signal(signal.SIGINT)
     with exit_codes():
         interruption.check()
+
+
+def test_a_command_leaves_python_as_it_found_it() -> None:
+    """Within a command garbage is looked for seldom; whoever calls it from a program has their own settings back."""
+    before = gc.get_threshold()
+    with pytest.raises(RuntimeError), garbage_seldom_looked_for():
+        assert gc.get_threshold()[0] == OBJECTS_OF_A_START
+        raise RuntimeError
+    assert gc.get_threshold() == before
+    assert gc.get_freeze_count() > 0
+    gc.unfreeze()

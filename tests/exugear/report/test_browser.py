@@ -334,6 +334,18 @@ def test_paper_shows_all_run_ups_and_a_picture_of_the_mode(view: View) -> None:
     view.page.emulate_media(media="screen")
 
 
+def test_paper_has_all_line_figures_in_light_colours_and_the_page_gets_its_own_back(view: View) -> None:
+    theme = "document.documentElement.dataset.theme"
+    view.page.evaluate(f"{theme} = 'dark'")
+    view.page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+    lacking = "[...document.querySelectorAll('[data-figure=chart]')].filter(own => !own.querySelector('canvas')).length"
+    assert view.page.evaluate(theme) == "light"
+    assert view.soon(lambda: view.page.evaluate(lacking) == 0)
+    view.page.evaluate("window.dispatchEvent(new Event('afterprint'))")
+    assert view.page.evaluate(theme) == "dark"
+    view.page.evaluate(f"{theme} = 'light'")
+
+
 @pytest.mark.parametrize("size", SIZES)
 def test_without_scripts_cards_and_tables_are_there(browser: Any, path: Path, data: dict[str, Any], size: str) -> None:
     view = opened(browser, size, java_script_enabled=False)
