@@ -13,6 +13,7 @@ import sys
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -23,6 +24,7 @@ from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.statics import accelerating_start
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
+from exugear.project import Project
 from exugear.runs.extent import SAMPLE_RATE
 from exugear.runs.runup import BAND, simulate
 from exugear.solvers.compiled.methods import RUNGE_KUTTA as RK4
@@ -365,20 +367,23 @@ def size_of(assembly: Assembly) -> dict[str, int]:
 # -- run-ups -------------------------------------------------------------------------------------------------------
 
 
-def run_up(variant: str, duration: float) -> dict[str, Any]:
-    """Run up with results stored, in this process."""
+def run_up(variant: str, duration: float, tables: Path | None = None) -> dict[str, Any]:
+    """Run up with results stored, in this process; by the law `table` with the tables of a folder, if one is given."""
     gearbox = Gearbox.from_toml(CASE)
+    choice, stiffness = Choice(variant), stiffness_of(gearbox)
+    if tables is not None:
+        choice = Choice(variant, "table")
+        stiffness = Project(gearbox, tables, choice).stiffness()
     with tempfile.TemporaryDirectory() as directory:
-        simulate(gearbox, Choice(variant), stiffness_of(gearbox), directory, duration=0.01)  # loads the compiled code
+        simulate(gearbox, choice, stiffness, directory, duration=0.01)  # loads the compiled code
         runs = []
-        cost = timed(
-            lambda: runs.append(simulate(gearbox, Choice(variant), stiffness_of(gearbox), directory, duration=duration))
-        )
-        assembly = assemble(gearbox, Choice(variant), stiffness_of(gearbox))
+        cost = timed(lambda: runs.append(simulate(gearbox, choice, stiffness, directory, duration=duration)))
+        assembly = assemble(gearbox, choice, stiffness)
         chosen = choose_integration(assembly, SAMPLE_RATE, BAND)
         step = chosen.step
         return {
             "variant": variant,
+            "law": choice.mesh_law,
             "method": chosen.method.name,
             **size_of(assembly),
             "simulated_s": runs[0].end,
@@ -392,9 +397,9 @@ def run_up(variant: str, duration: float) -> dict[str, Any]:
         }
 
 
-def run_ups_apart(variants: list[str], duration: float) -> list[dict[str, Any]]:
+def run_ups_apart(variants: list[str], duration: float, *options: str) -> list[dict[str, Any]]:
     """Run up in a process each, all at once."""
-    running = [start("dynamics.py", "--duration", str(duration), "--run-up", variant) for variant in variants]
+    running = [start("dynamics.py", "--duration", str(duration), "--run-up", name, *options) for name in variants]
     return [result(process) for process in running]
 
 
@@ -416,6 +421,15 @@ def run_ups(rounds: int, duration: float) -> dict[str, Any]:
     }
 
 
+def run_ups_by_tables(rounds: int, duration: float) -> dict[str, Any]:
+    """Run-up of the bushing variant by the law `table`, its tables computed over all axes of the file before."""
+    with tempfile.TemporaryDirectory() as folder:
+        Project(Gearbox.from_toml(CASE), Path(folder)).tables(grid=True)
+        say("run-ups: tables")
+        rows = [run_ups_apart(["bushing"], duration, "--tables", folder)[0] for _ in range(rounds)]
+    return median_row(rows, "wall_s")
+
+
 def measure(quick: bool) -> dict[str, Any]:
     """Everything."""
     gearbox = Gearbox.from_toml(CASE)
@@ -428,6 +442,7 @@ def measure(quick: bool) -> dict[str, Any]:
         "shares": shares_of_a_step(assembly, rounds),
         "run_up_rounds": 1 if quick else 3,
         "run_ups": run_ups(1, 1.0) if quick else run_ups(3, 30.0),
+        "run_up_by_tables": None if quick else run_ups_by_tables(3, 30.0),
         "amplitudes": amplitude_errors(gearbox),
         "growth": growth(rounds),
     }
@@ -438,10 +453,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Parts of run_all.py that need a process of their own.")
     parser.add_argument("--duration", type=float, default=30.0, help="simulated time of the run-up, s")
     parser.add_argument("--run-up", metavar="VARIANT")
+    parser.add_argument("--tables", metavar="FOLDER", type=Path, help="results folder with tables of the law `table`")
     parser.add_argument("--way", type=int, metavar="NUMBER")
     options = parser.parse_args()
     if options.run_up:
-        found = run_up(options.run_up, options.duration)
+        found = run_up(options.run_up, options.duration, options.tables)
     else:
         gearbox = Gearbox.from_toml(CASE)
         way = ways(assemble(gearbox, Choice("bushing"), stiffness_of(gearbox)), quick=True)[options.way]

@@ -82,6 +82,8 @@ def ways_bounds(part: Results) -> str:
 def run_up_table(part: Results) -> str:
     """Table of the run-ups."""
     rows = [("alone", row) for row in part["run_ups"]["alone"]] + [("two at once", part["run_ups"]["two_at_once"])]
+    if part.get("run_up_by_tables"):
+        rows.append(("alone, law table", part["run_up_by_tables"]))
     return table(
         [
             "variant",

@@ -152,26 +152,33 @@ def turning_arrays(bodies: Iterable[tuple[int, TurningBody]]) -> TurningArrays:
     given = list(bodies)
     sizes = np.array([body.reduced.size for _, body in given], dtype=np.int64)
 
+    columns = np.array([filled_up(int(size)) for size in sizes], dtype=np.int64)
+
+    def filled(values: Floats) -> Floats:
+        """Values (..., size) with zeros behind, up to a multiple of eight."""
+        size = values.shape[-1]
+        return np.concatenate([values, np.zeros((*values.shape[:-1], filled_up(size) - size))], axis=-1)
+
     def moved(body: TurningBody) -> Floats:
         """Mass matrix times a motion of all seats along each axis by one, (3, size)."""
         motion = np.zeros((3, body.reduced.size))
         for axis in range(3):
             motion[axis, axis : BODY_SIZE * body.seat_count : BODY_SIZE] = 1.0
-        return np.asarray(motion @ body.reduced.mass)
+        return filled(motion @ body.reduced.mass)
 
     inverses = [np.asarray(np.linalg.inv(body.reduced.mass), dtype=np.float64) for _, body in given]
     stiffness, square = laid_out(symmetric_tiles(-body.reduced.stiffness) for _, body in given)
     coriolis, across = laid_out(rectangular_tiles(-body.coriolis) for _, body in given)
 
     def joined(vectors: Iterable[Floats]) -> Floats:
-        return np.concatenate([np.zeros(0), *vectors])
+        return np.concatenate([np.zeros(0), *map(filled, vectors)])
 
     return TurningArrays(
         begin=np.array([begin for begin, _ in given], dtype=np.int64),
         size=sizes,
         seats=np.array([body.seat_count for _, body in given], dtype=np.int64),
-        columns=np.array([filled_up(int(size)) for size in sizes], dtype=np.int64),
-        first=np.cumsum(sizes) - sizes,
+        columns=columns,
+        first=np.cumsum(columns) - columns,
         spin=joined(body.reduced.spin for _, body in given),
         weight=joined(body.angle_weights for _, body in given),
         pull=joined(body.centrifugal for _, body in given),

@@ -234,16 +234,27 @@ class Assembly:
         return meshes
 
     def forces(self, q: Floats, v: Floats, meshes: MeshArrays | None = None) -> Floats:
-        """Generalized forces of meshes, bearings, couplings, elastic bodies and weight, shape (size,), N and N m."""
-        f = self.mesh_forces(q, v, self.meshes if meshes is None else meshes)
+        """Generalized forces of meshes, bearings, couplings, elastic bodies and weight, N and N m.
+
+        At one state or several: (..., size), as the coordinates and velocities have it.
+        """
+        meshes = self.meshes if meshes is None else meshes
+        if q.ndim == 1:
+            f = self._forces_but_of_connectors(q, v, meshes)
+        else:
+            f = np.array([self._forces_but_of_connectors(x, u, meshes) for x, u in zip(q, v, strict=True)])
         add_connector_forces(q, v, self.connectors, f)
+        return f + self.weight
+
+    def _forces_but_of_connectors(self, q: Floats, v: Floats, meshes: MeshArrays) -> Floats:
+        f = self.mesh_forces(q, v, meshes)
         add_spring_forces(q, v, self.springs, f)
         if self.elastic_bodies:
             add_elastic_forces(q, v, self.elastic, scratch_for(self.elastic), f)
         for name, body in self.turning.items():
             place = self.elastic_slices[name]
             f[place] += body.forces(q[place], v[place])
-        return f + self.weight
+        return f
 
     @cached_property
     def weight(self) -> Floats:

@@ -15,6 +15,8 @@ from fe_ste.tools.arrays import Complexes, Floats
 
 PER_FASTEST = 6.0
 """Kicks per period of the fastest mode: with fewer of them the splitting itself resonates."""
+TOGETHER = 24
+"""Kicks that are passed at once."""
 
 
 def kicks_needed(fastest: float, period: float) -> int:
@@ -57,10 +59,33 @@ def exponents(
     step = period / kicks
     advance = scipy.linalg.expm(step * constant)
     total = np.eye(len(constant))
-    for own in varying:
-        total = total - pushes @ (step * own @ (reads @ total))
-        total = advance @ total
+    for first in range(0, kicks, TOGETHER):
+        total = _after_kicks(total, advance, pushes, reads, step * varying[first : first + TOGETHER])
     multipliers, shapes = scipy.linalg.eig(total)
     found = np.log(np.where(multipliers == 0.0, 1e-300, multipliers)) / period
     order = np.argsort(-found.real)
     return np.asarray(found[order], dtype=complex), np.asarray(shapes[:, order], dtype=complex)
+
+
+def _after_kicks(state: Floats, advance: Floats, pushes: Floats, reads: Floats, kicks: Floats) -> Floats:
+    """Find states (n, n) after some kicks (k, j, r), each followed by a step of the constant part (n, n).
+
+    Readings at each kick are those without kicks, less what the kicks before it changed in them: products with the
+    whole matrix are needed once for all of them.
+    """
+    count = len(kicks)
+    rows, columns = [reads], [advance @ pushes]
+    for _ in range(count - 1):
+        rows.append(rows[-1] @ advance)
+        columns.append(advance @ columns[-1])
+    readings = (np.concatenate(rows) @ state).reshape(count, len(reads), -1)
+    felt = np.concatenate([reads @ column for column in columns])
+    given = np.empty((count, pushes.shape[1], state.shape[1]))
+    for n, kick in enumerate(kicks):
+        given[n] = kick @ readings[n]
+        later = count - 1 - n
+        changed = felt[: later * len(reads)] @ given[n]
+        readings[n + 1 :] -= changed.reshape(later, *readings.shape[1:])
+    moved: Floats = np.linalg.matrix_power(advance, count) @ state
+    moved -= np.concatenate(columns[::-1], axis=1) @ given.reshape(-1, state.shape[1])
+    return moved

@@ -156,21 +156,24 @@ def _places(connectors: ConnectorArrays, size: int) -> Integers:
 
 
 def _local(values: Floats, places: Integers) -> Floats:
-    """Coordinates or rates (size,) of both ends, (c, 2, 6)."""
-    return np.append(values, np.zeros(BODY_SIZE))[places]
+    """Coordinates or rates (..., size) of both ends, (..., c, 2, 6)."""
+    return np.concatenate([values, np.zeros((*values.shape[:-1], BODY_SIZE))], axis=-1)[..., places]
 
 
 def add_connector_forces(q: Floats, v: Floats, connectors: ConnectorArrays, f: Floats) -> None:
-    """Add the generalized forces of all connectors to f."""
+    """Add the generalized forces of all connectors at one or several states (..., size) to f, in C order."""
     if not connectors.bodies.size:
         return
-    places = _places(connectors, f.size)
+    size = f.shape[-1]
+    places = _places(connectors, size)
     with np.errstate(over="ignore", invalid="ignore"):  # a search that fails passes through any number
         x = _local(q, places)
         ends, load, torque = _loads(x, _local(v, places), connectors)
         forces = _forces(x, ends, load)
         forces[..., SPIN] += _SENSE * torque[..., None]
-        f += np.bincount(places.ravel(), forces.ravel(), f.size + BODY_SIZE)[: f.size]
+        rows, width = f.reshape(-1, size), size + BODY_SIZE
+        entries = places.ravel() + width * np.arange(len(rows))[:, None]
+        rows += np.bincount(entries.ravel(), forces.ravel(), width * len(rows)).reshape(-1, width)[:, :size]
 
 
 def connector_loads(q: Floats, v: Floats, connectors: ConnectorArrays) -> Floats:

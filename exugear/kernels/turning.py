@@ -33,7 +33,7 @@ from exugear.kernels.coordinates import AXIAL, BODY_SIZE, SPIN, TILT
 from exugear.kernels.products import add_rows, add_symmetric, add_symmetric_with_form, square_form
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import kernel
-from fe_ste.tools.octets import SIZE, aligned_zeros, eight, put
+from fe_ste.tools.octets import SIZE, aligned_zeros, all_eight, eight, put, sum_of
 
 
 class TurningArrays(NamedTuple):
@@ -43,7 +43,7 @@ class TurningArrays(NamedTuple):
     ----------
     begin, size, seats : (b,) first coordinate in the state, number of coordinates and seats
     columns : (b,) that number filled up to a multiple of eight
-    first : (b,) first entry of each body in the vectors
+    first : (b,) first entry of each body in the vectors, which are filled up likewise
     spin, weight, pull : r, s and -C r of all bodies
     square : (b,) first entry of each body in `stiffness`, `mass` and `inverse`
     stiffness, mass, inverse : tiles of -K, M and its inverse, see `exugear.kernels.products`
@@ -51,7 +51,7 @@ class TurningArrays(NamedTuple):
     coriolis : tiles of M S - 2 C
     damping_time : (b,) s
     gravity : (b, 3) m/s2
-    moving : (3, n) of all bodies M times a motion of all seats along x, y and z by one
+    moving : (3, c) of all bodies M times a motion of all seats along x, y and z by one
     """
 
     begin: Integers
@@ -145,26 +145,31 @@ def set_turning_motion(
         for i in range(0, columns, SIZE):
             put(given, i, eight(moved, i) + eight(deforming, i) * time)
         # Elastic and apparent forces; the reaction on the frame's angle gathers what they take from its power.
-        for i in range(columns):
-            elastic[i] = 0.0
-            apparent[i] = speed * turning.pull[first + i] if i < size else 0.0
-            total[i] = 0.0
+        for i in range(0, columns, SIZE):
+            put(elastic, i, all_eight(0.0))
+            put(apparent, i, eight(turning.pull, first + i) * speed)
         if with_power:
             damped -= time * add_symmetric_with_form(turning.stiffness, square, columns, given, elastic, deforming)
         else:
             add_symmetric(turning.stiffness, square, columns, given, elastic)
         add_rows(turning.coriolis, turning.across[b], columns, columns, rates, apparent)
-        reaction = 0.0
-        for i in range(size):
-            total[i] = f[begin + i] + elastic[i] + speed * apparent[i]
-            reaction -= (rates[i] + speed * turning.spin[first + i]) * apparent[i]
+        power = all_eight(0.0)
+        for i in range(0, columns, SIZE):
+            inner, pushed = eight(elastic, i), eight(apparent, i)
+            power = power + (eight(rates, i) + eight(turning.spin, first + i) * speed) * pushed
+            put(total, i, inner + pushed * speed)
+        reaction, lever = -sum_of(power), 0.0
         for n in range(turning.seats[b]):
             for i in (BODY_SIZE * n, BODY_SIZE * n + TILT):
                 x, y = f[begin + i], f[begin + i + 1]
-                reaction += moved[i + 1] * elastic[i] - moved[i] * elastic[i + 1]
-                # Outer forces turned into the frame; `total` has them in global axes so far.
-                total[i] += c * x + s * y - x
-                total[i + 1] += c * y - s * x - y
+                lever += moved[i + 1] * elastic[i] - moved[i] * elastic[i + 1]
+                # Outer forces turned into the frame.
+                total[i] += c * x + s * y
+                total[i + 1] += c * y - s * x
+                total[i + AXIAL] += f[begin + i + AXIAL]
+        for i in range(BODY_SIZE * turning.seats[b], size):
+            total[i] += f[begin + i]
+        reaction += lever
         for n in range(turning.seats[b]):
             total[BODY_SIZE * n + SPIN] += reaction * turning.weight[first + BODY_SIZE * n + SPIN]
         # Accelerations along the frame's axes, then in global ones: R (dw/dt + Omega S w).

@@ -19,6 +19,7 @@ import scipy.linalg
 
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.statics import BalanceError, static_state
+from exugear.harmonics.side_by_side import Elimination, elimination, solve_side_by_side
 from exugear.rotating.equal_planets import with_equal_planets
 from exugear.rotating.rotating_frame import RotatingFrame, SteadyError, planet_sets
 from fe_ste.tools.arrays import Complexes, Floats
@@ -33,8 +34,6 @@ VARIATION = 2e-4
 """Largest change of stiffness over the carrier's angle that counts as none, over the stiffness.
 
 Static tilts that are not the same for all planets bend the geometry by 5e-5 in the GRC; unequal planets bring 1e-3."""
-IN_CACHE = 50_000
-"""Numbers of matrices that are set up at once, so that they are solved before they leave the cache."""
 PLACES = 4
 """Places of the carrier between one planet's and the next, over which matrices are averaged.
 
@@ -111,17 +110,15 @@ class MeanSystem:
         """Torque of the drive at a speed of the input (rad/s), N m."""
         return float(self.at(self.torque, speed))
 
+    @cached_property
+    def _plan(self) -> Elimination:
+        """How dynamic stiffnesses are eliminated: bodies touch each other at few coordinates."""
+        return elimination((self.mass != 0.0) | (self.damping != 0.0).any(axis=0) | (self.stiffness != 0.0).any(axis=0))
+
     def responses(self, speed: float, frequencies: Floats, loads: Floats) -> Complexes:
         """Amplitudes (lines, size, n) under unit loads (size, n) at angular frequencies (lines,), none of them zero."""
-        stiffness, damping = self.stiffness_at(speed), self.damping_at(speed)
-        out = np.empty((len(frequencies), *loads.shape), dtype=np.complex128)
-        together = max(1, IN_CACHE // self.size**2)
-        for first in range(0, len(frequencies), together):
-            w = frequencies[first : first + together, None, None]
-            matrix = np.empty((len(w), self.size, self.size), dtype=np.complex128)
-            matrix.real, matrix.imag = stiffness - w**2 * self.mass, w * damping
-            out[first : first + together] = np.linalg.solve(matrix, np.broadcast_to(loads, (len(w), *loads.shape)))
-        return out
+        pencil = self.stiffness_at(speed), self.damping_at(speed), self.mass
+        return solve_side_by_side(self._plan, *pencil, frequencies, loads)
 
     def dynamic(self, speed: float, frequency: float) -> Complexes:
         """Dynamic stiffness (size, size) at a speed of the input and an angular frequency, rad/s."""
@@ -276,12 +273,13 @@ def tangents(frame: RotatingFrame, psi: float, speed: float, u: Floats) -> tuple
 
     The input turns at `speed` (rad/s).
     """
-    damping = _slopes(lambda step: _residual(frame, psi, speed, u, step), len(u), RATE_STEP)
+    here = np.tile(u, (len(u), 1))
+    damping = _slopes(lambda steps: _residuals(frame, psi, speed, here, steps), len(u), RATE_STEP)
     return damping, _stiffness(frame, psi, speed, u)
 
 
 def _stiffness(frame: RotatingFrame, psi: float, speed: float, u: Floats) -> Floats:
-    return _slopes(lambda step: _residual(frame, psi, speed, u + step), len(u), PLACE_STEP)
+    return _slopes(lambda steps: _residuals(frame, psi, speed, u + steps, None), len(u), PLACE_STEP)
 
 
 def _mass(frame: RotatingFrame, psi: float, u: Floats) -> Floats:
@@ -293,9 +291,19 @@ def _mass(frame: RotatingFrame, psi: float, u: Floats) -> Floats:
     return np.asarray(t.T @ np.array(columns).T)
 
 
+def _residuals(frame: RotatingFrame, psi: float, speed: float, u: Floats, du: Floats | None) -> Floats:
+    """Return `_residual` at several coordinates and velocities (n, size) at once: bearings have much in common."""
+    assembly, t = frame.assembly, frame.matrices(psi)[0]
+    states = [frame.state(psi, speed, own, None if du is None else du[n]) for n, own in enumerate(u)]
+    q, v, _ = (np.array(values) for values in zip(*states, strict=True))
+    needed = np.array([assembly.inertia_forces(*state) for state in states])
+    return np.asarray((needed - assembly.forces(q, v, frame.mean_meshes)) @ t)
+
+
 def _slopes(function: Callable[[Floats], Floats], size: int, step: float) -> Floats:
-    columns = [(function(e) - function(-e)) / (2.0 * step) for e in step * np.eye(size)]
-    return np.array(columns).T
+    """Take derivatives (size, size) by central differences of a function of several steps (n, size) at once."""
+    steps = step * np.eye(size)
+    return np.asarray((function(steps) - function(-steps)).T / (2.0 * step))
 
 
 def _static(

@@ -38,6 +38,13 @@ def test_the_derivatives_of_the_frame_are_those_of_differences(assembly):
         np.testing.assert_allclose((ahead[1] - behind[1]) / (2 * step), at[2], rtol=0.0, atol=1e-7 * abs(at).max())
 
 
+def test_forces_at_several_states_at_once_are_those_at_each(assembly):
+    random = np.random.default_rng(7)
+    q, v = 1e-5 * random.normal(size=(2, 5, assembly.size))
+    alone = np.array([assembly.forces(*state) for state in zip(q, v, strict=True)])
+    np.testing.assert_allclose(assembly.forces(q, v), alone, rtol=0.0, atol=1e-12 * abs(alone).max())
+
+
 def test_rolling_closes_no_mesh_and_strains_no_bearing_wherever_the_carrier_stands(assembly):
     frame = RotatingFrame(assembly, planet_sets(assembly))
     rest = np.zeros(assembly.size)

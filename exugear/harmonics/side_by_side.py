@@ -1,0 +1,231 @@
+"""Many systems of equations of one pattern, solved eight at a time: lines of a response at one speed.
+
+Bodies touch each other at few coordinates, so that most entries of a dynamic stiffness are zero, the same ones at all
+frequencies. Which entries an elimination fills, and in what order it fills the fewest, is found once; then eight lines
+at a time pass through it in the registers of the processor. Entries on the diagonal are not exchanged for larger ones:
+what is left over tells whether that was harmless, and a line that it was not harmless for is solved with exchanges.
+Machine code is kept by `fe_ste.tools.compilation`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
+from fe_ste.tools.compilation import kernel
+from fe_ste.tools.inner_kernels import kept_bundle
+from fe_ste.tools.octets import SIZE, aligned_zeros, all_eight, eight, put
+
+LEFT_OVER = 1e-10
+"""Residual over the load up to which a solution counts as such."""
+
+
+class Elimination(NamedTuple):
+    """Order and places of an elimination of systems of one pattern with n rows and e entries, filled ones too.
+
+    Attributes
+    ----------
+    order : (n,) row that is eliminated in each step
+    row, column : (e,) place of each entry in the matrix
+    diagonal : (n,) entry on the diagonal, by step
+    first : (n + 1,) first of the later rows that each step touches, in the three arrays that follow
+    later : (r,) steps in which these rows are eliminated
+    below, right : (r,) entries in the column and in the row of the step
+    change : (n,) first of the entries in `changed` that each step changes, row by row of its later rows
+    changed : (c,) entries
+    """
+
+    order: Integers
+    row: Integers
+    column: Integers
+    diagonal: Integers
+    first: Integers
+    later: Integers
+    below: Integers
+    right: Integers
+    change: Integers
+    changed: Integers
+
+
+def elimination(pattern: Booleans) -> Elimination:
+    """Find an elimination of matrices with entries where a pattern (n, n) is true: rows with few neighbours first.
+
+    Examples
+    --------
+    A chain needs no more entries than it has:
+
+    >>> found = elimination(np.abs(np.subtract.outer(np.arange(5), np.arange(5))) < 2)
+    >>> len(found.row), len(found.changed)
+    (13, 4)
+    """
+    n = len(pattern)
+    linked = pattern | pattern.T
+    np.fill_diagonal(linked, True)
+    filled, left, order = linked.copy(), np.ones(n, dtype=bool), []
+    touched: list[Integers] = []
+    for _ in range(n):
+        counts = np.where(left, (filled & left).sum(axis=1), n + 1)
+        k = int(np.argmin(counts))
+        left[k] = False
+        others = np.flatnonzero(filled[k] & left)
+        filled[np.ix_(others, others)] = True
+        order.append(k)
+        touched.append(others)
+    step = np.empty(n, dtype=np.int64)
+    step[order] = np.arange(n)
+    row, column = np.nonzero(filled)
+    entry = np.full((n, n), -1, dtype=np.int64)
+    entry[row, column] = np.arange(len(row))
+    none = np.zeros(0, dtype=np.int64)
+    return Elimination(
+        order=np.array(order, dtype=np.int64),
+        row=row.astype(np.int64),
+        column=column.astype(np.int64),
+        diagonal=entry[order, order],
+        first=np.cumsum([0, *map(len, touched)]).astype(np.int64),
+        later=np.concatenate([none, *(step[others] for others in touched)]),
+        below=np.concatenate([none, *(entry[others, k] for k, others in zip(order, touched, strict=True))]),
+        right=np.concatenate([none, *(entry[k, others] for k, others in zip(order, touched, strict=True))]),
+        change=np.cumsum([0, *(len(others) ** 2 for others in touched[:-1])]).astype(np.int64),
+        changed=np.concatenate([none, *(entry[np.ix_(others, others)].ravel() for others in touched)]),
+    )
+
+
+def solve_side_by_side(
+    plan: Elimination, stiffness: Floats, damping: Floats, mass: Floats, frequencies: Floats, loads: Floats
+) -> Complexes:
+    """Amplitudes (lines, n, loads) of (K + i w C - w^2 M) x = f.
+
+    Parameters
+    ----------
+    plan : Elimination
+        Of a pattern that holds all entries of the three matrices.
+    stiffness, damping, mass : (n, n) arrays
+    frequencies : (lines,) array
+        Angular frequencies w, rad/s.
+    loads : (n, loads) array
+    """
+    places, given = (plan.row, plan.column), np.ascontiguousarray(loads[plan.order])
+    amplitudes = np.empty((len(frequencies), *loads.shape), dtype=np.complex128)
+    memory = aligned_zeros(2 * SIZE * len(plan.row)).reshape(2, -1)
+    x, numbers = aligned_zeros(2 * SIZE * loads.size), amplitudes.view(np.float64)
+    pencil = stiffness[places], damping[places], mass[places]
+    solve_octets(kept_bundle(plan), *pencil, frequencies, given, memory[0], memory[1], x, numbers)
+    _exchange_where_needed(amplitudes, (stiffness, damping, mass), frequencies, loads)
+    return amplitudes
+
+
+def _exchange_where_needed(
+    amplitudes: Complexes, pencil: tuple[Floats, Floats, Floats], frequencies: Floats, loads: Floats
+) -> None:
+    """Solve those lines anew whose first solution leaves too much over, by the sum of all loads."""
+    stiffness, damping, mass = pencil
+    together = amplitudes.sum(axis=2)
+    w = frequencies[:, None]
+    inner = together @ stiffness.T + 1j * w * (together @ damping.T) - w**2 * (together @ mass.T)
+    scale = np.abs(loads.sum(axis=1)).max() + 1e-3 * np.abs(loads).max()
+    missing = np.abs(inner - loads.sum(axis=1)).max(axis=1)
+    for line in np.flatnonzero(~(missing <= LEFT_OVER * scale)):
+        w = frequencies[line]
+        amplitudes[line] = np.linalg.solve(stiffness - w**2 * mass + 1j * w * damping, loads)
+
+
+@kernel
+def solve_octets(
+    plan: Elimination,
+    stiffness: Floats,
+    damping: Floats,
+    mass: Floats,
+    frequencies: Floats,
+    loads: Floats,
+    real: Floats,
+    imaginary: Floats,
+    x: Floats,
+    out: Floats,
+) -> None:
+    """Fill amplitudes (lines, n, 2 cases), real and imaginary parts in turns, eight lines at a time.
+
+    Matrices are given by their entries (e,), loads (n, cases) by row in the order of the elimination. `real` and
+    `imaginary` (8 e,) and `x` (16 n cases,) are memory.
+    """
+    size, cases = loads.shape
+    lines = frequencies.size
+    for line in range(0, lines, SIZE):
+        count = min(SIZE, lines - line)
+        for lane in range(SIZE):
+            x[lane] = frequencies[line + min(lane, count - 1)]  # the last line fills what is left
+        w = eight(x, 0)
+        for entry in range(stiffness.size):
+            put(real, SIZE * entry, stiffness[entry] - w * w * mass[entry])
+            put(imaginary, SIZE * entry, w * damping[entry])
+        eliminate(plan, loads, real, imaginary, x)
+        for k in range(size):
+            for case in range(cases):
+                at = 2 * SIZE * (k * cases + case)
+                for lane in range(count):
+                    out[line + lane, plan.order[k], 2 * case] = x[at + lane]
+                    out[line + lane, plan.order[k], 2 * case + 1] = x[at + SIZE + lane]
+
+
+@kernel
+def eliminate(plan: Elimination, loads: Floats, real: Floats, imaginary: Floats, x: Floats) -> None:
+    """Solve eight systems, whose entries (8 e,) are overwritten, for loads (n, cases) that they share."""
+    size, cases = loads.shape
+    for k in range(size):
+        for case in range(cases):
+            at = 2 * SIZE * (k * cases + case)
+            put(x, at, all_eight(loads[k, case]))
+            put(x, at + SIZE, all_eight(0.0))
+    for k in range(size):
+        invert(SIZE * plan.diagonal[k], real, imaginary)
+        eliminate_row(k, cases, plan, real, imaginary, x)
+    for k in range(size - 1, -1, -1):
+        substitute_back(k, cases, plan, real, imaginary, x)
+
+
+@kernel
+def invert(at: int, real: Floats, imaginary: Floats) -> None:
+    """Take the inverse of the eight entries at a place."""
+    for i in range(at, at + SIZE):
+        square = real[i] * real[i] + imaginary[i] * imaginary[i]
+        real[i], imaginary[i] = real[i] / square, -imaginary[i] / square
+
+
+@kernel
+def eliminate_row(k: int, cases: int, plan: Elimination, real: Floats, imaginary: Floats, out: Floats) -> None:
+    """Take the row of step k, its diagonal inverted, out of all later rows."""
+    x, y = eight(real, SIZE * plan.diagonal[k]), eight(imaginary, SIZE * plan.diagonal[k])
+    begin, end, change = plan.first[k], plan.first[k + 1], plan.change[k]
+    for i in range(begin, end):
+        at = SIZE * plan.below[i]
+        a, b = eight(real, at), eight(imaginary, at)
+        factor, turned = a * x - b * y, a * y + b * x
+        for j in range(begin, end):
+            at, to = SIZE * plan.right[j], SIZE * plan.changed[change]
+            change += 1
+            a, b = eight(real, at), eight(imaginary, at)
+            put(real, to, eight(real, to) - factor * a + turned * b)
+            put(imaginary, to, eight(imaginary, to) - factor * b - turned * a)
+        for case in range(cases):
+            at, to = 2 * SIZE * (k * cases + case), 2 * SIZE * (plan.later[i] * cases + case)
+            a, b = eight(out, at), eight(out, at + SIZE)
+            put(out, to, eight(out, to) - factor * a + turned * b)
+            put(out, to + SIZE, eight(out, to + SIZE) - factor * b - turned * a)
+
+
+@kernel
+def substitute_back(k: int, cases: int, plan: Elimination, real: Floats, imaginary: Floats, out: Floats) -> None:
+    """Find the solution of step k from those of later ones."""
+    x, y = eight(real, SIZE * plan.diagonal[k]), eight(imaginary, SIZE * plan.diagonal[k])
+    for case in range(cases):
+        to = 2 * SIZE * (k * cases + case)
+        p, q = eight(out, to), eight(out, to + SIZE)
+        for j in range(plan.first[k], plan.first[k + 1]):
+            at, known = SIZE * plan.right[j], 2 * SIZE * (plan.later[j] * cases + case)
+            a, b = eight(real, at), eight(imaginary, at)
+            c, d = eight(out, known), eight(out, known + SIZE)
+            p, q = p - a * c + b * d, q - a * d - b * c
+        put(out, to, p * x - q * y)
+        put(out, to + SIZE, p * y + q * x)
