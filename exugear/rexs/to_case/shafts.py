@@ -105,7 +105,7 @@ def inertia_of(cylinders: Iterable[Cylinder]) -> Inertia:
     Examples
     --------
     >>> disc = inertia_of([Cylinder(0.0, 100.0, 200.0, 0.0, 7850.0)])
-    >>> round(disc.mass, 3), round(disc.axial, 5), round(disc.transverse, 5), disc.centre
+    >>> round(disc.mass, 3), round(disc.axial, 5), round(disc.transverse, 5), round(disc.centre, 6)
     (24.662, 0.12331, 0.08221, 50.0)
     """
     found = mass_properties(one.tube for one in cylinders)
