@@ -12,7 +12,7 @@ import os
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from threadpoolctl import ThreadpoolController
@@ -109,26 +109,6 @@ def second_thread() -> Executor:
 def _second_core() -> bool:
     """Whether a core is likely to be free for a second thread."""
     return available_cores() > 1 and multiprocessing.parent_process() is None
-
-
-def prepare_beside(preparation: Callable[[], object]) -> None:
-    """Begin what only saves time later, such as loading a library, beside loops that let go of Python's lock.
-
-    Nothing waits for it, and nothing is said if it fails: whoever needs the result asks for it anyway. Not begun where
-    there is one core only, or in a worker process.
-
-    Examples
-    --------
-    >>> prepare_beside(lambda: 1 / 0)
-    """
-    if available_cores() == 1 or multiprocessing.parent_process():
-        return
-
-    def quietly() -> None:
-        with suppress(Exception):
-            preparation()
-
-    threading.Thread(target=quietly, name="preparation").start()
 
 
 def available_cores() -> int:

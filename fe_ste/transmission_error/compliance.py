@@ -7,7 +7,6 @@ loads, centre distances and modifications. Frame and signs as in `fe_ste.contact
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -21,7 +20,7 @@ from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.notebook import html_table, value_range
-from fe_ste.tools.threads import one_dense_thread, prepare_beside
+from fe_ste.tools.threads import one_dense_thread
 
 if TYPE_CHECKING:
     from fe_ste.elasticity.flank import FlankCompliance
@@ -181,8 +180,6 @@ def pair_compliance(
     from fe_ste.elasticity.flank import TOOTH_REACH
     from fe_ste.elasticity.known_flanks import known_flanks
 
-    if "xarray" not in sys.modules:
-        prepare_beside(_load_labels)
     sides = ((pair.pinion, 1), (pair.gear, -1 if pair.gear.internal else 1))
     # Of wide helical gears more pairs touch at once than neighbours are usually kept.
     reach = max(TOOTH_REACH, math.ceil(pair.total_contact_ratio))
@@ -190,10 +187,3 @@ def pair_compliance(
         sides, mesh, open_teeth=open_teeth, tooth_reach=reach, incompatible_modes=incompatible_modes
     )
     return PairCompliance.from_flanks(pair, (pinion, gear), contact)
-
-
-def _load_labels() -> None:
-    """Load what results are labelled with; xarray loads some of its own libraries with its first variable only."""
-    import xarray as xr
-
-    xr.Variable("x", [0.0])
