@@ -141,10 +141,11 @@ def _material(context: Context, executor: Executor | None) -> Material:
         reasons = context.notes.left_out or ["no files"]
         raise ReportError("\n".join([f"{context.folder}: nothing here belongs to its case", *reasons]))
     groups = run_groups(context, results)
-    variations = model_variations(context, results.modes, begun)
     words = Words(context.gearbox)
-    material = Material(context, results, words, groups, variations, lines_of(context), ArrayStore())
-    return replace(material, run_data=run_data(material))
+    material = Material(context, results, words, groups, (), lines_of(context), ArrayStore())
+    # Last what another process computes meanwhile.
+    drawn = run_data(material)
+    return replace(material, run_data=drawn, variations=model_variations(context, results.modes, begun))
 
 
 def _head_data(material: Material) -> dict[str, Any]:
