@@ -11,7 +11,7 @@ import pytest
 
 import fe_ste.tools.threads
 from fe_ste.elimination.dense import add_product
-from fe_ste.tools.threads import AtOnce, one_dense_thread, prepare_beside, second_thread, side_by_side
+from fe_ste.tools.threads import AtOnce, one_dense_thread, second_thread, side_by_side
 
 
 @pytest.fixture
@@ -98,21 +98,3 @@ def test_dense_products_let_go_of_the_lock(two_cores: None) -> None:
         worker.join()
     assert steps > 5
     assert (target == size).all()
-
-
-def test_what_prepares_goes_beside_and_its_faults_stop_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    begun: list[int] = []
-    done = threading.Event()
-
-    def preparation() -> None:
-        begun.append(threading.get_ident())
-        done.set()
-        raise ValueError("only saves time")
-
-    monkeypatch.setattr(fe_ste.tools.threads, "available_cores", lambda: 1)
-    prepare_beside(preparation)
-    assert begun == []
-    monkeypatch.setattr(fe_ste.tools.threads, "available_cores", lambda: 2)
-    prepare_beside(preparation)
-    assert done.wait(30.0)
-    assert begun != [threading.get_ident()]
