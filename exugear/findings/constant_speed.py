@@ -67,15 +67,20 @@ class ConstantSpeed:
         return self.level[:, place] if same else None
 
     def near(self, line: OrderLine, frequency: float, resolution: float) -> Highest | None:
-        """Return where an order is loudest within what a run-up resolves about a frequency (both Hz).
+        """Return the highest peak of an order within what a run-up resolves about a frequency (both Hz).
 
-        None if the response does not go there. The sweep shifts a peak besides, by up to a few percent.
+        Without a peak there, the level at the frequency; None if the response does not go there. The sweep shifts a
+        peak besides, by up to a few percent.
         """
         along, frequencies = self.along(line), line.frequency(self.speed)
         there = np.flatnonzero(np.abs(frequencies - frequency) <= max(BESIDE * frequency, resolution))
         if along is None or not there.size:
             return None
-        place = int(there[np.argmax(along[there])])
+        # The end of the range may lie on the flank of a neighbour, which is no peak of this resonance.
+        beside = np.pad(along, 1, constant_values=np.inf)
+        peaks = there[(along[there] > beside[there]) & (along[there] >= beside[there + 2])]
+        nearest = there[np.argmin(np.abs(frequencies[there] - frequency))]
+        place = int(peaks[np.argmax(along[peaks])] if peaks.size else nearest)
         return Highest(float(along[place]), float(self.speed[place]), float(frequencies[place]))
 
     def highest(self, lines: Iterable[OrderLine]) -> tuple[OrderLine, Highest] | None:

@@ -58,6 +58,14 @@ def test_a_peak_is_found_within_what_a_run_up_resolves_whichever_way_the_input_t
     assert found.speed == pytest.approx(2.0 * np.pi * 790.0 / STORED_LINE.order)
 
 
+def test_the_flank_of_a_neighbour_is_no_peak():
+    levels = constant_speed_of(response())
+    found = levels.near(STORED_LINE, 840.0, 15.0)
+    assert found is not None
+    assert found.frequency == pytest.approx(840.0)
+    assert found.level < levels.near(STORED_LINE, 800.0, 15.0).level - 40.0
+
+
 def test_where_a_response_does_not_go_there_is_no_level():
     levels = constant_speed_of(response())
     assert levels.near(STORED_LINE, 3000.0, 15.0) is None
