@@ -137,6 +137,7 @@ def steady_section(part: Results) -> str:
     rows = [
         [
             row["variant"],
+            str(part["coordinates"][row["variant"]]),
             row["level"],
             "yes" if row["refined"] else "no",
             str(row["speeds"]),
@@ -154,8 +155,12 @@ def steady_section(part: Results) -> str:
         [
             "## Steady response over speed\n",
             f"{circumstances(part)} GRC, 400 speeds of the carrier from 0 to 215 rpm, mean system and signals "
-            f"included; processor time of one thread. The last column is over that of a run-up of 30 s.\n",
-            table(["variant", "level", "speeds added at resonances", "speeds", "all", "a speed", "run-ups"], rows),
+            f"included; processor time of one thread; flexible is that with elastic shafts. The last column is over "
+            f"the processor time of a run-up of 30 s.\n",
+            table(
+                ["variant", "coordinates", "level", "speeds added", "speeds", "all", "a speed", "run-ups"],
+                rows,
+            ),
             "Lines, variant bushing, level parametric, no speeds added:\n",
             table(["harmonics", "sum of multiples of combinations", "lines", "all"], growth),
             items(

@@ -5,15 +5,20 @@ Measured by ``python benchmarks/run_all.py --part steady``.
 
 from __future__ import annotations
 
+import tempfile
 from typing import Any
 
-from dynamics import run_up, stiffness_of
+from dynamics import stiffness_of
+from elastic import SHAFTS, with_elastic
 from timing import CASE, say, timed
 
+from exugear.bodies.elastic_body import ElasticBody
+from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
+from exugear.runs.runup import simulate
 from exugear.steady.settings import LEVELS, SpeedRange, SteadySettings
 from exugear.steady.steady_response import response_of
 
@@ -34,11 +39,23 @@ def cost_of(assembly: Assembly, settings: SteadySettings) -> dict[str, Any]:
     }
 
 
+def run_up_of(gearbox: Gearbox, variant: str, bodies: dict[str, ElasticBody], duration: float) -> float:
+    """Processor time of a run-up with its results stored, s."""
+    given = gearbox, Choice(variant), stiffness_of(gearbox)
+    with tempfile.TemporaryDirectory() as folder:
+        simulate(*given, folder, bodies=bodies, duration=0.01)  # loads the compiled code
+        return timed(lambda: simulate(*given, folder, bodies=bodies, duration=duration)).processor
+
+
 def measure(quick: bool) -> dict[str, Any]:
     """Everything."""
     gearbox = Gearbox.from_toml(CASE)
+    on_shafts = with_elastic(gearbox, SHAFTS)
+    elastic = reduced_bodies(on_shafts, gearbox.case.default_inertias)
+    cases = {"rigid": (gearbox, {}), "bushing": (gearbox, {}), "flexible": (on_shafts, elastic)}
     assemblies = {
-        variant: assemble(gearbox, Choice(variant), stiffness_of(gearbox)) for variant in ("rigid", "bushing")
+        variant: assemble(case, Choice(variant), stiffness_of(gearbox), bodies)
+        for variant, (case, bodies) in cases.items()
     }
     speeds = SpeedRange.from_text("0:215:20" if quick else SPEEDS)
     for level in LEVELS:  # loads the compiled code
@@ -55,5 +72,7 @@ def measure(quick: bool) -> dict[str, Any]:
         | cost_of(assemblies["bushing"], SteadySettings(speeds, "parametric", h, c, at_resonances=False))
         for h, c in LINES
     ]
-    run_ups = {variant: run_up(variant, 1.0 if quick else 30.0)["processor_s"] for variant in assemblies}
-    return {"responses": rows, "growth": growth, "run_ups": run_ups}
+    duration = 1.0 if quick else 30.0
+    run_ups = {variant: run_up_of(case, variant, bodies, duration) for variant, (case, bodies) in cases.items()}
+    coordinates = {variant: assembly.size for variant, assembly in assemblies.items()}
+    return {"responses": rows, "growth": growth, "run_ups": run_ups, "coordinates": coordinates}
