@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 _VOID = ("img", "input")
 """Elements without content."""
+SHORT_TEXT, LONG_TEXT = 8, 40
+"""Characters up to which a column of texts needs no width kept for it, and from which it needs much."""
 
 
 def text(value: object) -> str:
@@ -120,7 +122,7 @@ def table(
     left, small = {keys[0], *texts}, set(hidden)
 
     def kind(key: str) -> str | None:
-        return " ".join(["text"] * (key in left) + ["wide"] * (key in small)) or None
+        return " ".join(_text_kinds(rows, key) * (key in left) + ["wide"] * (key in small)) or None
 
     head = "".join(element("th", text(key), class_=kind(key), scope="col") for key in keys)
     chosen = [*choices, *[None] * (len(rows) - len(choices))]
@@ -133,6 +135,13 @@ def table(
     whole = element("table", own, id=name or None, data_title=caption if name else None, data_sortable=sortable)
     # Whoever has no mouse scrolls a wide table by the arrow keys.
     return element("div", whole, class_="scroll", tabindex=0, role="region", aria_label=caption or f"Table: {keys[0]}")
+
+
+def _text_kinds(rows: Sequence[Mapping[str, object]], key: str) -> list[str]:
+    """Classes of a column of texts, by the longest of them."""
+    shown = (row[key] for row in rows)
+    longest = max(len(value.shown if isinstance(value, Cell) else str(value)) for value in shown)
+    return ["text"] + ["brief"] * (longest <= SHORT_TEXT) + ["told"] * (longest > LONG_TEXT)
 
 
 def _cell(value: object, kind: str | None) -> str:
