@@ -116,10 +116,8 @@ def _order_charts(
         )
         figures.append(html)
         charts.update(spec)
-    words = (
-        "Level of the overall transmission error along the orders: at steady speed, and as run-ups show it, cut with "
-        "the window that suits their sweep."
-    )
+    words = "Level of the overall transmission error along the orders: at steady speed"
+    words += ", and as run-ups show it, cut with the window that suits their sweep." if runs else "."
     if settings_of(data.attrs).branches:
         words += " Branches go back at their folds; states on dashed parts do not last."
     return pieces.paragraph(words, "note") + pieces.element("div", "".join(figures), class_="grid")
