@@ -19,6 +19,7 @@ from exugear.solvers.compiled.methods import (
     adams,
     forced_error,
     growth,
+    resonance_error,
     stabilised,
 )
 from fe_ste.tools.arrays import Complexes, Floats
@@ -31,14 +32,10 @@ GROWTH_ALLOWED = 1e-9
 FORCED_ERROR = 7e-4
 """Allowed error of amplitudes at the top of the band, for a free mass; with stiffness around it may be 1.4 times."""
 RESONANCE_ERROR = 1e-3
-"""Allowed error on the slope of a resonance, as a share of its peak."""
-ACCURATE_BAND_FRACTION = 2.0 / 3.0
-"""Share of elastic bodies' band up to which they vibrate as they should on bearings (`exugear.bodies.reduction`)."""
+"""Allowed error of a resonance's answer to excitation within the band, as a share of its peak."""
 STIFFENING = 1.6
 """Stiffness of a non-linear bearing over that at its static load: at twice the load rollers have up to 1.25 times the
 radial and 1.6 times the tilt stiffness, as more of them and more of their length carry."""
-LIGHTEST_DAMPING = 2e-3
-"""Damping ratio that lighter ones count as: an undamped resonance would ask for no error at all."""
 MOST_MARGIN = 3.0
 """Margin up to which it is looked for."""
 INTEGRATORS = ("adams", "rk4")
@@ -46,8 +43,6 @@ INTEGRATORS = ("adams", "rk4")
 SLOWEST = 1e-3
 """Motions that turn by less than this in a step (rad) are the rolling of the train, also on planets whose pins are off:
 methods of fourth order err by its fifth power, and the growth that is computed for them by round-off, far more."""
-FOLLOWED_CLOSELY = 1e-2
-"""Motions that turn by less than this in a step (rad) are followed to 1e-9 by all methods: round-off is larger."""
 MOST_DIVISIONS = 100_000
 """Parts of a sampling interval that a step may be at least; finer ones are refused elsewhere, with the reason."""
 
@@ -64,8 +59,8 @@ class Integration:
     margin : float
         Factor by which all motions may be faster before it is not stable, in tenths, at most `MOST_MARGIN`.
     forced_error, resonance_error : float
-        Expected errors of amplitudes, relative: at the top of the band, and on the slope of the resonance where it is
-        largest.
+        Expected errors, relative: of the amplitude of a free mass at the top of the band, and of the answer of the
+        resonance where it is largest, for excitation within the band.
     fastest_rate : float
         Magnitude of the fastest eigenvalue, rad/s.
     """
@@ -168,23 +163,6 @@ def _margin(method: Method, values: Complexes, step: float) -> float:
     return margin
 
 
-def _resonance_error(method: Method, resonances: Complexes, step: float) -> float:
-    """Largest error on the slope of a resonance, as a share of its peak.
-
-    A shift of the eigenfrequency by a share e costs up to e / (2 zeta) there, a change of the damping ratio by e as
-    much as e / zeta.
-    """
-    resonances = resonances[np.abs(resonances) * step > FOLLOWED_CLOSELY]
-    if not resonances.size:
-        return 0.0
-    rates = np.abs(resonances)
-    exact = resonances.real + 1j * np.abs(resonances.imag)
-    made = growth(method, resonances, step)[:, 0]
-    error = np.log(np.where(made.imag < 0.0, made.conj(), made)) / step - exact
-    damping = np.maximum(-resonances.real / rates, LIGHTEST_DAMPING)
-    return float((np.maximum(np.abs(error.real), 0.5 * np.abs(error.imag)) / (damping * rates)).max())
-
-
 class _Motions:
     """Free motions of an assembly, and what a method makes of them."""
 
@@ -192,12 +170,8 @@ class _Motions:
         self.band = band
         self.values = eigenvalues(assembly)
         self.fastest = float(np.abs(self.values).max(initial=0.0))
-        accurate_band = band
-        if assembly.elastic_bodies:
-            accurate_band = min(band, ACCURATE_BAND_FRACTION * assembly.gearbox.case.elasticity.band_Hz)
         # Of a pair of conjugates one is enough; what does not oscillate has no resonance.
-        swinging = self.values[self.values.imag > 0.0]
-        self.resonances = swinging[np.abs(swinging) < 2.0 * np.pi * accurate_band]
+        self.resonances = self.values[self.values.imag > 0.0]
         self.values = self.values[self.values.imag >= 0.0]
 
     def with_step(self, method: Method, step: float) -> Integration:
@@ -207,7 +181,7 @@ class _Motions:
             step,
             _margin(method, self.values, step),
             forced_error(method, 2.0 * math.pi * self.band * step),
-            _resonance_error(method, self.resonances, step),
+            resonance_error(method, self.resonances, step, self.band),
             self.fastest,
         )
 
@@ -224,7 +198,7 @@ class _Motions:
         return (
             abs(forced_error(method, 2.0 * math.pi * self.band * step)) <= FORCED_ERROR
             and _stable(method, self.values, step, MARGIN)
-            and _resonance_error(method, self.resonances, step) <= RESONANCE_ERROR
+            and resonance_error(method, self.resonances, step, self.band) <= RESONANCE_ERROR
         )
 
 
@@ -251,10 +225,9 @@ def choose_integration(
     """Find the method and the step that take the fewest evaluations.
 
     The step divides the sampling interval, is stable by `MARGIN` for all eigenvalues of the system at rest, meshes at
-    their stiffest, keeps amplitudes up to `band` within `FORCED_ERROR` and the slopes of resonances within
-    `RESONANCE_ERROR`. Resonances count where they are meant: with elastic bodies up to two thirds of the frequency to
-    which these are described exactly. Heavy damping shortens the steps of multistep methods: the Runge-Kutta method
-    takes over then.
+    their stiffest, keeps amplitudes up to `band` within `FORCED_ERROR` and resonances excited up to there within
+    `RESONANCE_ERROR`, those of elastic bodies too: teeth excite them wherever mesh frequencies pass. Heavy damping
+    shortens the steps of multistep methods: the Runge-Kutta method takes over then.
 
     Parameters
     ----------

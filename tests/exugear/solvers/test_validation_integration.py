@@ -14,6 +14,7 @@ from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.runs.runup import simulate
 
+from ..assembled import bodies_of
 from ..table_case import surfaces
 
 SIGNALS = ("overall_dte", "mesh_dte", "mesh_force", "support_force")
@@ -37,20 +38,40 @@ def deviation(found: xr.Dataset, exact: xr.Dataset, name: str) -> float:
     return float((np.sqrt(np.mean((a - b) ** 2, axis=0)) / fluctuation)[counts].max())
 
 
-@pytest.mark.validation
-@pytest.mark.parametrize("variant", ["rigid", "bushing"])
-@pytest.mark.parametrize("rpm", [-60.0, -205.0])
-def test_stored_signals_are_those_of_the_runge_kutta_method_at_a_fine_step(
-    grc: Gearbox, stiffness: dict, tmp_path: Path, variant: str, rpm: float
-) -> None:
-    gearbox = grc.varied({"load_cases.reference.start_speed_rpm": rpm})
+def departure(
+    gearbox: Gearbox, choice: Choice, stiffness: dict, folder: Path, rpm: float, duration: float
+) -> dict[str, float]:
+    """Deviation of each signal of a run as it is chosen from one by the Runge-Kutta method at a fine step."""
+    case = gearbox.varied({"load_cases.reference.start_speed_rpm": rpm})
+    bodies = bodies_of(case, choice)
     chosen, fine = (
-        opened(simulate(gearbox, Choice(variant), stiffness, tmp_path / name, duration=0.6, **options).path)
+        opened(simulate(case, choice, stiffness, folder / name, bodies=bodies, duration=duration, **options).path)
         for name, options in {"chosen": {}, "fine": {"integrator": "rk4", "step": FINE}}.items()
     )
     assert chosen.attrs["solver"].startswith("compiled, Adams")
-    for name in SIGNALS:
-        assert deviation(chosen, fine, name) < 1e-3, name
+    return {name: deviation(chosen, fine, name) for name in SIGNALS}
+
+
+def test_stored_signals_with_elastic_shafts_are_those_of_the_runge_kutta_method_at_a_fine_step(
+    grc_shafts: Gearbox, stiffness: dict, tmp_path: Path
+) -> None:
+    """At 205 rpm the high-speed mesh excites resonances of the shafts at 6.2 kHz.
+
+    The carrier's bearings still sway from the start, at 190 Hz: they are left to the longer runs of the validation.
+    """
+    found = departure(grc_shafts, Choice("flexible"), stiffness, tmp_path, -205.0, 0.04)
+    assert max(found[name] for name in ("overall_dte", "mesh_dte", "mesh_force")) < 1e-3, found
+
+
+@pytest.mark.validation
+@pytest.mark.parametrize("variant", ["rigid", "bushing", "shafts", "flexible"])
+@pytest.mark.parametrize("rpm", [-60.0, -205.0])
+def test_stored_signals_are_those_of_the_runge_kutta_method_at_a_fine_step(
+    grc: Gearbox, grc_shafts: Gearbox, stiffness: dict, tmp_path: Path, variant: str, rpm: float
+) -> None:
+    gearbox, choice = (grc_shafts, Choice("flexible")) if variant == "shafts" else (grc, Choice(variant))
+    found = departure(gearbox, choice, stiffness, tmp_path, rpm, 0.6)
+    assert max(found.values()) < 1e-3, found
 
 
 def unexplained(data: xr.Dataset) -> float:
