@@ -15,6 +15,7 @@ from typing import Annotated
 import typer
 
 from exugear.cli.console import say, say_what_is_logged
+from exugear.cli.libraries import leave_out_dask
 from exugear.cli.streams import standard_streams
 
 VERBS = (
@@ -54,6 +55,7 @@ def main() -> None:
     BLAS keeps to one thread: its idle threads wait actively and slow the compiled kernels beside them severalfold.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    leave_out_dask()
     say_what_is_logged()
     with garbage_seldom_looked_for(), standard_streams():
         app()

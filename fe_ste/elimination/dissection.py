@@ -16,6 +16,7 @@ import numpy as np
 
 from fe_ste.elimination.dense import eliminate
 from fe_ste.tools.arrays import Booleans, Floats, Integers
+from fe_ste.tools.threads import side_by_side
 
 #: Directions in which a set of cells may be cut, and where, as parts of its cells.
 _DIRECTIONS = 8
@@ -185,9 +186,10 @@ def schur_complement(
         return known[front]
     blocks = np.concatenate([front.eliminated, front.border])
     count, gone = int(sizes[blocks].sum()), int(sizes[front.eliminated].sum())
+    parts = side_by_side(lambda child: schur_complement(child, sizes, add_cells, known), front.children)
     matrix = np.zeros((count, count), order="F")
-    for child in front.children:
-        _add(matrix, blocks, sizes, child.border, schur_complement(child, sizes, add_cells, known))
+    for child, part in zip(front.children, parts, strict=True):
+        _add(matrix, blocks, sizes, child.border, part)
     if not front.children:
         add_cells(matrix, front.cells, blocks)
     eliminate(matrix, gone)

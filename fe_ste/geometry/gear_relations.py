@@ -255,7 +255,7 @@ class UncheckedGear:
         """Whether the tip of the generating rack cuts back into the involute."""
         return not self.internal and self.generated_roll_length < -ROUNDING * self.normal_module
 
-    @property
+    @cached_property
     def form_roll_length(self) -> float:
         """Roll length at which the involute meets the root fillet, m.
 
@@ -331,7 +331,7 @@ class UncheckedGear:
         angle = self.transverse_pressure_angle
         return self.base_radius * math.tan(angle) - depth / math.sin(angle)
 
-    @property
+    @cached_property
     def fillet_radius(self) -> float:
         """Radius of the rack tip that cuts the root fillet, or of an internal gear's fillet itself, m.
 

@@ -24,6 +24,7 @@ import llvmlite
 import numba
 from numba.core import config
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.runtime.nrt import rtsys
 
 from fe_ste.tools.inner_kernels import Kernel
 
@@ -141,7 +142,10 @@ class _KernelCache(FunctionCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
-            kernel = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+            # numba's own way prepares to compile, too, which takes a tenth of a second that only a compilation needs.
+            rtsys.initialize(target_context)
+            with self._guard_against_spurious_io_errors():
+                kernel = self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         except Exception:  # what reading a damaged pickle raises is not bounded
             with suppress(OSError):
                 self.flush()  # type: ignore[no-untyped-call]

@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import sys
 import threading
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
@@ -21,7 +23,11 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 Other = TypeVar("Other")
 
-_here = threading.local()
+#: Seconds after which a thread is asked to hand on Python's lock; by default 5 ms, longer than most factorisations.
+_LOCK_KEPT = 2e-4
+
+#: Held by whatever works on the second core; the first one's work holds none until it waits for the second.
+_idle_core = threading.Semaphore(1)
 
 
 @contextmanager
@@ -40,8 +46,8 @@ def one_dense_thread() -> Iterator[None]:
 def side_by_side(function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
     """Call a function for each item, two at a time; it has to let go of Python's lock to gain by it.
 
-    One after the other where there is one core only, in a worker process, which shares the cores with others, and
-    within a call that stands beside another.
+    One after the other where there is one core only, and in a worker process, which shares the cores with others. There
+    are never more than two at a time: of calls within each other the one that finds the second core idle takes it.
 
     Examples
     --------
@@ -49,15 +55,59 @@ def side_by_side(function: Callable[[Item], Result], items: Iterable[Item]) -> l
     [1, 2]
     """
     given = list(items)
-    if len(given) < 2 or not _second_core() or getattr(_here, "beside", False):
+    if len(given) < 2 or not _second_core():
         return [function(item) for item in given]
+    results: dict[int, Result] = {}
+    waiting = deque(enumerate(given))
 
-    def beside(item: Item) -> Result:
-        _here.beside = True
-        return function(item)
+    def work_off(most: int) -> None:
+        for _ in range(most):
+            try:
+                number, item = waiting.popleft()
+            except IndexError:  # none waits
+                return
+            results[number] = function(item)
 
-    with ThreadPoolExecutor(2) as threads:
-        return list(threads.map(beside, given))
+    while len(waiting) > 1:
+        if _idle_core.acquire(blocking=False):
+            _with_help(lambda: work_off(len(given)), waiting.clear)
+        else:
+            work_off(1)
+    work_off(1)
+    return [results[number] for number in range(len(given))]
+
+
+def _with_help(work: Callable[[], None], stop: Callable[[], None]) -> None:
+    """Work here and in a second thread until both find nothing to do; an error of one keeps the other from going on."""
+
+    def beside() -> None:
+        try:
+            work()
+        finally:
+            stop()
+            _idle_core.release()
+
+    with _lock_handed_on_soon(), ThreadPoolExecutor(1) as thread:
+        helper = thread.submit(beside)
+        try:
+            work()
+        finally:
+            stop()
+            _idle_core.release()  # this one's, while it waits
+            wait([helper])
+            _idle_core.acquire()
+    helper.result()
+
+
+@contextmanager
+def _lock_handed_on_soon() -> Iterator[None]:
+    """Let a thread that waits for Python's lock have it soon: it wants it for a moment, between two factorisations."""
+    usual = sys.getswitchinterval()
+    sys.setswitchinterval(_LOCK_KEPT)
+    try:
+        yield
+    finally:
+        sys.setswitchinterval(usual)
 
 
 def both(first: Callable[[], Result], second: Callable[[], Other]) -> tuple[Result, Other]:

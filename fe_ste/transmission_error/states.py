@@ -315,9 +315,13 @@ class StateResults:
             "converged": (names, np.isfinite(self.values["ste"])),
         }
         coordinates |= {"tooth": self.teeth[shown], "axial_position": self.axial}
-        dataset = xr.Dataset(variables, coordinates)
-        for name, (unit, meaning) in _UNITS.items():
-            dataset[name].attrs = {"units": unit, "long_name": meaning}
+        variables |= {name: ((name,), values) for name, values in coordinates.items()}
+        # As variables of arrays of numpy: else xarray loads Dask, where that is installed, to ask what they are.
+        labelled = {}
+        for name, (names, values) in variables.items():
+            unit, meaning = _UNITS[name]
+            labelled[name] = xr.Variable(names, values, {"units": unit, "long_name": meaning}, fastpath=True)
+        dataset = xr.Dataset(labelled)
         dataset.attrs["failures"] = "\n".join(self.failures)
         return dataset
 

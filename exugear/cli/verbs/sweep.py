@@ -11,6 +11,7 @@ import typer
 from exugear.cli.case import check_choice, check_files_below, make_results_folder
 from exugear.cli.console import note, print_json, print_table, progress_bar, say
 from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption
+from exugear.cli.libraries import let_in_dask
 from exugear.cli.options import FilesBelowOption, JsonOption, OutOption, ScriptsOption
 
 if TYPE_CHECKING:
@@ -100,6 +101,7 @@ def _executor(executor: Executor, workers: int | None, scheduler: str | None) ->
             raise BadInputError("--executor dask needs --scheduler ADDRESS, as tcp://10.0.0.1:8786")
         if workers is not None:
             raise BadInputError("--workers: the cluster has as many as were started; leave it out")
+        let_in_dask()
         return dask_cluster(scheduler)
     if scheduler is not None:
         raise BadInputError("--scheduler is that of a Dask cluster; add --executor dask")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import sys
 import threading
 import time
 
@@ -36,11 +37,47 @@ def test_two_work_at_a_time(two_cores: None) -> None:
     side_by_side(lambda _: both.wait(), range(2))
 
 
-def test_one_core_one_item_a_worker_and_what_is_beside_another_take_no_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_calls_within_calls_no_more_than_two_work_at_a_time(two_cores: None) -> None:
+    working, most, counting = 0, 0, threading.Lock()
+
+    def work(depth: int) -> None:
+        nonlocal working, most
+        if depth:
+            side_by_side(work, [depth - 1] * 3)
+            return
+        with counting:
+            working += 1
+            most = max(most, working)
+        time.sleep(0.01)
+        with counting:
+            working -= 1
+
+    side_by_side(work, [2, 2, 0])
+    assert most == 2
+
+
+def test_a_core_that_has_nothing_left_to_do_helps_within_another_item(two_cores: None) -> None:
+    both, other_ended = threading.Barrier(2, timeout=30), threading.Event()
+
+    def step(number: int) -> None:
+        if number:
+            both.wait()
+        else:
+            assert other_ended.wait(30)
+            time.sleep(0.1)  # until its thread has found nothing else to do
+
+    side_by_side(lambda long: side_by_side(step, range(3)) if long else other_ended.set(), [True, False])
+
+
+def test_the_lock_is_handed_on_soon_only_while_two_work(two_cores: None) -> None:
+    usual = sys.getswitchinterval()
+    assert set(side_by_side(lambda _: sys.getswitchinterval() < 1e-3, range(2))) == {True}
+    assert sys.getswitchinterval() == usual
+
+
+def test_one_core_one_item_and_a_worker_take_no_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fe_ste.tools.threads, "available_cores", lambda: 2)
     assert threads_of(1) == {threading.get_ident()}
-    inner = side_by_side(lambda _: threads_of(2) == {threading.get_ident()}, range(2))
-    assert inner == [True, True]
     with monkeypatch.context() as in_worker:
         in_worker.setattr(multiprocessing, "parent_process", lambda: object())
         assert threads_of(2) == {threading.get_ident()}
@@ -76,6 +113,19 @@ def test_an_error_of_one_is_raised(two_cores: None) -> None:
 
     with pytest.raises(ValueError, match="second"):
         side_by_side(fails, range(2))
+
+
+def test_after_an_error_no_further_item_is_begun(two_cores: None) -> None:
+    begun = []
+
+    def fails(item: int) -> None:
+        begun.append(item)
+        time.sleep(0.01)
+        raise IndexError(f"item {item}")
+
+    with pytest.raises(IndexError, match="item"):
+        side_by_side(fails, range(100))
+    assert len(begun) <= 2
 
 
 def test_dense_products_let_go_of_the_lock(two_cores: None) -> None:
