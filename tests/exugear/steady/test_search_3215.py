@@ -13,7 +13,7 @@ import scipy.linalg
 from exugear import Choice, Project
 from exugear.rotating.mean_modes import mean_modes
 
-FOLDER = Path(__file__).parents[2] / "cases" / "grc750"
+FOLDER = Path(__file__).parents[3] / "cases" / "grc750"
 NEARLY_THE_FILE = {"housing_factor": 1.0, "spin": 1.0, "mass": 0.7, "coupling": 1e6}
 
 
