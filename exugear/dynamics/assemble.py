@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -40,6 +40,7 @@ def assemble(
     *,
     flanks: Mapping[str, int] | None = None,
     angles: Angles = "reference",
+    before_balance: Callable[[Assembly], None] | None = None,
 ) -> Assembly:
     """Put the equations of motion of a gearbox together.
 
@@ -55,6 +56,8 @@ def assemble(
         `exugear.bodies.of_gearbox.elastic_bodies` gives them.
     flanks, angles
         As in `exugear.tooth_mesh.element.mesh_elements`.
+    before_balance : callable, optional
+        Called with the assembly before the static load is looked for that bearings take their stiffness from.
 
     Raises
     ------
@@ -115,6 +118,8 @@ def assemble(
         motions=_rolling_motions(gearbox, coordinates) if only_rolls else np.eye(size),
         rows_stiffness=np.zeros((len(supports), 6, 6)),
     )
+    if before_balance is not None:
+        before_balance(assembly)
     return at_static_load(assembly)
 
 

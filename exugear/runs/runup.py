@@ -27,7 +27,7 @@ from exugear.runs.plan import RunPlan, plan_run
 from exugear.runs.recorder import Recorder
 from exugear.runs.run_folder import held, run_directory
 from exugear.runs.start import RunStart, prepare_start
-from exugear.solvers.compiled.solver import unsupported_reason
+from exugear.solvers.compiled.solver import compile_loop_ahead, unsupported_reason
 from exugear.solvers.compiled.step import INTEGRATORS, choose_integration, fastest_motion
 from exugear.tooth_mesh.law import Angles, MeshData
 
@@ -118,7 +118,12 @@ def simulate(
         raise gearbox.fault(f"no load case {choice.load_case!r}; load cases are {', '.join(gearbox.load_cases)}")
     case = gearbox.load_cases[choice.load_case]
     check_duration(gearbox, case, duration, sample_rate)
-    assembly = assemble(gearbox, choice, stiffness, bodies, angles=angles)
+
+    def begin_to_compile(parts: Assembly) -> None:
+        if _solver(solver, parts, mesh_route) == "compiled":
+            compile_loop_ahead(parts)
+
+    assembly = assemble(gearbox, choice, stiffness, bodies, angles=angles, before_balance=begin_to_compile)
     directory = run_directory(out, choice)
     total = case.duration if duration is None else duration
     if integrator is not None and integrator not in INTEGRATORS:

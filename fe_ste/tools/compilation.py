@@ -7,18 +7,22 @@ sources with kernels: after any change they are compiled anew.
 
 from __future__ import annotations
 
+import atexit
 import hashlib
+import importlib
 import logging
 import os
+import pickle
 import shutil
 import stat
+import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import IO, Any, TypeVar, cast
 
 import llvmlite
 import numba
@@ -27,6 +31,7 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.runtime.nrt import rtsys
 
 from fe_ste.tools.inner_kernels import Kernel
+from fe_ste.tools.threads import second_core_is_free
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
@@ -45,9 +50,18 @@ _COMPILED = {
     "exugear": " of the equations of motion, 10 to 25 s for each sort of model",
 }
 
+#: What a process does that compiles for this one: it finds modules where this one does.
+_COMPILE = """
+import pickle, sys
+sys.path[:] = pickle.load(sys.stdin.buffer)
+from fe_ste.tools.compilation import compile_as_asked
+compile_as_asked(sys.stdin.buffer)
+"""
+
 #: numba's settings, which have no types.
 _settings: Any = config
 _log = logging.getLogger(__name__)
+_compiled_ahead: dict[tuple[Callable[..., object], Any], subprocess.Popen[bytes]] = {}
 
 
 def compiled(function: Function) -> Function:
@@ -72,6 +86,44 @@ def kernel(function: Function) -> Function:
 def summing_kernel(function: Function) -> Function:
     """Compile as `kernel`, with sums in parts, not in the order that is written."""
     return _kept(function, **_WITHOUT_MEMORY, fastmath=_IN_PARTS)
+
+
+def compile_ahead(function: Callable[..., object], *given: object) -> None:
+    """Let another process compile a kernel while this one works on what comes before its first call.
+
+    numba compiles one kernel at a time in a process. The first call waits for the other process, and compiles itself
+    if that failed. Nothing is done where the kernel is there already, where none is kept, and without a second core.
+
+    Parameters
+    ----------
+    function : compiled function
+        Of the top of a module.
+    given
+        Arguments of the types with which it will be called.
+    """
+    kernel = cast(Any, function)
+    if not (isinstance(function, Kernel) and isinstance(kernel._cache, _KernelCache) and second_core_is_free()):
+        return
+    signature = tuple(kernel.typeof_pyval(one) for one in given)
+    if kernel._cache.holds(signature, kernel.targetctx) or not sys.executable or hasattr(sys, "frozen"):
+        return
+    process = subprocess.Popen(
+        [sys.executable, "-c", _COMPILE],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    atexit.register(process.kill)
+    with suppress(OSError), cast(IO[bytes], process.stdin) as request:
+        request.write(pickle.dumps(sys.path) + pickle.dumps((kernel.__module__, kernel.__name__)))
+        request.write(pickle.dumps(signature))
+    _compiled_ahead[kernel.py_func, signature] = process
+
+
+def compile_as_asked(request: IO[bytes]) -> None:
+    """Compile the kernel that `compile_ahead` asks for: module and name, then types of arguments."""
+    module, name = pickle.load(request)
+    getattr(importlib.import_module(module), name).compile(pickle.load(request))
 
 
 @cache
@@ -141,18 +193,32 @@ class _KernelCache(FunctionCache):
     _impl_class = _KernelFiles
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
+        kernel = self._found(sig, target_context)
+        if kernel is None:
+            _tell_of_compiling(self._py_func.__module__.partition(".")[0])
+            if process := _compiled_ahead.pop((self._py_func, sig), None):
+                process.wait()
+                kernel = self._found(sig, target_context)
+        return kernel
+
+    def holds(self, sig: Any, target_context: Any) -> bool:
+        """Tell whether there is machine code for types of arguments."""
+        key = self._index_key(sig, target_context.codegen())  # type: ignore[no-untyped-call]
+        try:
+            return key in cast(Any, self)._cache_file._load_index()
+        except Exception:  # as below
+            return False
+
+    def _found(self, sig: Any, target_context: Any) -> Any:
         try:
             # numba's own way prepares to compile, too, which takes a tenth of a second that only a compilation needs.
             rtsys.initialize(target_context)
             with self._guard_against_spurious_io_errors():
-                kernel = self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+                return self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         except Exception:  # what reading a damaged pickle raises is not bounded
             with suppress(OSError):
                 self.flush()  # type: ignore[no-untyped-call]
-            kernel = None
-        if kernel is None:
-            _tell_of_compiling(self._py_func.__module__.partition(".")[0])
-        return kernel
+        return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         try:

@@ -55,7 +55,7 @@ def side_by_side(function: Callable[[Item], Result], items: Iterable[Item]) -> l
     [1, 2]
     """
     given = list(items)
-    if len(given) < 2 or not _second_core():
+    if len(given) < 2 or not second_core_is_free():
         return [function(item) for item in given]
     results: dict[int, Result] = {}
     waiting = deque(enumerate(given))
@@ -153,11 +153,11 @@ def second_thread() -> Executor:
     ...     thread.submit(abs, -1).result()
     1
     """
-    return ThreadPoolExecutor(1) if _second_core() else AtOnce()
+    return ThreadPoolExecutor(1) if second_core_is_free() else AtOnce()
 
 
-def _second_core() -> bool:
-    """Whether a core is likely to be free for a second thread."""
+def second_core_is_free() -> bool:
+    """Whether a core is likely to be free beside this process's own: there is one, and this is no worker process."""
     return available_cores() > 1 and multiprocessing.parent_process() is None
 
 

@@ -6,6 +6,8 @@ Same coordinates and same laws as the Exudyn system built from the same assembly
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from exugear.dynamics.assembly import Assembly
@@ -18,6 +20,7 @@ from exugear.solvers.compiled.sampling import columns_of
 from exugear.solvers.loads import LoadTable
 from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.compilation import compile_ahead
 from fe_ste.tools.inner_kernels import bundle
 
 POWER_INTERVAL = 1.0 / 30e3
@@ -39,6 +42,13 @@ def unsupported_reason(assembly: Assembly) -> str:
         family = assembly.gearbox.body(next(iter(assembly.floating))).family
         return f"bodies.{family}.flexibility = 'ffrf' runs in Exudyn only, 'nonrotating' in both"
     return ""
+
+
+def compile_loop_ahead(assembly: Assembly) -> None:
+    """Let the loop over time, most of all that compiles, be compiled while a state to start from is looked for."""
+    rest, nothing = np.zeros(assembly.size), np.empty((0, 0))
+    system = CompiledSystem(assembly, rest, rest, LoadTable(), 1.0)
+    compile_ahead(advance, *system.arguments(np.empty(0), 0, 1, nothing, nothing, nothing, nothing))
 
 
 class CompiledSystem:
@@ -126,5 +136,9 @@ class CompiledSystem:
 
     def _pass(self, times: Floats, first: int, stride: int, *rows: Floats) -> int:
         """Pass through states, see `exugear.solvers.compiled.loop.advance`."""
+        return advance(*self.arguments(times, first, stride, *rows))
+
+    def arguments(self, times: Floats, first: int, stride: int, *rows: Floats) -> tuple[Any, ...]:
+        """Return all that `exugear.solvers.compiled.loop.advance` is called with."""
         how = first, self.step, self._method_b
-        return advance(times, *how, self._bundle, self._memory, self._past_b, self._columns, stride, *rows)
+        return times, *how, self._bundle, self._memory, self._past_b, self._columns, stride, *rows

@@ -195,3 +195,46 @@ def test_compiled_functions_read_only_what_the_digest_covers() -> None:
     others = {name for name, text in sources.items() if "fe_ste.tools.compilation" not in text}
     frozen = {name: list(foreign_names(text, others)) for name, text in with_kernels.items()}
     assert {name: names for name, names in frozen.items() if names} == {}
+
+
+AHEAD = """
+import subprocess, sys
+import fe_ste.tools.compilation as compilation
+from small.caller import value
+begun = []
+class Recorded(subprocess.Popen):
+    def __init__(self, *given, **named):
+        super().__init__(*given, **named)
+        begun.append(self)
+subprocess.Popen = Recorded
+compilation.second_core_is_free = lambda: {free}
+{first}
+compilation.compile_ahead(value, 1.0)
+print(value(1.0), [one.returncode == 0 for one in begun], sum(value.stats.cache_hits.values()))
+"""
+
+
+def ahead(small: Path, first: str = "", free: bool = True) -> str:
+    """Value, whether processes beside it succeeded, and kernels found, of a process that has one compiled ahead."""
+    path = os.pathsep.join(map(str, [small.parent, ROOT]))
+    outcome = subprocess.run(
+        [sys.executable, "-P", "-c", AHEAD.format(first=first, free=free)],
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return outcome.stdout.strip()
+
+
+def test_a_kernel_is_compiled_by_another_process_once(small: Path) -> None:
+    assert ahead(small) == "3.0 [True] 1"
+    assert ahead(small) == "3.0 [] 1"
+
+
+def test_a_process_that_cannot_compile_ahead_leaves_it_to_the_first_call(small: Path) -> None:
+    assert ahead(small, first=f"sys.executable = {shutil.which('false')!r}") == "3.0 [False] 0"
+
+
+def test_with_one_core_nothing_is_compiled_ahead(small: Path) -> None:
+    assert ahead(small, free=False) == "3.0 [] 0"
