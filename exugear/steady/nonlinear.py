@@ -20,7 +20,7 @@ from exugear.rotating.sampled_bearings import sample_rolling
 from exugear.rotating.sampled_laws import LawSamples, sample_stiffness, sample_table, widened
 from exugear.steady.excitation import Gearset, Interface
 from exugear.steady.response import Response, rates_of
-from fe_ste.tools.arrays import Complexes, Floats
+from fe_ste.tools.arrays import Complexes, Floats, Integers
 
 BALANCED = 1e-8
 """Residual of the balance over the size of the deflections."""
@@ -74,6 +74,13 @@ class Balance:
         if self.interface.bearings is not None:
             found[m:, :COMPONENTS] = self.interface.bearings.load
         return found
+
+    @cached_property
+    def read(self) -> Integers:
+        """Places of what the laws read among all readings (m r,): some laws read less than others."""
+        ports = self.interface.ports
+        found = ports.readings.any(axis=2) if ports.rates is None else (ports.readings + ports.rates).any(axis=2)
+        return np.flatnonzero(found)
 
     @property
     def meshes(self) -> int:
@@ -291,10 +298,13 @@ class Tangent:
 
         The balance of each line by itself, solved exactly, leaves GMRES what varying laws do between lines.
         """
-        inverse, lengths = np.linalg.inv(self.balance.averaged(self.sampled)), self.balance.gearset.lengths
+        read, lengths = self.balance.read, self.balance.gearset.lengths
+        inverse = np.linalg.inv(self.balance.averaged(self.sampled)[:, read[:, None], read])
 
         def alone(values: Complexes) -> Complexes:
-            return np.asarray(lengths * (inverse @ values.reshape(len(values), -1, 1)).reshape(values.shape))
+            found = values.reshape(len(values), -1).copy()
+            found[:, read] = (inverse @ found[:, read, None])[..., 0]
+            return np.asarray(lengths * found.reshape(values.shape))
 
         found, products = solve_lines(lambda own: alone(self.missing(own / lengths)), alone(right), tolerance)
         return found / lengths, products

@@ -104,6 +104,7 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
         "bearings_in_time": ", ".join(response.bearing_names),
         "growth_rate": response.growth_rate,
         "planet_spread": response.planet_spread,
+        "stiffness_variation": response.stiffness_variation,
         "contributions": json.dumps([{"line": line, **asdict(own)} for line, own in response.contributions]),
         "folds": json.dumps(response.folds),
         "unsolved": json.dumps([{"speed": speed, "reason": reason} for speed, reason in response.unsolved]),

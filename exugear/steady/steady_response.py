@@ -105,6 +105,8 @@ class SteadyResponse:
         work together, and of the points where teeth may part.
     planet_spread : float
         Largest change of planet bearings' stiffness that made the planets equal, over that stiffness.
+    stiffness_variation : float
+        Largest change of stiffness over the carrier's places, over the stiffness, whose mean counts.
     campbell : Campbell
         Modes over the speeds, as far up as the lines that `crossings` looks at.
     """
@@ -124,6 +126,7 @@ class SteadyResponse:
     folds: tuple[float, ...]
     growth_rate: float
     planet_spread: float
+    stiffness_variation: float
     campbell: Campbell
 
     def __repr__(self) -> str:
@@ -272,6 +275,7 @@ def response_of(
         folds=folds,
         growth_rate=float(np.fmax(solver.growth(float(even.min()), float(even.max())), fastest)),
         planet_spread=gearset.system.planet_spread,
+        stiffness_variation=gearset.system.variation,
         campbell=campbell_of(gearset.system, tracks),
     )
 
