@@ -169,7 +169,8 @@ class BearingWaves:
 
     def _along_radii(self) -> Floats:
         """Matrices (c, 5, 5) from components along a bearing's axes to those along radius and tangent of its planet."""
-        angles = [np.zeros(1) if self.waves[n].planets is None else self.waves[n].planets.angles for n in self.firsts]
+        sets = [self.waves[n].planets for n in self.firsts]
+        angles = [np.zeros(1) if planets is None else planets.angles for planets in sets]
         turn = np.tile(np.eye(COMPONENTS), (len(self._numbers), 1, 1))
         for own, angle in zip(turn, np.concatenate(angles), strict=True):
             c, s = math.cos(angle), math.sin(angle)

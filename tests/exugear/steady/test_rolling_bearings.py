@@ -18,6 +18,7 @@ from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import load_response, write_response
 from exugear.steady.steady_response import response_of
 
+from .. import table_case
 from ..assembled import assembled
 from ..bearing_case import BEARING_CASE, NAMES, NON_LINEAR
 from ..spur_case import SPUR_CASE
@@ -73,6 +74,17 @@ def test_a_spur_pair_with_clearances_stays_on_its_steady_state(loose_solver, spe
     complex_apart, in_amplitude = apart(loose_solver, speed, 0.8, 1.0 / 60e3, 0.4)
     assert complex_apart < most
     assert in_amplitude < 0.5 * most + 1e-4
+
+
+@pytest.mark.parametrize("speed", [60.0, 150.0])
+def test_teeth_by_their_table_and_bearings_by_their_elements_stay_on_their_steady_state(monkeypatch, speed):
+    """As with linear bearings: 1e-3."""
+    monkeypatch.setitem(table_case.STIFFNESS, "spur", 3e8)
+    data = {"spur": table_case.surface_of(PLAIN, "spur")}
+    solver = solver_of(assemble(PLAIN, Choice("bushing", "table"), data), (20.0, 400.0), "nonlinear", 14)
+    assert apart(solver, speed, 0.4, 1.0 / 60e3, 0.2)[0] < 1e-3
+    taken, given = dissipated_and_given(solver.gearset, solver.response(speed))
+    assert given == pytest.approx(taken, rel=1e-4)
 
 
 @pytest.mark.parametrize("speed", [80.0, 110.0, 220.0])
