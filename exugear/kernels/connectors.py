@@ -189,6 +189,50 @@ def connector_strains(q: Floats, connectors: ConnectorArrays) -> Floats:
     return _strains(_ends(x, np.zeros_like(x), connectors))[0]
 
 
+def rolling_strains(q: Floats, v: Floats, connectors: ConnectorArrays) -> Floats:
+    """Displacement (..., c, 5) from which rows of rolling elements have their force, damping with it, m and rad.
+
+    It is ahead of that of `connector_strains` by the time of the damping: see `exugear.kernels.rolling`.
+
+    Parameters
+    ----------
+    q, v : (..., size) arrays
+        Coordinates and velocities.
+    connectors : ConnectorArrays
+    """
+    places = _places(connectors, q.shape[-1])
+    strain, rate = _strains(_ends(_local(q, places), _local(v, places), connectors))
+    ahead = connectors.rolling.time
+    out: Floats = strain[..., :5] + ahead[:, None] * rate[..., :5]
+    out[..., 3] -= ahead * strain[..., 4] * rate[..., 5]
+    out[..., 4] += ahead * strain[..., 3] * rate[..., 5]
+    return out
+
+
+def rolling_pushes(q: Floats, connectors: ConnectorArrays) -> Floats:
+    """Generalized forces (c, 5, size) per unit of the forces and moments of rows of rolling elements, see `set_force`.
+
+    Parameters
+    ----------
+    q : (size,) array
+    connectors : ConnectorArrays
+    """
+    places = _places(connectors, q.size)
+    x = _local(q, places)
+    ends = _ends(x, np.zeros_like(x), connectors)
+    strain, _ = _strains(ends)
+    count = len(connectors.bodies)
+    out = np.zeros((count, 5, q.size + BODY_SIZE))
+    for component in range(5):
+        load = np.zeros((count, BODY_SIZE))
+        load[:, component] = 1.0
+        # Moments that do no work on the spin.
+        load[:, 5] = {3: -strain[:, 4], 4: strain[:, 3]}.get(component, 0.0)
+        vectors = load.reshape(count, 2, 3) @ ends.axes[..., 0, :, :].swapaxes(-1, -2)
+        np.add.at(out[:, component], (np.arange(count)[:, None, None], places), _forces(x, ends, vectors))
+    return out[..., : q.size]
+
+
 def add_connector_tangents(
     q: Floats, steps: Floats, connectors: ConnectorArrays, stiffness: Floats, damping: Floats
 ) -> None:

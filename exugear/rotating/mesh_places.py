@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exugear.rotating.mesh_waves import MeshWave, MeshWaves
+from exugear.rotating.mesh_waves import MeshWaves
 from exugear.rotating.rotating_frame import PlanetSet
 from fe_ste.tools.arrays import Floats
 
@@ -66,7 +66,7 @@ def mesh_places(waves: MeshWaves, speed: float, positions: Floats, angles: Float
         sense = math.copysign(1.0, speed) * wave.sense
         position = positions[first] + sense * angles[:, [wave.base]] / (2.0 * math.pi)
         column = len(waves.base_orders) + carriers.index(planets.carrier) if planets and wave.ahead else None
-        shapes = _shapes(wave, planets, speed, None if column is None else angles[:, column])
+        shapes = wave_shapes(planets, speed, None if column is None else angles[:, column])
         rows, columns = np.zeros((*shapes.shape[:-1], count)), np.zeros((*shapes.shape[:-2], count, shapes.shape[-2]))
         rows[..., own] = shapes
         columns[..., own, :] = np.swapaxes(shapes / (shapes**2).sum(axis=-2, keepdims=True), -1, -2)
@@ -80,11 +80,21 @@ def mesh_places(waves: MeshWaves, speed: float, positions: Floats, angles: Float
     )
 
 
-def _shapes(wave: MeshWave, planets: PlanetSet | None, speed: float, turned: Floats | None) -> Floats:
-    """Waves in the places (places, waves), or where the carrier is turned by angles (s, places, waves)."""
+def wave_shapes(planets: PlanetSet | None, speed: float, turned: Floats | None) -> Floats:
+    """Waves in the places (places, waves), or where the carrier is turned by angles (s, places, waves).
+
+    Parameters
+    ----------
+    planets : PlanetSet or None
+        None of what does not travel.
+    speed : float
+        Of the input, rad/s.
+    turned : (s,) array or None
+        Angles of the base of the carrier, rad; None where it is none.
+    """
     if planets is None:
         return np.ones((1, 1))
     if turned is not None:
-        return planets.values(math.copysign(1.0, speed * wave.carrier) * turned)
+        return planets.values(math.copysign(1.0, speed * planets.ratio) * turned)
     theta = 2.0 * np.pi * np.arange(TURNED) / TURNED
     return np.stack([np.ones_like(theta), np.cos(theta), np.sin(theta)], axis=1)

@@ -34,14 +34,17 @@ class MeshPorts:
         Their values in the static state; the mean position counts from there.
     forces : (m, f, size) array
         Rows along which its forces push.
-    positions : (m,) array
-        Position in the mesh cycle at zero angle of the input.
+    positions : (meshes,) array
+        Position in the mesh cycle at zero angle of the input, of the waves of meshes alone.
+    rates : (m, r, size) array, optional
+        Rows of what the law reads by the rates of the coordinates; non-linear bearings have some.
     """
 
     readings: Floats
     static: Floats
     forces: Floats
     positions: Floats
+    rates: Floats | None = None
 
 
 def mesh_ports(waves: MeshWaves, speed: float, parting: bool) -> MeshPorts:

@@ -53,6 +53,25 @@ class LawSamples(NamedTuple):
     damping: Floats
 
 
+def widened(samples: LawSamples, forces: int, readings: int) -> LawSamples:
+    """Return samples with as many forces and readings as asked for: zeros where the law has none.
+
+    The last reading, the position in the cycle, stays the last.
+    """
+    force, slope, damping = samples
+    if slope.shape[1:] == (forces, readings):
+        return samples
+    wide = np.zeros((len(force), forces))
+    wide[:, : force.shape[1]] = force
+    slopes = []
+    for own in (slope, damping):
+        found = np.zeros((len(force), forces, readings))
+        found[:, : own.shape[1], : own.shape[2] - 1] = own[..., :-1]
+        found[:, : own.shape[1], -1] = own[..., -1]
+        slopes.append(found)
+    return LawSamples(wide, *slopes)
+
+
 def sample_stiffness(stiffness: Floats, readings: Floats) -> LawSamples:
     """Sample a law along a row without its damper, which is in the mean system.
 

@@ -13,15 +13,15 @@ import numpy as np
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.modes import overall_row
 from exugear.kernels.coordinates import TILT
-from exugear.rotating.mean_system import MeanSystem
+from exugear.rotating.mean_system import MeanSystem, place_step
 from exugear.rotating.mesh_waves import MeshWaves, wave_name
 from exugear.rotating.rotating_frame import PlanetSet
 from fe_ste.tools.arrays import Complexes, Floats
 
 AXES = ("x", "y", "z")
 PLANET_AXES = ("radial", "tangential", "z")
-PLACE_STEP, RATE_STEP = 1e-6, 1e-3
-"""Steps of central differences by places (m, rad) and by rates."""
+RATE_STEP = 1e-3
+"""Step of central differences by rates."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def signal_rows(system: MeanSystem, speed: float) -> SignalRows:
     if assembly.supports:
         q, v, _ = frame.state(0.0, speed, system.static_at(speed))
         turn, labels = _support_waves(assembly, frame.sets)
-        by_q = turn @ _slopes(lambda step: _forces(assembly, q + step, v), assembly.size, PLACE_STEP)
+        by_q = turn @ _slopes(lambda step: _forces(assembly, q + step, v), assembly.size, place_step(assembly))
         by_v = turn @ _slopes(lambda step: _forces(assembly, q, v + step), assembly.size, RATE_STEP)
         seats = turn @ _seat_rows(assembly)
         for quantity, units in (("support_force", "N"), ("seat_acceleration", "m/s2")):

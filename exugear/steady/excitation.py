@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -13,10 +13,19 @@ from exugear.harmonics.lattice import Lattice, lattice
 from exugear.harmonics.lines import LineSet, line_set, modulated
 from exugear.harmonics.products import Product
 from exugear.kernels.meshes import SPIN_1
+from exugear.rotating.bearing_waves import (
+    TILTS,
+    BearingMean,
+    BearingWaves,
+    bearing_waves,
+    places_with_bearings,
+    ports_with_bearings,
+)
 from exugear.rotating.mean_system import MeanSystem
+from exugear.rotating.mesh_places import MeshPlaces, mesh_places
 from exugear.rotating.mesh_ports import BACK_TILT, DEFLECTION, POSITION, TILT, MeshPorts, mesh_ports
 from exugear.rotating.mesh_waves import MeshWaves
-from exugear.rotating.signals import SignalName, SignalRows, mesh_signal_names, signal_rows
+from exugear.rotating.signals import AXES, SignalName, SignalRows, mesh_signal_names, signal_rows
 from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
 
@@ -27,6 +36,8 @@ SAMPLES_PER_HARMONIC = 16
 @dataclass(frozen=True, eq=False)
 class Interface:
     """The meshes of a gearbox as they meet its mean system at one speed; m waves, r readings, f forces, n lines.
+
+    Waves of non-linear bearings follow those of the meshes.
 
     Attributes
     ----------
@@ -44,6 +55,8 @@ class Interface:
         Of the drive in the static state, N m.
     torque_per_force : (m, f) array
         Torque of the drive per steady force, N m/N.
+    bearings : BearingMean or None
+        Non-linear bearings in the mean system.
     """
 
     speed: float
@@ -53,6 +66,7 @@ class Interface:
     rows: SignalRows
     torque: float
     torque_per_force: Floats
+    bearings: BearingMean | None
 
     @cached_property
     def deflection(self) -> Complexes:
@@ -62,8 +76,15 @@ class Interface:
     @cached_property
     def readings(self) -> Complexes:
         """All that the laws read (n, m, r, m, f) under a unit of each force."""
-        found = np.tensordot(self.ports.readings, self.motion, axes=(2, 1))
-        return np.asarray(np.moveaxis(found, 2, 0))
+        return self.read(self.motion)
+
+    def read(self, motion: Complexes) -> Complexes:
+        """Find what the laws read (n, m, r, ...) of a motion (n, size, ...)."""
+        found = np.moveaxis(np.tensordot(self.ports.readings, motion, axes=(2, 1)), 2, 0)
+        if self.ports.rates is not None:
+            moving = 1j * self.frequencies.reshape(-1, *(1,) * (motion.ndim - 1)) * motion
+            found = found + np.moveaxis(np.tensordot(self.ports.rates, moving, axes=(2, 1)), 2, 0)
+        return np.ascontiguousarray(found)
 
 
 class Gearset:
@@ -76,6 +97,11 @@ class Gearset:
         Of each mesh frequency. The mesh stiffness has twice as many.
     combinations : int
         Largest sum of multiples of several mesh frequencies.
+
+    Notes
+    -----
+    All bearings are linear about the static state, but for those that `with_bearings` adds: waves of these follow those
+    of the meshes in all arrays.
     """
 
     def __init__(self, waves: MeshWaves, harmonics: int, combinations: int) -> None:
@@ -84,34 +110,93 @@ class Gearset:
         # Lines of the larger set are kept apart where forces are evaluated in time.
         self.lines, self._larger = _line_sets(waves, harmonics, combinations)
         self.parting = LAWS[waves.assembly.mesh_law].loses_contact
+        self.bearings: BearingWaves | None = None
+        self._bearing_means: tuple[BearingMean, ...] = ()
         ports, rows = [], []
         for speed in waves.system.speeds:
             ports.append(mesh_ports(waves, float(speed), self.parting))
             rows.append(signal_rows(waves.system, float(speed)))
-        self._ports = {
-            name: np.array([getattr(own, name) for own in ports])
-            for name in ("readings", "static", "forces", "positions")
-        }
+        self._ports = _stacked(ports)
         self._rows = {
             name: np.array([getattr(own, name) for own in rows]) for name in ("by_place", "by_rate", "by_acceleration")
         }
         self._row_names = rows[0].names
         self.signal_names: tuple[SignalName, ...] = (*self._row_names, *mesh_signal_names(waves))
 
+    @property
+    def bent(self) -> bool:
+        """Whether forces are no parabolas of what the laws read: teeth or rolling elements may part."""
+        return self.parting or self.bearings is not None
+
+    @cached_property
+    def with_bearings(self) -> Gearset:
+        """The same with the laws of bearings that have rows of rolling elements; itself where none has."""
+        other, bearings = self._copied(), bearing_waves(self.waves)
+        if bearings is None:
+            return self
+        ports, speeds = [], self.system.speeds
+        other.bearings = bearings
+        other._bearing_means = tuple(bearings.at(float(speed)) for speed in speeds)
+        for speed, mean in zip(speeds, other._bearing_means, strict=True):
+            ports.append(ports_with_bearings(self.ports_at(float(speed)), mean))
+        other._ports = _stacked(ports)
+        return other
+
+    @cached_property
+    def weights(self) -> Floats:
+        """What a unit of each wave's force counts in generalized forces, (m,)."""
+        bearings = np.zeros(0) if self.bearings is None else self.bearings.weights
+        return np.append(self.waves.weights, bearings)
+
+    @cached_property
+    def partners(self) -> Floats:
+        """What laws see of the rates of other waves, (m, m): `MeshWaves.partners`; rows of bearings have it in them."""
+        found = np.zeros((len(self.weights),) * 2)
+        found[: len(self.waves.waves), : len(self.waves.waves)] = self.waves.partners
+        return found
+
+    @property
+    def bearing_names(self) -> tuple[str, ...]:
+        """Bearings whose laws are evaluated in time, planets' by their family, in the order of the laws."""
+        return () if self.bearings is None else self.bearings.names
+
+    @cached_property
+    def bearing_signals(self) -> Integers:
+        """Places (b, 3) of the forces of non-linear bearings among the signals."""
+        axes = np.arange(len(AXES))
+        if self.bearings is None:
+            return np.zeros((0, len(axes)), dtype=np.int64)
+        supports = [wave.connectors[wave.wave] for wave in self.bearings.waves]
+        first = [own.quantity for own in self.signal_names].index("support_force")
+        return np.asarray(first + len(axes) * np.array(supports)[:, None] + axes)
+
+    def places(self, speed: float, positions: Floats, angles: Floats) -> MeshPlaces:
+        """Places where laws are evaluated, as `mesh_places` has them; those of bearings follow."""
+        found = mesh_places(self.waves, speed, positions, angles)
+        if self.bearings is None:
+            return found
+        return places_with_bearings(found, self.bearings, len(self.waves.base_orders), speed, angles)
+
     @cached_property
     def lattice(self) -> Lattice:
         """Samples on which forces are evaluated in time."""
-        least = SAMPLES_PER_HARMONIC * self.line_harmonics if self.parting else 0
+        least = SAMPLES_PER_HARMONIC * self.line_harmonics if self.bent else 0
         return lattice(self.lines, self._larger, least)
 
     @cached_property
     def finer(self) -> Gearset:
         """The same with twice the harmonics of each mesh frequency, and the same combinations of several."""
-        other = copy.copy(self)
-        for name in ("lattice", "products", "finer"):
-            other.__dict__.pop(name, None)
+        other = self._copied()
         other.line_harmonics = 2 * self.line_harmonics
         other.lines, other._larger = _line_sets(self.waves, other.line_harmonics, self.combinations)
+        return other
+
+    def _copied(self) -> Gearset:
+        """Copy without what was derived from lines and ports."""
+        other = copy.copy(self)
+        for name, value in vars(type(self)).items():
+            if isinstance(value, cached_property):
+                other.__dict__.pop(name, None)
         return other
 
     def places_in(self, other: Gearset) -> Integers:
@@ -151,13 +236,18 @@ class Gearset:
 
     @cached_property
     def lengths(self) -> Floats:
-        """What a reading (m, r) counts as a length: metres as they are, cycles and angles by the base pitch, m."""
+        """What a reading (m, r) counts as a length, m: metres as they are, cycles and angles by the base pitch.
+
+        Tilts of bearings count by half of their pitch diameter.
+        """
         meshes, firsts = self.waves.assembly.meshes, [wave.first for wave in self.waves.waves]
         pitch = np.abs(meshes.deflection[firsts, SPIN_1] / meshes.cycles[firsts])
-        found = np.ones(self._ports["static"].shape[1:])
-        found[:, POSITION] = pitch
+        found, count = np.ones(self._ports["static"].shape[1:]), len(firsts)
+        found[:count, POSITION] = pitch
         if self.parting:
-            found[:, [TILT, BACK_TILT]] = pitch[:, None]
+            found[:count, [TILT, BACK_TILT]] = pitch[:, None]
+        if self.bearings is not None:
+            found[count:, TILTS] = self.bearings.radii[:, None]
         return found
 
     def forward(self, speed: float) -> Booleans:
@@ -176,16 +266,19 @@ class Gearset:
 
     def loads(self, ports: MeshPorts) -> Floats:
         """Generalized forces (size, m f) of a unit of each force, in the frame."""
-        weighted = ports.forces * self.waves.weights[:, None, None]
+        weighted = ports.forces * self.weights[:, None, None]
         return np.asarray(weighted.reshape(-1, weighted.shape[2]).T)
 
     def at(self, speed: float) -> Interface:
         """Everything at one speed of the input (rad/s), which is not zero."""
         system, ports = self.system, self.ports_at(speed)
         frequencies, loads = abs(speed) * self.lines.orders, self.loads(ports)
-        still = system.still(system.stiffness_at(speed), loads)
-        moving = system.responses(speed, frequencies[1:], loads)
-        motion = np.concatenate([still[None, :-1].astype(complex), moving])
+        # Laws with fewer forces than others have none in their places.
+        acting = np.flatnonzero(loads.any(axis=0))
+        still = np.zeros((system.size + 1, loads.shape[1]))
+        still[:, acting] = system.still(system.stiffness_at(speed), loads[:, acting])
+        motion = np.zeros((len(frequencies), *loads.shape), dtype=complex)
+        motion[0], motion[1:, :, acting] = still[:-1], system.responses(speed, frequencies[1:], loads[:, acting])
         shape = ports.forces.shape[:2]
         rows = {name: system.at(values, speed) for name, values in self._rows.items()}
         return Interface(
@@ -196,7 +289,12 @@ class Gearset:
             rows=SignalRows(self._row_names, **rows),
             torque=system.torque_at(speed),
             torque_per_force=still[-1].reshape(shape),
+            bearings=self._bearings_at(speed) if self.bearings else None,
         )
+
+    def _bearings_at(self, speed: float) -> BearingMean:
+        """Bearings in the mean system at a speed of the input, rad/s."""
+        return BearingMean(*(self.system.at(np.array(own), speed) for own in zip(*self._bearing_means, strict=True)))
 
     def row_of_overall(self, speed: float) -> Floats:
         """Row (size,) of the overall transmission error by the frame's coordinates, m/m and m/rad."""
@@ -220,6 +318,12 @@ class Gearset:
         ahead = self.system.at(self._ports["static"], speed)[:, POSITION]
         rate = 2j * math.pi * np.where(self.forward(speed), 1.0, -1.0)[:, None] * np.arange(coefficients.shape[1])
         return np.asarray(ahead[:, None] * rate * coefficients)
+
+
+def _stacked(ports: list[MeshPorts]) -> dict[str, Floats]:
+    """Arrays of ports at several speeds (speeds, ...), by their names."""
+    by_name = {own.name: [getattr(port, own.name) for port in ports] for own in fields(MeshPorts)}
+    return {name: np.array(values) for name, values in by_name.items() if values[0] is not None}
 
 
 def _line_sets(waves: MeshWaves, harmonics: int, combinations: int) -> tuple[LineSet, LineSet]:

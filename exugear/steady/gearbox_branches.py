@@ -112,7 +112,7 @@ def follow_branch(
     )
     readings = found.lines / lengths
     growth = [
-        growth_of_state(balance_at(float(speed)), own, gearset.parting)
+        growth_of_state(balance_at(float(speed)), own, gearset.bent)
         for speed, own in zip(found.parameter, readings, strict=True)
     ]
     return SteadyBranch(found.parameter, readings, np.array(growth), tuple(fold for _, fold in found.folds))

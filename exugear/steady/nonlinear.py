@@ -13,12 +13,14 @@ import numpy as np
 
 from exugear.harmonics.krylov import HarmonicBalanceError, solve_lines
 from exugear.harmonics.lattice import Lattice
-from exugear.rotating.mesh_places import MeshPlaces, mesh_places
+from exugear.rotating.bearing_waves import COMPONENTS
+from exugear.rotating.mesh_places import MeshPlaces
 from exugear.rotating.mesh_ports import BACK, DEFLECTION, FRONT, POSITION
-from exugear.rotating.sampled_laws import LawSamples, sample_stiffness, sample_table
+from exugear.rotating.sampled_bearings import sample_rolling
+from exugear.rotating.sampled_laws import LawSamples, sample_stiffness, sample_table, widened
 from exugear.steady.excitation import Gearset, Interface
 from exugear.steady.response import Response, rates_of
-from fe_ste.tools.arrays import Complexes, Floats
+from fe_ste.tools.arrays import Complexes, Floats, Integers
 
 BALANCED = 1e-8
 """Residual of the balance over the size of the deflections."""
@@ -62,14 +64,28 @@ class Balance:
         return self._places(self.lattice.angles)
 
     def _places(self, angles: Floats) -> MeshPlaces:
-        return mesh_places(self.gearset.waves, self.interface.speed, self.interface.ports.positions, angles)
+        return self.gearset.places(self.interface.speed, self.interface.ports.positions, angles)
 
     @cached_property
     def mean_force(self) -> Floats:
-        """Forces (m, f) in the static state: those of the mean stiffness along the deflection."""
-        found = np.zeros(self.interface.ports.forces.shape[:2])
-        found[:, DEFLECTION] = self.gearset.waves.mean_stiffness * self.interface.ports.static[:, DEFLECTION]
+        """Forces (m, f) in the static state: those of the mean stiffness along the deflection, and of bearings."""
+        found, m = np.zeros(self.interface.ports.forces.shape[:2]), self.meshes
+        found[:m, DEFLECTION] = self.gearset.waves.mean_stiffness * self.interface.ports.static[:m, DEFLECTION]
+        if self.interface.bearings is not None:
+            found[m:, :COMPONENTS] = self.interface.bearings.load
         return found
+
+    @cached_property
+    def read(self) -> Integers:
+        """Places of what the laws read among all readings (m r,): some laws read less than others."""
+        ports = self.interface.ports
+        found = ports.readings.any(axis=2) if ports.rates is None else (ports.readings + ports.rates).any(axis=2)
+        return np.flatnonzero(found)
+
+    @property
+    def meshes(self) -> int:
+        """Number of the meshes' waves, behind which those of bearings follow."""
+        return len(self.gearset.waves.waves)
 
     def _stiffness(self, places: MeshPlaces) -> Floats:
         """Stiffness (3, s, u) in places, N/m, and two derivatives per cycle; none for laws that have tables.
@@ -82,7 +98,7 @@ class Balance:
         rate = 2j * np.pi * np.arange(coefficients.shape[1])
         twice = np.where(np.arange(coefficients.shape[1]) > 0, 2.0, 1.0)
         out = np.empty((3, *positions.shape))
-        for u, n in enumerate(places.means):
+        for u, n in enumerate(places.means[: positions.shape[1]]):
             if u and n == places.means[u - 1] and np.array_equal(positions[:, u], positions[:, u - 1]):
                 out[:, :, u] = out[:, :, u - 1]
                 continue
@@ -96,16 +112,28 @@ class Balance:
 
     def _sample(self, readings: Floats, rates: Floats, places: MeshPlaces, stiffness: Floats) -> LawSamples:
         """Sample the laws in all places: readings and rates (s, u, r), stiffness (3, s, u); results (s, u, ...)."""
-        waves = self.gearset.waves
-        if not self.gearset.parting:
-            found = [sample_stiffness(stiffness[:, :, u], readings[:, u]) for u in range(len(places.means))]
-        else:
-            whole, meshes = readings.copy(), waves.assembly.meshes
-            whole[..., POSITION] += places.positions
-            found = [
-                sample_table(meshes, waves.waves[n].first, whole[:, u], rates[:, u]) for u, n in enumerate(places.means)
-            ]
+        waves, meshes = self.gearset.waves, self.gearset.waves.assembly.meshes
+        found = []
+        for u, n in enumerate(places.means):
+            if n >= self.meshes:
+                found.append(self._sample_bearing(n - self.meshes, readings[:, u]))
+            elif self.gearset.parting:
+                whole = readings[:, u].copy()
+                whole[:, POSITION] += places.positions[:, u]
+                found.append(sample_table(meshes, waves.waves[n].first, whole, rates[:, u]))
+            else:
+                found.append(sample_stiffness(stiffness[:, :, u], readings[:, u][:, [DEFLECTION, POSITION]]))
+        shape = self.interface.ports.forces.shape[1], readings.shape[2]
+        found = [widened(own, *shape) for own in found]
         return LawSamples(*(np.stack(own, axis=1) for own in zip(*found, strict=True)))
+
+    def _sample_bearing(self, wave: int, readings: Floats) -> LawSamples:
+        """Sample the law of a bearing with readings (s, r), their last one none of it."""
+        bearings = self.gearset.bearings
+        assert bearings is not None
+        force, slope = sample_rolling(bearings.laws, bearings.waves[wave].law, readings[:, :COMPONENTS])
+        slope = np.pad(slope, ((0, 0), (0, 0), (0, readings.shape[1] - COMPONENTS)))
+        return LawSamples(force, slope, np.zeros_like(slope))
 
     def _held(self, readings: Complexes, still: Complexes) -> Complexes:
         """Hold the position of readings at that of others where it does not move with the vibration."""
@@ -145,23 +173,32 @@ class Balance:
     def averaged(self, sampled: LawSamples) -> Complexes:
         """Balance (n, m r, m r) of each line by itself, laws at their mean slopes over time: what couples no lines."""
         there, back = self.places.there, self.places.back
-        waves = self.gearset.waves
         n, m, r = self.static.shape
         means = []
-        for slopes, mean in ((sampled.slope, waves.mean_stiffness), (sampled.damping, waves.damping)):
+        for slopes in (sampled.slope, sampled.damping):
             if there.ndim == 2:
-                found = np.einsum("mu,ufr,uw->mfwr", back, slopes.mean(axis=0), there)
+                found = np.einsum("mu,ufr,uw->mfwr", back, slopes.mean(axis=0), there, optimize=True)
             else:
                 found = np.einsum("smu,sufr,suw->mfwr", back, slopes, there, optimize=True) / len(slopes)
-            if slopes is sampled.slope or self.gearset.parting:
-                at = np.arange(m)
-                found[at, DEFLECTION, at, DEFLECTION] -= mean
+            self._less_mean(found, slopes is sampled.damping)
             means.append(found.reshape(-1, m * r))
         unit = np.eye(m * r)
         # Rates of the waves as their meshes see them: their own, and what the turning carries along.
-        carried = self.interface.speed * np.kron(waves.partners, np.eye(r))
+        carried = self.interface.speed * np.kron(self.gearset.partners, np.eye(r))
         forces = means[0] + means[1] @ (1j * self.interface.frequencies[:, None, None] * unit + carried)
         return np.asarray(unit + self.interface.readings.reshape(n, m * r, -1) @ forces)
+
+    def _less_mean(self, slopes: Floats, by_rates: bool) -> None:
+        """Take from slopes (..., m, f, m, r) those that the mean system has."""
+        waves, at = self.gearset.waves, np.arange(self.meshes)
+        if by_rates:
+            # The damper of laws along a row is the same in the mean system; that of a table comes and goes.
+            if self.gearset.parting:
+                slopes[..., at, DEFLECTION, at, DEFLECTION] -= waves.damping
+            return
+        slopes[..., at, DEFLECTION, at, DEFLECTION] -= waves.mean_stiffness
+        if self.interface.bearings is not None:
+            slopes[..., self.meshes :, :COMPONENTS, self.meshes :, :COMPONENTS] -= self.interface.bearings.slope
 
     def tangents_along(self, readings: Complexes, base: int, samples: int) -> Floats:
         """Slopes of the forces beyond the mean system along the angle of one base, the meshes of others at their mean.
@@ -178,7 +215,7 @@ class Balance:
             By the readings, then by their rates.
         """
         there, back, means = self.places.there, self.places.back, self.places.means
-        waves, lines = self.gearset.waves, self.lattice.lines
+        lines = self.lattice.lines
         alone = np.abs(np.delete(lines.index, base, axis=1)).sum(axis=1) == 0
         angles = np.zeros((samples, lines.index.shape[1]))
         angles[:, base] = 2.0 * np.pi * np.arange(samples) / samples
@@ -189,25 +226,33 @@ class Balance:
         along = self._sample(values, moving, places, self._stiffness(places))
         moved, moving = self._in_time(readings)
         everywhere = self._sample(there @ moved, there @ moving, self.places, self._on_lattice)
-        varies = np.array([waves.waves[n].base == base for n in means])[:, None, None]
+        varies = np.array([self._varies(n, base) for n in means])[:, None, None]
         parts = []
-        for name, mean in (("slope", waves.mean_stiffness), ("damping", waves.damping)):
-            found = np.where(varies, getattr(along, name), getattr(everywhere, name).mean(axis=0))
-            whole = np.einsum("mu,sufr,uw->smfwr", back, found, there)
-            if name == "slope" or self.gearset.parting:
-                diagonal = np.arange(len(mean))
-                whole[:, diagonal, DEFLECTION, diagonal, DEFLECTION] -= mean
+        for name in ("slope", "damping"):
+            own, mean = getattr(along, name), getattr(everywhere, name).mean(axis=0)
+            found = np.where(varies, own, mean)
+            # What vibrations of all bases leave of a bearing in the mean counts, and how it varies with this one.
+            found[:, len(places.positions[0]) :] += (mean - own.mean(axis=0))[len(places.positions[0]) :]
+            whole = np.einsum("mu,sufr,uw->smfwr", back, found, there, optimize=True)
+            self._less_mean(whole, name == "damping")
             parts.append(whole.reshape(samples, back.shape[0] * found.shape[2], -1))
         return np.concatenate(parts, axis=2)
 
+    def _varies(self, wave: int, base: int) -> bool:
+        """Tell whether the law of a wave varies with a base: bearings do with all of them."""
+        return wave >= self.meshes or self.gearset.waves.waves[wave].base == base
+
     def _mean_slopes(self, change: Complexes) -> Complexes:
         """Find the forces (n, m, f) of the mean stiffness under changes of the readings (n, m, r)."""
-        waves, deflection = self.gearset.waves, change[..., DEFLECTION]
+        waves, m = self.gearset.waves, self.meshes
+        deflection = change[:, :m, DEFLECTION]
         found = np.zeros((len(change), *self.interface.ports.forces.shape[:2]), dtype=complex)
-        found[..., DEFLECTION] = waves.mean_stiffness * deflection
+        found[:, :m, DEFLECTION] = waves.mean_stiffness * deflection
         if self.gearset.parting:
-            # The damper of laws along a row is the same in the mean system; that of a table comes and goes.
-            found[..., DEFLECTION] += waves.damping * rates_of(self.gearset, self.interface, deflection)
+            found[:, :m, DEFLECTION] += waves.damping * rates_of(self.gearset, self.interface, deflection)
+        if self.interface.bearings is not None:
+            slope, own = self.interface.bearings.slope, change[:, m:, :COMPONENTS]
+            found[:, m:, :COMPONENTS] = np.tensordot(own, slope, axes=([1, 2], [2, 3]))
         return found
 
     def _mean_part(self, readings: Complexes) -> Complexes:
@@ -253,10 +298,13 @@ class Tangent:
 
         The balance of each line by itself, solved exactly, leaves GMRES what varying laws do between lines.
         """
-        inverse, lengths = np.linalg.inv(self.balance.averaged(self.sampled)), self.balance.gearset.lengths
+        read, lengths = self.balance.read, self.balance.gearset.lengths
+        inverse = np.linalg.inv(self.balance.averaged(self.sampled)[:, read[:, None], read])
 
         def alone(values: Complexes) -> Complexes:
-            return np.asarray(lengths * (inverse @ values.reshape(len(values), -1, 1)).reshape(values.shape))
+            found = values.reshape(len(values), -1).copy()
+            found[:, read] = (inverse @ found[:, read, None])[..., 0]
+            return np.asarray(lengths * found.reshape(values.shape))
 
         found, products = solve_lines(lambda own: alone(self.missing(own / lengths)), alone(right), tolerance)
         return found / lengths, products
@@ -313,15 +361,26 @@ def response_of_readings(balance: Balance, readings: Complexes, products: int = 
     """Response of a steady state whose readings (n, m, r) are known."""
     gearset, interface = balance.gearset, balance.interface
     excess, _, whole = balance.forces(readings)
-    waves = gearset.waves
-    deflection = readings[..., DEFLECTION]
-    apart = np.zeros(len(waves.waves))
+    waves, m = gearset.waves, balance.meshes
+    deflection = readings[:, :m, DEFLECTION]
+    apart = np.zeros(m)
     if gearset.parting:
         means, back = balance.places.means, balance.places.back
-        force = balance.lattice.coefficients(back @ (whole[..., [FRONT]] - whole[..., [BACK]]))[..., 0]
+        force = balance.lattice.coefficients(back @ (whole[..., [FRONT]] - whole[..., [BACK]]))[:, :m, 0]
         free = np.mean((whole[..., FRONT] == 0.0) & (whole[..., BACK] == 0.0), axis=0)
         apart = np.array([free[[own == n for own in means]].mean() if n in means else 0.0 for n in range(len(apart))])
     else:
         rates = rates_of(gearset, interface, deflection)
-        force = excess[..., 0] + waves.mean_stiffness * deflection + waves.damping * rates
-    return Response(interface, deflection, excess, force * waves.line_of_action, products, apart)
+        force = excess[:, :m, 0] + waves.mean_stiffness * deflection + waves.damping * rates
+    free = _free_shares(balance, whole)
+    return Response(interface, deflection, excess, force * waves.line_of_action, products, apart, free)
+
+
+def _free_shares(balance: Balance, whole: Floats) -> Floats:
+    """Shares of time (b,) in which bearings have no force, which are whole (s, u, f) in all places; planets' mean."""
+    bearings, m = balance.gearset.bearings, balance.meshes
+    if bearings is None:
+        return np.zeros(0)
+    laws = np.array([bearings.waves[n - m].law if n >= m else -1 for n in balance.places.means])
+    free = np.mean(~whole.any(axis=2), axis=0)
+    return np.array([free[laws == law].mean() for law in range(len(bearings.firsts))])

@@ -40,7 +40,7 @@ PUSHED = 1.02
 
 
 def gearset_of(assembly: Assembly, speeds: Floats, harmonics: int = 10, combinations: int = 3) -> Gearset:
-    """Gearset of an assembly for speeds of the input (rad/s), with lines as `SteadySettings` says."""
+    """Gearset of an assembly for speeds of the input (rad/s), with lines as `SteadySettings` says; bearings linear."""
     return Gearset(mesh_waves(mean_system(assembly, speeds)), harmonics, combinations)
 
 
@@ -88,11 +88,13 @@ class PointSolver:
     Parameters
     ----------
     gearset : Gearset
+        With linear bearings; the level `nonlinear` takes them by their laws.
     settings : SteadySettings
     """
 
     def __init__(self, gearset: Gearset, settings: SteadySettings) -> None:
-        self.gearset, self._level = gearset, settings.level
+        self._linear, self._level = gearset, settings.level
+        self.gearset = gearset.with_bearings if settings.level == "nonlinear" else gearset
         self._last: Complexes | None = None
         self.state: PartingState | None = None
 
@@ -102,18 +104,19 @@ class PointSolver:
         return self.gearset.lattice
 
     def forcing(self, interface: Interface) -> Complexes:
-        """Find the forces of the meshes (lines, m, f) that vary in the static state, N."""
-        if not self.gearset.parting:
-            return transmission_errors(self.gearset, interface)
-        balance = Balance(self.gearset, interface, self.lattice)
+        """Find the forces of the meshes (lines, m, f) that vary in the static state, N, bearings being linear."""
+        if not self._linear.parting:
+            return transmission_errors(self._linear, interface)
+        balance = Balance(self._linear, interface, self._linear.lattice)
         return balance.forces(balance.static)[0]
 
     def growth(self, low: float, high: float) -> float:
         """Fastest growth of a disturbance between two speeds of the input (rad/s), 1/s."""
-        found = [mean_growth(self.gearset)]
-        unknown = self.gearset.parting or self.gearset.waves.carriers
-        for candidate in () if unknown else candidates(self.gearset, low, high)[:CHECKED]:
-            balance = Balance(self.gearset, self.gearset.at(candidate.speed), self.lattice)
+        gearset = self._linear
+        found = [mean_growth(gearset)]
+        unknown = gearset.parting or gearset.waves.carriers
+        for candidate in () if unknown else candidates(gearset, low, high)[:CHECKED]:
+            balance = Balance(gearset, gearset.at(candidate.speed), gearset.lattice)
             found.append(growth_at(balance, balance.static, candidate.base))
         return max(found)
 
@@ -130,18 +133,18 @@ class PointSolver:
             return linear_response(self.gearset, interface)
         if self._level == "parametric" and not self.gearset.waves.carriers:
             return parametric_response(self.gearset, interface)
-        if self.gearset.parting:
+        if self.gearset.bent:
             return self._parting(speed).on(self.gearset, interface).response
         return self._in_time(interface)
 
     @property
     def branch_gearset(self) -> Gearset:
         """Gearset whose lines a branch has: twice the harmonics where teeth may part."""
-        return self.gearset.finer if self.gearset.parting else self.gearset
+        return self.gearset.finer if self.gearset.bent else self.gearset
 
     def readings(self, speed: float) -> Complexes:
         """Find what the mesh laws read (n, m, r) at a speed of the input (rad/s), in the lines of a branch."""
-        if self.gearset.parting:
+        if self.gearset.bent:
             state, gearset = self._parting(speed), self.branch_gearset
             if state.gearset is not self.gearset:
                 return state.on(gearset).readings
@@ -222,7 +225,7 @@ def _near(gearset: Gearset, interface: Interface, leg: Leg) -> PartingState | No
     ports = interface.ports
     moved = leg.motion.copy()
     moved[0] -= gearset.system.static_at(interface.speed)
-    readings = np.moveaxis(np.tensordot(ports.readings, moved, axes=(2, 1)), 2, 0)
+    readings = interface.read(moved)
     readings[0] += ports.static
     try:
         found = _refined(gearset, interface.speed, readings)
@@ -240,7 +243,7 @@ def _refined(gearset: Gearset, speed: float, start: Complexes | None) -> Parting
     readings, products = solve_balance(balance, balance.static if start is None else start)
     response = response_of_readings(balance, readings, products)
     for _ in range(MOST_REFINED):
-        if not response.apart.any():
+        if not response.apart.any() and gearset.bearings is None:
             break
         finer = gearset.finer
         ahead = Balance(finer, finer.at(speed), finer.lattice)
@@ -253,4 +256,5 @@ def _refined(gearset: Gearset, speed: float, start: Complexes | None) -> Parting
         readings, took = solve_balance(balance, more)
         products += took
         response = response_of_readings(balance, readings, products)
-    return PartingState(gearset, readings, response, growth_of_state(balance, readings, bool(response.apart.any())))
+    parted = bool(response.apart.any() or response.free.any())
+    return PartingState(gearset, readings, response, growth_of_state(balance, readings, parted))

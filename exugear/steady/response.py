@@ -43,6 +43,8 @@ class Response:
         Products with the operator that the solution took.
     apart : (m,) array
         Share of time in which teeth are apart.
+    free : (b,) array
+        Share of time in which no rolling element of a non-linear bearing touches, by law.
     """
 
     interface: Interface
@@ -51,6 +53,7 @@ class Response:
     force: Complexes
     products: int
     apart: Floats
+    free: Floats
 
     @property
     def motion(self) -> Complexes:
@@ -156,13 +159,14 @@ def _response(
     waves = gearset.waves
     rates = rates_of(gearset, interface, deflection)
     force = (excess + waves.mean_stiffness * deflection + waves.damping * rates) * waves.line_of_action
-    return Response(interface, deflection, excess[..., None], force, products, np.zeros(len(waves.waves)))
+    return Response(interface, deflection, excess[..., None], force, products, np.zeros(len(waves.waves)), np.zeros(0))
 
 
 def rates_of(gearset: Gearset, interface: Interface, values: Complexes) -> Complexes:
     """Rates (n, m, ...) of what meshes read (n, m, ...), as the meshes see it that travel through the waves."""
     frequencies = interface.frequencies.reshape(-1, *(1,) * (values.ndim - 1))
-    carried = np.moveaxis(np.tensordot(gearset.waves.partners, values, axes=(1, 1)), 0, 1)
+    partners = gearset.partners[: values.shape[1], : values.shape[1]]
+    carried = np.moveaxis(np.tensordot(partners, values, axes=(1, 1)), 0, 1)
     return np.asarray(1j * frequencies * values + interface.speed * carried)
 
 
@@ -170,6 +174,9 @@ def signals(gearset: Gearset, response: Response) -> Complexes:
     """Coefficients (n, signals) of all signals of a response, in the order of `Gearset.signal_names`."""
     interface = response.interface
     of_motion = interface.rows.of(response.motion, interface.frequencies)
+    # Rows have the bearings of the mean system; what non-linear ones have beyond it acts on their bodies, too.
+    beyond = response.excess[:, len(gearset.waves.waves) :, : gearset.bearing_signals.shape[1]]
+    of_motion[:, gearset.bearing_signals] -= beyond
     return np.concatenate([of_motion, response.deflection, response.force], axis=1)
 
 
@@ -185,5 +192,5 @@ def dissipated_and_given(gearset: Gearset, response: Response) -> tuple[float, f
     # A stiffness that is not symmetric takes power, too.
     taken = 2.0 * float(np.sum((rates.conj() * (rates @ damping.T + moving @ stiffness.T)).real))
     ports = interface.ports
-    along = np.tensordot(rates, ports.forces, axes=(1, 2)) * gearset.waves.weights[:, None]
+    along = np.tensordot(rates, ports.forces, axes=(1, 2)) * gearset.weights[:, None]
     return taken, -2.0 * float(np.sum((response.excess[1:] * along.conj()).real))

@@ -106,13 +106,17 @@ def growth_at(balance: Balance, readings: Complexes, base: int, least: int = SMO
     )
     rows = ports.readings.reshape(-1, size)
     # Rates of the waves as their meshes see them: those in the frame, and what the turning carries along.
-    carried = speed * np.tensordot(gearset.waves.partners, ports.readings, axes=1).reshape(-1, size)
-    reads = np.block([[rows, np.zeros_like(rows)], [carried, rows]])
-    # Meshes of other bases do not vary: they belong to the constant part.
-    own = np.array([wave.base == base for wave in gearset.waves.waves])
+    carried = speed * np.tensordot(gearset.partners, ports.readings, axes=1).reshape(-1, size)
+    by_rates = np.zeros_like(rows) if ports.rates is None else ports.rates.reshape(-1, size)
+    reads = np.block([[rows, by_rates], [carried, rows]])
+    # Meshes of other bases do not vary: they belong to the constant part. Bearings do with all bases.
+    own = np.ones(len(gearset.weights), dtype=bool)
+    own[: len(gearset.waves.waves)] = [wave.base == base for wave in gearset.waves.waves]
     pushed, read = np.repeat(own, ports.forces.shape[1]), np.tile(np.repeat(own, ports.readings.shape[1]), 2)
     constant = np.vstack([np.eye(size, 2 * size, size), lower])
     constant -= pushes[:, ~pushed] @ varying[0][np.ix_(~pushed, ~read)] @ reads[~read]
+    # Many slopes are zero: what nothing pushes along or reads costs nothing then.
+    pushed, read = pushed & varying.any(axis=(0, 2)), read & varying.any(axis=(0, 1))
     varying, pushes, reads = varying[:, pushed][:, :, read], pushes[:, pushed], reads[read]
     found, shapes = exponents(constant, pushes, reads, varying, period)
     # Free rolling neither grows nor decays but for what the losses change with the speed: it is known by its shape.

@@ -79,12 +79,17 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
         "remark": (("point",), solved.remark.astype(object), {}),
         "apart_share": (("point", "mesh_wave"), solved.apart, {"units": "1", "long_name": "share of time apart"}),
     }
+    if response.bearing_names:
+        words = "share of time in which no rolling element of a bearing touches"
+        variables["free_share"] = (("point", "bearing"), solved.free, {"units": "1", "long_name": words})
     variables |= response.campbell.variables()
     coordinates: dict[str, Any] = {
         "mesh_wave": np.array(response.wave_names, dtype=object),
         "base": np.array(response.base_names, dtype=object),
         "signal": np.array([own.name for own in response.signals], dtype=object),
     }
+    if response.bearing_names:
+        coordinates["bearing"] = np.array(response.bearing_names, dtype=object)
     attributes = {
         "gearbox": assembly.gearbox.name,
         "variant": assembly.variant,
@@ -96,8 +101,10 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
         "method_version": STEADY,
         "housing_factor": assembly.housing_factor,
         "bearing_laws": assembly.bearing_laws,
+        "bearings_in_time": ", ".join(response.bearing_names),
         "growth_rate": response.growth_rate,
         "planet_spread": response.planet_spread,
+        "stiffness_variation": response.stiffness_variation,
         "contributions": json.dumps([{"line": line, **asdict(own)} for line, own in response.contributions]),
         "folds": json.dumps(response.folds),
         "unsolved": json.dumps([{"speed": speed, "reason": reason} for speed, reason in response.unsolved]),

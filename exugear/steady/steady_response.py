@@ -50,6 +50,8 @@ class Solved:
         Products with the operator of the balance.
     apart : (points, waves) array
         Share of time in which the teeth of each mesh wave are apart.
+    free : (points, bearings) array
+        Share of time in which no rolling element of a non-linear bearing touches, of planets the mean.
     growth : (points,) array
         Fastest growth of a disturbance, 1/s, along a branch and where teeth may part; NaN elsewhere.
     remark : (points,) array of str
@@ -62,6 +64,7 @@ class Solved:
     energy_error: Floats
     products: Floats
     apart: Floats
+    free: Floats
     growth: Floats
     remark: Texts
 
@@ -85,6 +88,8 @@ class SteadyResponse:
     base_names, wave_names : tuple of str
         Meshes of each base, and mesh waves.
     signals : tuple of SignalName
+    bearing_names : tuple of str
+        Bearings whose law was evaluated in time; all others are linear about the static state.
     solved : Solved
         Points in ascending order of speed, or along a branch.
     unsolved : tuple of (float, str)
@@ -100,6 +105,8 @@ class SteadyResponse:
         work together, and of the points where teeth may part.
     planet_spread : float
         Largest change of planet bearings' stiffness that made the planets equal, over that stiffness.
+    stiffness_variation : float
+        Largest change of stiffness over the carrier's places, over the stiffness, whose mean counts.
     campbell : Campbell
         Modes over the speeds, as far up as the lines that `crossings` looks at.
     """
@@ -111,6 +118,7 @@ class SteadyResponse:
     base_names: tuple[str, ...]
     wave_names: tuple[str, ...]
     signals: tuple[SignalName, ...]
+    bearing_names: tuple[str, ...]
     solved: Solved
     unsolved: tuple[tuple[float, str], ...]
     crossings: tuple[Crossing, ...]
@@ -118,6 +126,7 @@ class SteadyResponse:
     folds: tuple[float, ...]
     growth_rate: float
     planet_spread: float
+    stiffness_variation: float
     campbell: Campbell
 
     def __repr__(self) -> str:
@@ -258,6 +267,7 @@ def response_of(
         base_names=gearset.base_names,
         wave_names=tuple(wave.name for wave in gearset.waves.waves),
         signals=gearset.signal_names,
+        bearing_names=solver.gearset.bearing_names,
         solved=solved.part(there),
         unsolved=tuple(zip(solved.speed[~there].tolist(), solved.remark[~there].tolist(), strict=True)),
         crossings=found,
@@ -265,6 +275,7 @@ def response_of(
         folds=folds,
         growth_rate=float(np.fmax(solver.growth(float(even.min()), float(even.max())), fastest)),
         planet_spread=gearset.system.planet_spread,
+        stiffness_variation=gearset.system.variation,
         campbell=campbell_of(gearset.system, tracks),
     )
 
@@ -289,7 +300,7 @@ def _solve(
     """Solve all speeds, beginning with what is known of them."""
     count = 0 if known is None else _same_beginning(known.speed, speeds)
     gearset = solver.gearset
-    if known is not None and gearset.parting:
+    if known is not None and gearset.bent:
         count = _in_contact(known, count)
         if count:
             solver.response(float(speeds[count - 1]))
@@ -318,7 +329,7 @@ def _solve_one(out: Solved, n: int, solver: PointSolver) -> None:
     try:
         _fill(out, n, solver.gearset, solver.response(float(out.speed[n])))
     except HarmonicBalanceError as error:
-        for values in (out.amplitude, out.drive_torque, out.energy_error, out.apart):
+        for values in (out.amplitude, out.drive_torque, out.energy_error, out.apart, out.free):
             values[n] = np.nan
         out.remark[n] = str(error)[:LONGEST_REMARK]
         return
@@ -361,6 +372,7 @@ def _empty(gearset: Gearset, speeds: Floats) -> Solved:
         energy_error=np.zeros(points),
         products=np.zeros(points),
         apart=np.zeros((points, len(gearset.waves.waves))),
+        free=np.zeros((points, len(gearset.bearing_names))),
         growth=np.full(points, np.nan),
         remark=np.zeros(points, dtype=f"<U{LONGEST_REMARK}"),
     )
@@ -372,13 +384,14 @@ def _fill(out: Solved, n: int, gearset: Gearset, response: Response) -> None:
     out.amplitude[n, 1:] *= 2.0
     taken, given = dissipated_and_given(gearset, response)
     out.drive_torque[n], out.products[n] = response.torque, response.products
-    out.apart[n] = response.apart
+    out.apart[n], out.free[n] = response.apart, response.free
     out.energy_error[n] = (taken - given) / max(abs(taken), abs(given), 1e-300)
 
 
 def _in_contact(known: Solved, count: int) -> int:
-    """Count the known points up to the last at which all teeth touch: states hang on those before, from there anew."""
-    touching = np.isfinite(known.drive_torque[:count]) & ~known.apart[:count].any(axis=1)
+    """Count the known points up to the last at which all touches: states hang on those before, from there anew."""
+    parted = known.apart[:count].any(axis=1) | known.free[:count].any(axis=1)
+    touching = np.isfinite(known.drive_torque[:count]) & ~parted
     return int(np.flatnonzero(touching)[-1]) + 1 if touching.any() else 0
 
 

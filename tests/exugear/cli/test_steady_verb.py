@@ -13,6 +13,7 @@ from exugear.cli.app import app
 from exugear.cli.verbs.steady import Level
 from exugear.steady.settings import LEVELS
 
+from ..bearing_case import BEARING_CASE
 from ..spur_case import COARSE_INPUT, SPUR_CASE
 
 
@@ -54,6 +55,25 @@ def test_steady_writes_a_response_and_sums_it_up(case):
     page = (case.parent / "out" / "report.html").read_text(encoding="utf-8")
     for words in ("Steady response", "Modes over speed as seen from the housing", "strongest crossing"):
         assert words in page, words
+
+
+def test_bearings_follow_their_elements_at_the_level_nonlinear(tmp_path):
+    """The state, its report and what is said of it; other levels say that they do not."""
+    case = tmp_path / "bearings.toml"
+    text = BEARING_CASE.replace("[bearings.roller.catalogue]", 'law = "iso16281"\n[bearings.roller.catalogue]')
+    case.write_text(text, encoding="utf-8")
+    options = "--variant", "bushing", "--speeds", "1000:1100:3"
+    outcome = steady(case, *options, "--level", "nonlinear", "--json")
+    assert outcome.exit_code == 0, outcome.stderr
+    summary = json.loads(outcome.stdout)
+    assert summary["bearings_in_time"] == "roller"
+    assert summary["largest_energy_error"] < 1e-4
+    assert "Bearings by their rolling elements: roller" in outcome.stderr
+    outcome = steady(case, *options, "--level", "linear")
+    assert outcome.exit_code == 0, outcome.stderr
+    assert "linear about the static state" in outcome.stderr
+    report = CliRunner().invoke(app, ["report", str(case.parent / "out")])
+    assert report.exit_code == 0, report.stderr
 
 
 def test_the_range_of_the_load_case_is_the_usual_one(case):
