@@ -72,13 +72,14 @@ def test_every_pair_of_the_grc_shows_its_curve(grc: Gearbox) -> None:
 
 
 @pytest.mark.validation
-def test_moment_of_misalignment_is_the_loads_lever(grc: Gearbox) -> None:
+@pytest.mark.parametrize("pair", ["high_speed", "sun_planet"])
+def test_moment_of_misalignment_is_the_loads_lever(grc: Gearbox, pair: str) -> None:
     """The potential's derivative by misalignment against F times the place of the load in the finite-element contact.
 
     Nothing of `load_centre` entered the surface: the derivative integrates the slopes of the transmission error over
     the load.
     """
-    spec = grc.pairs["high_speed"]
+    spec = grc.pairs[pair]
     tilts = np.array([-60e-6, -30e-6, 0.0, 30e-6, 60e-6]) / spec.pair.face_width
     factors = (0.05, 0.2, 0.5, 1.0, 2.0)
     wanted = TableInput(
@@ -100,5 +101,5 @@ def test_moment_of_misalignment_is_the_loads_lever(grc: Gearbox) -> None:
                 for f in loads
             ]
             lever = float(np.trapezoid(slope, loads)) / force
-            # Of half the face width of 55 mm: the first piece of the load axis carries most of the difference.
-            assert lever == pytest.approx(float(point.load_centre[p, m]), abs=1e-3)
+            # 2 % of half the face: the first piece of the load axis carries most of the difference.
+            assert lever == pytest.approx(float(point.load_centre[p, m]), abs=0.01 * spec.pair.face_width)
