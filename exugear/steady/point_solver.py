@@ -7,6 +7,7 @@ settles to the state that it jumps to, or to none, which is said in words.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -181,11 +182,25 @@ class PointSolver:
             found = _refined(last.gearset if last else self.gearset, speed, last.readings if last else None)
         except HarmonicBalanceError as error:
             reason = str(error)
+            found = self._from_rest(speed)
         if found is None or self._grows(found):
             found = self._settled(speed, found, reason)
         # Where no tooth parts the usual lines will do again.
         self.state = found if found.response.apart.any() else found.on(self.gearset)
         return self.state
+
+    def _from_rest(self, speed: float) -> PartingState | None:
+        """Find the state near the static one where the last one is of no help although all touched in it.
+
+        Bearings bend their forces so that a state of a far speed is a bad start. Where something parts, a run in time
+        has to tell which state the gearbox goes to.
+        """
+        last = self.state
+        if self.gearset.bearings is None or last is None or last.response.apart.any() or last.response.free.any():
+            return None
+        with suppress(HarmonicBalanceError):
+            return _refined(self.gearset, speed, None)
+        return None
 
     def _settled(self, speed: float, unstable: PartingState | None, reason: str) -> PartingState:
         """Find the state to which a run in time settles that begins at the last one, or at an unstable one."""
