@@ -229,6 +229,15 @@ def test_elements_that_pass_are_refused():
         spur_solver(turning, (50.0, 60.0))
 
 
+def test_elements_that_turn_against_their_load_are_refused():
+    between = BEARING_CASE.replace(
+        '[bearings.roller]\nbody = "shaft_1"', '[bearings.roller]\nbody = "shaft_1"\non = "shaft_2"'
+    )
+    gearbox = Gearbox.from_dict(tomllib.loads(between)).varied(NON_LINEAR)
+    with pytest.raises(SteadyError, match=r"bearings\.roller\.law.*turn with shaft_2 against the load"):
+        spur_solver(gearbox, (50.0, 60.0))
+
+
 @pytest.fixture(scope="module")
 def shafts_solver(grc_shafts, stiffness):
     rows = grc_shafts.varied({f"bearings.{family}.law": "iso16281" for family in FAMILIES})
