@@ -233,6 +233,7 @@ def _tell_run(case: Path, finished: Run, as_json: bool) -> None:
     from exugear.dynamics.signals import BALANCE_TERMS, MESH_TIMES, energy_residual
     from exugear.model.parts import RPM
     from exugear.results.run_file import read_run
+    from exugear.runs.plan import EXPECTATIONS
 
     data, attributes = read_run(finished.path, ("input_speed", *MESH_TIMES, *BALANCE_TERMS))
     longest = {name: float(np.max(data[name], initial=0.0)) for name in MESH_TIMES}  # a rotor has no meshes
@@ -243,6 +244,9 @@ def _tell_run(case: Path, finished: Run, as_json: bool) -> None:
         "file": str(finished.path),
         "simulated_s": finished.end,
         "wall_s": round(finished.wall, 2),
+        "step_s": float(attributes["step"]),
+        "band_Hz": float(attributes["band"]),
+        **{key: float(attributes[key]) for key in EXPECTATIONS if key in attributes},
         "input_speed_rpm": float(data["input_speed"][-1]) / RPM,
         "energy_not_accounted_for": energy_residual(data),
         "longest_pull_of_a_mesh_s": longest["pulling_time"],
@@ -268,6 +272,13 @@ def _print_run(summary: dict[str, Any], outside: float) -> None:
         f"{summary['simulated_s']:g} s simulated in {summary['wall_s']:.1f} s ({summary['solver']}), "
         f"{summary['input_speed_rpm']:.1f} rpm reached"
     )
+    if "stability_margin" in summary:
+        say(
+            f"Steps of {1e6 * summary['step_s']:.4g} us, stable up to {summary['stability_margin']:.1f} times the "
+            f"fastest motion; errors expected up to {summary['band_Hz'] / 1e3:g} kHz: "
+            f"{100.0 * abs(summary['expected_error_at_band']):.2g} % of amplitudes, "
+            f"{100.0 * summary['expected_error_of_resonances']:.2g} % of a resonance's peak"
+        )
     if outside > 0.0:
         say(
             f"A mesh was outside its table for {outside:.3g} s, where the table goes on in a straight line: "
