@@ -121,13 +121,11 @@ def table(
     keys = list(rows[0])
     left, small = {keys[0], *texts}, set(hidden)
 
-    def kind(key: str) -> str | None:
-        return " ".join(_text_kinds(rows, key) * (key in left) + ["wide"] * (key in small)) or None
-
-    head = "".join(element("th", text(key), class_=kind(key), scope="col") for key in keys)
+    kinds = {key: " ".join(_text_kinds(rows, key) * (key in left) + ["wide"] * (key in small)) or None for key in keys}
+    head = "".join(element("th", text(key), class_=kinds[key], scope="col") for key in keys)
     chosen = [*choices, *[None] * (len(rows) - len(choices))]
     body = "".join(
-        element("tr", "".join(_cell(row[key], kind(key)) for key in keys), data_choice=choice)
+        element("tr", "".join(_cell(row[key], kinds[key]) for key in keys), data_choice=choice)
         for row, choice in zip(rows, chosen, strict=True)
     )
     said = element("caption", text(caption), class_="unseen") if caption else ""

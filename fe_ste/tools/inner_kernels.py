@@ -97,7 +97,7 @@ class Kernel(CPUDispatcher):
     def compile(self, signature: Any) -> Any:
         """Compile for types of arguments, as numba; Python looks for garbage less often, of which there is none."""
         often = gc.get_threshold()
-        gc.set_threshold(*_SELDOM)
+        gc.set_threshold(*map(max, often, _SELDOM))
         try:
             return super().compile(signature)
         finally:

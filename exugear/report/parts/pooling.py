@@ -36,11 +36,15 @@ def pooled(level: Floats, speed: Floats, columns: int, lines: int) -> Floats:
         Where frames are rarer than cells, that of the nearest frame.
     """
     count = level.shape[1] // lines * lines
-    narrow = level[:, :count].reshape(len(level), -1, lines).max(axis=2)
+    narrow = level[:, :count:lines].copy()
+    for line in range(1, lines):
+        np.maximum(narrow, level[:, line:count:lines], out=narrow)
     low, span = float(speed.min()), max(float(np.ptp(speed)), 1e-12)
     cell = np.minimum(((speed - low) / span * columns).astype(np.int64), columns - 1)
     whole = np.full((columns, narrow.shape[1]), -np.inf)
-    np.maximum.at(whole, cell, narrow)
+    order = np.argsort(cell, kind="stable")
+    filled, starts = np.unique(cell[order], return_index=True)
+    whole[filled] = np.maximum.reduceat(narrow[order], starts, axis=0)
     empty = np.flatnonzero(~np.isfinite(whole[:, 0]))
     middle = low + (empty + 0.5) * span / columns
     whole[empty] = narrow[np.argmin(np.abs(speed[:, None] - middle), axis=0)]
