@@ -201,7 +201,7 @@ class Gearset:
 
     @cached_property
     def passing(self) -> Gearset | None:
-        """The same with lines of one more multiple of the passing of planets; None without planets in phase, or with bearings.
+        """The same with lines of one more multiple of the passing of planets; None where none are looked at.
 
         Planets tilt unequally under load, and tables tell that: each that passes then puts lines beside all others.
         """
@@ -213,7 +213,7 @@ class Gearset:
         return Gearset(mesh_waves(self.system, waves.passing + 1), self.line_harmonics, self.combinations)
 
     def places_in(self, other: Gearset) -> tuple[Integers, ...]:
-        """Places of the lines (n,) among those of another, which has them all; with those of waves where it has more."""
+        """Places of the lines (n,) among those of another, which has them all; those of waves follow if it has more."""
         index = self.lines.index
         more = np.zeros((len(index), other.lines.index.shape[1] - index.shape[1]), dtype=index.dtype)
         lines = other.lines.find(np.hstack([index, more]))[0]
