@@ -74,7 +74,7 @@ class Lattice:
         return np.asarray(found)
 
 
-def lattice(lines: LineSet, larger: LineSet, least: int = 0) -> Lattice:
+def lattice(lines: LineSet, larger: LineSet, least: int = 0, shared: bool = False) -> Lattice:
     """Find a lattice on which all lines of a larger set have slots of their own.
 
     Parameters
@@ -85,6 +85,9 @@ def lattice(lines: LineSet, larger: LineSet, least: int = 0) -> Lattice:
         Lines of the same bases; twice the harmonics and combinations keep products of two lines apart.
     least : int
         Samples at least.
+    shared : bool
+        Whether lines that are in the larger set alone may share slots with each other: a third fewer samples, on which
+        what lies beyond the larger set meets those of the lines more often.
 
     Raises
     ------
@@ -101,15 +104,16 @@ def lattice(lines: LineSet, larger: LineSet, least: int = 0) -> Lattice:
     True
     """
     bases = lines.index.shape[1]
-    whole = np.vstack([larger.index, -larger.index[1:]])
+    own, whole = (np.vstack([some.index, -some.index[1:]]) for some in (lines, larger))
+    apart = own if shared else whole
     rng = np.random.default_rng(1)
     # An odd number: then no slot but that of the mean is its own conjugate.
-    samples = max(len(whole), least) | 1
+    samples = max(len(apart), least) | 1
     while samples < 200 * len(whole):
         for _ in range(TRIES if bases > 1 else 1):
             generator = np.append(1, rng.integers(2, samples, size=bases - 1)).astype(np.int64)
-            slots = (whole @ generator) % samples
-            if len(np.unique(slots)) == len(whole):
+            taken = np.bincount((whole @ generator) % samples, minlength=samples)
+            if (taken[(apart @ generator) % samples] == 1).all():
                 return Lattice(lines, generator, samples)
         samples = _smooth(int(samples * GROWTH) + 2)
     raise LatticeError(f"no lattice was found for {len(whole)} lines")

@@ -172,6 +172,46 @@ def modulated(lines: LineSet, modulators: Sequence[Modulator]) -> LineSet:
     return LineSet(index, index @ bases)
 
 
+def beside(lines: LineSet, slow: Sequence[Modulator], most: int) -> LineSet:
+    """Lines with those that the passing of equal things puts beside each, the mean among them; slow bases come last.
+
+    Parameters
+    ----------
+    lines : LineSet
+    slow : sequence of Modulator
+        What turns, one at a time: after a turn over their `count` the things stand in each other's places.
+    most : int
+        Passings beside a line at most.
+
+    Examples
+    --------
+    >>> lines = beside(line_set([10.0], 1), [Modulator(1.0, (0,), 3, 0)], 1)
+    >>> [tuple(row) for row in lines.index.tolist()]
+    [(0, 0), (0, 3), (1, -3), (1, 0), (1, 3)]
+    """
+    bases = np.append(_bases(lines), [own.order for own in slow])
+    turns = [np.zeros(len(slow), dtype=np.int64)]
+    turns += [
+        n * own.count * unit
+        for own, unit in zip(slow, np.eye(len(slow), dtype=np.int64), strict=True)
+        for n in range(-most, most + 1)
+        if n
+    ]
+    rows = np.array([np.append(line, turn) for line in lines.index for turn in turns])
+    rows[rows @ bases < 0.0] *= -1
+    rows = np.unique(rows, axis=0)
+    index = rows[np.argsort(rows @ bases, kind="stable")]
+    return LineSet(index, index @ bases)
+
+
+def joined(one: LineSet, other: LineSet) -> LineSet:
+    """Lines of two sets of the same bases."""
+    orders = dict(zip(map(tuple, one.index.tolist()), one.orders.tolist(), strict=True))
+    orders |= dict(zip(map(tuple, other.index.tolist()), other.orders.tolist(), strict=True))
+    rows = sorted(orders, key=lambda row: (orders[row], row))
+    return LineSet(np.array(rows, dtype=np.int64), np.array([orders[row] for row in rows]))
+
+
 def _bases(lines: LineSet) -> Floats:
     """Frequencies of the bases of a set, over that of the reference."""
     units = np.eye(lines.index.shape[1], dtype=np.int64)

@@ -75,7 +75,7 @@ class MeshWave:
     carrier : float
         Turns of the waves per turn of the input.
     ahead : tuple of float
-        Cycles by which each planet's mesh is ahead of the first's, empty where they are in phase.
+        Cycles by which each planet's mesh is ahead of the first's, empty where the mean over a turn stands for all.
     """
 
     name: str
@@ -101,12 +101,16 @@ class MeshWaves:
         Mesh frequencies over the frequency of the input's turns.
     base_names : tuple of str
         Meshes of each base.
+    passing : int
+        Multiples of the passing of planets (thrice a turn of the carrier where there are three) whose lines are looked
+        at: planets in phase are then taken one by one as they turn, as those out of phase are, and not at their mean.
     """
 
     system: MeanSystem
     waves: tuple[MeshWave, ...]
     base_orders: Floats
     base_names: tuple[str, ...]
+    passing: int = 0
 
     @property
     def assembly(self) -> Assembly:
@@ -120,7 +124,7 @@ class MeshWaves:
 
     @cached_property
     def carriers(self) -> tuple[tuple[str, Modulator], ...]:
-        """Carriers whose planets mesh out of phase, and the lines that their turns put beside those of the meshes."""
+        """Carriers whose planets are looked at one by one, and the lines that turns put beside those of the meshes."""
         found: dict[str, tuple[PlanetSet, set[int], set[int | None]]] = {}
         for wave in self.waves:
             planets = self.planets(wave)
@@ -229,8 +233,8 @@ class MeshWaves:
         return out
 
 
-def mesh_waves(system: MeanSystem) -> MeshWaves:
-    """Mesh waves of a mean system."""
+def mesh_waves(system: MeanSystem, passing: int = 0) -> MeshWaves:
+    """Mesh waves of a mean system; `passing` as `MeshWaves` says."""
     assembly = system.frame.assembly
     gearbox = assembly.gearbox
     frequencies = gearbox.train.mesh_frequencies(2.0 * math.pi)
@@ -250,13 +254,13 @@ def mesh_waves(system: MeanSystem) -> MeshWaves:
         if planets is None:
             waves.append(MeshWave(mesh.name, mesh.name, *own, 0, 1.0, base, sense, 0.0))
             continue
-        ahead = _phases_ahead(assembly, meshes)
+        ahead = _phases_ahead(assembly, meshes) or (0.0,) * (len(meshes) if passing else 0)
         norms = (planets.shapes(0.0)[0] ** 2).sum(axis=0)
         for number in range(planets.waves if ahead else len(WAVES)):
             label = f"{mesh.family} {wave_name(number, planets.waves)}" if number else mesh.family
             weight = float(norms[number])
             waves.append(MeshWave(label, mesh.family, *own, number, weight, base, sense, planets.ratio, ahead))
-    return MeshWaves(system, tuple(waves), np.array(orders), tuple(", ".join(own) for own in names))
+    return MeshWaves(system, tuple(waves), np.array(orders), tuple(", ".join(own) for own in names), passing)
 
 
 def _groups(frame: RotatingFrame) -> tuple[tuple[tuple[int, ...], PlanetSet | None], ...]:

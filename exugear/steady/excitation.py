@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from exugear.harmonics.lattice import Lattice, lattice
-from exugear.harmonics.lines import LineSet, line_set, modulated
+from exugear.harmonics.lines import LineSet, beside, joined, line_set, modulated
 from exugear.harmonics.products import Product
 from exugear.kernels.meshes import SPIN_1
 from exugear.rotating.bearing_waves import (
@@ -24,7 +24,7 @@ from exugear.rotating.bearing_waves import (
 from exugear.rotating.mean_system import MeanSystem
 from exugear.rotating.mesh_places import MeshPlaces, mesh_places
 from exugear.rotating.mesh_ports import BACK_TILT, DEFLECTION, POSITION, TILT, MeshPorts, mesh_ports
-from exugear.rotating.mesh_waves import MeshWaves
+from exugear.rotating.mesh_waves import MeshWaves, mesh_waves
 from exugear.rotating.signals import AXES, SignalName, SignalRows, mesh_signal_names, signal_rows
 from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
@@ -181,7 +181,7 @@ class Gearset:
     def lattice(self) -> Lattice:
         """Samples on which forces are evaluated in time."""
         least = SAMPLES_PER_HARMONIC * self.line_harmonics if self.bent else 0
-        return lattice(self.lines, self._larger, least)
+        return lattice(self.lines, self._larger, least, shared=self.waves.passing > 0)
 
     @cached_property
     def finer(self) -> Gearset:
@@ -199,9 +199,28 @@ class Gearset:
                 other.__dict__.pop(name, None)
         return other
 
-    def places_in(self, other: Gearset) -> Integers:
-        """Places (n,) of the lines among those of another, which has them all."""
-        return other.lines.find(self.lines.index)[0]
+    @cached_property
+    def passing(self) -> Gearset | None:
+        """The same with lines of one more multiple of the passing of planets; None where none are looked at.
+
+        Planets tilt unequally under load, and tables tell that: each that passes then puts lines beside all others.
+        """
+        waves = self.waves
+        if not self.parting or self.bearings is not None:
+            return None
+        if (waves.carriers and not waves.passing) or not any(wave.wave for wave in waves.waves):
+            return None
+        return Gearset(mesh_waves(self.system, waves.passing + 1), self.line_harmonics, self.combinations)
+
+    def places_in(self, other: Gearset) -> tuple[Integers, ...]:
+        """Places of the lines (n,) among those of another, which has them all; those of waves follow if it has more."""
+        index = self.lines.index
+        more = np.zeros((len(index), other.lines.index.shape[1] - index.shape[1]), dtype=index.dtype)
+        lines = other.lines.find(np.hstack([index, more]))[0]
+        names = [wave.name for wave in other.waves.waves]
+        if len(names) == len(self.waves.waves):
+            return (lines,)
+        return lines[:, None], np.array([names.index(wave.name) for wave in self.waves.waves])
 
     @property
     def base_names(self) -> tuple[str, ...]:
@@ -329,5 +348,9 @@ def _stacked(ports: list[MeshPorts]) -> dict[str, Floats]:
 def _line_sets(waves: MeshWaves, harmonics: int, combinations: int) -> tuple[LineSet, LineSet]:
     """Lines of given harmonics and combinations, and those of twice as many."""
     orders, modulators = waves.base_orders.tolist(), [own for _, own in waves.carriers]
-    lines, larger = (modulated(line_set(orders, n * harmonics, n * combinations), modulators) for n in (1, 2))
-    return lines, larger
+    lines, larger = (line_set(orders, n * harmonics, n * combinations) for n in (1, 2))
+    if waves.passing:
+        # Of products that lie farther off in both senses little is left.
+        own, more = (beside(lines, modulators, n * waves.passing) for n in (1, 2))
+        return own, joined(beside(larger, modulators, waves.passing), more)
+    return modulated(lines, modulators), modulated(larger, modulators)

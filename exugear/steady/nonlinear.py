@@ -325,8 +325,11 @@ def nonlinear_response(
     return response_of_readings(balance, readings, products), readings
 
 
-def solve_balance(balance: Balance, readings: Complexes) -> tuple[Complexes, int]:
-    """Solve the balance by Newton's method from given readings; the number of products that it took."""
+def solve_balance(balance: Balance, readings: Complexes, enough: float = BALANCED) -> tuple[Complexes, int]:
+    """Solve the balance by Newton's method from given readings; the number of products that it took.
+
+    `enough` is the residual over the size of the deflections that counts as balanced.
+    """
     size = float(np.linalg.norm(balance.static[..., DEFLECTION]))
     lengths, products = balance.gearset.lengths, 0
     excess, tangent, _ = balance.forces(readings)
@@ -334,7 +337,7 @@ def solve_balance(balance: Balance, readings: Complexes) -> tuple[Complexes, int
     error = float(np.linalg.norm(lengths * missing))
     before = [np.inf] * PATIENCE
     for _ in range(MOST_STEPS):
-        if error <= BALANCED * size:
+        if error <= enough * size:
             return readings, products
         if error > STALLED * before[-PATIENCE]:
             break

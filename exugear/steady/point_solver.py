@@ -2,7 +2,8 @@
 
 Where teeth may part, a state that Newton's method finds is refined by more harmonics until they change nothing, and its
 stability looked at. Where none is found near the last one, or it is unstable, the gearbox runs in time from there: it
-settles to the state that it jumps to, or to none, which is said in words.
+settles to the state that it jumps to, or to none, which is said in words. Last the planets are looked at one by one:
+where they bear unequally, each one that passes puts lines beside all others, and these act back.
 """
 
 from __future__ import annotations
@@ -21,13 +22,19 @@ from exugear.rotating.mesh_waves import mesh_waves
 from exugear.settling.settled import Leg, SettlingRun, cannot_settle
 from exugear.steady.excitation import Gearset, Interface
 from exugear.steady.nonlinear import Balance, nonlinear_response, response_of_readings, solve_balance
-from exugear.steady.response import Response, linear_response, parametric_response, transmission_errors
+from exugear.steady.response import Response, linear_response, parametric_response, signals, transmission_errors
 from exugear.steady.settings import SteadySettings
 from exugear.steady.stability import CHECKED, candidates, growth_at, growth_of_state, mean_growth
 from fe_ste.tools.arrays import Complexes, Floats
 
 FINE_ENOUGH = 5e-4
 """Residual of the balance with twice the harmonics, over the vibration, up to which the present ones do."""
+PASSED = 1e-4
+"""The same, up to which lines beside others count as found that passing planets make."""
+MOST_PASSED = 3
+"""Multiples of the passing of planets whose lines are looked at, at most."""
+TOLD = 0.05
+"""Share of the overall transmission error in lines beside others from which it is remarked on."""
 MOST_REFINED = 2
 """Times that harmonics are doubled at most."""
 LEGS = 4
@@ -60,6 +67,8 @@ class PartingState:
         Fastest growth of a disturbance, 1/s.
     remark : str
         What is to be said of it, empty if nothing.
+    averaged : PartingState, optional
+        The state with planets at their mean over a turn of the carrier, where this one has lines beside those of it.
     """
 
     gearset: Gearset
@@ -67,6 +76,7 @@ class PartingState:
     response: Response
     growth: float
     remark: str = ""
+    averaged: PartingState | None = None
 
     def on(self, gearset: Gearset, interface: Interface | None = None) -> PartingState:
         """Return the state in the lines of another gearset, which are some of its own."""
@@ -79,6 +89,7 @@ class PartingState:
             deflection=old.deflection[at],
             excess=old.excess[at],
             force=old.force[at],
+            apart=old.apart[at[1]] if len(at) > 1 else old.apart,
         )
         return replace(self, gearset=gearset, readings=self.readings[at], response=response)
 
@@ -135,7 +146,8 @@ class PointSolver:
         if self._level == "parametric" and not self.gearset.waves.carriers:
             return parametric_response(self.gearset, interface)
         if self.gearset.bent:
-            return self._parting(speed).on(self.gearset, interface).response
+            self.state = _with_passing(self._parting(speed))
+            return self.state.on(self.gearset, interface).response
         return self._in_time(interface)
 
     @property
@@ -177,7 +189,7 @@ class PointSolver:
 
     def _parting(self, speed: float) -> PartingState:
         """Find the state at a speed: that near the last one if it is stable, else where a run in time settles."""
-        last, found, reason = self.state, None, ""
+        last, found, reason = self._last_averaged, None, ""
         try:
             found = _refined(last.gearset if last else self.gearset, speed, last.readings if last else None)
         except HarmonicBalanceError as error:
@@ -202,9 +214,14 @@ class PointSolver:
             return _refined(self.gearset, speed, None)
         return None
 
+    @property
+    def _last_averaged(self) -> PartingState | None:
+        """The last state with planets at their mean."""
+        return self.state.averaged or self.state if self.state else None
+
     def _settled(self, speed: float, unstable: PartingState | None, reason: str) -> PartingState:
         """Find the state to which a run in time settles that begins at the last one, or at an unstable one."""
-        begin = unstable or self.state
+        begin = unstable or self._last_averaged
         gearset = begin.gearset if begin else self.gearset
         interface = gearset.at(speed)
         verdict = cannot_settle(gearset.system)
@@ -233,6 +250,44 @@ class PointSolver:
         """Tell whether a disturbance of a state grows within a run in time."""
         slowest = abs(state.response.interface.speed) * float(self.gearset.waves.base_orders.min())
         return state.growth * 2.0 * np.pi / slowest > GROWING
+
+
+def _with_passing(state: PartingState) -> PartingState:
+    """Look at planets one by one: a state with the lines that their passing puts beside others, where they count."""
+    found, speed = state, state.response.interface.speed
+    size = float(np.linalg.norm(state.readings[1:, :, DEFLECTION]))
+    for _ in range(MOST_PASSED):
+        gearset = found.gearset.passing
+        if gearset is None:
+            break
+        balance = Balance(gearset, gearset.at(speed), gearset.lattice)
+        start = np.zeros_like(balance.static)
+        known = found.gearset.places_in(gearset)
+        start[known] = found.readings
+        new = np.delete(balance.missing(start)[..., DEFLECTION], known[0].ravel(), axis=0)
+        if float(np.linalg.norm(new)) < FINE_ENOUGH * size:
+            break
+        enough = PASSED * size / float(np.linalg.norm(balance.static[..., DEFLECTION]))
+        try:
+            readings, products = solve_balance(balance, start, enough)
+        except HarmonicBalanceError:
+            return _remarked(state, "passing planets put lines beside others, but no balance with these was found")
+        response = response_of_readings(balance, readings, found.response.products + products)
+        found = replace(state, gearset=gearset, readings=readings, response=response, averaged=state)
+    if found is state:
+        return state
+    overall = np.abs(signals(found.gearset, found.response)[1:, 0])
+    bases = len(found.gearset.waves.base_orders)
+    share = float(np.linalg.norm(overall[found.gearset.lines.index[1:, bases:].any(axis=1)]) / np.linalg.norm(overall))
+    if share < TOLD:
+        return found
+    return _remarked(
+        found, f"passing planets put {100.0 * share:.2g} % of the overall transmission error beside these lines"
+    )
+
+
+def _remarked(state: PartingState, remark: str) -> PartingState:
+    return replace(state, remark="; ".join(filter(None, (state.remark, remark))))
 
 
 def _near(gearset: Gearset, interface: Interface, leg: Leg) -> PartingState | None:

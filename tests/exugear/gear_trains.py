@@ -179,10 +179,11 @@ def internal_pair() -> dict[str, Any]:
     return train.loaded({"input": TORQUE, "output": -TORQUE * 72 / 24}, ["output"], ("input", "output"), "ring")
 
 
-def two_stage() -> dict[str, Any]:
+def two_stage(teeth: tuple[int, int, int, int] = (21, 42, 24, 60)) -> dict[str, Any]:
     """Two helical stages on bearings from a catalogue."""
+    p1, w1, p2, w2 = teeth
     train = Train("two stages", helix_deg=12.0)
-    train.gear("p1", 21, 1).gear("w1", 42, -1).gear("p2", 24, -1).gear("w2", 60, 1)
+    train.gear("p1", p1, 1).gear("w1", w1, -1).gear("p2", p2, -1).gear("w2", w2, 1)
     first = train.distance_mm("p1", "w1")
     second = first + train.distance_mm("p2", "w2")
     train.body("input", {"p1": 0.0}).body("middle", {"w1": 0.0, "p2": 60.0}, (first, 0.0))
@@ -195,7 +196,8 @@ def two_stage() -> dict[str, Any]:
         for body in ("input", "middle", "output")
         for side, z in (("left", -50.0), ("right", 50.0 if body == "input" else 110.0))
     }
-    return train.loaded({"input": TORQUE, "output": -TORQUE * 2.0 * 2.5}, ["output"], ("input", "output"), "w2")
+    torques = {"input": TORQUE, "output": -TORQUE * w1 / p1 * w2 / p2}
+    return train.loaded(torques, ["output"], ("input", "output"), "w2")
 
 
 def planetary(held: str, planets: int = 3) -> dict[str, Any]:

@@ -11,8 +11,11 @@ LOADS = np.array([0.05, 0.2, 0.5, 1.0, 1.5, 2.0])
 STIFFNESS = {"sun_planet": 3.77e9, "ring_planet": 4.85e9, "intermediate": 3.07e9, "high_speed": 1.93e9}
 
 
-def surface_of(gearbox: Gearbox, name: str, positions: int = 50, variation: float = 1.0) -> SteSurface:
+def surface_of(
+    gearbox: Gearbox, name: str, positions: int = 50, variation: float = 1.0, stiffness: float | None = None
+) -> SteSurface:
     """Table of a pair around its centre distance, up to twice its static load; `variation` times 5 % over the cycle."""
+    stiffness = stiffness or STIFFNESS[name]
     mesh = next(mesh for mesh in gearbox.meshes if mesh.pair.name == name)
     static = abs(gearbox.train.static_mesh_forces()[mesh.name])
     centre = mesh.centre_distance + np.linspace(-2e-4, 2e-4, 5)
@@ -25,7 +28,7 @@ def surface_of(gearbox: Gearbox, name: str, positions: int = 50, variation: floa
     a = misalignment[None, None, :, None] / 4e-4
     softer = (1.0 + 0.03 * c) * (1.0 + 0.2 * a**2 + 0.05 * a)
     unloaded = -1e-6 * a[..., 0] ** 2 + 1e-6 * (1.0 + p[..., 0])
-    per_force = p * softer / STIFFNESS[name]
+    per_force = p * softer / stiffness
     bend = 4e-6 * softer * p
     ste = unloaded[..., None] + per_force * force + bend * (force / static) ** 0.75
     slope = per_force + 0.75 * bend * (force / static) ** -0.25 / static

@@ -7,7 +7,7 @@ import pytest
 import scipy.integrate
 
 from exugear.harmonics.krylov import HarmonicBalanceError, solve_lines
-from exugear.harmonics.lines import line_set
+from exugear.harmonics.lines import Modulator, beside, joined, line_set
 from exugear.harmonics.products import Product
 
 BASES = (1.0, 0.5 * (1.0 + 5.0**0.5))
@@ -108,3 +108,19 @@ def test_the_solver_agrees_with_a_dense_one():
 def test_equations_without_solution_are_told():
     with pytest.raises(HarmonicBalanceError, match="the residual stays at"):
         solve_lines(lambda y: np.array([y[0], 0.0 * y[1]]), np.array([1.0, 1.0j]), 1e-10)
+
+
+def test_what_passes_puts_lines_beside_every_line_and_none_twice():
+    """Three things that turn: the product of a line with the third harmonic of their turn is in the set."""
+    slow = [Modulator(1.0, (0,), 3, 0), Modulator(4.3, (1,), 5, 0)]
+    lines = line_set([99.0, 468.57], 4, 3)
+    found = beside(lines, slow, 2)
+    rows = {tuple(row) for row in found.index.tolist()}
+    assert len(rows) == len(found.index) == len(lines.index) + 8 * (len(lines.index) - 1) + 4
+    assert not any(tuple(-n for n in row) in rows for row in rows if any(row))
+    assert found.orders[0] == 0.0 and np.all(np.diff(found.orders) >= 0.0)
+    for turns in ((3, 0), (-6, 0), (0, 5), (0, -10)):
+        places, _ = found.find(np.hstack([lines.index, np.tile(turns, (len(lines.index), 1))]))
+        assert (places >= 0).all()
+    both = joined(beside(lines, slow, 1), beside(lines, slow, 2))
+    np.testing.assert_array_equal(np.sort(both.orders), np.sort(found.orders))

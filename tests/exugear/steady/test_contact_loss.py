@@ -20,7 +20,7 @@ from exugear.steady.response import signals
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_response import response_of
 
-from .. import table_case
+from .. import gear_trains, table_case
 from ..spur_case import SPUR_CASE
 from .test_steady_in_time import fitted
 
@@ -181,3 +181,75 @@ def test_a_branch_turns_back_where_the_sweep_jumps():
     assert first > 0
     folds = np.array(branch.folds) / own.resonance
     assert ((folds > shares[first - 1] - 1e-3) & (folds < shares[first] + 1e-3)).any()
+
+
+def train_solver(content, share, mesh_time, bearing_time, combinations):
+    """Solver of a gear train on bearings under a share of its load, stiffness varying by 15 to 20 %, and its range."""
+    load = content["static_load"]
+    load["torques_N_m"] = {name: share * torque for name, torque in load["torques_N_m"].items()}
+    content["damping"] = {"mesh_time_s": mesh_time, "bearing_time_s": bearing_time}
+    gearbox = Gearbox.from_dict(content)
+    tables = {
+        mesh.pair.name: table_case.surface_of(gearbox, mesh.pair.name, variation=3.0, stiffness=3e8)
+        for mesh in gearbox.meshes
+    }
+    gearset = gearset_of(
+        assemble(gearbox, Choice("bushing", "table"), tables), np.array([50.0, 2000.0]), 10, combinations
+    )
+    return PointSolver(gearset, SteadySettings(SpeedRange(50.0, 2000.0, 2), "nonlinear", 10, combinations))
+
+
+def stays(solver, speeds, periods):
+    """Differences of lines and amplitudes at the last of several speeds from a run in time, over all lines."""
+    for speed in speeds:
+        solver.response(speed)
+    state, bases = solver.state, solver.gearset.waves.base_orders
+    step = min(2.0 * np.pi / (bases.max() * speeds[-1]) / 300.0, 1.0 / 240e3)
+    duration = 8000 * step * max(1, round(periods * 2.0 * np.pi / (bases.min() * speeds[-1]) / step / 8000))
+    measured, lines = fitted(state, state.response, duration, step, 0.5 * duration)
+    solver.response(measured)
+    again = solver.state.on(state.gearset)
+    known = 2.0 * signals(again.gearset, again.response)[1:, 0]
+    size = np.linalg.norm(known)
+    return np.linalg.norm(lines - known) / size, np.linalg.norm(abs(lines) - abs(known)) / size
+
+
+def helical():
+    """A helical pair with light load and little damping."""
+    return train_solver(gear_trains.pair(helix_deg=15.0), 0.3, 1e-6, 1e-6, 3)
+
+
+def test_a_helical_pair_stays_on_a_state_with_contact_loss():
+    solver = helical()
+    lines, amplitudes = stays(solver, np.arange(520.0, 499.0, -5.0), 400)
+    assert solver.state.response.apart[0] > 0.1
+    assert lines < 1e-3
+    assert amplitudes < 5e-4
+
+
+def test_the_branch_of_a_helical_pair_turns_back_where_its_sweeps_jump():
+    """Two folds, no stable state between them; the sweep up jumps at one, that down at the other, 0.5 rad/s apart."""
+    solver = helical()
+    branch = follow_branch(solver, 510.0, 485.0)
+    low, high = sorted(branch.folds)
+    turned = np.flatnonzero(np.diff(np.sign(np.diff(branch.speed)))) + 1
+    inside = slice(turned[0] + 2, turned[1] - 1)
+    assert not branch.stable[inside].any()
+    assert branch.stable[: turned[0] - 1].all() and branch.stable[turned[1] + 2 :].all()
+    for speeds, fold in ((np.arange(489.0, 500.0, 0.5), high), (np.arange(501.0, 490.0, -0.5), low)):
+        solver.state, sizes = None, []
+        for speed in (510.0, *speeds) if speeds[0] > speeds[-1] else speeds:
+            solver.response(speed)
+            sizes.append(np.linalg.norm(solver.state.response.deflection[1:]))
+        jump = int(np.argmax(np.abs(np.diff(sizes[-len(speeds) :]))))
+        assert min(speeds[jump : jump + 2]) - 0.05 < fold < max(speeds[jump : jump + 2]) + 0.05
+
+
+@pytest.mark.validation
+def test_a_gearbox_of_two_stages_stays_on_a_state_with_contact_loss():
+    """Combinations up to the eighth, since kinks join both mesh frequencies; tooth numbers keep these apart."""
+    solver = train_solver(gear_trains.two_stage((21, 43, 25, 61)), 0.1, 5e-7, 1e-5, 8)
+    lines, amplitudes = stays(solver, np.array([770.0, 750.0]), 1500)
+    assert solver.state.response.apart[0] > 0.08
+    assert lines < 2e-3
+    assert amplitudes < 1e-3
