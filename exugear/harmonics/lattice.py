@@ -103,15 +103,15 @@ def lattice(lines: LineSet, larger: LineSet, least: int = 0, shared: bool = Fals
     >>> bool(np.allclose(found.coefficients(found.values(signal)), signal))
     True
     """
-    bases = lines.index.shape[1]
+    independent = lines.units.shape[1]
     own, whole = (np.vstack([some.index, -some.index[1:]]) for some in (lines, larger))
     apart = own if shared else whole
     rng = np.random.default_rng(1)
     # An odd number: then no slot but that of the mean is its own conjugate.
     samples = max(len(apart), least) | 1
     while samples < 200 * len(whole):
-        for _ in range(TRIES if bases > 1 else 1):
-            generator = np.append(1, rng.integers(2, samples, size=bases - 1)).astype(np.int64)
+        for _ in range(TRIES if independent > 1 else 1):
+            generator = lines.units @ np.append(1, rng.integers(2, samples, size=independent - 1)).astype(np.int64)
             taken = np.bincount((whole @ generator) % samples, minlength=samples)
             if (taken[(apart @ generator) % samples] == 1).all():
                 return Lattice(lines, generator, samples)

@@ -2,18 +2,29 @@
 
 Each cause is a base with a frequency of its own. What all of them do together is a sum of lines, at integer
 combinations k . base of these frequencies. Real signals need one line of each pair k, -k.
+
+Bases in a ratio of small integers (a shaft whose wheel has twice the teeth of its pinion) have lines in common. What
+two bases do at one frequency is one line: bases are then multiples of fewer independent frequencies, and lines are told
+apart by these.
 """
 
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 
 import numpy as np
 
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
+
+LARGEST_RATIO = 40
+"""Integers up to which a ratio of two bases is looked for: harmonics that any set has."""
+SAME = 1e-9
+"""Relative difference up to which two frequencies are the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,33 +38,59 @@ class LineSet:
     ----------
     index : (n, bases) array of int
         Multiples of each base; the first line is the mean.
-    orders : (n,) array
-        Frequency of each line over that of the reference, not negative.
+    bases : (bases,) array
+        Frequency of each base over that of the reference.
+    units : (bases, independent) array of int
+        Multiples of independent frequencies that the bases are.
     """
 
     index: Integers
-    orders: Floats
+    bases: Floats
+    units: Integers
 
     def __repr__(self) -> str:
         """Sizes in one line."""
         return f"<LineSet: {len(self.index)} lines of {self.index.shape[1]} bases>"
 
     @cached_property
+    def orders(self) -> Floats:
+        """Frequency of each line (n,) over that of the reference, not negative."""
+        return np.asarray(self.index @ self.bases)
+
+    def shared(self) -> tuple[tuple[int, ...], ...]:
+        """Pairs of bases in a ratio of small integers: multiples (bases,) of two of them whose sum is no frequency.
+
+        Examples
+        --------
+        >>> line_set([3.0, 4.0, 7.1], 1).shared()
+        ((4, -3, 0),)
+        """
+        found = []
+        for a, b in itertools.combinations(range(len(self.bases)), 2):
+            column = int(np.argmax(self.units[a]))
+            one, other = int(self.units[a, column]), int(self.units[b, column])
+            if other:
+                row = np.zeros(len(self.bases), dtype=np.int64)
+                row[[a, b]] = np.array([other, -one]) // math.gcd(one, other)
+                found.append(tuple(row.tolist()))
+        return tuple(found)
+
+    @cached_property
     def _radix(self) -> Integers:
         """Weights that make one number of a vector of multiples; wide enough for sums of several lines."""
-        span = 64 * (int(np.abs(self.index).max(initial=0)) + 1)
-        return np.array([span**n for n in range(self.index.shape[1])], dtype=np.int64)
+        span = 64 * (int(np.abs(self.index @ self.units).max(initial=0)) + 1)
+        return np.array([span**n for n in range(self.units.shape[1])], dtype=np.int64)
 
     @cached_property
     def _sorted_keys(self) -> tuple[Integers, Integers]:
-        keys = self.index @ self._radix
+        keys = self.index @ self.units @ self._radix
         order = np.argsort(keys)
         return keys[order], order
 
     def find(self, multiples: Integers) -> tuple[Integers, Booleans]:
         """Place of lines (..., bases) in the set, -1 for none, and whether it is the conjugate that stands there."""
         keys, order = self._sorted_keys
-        wanted = multiples @ self._radix
+        wanted = multiples @ self.units @ self._radix
 
         def look(values: Integers) -> Integers:
             at = np.minimum(np.searchsorted(keys, values), len(keys) - 1)
@@ -133,16 +170,19 @@ def line_set(orders: Sequence[float], harmonics: int, combinations: int = 0) -> 
     >>> lines = line_set([1.0, 4.5], harmonics=2, combinations=2)
     >>> [tuple(row) for row in lines.index.tolist()]
     [(0, 0), (1, 0), (2, 0), (-1, 1), (0, 1), (1, 1), (0, 2)]
+
+    The double of one base is another: one line each of (0, 1) and (2, 0), of (1, 0) and (-1, 1).
+
+    >>> [tuple(row) for row in line_set([1.0, 2.0], harmonics=2, combinations=2).index.tolist()]
+    [(0, 0), (1, 0), (0, 1), (1, 1), (0, 2)]
     """
     bases = np.asarray(orders, dtype=np.float64)
     rows = {tuple(n * unit) for unit in np.eye(bases.size, dtype=np.int64) for n in range(1, harmonics + 1)}
     reach = range(-combinations, combinations + 1)
     for row in itertools.product(reach, repeat=bases.size):
         if 0 < sum(map(abs, row)) <= combinations and row > tuple(-n for n in row):
-            rows.add(row if np.dot(row, bases) >= 0.0 else tuple(-n for n in row))
-    index = np.array(sorted((tuple(map(int, row)) for row in rows), key=lambda row: float(np.dot(row, bases))))
-    index = np.vstack([np.zeros((1, bases.size), dtype=np.int64), index.astype(np.int64).reshape(-1, bases.size)])
-    return LineSet(index, index @ bases)
+            rows.add(row)
+    return _of_rows(np.array([tuple(map(int, row)) for row in rows]), bases, _independent(bases))
 
 
 def modulated(lines: LineSet, modulators: Sequence[Modulator]) -> LineSet:
@@ -160,16 +200,12 @@ def modulated(lines: LineSet, modulators: Sequence[Modulator]) -> LineSet:
     [(0, 0, 0), (1, 0, -1), (1, 0, 0), (1, 0, 1), (0, 1, 0)]
     """
     own = np.array([modulator.order for modulator in modulators])
-    bases = np.append(_bases(lines), own)
+    bases = np.append(lines.bases, own)
     rows: set[tuple[int, ...]] = set()
     for line in lines.index[1:]:
         for turns in itertools.product(*(modulator.turns(line) for modulator in modulators)):
-            row = np.append(line, np.array(turns, dtype=np.int64))
-            row = row if np.dot(row, bases) >= 0.0 else -row
-            rows.add(tuple(int(n) for n in row))
-    index = np.array(sorted(rows, key=lambda row: float(np.dot(row, bases))), dtype=np.int64)
-    index = np.vstack([np.zeros((1, len(bases)), dtype=np.int64), index.reshape(-1, len(bases))])
-    return LineSet(index, index @ bases)
+            rows.add(tuple(int(n) for n in (*line, *turns)))
+    return _of_rows(np.array(sorted(rows)), bases, _with_slow(lines.units, len(modulators)))
 
 
 def beside(lines: LineSet, slow: Sequence[Modulator], most: int) -> LineSet:
@@ -189,7 +225,7 @@ def beside(lines: LineSet, slow: Sequence[Modulator], most: int) -> LineSet:
     >>> [tuple(row) for row in lines.index.tolist()]
     [(0, 0), (0, 3), (1, -3), (1, 0), (1, 3)]
     """
-    bases = np.append(_bases(lines), [own.order for own in slow])
+    bases = np.append(lines.bases, [own.order for own in slow])
     turns = [np.zeros(len(slow), dtype=np.int64)]
     turns += [
         n * own.count * unit
@@ -198,21 +234,53 @@ def beside(lines: LineSet, slow: Sequence[Modulator], most: int) -> LineSet:
         if n
     ]
     rows = np.array([np.append(line, turn) for line in lines.index for turn in turns])
-    rows[rows @ bases < 0.0] *= -1
-    rows = np.unique(rows, axis=0)
-    index = rows[np.argsort(rows @ bases, kind="stable")]
-    return LineSet(index, index @ bases)
+    return _of_rows(rows, bases, _with_slow(lines.units, len(slow)))
 
 
 def joined(one: LineSet, other: LineSet) -> LineSet:
     """Lines of two sets of the same bases."""
-    orders = dict(zip(map(tuple, one.index.tolist()), one.orders.tolist(), strict=True))
-    orders |= dict(zip(map(tuple, other.index.tolist()), other.orders.tolist(), strict=True))
-    rows = sorted(orders, key=lambda row: (orders[row], row))
-    return LineSet(np.array(rows, dtype=np.int64), np.array([orders[row] for row in rows]))
+    return _of_rows(np.vstack([one.index, other.index]), one.bases, one.units)
 
 
-def _bases(lines: LineSet) -> Floats:
-    """Frequencies of the bases of a set, over that of the reference."""
-    units = np.eye(lines.index.shape[1], dtype=np.int64)
-    return np.array([float(lines.orders[np.flatnonzero((lines.index == unit).all(axis=1))[0]]) for unit in units])
+def _of_rows(rows: Integers, bases: Floats, units: Integers) -> LineSet:
+    """Line set of the mean and multiples (n, bases) of bases in any order and sign, some of them at one frequency.
+
+    Of lines at one frequency that of one base alone stands for all, else that with the smallest multiples.
+    """
+    rows = rows.astype(np.int64).reshape(-1, bases.size)
+    rows = np.where((rows @ bases < 0.0)[:, None], -rows, rows)
+    simplest = sorted(map(tuple, rows.tolist()), key=lambda row: (np.count_nonzero(row), sum(map(abs, row)), row))
+    kept: dict[tuple[int, ...], tuple[int, ...]] = {(0,) * units.shape[1]: (0,) * bases.size}
+    for row in simplest:
+        kept.setdefault(tuple((np.array(row, dtype=np.int64) @ units).tolist()), row)
+    index = np.array(sorted(kept.values(), key=lambda row: (float(np.dot(row, bases)), row)), dtype=np.int64)
+    return LineSet(index, bases, units)
+
+
+def _independent(bases: Floats) -> Integers:
+    """Multiples (bases, independent) of independent frequencies that bases are: their greatest common divisors."""
+    groups: list[list[tuple[int, Fraction]]] = []
+    for n, base in enumerate(bases):
+        for group in groups:
+            ratio = base / bases[group[0][0]]
+            near = Fraction(ratio).limit_denominator(LARGEST_RATIO)
+            if near.numerator <= LARGEST_RATIO and abs(ratio - near) < SAME * ratio:
+                group.append((n, near))
+                break
+        else:
+            groups.append([(n, Fraction(1))])
+    units = np.zeros((bases.size, len(groups)), dtype=np.int64)
+    for column, group in enumerate(groups):
+        whole = math.lcm(*(near.denominator for _, near in group))
+        common = math.gcd(*(int(near * whole) for _, near in group))
+        for n, near in group:
+            units[n, column] = int(near * whole) // common
+    return units
+
+
+def _with_slow(units: Integers, slow: int) -> Integers:
+    """Multiples of independent frequencies of bases and slow ones behind them, each independent of all others."""
+    found = np.zeros((len(units) + slow, units.shape[1] + slow), dtype=np.int64)
+    found[: len(units), : units.shape[1]] = units
+    found[len(units) :, units.shape[1] :] = np.eye(slow, dtype=np.int64)
+    return found

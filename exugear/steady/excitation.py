@@ -186,10 +186,12 @@ class Gearset:
     @cached_property
     def finer(self) -> Gearset:
         """The same with twice the harmonics of each mesh frequency, and the same combinations of several."""
-        other = self._copied()
-        other.line_harmonics = 2 * self.line_harmonics
-        other.lines, other._larger = _line_sets(self.waves, other.line_harmonics, self.combinations)
-        return other
+        return self._with_lines(2 * self.line_harmonics, self.combinations)
+
+    @cached_property
+    def wider(self) -> Gearset:
+        """The same with twice the combinations of several mesh frequencies: kinks where teeth part join these."""
+        return self._with_lines(self.line_harmonics, 2 * self.combinations)
 
     def _copied(self) -> Gearset:
         """Copy without what was derived from lines and ports."""
@@ -197,6 +199,12 @@ class Gearset:
         for name, value in vars(type(self)).items():
             if isinstance(value, cached_property):
                 other.__dict__.pop(name, None)
+        return other
+
+    def _with_lines(self, harmonics: int, combinations: int) -> Gearset:
+        other = self._copied()
+        other.line_harmonics, other.combinations = harmonics, combinations
+        other.lines, other._larger = _line_sets(self.waves, harmonics, combinations)
         return other
 
     @cached_property

@@ -35,8 +35,8 @@ MOST_PASSED = 3
 """Multiples of the passing of planets whose lines are looked at, at most."""
 TOLD = 0.05
 """Share of the overall transmission error in lines beside others from which it is remarked on."""
-MOST_REFINED = 2
-"""Times that harmonics are doubled at most."""
+MOST_REFINED = 3
+"""Times that harmonics or combinations are doubled at most."""
 LEGS = 4
 """Legs of a run in time, after each of which Newton's method is tried."""
 NEAR = 0.1
@@ -308,23 +308,35 @@ def _near(gearset: Gearset, interface: Interface, leg: Leg) -> PartingState | No
 
 
 def _refined(gearset: Gearset, speed: float, start: Complexes | None) -> PartingState:
-    """Solve at a speed, from given readings or the static state, with more and more harmonics until they do."""
+    """Solve at a speed, from given readings or the static state, with more and more lines until they do."""
     balance = Balance(gearset, gearset.at(speed), gearset.lattice)
     readings, products = solve_balance(balance, balance.static if start is None else start)
     response = response_of_readings(balance, readings, products)
     for _ in range(MOST_REFINED):
-        if not response.apart.any() and gearset.bearings is None:
+        ahead = _ahead_of(balance, readings, response)
+        if ahead is None:
             break
-        finer = gearset.finer
-        ahead = Balance(finer, finer.at(speed), finer.lattice)
         more = np.zeros_like(ahead.static)
-        more[gearset.places_in(finer)] = readings
-        size = float(np.linalg.norm(readings[1:, :, DEFLECTION]))
-        if float(np.linalg.norm(ahead.missing(more)[..., DEFLECTION])) < FINE_ENOUGH * size:
-            break
-        gearset, balance = finer, ahead
+        more[balance.gearset.places_in(ahead.gearset)] = readings
+        balance = ahead
         readings, took = solve_balance(balance, more)
         products += took
         response = response_of_readings(balance, readings, products)
     parted = bool(response.apart.any() or response.free.any())
-    return PartingState(gearset, readings, response, growth_of_state(balance, readings, parted))
+    return PartingState(balance.gearset, readings, response, growth_of_state(balance, readings, parted))
+
+
+def _ahead_of(balance: Balance, readings: Complexes, response: Response) -> Balance | None:
+    """Balance with the lines that a state lacks, harmonics or combinations, None where it lacks none."""
+    gearset, speed = balance.gearset, balance.interface.speed
+    if not response.apart.any() and gearset.bearings is None:
+        return None
+    several = len(gearset.waves.base_orders) > 1 and bool(response.apart.any())
+    size = float(np.linalg.norm(readings[1:, :, DEFLECTION]))
+    for other in (gearset.finer, gearset.wider) if several else (gearset.finer,):
+        ahead = Balance(other, other.at(speed), other.lattice)
+        more = np.zeros_like(ahead.static)
+        more[gearset.places_in(other)] = readings
+        if float(np.linalg.norm(ahead.missing(more)[..., DEFLECTION])) >= FINE_ENOUGH * size:
+            return ahead
+    return None

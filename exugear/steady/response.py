@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.harmonics.krylov import solve_lines
+from exugear.harmonics.lines import SAME
 from exugear.rotating.mesh_places import mesh_places
 from exugear.rotating.mesh_ports import DEFLECTION, POSITION, MeshPorts
 from exugear.steady.excitation import Gearset, Interface
@@ -97,12 +98,13 @@ def transmission_error_line(gearset: Gearset, ports: MeshPorts, speed: float, li
     """Find the forces (m,) of one line of a single base as `transmission_errors` does for all."""
     if gearset.waves.carriers:
         return np.asarray(_errors_in_time(gearset, ports, speed)[line, :, 0])
-    multiples = gearset.lines.index[line]
-    base = int(np.flatnonzero(multiples)[0])
-    harmonic = int(multiples[base])
-    own = np.array([wave.base == base for wave in gearset.waves.waves])
-    errors = _harmonics_of_errors(gearset, ports, speed)[:, harmonic]
-    return np.asarray(-gearset.waves.mean_stiffness * errors * own)
+    # A line may be a harmonic of several bases.
+    ratios = gearset.lines.orders[line] / gearset.waves.base_orders[[wave.base for wave in gearset.waves.waves]]
+    harmonics = np.rint(ratios).astype(np.int64)
+    own = (np.abs(ratios - harmonics) < SAME * ratios) & (harmonics <= gearset.harmonics)
+    errors = _harmonics_of_errors(gearset, ports, speed)
+    found = errors[np.arange(len(own)), np.where(own, harmonics, 0)] * own
+    return np.asarray(-gearset.waves.mean_stiffness * found)
 
 
 def _errors_in_time(gearset: Gearset, ports: MeshPorts, speed: float) -> Complexes:

@@ -105,12 +105,19 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
         "growth_rate": response.growth_rate,
         "planet_spread": response.planet_spread,
         "stiffness_variation": response.stiffness_variation,
+        "shared_lines": "; ".join(_shared(row, response.base_names) for row in response.lines.shared()),
         "contributions": json.dumps([{"line": line, **asdict(own)} for line, own in response.contributions]),
         "folds": json.dumps(response.folds),
         "unsolved": json.dumps([{"speed": speed, "reason": reason} for speed, reason in response.unsolved]),
         "crossings": json.dumps([asdict(crossing) for crossing in response.crossings]),
     }
     return xr.Dataset(variables, coordinates, attributes)
+
+
+def _shared(multiples: tuple[int, ...], bases: tuple[str, ...]) -> str:
+    """Two multiples of bases that are one frequency, by their names."""
+    names = [f"{abs(n)} x {base.split(', ')[0]}" for n, base in zip(multiples, bases, strict=False) if n]
+    return " = ".join(names)
 
 
 def write_response(path: Path, response: SteadyResponse) -> None:

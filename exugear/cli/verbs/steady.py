@@ -124,6 +124,8 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
     growth = float(data.attrs["growth_rate"])
     _tell_of_stability(data, growth)
     _tell_of_bearings(data)
+    if data.attrs["shared_lines"]:
+        note(f"Mesh frequencies share lines, each of which is named after one of them: {data.attrs['shared_lines']}")
     if not found:
         note(f"Nothing resonates: by the mesh law {data.attrs['mesh_law']} hardly anything excites the gearbox")
     if as_json:
@@ -144,6 +146,7 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
                 "planet_spread": float(data.attrs["planet_spread"]),
                 "stiffness_variation": float(data.attrs["stiffness_variation"]),
                 "bearings_in_time": str(data.attrs["bearings_in_time"]),
+                "shared_lines": str(data.attrs["shared_lines"]),
                 "peaks_of_overall_dte": [_summary(peak) for peak in found],
                 "file": str(path),
             }

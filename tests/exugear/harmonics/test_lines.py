@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
+from fractions import Fraction
+
 import numpy as np
 import pytest
 import scipy.integrate
 
 from exugear.harmonics.krylov import HarmonicBalanceError, solve_lines
+from exugear.harmonics.lattice import lattice
 from exugear.harmonics.lines import Modulator, beside, joined, line_set
 from exugear.harmonics.products import Product
 
@@ -124,3 +128,37 @@ def test_what_passes_puts_lines_beside_every_line_and_none_twice():
         assert (places >= 0).all()
     both = joined(beside(lines, slow, 1), beside(lines, slow, 2))
     np.testing.assert_array_equal(np.sort(both.orders), np.sort(found.orders))
+
+
+@pytest.mark.parametrize("bases", [[1.0, 2.0], [4.0, 3.0], [21.0, 12.0], [20.0, 15.0, 47.3]])
+def test_bases_in_small_ratios_have_each_frequency_once(bases):
+    """And all that independent bases have: their frequencies, counted as rational numbers."""
+    lines = line_set(bases, 6, 4)
+    exact = {Fraction(str(base)): n for n, base in enumerate(bases)}
+    wanted = {
+        abs(sum((m * base for m, base in zip(row, exact, strict=True)), Fraction(0)))
+        for row in itertools.product(range(-6, 7), repeat=len(bases))
+        if sum(map(abs, row)) <= 4 or np.count_nonzero(row) <= 1
+    }
+    np.testing.assert_allclose(lines.orders, sorted(map(float, wanted)), rtol=1e-12, atol=1e-12)
+
+
+def test_a_product_of_bases_that_share_lines_is_that_in_time():
+    """One period of both, sampled: every frequency is a multiple of their greatest common divisor."""
+    lines = line_set([4.0, 3.0], 8, 6)
+    signal = np.where(lines.orders <= 12.0, 1.0 / (1.0 + lines.orders) + 0.3j * (lines.orders > 0.0), 0.0)
+    angle = 2.0 * np.pi * np.arange(512) / 512
+    values = lines.values(signal, np.outer(angle, [4.0, 3.0]))
+    factor = 1.0 + 0.4 * np.cos(4.0 * angle)
+    found = Product(lines, 0, 2).of(np.array([1.0, 0.2, 0.0], dtype=complex), signal)
+    known = np.fft.rfft(values * factor)[np.rint(lines.orders).astype(int)] / 512
+    inside = lines.orders <= 8.0
+    np.testing.assert_allclose(found[inside], known[inside], atol=1e-12)
+
+
+def test_samples_of_bases_that_share_lines_give_their_lines_back():
+    lines = line_set([2.0, 1.0, 17.4], 5, 3)
+    samples = lattice(lines, line_set([2.0, 1.0, 17.4], 10, 6))
+    signal = np.arange(1.0, len(lines.orders) + 1) + 0j
+    np.testing.assert_allclose(samples.coefficients(samples.values(signal)), signal, atol=1e-9)
+    np.testing.assert_allclose(lines.values(signal, samples.angles), samples.values(signal), atol=1e-8)

@@ -246,10 +246,11 @@ def test_the_branch_of_a_helical_pair_turns_back_where_its_sweeps_jump():
 
 
 @pytest.mark.validation
-def test_a_gearbox_of_two_stages_stays_on_a_state_with_contact_loss():
-    """Combinations up to the eighth, since kinks join both mesh frequencies; tooth numbers keep these apart."""
-    solver = train_solver(gear_trains.two_stage((21, 43, 25, 61)), 0.1, 5e-7, 1e-5, 8)
+@pytest.mark.parametrize("teeth", [(21, 43, 25, 61), (21, 42, 24, 60), (20, 40, 20, 60)])
+def test_a_gearbox_of_two_stages_stays_on_a_state_with_contact_loss(teeth):
+    """Kinks join both mesh frequencies, so that combinations grow; the latter two have these as 7 : 4 and 2 : 1."""
+    solver = train_solver(gear_trains.two_stage(teeth), 0.1, 5e-7, 1e-5, 3)
     lines, amplitudes = stays(solver, np.array([770.0, 750.0]), 1500)
     assert solver.state.response.apart[0] > 0.08
-    assert lines < 2e-3
+    assert lines < 1e-3
     assert amplitudes < 1e-3
