@@ -74,8 +74,8 @@ class Integration:
 
     @property
     def error(self) -> float:
-        """Sum of both errors, relative."""
-        return abs(self.forced_error) + self.resonance_error
+        """The larger of both errors, each over what is allowed of it."""
+        return max(abs(self.forced_error) / FORCED_ERROR, self.resonance_error / RESONANCE_ERROR)
 
     @property
     def is_accurate(self) -> bool:

@@ -35,7 +35,7 @@ def deviation(found: xr.Dataset, exact: xr.Dataset, name: str) -> float:
     # Columns without a fluctuation to speak of: forces along axes that nothing pushes along.
     counts = fluctuation > 1e-5 * np.abs(b).max()
     assert counts.any()
-    return float((np.sqrt(np.mean((a - b) ** 2, axis=0)) / fluctuation)[counts].max())
+    return float((np.sqrt(np.mean((a - b)[:, counts] ** 2, axis=0)) / fluctuation[counts]).max())
 
 
 def departure(
