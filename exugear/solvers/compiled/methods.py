@@ -255,8 +255,8 @@ def resonance_error(method: Method, eigenvalues: Complexes, step: float, band: f
     """Largest error of a resonance's answer to excitation up to a band, in amplitude and phase, as a share of its peak.
 
     The answer to a frequency w goes with 1 / (i w - s), s the eigenvalue, so that an error e of the eigenvalue changes
-    it by e / (i w - s): by e / (zeta |s|) at the peak. That of a resonance above the band is largest at its end, and
-    less than this, which takes the error of the free motion for that of the forced one.
+    it by e / (i w - s): by e over the rate of decay at the peak. That of a resonance above the band is largest at its
+    end, and less than this, which takes the error of the free motion for that of the forced one.
 
     Parameters
     ----------
