@@ -31,6 +31,8 @@ from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
 
 SAMPLES_PER_HARMONIC = 16
 """Samples over a mesh period at least where teeth part, over the harmonics: kinks want more than products of lines."""
+MOST_LINES = 500
+"""Lines up to which combinations grow: those up to the eighth of three mesh frequencies, the twenty-first of two."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,9 +191,18 @@ class Gearset:
         return self._with_lines(2 * self.line_harmonics, self.combinations)
 
     @cached_property
-    def wider(self) -> Gearset:
-        """The same with twice the combinations of several mesh frequencies: kinks where teeth part join these."""
-        return self._with_lines(self.line_harmonics, 2 * self.combinations)
+    def wider(self) -> Gearset | None:
+        """The same with up to twice the combinations of several mesh frequencies, None where lines would be too many.
+
+        Kinks where teeth part join these frequencies.
+        """
+        if len(self.waves.base_orders) == 1:
+            return None
+        for combinations in range(2 * self.combinations, self.combinations, -1):
+            other = self._with_lines(self.line_harmonics, combinations)
+            if len(other.lines.index) <= MOST_LINES:
+                return other
+        return None
 
     def _copied(self) -> Gearset:
         """Copy without what was derived from lines and ports."""

@@ -37,8 +37,6 @@ TOLD = 0.05
 """Share of the overall transmission error in lines beside others from which it is remarked on."""
 MOST_REFINED = 3
 """Times that harmonics or combinations are doubled at most."""
-MOST_COMBINED = 8
-"""Sum of the multiples of a combination up to which these are doubled: with three bases there are 400 lines then."""
 LEGS = 4
 """Legs of a run in time, after each of which Newton's method is tried."""
 NEAR = 0.1
@@ -333,11 +331,10 @@ def _ahead_of(balance: Balance, readings: Complexes, response: Response) -> Bala
     gearset, speed = balance.gearset, balance.interface.speed
     if not response.apart.any() and gearset.bearings is None:
         return None
-    others = [gearset.finer]
-    if response.apart.any() and len(gearset.waves.base_orders) > 1 and 2 * gearset.combinations <= MOST_COMBINED:
-        others.append(gearset.wider)
     size = float(np.linalg.norm(readings[1:, :, DEFLECTION]))
-    for other in others:
+    for other in (gearset.finer, gearset.wider if response.apart.any() else None):
+        if other is None:
+            continue
         ahead = Balance(other, other.at(speed), other.lattice)
         more = np.zeros_like(ahead.static)
         more[gearset.places_in(other)] = readings
