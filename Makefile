@@ -72,7 +72,7 @@ FIND_PYTHON := for candidate in $(if $(PYTHON),"$(PYTHON)",python3 python3.13 py
 	echo "exugear needs Python 3.11, 3.12 or 3.13; found: $$($(or $(PYTHON),python3) --version 2>&1)." >&2; \
 	echo "Install one, or name it: make PYTHON=/path/to/python3.12 TARGET" >&2; exit 1
 
-.PHONY: test-browser help demo demo-short test validate benchmarks check check-web vendor-web docs dist wheel-test lock clean
+.PHONY: test-browser help demo demo-short test validate validate-long benchmarks check check-web vendor-web docs dist wheel-test lock clean
 
 help:
 	@echo "make demo        GRC 750 from gear data to waterfalls, modes and a report, into $(RESULTS)"
@@ -80,6 +80,7 @@ help:
 	@echo "make test        tests and documentation examples"
 	@echo "make test-browser  claims about the report page in a browser, desk and phone; needs chromium"
 	@echo "make validate    the long comparisons with references"
+	@echo "make validate-long  the longest ones, before a release; docs/validation.md records them"
 	@echo "make benchmarks  what all of it costs, into benchmarks/results.md and what README and docs quote"
 	@echo "make check       ruff and mypy"
 	@echo "make check-web   the pages' scripts: linted, types checked; with a node of its own"
@@ -122,7 +123,11 @@ test-browser: $(INSTALLED)
 	$(RUN)/python -m pytest -m browser tests/exugear/report
 
 validate: $(INSTALLED)
-	$(RUN)/python -m pytest -m validation $(SIDE_BY_SIDE)
+	$(RUN)/python -m pytest -m "validation and not long" $(SIDE_BY_SIDE)
+
+# Each test tells its time and, as it goes, what it found.
+validate-long: $(INSTALLED)
+	$(RUN)/python -m pytest -m long -rA --durations=0 $(SIDE_BY_SIDE)
 
 benchmarks: $(INSTALLED)
 	$(RUN)/python benchmarks/run_all.py

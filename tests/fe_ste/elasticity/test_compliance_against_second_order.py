@@ -19,14 +19,18 @@ CASES = [(name, int(gear)) for name, entry in STORED.items() for gear in entry["
 ASKED = 5e-3
 
 
-@pytest.fixture(scope="module")
-def agreement() -> ModuleType:
-    """The benchmark's own module, which is no part of the installed packages."""
+def benchmark_module(name: str) -> ModuleType:
+    """A module of the benchmark, which is no part of the installed packages."""
     sys.path.insert(0, str(FOLDER))
     try:
-        return importlib.import_module("agreement_with_truth")
+        return importlib.import_module(name)
     finally:
         sys.path.remove(str(FOLDER))
+
+
+@pytest.fixture(scope="module")
+def agreement() -> ModuleType:
+    return benchmark_module("agreement_with_truth")
 
 
 def close(agreement: ModuleType, name: str, gear: int) -> None:
@@ -53,3 +57,14 @@ def test_the_truth_is_known_to_six_per_mille(name: str, gear: int) -> None:
     low, high = entry["between_um"]
     assert coarse < fine < low <= entry["deflection_um"] <= high
     assert high - low < 6e-3 * entry["deflection_um"]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "gear"), CASES)
+def test_the_stored_truth_is_what_its_bricks_give(name: str, gear: int) -> None:
+    """The coarsest stored mesh again; digits of the file are 1e-6 of the deflection."""
+    renew, stored = benchmark_module("renew"), STORED[name]["gears"][str(gear)]["meshes"][0]
+    again = renew.mesh_entry(renew.stored_load(name), gear, stored["factor"])
+    print(f"{name}, gear {gear + 1}: {again['deflection_um']} um, stored {stored['deflection_um']} um")
+    assert again["unknowns"] == stored["unknowns"]
+    assert again["deflection_um"] == pytest.approx(stored["deflection_um"], rel=1e-5)
