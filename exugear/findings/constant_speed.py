@@ -1,8 +1,9 @@
-"""Levels along orders at constant speed: a run-up that gives a resonance no time to build up shows it too low."""
+"""Levels at constant speed: a run-up that gives a resonance no time to build up shows it too low."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import json
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,8 @@ import numpy as np
 
 from exugear.findings.context import choice_of
 from exugear.model.choice import Choice
+from exugear.model.gearbox import Gearbox
+from exugear.spectra.line_spectra import LineSpectra, line_spectra
 from exugear.spectra.orders import OrderLine
 from exugear.steady.peaks import BESIDE, SAME_ORDER
 from exugear.steady.settings import LEVELS
@@ -21,6 +24,10 @@ if TYPE_CHECKING:
 
 FAINTEST = 1e-12
 """Amplitude (m) below which a level is no lower."""
+TOP = 1.1
+"""Highest frequency drawn over that of the fastest mesh at the highest speed."""
+LEAST_SPEEDS = 3
+"""Speeds without which nothing is drawn over speed."""
 
 
 @dataclass(frozen=True)
@@ -119,3 +126,40 @@ def truest_of(responses: Iterable[xr.Dataset], choice: Choice) -> ConstantSpeed 
     own = [data for data in responses if choice_of(data.attrs) == choice and not settings_of(data.attrs).branches]
     best = max(own, key=lambda data: LEVELS.index(data.attrs["level"]), default=None)
     return None if best is None else constant_speed_of(best)
+
+
+def is_over_speed(response: xr.Dataset) -> bool:
+    """Tell whether a steady response is a function of speed: no branch with folds, and speeds enough to draw."""
+    return not settings_of(response.attrs).branches and np.unique(response["speed"]).size >= LEAST_SPEEDS
+
+
+def highest_drawn(gearbox: Gearbox, response: xr.Dataset) -> float:
+    """Highest frequency (Hz) that is drawn of a steady response."""
+    fastest = float(np.abs(response["speed"]).max())
+    return TOP * max(gearbox.train.mesh_frequencies(fastest).values())
+
+
+def response_spectra(
+    response: xr.Dataset, signals: Sequence[str], highest: float, reference: float = 1e-6, unit: str = "m"
+) -> LineSpectra:
+    """Lines of a steady response over speed, as a waterfall.
+
+    Parameters
+    ----------
+    response : Dataset
+        As `exugear.steady.steady_file.load_response` reads it, a function of speed.
+    signals : sequence of str
+        The root of the summed squares of their amplitudes is taken.
+    highest : float
+        Highest frequency that is drawn, Hz.
+    reference, unit : float, str
+        Amplitude of 0 dB, and the unit of the signals.
+    """
+    speed, places = np.unique(np.abs(response["speed"].to_numpy()), return_index=True)
+    names = [str(name) for name in response["signal"].to_numpy()]
+    # Line 0 is the mean, which is no vibration.
+    parts = response["amplitude"].to_numpy()[places, 1:][..., [names.index(name) for name in signals]]
+    amplitude = np.sqrt((parts.astype(np.float64) ** 2).sum(axis=-1))
+    orders = response["order"].to_numpy()[1:]
+    unknown = [abs(float(own["speed"])) for own in json.loads(response.attrs.get("unsolved", "[]"))]
+    return line_spectra(speed, orders, amplitude, highest, unknown=unknown, reference=reference, unit=unit)

@@ -110,16 +110,19 @@ def _loudest(context: Context, words: Words, group: RunGroup) -> Fact | None:
     top = group.loudest
     if top is None:
         highest = max(float(run.spectra.speed.max()) for run in group.runs.values())
-        said = f"No resonance stands out up to {speed_text(highest)} with every window."
+        with_all = "" if group.responses else " with every window"
+        said = f"No resonance stands out up to {speed_text(highest)}{with_all}."
         return Fact("Loudest resonance", "none", "that stands out", said, "ranking")
     unseen = _unseen(context, words, group, top)
     if unseen is not None:
         return unseen
     peak, modes = top.peak, group.runs[group.main].modes
-    moves = "" if top.finding.mode is None or modes is None else f": {words.moves(modes, top.finding.mode)}"
+    moves = f": {words.told(top.finding.mode_name)}" if top.finding.mode_name else ""
+    if top.finding.mode is not None and modes is not None:
+        moves = f": {words.moves(modes, top.finding.mode)}"
     said = (
         f"Excited by {words.line_sentence(peak.line)}. The overall transmission error swings by "
-        f"{amplitude_text(top.loudness)} ({figure_text(top.loudness)} dB){_how(top)}{moves}."
+        f"{amplitude_text(top.loudness)} ({figure_text(top.loudness)} dB){_how(group, top)}{moves}."
         f"{_against_rated(context, group)}"
     )
     beside = f"at {speed_text(top.speed)}, {VARIANTS[group.main]}"
@@ -142,8 +145,10 @@ def _unseen(context: Context, words: Words, group: RunGroup, top: RankedResonanc
     return Fact("Loudest resonance", frequency_text(at.frequency), beside, said, "steady")
 
 
-def _how(own: RankedResonance) -> str:
-    """Tell what a level was read from, where there are both."""
+def _how(group: RunGroup, own: RankedResonance) -> str:
+    """Tell what a level was read from, unless it is a run-up alone."""
+    if group.responses:
+        return " at constant speed"
     if own.constant is None:
         return ""
     return f" at constant speed, {amplitude_text(own.peak.level)} in the run-up"
@@ -183,11 +188,11 @@ def _compliance(group: RunGroup) -> Fact | None:
     change = top.peak.level - stiff.peak.level
     fresh = sum(own.steady and REFERENCE_VARIANT in own.lacking for own in group.ranked[group.main])
     gone = sum(own.steady and group.main in own.lacking for own in reference)
+    counted = "" if group.responses else " Counted are those that windows of five lengths show."
     said = (
         f"On ideal joints the loudest is {frequency_text(stiff.finding.resonance.frequency)} at "
         f"{speed_text(stiff.peak.speed)} with {amplitude_text(stiff.peak.level)}. {VARIANTS[group.main].capitalize()} "
-        f"{_resonances(fresh)} that the rigid model lacks, and {gone} of its own disappear. "
-        "Counted are those that windows of five lengths show."
+        f"{_resonances(fresh)} that the rigid model lacks, and {gone} of its own disappear.{counted}"
     )
     sign = "−" if change < 0.0 else "+"
     kind = "What elastic bodies do" if group.main == "flexible" else "What the bearings do"

@@ -1,22 +1,36 @@
-"""Run-ups of one load case, mesh law and inertia set: their resonances ranked, and what only one variant shows."""
+"""Results of one source, mesh law and inertia set: their resonances ranked, and what only one variant shows.
+
+A source is the run-ups of a load case, or the steady responses of a level.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+import xarray as xr
 
-from exugear.findings.constant_speed import ConstantSpeed, Highest, truest_of
-from exugear.findings.context import REFERENCE_VARIANT, Context
+from exugear.campbell.campbell import campbell_from
+from exugear.findings.constant_speed import (
+    ConstantSpeed,
+    Highest,
+    highest_drawn,
+    is_over_speed,
+    response_spectra,
+    truest_of,
+)
+from exugear.findings.context import REFERENCE_VARIANT, Context, choice_of
 from exugear.findings.stored import StoredResults, run_key
 from exugear.model.choice import Choice
 from exugear.spectra.comparison import AbsenceRule, Comparison, compare, only_in_first
+from exugear.spectra.line_spectra import pick_line_peaks
 from exugear.spectra.orders import order_lines
 from exugear.spectra.resonances import Pick
 from exugear.spectra.run_spectra import Finding, VariantRun
 from exugear.spectra.waterfall import Waterfall
 from exugear.spectra.windows import OtherWindow, other_windows, stays_absent, survives
+from exugear.steady.steady_file import settings_of, steady_path
 
 STIFF_TO_SOFT = ("rigid", "bushing", "flexible")
 """Variants in the order in which they are shown."""
@@ -24,7 +38,7 @@ STIFF_TO_SOFT = ("rigid", "bushing", "flexible")
 
 @dataclass(frozen=True)
 class RankedResonance:
-    """A resonance of a run-up, judged.
+    """A resonance of a run-up or a steady response, judged.
 
     Attributes
     ----------
@@ -73,11 +87,13 @@ class RankedResonance:
 
 @dataclass(frozen=True)
 class RunGroup:
-    """Run-ups that differ in the variant alone.
+    """Run-ups, or steady responses, that differ in the variant alone.
 
     Attributes
     ----------
-    load_case, mesh_law, inertias : str
+    source : str
+        Where the figures are from, in words: the run-up of a load case, or constant speed at a level.
+    mesh_law, inertias : str
     runs : mapping of variant to VariantRun
         The stiffest first.
     ranked : mapping of variant to tuple of RankedResonance
@@ -85,21 +101,24 @@ class RunGroup:
     comparisons : mapping of variant to Comparison
         Of each other variant with the stiff reference.
     constant : mapping of variant to ConstantSpeed
-        Levels at constant speed of those that have a steady response.
+        Levels at constant speed of run-ups that have a steady response.
+    responses : mapping of variant to Dataset
+        Steady responses that the group is made of; none where it is made of run-ups.
     """
 
-    load_case: str
+    source: str
     mesh_law: str
     inertias: str
     runs: Mapping[str, VariantRun]
     ranked: Mapping[str, tuple[RankedResonance, ...]]
     comparisons: Mapping[str, Comparison]
     constant: Mapping[str, ConstantSpeed]
+    responses: Mapping[str, xr.Dataset] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
         """Name for files and links."""
-        return f"{self.load_case}-{self.mesh_law}-{self.inertias}"
+        return f"{self.source.replace(', ', '_').replace(' ', '_')}-{self.mesh_law}-{self.inertias}"
 
     @property
     def main(self) -> str:
@@ -119,10 +138,7 @@ class RunGroup:
     def title(self) -> str:
         """What its runs have in common, in words."""
         factors = sorted({f"{float(run.attributes['housing_factor']):g}" for run in self.runs.values()})
-        return (
-            f"load case {self.load_case}, law {self.mesh_law}, inertias {self.inertias}, "
-            f"housing factor {', '.join(factors)}"
-        )
+        return f"{self.source}, law {self.mesh_law}, inertias {self.inertias}, housing factor {', '.join(factors)}"
 
 
 def run_groups(context: Context, results: StoredResults) -> tuple[RunGroup, ...]:
@@ -150,7 +166,70 @@ def _group(context: Context, key: tuple[str, str, str], runs: Sequence[VariantRu
         for variant, run in by_variant.items()
         if reference is not None and run is not reference
     }
-    return RunGroup(*key, by_variant, ranked, comparisons, constant)
+    return RunGroup(f"run-up {key[0]}", *key[1:], by_variant, ranked, comparisons, constant)
+
+
+def response_groups(context: Context, results: StoredResults) -> tuple[RunGroup, ...]:
+    """Gather the steady responses of a folder that go over a range of speeds, those of the default inertia set first.
+
+    What `run_groups` reads out of run-ups is read out of the lines of these: the same orders, the same rules.
+    """
+    gathered: dict[tuple[str, str, str], dict[str, xr.Dataset]] = {}
+    for data in filter(is_over_speed, results.steady):
+        choice = choice_of(data.attrs)
+        key = str(data.attrs["level"]), choice.mesh_law, choice.inertias
+        gathered.setdefault(key, {})[choice.variant] = data
+    default = context.gearbox.case.default_inertias
+    keys = sorted(gathered, key=lambda key: (key[2] != default, key))
+    return tuple(_response_group(context, key, gathered[key], results) for key in keys)
+
+
+def _response_group(
+    context: Context, key: tuple[str, str, str], responses: Mapping[str, xr.Dataset], results: StoredResults
+) -> RunGroup:
+    context.tell(f"lines at constant speed, {', '.join(key)}")
+    own = {variant: responses[variant] for variant in sorted(responses, key=STIFF_TO_SOFT.index)}
+    runs = {variant: _as_run(context, data, results) for variant, data in own.items()}
+    ranked = {variant: _ranked_lines(runs, own, variant) for variant in runs}
+    reference, rule = runs.get(REFERENCE_VARIANT), AbsenceRule()
+    others = {variant: run for variant, run in runs.items() if run is not reference}
+    comparisons = {} if reference is None else {name: Comparison(run, reference, rule) for name, run in others.items()}
+    return RunGroup(f"constant speed, level {key[0]}", *key[1:], runs, ranked, comparisons, {}, own)
+
+
+def _as_run(context: Context, data: xr.Dataset, results: StoredResults) -> VariantRun:
+    """Take a steady response as a run-up: its lines as spectra, its peaks as picks."""
+    choice = choice_of(data.attrs)
+    spectra = response_spectra(data, ("overall_dte",), highest_drawn(context.gearbox, data))
+    picks = pick_line_peaks(spectra, order_lines(context.gearbox))
+    path = steady_path(context.folder, choice, settings_of(data.attrs))
+    return VariantRun(path, data.attrs, spectra, picks, results.modes.get(choice))
+
+
+def _ranked_lines(
+    runs: Mapping[str, VariantRun], responses: Mapping[str, xr.Dataset], variant: str
+) -> tuple[RankedResonance, ...]:
+    run, rule = runs[variant], AbsenceRule()
+    others = {name: other.spectra for name, other in runs.items() if name != variant}
+    ranked = []
+    for own in run.findings():
+        peak = own.strongest
+        finding = _named(own, responses[variant]) if run.modes is None else run.located(own, peak.frequency)
+        lacking = tuple(name for name, spectra in others.items() if only_in_first([peak], spectra, rule))
+        elsewhere = {name: _level_at(spectra, peak) for name, spectra in others.items()}
+        ranked.append(RankedResonance(finding, True, lacking, elsewhere, None))
+    return tuple(sorted(ranked, key=lambda own: -own.loudness))
+
+
+def _named(finding: Finding, data: xr.Dataset) -> Finding:
+    """Name the mode of a resonance by those that the response followed over speed, where no others were computed."""
+    diagram, peak = campbell_from(data), finding.strongest
+    sense = 1.0 if float(data["speed"][0]) >= 0.0 else -1.0
+    mode = diagram.mode_at(sense * peak.speed, peak.frequency)
+    if mode is None:
+        return finding
+    frequency = float(np.interp(sense * peak.speed, diagram.speeds, diagram.frequency[:, mode]))
+    return Finding(finding.resonance, None, frequency, diagram.names[mode])
 
 
 def _ranked(

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import dataclass
 
 import numpy as np
+import xarray as xr
 
 from exugear.dynamics.signals import BALANCE_TERMS, MESH_TIMES, energy_residual
 from exugear.findings.context import Context
@@ -22,6 +24,8 @@ ENERGY = 1e-3
 """Share of energy that may be unaccounted for."""
 MATCHED = 0.8
 """Least share of the loudest resonances that should match a mode."""
+STEADY_ENERGY = 1e-4
+"""Share of the power that damping takes by which that of the meshes may differ in a steady response."""
 BEYOND_RATED = 1.3
 """Speed over the rated one from which a sweep is said to go beyond it."""
 
@@ -71,11 +75,12 @@ def run_figures(run: VariantRun) -> RunFigures:
     return RunFigures(energy_residual(data), times, float(data["time"][-1]))
 
 
-def verdicts_of(context: Context, group: RunGroup, figures: RunFigures) -> tuple[Verdict, ...]:
+def verdicts_of(context: Context, group: RunGroup) -> tuple[Verdict, ...]:
     """Judge the main variant of a group; what was passed comes first."""
     case = context.gearbox.case
-    run = group.runs[group.main]
-    verdicts = [*_of_run(run, figures), *_of_resonances(group)]
+    run, response = group.runs[group.main], group.responses.get(group.main)
+    own = _of_run(run, run_figures(run)) if response is None else _of_response(response)
+    verdicts = [*own, *_of_resonances(group)]
     verdicts.append(
         Verdict(False, f"damping is assumed (meshes {1e6 * case.damping.mesh_time_s:g} µs): levels are only as good")
     )
@@ -86,7 +91,7 @@ def verdicts_of(context: Context, group: RunGroup, figures: RunFigures) -> tuple
     if rated is None:
         verdicts.append(Verdict(False, "the case names no rated speed ([operation] rated_speed_rpm)"))
     elif fastest > BEYOND_RATED * rated:
-        verdicts.append(Verdict(False, f"the sweep goes to {figure_text(fastest / rated, 2)} times the rated speed"))
+        verdicts.append(Verdict(False, f"speeds go to {figure_text(fastest / rated, 2)} times the rated one"))
     return tuple(sorted(verdicts, key=lambda own: not own.passed))
 
 
@@ -113,13 +118,35 @@ def _of_run(run: VariantRun, figures: RunFigures) -> list[Verdict]:
     return verdicts
 
 
+def _of_response(response: xr.Dataset) -> list[Verdict]:
+    error, growth = float(np.nanmax(response["energy_error"])), float(response.attrs["growth_rate"])
+    verdicts = [
+        Verdict(error < STEADY_ENERGY, f"what damping takes is what the meshes give within {100.0 * error:.1g} %"),
+        Verdict(growth <= 0.0, f"disturbances {'decay' if growth <= 0.0 else 'grow: the steady state does not last'}"),
+    ]
+    unsolved = json.loads(response.attrs["unsolved"])
+    if unsolved:
+        verdicts.append(Verdict(False, f"no steady state was found at {len(unsolved)} speeds, which are left blank"))
+    remarks = [str(words) for words in response["remark"].to_numpy() if str(words)]
+    if remarks:
+        verdicts.append(Verdict(False, f"speeds with remarks: {len(remarks)}, the first: {remarks[0]}"))
+    apart = float(np.nanmax(response["apart_share"], initial=0.0))
+    if apart > 0.0:
+        verdicts.append(
+            Verdict(True, f"teeth are apart for up to {100.0 * apart:.2g} % of the time, and the law knows")
+        )
+    return verdicts
+
+
 def _of_resonances(group: RunGroup) -> list[Verdict]:
     loudest = group.ranked[group.main][:LOUDEST]
     if not loudest:
         return []
     count, steady = len(loudest), sum(own.steady for own in loudest)
-    verdicts = [Verdict(steady == count, f"{steady} of the {count} loudest stay with windows of other lengths")]
-    if group.runs[group.main].modes is None:
+    verdicts = []
+    if not group.responses:
+        verdicts.append(Verdict(steady == count, f"{steady} of the {count} loudest stay with windows of other lengths"))
+    if group.runs[group.main].modes is None and not group.responses:
         return [*verdicts, Verdict(False, "no modes were computed (exugear modes): nothing tells what moves")]
-    matched = sum(own.finding.mode is not None for own in loudest)
+    matched = sum(bool(own.finding.mode_name) for own in loudest)
     return [*verdicts, Verdict(matched >= MATCHED * count, f"{matched} of the {count} loudest match an eigenmode")]

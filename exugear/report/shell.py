@@ -34,7 +34,9 @@ def _brand(material: Material) -> str:
     gearbox = material.context.gearbox
     shown = ", ".join(dict.fromkeys(run.variant for run in material.results.runs))
     line = f"Where it rings, how loud, and why. Ratio {gearbox.train.ratio:.6f}"
-    line += f"; run-ups {shown}." if shown else "."
+    steady = ", ".join(dict.fromkeys(str(data.attrs["variant"]) for data in material.results.steady))
+    line += f"; run-ups {shown}" if shown else ""
+    line += f"; constant speeds {steady}." if steady else "."
     return pieces.element("div", f"<h1>{pieces.text(gearbox.name)}</h1>{pieces.paragraph(line)}", class_="brand")
 
 
@@ -59,8 +61,8 @@ def _contents(parts: Sequence[Part]) -> str:
 
 
 def _sets(material: Material) -> str:
-    """Choice of the group of run-ups, where there are several."""
+    """Choice of the group of results, where there are several: which source the figures are read from."""
     if len(material.groups) < 2:
         return ""
-    choices = pieces.element("div", "", class_="choices", id="group", role="group", aria_label="Run-ups shown")
-    return pieces.element("div", choices, class_="controls scripts-only")
+    choices = pieces.element("div", "", class_="choices", id="group", role="group", aria_label="Results shown")
+    return pieces.element("div", f"Figures of: {choices}", class_="controls scripts-only")

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from exugear.findings.context import Context
-from exugear.findings.groups import run_groups
+from exugear.findings.groups import response_groups, run_groups
 from exugear.findings.stored import bytes_of_runs, stored_models, with_responses
 from exugear.findings.variations import begin_variations, model_variations
 from exugear.findings.words import Words
@@ -140,7 +140,7 @@ def _material(context: Context, executor: Executor | None) -> Material:
     if not results:
         reasons = context.notes.left_out or ["no files"]
         raise ReportError("\n".join([f"{context.folder}: nothing here belongs to its case", *reasons]))
-    groups = run_groups(context, results)
+    groups = (*run_groups(context, results), *response_groups(context, results))
     words = Words(context.gearbox)
     material = Material(context, results, words, groups, (), lines_of(context), ArrayStore())
     # Last what another process computes meanwhile.

@@ -28,14 +28,14 @@ class Material:
     results : StoredResults
     words : Words
     groups : tuple of RunGroup
-        The default inertia set first.
+        Those of run-ups first, then those of steady responses; of each the default inertia set first.
     variations : tuple of ModelVariations
     lines : tuple of OrderLine
         Orders that are drawn.
     arrays : ArrayStore
         Takes the arrays of the page.
     run_data : mapping
-        Run-ups as data of the page, as `exugear.report.parts.run_data.run_data` makes them.
+        Run-ups and steady responses as data of the page, as `exugear.report.parts.run_data.run_data` makes them.
     """
 
     context: Context
@@ -84,8 +84,24 @@ class Part:
 
 
 def only_for(content: str, group: str, variant: str = "") -> str:
-    """Mark content as that of a group of run-ups, or of one variant: scripts show what was chosen, paper shows all."""
+    """Mark content as that of a group of results, or of one variant: scripts show what was chosen, paper shows all."""
     return element("div", content, data_group=group, data_variant=variant or None) if content else ""
+
+
+def group_words(groups: Sequence[RunGroup], own: RunGroup) -> str:
+    """Tell one group from the others in few words: its source, and law and inertia set where these differ."""
+    parts = [own.source]
+    if len({group.mesh_law for group in groups}) > 1:
+        parts.append(f"law {own.mesh_law}")
+    if len({group.inertias for group in groups}) > 1:
+        parts.append(f"inertias {own.inertias}")
+    words = ", ".join(parts)
+    return words[0].upper() + words[1:]
+
+
+def told_groups(groups: Sequence[RunGroup]) -> list[RunGroup]:
+    """List the groups that the command line tells of: run-ups, or else steady responses."""
+    return [group for group in groups if not group.responses] or list(groups)
 
 
 def model_name(choice: Choice) -> str:

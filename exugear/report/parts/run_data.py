@@ -1,4 +1,4 @@
-"""Run-ups as data of the page: waterfalls and order cuts of all channels, resonances with their facts."""
+"""Run-ups and steady responses as data of the page: waterfalls and order cuts of all channels, resonances."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from exugear.findings.channels import Channel, channels_of, loudest_order
-from exugear.findings.constant_speed import ConstantSpeed
+from exugear.findings.constant_speed import TOP, ConstantSpeed, highest_drawn
 from exugear.findings.groups import RankedResonance, RunGroup
+from exugear.findings.response_channels import channels_of_response
 from exugear.findings.words import VARIANTS, figure_text, percentages
 from exugear.model.parts import RPM
-from exugear.report.parts.material import Material, model_name
+from exugear.report.parts.material import Material, group_words, model_name
 from exugear.report.parts.pooling import cut_levels, level_bytes, pooled, tenths
 from exugear.spectra.orders import OrderLine
 from exugear.spectra.run_spectra import VariantRun
@@ -30,14 +31,12 @@ CHANNEL_LINES = 3
 """Spectral lines of another channel that are drawn as one."""
 CUTS_EVERY = 2
 """Every which frame of other channels their order cuts hold."""
-TOP = 1.1
-"""Highest frequency drawn over that of the fastest mesh at the highest speed."""
 ALSO = 4
 """Further orders that are told to show a resonance."""
 
 
 def run_data(material: Material) -> dict[str, Any]:
-    """Gather what the scripts need of all run-ups: ``lines`` and ``groups``."""
+    """Gather what the scripts need of all run-ups and steady responses: ``lines`` and ``groups``."""
     return {
         "lines": [_line(material, line) for line in material.lines],
         "groups": [_group(material, group) for group in material.groups],
@@ -60,17 +59,23 @@ def _group(material: Material, group: RunGroup) -> dict[str, Any]:
     return {
         "name": group.name,
         "title": group.title,
-        "loadCase": group.load_case,
-        "law": group.mesh_law,
-        "inertias": group.inertias,
+        "words": group_words(material.groups, group),
+        "source": group.source,
         "main": group.main,
         "variants": {variant: _variant(material, group, run) for variant, run in group.runs.items()},
     }
 
 
+def _channels(material: Material, group: RunGroup, run: VariantRun) -> list[Channel]:
+    response = group.responses.get(run.variant)
+    if response is None:
+        return list(channels_of(run, material.words))
+    return list(channels_of_response(response, material.words, highest_drawn(material.context.gearbox, response)))
+
+
 def _variant(material: Material, group: RunGroup, run: VariantRun) -> dict[str, Any]:
-    material.context.tell(f"channels of {run.variant}, {group.inertias}")
-    channels = list(channels_of(run, material.words))
+    material.context.tell(f"channels of {run.variant}, {group.source}, {group.inertias}")
+    channels = _channels(material, group, run)
     return {
         "words": VARIANTS[run.variant],
         "model": model_name(group.choice(run.variant)),
@@ -205,16 +210,21 @@ def _facts(material: Material, group: RunGroup, run: VariantRun, own: RankedReso
         lacks = "does not show it, " if variant in own.lacking else ""
         there = f"{figure_text(level)} dB there" if math.isfinite(level) else "did not go there"
         facts.append([VARIANTS[variant].capitalize(), f"{lacks}{there}"])
-    facts += _mode_facts(material, run, own)
+    facts += _mode_facts(material, group, run, own)
     if not own.steady:
         facts.append(["Mind", "not every length of the window shows it: it may be no resonance"])
     return facts
 
 
-def _mode_facts(material: Material, run: VariantRun, own: RankedResonance) -> list[list[str]]:
+def _mode_facts(material: Material, group: RunGroup, run: VariantRun, own: RankedResonance) -> list[list[str]]:
     mode, modes = own.finding.mode, run.modes
+    if own.finding.mode_name and modes is None:
+        moves = material.words.told(own.finding.mode_name)
+        return [["Mode", f"{own.finding.mode_frequency:.1f} Hz at this speed"], ["What moves", moves]]
+    if modes is None and not group.responses:
+        return [["Mode", "no modes were computed: `exugear modes`"]]
     if mode is None or modes is None:
-        return [["Mode", "none within the resolution of the sweep"]]
+        return [["Mode", "none near"]]
     damping = 100.0 * float(modes["damping_ratio"][mode])
     return [
         ["Mode", f"{own.finding.mode_frequency:.1f} Hz, damping {figure_text(damping, 2)} %"],

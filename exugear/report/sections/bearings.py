@@ -1,4 +1,4 @@
-"""Section "At the bearings": forces of the run-up, accelerations of seats, and what bearings bear at rest."""
+"""Section "At the bearings": forces by source, accelerations of seats, and what bearings bear at rest."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.bearing_duties import bearing_duties
 from exugear.dynamics.statics import BalanceError
 from exugear.findings.context import choice_of, words_of
+from exugear.findings.groups import RunGroup
 from exugear.findings.words import VARIANTS, figure_text
 from exugear.model.parts import RPM
 from exugear.report.parts.material import Material, Part, only_for
@@ -29,18 +30,29 @@ NOISE = 1e-3
 """Share of the mean transverse force below which an axial force is told as none."""
 NOISE_OF_ALL = 1e-5
 """Share of the largest force of all bearings below which a force is told as none."""
+MEANS = (
+    "Mean force over the middle third of the run-up, and the largest amplitude along an order (root of the summed "
+    "squares of both transverse directions). Of the copies of a planet set the one that swings most stands for all."
+)
+"""What is told of forces in run-ups."""
+WAVES = (
+    "Largest amplitude along an order at constant speed (root of the summed squares of both transverse directions). "
+    "Forces of the bearings of planets are waves around the carrier: mean, cosine and sine. What the bearings bear at "
+    "rest stands below."
+)
+"""What is told of forces at constant speed."""
 SEATS = 12
+"""Seats whose accelerations are listed."""
 QUIET = 1e-3
 """Share of the largest acceleration below which none is listed."""
-"""Seats whose accelerations are listed."""
 
 
 def bearings_section(material: Material) -> Part:
-    """List forces at bearings by run-up, accelerations by steady response, and duties by model."""
+    """List forces at bearings by source, accelerations by steady response, and duties by model."""
     forces = [
-        only_for(_forces(material, group["name"], variant, own), group["name"], variant)
-        for group in material.run_data["groups"]
-        for variant, own in group["variants"].items()
+        only_for(_forces(material, data, group, variant), group.name, variant)
+        for data, group in zip(material.run_data["groups"], material.groups, strict=True)
+        for variant in group.runs
     ]
     accelerations = [_accelerations(material, data) for data in material.results.steady]
     duties = [_duties(material, assembly) for assembly in material.context.assemblies.values()]
@@ -53,7 +65,8 @@ def bearings_section(material: Material) -> Part:
     return Part(html, {}, "At the bearings", "bearings")
 
 
-def _forces(material: Material, group: str, variant: str, own: Mapping[str, Any]) -> str:
+def _forces(material: Material, data: Mapping[str, Any], group: RunGroup, variant: str) -> str:
+    own = data["variants"][variant]
     loudest = {name: figures for name, figures in own["loudest"].items() if figures["amplitude"] is not None}
     if not loudest:
         return ""
@@ -64,22 +77,19 @@ def _forces(material: Material, group: str, variant: str, own: Mapping[str, Any]
         for name, figures in loudest.items()
     }
     rows = [_force_row(group, variant, name, figures, largest) for name, figures in loudest.items()]
-    caption = f"Transverse forces {VARIANTS[variant]}"
+    caption = f"Transverse forces {VARIANTS[variant]}, {group.source}"
     lifting = [
         f"{figures['words']}: the force swings by {100.0 * figures['amplitude'] / figures['mean']:.0f} % of its mean; "
         "a linear bearing cannot lift off, a real one would."
         for figures in loudest.values()
         if figures["mean"] and figures["amplitude"] > LIFTS * figures["mean"]
     ]
-    words = (
-        "Mean force over the middle third of the run-up, and the largest amplitude along an order (root of the summed "
-        "squares of both transverse directions). Of the copies of a planet set the one that swings most stands for all."
-    )
+    words = WAVES if group.responses else MEANS
     table = pieces.table(
         rows,
         ("loudest order",),
         caption=caption,
-        name=f"forces-{group}-{variant}",
+        name=f"forces-{group.name}-{variant}",
         hidden=("axial / kN",),
         sortable=True,
     )
@@ -87,16 +97,25 @@ def _forces(material: Material, group: str, variant: str, own: Mapping[str, Any]
     return pieces.element("h3", pieces.text(caption)) + pieces.paragraph(words, "note") + table + warned
 
 
-def _force_row(group: str, variant: str, name: str, figures: Mapping[str, Any], largest: float) -> dict[str, object]:
+def _force_row(
+    group: RunGroup, variant: str, name: str, figures: Mapping[str, Any], largest: float
+) -> dict[str, object]:
     amplitude, mean = figures["amplitude"], figures["mean"] or 0.0
     copies = f" (1 of {figures['copies']})" if figures["copies"] > 1 else ""
     share = amplitude / mean if mean else math.inf
+    named = Cell(f"{figures['words']}{copies}", choice=f"channel:{group.name}:{variant}:{name}")
+    swings = Cell(figure_text(1e-3 * amplitude), amplitude, bar=amplitude / largest)
+    measures = {"swings by ± / kN": swings}
+    if not group.responses:
+        measures = {
+            "mean / kN": Cell(figure_text(1e-3 * mean), mean),
+            "axial / kN": Cell(figure_text(_without_noise(1e-3 * figures["axial"], mean)), figures["axial"]),
+            **measures,
+            "of the mean / %": Cell(figure_text(100.0 * share, 2) if math.isfinite(share) else "–", min(share, 1e9)),
+        }
     return {
-        "bearing or joint": Cell(f"{figures['words']}{copies}", choice=f"channel:{group}:{variant}:{name}"),
-        "mean / kN": Cell(figure_text(1e-3 * mean), mean),
-        "axial / kN": Cell(figure_text(_without_noise(1e-3 * figures["axial"], mean)), figures["axial"]),
-        "swings by ± / kN": Cell(figure_text(1e-3 * amplitude), amplitude, bar=amplitude / largest),
-        "of the mean / %": Cell(figure_text(100.0 * share, 2) if math.isfinite(share) else "–", min(share, 1e9)),
+        "bearing or joint": named,
+        **measures,
         "loudest order": figures["line"],
         "at / rpm": Cell(figure_text(figures["speed"], 4), figures["speed"]),
         "at / Hz": Cell(f"{figures['frequency']:.0f}", figures["frequency"]),

@@ -6,7 +6,7 @@ import math
 
 from exugear.findings.groups import RankedResonance, RunGroup
 from exugear.findings.words import VARIANTS, figure_text, percentages
-from exugear.report.parts.material import Material, Part, only_for
+from exugear.report.parts.material import Material, Part, only_for, told_groups
 from exugear.spectra.comparison import AbsenceRule
 from exugear.spectra.run_spectra import VariantRun
 from exugear.spectra.windows import WINDOW_FACTORS
@@ -17,17 +17,18 @@ SHOWN_SPAN = 60.0
 """dB below the loudest at which the bar of a level ends."""
 BUILT_UP = 3.0
 """dB below the level at constant speed from which a run-up counts as too fast for a resonance."""
+NOT_NEAR = "no mode near"
 AT_CONSTANT = "Constant speed / dB, Hz"
 
 
 def ranking_section(material: Material) -> Part:
-    """Rank the resonances of each run-up in a table."""
+    """Rank the resonances of each run-up, and of each steady response, in a table."""
     tables = [
         only_for(_table(material, group, variant), group.name, variant)
         for group in material.groups
         for variant in reversed(list(group.runs))
     ]
-    for group in material.groups:
+    for group in told_groups(material.groups):
         _note_comparisons(material, group)
     if not tables:
         return Part("")
@@ -64,17 +65,16 @@ def _rules() -> str:
     return (
         "A resonance is a peak that stands at least 6 dB above its surroundings along an order; peaks of several "
         f"orders at one frequency are one. Absent, judged at its loudest peak: {AbsenceRule().description}, with every "
-        f"window. Unsteady: not shown with every length of the window, {factors} times that of the diagrams. Where a "
-        "steady response is there, levels at constant speed rank: a run-up that is too fast for a resonance shows it "
-        f"too low, and is marked where it lacks {BUILT_UP:g} dB or more."
+        f"window. Unsteady, of run-ups: not shown with every length of the window, {factors} times that of the "
+        "diagrams. Where a steady response is there, levels at constant speed rank: a run-up that is too fast for a "
+        f"resonance shows it too low, and is marked where it lacks {BUILT_UP:g} dB or more. At constant speed ± is "
+        "half of the width of a peak 3 dB below its top."
     )
 
 
 def _table(material: Material, group: RunGroup, variant: str) -> str:
     run, ranked = group.runs[variant], group.ranked[variant]
-    title = (
-        f"{VARIANTS[variant][0].upper()}{VARIANTS[variant][1:]}, inertias {group.inertias}, load case {group.load_case}"
-    )
+    title = f"{VARIANTS[variant][0].upper()}{VARIANTS[variant][1:]}, inertias {group.inertias}, {group.source}"
     heading = pieces.element("h3", pieces.text(f"{title}: {len(ranked)}"))
     rows = [_row(material, group, run, number, own) for number, own in enumerate(ranked, start=1)]
     if not rows:
@@ -98,9 +98,9 @@ def _others(group: RunGroup, variant: str) -> list[str]:
 def _row(material: Material, group: RunGroup, run: VariantRun, number: int, own: RankedResonance) -> dict[str, object]:
     finding, peak = own.finding, own.peak
     loudest = group.ranked[run.variant][0].loudness
-    frequency = f"{finding.resonance.frequency:.0f} ± {finding.resonance.resolution:.0f}"
+    frequency = f"{finding.resonance.frequency:.0f} ± {figure_text(finding.resonance.resolution, 1)}"
     choice = f"resonance:{group.name}:{run.variant}:{number - 1}"
-    matched = finding.mode is not None and run.modes is not None
+    matched = math.isfinite(finding.mode_frequency)
     row: dict[str, object] = {
         "No.": Cell(str(number), number),
         "Frequency / Hz": Cell(frequency, finding.resonance.frequency, choice),
@@ -121,7 +121,9 @@ def _row(material: Material, group: RunGroup, run: VariantRun, number: int, own:
     row["Mode / Hz"] = Cell(
         f"{finding.mode_frequency:.1f}" if matched else "–", finding.mode_frequency if matched else -1.0
     )
-    row["What moves; what gives"] = _story(material, run, own)
+    row["What moves; what gives"] = _story(material, group, run, own)
+    if group.responses:
+        return row
     row["Windows"] = Cell("all" if own.steady else "unsteady", float(own.steady), tag="good" if own.steady else "mind")
     return row
 
@@ -144,10 +146,14 @@ def _at_constant(own: RankedResonance, loudest: float) -> Cell:
     return Cell(f"{at.level:.1f}, {at.frequency:.0f} Hz", at.level, bar=1.0 - (loudest - at.level) / SHOWN_SPAN)
 
 
-def _story(material: Material, run: VariantRun, own: RankedResonance) -> str:
+def _story(material: Material, group: RunGroup, run: VariantRun, own: RankedResonance) -> str:
     mode, modes = own.finding.mode, run.modes
-    if mode is None or modes is None:
-        return "no mode within the resolution"
+    if own.finding.mode_name and modes is None:
+        return material.words.told(own.finding.mode_name)
+    if modes is None:
+        return NOT_NEAR if group.responses else "no modes were computed"
+    if mode is None:
+        return NOT_NEAR
     gives = percentages(material.words.gives(modes, mode))
     return f"{material.words.moves(modes, mode)}; {gives}"
 

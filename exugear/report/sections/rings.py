@@ -11,9 +11,11 @@ from exugear.report.parts.material import Material, Part
 from exugear.web import pieces
 from exugear.web.stage_figure import stage_figure
 
+NO_MODES = "No modes are here: `exugear modes` computes them, and the page shows them move."
+
 
 def rings_section(material: Material) -> Part:
-    """Draw the waterfalls of all run-ups; the sentences stand in the ranking, too."""
+    """Draw the waterfalls of all run-ups and steady responses; the sentences stand in the ranking, too."""
     if not material.groups:
         return Part("")
     return Part(_html(material), material.run_data, "Where it rings", "rings")
@@ -23,7 +25,7 @@ def _html(material: Material) -> str:
     words = _in_words(material.groups)
     channel = pieces.element("label", "Signal " + pieces.element("select", "", id="channel"))
     views = pieces.element("div", "", class_="choices", id="view", role="group", aria_label="Model shown")
-    waterfall = pieces.figure("waterfall", "Waterfall", "Drag to zoom. Click a circle or an order line.", words)
+    waterfall = pieces.figure("waterfall", "Waterfall", f"Read from: {material.groups[0].source}.", words)
     scale = pieces.element("div", "", class_="scale", id="waterfall-scale") + pieces.element(
         "p", "", class_="readout", id="readout"
     )
@@ -33,7 +35,9 @@ def _html(material: Material) -> str:
     left = pieces.element(
         "div", waterfall.replace("</figure>", f"{scale}</figure>") + cuts.replace("</figure>", f"{orders}</figure>")
     )
-    right = pieces.element("div", detail + stage_figure())
+    # Without modes nothing moves.
+    stage = stage_figure() if material.results.modes else pieces.paragraph(NO_MODES, "note")
+    right = pieces.element("div", detail + stage)
     controls = pieces.element("div", channel + views, class_="controls scripts-only")
     split = pieces.element("div", left + right, class_="split scripts-only")
     return pieces.section("Where it rings", controls, split, _without_scripts(words), name="rings")
@@ -48,4 +52,4 @@ def _in_words(groups: Sequence[RunGroup]) -> str:
     group = groups[0]
     loudest = [own for own in group.ranked[group.main] if own.steady][:3]
     told = [f"{own.frequency:.0f} Hz at {own.speed / RPM:.1f} rpm, {figure_text(own.loudness)} dB" for own in loudest]
-    return f"Loudest, {VARIANTS[group.main]}: {'; '.join(told) or 'nothing stands out'}."
+    return f"Loudest, {VARIANTS[group.main]}, {group.source}: {'; '.join(told) or 'nothing stands out'}."

@@ -6,24 +6,30 @@ from collections.abc import Sequence
 
 from exugear.findings.facts import Fact, facts_of, facts_of_response
 from exugear.findings.groups import RunGroup
-from exugear.findings.verdicts import Verdict, run_figures, verdicts_of
-from exugear.report.parts.material import Material, Part, only_for
+from exugear.findings.verdicts import Verdict, verdicts_of
+from exugear.report.parts.material import Material, Part, group_words, only_for, told_groups
 from exugear.web import pieces
 
 
 def short_section(material: Material) -> Part:
-    """Tell the facts of each group of run-ups as cards; the command line prints the same sentences."""
-    context = material.context
+    """Tell the facts of each group of results as cards; the command line prints the same sentences.
+
+    Those of steady responses are printed where there is no run-up, which else tells of both.
+    """
+    context, told = material.context, told_groups(material.groups)
     content = []
     for group in material.groups:
         facts = facts_of(context, material.words, group, material.variations)
-        verdicts = verdicts_of(context, group, run_figures(group.runs[group.main]))
-        several = f"Inertias {group.inertias}: " if len(material.groups) > 1 else ""
-        context.notes.statements.extend(f"{several}{fact.line}" for fact in facts)
-        context.notes.statements.extend(f"{several}{verdict.line}." for verdict in verdicts)
+        verdicts = verdicts_of(context, group)
+        if group in told:
+            several = f"{group_words(told, group)}: " if len(told) > 1 else ""
+            context.notes.statements.extend(f"{several}{fact.line}" for fact in facts)
+            context.notes.statements.extend(f"{several}{verdict.line}." for verdict in verdicts)
         content.append(only_for(_group(material, group, facts, verdicts), group.name))
     if not content:
-        content = [_without_run_ups(material)]
+        content = [_without_groups(material)]
+    elif not any(not group.responses for group in material.groups):
+        content.append(pieces.paragraph("No run-up of this case is here: `exugear run` makes one.", "note"))
     return Part(pieces.section("In short", *content, name="short"), {}, "In short", "short")
 
 
@@ -39,8 +45,8 @@ def _group(material: Material, group: RunGroup, facts: Sequence[Fact], verdicts:
     )
 
 
-def _without_run_ups(material: Material) -> str:
-    """Tell what steady responses know, and what tells more."""
+def _without_groups(material: Material) -> str:
+    """Tell what branches and responses at few speeds know, and what tells more."""
     facts = [fact for data in material.results.steady for fact in facts_of_response(material.words, data)]
     material.context.notes.statements.extend(fact.line for fact in facts)
     cards = pieces.element("div", "".join(map(_card, facts)), class_="cards") if facts else ""

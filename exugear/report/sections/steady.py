@@ -75,6 +75,8 @@ def _response(material: Material, data: xr.Dataset, charts: dict[str, Any]) -> s
     content = [
         pieces.alert("Unstable", [f"disturbances grow by up to {growth:.3g} 1/s"]) if growth > 0.0 else "",
         note,
+        _shared_lines(material, data),
+        _remarks(data, f"remarks-{level}-{model_name(choice)}"),
         _order_charts(material, data, own, f"steady-{level}-{model_name(choice)}", charts),
         pieces.element("h4", f"Loudest peaks: the first {len(rows)}"),
         pieces.table(
@@ -95,6 +97,32 @@ def _response(material: Material, data: xr.Dataset, charts: dict[str, Any]) -> s
         ),
     ]
     return pieces.section(label[0].upper() + label[1:], *content, level=3)
+
+
+def _shared_lines(material: Material, data: xr.Dataset) -> str:
+    """Say which mesh frequencies share lines: what excites such a line cannot be told from its frequency."""
+    shared = str(data.attrs["shared_lines"])
+    if not shared:
+        return ""
+    told = material.words.told(shared)
+    return pieces.paragraph(
+        f"Mind: mesh frequencies share lines: {told}. Each such line is one, named after the simplest of those that "
+        "make it; its level is that of all of them together.",
+        "warning",
+    )
+
+
+def _remarks(data: xr.Dataset, name: str) -> str:
+    """Table of the speeds that something is to be said of, and of those at which no state was found."""
+    speeds = data["speed"].to_numpy()
+    said = [(abs(float(speed)), str(words)) for speed, words in zip(speeds, data["remark"].to_numpy(), strict=True)]
+    lost = [(abs(float(own["speed"])), f"left out: {own['reason']}") for own in json.loads(str(data.attrs["unsolved"]))]
+    told = sorted([own for own in said if own[1]] + lost)
+    if not told:
+        return ""
+    rows: list[dict[str, object]] = [{"speed / rpm": f"{speed / RPM:.2f}", "remark": words} for speed, words in told]
+    table = pieces.table(rows, ("remark",), caption="Remarks on speeds", name=name)
+    return pieces.folded(f"Remarks on {len(rows)} of {len(speeds) + len(lost)} speeds", table)
 
 
 def _order_charts(

@@ -9,8 +9,9 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
-from exugear.findings.context import words_of
+from exugear.findings.context import choice_of, words_of
 from exugear.findings.verdicts import run_figures
 from exugear.model.parts import RPM
 from exugear.report.parts.material import Material, Part
@@ -111,7 +112,27 @@ def _elastic_words(material: Material) -> Iterator[str]:
 
 def _runs(material: Material) -> str:
     rows = [_run_row(material, run) for run in material.results.runs]
-    return pieces.table(rows, ("run", "solver", "analysis"), caption="What was run", name="runs")
+    steady = [_response_row(data) for data in material.results.steady]
+    tables = []
+    if rows:
+        tables.append(pieces.table(rows, ("run", "solver", "analysis"), caption="What was run", name="runs"))
+    if steady:
+        tables.append(pieces.table(steady, ("steady response",), caption="Steady responses", name="responses"))
+    return "".join(tables) or pieces.paragraph("Nothing was run.")
+
+
+def _response_row(data: xr.Dataset) -> dict[str, object]:
+    speed = np.abs(data["speed"].to_numpy()) / RPM
+    return {
+        "steady response": f"{words_of(choice_of(data.attrs))}, level {data.attrs['level']}",
+        "speeds": data.sizes["point"],
+        "slowest / rpm": f"{speed.min():.1f}",
+        "fastest / rpm": f"{speed.max():.1f}",
+        "lines": data.sizes["line"] - 1,
+        "left out": len(json.loads(data.attrs["unsolved"])),
+        "largest share of power not accounted for": f"{float(np.nanmax(data['energy_error'])):.1e}",
+        "fastest growth of a disturbance / (1/s)": f"{float(data.attrs['growth_rate']):.3g}",
+    }
 
 
 def _run_row(material: Material, run: VariantRun) -> dict[str, object]:
@@ -154,6 +175,10 @@ def _provenance(material: Material) -> str:
     results, context = material.results, material.context
     hashes = {f"table {name}": table.input_hash for name, table in results.tables.items()}
     hashes |= {str(context.name_of(run.path)): run.attributes["input_hash"] for run in results.runs}
+    hashes |= {
+        f"steady response {words_of(choice_of(data.attrs))}, {data.attrs['level']}": data.attrs["input_hash"]
+        for data in results.steady
+    }
     hashes |= {f"modes {words_of(model)}": data.attrs["input_hash"] for model, data in results.modes.items()}
     rows = [{"result": name, "SHA-256 of its input": sha256} for name, sha256 in hashes.items()]
     versions = [f"Python {platform.python_version()}", *(f"{name} {_version(name)}" for name in PACKAGES)]

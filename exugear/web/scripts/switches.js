@@ -11,7 +11,7 @@ export function drawSwitches() {
   if (!group || !variant) return;
   const box = find("group");
   if (box) {
-    const words = pageData.groups.map((own) => /** @type {[string, string]} */ ([own.name, groupWords(own)]));
+    const words = pageData.groups.map((own) => /** @type {[string, string]} */ ([own.name, own.words]));
     fillChoices(box, words, state.group, (name) => chooseLoudest({ group: name }));
   }
   const variants = Object.entries(group.variants).map(
@@ -32,16 +32,6 @@ export function drawSwitches() {
 
 /** @param {string} words */
 const sentenceCase = (words) => words.charAt(0).toUpperCase() + words.slice(1);
-
-/** What tells a group from the others. @param {import("./page_data.js").GroupData} own */
-function groupWords(own) {
-  const differ = (/** @type {"loadCase" | "law" | "inertias"} */ key) => new Set(pageData.groups.map((g) => g[key])).size > 1;
-  const words = [];
-  if (differ("loadCase")) words.push(`load case ${own.loadCase}`);
-  if (differ("law")) words.push(`law ${own.law}`);
-  if (differ("inertias")) words.push(`inertias ${own.inertias}`);
-  return sentenceCase(words.join(", ") || own.title);
-}
 
 /** Show what belongs to the chosen run-ups and variant; paper shows all of it. */
 export function showChosen() {

@@ -13,6 +13,7 @@ const SHOWN = 15;
 const NUMBERED = 5;
 /** dB below the loudest of what sets the height of the diagram. */
 const TALK = 45;
+const HINT = "Drag to zoom. Click a circle or an order line.";
 
 /** @type {import("./heat.js").Heat | null} */
 let heat = null;
@@ -219,10 +220,13 @@ function resonanceWords(place) {
 function tell(channel, variant, other) {
   if (!heat) return;
   const title = other ? `${channel}: ${variant} against ${other}` : `${channel}, ${variant}`;
+  const source = chosenGroup()?.source ?? "";
   const named = need("waterfall").querySelector("figcaption strong");
   if (named) named.textContent = title;
+  const hint = need("waterfall").querySelector(".hint");
+  if (hint) hint.textContent = `Read from: ${source}. ${HINT}`;
   const loudest = inRange().slice(0, 3).map(({ place }) => resonanceWords(place)).join("; ");
-  box().setAttribute("aria-label", `${title}. ${loudest}. Arrow keys move, plus and minus zoom, 0 shows all.`);
+  box().setAttribute("aria-label", `${title}, ${source}. ${loudest}. Arrow keys move, plus and minus zoom, 0 shows all.`);
   const { top, field } = heat;
   const bar = make("i", { class: "bar" });
   bar.style.background = `linear-gradient(to right, ${mapColours(Boolean(other)).join(",")})`;

@@ -6,9 +6,7 @@ import csv
 import io
 import json
 import re
-import shutil
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -23,16 +21,11 @@ from exugear.tooth_mesh.tables import requested_tables
 
 from ..assembled import modes_with_bodies, simulated
 from ..spur_case import COARSE_INPUT, SPUR_CASE
+from .page_view import IN_BROWSER, SIZES, View, opened
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-SIZES = {"desk": (1400, 900), "phone": (390, 844)}
 LAW = "line_of_action"
 NAME = "</script><img src=x onerror=document.title=1> & pair"
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.skipif(CHROMIUM is None, reason="no chromium: apt-get install chromium"),
-    pytest.mark.xdist_group("browser"),
-]
+pytestmark = IN_BROWSER
 
 
 @pytest.fixture(scope="module")
@@ -63,55 +56,6 @@ def data(path: Path) -> dict[str, Any]:
     found = re.search(r'id="data">(.*?)</script>', path.read_text(encoding="utf-8"), re.DOTALL)
     assert found
     return json.loads(found[1])
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    sync = pytest.importorskip("playwright.sync_api", reason="no playwright: pip install playwright")
-    with sync.sync_playwright() as play:
-        # Drawn by the processor: the machines that test have no graphics.
-        arguments = ["--no-sandbox", "--enable-unsafe-swiftshader", "--use-angle=swiftshader"]
-        one = play.chromium.launch(executable_path=CHROMIUM, args=arguments)
-        yield one
-        one.close()
-
-
-@dataclass
-class View:
-    """A page in a browser, and what went wrong in it."""
-
-    page: Any
-    faults: list[str] = field(default_factory=list)
-
-    def open(self, path: Path, fragment: str = "") -> None:
-        self.page.goto("about:blank")
-        self.page.goto(path.as_uri() + fragment)
-        self.page.wait_for_selector("html[data-ready]", state="attached", timeout=60_000)
-
-    def pixels(self, selector: str) -> str:
-        return str(self.page.evaluate("s => document.querySelector(s).toDataURL()", selector))
-
-    def soon(self, claim: Any) -> bool:
-        """Wait for a claim: what is drawn comes a moment later."""
-        for _ in range(100):
-            if claim():
-                return True
-            self.page.wait_for_timeout(100)
-        return False
-
-
-def opened(browser: Any, size: str, **options: Any) -> View:
-    width, height = SIZES[size]
-    context = browser.new_context(
-        viewport={"width": width, "height": height}, reduced_motion="reduce", accept_downloads=True, **options
-    )
-    view = View(context.new_page())
-    view.page.on("pageerror", lambda error: view.faults.append(str(error)))
-    view.page.on("console", lambda told: view.faults.append(told.text) if told.type == "error" else None)
-    view.page.on("dialog", lambda dialog: view.faults.append(dialog.message))
-    local = ("file:", "data:", "blob:", "about:")
-    view.page.on("request", lambda asked: None if asked.url.startswith(local) else view.faults.append(asked.url))
-    return view
 
 
 @pytest.fixture(scope="module", params=SIZES)

@@ -73,7 +73,7 @@ def test_the_page_stands_alone_and_names_its_assumptions(results):
     assert "default-src 'none'" in page
     for words in (
         "Resonances, loudest first",
-        "load case run_up, law line_of_action, inertias disc, housing factor 0.5",
+        "Run-up run_up, law line_of_action, inertias disc, housing factor 0.5",
         "no peak of 3 dB prominence on the same order within the resolution",
         "a step of the test",
         "Hann window",

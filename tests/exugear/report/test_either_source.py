@@ -1,0 +1,158 @@
+"""Waterfall, order cuts, ranking and cards read run-ups or steady responses, and say which."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from exugear.model.choice import Choice
+from exugear.model.gearbox import Gearbox
+from exugear.report.writer import write_report
+from exugear.results.folder import keep_case
+from exugear.spectra.orders import order_lines
+from exugear.steady.peaks import peaks
+from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear.steady.steady_file import load_response, steady_path, stored_or_computed
+from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear.tooth_mesh.tables import requested_tables
+
+from ..assembled import assembled, simulated
+from ..spur_case import COARSE_INPUT, SPUR_CASE
+from .page_view import IN_BROWSER, SIZES, opened
+
+LAW = "line_of_action"
+SETTINGS = SteadySettings(SpeedRange.from_text("50:8000:80"), "parametric")
+VARIANTS = ("rigid", "bushing")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def coarse_tables():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("exugear.tooth_mesh.tables.TableInput", COARSE_INPUT)
+        yield
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Steady responses of both variants, and nothing else."""
+    folder = tmp_path_factory.mktemp("steady")
+    case = folder / "spur.toml"
+    case.write_text(SPUR_CASE, encoding="utf-8")
+    gearbox = Gearbox.from_toml(case)
+    keep_case(gearbox, folder)
+    for request in requested_tables(gearbox, folder):
+        request.compute()
+    stiffness = mesh_stiffness(gearbox, LAW, folder)
+    for variant in VARIANTS:
+        assembly = assembled(gearbox, Choice(variant, LAW), stiffness)
+        stored_or_computed(response_path(folder, variant), assembly, SETTINGS)
+    return folder
+
+
+def response_path(folder: Path, variant: str) -> Path:
+    return steady_path(folder, Choice(variant, LAW, "disc"), SETTINGS)
+
+
+def data_of(page: Path) -> dict[str, Any]:
+    found = re.search(r'id="data">(.*?)</script>', page.read_text(encoding="utf-8"), re.DOTALL)
+    assert found
+    return json.loads(found[1])
+
+
+def test_the_ranking_of_steady_responses_alone_is_that_of_the_largest_amplitudes_in_their_files(folder):
+    """Second way: the arrays of the file, looked through for local maxima without any spectra."""
+    report = write_report(folder)
+    assert report.left_out == ()
+    (group,) = data_of(report.path)["groups"]
+    assert group["source"] == "constant speed, level parametric"
+    assert list(group["variants"]) == list(VARIANTS)
+    gearbox = Gearbox.from_toml(folder / "spur.toml")
+    for variant in VARIANTS:
+        data = load_response(response_path(folder, variant))
+        told = [line.order for line in order_lines(gearbox)]
+        loudest = next(peak for peak in peaks(data) if np.isclose(told, peak.order).any())
+        first = group["variants"][variant]["resonances"][0]
+        # Levels have four digits and speeds five on the page.
+        assert first["level"] == pytest.approx(20.0 * np.log10(loudest.amplitude / 1e-6), abs=0.02)
+        assert first["speed"] == pytest.approx(loudest.speed * 30.0 / np.pi, rel=1e-4)
+        channels = {channel["words"] for channel in group["variants"][variant]["channels"]}
+        assert {"Overall transmission error", "Force: mesh spur"} <= channels
+
+
+def test_words_say_that_figures_are_of_constant_speed_and_name_the_mode_without_a_file_of_modes(folder):
+    report = write_report(folder)
+    page = html.unescape(report.path.read_text(encoding="utf-8"))
+    (card,) = [line for line in report.statements if line.startswith("Loudest resonance")]
+    assert "at constant speed: shaft" in card
+    for words in (
+        "Read from: constant speed, level parametric",
+        "On bearings, inertias disc, constant speed, level parametric",
+        "Transverse forces on bearings, constant speed, level parametric",
+        "No run-up of this case is here",
+        "what damping takes is what the meshes give within",
+    ):
+        assert words in page, words
+    assert "no modes were computed" not in page
+    assert "unsteady" not in page.partition('id="trust"')[0]
+
+
+def test_with_run_ups_beside_them_both_sources_can_be_chosen(folder, tmp_path):
+    both = tmp_path / "both"
+    shutil.copytree(folder, both)
+    gearbox = Gearbox.from_toml(both / "spur.toml")
+    stiffness = mesh_stiffness(gearbox, LAW, both)
+    simulated(gearbox, Choice("bushing", LAW, load_case="run_up"), stiffness, both)
+    report = write_report(both)
+    groups = data_of(report.path)["groups"]
+    assert [group["source"] for group in groups] == ["run-up run_up", "constant speed, level parametric"]
+    assert 'id="group"' in report.path.read_text(encoding="utf-8")
+    # The command line tells of the run-up, which stands beside the level at constant speed in one sentence.
+    assert len([line for line in report.statements if line.startswith("Loudest resonance")]) == 1
+
+
+def test_lines_that_mesh_frequencies_share_and_remarks_on_speeds_are_told(folder, monkeypatch):
+    def read(path: Path) -> Any:
+        data = load_response(path)
+        remark = data["remark"].astype(object)
+        remark[3] = "passing planets put 1.2 % of the overall transmission error beside these lines"
+        return data.assign(remark=remark).assign_attrs(shared_lines="2 x spur = 1 x other")
+
+    monkeypatch.setattr("exugear.findings.stored.load_response", read)
+    page = html.unescape(write_report(folder).path.read_text(encoding="utf-8"))
+    assert "mesh frequencies share lines: 2 × spur = 1 × other" in page
+    assert page.count("passing planets put 1.2 % of the overall") >= 2
+
+
+@pytest.mark.parametrize("size", SIZES)
+class TestInABrowser:
+    pytestmark = IN_BROWSER
+
+    def test_the_waterfall_of_lines_is_drawn_and_says_its_source(self, browser, folder, size):
+        view = opened(browser, size)
+        view.open(write_report(folder).path)
+        assert view.page.evaluate("document.documentElement.scrollWidth - window.innerWidth") <= 0
+        assert "Read from: constant speed" in view.page.locator("#waterfall .hint").inner_text()
+        view.page.locator("#waterfall").scroll_into_view_if_needed()
+        coloured = view.page.evaluate(
+            """() => { const c = document.querySelector('#waterfall canvas'), g = c.getContext('2d');
+            const p = g.getImageData(0, 0, c.width, c.height).data; let n = 0;
+            for (let i = 0; i < p.length; i += 4)
+              if (p[i] > p[i + 1] + 40 && p[i + 2] > p[i + 1] + 20) n++;
+            return n / (p.length / 4); }"""
+        )
+        # Lines in the purple of middle levels on white ground; axes are grey, circles blue.
+        assert 0.0005 < coloured < 0.2
+        view.page.locator("#bearings .choice:visible").first.click()
+        title = view.page.locator("#waterfall figcaption strong")
+        assert view.soon(lambda: title.inner_text().startswith("Force: "))
+        view.page.locator("#view button", has_text="Difference").click()
+        assert view.soon(lambda: "on bearings against on ideal joints" in title.inner_text())
+        view.page.context.close()
+        assert view.faults == []
