@@ -15,10 +15,10 @@ from fe_ste.tools.arrays import Floats
 
 SAME_ORDER = 1e-6
 """Share by which orders of one line may differ."""
-FRAMES, ROWS = 880, 640
+FRAMES, ROWS = 880, 1536
 """Least number of speeds, and number of frequencies, of the picture."""
-THICK = 1
-"""Rows to both sides of its own that a line is drawn over: one row alone is lost on a small screen."""
+THICK = 2
+"""Rows to both sides of its own that a line is drawn over: fewer are lost on a small screen."""
 HALF_POWER = 3.0
 """dB below a peak at which its width is told."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -66,22 +67,27 @@ def _group(material: Material, group: RunGroup) -> dict[str, Any]:
     }
 
 
-def _channels(material: Material, group: RunGroup, run: VariantRun) -> list[Channel]:
+def _channels(material: Material, group: RunGroup, run: VariantRun) -> Iterator[Channel]:
     response = group.responses.get(run.variant)
     if response is None:
-        return list(channels_of(run, material.words))
-    return list(channels_of_response(response, material.words, highest_drawn(material.context.gearbox, response)))
+        return channels_of(run, material.words)
+    return channels_of_response(response, material.words, highest_drawn(material.context.gearbox, response))
 
 
 def _variant(material: Material, group: RunGroup, run: VariantRun) -> dict[str, Any]:
     material.context.tell(f"channels of {run.variant}, {group.source}, {group.inertias}")
-    channels = _channels(material, group, run)
+    channels, loudest = [_overall(material, run.spectra)], {}
+    # One at a time: spectra are large.
+    for channel in _channels(material, group, run):
+        channels.append(_channel(material, channel))
+        if channel.kind == "support":
+            loudest[channel.name] = _loudest(material, channel)
     return {
         "words": VARIANTS[run.variant],
         "model": model_name(group.choice(run.variant)),
         "window": run.spectra.description,
-        "channels": [_overall(material, run.spectra), *(_channel(material, channel) for channel in channels)],
-        "loudest": {channel.name: _loudest(material, channel) for channel in channels if channel.kind == "support"},
+        "channels": channels,
+        "loudest": loudest,
         "constant": _constant(material, group.constant.get(run.variant)),
         "resonances": [_resonance(material, group, run, own) for own in group.ranked[run.variant]],
     }

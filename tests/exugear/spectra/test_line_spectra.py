@@ -46,7 +46,7 @@ def test_the_picture_has_each_line_where_it_runs_and_silence_elsewhere():
                 drawn = spectra.level[frame, round(order / rows)]
                 # Where lines cross, the louder one is drawn. Pictures have single precision.
                 assert drawn >= spectra.along(line)[frame] - 1e-4
-        silent = np.min([np.abs(spectra.frequency - order) for order in lines], axis=0) > 4.0 * rows
+        silent = np.min([np.abs(spectra.frequency - order) for order in lines], axis=0) > (2.0 * 2 + 1) * rows
         assert (spectra.amplitude[frame, silent] == 0.0).all()
     assert spectra.amplitude.max() == pytest.approx(1e-6 * 0.5 / DAMPING, rel=3e-3)
 
