@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +27,13 @@ def spur_pair() -> GearPair:
     """Two equal spur gears, 50 teeth, module 3 mm, 20 mm wide."""
     gear = Gear(name="spur", teeth=50, normal_module=3e-3, face_width=20e-3, held_diameter=100e-3)
     return GearPair(name="spur", pinion=gear, gear=gear, centre_distance=150e-3)
+
+
+def thin_pair() -> GearPair:
+    """Spur pair with rims of 1.4 modules under the roots."""
+    pair = spur_pair()
+    gear = replace(pair.pinion, held_diameter=134e-3)
+    return replace(pair, pinion=gear, gear=gear)
 
 
 def helical_pair() -> GearPair:
@@ -65,6 +72,12 @@ def internal_pair() -> GearPair:
     )
 
 
+def thin_ring_pair() -> GearPair:
+    """Internal pair with a rim of 1.6 modules about the roots of the ring."""
+    pair = internal_pair()
+    return replace(pair, gear=replace(pair.gear, held_diameter=1080e-3))
+
+
 def sun_planet() -> GearPair:
     """Sun and planet of the GRC 750 gearbox (21/39), 220 mm wide."""
     return GearPair(name="sun_planet", pinion=_grc_gear("sun"), gear=_grc_gear("planet"), centre_distance=308e-3)
@@ -78,7 +91,9 @@ def high_speed() -> GearPair:
 PAIRS = {
     "spur": (spur_pair, 340.0, (0.0, 0.5)),
     "helical": (helical_pair, 400.0, (0.2, 0.6)),
+    "thin_rim": (thin_pair, 340.0, (0.0, 0.5)),
     "internal": (internal_pair, 10000.0, (0.0, 0.5)),
+    "thin_ring": (thin_ring_pair, 10000.0, (0.0, 0.5)),
     "sun_planet": (sun_planet, 14000.0, (0.3,)),
     "high_speed": (high_speed, 2945.0, (0.3,)),
 }

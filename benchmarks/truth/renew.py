@@ -26,8 +26,8 @@ FACTORS = (0.5, 0.7)
 ORDER, HIGHEST_ORDER, LOWEST_ORDER = 2.75, 3.5, 2.0
 """Of convergence: the one taken, and those that bound the truth."""
 
-GEARS = {"spur": (0,), "high_speed": (0,)}
-"""Gears of a pair that are computed where they are not both: equal ones, and a wheel whose sector is a thin wedge."""
+GEARS = {"spur": (0,), "thin_rim": (0,), "thin_ring": (1,), "high_speed": (0,)}
+"""Gears of a pair that are computed where they are not both: one of equal ones, no known one, no thin wedge."""
 
 
 def extrapolated(meshes: Sequence[dict[str, float]], order: float) -> float:
