@@ -73,7 +73,7 @@ def internal_pair() -> GearPair:
 
 
 def thin_ring_pair() -> GearPair:
-    """Internal pair with a rim of 1.6 modules about the roots of the ring."""
+    """Planet and ring as before, with a rim of 1.6 modules about the roots of the ring."""
     pair = internal_pair()
     return replace(pair, gear=replace(pair.gear, held_diameter=1080e-3))
 
