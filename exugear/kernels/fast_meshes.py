@@ -58,6 +58,7 @@ class Meshes(NamedTuple):
     rows : (m, r, 48) rows over both gears' padded places: parts W0, W1, W2 of the first, then of the second gear, whose
         row is W0 + W1 cos psi + W2 sin psi at the angle psi of the frame
     offsets : (m, r, 3) of each row: what cos psi, sin psi and psi itself add to its value
+    mean : (m, 2) stiffness (N/m) and damping (N s/m) at the static load, mean over the cycle
     nominal : (m,) deflection of gears in their nominal place, m
     table : None where no mesh follows one
     """
@@ -78,6 +79,7 @@ class Meshes(NamedTuple):
     pieces: Integers
     stiffness: Floats
     damping: Floats
+    mean: Floats
     line_of_action: Floats
     error_pieces: Integers
     error: Floats

@@ -12,7 +12,7 @@ REDUCTION = 1
 #: Eigenmodes (`exugear.dynamics.modes`, and the laws and matrices of `exugear.dynamics.assembly`).
 MODES = 2
 #: Runs in time (`exugear.runs`, both solvers, the laws, signals and filters).
-RUN = 5
+RUN = 6
 #: Life of gears and bearings (`exugear.life`, and the root stress of `fe_ste.root_stress`).
 LIFE = 2
 #: Steady responses (`exugear.steady`, and all that modes rest on).

@@ -2,54 +2,76 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from fe_ste.tools.arrays import Floats
+from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import kernel
-from fe_ste.tools.octets import SIZE, all_eight, eight, put
+from fe_ste.tools.octets import SIZE, eight, put
 
 TAPS_PER_FACTOR = 31
 """Length of the anti-aliasing filter per decimation factor: 80 dB above 0.58, flat below 0.42 of the rate."""
 
 
-@kernel
-def filtered(rows: Floats, middle: int, column: int, taps: Floats) -> float:
-    """One column of rows around a middle one, filtered."""
-    total: float = taps[0] * rows[middle, column]
-    for k in range(1, taps.size):
-        total += taps[k] * (rows[middle - k, column] + rows[middle + k, column])
-    return total
+AT_ONCE = 32
+"""Results that are made of one block before the next: their rows and the taps stay in the caches of a core."""
 
 
 @kernel
-def filter_eight(rows: Floats, middle: int, column: int, taps: Floats, out: Floats) -> None:
-    """Fill eight columns of out (columns,), from one on, with rows around a middle one, filtered.
+def filter_one(rows: Floats, first: int, taps: Floats, source: int, target: int, out: Floats) -> None:
+    """Add to eight columns of out (columns,), from `target` on, those of rows from `source` on, by taps (length, 8)."""
+    columns, length = rows.shape[1], taps.shape[0]
+    if columns < SIZE:
+        for c in range(max(0, -source), columns):
+            for k in range(length):
+                out[c] += taps[k, c] * rows[first + k, source + c]
+        return
+    total = eight(out, target)
+    for k in range(length):
+        total = total + eight(rows[first + k], source) * eight(taps[k], 0)
+    put(out, target, total)
 
-    In two sums, because each addition waits for the one before.
+
+@kernel
+def filter_four(rows: Floats, first: int, factor: int, taps: Floats, source: int, target: int, out: Floats) -> None:
+    """Do the same for four results side by side, because each addition waits for the one before."""
+    a, b, c, d = eight(out[0], target), eight(out[1], target), eight(out[2], target), eight(out[3], target)
+    for k in range(first, first + taps.shape[0]):
+        tap = eight(taps[k - first], 0)
+        a = a + eight(rows[k], source) * tap
+        b = b + eight(rows[k + factor], source) * tap
+        c = c + eight(rows[k + 2 * factor], source) * tap
+        d = d + eight(rows[k + 3 * factor], source) * tap
+    put(out[0], target, a)
+    put(out[1], target, b)
+    put(out[2], target, c)
+    put(out[3], target, d)
+
+
+@kernel
+def filter_rows(rows: Floats, taps: Floats, places: Integers, factor: int, out: Floats) -> None:
+    """Add to out (count, columns) every so many rows, filtered.
+
+    Parameters
+    ----------
+    rows : (n, columns) array
+    taps : (blocks, length, 8) array
+        Of eight neighbouring columns each.
+    places : (blocks, 2) array
+        First column that a block reads, and first one that it adds to.
+    factor : int
+    out : (count, columns) array
     """
-    near, far = eight(rows[middle], column) * taps[0], all_eight(0.0)
-    for k in range(1, taps.size - 1, 2):
-        near = near + (eight(rows[middle - k], column) + eight(rows[middle + k], column)) * taps[k]
-        far = far + (eight(rows[middle - k - 1], column) + eight(rows[middle + k + 1], column)) * taps[k + 1]
-    if taps.size % 2 == 0:
-        k = taps.size - 1
-        near = near + (eight(rows[middle - k], column) + eight(rows[middle + k], column)) * taps[k]
-    put(out, column, near + far)
-
-
-@kernel
-def filter_rows(rows: Floats, taps: Floats, factor: int, out: Floats) -> None:
-    """Fill out (count, columns) with every so many rows, filtered by symmetric taps of unit sum (middle first)."""
-    half, columns = taps.size - 1, rows.shape[1]
-    for n in range(out.shape[0]):
-        middle = n * factor + half
-        if columns < SIZE:
-            for c in range(columns):
-                out[n, c] = filtered(rows, middle, c, taps)
-            continue
-        for c in range(0, columns, SIZE):
-            last = columns - SIZE  # the last ones lap over those before
-            filter_eight(rows, middle, c if c < last else last, taps, out[n])
+    for begin in range(0, out.shape[0], AT_ONCE):
+        end = min(begin + AT_ONCE, out.shape[0])
+        fours = end - (end - begin) % 4 if rows.shape[1] >= SIZE else begin
+        for b in range(places.shape[0]):
+            source, target = places[b]
+            for n in range(begin, fours, 4):
+                filter_four(rows, n * factor, factor, taps[b], source, target, out[n:])
+            for n in range(fours, end):
+                filter_one(rows, n * factor, taps[b], source, target, out[n])
 
 
 def low_pass(factor: int, half: int) -> Floats:
@@ -70,8 +92,52 @@ def low_pass(factor: int, half: int) -> Floats:
     return taps
 
 
+class Filter(NamedTuple):
+    """A filter over rows: taps of each column on itself, and of some columns on others.
+
+    Attributes
+    ----------
+    own : (2 half + 1, columns) what each column takes of itself
+    other : (2 half + 1, columns) what each column takes of the one that stands so many columns before it
+    before : that number of columns
+    """
+
+    own: Floats
+    other: Floats
+    before: int
+
+    @property
+    def half(self) -> int:
+        """Rows that it needs on either side."""
+        return len(self.own) // 2
+
+
+def plain_filter(factor: int, count: int) -> Filter:
+    """Low pass of so many columns before decimation; nothing at all at a factor of 1."""
+    taps = low_pass(factor, (TAPS_PER_FACTOR * factor) // 2 if factor > 1 else 0)
+    own = np.repeat(taps[:, None], count, axis=1)
+    return Filter(own, np.zeros_like(own), 0)
+
+
+def _blocks(taps: Floats, before: int) -> tuple[Floats, Integers]:
+    """Taps (blocks, length, 8) of eight columns each, none twice, and the places of `filter_rows`."""
+    length, columns = taps.shape
+    used = np.flatnonzero(taps.any(axis=0))
+    blocks, places, done = [], [], 0
+    for first in used:
+        if first < done:
+            continue
+        start = max(0, min(int(first), columns - SIZE))
+        block = np.zeros((length, SIZE))
+        begin, done = max(start, done), min(start + SIZE, columns)
+        block[:, begin - start : done - start] = taps[:, begin:done]
+        blocks.append(block)
+        places.append((start - before, start))
+    return np.array(blocks).reshape(-1, length, SIZE), np.array(places, dtype=np.int64).reshape(-1, 2)
+
+
 class Decimator:
-    """Linear-phase low pass and decimation of a stream of rows.
+    """Low pass and decimation of a stream of rows.
 
     Parameters
     ----------
@@ -79,6 +145,8 @@ class Decimator:
         Keep every so many rows; 1 passes everything.
     count : int
         Columns per row.
+    by : Filter, optional
+        Taps; the linear-phase low pass of all columns alike by default.
 
     Examples
     --------
@@ -90,10 +158,12 @@ class Decimator:
     (32, 70, True)
     """
 
-    def __init__(self, factor: int, count: int) -> None:
+    def __init__(self, factor: int, count: int, by: Filter | None = None) -> None:
         self.factor = factor
-        self.half = (TAPS_PER_FACTOR * factor) // 2 if factor > 1 else 0
-        self.taps = low_pass(factor, self.half)
+        chosen = plain_filter(factor, count) if by is None else by
+        self.half = chosen.half
+        own, other = _blocks(chosen.own, 0), _blocks(chosen.other, chosen.before)
+        self._taps, self._places = (np.concatenate(both) for both in zip(own, other, strict=True))
         self.pending = np.zeros((0, count))
         self.pending_first = 0  # number of the raw row that `pending` starts with
 
@@ -118,11 +188,11 @@ class Decimator:
         begin = centre - self.half - self.pending_first  # first row that the first result needs, among all
         # Results that need rows from before come from both put together; the others from the new rows as they lie.
         of_both = min(count, max(0, -((begin - before) // self.factor)))
-        results = np.empty((count, rows.shape[1]))
+        results = np.zeros((count, rows.shape[1]))
         seam = np.vstack([self.pending, rows[: length + self.factor * (of_both + 1)]])
-        filter_rows(seam[begin:], self.taps[self.half :], self.factor, results[:of_both])
+        filter_rows(seam[begin:], self._taps, self._places, self.factor, results[:of_both])
         skipped = max(0, begin + of_both * self.factor - before)
-        filter_rows(rows[skipped:], self.taps[self.half :], self.factor, results[of_both:])
+        filter_rows(rows[skipped:], self._taps, self._places, self.factor, results[of_both:])
         following = begin + count * self.factor if count else 0
         self.pending = np.vstack([self.pending[following:], rows[max(0, following - before) :]])
         self.pending_first += following

@@ -17,6 +17,8 @@ from exugear.results.decimation import Decimator
 from exugear.results.run_file import FINAL_NAME, PARTIAL_NAME
 from exugear.runs.extent import too_fine
 from exugear.runs.outcome import RunError
+from exugear.runs.read_out import stored_filter
+from exugear.solvers.compiled.methods import RUNGE_KUTTA
 from exugear.solvers.compiled.step import Integration, unstable
 
 if TYPE_CHECKING:
@@ -83,7 +85,13 @@ class RunPlan:
     @property
     def samples(self) -> int:
         """Number of samples that the file will hold."""
-        return Decimator(self.steps_per_sample, 0).count_of(self.steps + 1)
+        return self.decimator().count_of(self.steps + 1)
+
+    def decimator(self) -> Decimator:
+        """Filter of the signals on their way into the file, at its beginning."""
+        method = self.integration.method if self.solver == "compiled" else RUNGE_KUTTA
+        taps = stored_filter(self.assembly, method, self.step, self.steps_per_sample)
+        return Decimator(self.steps_per_sample, taps.own.shape[1], taps)
 
     @property
     def is_implicit(self) -> bool:

@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 
 from exugear.dynamics.signals import ENERGIES, POWERS
-from exugear.results.decimation import Decimator
 from exugear.results.pieces import Checkpoint
 from exugear.results.run_file import RunFile
 from exugear.runs.account import EnergyAccount
@@ -124,7 +123,7 @@ class Recorder:
         self._judge = start.judge
         self._observer = Observer(plan.assembly, start.loads)
         self._layout = self._observer.layout
-        self._decimator = Decimator(plan.steps_per_sample, self._layout.count)
+        self._decimator = plan.decimator()
         self._decimator.pending, self._decimator.pending_first = start.state.pending, start.state.pending_first
         self._account = EnergyAccount(plan.step, start.state.balance, start.state.powers)
         self._mesh_times = start.state.mesh_times

@@ -1,8 +1,8 @@
 """The loop over time as one compiled piece that allocates nothing per step: states, their signals and powers.
 
 Methods stand in `exugear.solvers.compiled.methods`. Signals and powers come from the evaluation that each step makes
-at its new state anyway. A multistep method evaluates at the predicted state, which the correction then moves by less
-than it is in error itself.
+at its new state anyway. A multistep method evaluates at the predicted state: what the correction changes of signals is
+known, and taken off here or when they are stored (`exugear.runs.read_out`).
 
 Numbers here become part of machine code: `fe_ste.tools.compilation` compiles anew when this file changes.
 """
@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import math
 
+from exugear.kernels.fast_meshes import LAST_DEFLECTION, LAST_FORCE, Meshes
+from exugear.kernels.meshes import FRAME, SPIN_1, SPIN_2
 from exugear.solvers.compiled.arrays import Equations, Work
 from exugear.solvers.compiled.equations import evaluate
 from exugear.solvers.compiled.methods import (
@@ -70,6 +72,32 @@ def correct(step: float, method: Method, past: Past, work: Work) -> None:
         difference = eight(work.rate, i) - eight(past.sums[0], i)
         put(work.q, i, eight(work.stage_q, i) + difference * of_q)
         put(work.v, i, eight(work.stage_v, i) + difference * of_v)
+
+
+@kernel
+def corrected_by(i: int, past: Past, work: Work) -> float:
+    """Difference of the acceleration of coordinate i from the extrapolated one; one that is missing has none."""
+    return float(work.rate[i] - past.sums[0, i]) if i < past.sums.shape[1] else 0.0
+
+
+@kernel
+def correct_spinning_meshes(step: float, method: Method, past: Past, meshes: Meshes, work: Work) -> None:
+    """Carry what meshes of gears that only spin do on to the corrected state, to first order: two products each.
+
+    Rows of other meshes would take a tenth of a step; `exugear.runs.read_out` puts their signals right.
+    """
+    of_v = step * method.correction[CORRECT_VELOCITY]
+    of_q = step * step * method.correction[CORRECT_POSITION]
+    for m in range(meshes.coordinates.shape[0]):
+        if meshes.spinning[m] == 0:
+            continue
+        index, state = meshes.coordinates[m], work.mesh.states[m]
+        frame = corrected_by(index[FRAME], past, work)
+        change = meshes.deflection[m, SPIN_1] * (corrected_by(index[SPIN_1], past, work) - frame)
+        change += meshes.deflection[m, SPIN_2] * (corrected_by(index[SPIN_2], past, work) - frame)
+        state[LAST_DEFLECTION] += of_q * change
+        if state[LAST_FORCE] != 0.0:  # teeth that are apart stay so
+            state[LAST_FORCE] += (meshes.mean[m, 0] * of_q + meshes.mean[m, 1] * of_v) * change
 
 
 @kernel
@@ -189,6 +217,8 @@ def advance(
             if not copy_state(work, out_q[n], out_v[n]):
                 return n
         if n < out_signals.shape[0]:
+            if multistep and not given:
+                correct_spinning_meshes(step, method, past, equations.meshes, work)
             q, v = work.stage_q, work.stage_v
             stood_for = stride if due else 0
             take_sample(end, q, v, equations, work, columns, stood_for, given, out_signals[n], out_energies[n])

@@ -251,6 +251,38 @@ def forced_error(method: Method, angle: float) -> float:
     return float(abs(position) * angle**2 - 1.0)
 
 
+def ahead_of_correction(method: Method, angle: Floats, lag: float = 0.0) -> Complexes:
+    """Error of what is read off the predicted state, relative, of motions that turn by an angle (rad) in each step.
+
+    The correction moves a position by ``h^2 c`` and a velocity by ``h c'`` times the difference of the acceleration
+    from the extrapolated one. In a motion of one frequency that difference is the acceleration itself times a number
+    that follows from the weights, and the acceleration is -w^2 times the position: so the error is known, in amplitude
+    and phase, and what has been read off the predicted states can be put right afterwards.
+
+    Parameters
+    ----------
+    method : Method
+    angle : (n,) array
+        rad, up to pi.
+    lag : float
+        What is read off is ahead by so many steps: position + lag * step * velocity, as the force of a spring with
+        damping in proportion to its stiffness. A deflection has none.
+
+    Examples
+    --------
+    Deflections at 6.43 kHz, steps of 1/60000 s:
+
+    >>> f"{abs(1.0 + ahead_of_correction(adams(5), np.array([2 * np.pi * 6430 / 60000]))[0]) - 1.0:.4f}"
+    '0.0049'
+    """
+    if not method.is_multistep:
+        return np.zeros(np.shape(angle), dtype=np.complex128)
+    past = np.exp(-1j * np.multiply.outer(angle, np.arange(1.0, method.points + 1.0)))
+    difference = 1.0 - past @ method.weights[EXTRAPOLATE]
+    corrected = method.correction[CORRECT_POSITION] + lag * method.correction[CORRECT_VELOCITY]
+    return np.asarray(corrected * angle**2 * difference / (1.0 + 1j * lag * angle))
+
+
 def resonance_error(method: Method, eigenvalues: Complexes, step: float, band: float) -> float:
     """Largest error of a resonance's answer to excitation up to a band, in amplitude and phase, as a share of its peak.
 

@@ -8,7 +8,7 @@ from exugear.dynamics.assembly import Assembly
 from exugear.kernels.coordinates import BODY_SIZE, PADDED, PADDED_TILT, SPIN, TILT
 from exugear.kernels.elastic import elastic_motion, scratch_for
 from exugear.kernels.fast_meshes import STATES_SIZE, TURNING, Meshes, MeshMemory, padded_rows
-from exugear.kernels.meshes import FRAME, ROW_SIZE, SPIN_1, SPIN_2
+from exugear.kernels.meshes import FRAME, ROW_SIZE, SPIN_1, SPIN_2, MeshArrays
 from exugear.kernels.products import filled_up
 from exugear.kernels.rolling import rolling_memory
 from exugear.kernels.table_law import NOMINAL_DEFLECTION, scratch_memory
@@ -42,7 +42,7 @@ from exugear.solvers.compiled.arrays import (
 from exugear.solvers.loads import LoadTable
 from exugear.tooth_mesh.laws.registry import LAWS
 from exugear.tooth_mesh.laws.table import TABLE_FORM
-from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.arrays import Booleans, Floats, Integers
 
 ROUND_OFF = 1e-14
 """Entries of a bearing's matrix this small beside its diagonal are left-overs of rotating it, and left out."""
@@ -175,11 +175,17 @@ def _without_round_off(matrix: Floats) -> Floats:
     return np.where(entries <= ROUND_OFF * np.outer(size, size), 0.0, matrix)
 
 
+def spinning_alone(meshes: MeshArrays) -> Booleans:
+    """Tell of each mesh whether its gears have their spins alone, (m,)."""
+    others = np.delete(meshes.coordinates[:, :FRAME], [SPIN_1, SPIN_2], axis=1)
+    return np.asarray((others < 0).all(axis=1))
+
+
 def _meshes(numbers: _Numbers, ends: Integers) -> Meshes:
     given = numbers.assembly.meshes
     axis = given.axis.copy()
     axis[given.coordinates[:, :FRAME].reshape(-1, 2, BODY_SIZE)[:, :, 0] < 0] = 0.0
-    others = np.delete(given.coordinates[:, :FRAME], [SPIN_1, SPIN_2], axis=1)
+    elements = numbers.assembly.elements
     table = given.table
     kinds = [given.deflection, given.force]
     if (given.form == TABLE_FORM).any():
@@ -193,7 +199,7 @@ def _meshes(numbers: _Numbers, ends: Integers) -> Meshes:
         deflection=given.deflection,
         force=given.force,
         conjugate=np.all(given.deflection == given.force, axis=1).astype(np.int64),
-        spinning=np.all(others < 0, axis=1).astype(np.int64),
+        spinning=spinning_alone(given).astype(np.int64),
         ends=ends,
         rows=rows,
         offsets=offsets,
@@ -202,6 +208,7 @@ def _meshes(numbers: _Numbers, ends: Integers) -> Meshes:
         pieces=given.pieces,
         stiffness=given.stiffness,
         damping=given.damping,
+        mean=np.array([(e.stiffness.mean(), e.damping) for e in elements]).reshape(-1, 2),
         line_of_action=given.line_of_action,
         error_pieces=given.error_pieces,
         error=given.error,

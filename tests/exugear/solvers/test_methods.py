@@ -24,6 +24,7 @@ from exugear.solvers.compiled.methods import (
     RUNGE_KUTTA,
     Method,
     adams,
+    ahead_of_correction,
     forced_error,
     growth,
     resonance_error,
@@ -101,6 +102,26 @@ def test_stabilised_method_is_of_order_4_and_stable_at_steps_longer_by_a_fifth()
 def motion(damping: float) -> complex:
     """Eigenvalue of an oscillator in units of its rate."""
     return -damping + 1j * float(np.sqrt(1.0 - damping**2))
+
+
+@pytest.mark.parametrize("method", [adams(4), adams(5), adams(6), stabilised()], ids=lambda method: method.name)
+@pytest.mark.parametrize("lag", [0.0, 0.3])
+def test_predicted_states_are_ahead_of_corrected_ones_as_the_method_says(method: Method, lag: float) -> None:
+    """One step from the exact past of a motion exp(i w t), whose accelerations are -w^2 times itself."""
+    angle = 0.5
+    past = -(angle**2) * np.exp(-1j * angle * np.arange(method.points))
+    velocity = 1j * angle + method.weights[PREDICT_VELOCITY] @ past
+    position = 1.0 + 1j * angle + method.weights[PREDICT_POSITION] @ past
+    difference = -(angle**2) * np.exp(1j * angle) - method.weights[EXTRAPOLATE] @ past
+    predicted = position + lag * velocity
+    corrected = (position + method.correction[CORRECT_POSITION] * difference) + lag * (
+        velocity + method.correction[CORRECT_VELOCITY] * difference
+    )
+    ahead = ahead_of_correction(method, np.array([angle]), lag)[0]
+    # The corrected state is the exact one but for the error of a step.
+    assert predicted / corrected - 1.0 == pytest.approx(ahead, rel=0.02)
+    assert abs(ahead) > 1e-4
+    assert ahead_of_correction(RUNGE_KUTTA, np.array([angle]), lag)[0] == 0.0
 
 
 @pytest.mark.parametrize("damping", [0.0, 0.01, 0.02, 0.03, 0.04])
