@@ -87,6 +87,23 @@ class LineSet:
         order = np.argsort(keys)
         return keys[order], order
 
+    def part(self, which: Booleans) -> LineSet:
+        """Some of the lines, told by a flag for each (n,); the mean is always among them.
+
+        Examples
+        --------
+        >>> lines = line_set([1.0], 3)
+        >>> lines.part(lines.orders > 1.5).index.ravel()
+        array([0, 2, 3])
+        """
+        return LineSet(self.index[which | (np.arange(len(which)) == 0)], self.bases, self.units)
+
+    def of_first(self, bases: int) -> LineSet:
+        """Lines of the first bases alone, without the slow ones that come after them."""
+        slow = len(self.bases) - bases
+        alone = ~self.index[:, bases:].any(axis=1)
+        return LineSet(self.index[alone, :bases], self.bases[:bases], self.units[:bases, : self.units.shape[1] - slow])
+
     def find(self, multiples: Integers) -> tuple[Integers, Booleans]:
         """Place of lines (..., bases) in the set, -1 for none, and whether it is the conjugate that stands there."""
         keys, order = self._sorted_keys
@@ -240,6 +257,32 @@ def beside(lines: LineSet, slow: Sequence[Modulator], most: int) -> LineSet:
 def joined(one: LineSet, other: LineSet) -> LineSet:
     """Lines of two sets of the same bases."""
     return _of_rows(np.vstack([one.index, other.index]), one.bases, one.units)
+
+
+def count_of_lines(bases: int, sum_of_multiples: int) -> int:
+    """Count lines of independent bases with a sum of the magnitudes of their multiples up to a given one, no mean.
+
+    Examples
+    --------
+    >>> count_of_lines(2, 3), len(line_set([1.0, 4.7], 3, 3).index) - 1
+    (12, 12)
+    """
+    points = sum(2**n * math.comb(bases, n) * math.comb(sum_of_multiples, n) for n in range(bases + 1))
+    return (points - 1) // 2
+
+
+def largest(sizes: Floats, rest: float) -> Booleans:
+    """Tell which of many contributions (n,) are the largest, so that all others together, as a norm, are at most `rest`.
+
+    Examples
+    --------
+    >>> largest(np.array([0.1, 3.0, 0.2, 4.0]), 0.25)
+    array([False,  True, False,  True])
+    """
+    order = np.argsort(sizes, kind="stable")
+    found = np.zeros(len(sizes), dtype=bool)
+    found[order] = np.sqrt(np.cumsum(sizes[order] ** 2)) > rest
+    return found
 
 
 def _of_rows(rows: Integers, bases: Floats, units: Integers) -> LineSet:

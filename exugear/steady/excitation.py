@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from exugear.harmonics.lattice import Lattice, lattice
-from exugear.harmonics.lines import LineSet, beside, joined, line_set, modulated
+from exugear.harmonics.lines import LineSet, beside, count_of_lines, joined, line_set, modulated
 from exugear.harmonics.products import Product
 from exugear.kernels.meshes import SPIN_1
 from exugear.rotating.bearing_waves import (
@@ -32,7 +32,7 @@ from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
 SAMPLES_PER_HARMONIC = 16
 """Samples over a mesh period at least where teeth part, over the harmonics: kinks want more than products of lines."""
 MOST_LINES = 500
-"""Lines up to which combinations grow: those up to the eighth of three mesh frequencies, the twenty-first of two."""
+"""Combinations up to which lines are looked for: those up to the eighth of three mesh frequencies, the 21st of two."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +89,31 @@ class Interface:
         return np.ascontiguousarray(found)
 
 
+@dataclass(frozen=True)
+class Reach:
+    """How far a set of lines reaches: harmonics of each mesh frequency, largest sum of multiples of several."""
+
+    harmonics: int
+    combinations: int
+
+    def around(self, lines: LineSet, bases: int, clear: bool) -> Reach:
+        """Return this one, doubled until it has lines of so many bases; combinations up to `MOST_LINES`.
+
+        `clear` asks that none of them is at its edge.
+        """
+        multiples = np.abs(lines.index[:, :bases])
+        alone, sums = np.count_nonzero(multiples, axis=1) == 1, multiples.sum(axis=1) + clear
+        harmonics, combinations = self.harmonics, self.combinations
+        while sums[alone].max(initial=0) > harmonics:
+            harmonics *= 2
+        while sums[~alone].max(initial=0) > combinations:
+            sooner, later = combinations, range(combinations + 1, 2 * combinations + 1)
+            combinations = max((n for n in later if count_of_lines(bases, n) <= MOST_LINES), default=sooner)
+            if combinations == sooner:
+                break
+        return Reach(harmonics, combinations)
+
+
 class Gearset:
     """A gearbox ready for the balance of lines at any speed within a range.
 
@@ -108,9 +133,16 @@ class Gearset:
 
     def __init__(self, waves: MeshWaves, harmonics: int, combinations: int) -> None:
         self.waves, self.harmonics = waves, 2 * harmonics
-        self.line_harmonics, self.combinations = harmonics, combinations
         # Lines of the larger set are kept apart where forces are evaluated in time.
-        self.lines, self._larger = _line_sets(waves, harmonics, combinations)
+        self._usual = self._reach = Reach(2 * harmonics, 2 * combinations)
+        self.lines, self.larger = (
+            _lines_within(waves, Reach(harmonics, combinations)),
+            _lines_within(waves, self._usual),
+        )
+        self._least = 0
+        # Shared by all that differ in their lines alone.
+        self._lattices: dict[tuple[Reach, int, int], Lattice] = {}
+        self._one_by_one: dict[int, Gearset] = {}
         self.parting = LAWS[waves.assembly.mesh_law].loses_contact
         self.bearings: BearingWaves | None = None
         self._bearing_means: tuple[BearingMean, ...] = ()
@@ -182,27 +214,54 @@ class Gearset:
     @cached_property
     def lattice(self) -> Lattice:
         """Samples on which forces are evaluated in time."""
-        least = SAMPLES_PER_HARMONIC * self.line_harmonics if self.bent else 0
-        return lattice(self.lines, self._larger, least, shared=self.waves.passing > 0)
+        least = max(self._least, SAMPLES_PER_HARMONIC * self._reach.harmonics if self.bent else 0)
+        key = self._reach, least, self.waves.passing
+        known = self._lattices.get(key)
+        if self.waves.passing:
+            known = lattice(self.lines, self.larger, least, shared=True)
+        elif known is None:
+            known = lattice(self.larger, self.larger, least)
+        self._lattices[key] = known
+        return Lattice(self.lines, known.generator, known.samples)
+
+    @cached_property
+    def denser(self) -> Gearset:
+        """The same on twice as many samples, on which other lines alias."""
+        other = self._copied()
+        other._least = 2 * self.lattice.samples
+        return other
+
+    @cached_property
+    def whole(self) -> Gearset:
+        """The same with all lines of the larger set, on the same samples."""
+        other = self._copied()
+        other.lines = self.larger
+        return other
+
+    def with_lines(self, lines: LineSet, clear: bool) -> Gearset:
+        """The same with other lines, and a larger set that has them; `clear` as `Reach.around` has it."""
+        other, reach = self._copied(), self._usual.around(lines, len(self.waves.base_orders), clear)
+        other.lines = lines
+        if not clear:
+            other._least = 0
+        if reach != self._reach:
+            other._reach, other.larger, other._least = reach, _lines_within(self.waves, reach), 0
+        return other
+
+    def of(self, which: Booleans) -> Gearset:
+        """The same with some of its lines, told by a flag for each (n,)."""
+        other = self._copied()
+        other.lines = self.lines.part(which)
+        return other
 
     @cached_property
     def finer(self) -> Gearset:
-        """The same with twice the harmonics of each mesh frequency, and the same combinations of several."""
-        return self._with_lines(2 * self.line_harmonics, self.combinations)
-
-    @cached_property
-    def wider(self) -> Gearset | None:
-        """The same with up to twice the combinations of several mesh frequencies, None where lines would be too many.
-
-        Kinks where teeth part join these frequencies.
-        """
-        if len(self.waves.base_orders) == 1:
-            return None
-        for combinations in range(2 * self.combinations, self.combinations, -1):
-            other = self._with_lines(self.line_harmonics, combinations)
-            if len(other.lines.index) <= MOST_LINES:
-                return other
-        return None
+        """The same with twice the usual harmonics of each mesh frequency, and the usual combinations of several."""
+        other, usual = self._copied(), self._usual
+        other.lines = _lines_within(self.waves, Reach(usual.harmonics, usual.combinations // 2))
+        other._reach = Reach(2 * usual.harmonics, usual.combinations)
+        other.larger = _lines_within(self.waves, other._reach)
+        return other
 
     def _copied(self) -> Gearset:
         """Copy without what was derived from lines and ports."""
@@ -212,24 +271,30 @@ class Gearset:
                 other.__dict__.pop(name, None)
         return other
 
-    def _with_lines(self, harmonics: int, combinations: int) -> Gearset:
-        other = self._copied()
-        other.line_harmonics, other.combinations = harmonics, combinations
-        other.lines, other._larger = _line_sets(self.waves, harmonics, combinations)
-        return other
-
-    @cached_property
-    def passing(self) -> Gearset | None:
-        """The same with lines of one more multiple of the passing of planets; None where none are looked at.
+    def passing(self, strong: Booleans) -> Gearset | None:
+        """The same with one more multiple of the passing of planets beside strong lines, told by a flag for each (n,).
 
         Planets tilt unequally under load, and tables tell that: each that passes then puts lines beside all others.
+        None where planets are not looked at one by one.
         """
-        waves = self.waves
+        waves, usual = self.waves, self._usual
         if not self.parting or self.bearings is not None:
             return None
         if (waves.carriers and not waves.passing) or not any(wave.wave for wave in waves.waves):
             return None
-        return Gearset(mesh_waves(self.system, waves.passing + 1), self.line_harmonics, self.combinations)
+        more, bases = waves.passing + 1, len(waves.base_orders)
+        if more not in self._one_by_one:
+            travelling = mesh_waves(self.system, more)
+            self._one_by_one[more] = Gearset(travelling, usual.harmonics // 2, usual.combinations // 2)
+        other = self._one_by_one[more]._copied()
+        slow = [own for _, own in other.waves.carriers]
+        other._one_by_one, other._lattices, other._reach = self._one_by_one, self._lattices, self._reach
+        loud, whole = self.lines.part(strong).of_first(bases), self.larger.of_first(bases)
+        known = self.lines if waves.passing else beside(self.lines, slow, 0)
+        other.lines = joined(known, beside(loud, slow, more))
+        # Of products that lie farther off in both senses little is left.
+        other.larger = joined(joined(beside(whole, slow, 1), beside(loud, slow, more + 1)), other.lines)
+        return other
 
     def places_in(self, other: Gearset) -> tuple[Integers, ...]:
         """Places of the lines (n,) among those of another, which has them all; those of waves follow if it has more."""
@@ -364,12 +429,8 @@ def _stacked(ports: list[MeshPorts]) -> dict[str, Floats]:
     return {name: np.array(values) for name, values in by_name.items() if values[0] is not None}
 
 
-def _line_sets(waves: MeshWaves, harmonics: int, combinations: int) -> tuple[LineSet, LineSet]:
-    """Lines of given harmonics and combinations, and those of twice as many."""
-    orders, modulators = waves.base_orders.tolist(), [own for _, own in waves.carriers]
-    lines, larger = (line_set(orders, n * harmonics, n * combinations) for n in (1, 2))
-    if waves.passing:
-        # Of products that lie farther off in both senses little is left.
-        own, more = (beside(lines, modulators, n * waves.passing) for n in (1, 2))
-        return own, joined(beside(larger, modulators, waves.passing), more)
-    return modulated(lines, modulators), modulated(larger, modulators)
+def _lines_within(waves: MeshWaves, reach: Reach) -> LineSet:
+    """Lines that reach so far; those that planets make that mesh out of phase stand beside them."""
+    lines = line_set(waves.base_orders.tolist(), reach.harmonics, reach.combinations)
+    modulators = [own for _, own in waves.carriers]
+    return beside(lines, modulators, 0) if waves.passing else modulated(lines, modulators)

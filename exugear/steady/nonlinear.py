@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -155,11 +156,20 @@ class Balance:
 
         The last result is the whole forces (s, u, f) in time, in all places.
         """
+        if self._last and self._last[0] is readings:
+            return self._last[1]
         there, back = self.places.there, self.places.back
         values, rates = self._in_time(self._held(readings, self.static))
         sampled = self._sample(there @ values, there @ rates, self.places, self._on_lattice)
-        whole = back @ sampled.force
-        return self.lattice.coefficients(whole) - self._mean_part(readings), Tangent(self, sampled), sampled.force
+        excess = self.lattice.coefficients(back @ sampled.force) - self._mean_part(readings)
+        found = excess, Tangent(self, sampled), sampled.force
+        self._last[:] = readings, found
+        return found
+
+    @cached_property
+    def _last(self) -> list[Any]:
+        """The last readings and the forces that they gave: a search ends where others go on."""
+        return []
 
     def change(self, sampled: LawSamples, step: Complexes) -> Complexes:
         """Find how the forces (n, m, f) follow a small change (n, m, r) of the readings that were sampled."""
@@ -179,7 +189,7 @@ class Balance:
             if there.ndim == 2:
                 found = np.einsum("mu,ufr,uw->mfwr", back, slopes.mean(axis=0), there, optimize=True)
             else:
-                found = np.einsum("smu,sufr,suw->mfwr", back, slopes, there, optimize=True) / len(slopes)
+                found = _mean_of_waves(there, back, slopes)
             self._less_mean(found, slopes is sampled.damping)
             means.append(found.reshape(-1, m * r))
         unit = np.eye(m * r)
@@ -224,8 +234,7 @@ class Balance:
         rates = rates_of(self.gearset, self.interface, own)
         values, moving = there @ lines.values(own, angles), there @ lines.values(rates, angles)
         along = self._sample(values, moving, places, self._stiffness(places))
-        moved, moving = self._in_time(readings)
-        everywhere = self._sample(there @ moved, there @ moving, self.places, self._on_lattice)
+        everywhere = self.forces(readings)[1].sampled
         varies = np.array([self._varies(n, base) for n in means])[:, None, None]
         parts = []
         for name in ("slope", "damping"):
@@ -298,16 +307,24 @@ class Tangent:
 
         The balance of each line by itself, solved exactly, leaves GMRES what varying laws do between lines.
         """
-        read, lengths = self.balance.read, self.balance.gearset.lengths
-        inverse = np.linalg.inv(self.balance.averaged(self.sampled)[:, read[:, None], read])
+        lengths = self.balance.gearset.lengths
 
-        def alone(values: Complexes) -> Complexes:
-            found = values.reshape(len(values), -1).copy()
-            found[:, read] = (inverse @ found[:, read, None])[..., 0]
-            return np.asarray(lengths * found.reshape(values.shape))
+        def apply(scaled: Complexes) -> Complexes:
+            return lengths * self.alone(self.missing(scaled / lengths))
 
-        found, products = solve_lines(lambda own: alone(self.missing(own / lengths)), alone(right), tolerance)
+        found, products = solve_lines(apply, lengths * self.alone(right), tolerance)
         return found / lengths, products
+
+    def alone(self, right: Complexes) -> Complexes:
+        """Solve for readings (n, m, r) that change what is missing by `right`, each line by itself."""
+        read, found = self.balance.read, right.reshape(len(right), -1).copy()
+        found[:, read] = (self._inverse @ found[:, read, None])[..., 0]
+        return found.reshape(right.shape)
+
+    @cached_property
+    def _inverse(self) -> Complexes:
+        read = self.balance.read
+        return np.linalg.inv(self.balance.averaged(self.sampled)[:, read[:, None], read])
 
 
 def nonlinear_response(
@@ -387,3 +404,18 @@ def _free_shares(balance: Balance, whole: Floats) -> Floats:
     laws = np.array([bearings.waves[n - m].law if n >= m else -1 for n in balance.places.means])
     free = np.mean(~whole.any(axis=2), axis=0)
     return np.array([free[laws == law].mean() for law in range(len(bearings.firsts))])
+
+
+def _mean_of_waves(there: Floats, back: Floats, slopes: Floats) -> Floats:
+    """Mean over samples of slopes (s, u, f, r) in places as those of the waves (m, f, m, r), as they turn.
+
+    A place sees the waves of its own planets alone: few products, where that of all arrays at once has many.
+    """
+    samples, places, m = there.shape
+    found = np.zeros((m, slopes.shape[2], m, slopes.shape[3]))
+    for u in range(places):
+        own = np.flatnonzero(there[:, u].any(axis=0))
+        turning = back[:, :, u][:, own, None] * there[:, u][:, None, own]
+        mean = np.tensordot(turning, slopes[:, u], axes=(0, 0)) / samples
+        found[np.ix_(own, range(found.shape[1]), own, range(found.shape[3]))] += mean.transpose(0, 2, 1, 3)
+    return found

@@ -16,27 +16,40 @@ import numpy as np
 from exugear.dynamics.assembly import Assembly
 from exugear.harmonics.krylov import HarmonicBalanceError
 from exugear.harmonics.lattice import Lattice
+from exugear.harmonics.lines import LineSet, joined, largest
 from exugear.rotating.mean_system import mean_system
 from exugear.rotating.mesh_ports import DEFLECTION
 from exugear.rotating.mesh_waves import mesh_waves
 from exugear.settling.settled import Leg, SettlingRun, cannot_settle
 from exugear.steady.excitation import Gearset, Interface
-from exugear.steady.nonlinear import Balance, nonlinear_response, response_of_readings, solve_balance
+from exugear.steady.nonlinear import BALANCED, Balance, nonlinear_response, response_of_readings, solve_balance
 from exugear.steady.response import Response, linear_response, parametric_response, signals, transmission_errors
 from exugear.steady.settings import SteadySettings
 from exugear.steady.stability import CHECKED, candidates, growth_at, growth_of_state, mean_growth
 from fe_ste.tools.arrays import Complexes, Floats
 
-FINE_ENOUGH = 5e-4
-"""Residual of the balance with twice the harmonics, over the vibration, up to which the present ones do."""
+LEFT_OUT = 2e-4
+"""What lines that are left out may have together, over the vibration."""
+ALIASED = 5e-4
+"""The same of the residual on other samples, up to which those of the balance do where something parts."""
+HARDLY = 2e-5
+"""The same of lines that a state has, up to which the next speed begins without them."""
+ROUGH = 1e-5
+"""Residual of the balance over the size of the deflections up to which it is solved before lines are added."""
+UNEQUAL = 5e-4
+"""What lines have, over the vibration, from which planets that pass unequally are looked for beside them.
+
+Where they are found to put as much beside all lines, planets are looked at one by one."""
 PASSED = 1e-4
-"""The same, up to which lines beside others count as found that passing planets make."""
-MOST_PASSED = 3
+"""Residual over the vibration up to which lines beside others count as found that passing planets make."""
+MOST_PASSED = 2
 """Multiples of the passing of planets whose lines are looked at, at most."""
 TOLD = 0.05
 """Share of the overall transmission error in lines beside others from which it is remarked on."""
-MOST_REFINED = 3
-"""Times that harmonics or combinations are doubled at most."""
+MOST_REFINED = 5
+"""Times that lines are added at most."""
+MOST_DENSER = 2
+"""Times that samples are doubled at most."""
 LEGS = 4
 """Legs of a run in time, after each of which Newton's method is tried."""
 NEAR = 0.1
@@ -77,6 +90,11 @@ class PartingState:
     growth: float
     remark: str = ""
     averaged: PartingState | None = None
+
+    @property
+    def kinks(self) -> bool:
+        """Whether teeth or rolling elements part."""
+        return bool(self.response.apart.any() or self.response.free.any())
 
     def on(self, gearset: Gearset, interface: Interface | None = None) -> PartingState:
         """Return the state in the lines of another gearset, which are some of its own."""
@@ -158,12 +176,8 @@ class PointSolver:
     def readings(self, speed: float) -> Complexes:
         """Find what the mesh laws read (n, m, r) at a speed of the input (rad/s), in the lines of a branch."""
         if self.gearset.bent:
-            state, gearset = self._parting(speed), self.branch_gearset
-            if state.gearset is not self.gearset:
-                return state.on(gearset).readings
-            found = np.zeros((len(gearset.lines.orders), *state.readings.shape[1:]), dtype=complex)
-            found[self.gearset.places_in(gearset)] = state.readings
-            return found
+            state = self._parting(speed)
+            return readings_in(state.gearset, state.readings, self.branch_gearset)
         self._in_time(self.gearset.at(speed))
         assert self._last is not None
         return self._last
@@ -191,15 +205,15 @@ class PointSolver:
         """Find the state at a speed: that near the last one if it is stable, else where a run in time settles."""
         last, found, reason = self._last_averaged, None, ""
         try:
-            found = _refined(last.gearset if last else self.gearset, speed, last.readings if last else None)
+            gearset, readings = _thinned(last, self.gearset) if last else (self.gearset, None)
+            found = _refined(gearset, speed, readings)
         except HarmonicBalanceError as error:
             reason = str(error)
             found = self._from_rest(speed)
         if found is None or self._grows(found):
             found = self._settled(speed, found, reason)
-        # Where no tooth parts the usual lines will do again.
-        self.state = found if found.response.apart.any() else found.on(self.gearset)
-        return self.state
+        self.state = found
+        return found
 
     def _from_rest(self, speed: float) -> PartingState | None:
         """Find the state near the static one where the last one is of no help although all touched in it.
@@ -257,16 +271,21 @@ def _with_passing(state: PartingState) -> PartingState:
     found, speed = state, state.response.interface.speed
     size = float(np.linalg.norm(state.readings[1:, :, DEFLECTION]))
     for _ in range(MOST_PASSED):
-        gearset = found.gearset.passing
+        gearset = found.gearset.passing(np.linalg.norm(found.readings[..., DEFLECTION], axis=1) > UNEQUAL * size)
         if gearset is None:
             break
         balance = Balance(gearset, gearset.at(speed), gearset.lattice)
-        start = np.zeros_like(balance.static)
-        known = found.gearset.places_in(gearset)
-        start[known] = found.readings
-        new = np.delete(balance.missing(start)[..., DEFLECTION], known[0].ravel(), axis=0)
-        if float(np.linalg.norm(new)) < FINE_ENOUGH * size:
+        start = readings_in(found.gearset, found.readings, gearset)
+        known = found.gearset.places_in(gearset)[0].ravel()
+        new = np.linalg.norm(balance.missing(start)[..., DEFLECTION], axis=1)
+        new[known] = 0.0
+        wanted = largest(new, UNEQUAL * size)
+        if not wanted.any():
             break
+        wanted[known] = True
+        gearset = gearset.of(wanted)
+        balance = Balance(gearset, gearset.at(speed), gearset.lattice)
+        start = readings_in(found.gearset, found.readings, gearset)
         enough = PASSED * size / float(np.linalg.norm(balance.static[..., DEFLECTION]))
         try:
             readings, products = solve_balance(balance, start, enough)
@@ -308,36 +327,77 @@ def _near(gearset: Gearset, interface: Interface, leg: Leg) -> PartingState | No
 
 
 def _refined(gearset: Gearset, speed: float, start: Complexes | None) -> PartingState:
-    """Solve at a speed, from given readings or the static state, with more and more lines until they do."""
+    """Solve at a speed, from given readings or the static state, with those lines more that it lacks."""
     balance = Balance(gearset, gearset.at(speed), gearset.lattice)
-    readings, products = solve_balance(balance, balance.static if start is None else start)
-    response = response_of_readings(balance, readings, products)
+    readings, products, kinks = balance.static if start is None else start, 0, False
     for _ in range(MOST_REFINED):
-        ahead = _ahead_of(balance, readings, response)
-        if ahead is None:
-            break
-        more = np.zeros_like(ahead.static)
-        more[balance.gearset.places_in(ahead.gearset)] = readings
-        balance = ahead
-        readings, took = solve_balance(balance, more)
+        readings, took = solve_balance(balance, readings, ROUGH)
         products += took
-        response = response_of_readings(balance, readings, products)
+        lacking = _lacking(balance, readings)
+        if lacking is None:
+            break
+        # Kinks where something parts reach farther than any smooth law does.
+        response = response_of_readings(balance, readings)
+        kinks = bool(response.apart.any() or response.free.any())
+        before, own = balance.gearset, balance.gearset.with_lines(joined(balance.gearset.lines, lacking), kinks)
+        balance, readings = Balance(own, own.at(speed), own.lattice), readings_in(before, readings, own)
+    readings, took = solve_balance(balance, readings)
+    products += took
+    if kinks:
+        balance, readings, took = _without_aliases(balance, readings)
+        products += took
+    response = response_of_readings(balance, readings, products)
     parted = bool(response.apart.any() or response.free.any())
     return PartingState(balance.gearset, readings, response, growth_of_state(balance, readings, parted))
 
 
-def _ahead_of(balance: Balance, readings: Complexes, response: Response) -> Balance | None:
-    """Balance with the lines that a state lacks, harmonics or combinations, None where it lacks none."""
-    gearset, speed = balance.gearset, balance.interface.speed
-    if not response.apart.any() and gearset.bearings is None:
-        return None
-    size = float(np.linalg.norm(readings[1:, :, DEFLECTION]))
-    for other in (gearset.finer, gearset.wider if response.apart.any() else None):
-        if other is None:
-            continue
-        ahead = Balance(other, other.at(speed), other.lattice)
-        more = np.zeros_like(ahead.static)
-        more[gearset.places_in(other)] = readings
-        if float(np.linalg.norm(ahead.missing(more)[..., DEFLECTION])) >= FINE_ENOUGH * size:
-            return ahead
-    return None
+def _without_aliases(balance: Balance, readings: Complexes, enough: float = BALANCED) -> tuple[Balance, Complexes, int]:
+    """Solve on more samples until the balance holds on twice as many, too; the balance and the products that it took."""
+    size, products = float(np.linalg.norm(readings[1:, :, DEFLECTION])), 0
+    for _ in range(MOST_DENSER):
+        denser = balance.gearset.denser
+        ahead = Balance(denser, balance.interface, denser.lattice)
+        if float(np.linalg.norm(ahead.missing(readings)[..., DEFLECTION])) < ALIASED * size:
+            break
+        balance = ahead
+        readings, took = solve_balance(balance, readings, enough)
+        products += took
+    return balance, readings, products
+
+
+def _lacking(balance: Balance, readings: Complexes) -> LineSet | None:
+    """Lines of the larger set that a state lacks, None where those that it has do.
+
+    Their forces are those on the samples that the state has; what each line answers by itself is taken for its size.
+    """
+    whole, size = balance.gearset.whole, float(np.linalg.norm(readings[1:, :, DEFLECTION]))
+    ahead = Balance(whole, whole.at(balance.interface.speed), whole.lattice)
+    start = readings_in(balance.gearset, readings, whole)
+    excess, tangent, _ = ahead.forces(start)
+    missing = tangent.alone(ahead.answer(excess) + ahead.static - start)
+    new = np.linalg.norm(missing[..., DEFLECTION], axis=1)
+    new[balance.gearset.places_in(whole)[0]] = 0.0
+    wanted = largest(new, LEFT_OUT * size)
+    return whole.lines.part(wanted) if wanted.any() else None
+
+
+def _thinned(state: PartingState, usual: Gearset) -> tuple[Gearset, Complexes]:
+    """Lines of a state, without those beyond the usual ones that it hardly has, and its readings in them."""
+    sizes = np.linalg.norm(state.readings[..., DEFLECTION], axis=1)
+    needed = np.isin(np.arange(len(sizes)), usual.places_in(state.gearset)[0])
+    sizes[needed] = 0.0
+    kept = needed | largest(sizes, HARDLY * float(np.linalg.norm(state.readings[1:, :, DEFLECTION])))
+    gearset = state.gearset
+    if kept.all():
+        return gearset, state.readings
+    thinner = gearset.with_lines(gearset.lines.part(kept), state.kinks)
+    return thinner, readings_in(gearset, state.readings, thinner)
+
+
+def readings_in(gearset: Gearset, readings: Complexes, other: Gearset) -> Complexes:
+    """Readings (n, m, r) in the lines of another gearset, those that only one of both has left out."""
+    found = np.zeros((len(other.lines.orders), *other.lengths.shape), dtype=complex)
+    places = gearset.places_in(other)
+    there = places[0].ravel() >= 0
+    found[(places[0][there], *places[1:])] = readings[there]
+    return found
