@@ -88,7 +88,7 @@ class LineSet:
         return keys[order], order
 
     def part(self, which: Booleans) -> LineSet:
-        """Some of the lines, told by a flag for each (n,); the mean is always among them.
+        """Take some of the lines, told by a flag for each (n,); the mean is always among them.
 
         Examples
         --------
@@ -99,7 +99,7 @@ class LineSet:
         return LineSet(self.index[which | (np.arange(len(which)) == 0)], self.bases, self.units)
 
     def of_first(self, bases: int) -> LineSet:
-        """Lines of the first bases alone, without the slow ones that come after them."""
+        """Take the lines of the first bases alone, without the slow ones that come after them."""
         slow = len(self.bases) - bases
         alone = ~self.index[:, bases:].any(axis=1)
         return LineSet(self.index[alone, :bases], self.bases[:bases], self.units[:bases, : self.units.shape[1] - slow])
@@ -267,12 +267,12 @@ def count_of_lines(bases: int, sum_of_multiples: int) -> int:
     >>> count_of_lines(2, 3), len(line_set([1.0, 4.7], 3, 3).index) - 1
     (12, 12)
     """
-    points = sum(2**n * math.comb(bases, n) * math.comb(sum_of_multiples, n) for n in range(bases + 1))
+    points = sum((1 << n) * math.comb(bases, n) * math.comb(sum_of_multiples, n) for n in range(bases + 1))
     return (points - 1) // 2
 
 
 def largest(sizes: Floats, rest: float) -> Booleans:
-    """Tell which of many contributions (n,) are the largest, so that all others together, as a norm, are at most `rest`.
+    """Tell which of many contributions (n,) are the largest, so that the norm of all others is at most `rest`.
 
     Examples
     --------

@@ -239,7 +239,7 @@ class Gearset:
         return other
 
     def with_lines(self, lines: LineSet, clear: bool) -> Gearset:
-        """The same with other lines, and a larger set that has them; `clear` as `Reach.around` has it."""
+        """Copy with other lines, and a larger set that has them; `clear` as `Reach.around` has it."""
         other, reach = self._copied(), self._usual.around(lines, len(self.waves.base_orders), clear)
         other.lines = lines
         if not clear:
@@ -249,7 +249,7 @@ class Gearset:
         return other
 
     def of(self, which: Booleans) -> Gearset:
-        """The same with some of its lines, told by a flag for each (n,)."""
+        """Copy with some of its lines, told by a flag for each (n,)."""
         other = self._copied()
         other.lines = self.lines.part(which)
         return other
@@ -272,7 +272,7 @@ class Gearset:
         return other
 
     def passing(self, strong: Booleans) -> Gearset | None:
-        """The same with one more multiple of the passing of planets beside strong lines, told by a flag for each (n,).
+        """Copy with one more multiple of the passing of planets beside strong lines, told by a flag for each (n,).
 
         Planets tilt unequally under load, and tables tell that: each that passes then puts lines beside all others.
         None where planets are not looked at one by one.

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -156,18 +155,18 @@ class Balance:
 
         The last result is the whole forces (s, u, f) in time, in all places.
         """
-        if self._last and self._last[0] is readings:
-            return self._last[1]
+        if self._last and self._last[0][0] is readings:
+            return self._last[0][1]
         there, back = self.places.there, self.places.back
         values, rates = self._in_time(self._held(readings, self.static))
         sampled = self._sample(there @ values, there @ rates, self.places, self._on_lattice)
         excess = self.lattice.coefficients(back @ sampled.force) - self._mean_part(readings)
         found = excess, Tangent(self, sampled), sampled.force
-        self._last[:] = readings, found
+        self._last[:] = [(readings, found)]
         return found
 
     @cached_property
-    def _last(self) -> list[Any]:
+    def _last(self) -> list[tuple[Complexes, tuple[Complexes, Tangent, Floats]]]:
         """The last readings and the forces that they gave: a search ends where others go on."""
         return []
 
@@ -324,7 +323,7 @@ class Tangent:
     @cached_property
     def _inverse(self) -> Complexes:
         read = self.balance.read
-        return np.linalg.inv(self.balance.averaged(self.sampled)[:, read[:, None], read])
+        return np.asarray(np.linalg.inv(self.balance.averaged(self.sampled)[:, read[:, None], read]), dtype=complex)
 
 
 def nonlinear_response(
@@ -417,5 +416,5 @@ def _mean_of_waves(there: Floats, back: Floats, slopes: Floats) -> Floats:
         own = np.flatnonzero(there[:, u].any(axis=0))
         turning = back[:, :, u][:, own, None] * there[:, u][:, None, own]
         mean = np.tensordot(turning, slopes[:, u], axes=(0, 0)) / samples
-        found[np.ix_(own, range(found.shape[1]), own, range(found.shape[3]))] += mean.transpose(0, 2, 1, 3)
+        found[own[:, None], :, own] += mean
     return found

@@ -22,7 +22,7 @@ from exugear.rotating.mesh_ports import DEFLECTION
 from exugear.rotating.mesh_waves import mesh_waves
 from exugear.settling.settled import Leg, SettlingRun, cannot_settle
 from exugear.steady.excitation import Gearset, Interface
-from exugear.steady.nonlinear import BALANCED, Balance, nonlinear_response, response_of_readings, solve_balance
+from exugear.steady.nonlinear import Balance, nonlinear_response, response_of_readings, solve_balance
 from exugear.steady.response import Response, linear_response, parametric_response, signals, transmission_errors
 from exugear.steady.settings import SteadySettings
 from exugear.steady.stability import CHECKED, candidates, growth_at, growth_of_state, mean_growth
@@ -30,16 +30,16 @@ from fe_ste.tools.arrays import Complexes, Floats
 
 LEFT_OUT = 2e-4
 """What lines that are left out may have together, over the vibration."""
-ALIASED = 5e-4
+ALIASED = 2e-4
 """The same of the residual on other samples, up to which those of the balance do where something parts."""
 HARDLY = 2e-5
 """The same of lines that a state has, up to which the next speed begins without them."""
 ROUGH = 1e-5
 """Residual of the balance over the size of the deflections up to which it is solved before lines are added."""
 UNEQUAL = 5e-4
-"""What lines have, over the vibration, from which planets that pass unequally are looked for beside them.
-
-Where they are found to put as much beside all lines, planets are looked at one by one."""
+"""What passing planets put beside all lines, over the vibration, from which they are looked at one by one."""
+BESIDE = 1e-4
+"""What a line has, over the vibration, from which others are looked for beside it; what those left out may have."""
 PASSED = 1e-4
 """Residual over the vibration up to which lines beside others count as found that passing planets make."""
 MOST_PASSED = 2
@@ -90,11 +90,6 @@ class PartingState:
     growth: float
     remark: str = ""
     averaged: PartingState | None = None
-
-    @property
-    def kinks(self) -> bool:
-        """Whether teeth or rolling elements part."""
-        return bool(self.response.apart.any() or self.response.free.any())
 
     def on(self, gearset: Gearset, interface: Interface | None = None) -> PartingState:
         """Return the state in the lines of another gearset, which are some of its own."""
@@ -222,7 +217,7 @@ class PointSolver:
         has to tell which state the gearbox goes to.
         """
         last = self.state
-        if self.gearset.bearings is None or last is None or last.response.apart.any() or last.response.free.any():
+        if self.gearset.bearings is None or last is None or _parted(last.response):
             return None
         with suppress(HarmonicBalanceError):
             return _refined(self.gearset, speed, None)
@@ -271,7 +266,7 @@ def _with_passing(state: PartingState) -> PartingState:
     found, speed = state, state.response.interface.speed
     size = float(np.linalg.norm(state.readings[1:, :, DEFLECTION]))
     for _ in range(MOST_PASSED):
-        gearset = found.gearset.passing(np.linalg.norm(found.readings[..., DEFLECTION], axis=1) > UNEQUAL * size)
+        gearset = found.gearset.passing(np.linalg.norm(found.readings[..., DEFLECTION], axis=1) > BESIDE * size)
         if gearset is None:
             break
         balance = Balance(gearset, gearset.at(speed), gearset.lattice)
@@ -279,8 +274,8 @@ def _with_passing(state: PartingState) -> PartingState:
         known = found.gearset.places_in(gearset)[0].ravel()
         new = np.linalg.norm(balance.missing(start)[..., DEFLECTION], axis=1)
         new[known] = 0.0
-        wanted = largest(new, UNEQUAL * size)
-        if not wanted.any():
+        wanted = largest(new, BESIDE * size)
+        if not wanted.any() or (found is state and float(np.linalg.norm(new)) < UNEQUAL * size):
             break
         wanted[known] = True
         gearset = gearset.of(wanted)
@@ -329,7 +324,7 @@ def _near(gearset: Gearset, interface: Interface, leg: Leg) -> PartingState | No
 def _refined(gearset: Gearset, speed: float, start: Complexes | None) -> PartingState:
     """Solve at a speed, from given readings or the static state, with those lines more that it lacks."""
     balance = Balance(gearset, gearset.at(speed), gearset.lattice)
-    readings, products, kinks = balance.static if start is None else start, 0, False
+    readings, products = balance.static if start is None else start, 0
     for _ in range(MOST_REFINED):
         readings, took = solve_balance(balance, readings, ROUGH)
         products += took
@@ -337,22 +332,26 @@ def _refined(gearset: Gearset, speed: float, start: Complexes | None) -> Parting
         if lacking is None:
             break
         # Kinks where something parts reach farther than any smooth law does.
-        response = response_of_readings(balance, readings)
-        kinks = bool(response.apart.any() or response.free.any())
+        kinks = _parted(response_of_readings(balance, readings))
         before, own = balance.gearset, balance.gearset.with_lines(joined(balance.gearset.lines, lacking), kinks)
         balance, readings = Balance(own, own.at(speed), own.lattice), readings_in(before, readings, own)
     readings, took = solve_balance(balance, readings)
     products += took
-    if kinks:
-        balance, readings, took = _without_aliases(balance, readings)
-        products += took
     response = response_of_readings(balance, readings, products)
-    parted = bool(response.apart.any() or response.free.any())
-    return PartingState(balance.gearset, readings, response, growth_of_state(balance, readings, parted))
+    if _parted(response):
+        balance, readings, took = _without_aliases(balance, readings)
+        response = response_of_readings(balance, readings, products + took)
+    growth = growth_of_state(balance, readings, _parted(response))
+    return PartingState(balance.gearset, readings, response, growth)
 
 
-def _without_aliases(balance: Balance, readings: Complexes, enough: float = BALANCED) -> tuple[Balance, Complexes, int]:
-    """Solve on more samples until the balance holds on twice as many, too; the balance and the products that it took."""
+def _parted(response: Response) -> bool:
+    """Tell whether teeth or rolling elements part."""
+    return bool(response.apart.any() or response.free.any())
+
+
+def _without_aliases(balance: Balance, readings: Complexes) -> tuple[Balance, Complexes, int]:
+    """Solve on more samples until the balance holds on twice as many; with the products that it took."""
     size, products = float(np.linalg.norm(readings[1:, :, DEFLECTION])), 0
     for _ in range(MOST_DENSER):
         denser = balance.gearset.denser
@@ -360,7 +359,7 @@ def _without_aliases(balance: Balance, readings: Complexes, enough: float = BALA
         if float(np.linalg.norm(ahead.missing(readings)[..., DEFLECTION])) < ALIASED * size:
             break
         balance = ahead
-        readings, took = solve_balance(balance, readings, enough)
+        readings, took = solve_balance(balance, readings)
         products += took
     return balance, readings, products
 
@@ -390,12 +389,12 @@ def _thinned(state: PartingState, usual: Gearset) -> tuple[Gearset, Complexes]:
     gearset = state.gearset
     if kept.all():
         return gearset, state.readings
-    thinner = gearset.with_lines(gearset.lines.part(kept), state.kinks)
+    thinner = gearset.with_lines(gearset.lines.part(kept), _parted(state.response))
     return thinner, readings_in(gearset, state.readings, thinner)
 
 
 def readings_in(gearset: Gearset, readings: Complexes, other: Gearset) -> Complexes:
-    """Readings (n, m, r) in the lines of another gearset, those that only one of both has left out."""
+    """Enter readings (n, m, r) in the lines of another gearset; what only one of both has is left out."""
     found = np.zeros((len(other.lines.orders), *other.lengths.shape), dtype=complex)
     places = gearset.places_in(other)
     there = places[0].ravel() >= 0
