@@ -42,7 +42,7 @@ BESIDE = 1e-4
 """What a line has, over the vibration, from which others are looked for beside it; what those left out may have."""
 PASSED = 1e-4
 """Residual over the vibration up to which lines beside others count as found that passing planets make."""
-MOST_PASSED = 2
+MOST_PASSED = 3
 """Multiples of the passing of planets whose lines are looked at, at most."""
 TOLD = 0.05
 """Share of the overall transmission error in lines beside others from which it is remarked on."""
