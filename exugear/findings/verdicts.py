@@ -149,7 +149,7 @@ def _of_resonances(group: RunGroup) -> list[Verdict]:
     if not loudest:
         return []
     count, steady = len(loudest), sum(own.steady for own in loudest)
-    verdicts = []
+    verdicts: list[Verdict] = []
     if not group.responses:
         verdicts.append(Verdict(steady == count, f"{steady} of the {count} loudest stay with windows of other lengths"))
     if group.runs[group.main].modes is None and not group.responses:

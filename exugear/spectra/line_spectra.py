@@ -47,7 +47,7 @@ class LineSpectra(Waterfall):
 
     def resolution(self, line: OrderLine) -> Floats:
         """Distance of the speeds along an order, Hz, shape (n,)."""
-        return np.abs(np.gradient(line.frequency(self.speed)))
+        return np.asarray(np.abs(np.gradient(line.frequency(self.speed))), dtype=np.float64)
 
     @property
     def description(self) -> str:

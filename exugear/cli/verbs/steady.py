@@ -179,7 +179,7 @@ def _tell_of_pulls(data: xr.Dataset) -> tuple[Pull, ...]:
     from exugear.tooth_mesh.laws.registry import LAWS
 
     law = str(data.attrs["mesh_law"])
-    found = () if LAWS[law].loses_contact else pulls(data)
+    found: tuple[Pull, ...] = () if LAWS[law].loses_contact else pulls(data)
     for pull in found:
         note(
             f"{pull.mesh}: teeth would have to pull at {pull.count} of {data.sizes['point']} speeds, longest at "
