@@ -17,6 +17,8 @@ from exugear.model.parts import RPM
 from exugear.results.run_file import read_run
 from exugear.runs.trust import verdict_of
 from exugear.spectra.run_spectra import VariantRun
+from exugear.steady.peaks import pulls
+from exugear.tooth_mesh.laws.registry import LAWS
 
 LOUDEST = 10
 """Loudest resonances that checks look at."""
@@ -130,6 +132,10 @@ def _of_response(response: xr.Dataset) -> list[Verdict]:
     remarks = [str(words) for words in response["remark"].to_numpy() if str(words)]
     if remarks:
         verdicts.append(Verdict(False, f"speeds with remarks: {len(remarks)}, the first: {remarks[0]}"))
+    for pull in () if LAWS[str(response.attrs["mesh_law"])].loses_contact else pulls(response):
+        where = f"{pull.count} of {response.sizes['point']} speeds, longest at {abs(pull.speed) / RPM:.4g} rpm"
+        said = f"teeth of {pull.mesh} would have to pull at {where}: they would part, and levels there are not real"
+        verdicts.append(Verdict(False, said))
     apart = float(np.nanmax(response["apart_share"], initial=0.0))
     if apart > 0.0:
         verdicts.append(
@@ -143,7 +149,7 @@ def _of_resonances(group: RunGroup) -> list[Verdict]:
     if not loudest:
         return []
     count, steady = len(loudest), sum(own.steady for own in loudest)
-    verdicts = []
+    verdicts: list[Verdict] = []
     if not group.responses:
         verdicts.append(Verdict(steady == count, f"{steady} of the {count} loudest stay with windows of other lengths"))
     if group.runs[group.main].modes is None and not group.responses:

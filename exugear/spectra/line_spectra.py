@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.signal
+from numpy.typing import NDArray
 
 from exugear.spectra.orders import OrderLine
 from exugear.spectra.resonances import Pick
@@ -47,7 +49,7 @@ class LineSpectra(Waterfall):
 
     def resolution(self, line: OrderLine) -> Floats:
         """Distance of the speeds along an order, Hz, shape (n,)."""
-        return np.abs(np.gradient(line.frequency(self.speed)))
+        return np.asarray(np.abs(np.gradient(line.frequency(self.speed))), dtype=np.float64)
 
     @property
     def description(self) -> str:
@@ -109,12 +111,12 @@ def line_spectra(
     return LineSpectra(time, fine, frequency, picture, "none", 0.0, 0.0, reference, unit, orders, level)
 
 
-def _picture(speed: Floats, orders: Floats, amplitude: Floats, frequency: Floats) -> Floats:
+def _picture(speed: Floats, orders: Floats, amplitude: Floats, frequency: Floats) -> NDArray[Any]:
     """Amplitudes over speeds and frequencies: each line over all rows that it passes on its way between speeds."""
     middle = 0.5 * (speed[1:] + speed[:-1])
     low, high = np.append(speed[0], middle), np.append(middle, speed[-1])
     rows_per_hertz = (frequency.size - 1) / frequency[-1]
-    picture = np.zeros((speed.size, frequency.size), dtype=np.float32)
+    picture: NDArray[Any] = np.zeros((speed.size, frequency.size), dtype=np.float32)
     drawn = np.nan_to_num(amplitude)
     for line, order in enumerate(orders):
         first = np.rint(order * low / (2.0 * np.pi) * rows_per_hertz).astype(np.int64) - THICK

@@ -23,6 +23,10 @@ SAME_ORDER = 1e-6
 """Share by which orders of one line may differ."""
 SAME_SPEED = 0.02
 """Share of the speed within which a peak belongs to the crossing of its line with a mode."""
+DRAWN, MANY_TURNS = 4096, 2e4
+"""Angles of the input that teeth are looked at, and from which range they are drawn, rad."""
+HEARD = 1e-4
+"""Share of the static force below which a line plays no part in whether teeth pull."""
 BESIDE = 0.03
 """Share of the speed within which a run-up's peak is looked for: sweeps shift it."""
 
@@ -224,6 +228,70 @@ def _place(data: xr.Dataset, peak: Peak) -> tuple[int, int]:
 
 def _signed(words: str) -> str:
     return words if words.startswith("- ") else f"+ {words}"
+
+
+@dataclass(frozen=True)
+class Pull:
+    """A mesh whose teeth would have to pull: they part, which a law without contact loss does not know.
+
+    Attributes
+    ----------
+    mesh : str
+        Name; of planets the family.
+    count : int
+        At how many of the speeds.
+    speed : float
+        Of the input where it pulls longest, rad/s.
+    share : float
+        Of the time there.
+    """
+
+    mesh: str
+    count: int
+    speed: float
+    share: float
+
+
+def pulls(data: xr.Dataset) -> tuple[Pull, ...]:
+    """Find the meshes whose force changes its sign about its mean, the static force, that longest pulling first.
+
+    The lines of a speed are summed up at angles of the input drawn at random (`DRAWN`, the same each time). Of planets
+    it is the one that the waves around the carrier unload most.
+
+    Parameters
+    ----------
+    data : Dataset
+        As `exugear.steady.steady_file.load_response` reads it.
+    """
+    names = [str(name) for name in data["signal"].to_numpy()]
+    places: dict[str, list[int]] = {}
+    for place, name in enumerate(names):
+        if name.startswith("mesh_force "):
+            places.setdefault(name.split(" ")[1], []).append(place)
+    found = []
+    for mesh, own in places.items():
+        shares = _pulling(data, own)
+        most = int(np.argmax(shares))
+        if shares[most] > 0.0:
+            found.append(Pull(mesh, int((shares > 0.0).sum()), float(data["speed"][most]), float(shares[most])))
+    return tuple(sorted(found, key=lambda pull: -pull.share))
+
+
+def _pulling(data: xr.Dataset, places: list[int]) -> Floats:
+    """Share of time at each speed in which a mesh pulls, from its waves: all planets alike, then the others."""
+    own = data[["amplitude", "phase"]].isel(signal=places)
+    force = own["amplitude"].to_numpy() * np.exp(1j * own["phase"].to_numpy().astype(np.float64))
+    static = force[:, 0, 0].real
+    force *= np.where(static < 0.0, -1.0, 1.0)[:, None, None]
+    swing = np.abs(force).sum(axis=(1, 2)) - np.abs(static)
+    angles = np.random.default_rng(0).uniform(0.0, MANY_TURNS, DRAWN)
+    shares = np.zeros(len(static))
+    for point in np.flatnonzero(swing >= np.abs(static)):
+        lines = np.flatnonzero(np.abs(force[point]).max(axis=1) > HEARD * np.abs(static[point]))
+        turning = np.exp(1j * np.outer(angles, data["order"].to_numpy()[lines]))
+        waves = (turning @ force[point, lines]).real
+        shares[point] = np.mean(waves[:, 0] < np.hypot.reduce(waves[:, 1:], axis=1, initial=0.0))
+    return shares
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import numpy as np
 
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.fingerprint import input_hash
-from exugear.loads.summary import summarise_loads
+from exugear.loads.summary import BURSTING_RIM_SPEED, rim_radii, summarise_loads
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import RPM
 from exugear.model.versions import STEADY
@@ -103,6 +103,25 @@ def usual_speeds(gearbox: Gearbox) -> SpeedRange:
         if loads.fastest_speed > 0.0:
             return SpeedRange(0.0, math.copysign(loads.fastest_speed, loads.end_speed), USUAL_COUNT)
     raise SteadyError("speeds: no load case turns the train; name them, as 0:215:400 in rpm of the input")
+
+
+def check_speeds(gearbox: Gearbox, speeds: SpeedRange) -> None:
+    """Refuse speeds that no gearbox reaches.
+
+    Raises
+    ------
+    SteadyError
+        A rim runs faster than wheels of steel bear.
+    """
+    fastest = max(abs(speeds.first), abs(speeds.last))
+    turns = gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)
+    rims = {name: abs(turns[name]) * radius for name, radius in rim_radii(gearbox).items()}
+    body, rim = max(rims.items(), key=lambda item: item[1], default=("", 0.0))
+    if rim * fastest > BURSTING_RIM_SPEED:
+        raise SteadyError(
+            f"speeds {speeds.text}: bring a rim on {body} to {rim * fastest:.4g} m/s, and wheels of steel burst at "
+            f"some {BURSTING_RIM_SPEED:g} m/s; ask for up to {BURSTING_RIM_SPEED / rim / RPM:.4g} rpm"
+        )
 
 
 def check_law(name: str, level: Level) -> None:

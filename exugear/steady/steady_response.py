@@ -26,7 +26,7 @@ from exugear.steady.gearbox_branches import follow_branch
 from exugear.steady.point_solver import PointSolver, gearset_of
 from exugear.steady.resonances import HARMONICS, Crossing, crossings, refined
 from exugear.steady.response import Response, dissipated_and_given, signals
-from exugear.steady.settings import SteadySettings, check_law, usual_speeds
+from exugear.steady.settings import SteadySettings, check_law, check_speeds, usual_speeds
 from exugear.tooth_mesh.law import MeshData
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Texts
 from fe_ste.tools.notebook import html_table, value_range
@@ -243,6 +243,7 @@ def response_of(
     keep_every : float
         Seconds between them.
     """
+    check_speeds(assembly.gearbox, settings.speeds)
     check_law(assembly.mesh_law, settings.level)
     even = settings.speeds.values
     gearset = gearset_of(assembly, even, settings.harmonics, settings.combinations)

@@ -11,7 +11,7 @@ import typer
 from exugear.cli.case import make_results_folder, open_project
 from exugear.cli.console import note, print_json, print_table, progress_bar, say
 from exugear.cli.dynamics import reduce_elastic_bodies
-from exugear.cli.errors import exit_codes, interruption, model_errors
+from exugear.cli.errors import FailedError, exit_codes, interruption, model_errors
 from exugear.cli.options import (
     USUAL_LAW,
     CaseArgument,
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from exugear.project import Project
-    from exugear.steady.peaks import Peak
+    from exugear.steady.peaks import Peak, Pull
     from exugear.steady.settings import SteadySettings
 
 LEAST_AMPLITUDE = 1e-12
@@ -96,10 +96,11 @@ def steady(
 
 
 def _settings(project: Project, level: Level, speeds: str | None, branches: bool) -> SteadySettings:
-    from exugear.steady.settings import SpeedRange, SteadySettings, check_law, usual_speeds
+    from exugear.steady.settings import SpeedRange, SteadySettings, check_law, check_speeds, usual_speeds
 
     check_law(project.choice.mesh_law, level.value)
     asked = usual_speeds(project.gearbox) if speeds is None else SpeedRange.from_text(speeds)
+    check_speeds(project.gearbox, asked)
     return SteadySettings(asked, level.value, branches=branches)
 
 
@@ -123,6 +124,7 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
     path, found = project.steady_path(settings), [peak for peak in peaks(data) if peak.amplitude > LEAST_AMPLITUDE]
     growth = float(data.attrs["growth_rate"])
     _tell_of_stability(data, growth)
+    pulling = _tell_of_pulls(data)
     _tell_of_bearings(data)
     if data.attrs["shared_lines"]:
         note(f"Mesh frequencies share lines, each of which is named after one of them: {data.attrs['shared_lines']}")
@@ -136,6 +138,7 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
                 "speeds": int(data.sizes["point"]),
                 "lines": int(data.sizes["line"]),
                 "growth_rate_1_per_s": growth,
+                "meshes_that_pull": [_pull_summary(pull) for pull in pulling],
                 "unsolved": [
                     {"speed_rpm": own["speed"] / RPM, "reason": own["reason"]}
                     for own in json.loads(data.attrs["unsolved"])
@@ -151,13 +154,46 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
                 "file": str(path),
             }
         )
+        _fail_if_unstable(data, growth)
         return
     shown = [_row(peak) for peak in found[:SHOWN_PEAKS]]
     title = f"Overall transmission error, {project.choice.variant}, {settings.level}: its loudest peaks"
     if shown:
         print_table(title, shown)
     fastest = float(abs(data["speed"]).max()) / RPM
-    say(f"{data.sizes['point']} speeds up to {fastest:.4g} rpm, slowest decay {-growth:.3g} 1/s, in {path}")
+    decay = f"slowest decay {-growth:.3g} 1/s" if growth <= 0.0 else f"fastest growth {growth:.3g} 1/s"
+    say(f"{data.sizes['point']} speeds up to {fastest:.4g} rpm, {decay}, in {path}")
+    _fail_if_unstable(data, growth)
+
+
+def _fail_if_unstable(data: xr.Dataset, growth: float) -> None:
+    """End with code 1 where no speed has a steady state; where each has its own stability, its file tells which."""
+    if growth > 0.0 and not bool(data["growth"].notnull().any()):
+        raise FailedError(f"the steady response is not to be trusted: disturbances grow by up to {growth:.3g} 1/s")
+
+
+def _tell_of_pulls(data: xr.Dataset) -> tuple[Pull, ...]:
+    """Say which meshes would have to pull, where the law does not let their teeth part."""
+    from exugear.model.parts import RPM
+    from exugear.steady.peaks import pulls
+    from exugear.tooth_mesh.laws.registry import LAWS
+
+    law = str(data.attrs["mesh_law"])
+    found: tuple[Pull, ...] = () if LAWS[law].loses_contact else pulls(data)
+    for pull in found:
+        note(
+            f"{pull.mesh}: teeth would have to pull at {pull.count} of {data.sizes['point']} speeds, longest at "
+            f"{pull.speed / RPM:.4g} rpm, {100.0 * pull.share:.2g} % of the time: they would part, which the law "
+            f"{law} does not know; take --mesh-law table --level nonlinear",
+            style="yellow",
+        )
+    return found
+
+
+def _pull_summary(pull: Pull) -> dict[str, Any]:
+    from exugear.model.parts import RPM
+
+    return {"mesh": pull.mesh, "speeds": pull.count, "worst_speed_rpm": pull.speed / RPM, "share_of_time": pull.share}
 
 
 def _tell_of_stability(data: xr.Dataset, growth: float) -> None:

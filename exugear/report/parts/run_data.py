@@ -76,7 +76,8 @@ def _channels(material: Material, group: RunGroup, run: VariantRun) -> Iterator[
 
 def _variant(material: Material, group: RunGroup, run: VariantRun) -> dict[str, Any]:
     material.context.tell(f"channels of {run.variant}, {group.source}, {group.inertias}")
-    channels, loudest = [_overall(material, run.spectra)], {}
+    channels = [_overall(material, run.spectra)]
+    loudest: dict[str, dict[str, Any] | None] = {}
     # One at a time: spectra are large.
     for channel in _channels(material, group, run):
         channels.append(_channel(material, channel))

@@ -87,6 +87,8 @@ def test_the_range_of_the_load_case_is_the_usual_one(case):
     [
         (("--variant", "rigid", "--speeds", "5"), "must be FIRST:LAST:COUNT"),
         (("--variant", "rigid", "--speeds", "-5:5:10"), "change their sense"),
+        (("--variant", "rigid", "--speeds", "0:1e6:10"), "wheels of steel burst"),
+        (("--variant", "rigid", "--speeds", "0:1e300:10"), "wheels of steel burst"),
         (("--variant", "rigid", "--mesh-law", "rigid"), "nothing vibrates"),
         (("--variant", "rigid", "--mesh-law", "table"), "its teeth may part"),
     ],
@@ -95,3 +97,28 @@ def test_what_cannot_be_answered_is_one_sentence_and_code_2(case, options, said)
     outcome = steady(case, *options)
     assert outcome.exit_code == 2
     assert said in outcome.stderr
+
+
+def test_a_response_in_which_teeth_pull_says_where(case):
+    """On ideal joints the spur pair's force swings beyond its static one at the resonance, and grows besides."""
+    outcome = steady(case, "--variant", "rigid", "--speeds", "500:8000:30", "--json")
+    assert outcome.exit_code == 1
+    assert "disturbances grow" in outcome.stderr
+    (pull,) = json.loads(outcome.stdout)["meshes_that_pull"]
+    assert pull["mesh"] == "spur" and pull["speeds"] > 0
+    assert "teeth would have to pull" in outcome.stderr
+
+
+def test_an_unstable_response_ends_with_code_1_and_says_so(case, monkeypatch):
+    from exugear.project import Project
+
+    kept = Project.steady
+
+    def unstable(self, settings, progress):
+        return kept(self, settings, progress).assign_attrs(growth_rate=221.0)
+
+    monkeypatch.setattr(Project, "steady", unstable)
+    outcome = steady(case, "--variant", "rigid", "--speeds", "10:50:5")
+    assert outcome.exit_code == 1
+    assert "fastest growth 221 1/s" in outcome.stdout
+    assert "not to be trusted" in outcome.stderr
