@@ -23,6 +23,7 @@ from typing import TypeAlias
 import numpy as np
 
 from fe_ste.tools.arrays import Complexes, Floats, Integers
+from fe_ste.tools.threads import side_by_side
 
 Found: TypeAlias = tuple[Complexes, Complexes, Complexes]
 """Eigenvalues (n,), right and left shapes (n, 2 size), as `exugear.rotating.mean_modes` gives them."""
@@ -93,7 +94,8 @@ def mode_tracks(modes_at: Callable[[float], Found], low: float, high: float) -> 
     array([[10.   ,  7.071],
            [10.   , 21.213]])
     """
-    found = {float(speed): modes_at(float(speed)) for speed in np.linspace(low, high, COUNT)}
+    even = np.linspace(low, high, COUNT).tolist()
+    found = dict(zip(even, side_by_side(modes_at, even), strict=True))
     narrowest = NARROWEST * abs(high - low)
     while len(found) < MOST:
         speeds = sorted(found)

@@ -9,6 +9,7 @@ Machine code is kept by `fe_ste.tools.compilation`.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ from fe_ste.tools.inner_kernels import kept_bundle
 from fe_ste.tools.octets import SIZE, aligned_zeros, all_eight, eight, put
 
 LEFT_OVER = 1e-10
-"""Residual over the load up to which a solution counts as such."""
+"""Residual over the load up to which a solution counts as such, both by the sum of all loads."""
 
 
 class Elimination(NamedTuple):
@@ -94,9 +95,15 @@ def elimination(pattern: Booleans) -> Elimination:
 
 
 def solve_side_by_side(
-    plan: Elimination, stiffness: Floats, damping: Floats, mass: Floats, frequencies: Floats, loads: Floats
-) -> Complexes:
-    """Amplitudes (lines, n, loads) of (K + i w C - w^2 M) x = f.
+    plan: Elimination,
+    stiffness: Floats,
+    damping: Floats,
+    mass: Floats,
+    frequencies: Floats,
+    loads: Floats,
+    amplitudes: Complexes,
+) -> None:
+    """Fill amplitudes x (lines, n, loads) of (K + i w C - w^2 M) x = f, an array in C order.
 
     Parameters
     ----------
@@ -108,25 +115,12 @@ def solve_side_by_side(
     loads : (n, loads) array
     """
     places, given = (plan.row, plan.column), np.ascontiguousarray(loads[plan.order])
-    amplitudes = np.empty((len(frequencies), *loads.shape), dtype=np.complex128)
-    memory = aligned_zeros(2 * SIZE * len(plan.row)).reshape(2, -1)
+    memory = aligned_zeros(2 * SIZE * max(len(plan.row), 2 * len(plan.order))).reshape(2, -1)
     x, numbers = aligned_zeros(2 * SIZE * loads.size), amplitudes.view(np.float64)
-    pencil = stiffness[places], damping[places], mass[places]
-    solve_octets(kept_bundle(plan), *pencil, frequencies, given, memory[0], memory[1], x, numbers)
-    _exchange_where_needed(amplitudes, (stiffness, damping, mass), frequencies, loads)
-    return amplitudes
-
-
-def _exchange_where_needed(
-    amplitudes: Complexes, pencil: tuple[Floats, Floats, Floats], frequencies: Floats, loads: Floats
-) -> None:
-    """Solve those lines anew whose first solution leaves too much over, by the sum of all loads."""
-    stiffness, damping, mass = pencil
-    together = amplitudes.sum(axis=2)
-    w = frequencies[:, None]
-    inner = together @ stiffness.T + 1j * w * (together @ damping.T) - w**2 * (together @ mass.T)
+    pencil, missing = (stiffness[places], damping[places], mass[places]), np.empty(len(frequencies))
+    solve_octets(kept_bundle(plan), *pencil, frequencies, given, memory[0], memory[1], x, numbers, missing)
     scale = np.abs(loads.sum(axis=1)).max() + 1e-3 * np.abs(loads).max()
-    missing = np.abs(inner - loads.sum(axis=1)).max(axis=1)
+    # A residual that is no number is none that is small.
     for line in np.flatnonzero(~(missing <= LEFT_OVER * scale)):
         w = frequencies[line]
         amplitudes[line] = np.linalg.solve(stiffness - w**2 * mass + 1j * w * damping, loads)
@@ -144,11 +138,12 @@ def solve_octets(
     imaginary: Floats,
     x: Floats,
     out: Floats,
+    missing: Floats,
 ) -> None:
-    """Fill amplitudes (lines, n, 2 cases), real and imaginary parts in turns, eight lines at a time.
+    """Fill amplitudes (lines, n, 2 cases), real and imaginary parts in turns, and residuals (lines,), eight at a time.
 
     Matrices are given by their entries (e,), loads (n, cases) by row in the order of the elimination. `real` and
-    `imaginary` (8 e,) and `x` (16 n cases,) are memory.
+    `imaginary` (8 e, or 16 n if that is more) and `x` (16 n cases,) are memory.
     """
     size, cases = loads.shape
     lines = frequencies.size
@@ -167,6 +162,47 @@ def solve_octets(
                 for lane in range(count):
                     out[line + lane, plan.order[k], 2 * case] = x[at + lane]
                     out[line + lane, plan.order[k], 2 * case + 1] = x[at + SIZE + lane]
+        add_cases(plan.order, loads, real, imaginary, x)
+        for lane in range(SIZE):
+            x[lane] = frequencies[line + min(lane, count - 1)]
+        leave_over(plan, stiffness, damping, mass, real, imaginary, x)
+        for lane in range(count):
+            missing[line + lane] = math.sqrt(x[lane])
+
+
+@kernel
+def add_cases(order: Integers, loads: Floats, real: Floats, imaginary: Floats, x: Floats) -> None:
+    """Put the sum of the solutions of all cases into the first 8 n numbers of the memory, by row, its loads behind."""
+    size, cases = loads.shape
+    for k in range(size):
+        a, b, given = all_eight(0.0), all_eight(0.0), 0.0
+        for case in range(cases):
+            at = 2 * SIZE * (k * cases + case)
+            a, b = a + eight(x, at), b + eight(x, at + SIZE)
+            given += loads[k, case]
+        put(real, SIZE * order[k], a)
+        put(imaginary, SIZE * order[k], b)
+        put(real, SIZE * (size + order[k]), all_eight(-given))
+        put(imaginary, SIZE * (size + order[k]), all_eight(0.0))
+
+
+@kernel
+def leave_over(
+    plan: Elimination, stiffness: Floats, damping: Floats, mass: Floats, real: Floats, imaginary: Floats, x: Floats
+) -> None:
+    """Turn eight frequencies, the first numbers of `x`, into the squares of what solutions in the memory leave over."""
+    size, w = plan.order.size, eight(x, 0)
+    for entry in range(stiffness.size):
+        p, q = stiffness[entry] - w * w * mass[entry], w * damping[entry]
+        at, to = SIZE * plan.column[entry], SIZE * (size + plan.row[entry])
+        a, b = eight(real, at), eight(imaginary, at)
+        put(real, to, eight(real, to) + p * a - q * b)
+        put(imaginary, to, eight(imaginary, to) + p * b + q * a)
+    total = all_eight(0.0)
+    for row in range(size, 2 * size):
+        a, b = eight(real, SIZE * row), eight(imaginary, SIZE * row)
+        total = total + a * a + b * b
+    put(x, 0, total)
 
 
 @kernel

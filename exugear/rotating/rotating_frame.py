@@ -184,10 +184,12 @@ class RotatingFrame:
         return {}
 
     def _at(self, psi: float) -> tuple[Jet, Jet]:
-        if psi not in self._kept:
+        found = self._kept.get(psi)
+        if found is None:
+            found = self._matrices(psi), self._rolling(psi)
             self._kept.clear()
-            self._kept[psi] = self._matrices(psi), self._rolling(psi)
-        return self._kept[psi]
+            self._kept[psi] = found
+        return found
 
     def matrices(self, psi: float) -> Jet:
         """T and its two derivatives by psi, each (size, size)."""

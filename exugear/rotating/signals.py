@@ -58,10 +58,15 @@ class SignalRows:
 
     def of(self, motion: Complexes, frequencies: Floats) -> Complexes:
         """Coefficients (lines, signals) of the signals of a motion (lines, size) at angular frequencies."""
-        w = frequencies[:, None]
-        return np.asarray(
-            motion @ self.by_place.T + 1j * w * (motion @ self.by_rate.T) - w**2 * (motion @ self.by_acceleration.T)
-        )
+        w = 1j * frequencies[:, None]
+        # Rows are real, and most have one part or two: products with the real numbers of the motion in those.
+        parts, lines = np.concatenate([motion.real, motion.imag]), len(motion)
+        found = np.zeros((lines, len(self.names)), dtype=np.complex128)
+        for factor, rows in ((1.0, self.by_place), (w, self.by_rate), (w**2, self.by_acceleration)):
+            own = np.flatnonzero(rows.any(axis=1))
+            values = parts @ rows[own].T
+            found[:, own] += factor * (values[:lines] + 1j * values[lines:])
+        return found
 
 
 def mesh_signal_names(waves: MeshWaves) -> tuple[SignalName, ...]:

@@ -134,18 +134,18 @@ def _derivatives(
     assembly, t = frame.assembly, frame.matrices(0.0)[0]
     q, _, _ = frame.state(0.0, speed, system.static_at(speed))
     elements = linearise(assembly, q, frame.mean_meshes)
+    adjoint, motion = t @ adjoint, t @ motion
     supports: dict[str, float] = {}
     for support in assembly.supports:
-        element = elements.stiffness[support.name] + 1j * frequency * elements.damping[support.name]
-        own = _share(-complex(adjoint @ (t.T @ element @ t) @ motion), total)
+        forces = elements.stiffness[support.name] @ motion
+        forces = forces + 1j * frequency * (elements.damping[support.name] @ motion)
+        own = _share(-complex(adjoint @ forces), total)
         supports[support.family] = supports.get(support.family, 0.0) + own
     bodies: dict[str, float] = {}
     for body in assembly.bodies:
         place = assembly.elastic_slices.get(body.name)
         index = [i for i in assembly.coordinates[body.name] if i >= 0]
         index = index if place is None else list(range(place.start, place.stop))
-        own_mass = np.zeros_like(elements.mass)
-        own_mass[np.ix_(index, index)] = elements.mass[np.ix_(index, index)]
-        change = -(frequency**2) * (t.T @ own_mass @ t)
-        bodies[body.family] = bodies.get(body.family, 0.0) + _share(-complex(adjoint @ change @ motion), total)
+        inertia = -(frequency**2) * (elements.mass[np.ix_(index, index)] @ motion[index])
+        bodies[body.family] = bodies.get(body.family, 0.0) + _share(-complex(adjoint[index] @ inertia), total)
     return supports, bodies

@@ -73,7 +73,10 @@ class Interface:
     @cached_property
     def deflection(self) -> Complexes:
         """Deflections (n, m, m, f) under a unit of each force."""
-        return np.asarray(np.tensordot(self.ports.readings[:, DEFLECTION], self.motion, axes=(1, 1)).swapaxes(0, 1))
+        rows, (lines, size, *loads) = self.ports.readings[:, DEFLECTION], self.motion.shape
+        # A row's numbers are real: so are the products with both parts of the motion.
+        found = rows @ self.motion.view(np.float64).reshape(lines, size, -1)
+        return np.asarray(found.view(np.complex128).reshape(lines, len(rows), *loads))
 
     @cached_property
     def readings(self) -> Complexes:
@@ -338,6 +341,11 @@ class Gearset:
         return tuple(Product(self.lines, base, self.harmonics) for base in range(len(self.waves.base_orders)))
 
     @cached_property
+    def _waves_by_base(self) -> tuple[Integers, ...]:
+        bases = np.array([wave.base for wave in self.waves.waves])
+        return tuple(np.flatnonzero(bases == base) for base in range(len(self.waves.base_orders)))
+
+    @cached_property
     def lengths(self) -> Floats:
         """What a reading (m, r) counts as a length, m: metres as they are, cycles and angles by the base pitch.
 
@@ -378,10 +386,15 @@ class Gearset:
         frequencies, loads = abs(speed) * self.lines.orders, self.loads(ports)
         # Laws with fewer forces than others have none in their places.
         acting = np.flatnonzero(loads.any(axis=0))
-        still = np.zeros((system.size + 1, loads.shape[1]))
-        still[:, acting] = system.still(system.stiffness_at(speed), loads[:, acting])
-        motion = np.zeros((len(frequencies), *loads.shape), dtype=complex)
-        motion[0], motion[1:, :, acting] = still[:-1], system.responses(speed, frequencies[1:], loads[:, acting])
+        pencil = system.stiffness_at(speed), system.damping_at(speed)
+        found = system.still(pencil[0], loads[:, acting])
+        moved = np.empty((len(frequencies), system.size, len(acting)), dtype=complex)
+        moved[0] = found[:-1]
+        system.fill_responses(pencil, frequencies[1:], loads[:, acting], moved[1:])
+        still, motion = found[-1], moved
+        if len(acting) < loads.shape[1]:
+            still, motion = np.zeros(loads.shape[1]), np.zeros((len(frequencies), *loads.shape), dtype=complex)
+            still[acting], motion[:, :, acting] = found[-1], moved
         shape = ports.forces.shape[:2]
         rows = {name: system.at(values, speed) for name, values in self._rows.items()}
         return Interface(
@@ -391,7 +404,7 @@ class Gearset:
             ports=ports,
             rows=SignalRows(self._row_names, **rows),
             torque=system.torque_at(speed),
-            torque_per_force=still[-1].reshape(shape),
+            torque_per_force=still.reshape(shape),
             bearings=self._bearings_at(speed) if self.bearings else None,
         )
 
@@ -409,8 +422,10 @@ class Gearset:
 
     def stretched(self, coefficients: Complexes, deflection: Complexes) -> Complexes:
         """Products (n, m) of each wave's stiffness, by its `coefficients`, with its deflection (n, m), N."""
-        waves = zip(self.waves.waves, coefficients, deflection.T, strict=True)
-        return np.stack([self.products[wave.base].of(own, values) for wave, own, values in waves], axis=1)
+        out, values = np.zeros(deflection.shape, dtype=np.complex128), np.ascontiguousarray(deflection)
+        for product, waves in zip(self.products, self._waves_by_base, strict=True):
+            product.add(coefficients, values, waves, out)
+        return out
 
     def slopes(self, coefficients: Complexes, speed: float) -> Complexes:
         """Coefficients (m, h + 1) by the bases' angles of what planets ahead in the mesh cycle have more of a function.

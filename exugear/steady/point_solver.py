@@ -118,7 +118,7 @@ class PointSolver:
     """
 
     def __init__(self, gearset: Gearset, settings: SteadySettings) -> None:
-        self._linear, self._level = gearset, settings.level
+        self.linear, self._level = gearset, settings.level
         self.gearset = gearset.with_bearings if settings.level == "nonlinear" else gearset
         self._last: Complexes | None = None
         self.state: PartingState | None = None
@@ -130,14 +130,14 @@ class PointSolver:
 
     def forcing(self, interface: Interface) -> Complexes:
         """Find the forces of the meshes (lines, m, f) that vary in the static state, N, bearings being linear."""
-        if not self._linear.parting:
-            return transmission_errors(self._linear, interface)
-        balance = Balance(self._linear, interface, self._linear.lattice)
+        if not self.linear.parting:
+            return transmission_errors(self.linear, interface)
+        balance = Balance(self.linear, interface, self.linear.lattice)
         return balance.forces(balance.static)[0]
 
     def growth(self, low: float, high: float) -> float:
         """Fastest growth of a disturbance between two speeds of the input (rad/s), 1/s."""
-        gearset = self._linear
+        gearset = self.linear
         found = [mean_growth(gearset)]
         unknown = gearset.parting or gearset.waves.carriers
         for candidate in () if unknown else candidates(gearset, low, high)[:CHECKED]:

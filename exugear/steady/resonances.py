@@ -17,6 +17,7 @@ from exugear.rotating.mean_system import MeanSystem
 from exugear.rotating.mesh_ports import DEFLECTION
 from exugear.steady.excitation import Gearset, Interface
 from fe_ste.tools.arrays import Complexes, Floats
+from fe_ste.tools.threads import side_by_side
 
 Forcing = Callable[[Interface], Complexes]
 HARMONICS = 3
@@ -90,14 +91,15 @@ def crossings(gearset: Gearset, tracks: ModeTracks, forcing: Forcing) -> tuple[C
     peaks = np.array([_peak(gearset, tracks, mode, speed, forces[at]) for mode, at, speed in met])
     shares = np.max(peaks / np.maximum(peaks.max(axis=0, initial=0.0), 1e-300), axis=1) if met else np.zeros(0)
     strongest = [n for n in np.argsort(-shares, kind="stable") if shares[n] >= LEAST_SHARE][:MOST]
-    exact = []
-    for n in strongest:
+
+    def exact(n: int) -> Crossing:
         mode, at, speed = met[n]
         value = _followed(gearset.system, tracks, mode, speed).value
         near = Crossing(speed, lines[at], mode, value.imag / 2.0 / np.pi, -value.real / abs(value), float(shares[n]))
-        exact.append(_met(gearset.system, tracks, gearset.lines.orders, near))
+        return _met(gearset.system, tracks, gearset.lines.orders, near)
+
     low, high = tracks.speeds[0], tracks.speeds[-1]
-    return tuple(crossing for crossing in exact if low <= crossing.speed <= high)
+    return tuple(crossing for crossing in side_by_side(exact, strongest) if low <= crossing.speed <= high)
 
 
 def refined(speeds: Floats, found: tuple[Crossing, ...]) -> Floats:

@@ -11,6 +11,7 @@ for every line k. Level `linear`: F is what the static transmission error excite
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -56,10 +57,12 @@ class Response:
     apart: Floats
     free: Floats
 
-    @property
+    @cached_property
     def motion(self) -> Complexes:
         """Coefficients (n, size) of the motion about the static state, in the rotating frame."""
-        return np.asarray(-np.einsum("nsmf,nmf->ns", self.interface.motion, self.excess))
+        lines, size = self.interface.motion.shape[:2]
+        found = self.interface.motion.reshape(lines, size, -1) @ self.excess.reshape(lines, -1, 1)
+        return np.asarray(-found[..., 0])
 
     @property
     def torque(self) -> float:
@@ -188,11 +191,12 @@ def dissipated_and_given(gearset: Gearset, response: Response) -> tuple[float, f
     Both are equal in a steady state.
     """
     interface, motion = response.interface, response.motion
-    w, moving = interface.frequencies[1:], motion[1:]
+    w, moving = interface.frequencies[1:, None], motion[1:]
     damping, stiffness = gearset.system.damping_at(interface.speed), gearset.system.stiffness_at(interface.speed)
-    rates = 1j * w[:, None] * moving
-    # A stiffness that is not symmetric takes power, too.
-    taken = 2.0 * float(np.sum((rates.conj() * (rates @ damping.T + moving @ stiffness.T)).real))
+    rates = 1j * w * moving
+    # A stiffness that is not symmetric takes power, too. Matrices are real: so are the products with both parts.
+    places, speeds = np.concatenate([moving.real, moving.imag]), np.concatenate([rates.real, rates.imag])
+    taken = 2.0 * float(np.sum(speeds * (speeds @ damping.T + places @ stiffness.T)))
     ports = interface.ports
     along = np.tensordot(rates, ports.forces, axes=(1, 2)) * gearset.weights[:, None]
     return taken, -2.0 * float(np.sum((response.excess[1:] * along.conj()).real))

@@ -30,6 +30,7 @@ from exugear.steady.settings import SteadySettings, check_law, check_speeds, usu
 from exugear.tooth_mesh.law import MeshData
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Texts
 from fe_ste.tools.notebook import html_table, value_range
+from fe_ste.tools.threads import one_dense_thread, second_thread
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,6 +221,7 @@ def steady_response(
     return response_of(assembly, settings or SteadySettings(usual_speeds(gearbox)))
 
 
+@one_dense_thread()
 def response_of(
     assembly: Assembly,
     settings: SteadySettings,
@@ -252,14 +254,17 @@ def response_of(
     tracks = _tracks(gearset, even)
     found = crossings(gearset, tracks, solver.forcing) if settings.at_resonances else ()
     folds: tuple[float, ...] = ()
-    if settings.branches:
-        solved, folds = _along_branch(solver, settings.speeds.first, settings.speeds.last, told)
-    else:
-        solved = _solve(solver, refined(even, found), known, told, keep, keep_every)
+    with second_thread() as beside:
+        # Large matrices, which wait for nobody, beside many small ones.
+        said = beside.submit(_of_mean_system, solver, even, found, tracks)
+        if settings.branches:
+            solved, folds = _along_branch(solver, settings.speeds.first, settings.speeds.last, told)
+        else:
+            solved = _solve(solver, refined(even, found), known, told, keep, keep_every)
     there = np.isfinite(solved.drive_torque)
     if not there.any():
         raise HarmonicBalanceError(str(solved.remark[0]))
-    fastest = np.fmax.reduce(solved.growth, initial=-np.inf)
+    explained, growth, campbell = said.result()
     return SteadyResponse(
         assembly=gearset.waves.assembly,
         settings=settings,
@@ -272,13 +277,22 @@ def response_of(
         solved=solved.part(there),
         unsolved=tuple(zip(solved.speed[~there].tolist(), solved.remark[~there].tolist(), strict=True)),
         crossings=found,
-        contributions=() if gearset.parting else _contributions(gearset, found),
+        contributions=explained,
         folds=folds,
-        growth_rate=float(np.fmax(solver.growth(float(even.min()), float(even.max())), fastest)),
+        growth_rate=float(np.fmax.reduce(solved.growth, initial=growth)),
         planet_spread=gearset.system.planet_spread,
         stiffness_variation=gearset.system.variation,
-        campbell=campbell_of(gearset.system, tracks),
+        campbell=campbell,
     )
+
+
+def _of_mean_system(
+    solver: PointSolver, speeds: Floats, found: tuple[Crossing, ...], tracks: ModeTracks
+) -> tuple[tuple[tuple[int, Contributions], ...], float, Campbell]:
+    """Find what makes the lines at the strongest crossings, the fastest growth, and the Campbell diagram."""
+    gearset = solver.linear
+    explained = () if gearset.parting else _contributions(gearset, found)
+    return explained, solver.growth(float(speeds.min()), float(speeds.max())), campbell_of(gearset.system, tracks)
 
 
 def _tracks(gearset: Gearset, speeds: Floats) -> ModeTracks:
