@@ -176,9 +176,8 @@ def response_groups(context: Context, results: StoredResults) -> tuple[RunGroup,
     """
     gathered: dict[tuple[str, str, str], dict[str, xr.Dataset]] = {}
     for data in filter(is_over_speed, results.steady):
-        choice = choice_of(data.attrs)
-        key = str(data.attrs["level"]), choice.mesh_law, choice.inertias
-        gathered.setdefault(key, {})[choice.variant] = data
+        key = str(data.attrs["level"]), str(data.attrs["mesh_law"]), str(data.attrs["inertias"])
+        gathered.setdefault(key, {})[str(data.attrs["variant"])] = data
     default = context.gearbox.case.default_inertias
     keys = sorted(gathered, key=lambda key: (key[2] != default, key))
     return tuple(_response_group(context, key, gathered[key], results) for key in keys)
