@@ -137,5 +137,10 @@ def _fitted(remedy: Complexes, by: Complexes, error: Complexes, half: int) -> Fl
 
 
 def _after(low_pass: Floats, remedy: Floats) -> Floats:
-    """Taps of a low pass and a remedy one after the other, as many as the low pass has: what is cut off is 1e-6."""
-    return np.convolve(low_pass, remedy, mode="same")
+    """Taps of a low pass and a remedy one after the other, as many as the low pass has: what is cut off is 1e-6.
+
+    Their sum is zero: a mean load may be ten thousand times the fluctuation beside it, and is right as it is.
+    """
+    both = np.convolve(low_pass, remedy, mode="same")
+    both[len(both) // 2] -= both.sum()
+    return both
