@@ -30,7 +30,7 @@ from exugear.steady.settings import SteadySettings, check_law, check_speeds, usu
 from exugear.tooth_mesh.law import MeshData
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Texts
 from fe_ste.tools.notebook import html_table, value_range
-from fe_ste.tools.threads import one_dense_thread, second_thread
+from fe_ste.tools.threads import one_dense_thread
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,17 +254,14 @@ def response_of(
     tracks = _tracks(gearset, even)
     found = crossings(gearset, tracks, solver.forcing) if settings.at_resonances else ()
     folds: tuple[float, ...] = ()
-    with second_thread() as beside:
-        # Large matrices, which wait for nobody, beside many small ones.
-        said = beside.submit(_of_mean_system, solver, even, found, tracks)
-        if settings.branches:
-            solved, folds = _along_branch(solver, settings.speeds.first, settings.speeds.last, told)
-        else:
-            solved = _solve(solver, refined(even, found), known, told, keep, keep_every)
+    if settings.branches:
+        solved, folds = _along_branch(solver, settings.speeds.first, settings.speeds.last, told)
+    else:
+        solved = _solve(solver, refined(even, found), known, told, keep, keep_every)
     there = np.isfinite(solved.drive_torque)
     if not there.any():
         raise HarmonicBalanceError(str(solved.remark[0]))
-    explained, growth, campbell = said.result()
+    explained, growth, campbell = _of_mean_system(solver, even, found, tracks)
     return SteadyResponse(
         assembly=gearset.waves.assembly,
         settings=settings,
