@@ -1,0 +1,81 @@
+"""Contact of a mesh about its static state: what it deflects by, where it bears, and how both follow load and tilt.
+
+With the deflection d at mid-face and the misalignment g, both of the loaded flank, a law along a row reads
+
+    e = d - zt (g - g0),   force F(e),   moment M = F0 zc + zt (F - F0) - kg (g - g0),
+
+which has a potential, U = U(e) + (zt - zc) F0 (g - g0) + kg (g - g0)^2 / 2: the generalized force of the mesh is
+-F dd/dq + M dg/dq. The load centre zc and that of a load more, zt, are means over the mesh cycle, in the transverse
+plane of action from the middle of the common face towards +z.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from fe_ste.geometry.gears import GearPair
+
+
+@dataclass(frozen=True)
+class ContactState:
+    """Contact of a mesh at one load and misalignment, as mean over the mesh cycle.
+
+    Attributes
+    ----------
+    force : float
+        Load F0 on the transverse line of action, N, positive.
+    deflection : float
+        Static transmission error at that load and misalignment, m.
+    tangent_stiffness : float
+        Change of the load with the deflection at that misalignment, N/m.
+    misalignment : float
+        g0, rad; it opens the gap at the +z end.
+    load_centre : float
+        zc, m.
+    tangent_load_centre : float
+        Centre zt of the load that a little more deflection adds, m; also the change of the deflection with the
+        misalignment under constant load, m/rad.
+    tilt_stiffness : float
+        kg: how much the load's moment falls with the misalignment while the load stays, N m/rad.
+
+    Examples
+    --------
+    >>> state = ContactState(50e3, 20e-6, 2.6e9, 1e-4, -2e-3, -1.9e-3, 2e5)
+    >>> state.seen_by(-1).load_centre, state.seen_by(-1).misalignment
+    (0.002, -0.0001)
+    """
+
+    force: float
+    deflection: float
+    tangent_stiffness: float
+    misalignment: float
+    load_centre: float
+    tangent_load_centre: float
+    tilt_stiffness: float
+
+    def seen_by(self, flank: int) -> ContactState:
+        """Take the state from the axes of a table to those of a mesh with this flank, or back.
+
+        The flank -1 is that of the table turned about the line of centres: the ends of the face change places.
+        """
+        return replace(
+            self,
+            misalignment=flank * self.misalignment,
+            load_centre=flank * self.load_centre,
+            tangent_load_centre=flank * self.tangent_load_centre,
+        )
+
+
+def even_contact(pair: GearPair, force: float, stiffness: float, tangent_stiffness: float) -> ContactState:
+    """Contact of teeth that are equally stiff all along the common face and bear evenly, so that kg = k b^2 / 12.
+
+    Parameters
+    ----------
+    pair : GearPair
+    force : float
+        N.
+    stiffness, tangent_stiffness : float
+        Load over deflection, and the slope of the load: that is what a tilt at constant load works against, N/m.
+    """
+    tilt_stiffness = tangent_stiffness * pair.face_width**2 / 12.0
+    return ContactState(force, force / stiffness, tangent_stiffness, 0.0, 0.0, 0.0, tilt_stiffness)
