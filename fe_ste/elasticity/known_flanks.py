@@ -147,11 +147,12 @@ def _remember(key: str, flank: FlankCompliance) -> None:
 
 def _path(key: str) -> Path | None:
     """File of a flank, or None where none is kept."""
-    folder = _folder()
+    folder = kept_folder()
     return None if folder is None else folder / f"flank-{key}.npz"
 
 
-def _folder() -> Path | None:
+def kept_folder() -> Path | None:
+    """Folder of the files; None where none are kept."""
     asked = os.environ.get(FOLDER_VARIABLE, "")
     if asked:
         return None if asked == "off" else Path(asked)

@@ -9,5 +9,8 @@ from __future__ import annotations
 #: Table of the static transmission error by the superelement (`fe_ste.transmission_error`).
 TABLE = 6
 
+#: Contact about a state (`fe_ste.transmission_error.mean_contact`); it rests on `TABLE`, too.
+MEAN_CONTACT = 1
+
 #: Table by the reference analysis (`fe_ste.reference.table`, and what it is computed by).
 NONLINEAR_TABLE = 1

@@ -220,6 +220,7 @@ class _Search:
             if touching is None:
                 return np.ones(expected.size, dtype=np.bool_)
             expected.reshape(-1)[touching] = True
+        margin += max(self.starts[index].moved for index in pending)
         _widen(expected, axis=1, steps=margin)
         _widen(expected, axis=2, steps=margin + 1)
         return expected.reshape(-1)

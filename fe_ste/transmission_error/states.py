@@ -68,11 +68,14 @@ class SearchStart:
         Reckoned approach beyond the first touch, m.
     touching : ndarray, optional
         Addresses, relative to the contact lines, of the cells that carried load.
+    moved : int
+        Cells by which contact may have moved since then.
     """
 
     cells: int
     depth: float
     touching: Integers | None = None
+    moved: int = 0
 
     def scaled(self, factor: float) -> SearchStart:
         """Return the start for `factor` times the load; the cells grow with the contact, so their addresses stay."""

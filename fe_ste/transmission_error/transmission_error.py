@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from itertools import count
 from threading import Lock
 from typing import TYPE_CHECKING
@@ -25,6 +26,9 @@ from fe_ste.transmission_error.states import StateAxes, StateResults
 
 if TYPE_CHECKING:
     import xarray as xr
+
+#: Positions from which on contact moves by no more than a cell from one to the next.
+_CLOSE_POSITIONS = 20
 
 
 def static_transmission_error(
@@ -136,6 +140,7 @@ def solve_positions(
         Of these positions alone.
     """
     chosen = list(positions)
+    moved = 0 if axes.positions >= _CLOSE_POSITIONS else 2
     results = StateResults.empty(compliance, (len(chosen), *axes.shape[1:]))
     finished = 0
     with one_dense_thread():
@@ -143,7 +148,7 @@ def solve_positions(
             at_distance = compliance.at_centre_distance(float(distance))
             descending = np.argsort(-axes.torque, kind="stable")  # contact that shrinks is found in fewer steps
             known_torque = float(axes.torque[descending[0]])
-            starts_of_first = [new_start(at_distance, known_torque) for _ in axes.misalignment]
+            starts_of_first = [replace(new_start(at_distance, known_torque), moved=moved) for _ in axes.misalignment]
             for t in descending:
                 torque = axes.torque[t]
                 starts = [start.scaled(float(torque) / known_torque) for start in starts_of_first]

@@ -1,0 +1,212 @@
+"""Contact of a pair about the state that it stands in: means over the mesh cycle, and their slopes by misalignment.
+
+A table over load, centre distance and misalignment takes thousands of states. What shafts and bearings need to know
+about teeth at rest takes ten: some positions of the mesh cycle under two misalignments on either side of the real one.
+Between these all is linear. They stand on a lattice whose steps are small against what teeth yield, so that all states
+nearby share one contact: those of equal planets, of a later step of the same search, of a gearbox that varies a little.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from fe_ste.contact.cells import ContactSettings
+from fe_ste.contact.kinematics import ContactError
+from fe_ste.elasticity.hexmesh import MeshSettings
+from fe_ste.geometry.gears import GearPair
+from fe_ste.tools.arrays import Floats
+from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance
+from fe_ste.transmission_error.face_load import face_load_factor, load_along_face
+from fe_ste.transmission_error.states import StateAxes
+from fe_ste.transmission_error.table import TableInput
+from fe_ste.transmission_error.transmission_error import solve_positions
+
+POSITIONS = 5
+"""Positions of the mesh cycle: twice as many move the misalignment of a gearbox in balance by 0.4 %."""
+FORCE_STEP = 0.02
+"""Step of the lattice in force, as a part of it: the slopes by force are those of the contact itself."""
+OPENING_STEP = 0.05
+"""Step of the lattice in misalignment: how far it opens the gap over the face, as a part of what teeth yield."""
+DISTANCE_STEP = 5e-3
+"""Step of the lattice in centre distance, in normal modules."""
+YIELDING = 14e9
+"""Force per face width and deflection, Pa, of usual teeth (c' of ISO 6336-1): it sets steps, no result."""
+_SHARED_PAIRS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class MeanContact:
+    """Contact of a pair over its mesh cycle under one force, at two misalignments.
+
+    Lengths and forces are along the transverse line of action. Each array is over the misalignments.
+
+    Attributes
+    ----------
+    force : float
+        N.
+    centre_distance : float
+        m.
+    misalignment : ndarray (2,)
+        rad, rising; positive where it opens the gap at the +z end.
+    deflection : ndarray (2,)
+        Mean of the static transmission error, m.
+    stiffness : ndarray (2,)
+        Force over that, by a little more force: 1 / mean (d deflection / d force), N/m.
+    load_centre : ndarray (2,)
+        Axial position of the resultant, m from the middle of the common face; mean under the constant force.
+    tangent_load_centre : ndarray (2,)
+        That of a little more force, m: derivative of the deflection by the misalignment.
+    face_load_factor : ndarray (2,)
+        K_Hbeta: highest over mean line load along the face, see `fe_ste.transmission_error.face_load`.
+    max_pressure, edge_pressure : ndarray (2,)
+        Largest of the cycle, away from and at tip edges, Pa.
+    axial : ndarray (k,)
+        Middle of the contact slices, m.
+    line_load : ndarray (2, k)
+        Of all tooth pairs together, mean of the cycle, N/m.
+    """
+
+    force: float
+    centre_distance: float
+    misalignment: Floats
+    deflection: Floats
+    stiffness: Floats
+    load_centre: Floats
+    tangent_load_centre: Floats
+    face_load_factor: Floats
+    max_pressure: Floats
+    edge_pressure: Floats
+    axial: Floats
+    line_load: Floats
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        low, high = 1e6 * self.misalignment
+        return f"<MeanContact: {self.force:.5g} N, misalignment {low:.4g} to {high:.4g} urad>"
+
+    @property
+    def tilt_stiffness(self) -> float:
+        """Moment against misalignment under constant force, -force d load_centre / d misalignment, N m/rad."""
+        return float(-self.force * np.diff(self.load_centre)[0] / np.diff(self.misalignment)[0])
+
+    def at(self, values: Floats, misalignment: float) -> Floats:
+        """One of the fields, (2,) or (2, k), at a misalignment (rad): on the straight line through both.
+
+        Examples
+        --------
+        >>> two = np.array([0.0, 1.0])
+        >>> contact = MeanContact(1.0, 1.0, 1e-5 * two, *[two] * 9)
+        >>> float(contact.at(contact.load_centre, 5e-6))
+        0.5
+        """
+        low, high = self.misalignment
+        share = (misalignment - low) / (high - low)
+        return np.asarray((1.0 - share) * values[0] + share * values[1])
+
+
+def contact_input(
+    table: TableInput, force: float, misalignment: float, centre_distance: float, positions: int = POSITIONS
+) -> TableInput:
+    """Return the two states of the lattice between which a state lies.
+
+    Parameters
+    ----------
+    table : TableInput
+        Of the pair: its modifications and discretisation.
+    force : float
+        On the transverse line of action, N, positive.
+    misalignment, centre_distance : float
+        rad, m.
+    positions : int
+
+    Raises
+    ------
+    ValueError
+        A force that is not positive, or a state that is not finite.
+
+    Examples
+    --------
+    >>> from fe_ste.geometry.gears import Gear
+    >>> gear = Gear(name="gear", teeth=30, normal_module=3e-3, face_width=20e-3, held_diameter=50e-3)
+    >>> pair = GearPair(name="pair", pinion=gear, gear=gear, centre_distance=90e-3)
+    >>> wanted = contact_input(TableInput(pair=pair, torque=(100.0,)), 2000.0, 30e-6, 90.001e-3)
+    >>> [round(1e6 * value, 1) for value in wanted.misalignment]
+    [26.9, 44.8]
+    """
+    if not (math.isfinite(force) and force > 0.0 and math.isfinite(misalignment) and math.isfinite(centre_distance)):
+        raise ValueError(
+            f"force = {force} N, misalignment = {misalignment} rad, centre_distance = {centre_distance} m: a state of "
+            "contact needs a positive force and finite numbers"
+        )
+    pair = table.pair
+    node = (1.0 + FORCE_STEP) ** round(math.log(force) / math.log(1.0 + FORCE_STEP))
+    step = OPENING_STEP * node / (YIELDING * pair.face_width**2)
+    # Teeth that stand straight lie between two nodes, so that rounding cannot move them to others.
+    below = math.floor(misalignment / step + 0.5) - 0.5
+    apart = DISTANCE_STEP * pair.pinion.normal_module
+    distance = pair.centre_distance + apart * round((centre_distance - pair.centre_distance) / apart)
+    return replace(
+        table,
+        torque=(_rounded(node * pair.pinion.base_radius),),
+        positions=positions,
+        centre_distance=(_rounded(distance),),
+        misalignment=(_rounded(below * step), _rounded((below + 1.0) * step)),
+        static_torque=None,
+    )
+
+
+def _rounded(value: float) -> float:
+    """Drop the digits that another machine's libraries may have otherwise."""
+    return float(f"{value:.12g}")
+
+
+def mean_contact(wanted: TableInput, progress: Callable[[int, int], None] | None = None) -> MeanContact:
+    """Solve the contact of a pair at two misalignments.
+
+    Parameters
+    ----------
+    wanted : TableInput
+        With one torque, one centre distance and two misalignments, as `contact_input` gives it.
+    progress : callable, optional
+        Called with the number of solved states and of all.
+
+    Raises
+    ------
+    ContactError
+        If the contact of a position could not be solved; the message says of which pair and why.
+    """
+    pair, (torque,), (distance,) = wanted.pair, wanted.torque, wanted.centre_distance
+    compliance = _compliance(pair, wanted.mesh, wanted.contact)
+    compliance = compliance.with_modifications(wanted.pinion_modification, wanted.gear_modification)
+    axes = StateAxes.checked(pair, torque, wanted.positions, distance, wanted.misalignment)
+    total = math.prod(axes.shape)
+    tell = None if progress is None else lambda solved: progress(solved, total)
+    data = solve_positions(compliance, axes, range(wanted.positions), tell).dataset(axes)
+    data = data.isel(torque=0, centre_distance=0)
+    if not bool(data["converged"].all()):
+        raise ContactError(f"pair {pair.name}: {str(data.attrs['failures']).splitlines()[0]}")
+    mean, largest = data.mean("pmc"), data.max("pmc")
+    return MeanContact(
+        force=torque / pair.pinion.base_radius,
+        centre_distance=distance,
+        misalignment=np.array(wanted.misalignment),
+        deflection=mean["ste"].to_numpy(),
+        stiffness=1.0 / (1.0 / data["tangent_stiffness"]).mean("pmc").to_numpy(),
+        load_centre=mean["load_centre"].to_numpy(),
+        tangent_load_centre=mean["tangent_load_centre"].to_numpy(),
+        face_load_factor=face_load_factor(data).to_numpy(),
+        max_pressure=largest["max_pressure"].to_numpy(),
+        edge_pressure=largest["edge_pressure"].to_numpy(),
+        axial=data["axial_position"].to_numpy(),
+        line_load=load_along_face(data).to_numpy(),
+    )
+
+
+@lru_cache(maxsize=_SHARED_PAIRS)
+def _compliance(pair: GearPair, mesh: MeshSettings, contact: ContactSettings) -> PairCompliance:
+    return pair_compliance(pair, mesh, contact)
