@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 import io
+import lzma
+import struct
 import zipfile
 import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 from exugear.rexs import json_additions, xml_additions
@@ -19,6 +23,17 @@ LARGEST = 64_000_000
 """Most bytes of a model, unpacked; the largest found is a tenth of it."""
 MOST_MEMBERS = 1000
 """Most members of an archive."""
+_DAMAGES = (
+    zipfile.BadZipFile,
+    NotImplementedError,
+    RuntimeError,
+    EOFError,
+    OSError,
+    ValueError,
+    struct.error,
+    zlib.error,
+    lzma.LZMAError,
+)
 _ENDINGS = (".rexs", ".rexsj", ".xml", ".json")
 
 
@@ -81,12 +96,25 @@ def with_additions(path: str | Path, additions: Iterable[Addition]) -> bytes:
     if not _is_archive(content):
         return _put_in(content, placed)
     member, unpacked = _member(content)
+    return _repacked(content, member, _put_in(unpacked, placed))
+
+
+def _repacked(content: bytes, member: str, new: bytes) -> bytes:
+    """Archive with a new member in the place of an old one; the bytes of all others stay, packed as they are."""
     packed = io.BytesIO()
-    with zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(packed, "w") as new:
-        new.comment = old.comment
-        _check_size(sum(one.file_size for one in old.infolist()))
-        for one in old.infolist():
-            new.writestr(one, _put_in(unpacked, placed) if one.filename == member else old.read(one))
+    with _damage_told(), zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(packed, "w") as target:
+        target.comment = old.comment
+        members = sorted(old.infolist(), key=lambda one: one.header_offset)
+        stops = [*(one.header_offset for one in members[1:]), old.start_dir]
+        for one, stop in zip(members, stops, strict=True):
+            if one.filename == member:
+                target.writestr(one, new)
+                continue
+            start, moved = one.header_offset, copy.copy(one)
+            moved.header_offset = packed.tell()
+            packed.write(content[start:stop])
+            target.filelist.append(moved)
+            target.start_dir = packed.tell()
     return packed.getvalue()
 
 
@@ -120,21 +148,31 @@ def _check_size(size: int) -> None:
 
 def _member(content: bytes) -> tuple[str, bytes]:
     """Name and bytes of the one model in an archive."""
-    try:
-        with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            members = archive.infolist()
-            if len(members) > MOST_MEMBERS:
-                raise RexsError(f"the archive has {len(members)} members; {MOST_MEMBERS} are the most")
-            models = [one for one in members if one.filename.lower().endswith(_ENDINGS) and not one.is_dir()]
-            if len(models) != 1:
-                names = ", ".join(plain(one.filename) for one in models[:5]) or "none"
-                raise RexsError(f"the archive must hold one model ({', '.join(_ENDINGS)}); it holds {names}")
-            if models[0].flag_bits & 1:
-                raise RexsError("the archive is encrypted; only open ones can be read")
-            _check_size(models[0].file_size)
-            with archive.open(models[0]) as file:
-                unpacked = file.read(LARGEST + 1)
-    except (zipfile.BadZipFile, NotImplementedError, EOFError, OSError, zlib.error) as error:
-        raise RexsError(f"the archive is damaged: {error}") from None
+    with _damage_told(), zipfile.ZipFile(io.BytesIO(content)) as archive:
+        members = archive.infolist()
+        if len(members) > MOST_MEMBERS:
+            raise RexsError(f"the archive has {len(members)} members; {MOST_MEMBERS} are the most")
+        if len({one.header_offset for one in members}) < len(members):
+            raise RexsError("the archive is damaged: two of its members lie at one place")
+        models = [one for one in members if one.filename.lower().endswith(_ENDINGS) and not one.is_dir()]
+        if len(models) != 1:
+            names = ", ".join(plain(one.filename) for one in models[:5]) or "none"
+            raise RexsError(f"the archive must hold one model ({', '.join(_ENDINGS)}); it holds {names}")
+        if models[0].flag_bits & 1:
+            raise RexsError("the archive is encrypted; only open ones can be read")
+        _check_size(models[0].file_size)
+        with archive.open(models[0]) as file:
+            unpacked = file.read(LARGEST + 1)
     _check_size(len(unpacked))
     return models[0].filename, unpacked
+
+
+@contextmanager
+def _damage_told() -> Iterator[None]:
+    """Tell in words what an archive is damaged by; the modules that unpack raise what they meet."""
+    try:
+        yield
+    except RexsError:
+        raise
+    except _DAMAGES as error:
+        raise RexsError(f"the archive is damaged: {plain(error)}") from None

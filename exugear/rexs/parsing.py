@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import binascii
 import json
-import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,6 +14,7 @@ from xml.parsers import expat
 import numpy as np
 
 from exugear.rexs import synonyms
+from exugear.rexs.encodings import decoded
 from exugear.rexs.faults import RexsError, plain
 from exugear.rexs.tree import Attribute, Component, LoadCase, Model, Relation, Value
 
@@ -22,6 +22,8 @@ DEEPEST = 24
 """Most levels of nesting; a REXS file has nine."""
 MOST_ELEMENTS = 500_000
 """Most elements of an XML file; the largest found has 20,000."""
+LONGEST_WHOLE = 30
+"""Digits from which on a whole number of JSON is read as a float."""
 CODES = {"int32": "<i4", "float32": "<f4", "float64": "<f8"}
 """Numbers packed as base64 (since 1.4): little-endian, matrices row by row."""
 _FORBIDDEN = ("data_source", "referenced_component_id")
@@ -157,7 +159,7 @@ def _unpacked(code: str, text: str, rows: int | None) -> tuple[Value, ...]:
 
 def _header_of_json(content: bytes) -> _Raw:
     try:
-        tree = json.loads(content.decode("utf-8-sig"), parse_constant=_no_number)
+        tree = json.loads(content.decode("utf-8-sig"), parse_constant=_no_number, parse_int=_whole_number)
     except UnicodeDecodeError:
         raise RexsError("the file is not UTF-8, as JSON must be") from None
     except json.JSONDecodeError as error:
@@ -175,6 +177,11 @@ def _header_of_json(content: bytes) -> _Raw:
         [(one, list(_json_attributes(one))) for one in _tables(model, "components")],
         [(case, [(one, list(_json_attributes(one))) for one in _tables(case, "components")]) for case in cases],
     )
+
+
+def _whole_number(digits: str) -> int | float:
+    """Whole number; one of more digits than any id has is a float, and infinite beyond that: it costs no time."""
+    return int(digits) if len(digits) < LONGEST_WHOLE else float(digits)
 
 
 def _no_number(text: str) -> float:
@@ -213,7 +220,7 @@ def _json_value(value: Any, depth: int = 0) -> Value:
             str(value.get("code", "")), str(value.get("value", "")), None if rows is None else _identifier(rows, "rows")
         )
     if isinstance(value, int) and not isinstance(value, bool):
-        return float(value) if value.bit_length() < 1000 else math.inf
+        return float(value)
     return value if isinstance(value, str | bool | float) else ""
 
 
@@ -286,7 +293,7 @@ def _elements(content: bytes) -> _Element:
     def refuse(*_: object) -> None:
         raise RexsError("the file has a DOCTYPE or an entity of its own, which no REXS file has and none may")
 
-    parser = expat.ParserCreate()
+    parser = expat.ParserCreate("utf-8")
     parser.buffer_text = True
     parser.StartElementHandler = start
     parser.EndElementHandler = _closing(open_elements)
@@ -294,7 +301,7 @@ def _elements(content: bytes) -> _Element:
     parser.StartDoctypeDeclHandler = refuse
     parser.EntityDeclHandler = refuse
     try:
-        parser.Parse(content, True)
+        parser.Parse(decoded(content).text, True)
     except expat.ExpatError as error:
         reason = expat.errors.messages.get(error.code, "cannot be parsed")
         raise RexsError(f"the file is no XML: {reason} in line {error.lineno}") from None

@@ -10,6 +10,9 @@ from functools import cached_property
 from exugear.rexs.faults import RexsError, plain
 from exugear.rexs.synonyms import unit_factor
 
+LARGEST_NUMBER = 1e40
+"""Numbers beyond it are no quantity of a gearbox; files write 1e23 for 'rigid'. Powers of it are still numbers."""
+
 Value = str | bool | float | tuple["Value", ...]
 """A value as it stands in the file: texts of XML are turned into numbers when these are asked for."""
 
@@ -132,6 +135,8 @@ class Component:
             number = math.nan
         if not math.isfinite(number):
             raise RexsError(f"{self}: {key} = '{plain(value)}' is no finite number")
+        if abs(number) > LARGEST_NUMBER:
+            raise RexsError(f"{self}: {key} = '{plain(value)}' is larger than any quantity of a gearbox")
         return number
 
     def _factor(self, key: str, attribute: Attribute, unit: str) -> float:

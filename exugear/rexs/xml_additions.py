@@ -9,11 +9,11 @@ from xml.parsers import expat
 from xml.sax.saxutils import escape, quoteattr
 
 from exugear.rexs.additions import Addition, Edit, edited, number
+from exugear.rexs.encodings import decoded
 
 LONGEST_INDENT = 200
 """Most blanks before an element that are repeated."""
 _TAG_END = re.compile(rb"(?:[^\"'>]|\"[^\"]*\"|'[^']*')*>")
-_BYTE_ORDER_MARKS = {b"\xef\xbb\xbf": "utf-8", b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
 _COMPONENT = ("model", "components", "component")
 _LOAD_CASE = ("model", "load_spectrum", "load_case")
 _IN_LOAD_CASE = (*_LOAD_CASE, "component")
@@ -28,8 +28,8 @@ def with_additions(content: bytes, additions: Mapping[tuple[int | None, int], Ma
         A file that `exugear.rexs.parsing.parse_model` reads.
     additions : mapping of (load case, component) to attributes by name
     """
-    mark, encoding, text = _decoded(content)
-    found = _elements(text.encode("utf-8"))
+    written = decoded(content)
+    found = _elements(written.text.encode("utf-8"))
     edits: list[Edit] = []
     for (case, component), attributes in additions.items():
         place = found.components.get((case, component))
@@ -39,20 +39,8 @@ def with_additions(content: bytes, additions: Mapping[tuple[int | None, int], Ma
             edits.append(_new_component(found, found.load_cases[case], found.components[None, component], attributes))
     # Places are of bytes; UTF-8 is cut between letters only, since edits stand at tags.
     raw = edited(found.content.decode("latin-1"), [(a, b, new.encode().decode("latin-1")) for a, b, new in edits])
-    return mark + raw.encode("latin-1").decode("utf-8").encode(encoding, errors="xmlcharrefreplace")
-
-
-def _decoded(content: bytes) -> tuple[bytes, str, str]:
-    """Byte order mark, encoding and text."""
-    for mark, encoding in _BYTE_ORDER_MARKS.items():
-        if content.startswith(mark):
-            return mark, encoding, content[len(mark) :].decode(encoding)
-    declared: list[str] = []
-    parser = expat.ParserCreate()
-    parser.XmlDeclHandler = lambda version, encoding, standalone: declared.append(encoding or "utf-8")
-    parser.Parse(content, True)
-    encoding = declared[0] if declared else "utf-8"
-    return b"", encoding, content.decode(encoding)
+    text = raw.encode("latin-1").decode("utf-8")
+    return written.mark + text.encode(written.encoding, errors="xmlcharrefreplace")
 
 
 @dataclass
@@ -79,6 +67,10 @@ class _Found:
 
     def first_tag(self, place: _Place) -> str:
         return self.content[place.start : place.tag_end].decode("utf-8")
+
+    def tag(self, place: _Place) -> str:
+        """Return the name in an element's first tag, with its prefix."""
+        return self.first_tag(place)[1:-1].rstrip("/").split()[0]
 
 
 def _elements(content: bytes) -> _Found:
@@ -121,13 +113,20 @@ def _end_of_tag(content: bytes, start: int) -> int:
 
 def _edits(found: _Found, place: _Place, attributes: Mapping[str, Addition]) -> Iterator[Edit]:
     there = {child.name: child for child in place.children}
+    prefix = _prefix(found.tag(place))
     for name in attributes.keys() & there.keys():
-        yield there[name].start, there[name].end, _element(attributes[name])
-    new = [_element(one) for name, one in attributes.items() if name not in there]
-    yield from _put_inside(found, place, new, "component")
+        yield there[name].start, there[name].end, _element(attributes[name], prefix)
+    new = [_element(one, prefix) for name, one in attributes.items() if name not in there]
+    yield from _put_inside(found, place, new)
 
 
-def _put_inside(found: _Found, place: _Place, new: Sequence[str], tag: str) -> Iterator[Edit]:
+def _prefix(tag: str) -> str:
+    """Prefix of a tag with its colon: elements in one stand for the same as their neighbours only with it."""
+    prefix, colon, _ = tag.rpartition(":")
+    return prefix + colon
+
+
+def _put_inside(found: _Found, place: _Place, new: Sequence[str]) -> Iterator[Edit]:
     """Put elements behind the last one inside an element, or into an empty one."""
     if not new:
         return
@@ -139,7 +138,7 @@ def _put_inside(found: _Found, place: _Place, new: Sequence[str], tag: str) -> I
     space = f"{outside}  " if "\n" in outside else ""
     inside = "".join(space + one for one in new)
     if found.first_tag(place).endswith("/>"):
-        yield place.tag_end - 2, place.tag_end, f">{inside}{outside if space else ''}</{tag}>"
+        yield place.tag_end - 2, place.tag_end, f">{inside}{outside if space else ''}</{found.tag(place)}>"
     else:
         yield place.tag_end, place.tag_end, inside
 
@@ -150,17 +149,18 @@ def _new_component(found: _Found, case: _Place, model: _Place, attributes: Mappi
     inner = f"{space}  " if "\n" in space else ""
     head = found.first_tag(model)
     head = f"{head[:-2]}>" if head.endswith("/>") else head
-    tag = head[1:].split()[0].rstrip(">")
-    content = "".join(inner + _element(one) for one in attributes.values())
-    return next(iter(_put_inside(found, case, [f"{head}{content}{space if inner else ''}</{tag}>"], "load_case")))
+    tag = found.tag(model)
+    content = "".join(inner + _element(one, _prefix(tag)) for one in attributes.values())
+    return next(iter(_put_inside(found, case, [f"{head}{content}{space if inner else ''}</{tag}>"])))
 
 
-def _element(addition: Addition) -> str:
+def _element(addition: Addition, prefix: str) -> str:
     """Attribute as XML has it."""
-    head = f"<attribute id={quoteattr(addition.name)} unit={quoteattr(addition.unit)}>"
+    head = f"<{prefix}attribute id={quoteattr(addition.name)} unit={quoteattr(addition.unit)}>"
     value = addition.value
     if isinstance(value, tuple):
-        inside = f"<array>{''.join(f'<c>{number(one)}</c>' for one in value)}</array>"
+        entries = "".join(f"<{prefix}c>{number(one)}</{prefix}c>" for one in value)
+        inside = f"<{prefix}array>{entries}</{prefix}array>"
     else:
         inside = escape(value) if isinstance(value, str) else number(value)
-    return f"{head}{inside}</attribute>"
+    return f"{head}{inside}</{prefix}attribute>"

@@ -69,6 +69,10 @@ def _imported(file: Path, target: Path) -> Imported:
     from exugear.rexs.to_case.conversion import to_case
 
     try:
-        return to_case(read_rexs(file), file.name, target)
+        model = read_rexs(file)
+        try:
+            return to_case(model, file.name, target)
+        except RexsError as error:
+            raise RexsError(*(f"{file}: {fault}" for fault in error.faults)) from None
     except RexsError as error:
         raise BadInputError(error) from error

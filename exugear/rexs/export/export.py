@@ -13,6 +13,7 @@ from exugear.rexs.containers import read_rexs, with_additions
 from exugear.rexs.export.dynamics import put_bearings, put_modes, put_runs
 from exugear.rexs.export.names import Results
 from exugear.rexs.export.origins import origins_of
+from exugear.rexs.export.shafts import put_displacements, put_speeds
 from exugear.rexs.export.stored import StoredResults
 from exugear.rexs.export.teeth import Target, check_same_gears, put_gears, put_pairs, put_static_forces, put_tables
 from exugear.rexs.to_case.conversion import to_case
@@ -83,9 +84,12 @@ def with_results(gearbox: Gearbox, folder: Path, path: str | Path) -> Exported:
     put_pairs(results, gearbox, target)
     put_static_forces(results, gearbox, target)
     put_tables(results, gearbox, stored.tables(), target)
+    put_speeds(results, gearbox, target)
     put_bearings(results, gearbox, stored.duties(), target)
     put_modes(results, stored.modes(), unit, target.load_case)
     put_runs(results, gearbox, stored.runs(), target)
+    if stored.loaded is not None:
+        put_displacements(results, stored.loaded, target)
     content = with_additions(path, results.additions)
     own = sum(one.name.startswith(OWN) for one in results.additions)
     return Exported(content, own, len(results.additions) - own, _replaced(model, results), tuple(stored.left_out))

@@ -13,8 +13,23 @@ NAMES: Mapping[str, Sequence[tuple[Version, str]]] = {
     # of gears
     "reference_diameter": [((1, 1), "reference_circle_diameter"), ((2, 0), "reference_diameter_cylindrical_gear")],
     "base_diameter": [((1, 1), "base_circle_diameter"), ((2, 0), "base_diameter")],
+    "axial_pitch": [((1, 1), "axial_pitch")],
+    "normal_tooth_thickness": [
+        ((1, 2), "normal_tooth_thickness_at_pitch_diameter"),
+        ((1, 5), "normal_tooth_thickness_at_reference_diameter"),
+    ],
+    "transverse_tooth_thickness": [
+        ((1, 2), "tooth_thickness_at_pitch_diameter"),
+        ((1, 5), "transverse_tooth_thickness_at_reference_diameter"),
+    ],
     "root_form_diameter": [((1, 2), "root_form_diameter")],
     "normal_tooth_thickness_at_tip_diameter": [((1, 5), "normal_tooth_thickness_at_tip_diameter")],
+    # of shafts
+    "rotational_speed": [((1, 0), "rotational_speed")],
+    "node_positions": [((1, 1), "u_coordinates_of_beam_nodes")],
+    "displacement_u": [((1, 1), "displacement_u_of_nodes")],
+    "displacement_v": [((1, 1), "displacement_v_of_nodes")],
+    "displacement_w": [((1, 1), "displacement_w_of_nodes")],
     # of a gear in a stage
     "pitch_diameter": [((1, 0), "pitch_diameter")],
     "working_pressure_angle": [((1, 1), "operating_pressure_angle_in_the_transverse_section")],

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from exugear.rexs.to_case.bodies import ends
+from exugear.rexs.to_case.bodies import GEARS, ends
 from exugear.rexs.to_case.conversion import Found
 from exugear.rexs.to_case.gear_blocks import Teeth, first_of_planets
 from exugear.rexs.to_case.notes import Block
@@ -23,14 +23,20 @@ class Origins:
     Attributes
     ----------
     gears, pairs, bearings : mapping of str to tuple of int
+    bodies : mapping of str to tuple of tuple of int
+        Shafts and gears of each body, of planets one such tuple for each.
     axes : mapping of int to (3, 3) array
-        Axes u, v, w of bearings as rows, in those of the gearbox file.
+        Axes u, v, w of bearings and shafts as rows, in those of the gearbox file.
+    places : mapping of int to float
+        Origin of bearings, gears and shafts along z, m.
     """
 
     gears: Mapping[str, tuple[int, ...]]
     pairs: Mapping[str, tuple[int, ...]]
     bearings: Mapping[str, tuple[int, ...]]
+    bodies: Mapping[str, tuple[tuple[int, ...], ...]]
     axes: Mapping[int, Floats]
+    places: Mapping[int, float]
 
     def __repr__(self) -> str:
         """Return one short line."""
@@ -46,8 +52,28 @@ def origins_of(found: Found) -> Origins:
         for number, name in found.teeth.names.items()
     }
     held = {name: _bearings(found, block) for name, block in found.bearings.items() if block.number}
-    axes = {number: places.axes(model.components[number]) for numbers in held.values() for number in numbers}
-    return Origins(gears, _stages(model, found.teeth, first, gears), held, axes)
+    bodies = {
+        body.name: tuple(_shafts_and_gears(each) for each in (body.parts, *body.others))
+        for body in found.bodies.members
+    }
+    turning = [number for each in bodies.values() for numbers in each for number in numbers]
+    placed = [
+        model.components[number]
+        for number in dict.fromkeys([*turning, *(number for numbers in held.values() for number in numbers)])
+        if model.components[number].given("support_vector")
+    ]
+    return Origins(
+        gears,
+        _stages(model, found.teeth, first, gears),
+        held,
+        bodies,
+        {part.number: places.axes(part) for part in placed},
+        {part.number: 1e-3 * _z(places, part) for part in placed},
+    )
+
+
+def _shafts_and_gears(parts: Iterable[Component]) -> tuple[int, ...]:
+    return tuple(part.number for part in parts if part.type in ("shaft", *GEARS))
 
 
 def _stages(

@@ -77,6 +77,12 @@ class StoredResults:
         best = sorted(found, key=lambda choice: choice.variant == "flexible")[-1:]
         return [duty for choice in best for duty in found[choice]]
 
+    @property
+    def loaded(self) -> Assembly | None:
+        """The most complete variant with bearings of which results were read."""
+        found = [one for one in self._assemblies.values() if one.variant != "rigid"]
+        return max(found, key=lambda one: one.variant == "flexible", default=None)
+
     def _each(self, pattern: str, read: Callable[[Path], tuple[Choice, Result]]) -> Iterator[tuple[Choice, Result]]:
         """Read files one by one; what does not belong to the gearbox is noted."""
         for path in sorted(self.folder.glob(pattern)):

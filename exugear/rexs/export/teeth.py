@@ -62,11 +62,21 @@ def put_gears(results: Results, gearbox: Gearbox, target: Target) -> None:
         for number in target.origins.gears[name]:
             results.put(number, "reference_diameter", "mm", 2e3 * gear.reference_radius)
             results.put(number, "base_diameter", "mm", 2e3 * gear.base_radius)
-            results.put(number, "root_form_diameter", "mm", 2e3 * gear.form_radius)
+            if gear.helix_angle:
+                results.put(
+                    number, "axial_pitch", "mm", 1e3 * math.pi * gear.normal_module / abs(math.sin(gear.helix_angle))
+                )
+            normal = gear.normal_tooth_thickness
+            results.put(number, "normal_tooth_thickness", "mm", 1e3 * normal)
+            results.put(number, "transverse_tooth_thickness", "mm", 1e3 * normal / math.cos(gear.helix_angle))
             results.put(number, "normal_tooth_thickness_at_tip_diameter", "mm", 1e3 * gear.tip_thickness)
-            stated = target.model.components[number].quantity("tip_diameter", "mm")
-            if stated is None or not math.isclose(abs(stated), 2e3 * gear.tip_radius, rel_tol=EQUAL):
-                results.put_own(number, "tip_diameter", "mm", 2e3 * gear.tip_radius)
+            part = target.model.components[number]
+            for key, radius in (("root_form_diameter", gear.form_radius), ("tip_diameter", gear.tip_radius)):
+                stated = part.quantity(key, "mm")
+                if stated is None and key == "root_form_diameter":
+                    results.put(number, key, "mm", 2e3 * radius)
+                elif stated is None or not math.isclose(abs(stated), 2e3 * radius, rel_tol=EQUAL):
+                    results.put_own(number, key, "mm", 2e3 * radius)  # the file's own is an input and stays
             for key, unit, value in _inputs(gear):
                 results.put_own(number, key, unit, value)
 
@@ -88,7 +98,8 @@ def put_pairs(results: Results, gearbox: Gearbox, target: Target) -> None:
         for stage in target.origins.pairs[name]:
             results.put(stage, "gear_ratio", "none", pair.ratio)
             results.put(stage, "transverse_contact_ratio", "none", pair.transverse_contact_ratio)
-            results.put(stage, "overlap_ratio", "none", pair.overlap_ratio)
+            if pair.overlap_ratio > 0.0:  # REXS has none of zero
+                results.put(stage, "overlap_ratio", "none", pair.overlap_ratio)
             results.put(stage, "total_contact_ratio", "none", pair.total_contact_ratio)
             length = pair.path_end - pair.path_start
             results.put(stage, "length_of_path_of_contact", "mm", 1e3 * length)

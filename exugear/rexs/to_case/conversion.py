@@ -38,6 +38,19 @@ OTHER_GEARS = {"bevel": "bevel gears", "worm": "worm gears", "hypoid": "hypoid g
 SPEED_TOLERANCE = 1e-3
 """Largest difference of a speed in the file from the one at which the train rolls, relative."""
 _SHAPE_FAULT = re.compile(r"bodies\.(\w+)\.shape: (.*)")
+TYPES_OF_ROLES = {
+    ("stage", "gear_1"): GEARS,
+    ("stage", "gear_2"): GEARS,
+    ("stage", "stage"): ("cylindrical_stage",),
+    ("planet_shaft", "shaft"): ("shaft",),
+    ("planet_shaft", "planetary_stage"): ("planetary_stage",),
+    ("planet_pin", "shaft"): ("shaft",),
+    ("planet_pin", "planetary_stage"): ("planetary_stage",),
+    ("planet_carrier_shaft", "shaft"): ("shaft",),
+    ("planet_carrier_shaft", "planetary_stage"): ("planetary_stage",),
+    ("side", "assembly"): (*BEARINGS, *PLAIN_BEARINGS, *JOINING),
+}
+"""What a component must be that has a role in a relation; a wrong id makes another component of it."""
 READ_TYPES = frozenset(
     (
         *GEARS,
@@ -139,6 +152,7 @@ def to_case(model: Model, source: str, path: str | Path = "gearbox.toml") -> Imp
     """
     notes = Notes()
     _refuse_types(model, notes)
+    _refuse_misplaced(model, notes)
     notes.faults.tell()
     places = Places(model)
     draft = _Draft(model, places, notes)
@@ -168,6 +182,18 @@ def _refuse_types(model: Model, notes: Notes) -> None:
     notes.faults.tell()
     if not any(True for _ in model.relations_of("stage")) or not model.of_type(*GEARS):
         notes.faults.add("the file holds no stage of two cylindrical gears: there is no gearbox to import")
+
+
+def _refuse_misplaced(model: Model, notes: Notes) -> None:
+    """Refuse relations with a component of the wrong type in a role, as wrong ids make them."""
+    for relation in model.relations:
+        for role, number in relation.roles.items():
+            wanted = TYPES_OF_ROLES.get((relation.type, role))
+            if wanted is not None and model.components[number].type not in wanted:
+                notes.faults.add(
+                    f"a relation '{relation.type}' has {model.components[number]} as {role}; expected a component of "
+                    f"type {' or '.join(wanted[:3])}: correct the id"
+                )
 
 
 class _Draft:

@@ -100,6 +100,19 @@ def needed(value: float | None, part: object, key: str) -> float:
     return value
 
 
+def within(value: float, part: object, key: str, low: float, high: float) -> float:
+    """Return the value, or say that no gear can have it.
+
+    Raises
+    ------
+    RexsError
+        It lies outside of low and high.
+    """
+    if not low <= value <= high:
+        raise RexsError(f"{part}: {key} = {value:g} cannot be; expected {low:g} to {high:g}")
+    return value
+
+
 @dataclass
 class Block:
     """Table of the gearbox file with its entries and the tables inside it.

@@ -7,13 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from exugear.rexs.faults import RexsError
-from exugear.rexs.to_case.notes import Entry, Notes, assumed, needed, read, tidy
+from exugear.rexs.to_case.notes import Entry, Notes, assumed, needed, read, tidy, within
 from exugear.rexs.tree import Component, Model
 
 PLAUSIBLE_TIP = (0.5, 2.0)
 """Tip diameters over the reference diameter beyond which a tip diameter is taken as a placeholder."""
 THINNING = 0.02
 """Tooth thinning assumed where the file gives none, in normal modules: half of a usual backlash."""
+LENGTHS, PRESSURE_ANGLES, HELIX_ANGLES = (1e-3, 1e5), (1.0, 45.0), (-60.0, 60.0)
+"""Modules and face widths (mm), pressure and helix angles (deg) that a cylindrical gear can have."""
 EQUAL = 1e-6
 """Largest difference of numbers on equal flanks or planets."""
 LEAST_RADIUS = 0.2
@@ -75,7 +77,7 @@ def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes
         A number is missing, or left and right flanks differ.
     """
     internal = gear.type == "ring_gear"
-    module = needed(gear.quantity("normal_module", "mm"), gear, "normal_module")
+    module = _length(gear, "normal_module")
     flank = _flank(model, gear)
     tool = _tool(model, gear)
     chamfer = (flank.quantity("tooth_tip_chamfer", "mm") if flank else None) or 0.0
@@ -90,7 +92,7 @@ def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes
         module=read(tidy(module), "normal_module"),
         pressure_angle=angle,
         helix_angle=helix,
-        face_width=read(needed(gear.quantity("face_width", "mm"), gear, "face_width"), "face_width"),
+        face_width=read(_length(gear, "face_width"), "face_width"),
         shift=_shift(flank, internal),
         tip=_tip(gear, teeth * module, notes),
         root=_diameter(gear, "root_diameter"),
@@ -103,6 +105,11 @@ def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes
         root_form=_diameter(gear, "root_form_diameter"),
         internal=internal,
     )
+
+
+def _length(gear: Component, key: str) -> float:
+    """Length that a gear must have, mm."""
+    return within(needed(gear.quantity(key, "mm"), gear, key), gear, key, *LENGTHS)
 
 
 def _chamfer(gear: Component, stated: float) -> float:
@@ -145,10 +152,11 @@ def _tool(model: Model, gear: Component) -> Component | None:
 
 
 def _pressure_angle(gear: Component, flank: Component | None) -> Entry:
+    key = "normal_pressure_angle"
     for part in (flank, gear):
-        value = part.quantity("normal_pressure_angle", "deg") if part else None
-        if value is not None:
-            return read(tidy(value), "normal_pressure_angle of the flank")
+        value = part.quantity(key, "deg") if part else None
+        if part is not None and value is not None:
+            return read(tidy(within(value, part, key, *PRESSURE_ANGLES)), f"{key} of the flank")
     return assumed(20.0, "the file gives none")
 
 
@@ -156,9 +164,13 @@ def _helix_angle(gear: Component, mates: Sequence[Component]) -> Entry:
     """Helix angle, right hand positive; of a ring that of its mates, as programs differ in its sign."""
     key = "helix_angle_reference_diameter"
     if gear.type == "ring_gear" and mates:
-        angle = needed(mates[0].quantity(key, "deg"), mates[0], key)
+        angle = _helix(mates[0], key)
         return read(tidy(angle), f"{key}, with the hand of {mates[0]}, as internal pairs have")
-    return read(tidy(needed(gear.quantity(key, "deg"), gear, key)), key)
+    return read(tidy(_helix(gear, key)), key)
+
+
+def _helix(gear: Component, key: str) -> float:
+    return within(needed(gear.quantity(key, "deg"), gear, key), gear, key, *HELIX_ANGLES)
 
 
 def _shift(flank: Component | None, internal: bool) -> Entry | None:

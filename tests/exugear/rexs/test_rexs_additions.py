@@ -7,6 +7,7 @@ import json
 import re
 import zipfile
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -14,6 +15,8 @@ from exugear.rexs.additions import Addition
 from exugear.rexs.containers import parsed, read_rexs, with_additions
 from exugear.rexs.faults import RexsError
 from exugear.rexs.parsing import parse_model
+
+from .own_files import spur_pair
 
 DATA = Path(__file__).parent / "data"
 FILES = sorted(path.name for path in DATA.iterdir() if path.suffix not in (".txt", ".md"))
@@ -110,6 +113,33 @@ def test_json_without_attributes_or_spaces_takes_them(tmp_path):
     model = parse_model(new)
     assert model.components[1].quantity("a", "mm") == 1.0
     assert model.components[2].text("c") == "x"
+
+
+def test_elements_with_a_prefix_get_new_ones_with_that_prefix(tmp_path):
+    """Without it the new elements would lie outside of the namespace, and no program would find them."""
+    file, shafts = spur_pair()
+    file.load_case({shafts[0]: {"rotational_speed": 900.0}})
+    empty = file.add("lubricant")
+    path = tmp_path / "gearbox.rexs"
+    path.write_text(file.text("r").replace("></r:component>", "/>").replace('">\n  </r:component>', '"/>'))
+    assert f'<r:component id="{empty}" type="lubricant" name=""/>' in path.read_text()
+    new = [
+        Addition(shafts[0], "rotational_speed", "1 / min", 1.0),
+        Addition(shafts[0], "custom_exugear_list", "mm", (1.0, 2.0)),
+        Addition(empty, "custom_exugear_x", "mm", 3.0),
+        Addition(shafts[0], "custom_exugear_case", "mm", 4.0, 1),
+        Addition(shafts[1], "custom_exugear_new", "mm", 5.0, 1),
+    ]
+    content = with_additions(path, new)
+    tree = ElementTree.fromstring(content)
+    assert {element.tag.partition("}")[0] for element in tree.iter()} == {"{https://rexs.info"}
+    model = parse_model(content)
+    assert model.components[shafts[0]].quantity("rotational_speed", "1 / min") == 1.0
+    assert model.components[shafts[0]].attributes["custom_exugear_list"].value == ("1.0", "2.0")
+    assert model.components[empty].quantity("custom_exugear_x", "mm") == 3.0
+    changes = model.load_cases[0].changes
+    assert float(changes[shafts[0]]["custom_exugear_case"].value) == 4.0
+    assert float(changes[shafts[1]]["custom_exugear_new"].value) == 5.0
 
 
 def test_a_component_that_is_not_there_is_refused():

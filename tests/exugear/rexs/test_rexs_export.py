@@ -24,6 +24,8 @@ from exugear.rexs.faults import RexsError
 from exugear.rexs.to_case.conversion import to_case
 from exugear.rexs.tree import Model
 
+from .own_files import spur_pair
+
 DATA = Path(__file__).parent / "data"
 SEW = "SEW_3-stage_cylindrical_gearbox_1.0.rexs"
 SPECTRUM = "FVA-Industriegetriebe_2_stufig_1-6.rexs"
@@ -181,6 +183,105 @@ def test_modes_bearings_and_tables_of_the_folder_are_in_the_file(tmp_path):
     assert part.quantity("operating_point_stiffness_dF_v_d_v", "N / m") == pytest.approx(duty.stiffness[0, 0], rel=1e-9)
     tilt = part.quantity("operating_point_stiffness_dM_w_d_v_rot", "N mm / rad")
     assert tilt == pytest.approx(1e3 * duty.stiffness[4, 3], rel=1e-9)
+
+
+def test_a_form_diameter_of_the_file_stays_and_ours_stands_beside_it(tmp_path):
+    file, _ = spur_pair(root_form_diameter=None)
+    gears = [part.number for part in file.model().of_type("cylindrical_gear")]
+    file.give(gears[1], root_form_diameter=114.0)  # below what the tool's rounding leaves: the import takes the tool's
+    path = tmp_path / "gearbox.rexs"
+    path.write_text(file.text())
+    gearbox = to_case(read_rexs(path), path.name).gearbox
+    exported = with_results(gearbox, tmp_path, path)
+    assert exported.replaced == ()
+    first, second = (parsed(exported.content, path).components[number] for number in gears)
+    assert second.quantity("root_form_diameter", "mm") == 114.0
+    ours = 2e3 * gearbox.gears["gear_2"].form_radius
+    assert ours > 114.5
+    assert second.quantity("custom_exugear_root_form_diameter", "mm") == pytest.approx(ours, rel=1e-9)
+    assert first.quantity("root_form_diameter", "mm") == pytest.approx(2e3 * gearbox.gears["gear_1"].form_radius)
+    assert not first.given("custom_exugear_root_form_diameter")
+
+
+def test_spur_gears_have_no_overlap_ratio_and_no_axial_pitch(exported):
+    """REXS asks for more than 0 of both; helical gears have them: p_x = pi m_n / sin(beta) (ISO 21771)."""
+    _, model = exported(PLANETARY)
+    assert not any(stage.given("overlap_contact_ratio") for stage in model.of_type("cylindrical_stage"))
+    assert not any(gear.given("axial_pitch") for gear in model.of_type("cylindrical_gear", "ring_gear"))
+    _, model = exported(SPECTRUM)
+    for gear in model.of_type("cylindrical_gear"):
+        helix = math.radians(abs(gear.quantity("helix_angle_reference_diameter", "deg")))
+        pitch = math.pi * gear.quantity("normal_module", "mm") / math.sin(helix)
+        assert gear.quantity("axial_pitch", "mm") == pytest.approx(pitch, rel=1e-9)
+
+
+def test_tooth_thicknesses_are_those_of_the_reference_circle(tmp_path):
+    """By hand: s_n = m_n (pi / 2 + 2 x tan 20 deg) less the thinning, which is assumed in the transverse section."""
+    for version, ends in (
+        ("1.4", ("normal_tooth_thickness_at_pitch_diameter", "tooth_thickness_at_pitch_diameter")),
+        ("1.6", [f"{kind}_tooth_thickness_at_reference_diameter" for kind in ("normal", "transverse")]),
+    ):
+        file, _ = spur_pair(version)
+        path = tmp_path / f"gearbox{version}.rexs"
+        path.write_text(file.text())
+        gearbox = to_case(read_rexs(path), path.name).gearbox
+        model = parsed(with_results(gearbox, tmp_path, path).content, path)
+        for gear in model.of_type("cylindrical_gear"):
+            for key in ends:
+                assert gear.quantity(key, "mm") == pytest.approx(3.0 * math.pi / 2.0 - 0.06, rel=1e-9)
+
+
+def test_speeds_that_the_file_leaves_out_are_put_into_each_load_case(tmp_path):
+    file, shafts = spur_pair()
+    gears = [part.number for part in file.model().of_type("cylindrical_gear")]
+    file.load_case({shafts[0]: {"rotational_speed": 900.0}, shafts[1]: {"rotational_speed": -450.0}})
+    file.load_case({shafts[0]: {"rotational_speed": -600.0}, shafts[1]: {"rotational_speed": 300.0}})
+    path = tmp_path / "gearbox.rexs"
+    path.write_text(file.text())
+    model = parsed(with_results(to_case(read_rexs(path), path.name).gearbox, tmp_path, path).content, path)
+    found = [[float(case.changes[gear]["rotational_speed"].value) for gear in gears] for case in model.load_cases]
+    assert found == [pytest.approx([900.0, -450.0]), pytest.approx([-600.0, 300.0])]
+    assert not any("rotational_speed" in model.components[gear].attributes for gear in gears)
+
+
+def test_shafts_move_by_what_their_bearings_carry_over_their_stiffness(tmp_path):
+    """Levers by hand: of the load at 40 mm the bearing at 10 mm takes 5/8, that at 90 mm 3/8; each yields by 1e-9 m/N.
+
+    A shaft that points against z has its nodes in its own sense, its displacements along its own axes.
+    """
+    file, shafts = spur_pair()
+    file.give(
+        shafts[0], support_vector=(100.0, 0.0, 0.0), u_axis_vector=(-1.0, 0.0, 0.0), w_axis_vector=(0.0, 0.0, 1.0)
+    )
+    file.give(shafts[0], rotational_speed=-1500.0)
+    path = tmp_path / "gearbox.rexs"
+    path.write_text(file.text())
+    case = tmp_path / "gearbox.toml"
+    case.write_text(to_case(read_rexs(path), path.name, case).text, encoding="utf-8")
+    project = Project.from_toml(case, tmp_path / "results", Choice("bushing", "iso6336"))
+    project.modes()
+    model = parsed(with_results(project.gearbox, project.folder, path).content, path)
+    force = 100.0 / 0.030  # tangential, at the pitch circle; radially its share by tan(20 deg)
+    radial = force * math.tan(math.radians(20.0))
+    first, second = (
+        {key: [float(one) for one in model.components[shaft].attributes[key].value] for key in NODES}
+        for shaft in shafts
+    )
+    assert first["u_coordinates_of_beam_nodes"] == pytest.approx([10.0, 60.0, 90.0])
+    assert second["u_coordinates_of_beam_nodes"] == pytest.approx([10.0, 40.0, 90.0])
+    shares = [0.625, 0.53125, 0.375]  # in the middle by the line between the ends
+    for axis, sizes in (("v", radial), ("w", force)):
+        moved = [1e-3 * sizes * share for share in shares]
+        assert [abs(one) for one in second[f"displacement_{axis}_of_nodes"]] == pytest.approx(moved, rel=2e-4)
+        assert [abs(one) for one in first[f"displacement_{axis}_of_nodes"]][::-1] == pytest.approx(moved, rel=2e-4)
+    # Torque about -z on the first shaft: its teeth are pushed along +y of the gear unit, away from the mate along -x;
+    # v of a shaft that is turned about w points against that of the gear unit.
+    assert first["displacement_v_of_nodes"][0] * second["displacement_v_of_nodes"][0] > 0.0
+    assert second["displacement_v_of_nodes"][0] > 0.0
+    assert first["displacement_w_of_nodes"][0] * second["displacement_w_of_nodes"][0] < 0.0
+
+
+NODES = ("u_coordinates_of_beam_nodes", *(f"displacement_{axis}_of_nodes" for axis in "uvw"))
 
 
 def test_the_trace_of_a_turned_stiffness_stays():
