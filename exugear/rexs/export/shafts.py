@@ -23,14 +23,12 @@ def put_speeds(results: Results, gearbox: Gearbox, target: Target) -> None:
 
     Those of planets are left out: REXS does not say whether they count against the carrier.
     """
-    cases = {f"load_case_{case.number}": case for case in target.model.load_cases} or {"nominal": None}
-    for name, case in cases.items():
+    for case in target.model.load_cases or (None,):
+        name = "nominal" if case is None else f"load_case_{case.number}"
         known = gearbox.load_cases.get(name)
         if known is None or not known.start_speed:
             continue
-        speeds = gearbox.train.rolling(
-            {gearbox.case.overall.input: known.start_speed, **known.start_speeds},
-        )
+        speeds = gearbox.train.rolling({gearbox.case.overall.input: known.start_speed, **known.start_speeds})
         for body, members in target.origins.bodies.items():
             for number in members[0] if body in speeds else ():
                 part = target.model.components[number]
