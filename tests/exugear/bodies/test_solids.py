@@ -209,6 +209,7 @@ def test_a_broken_pipe_stays_an_error_after_meshing():
 
 
 @needs_gmsh
+@pytest.mark.usefixtures("terminal_signals")
 def test_a_request_to_stop_is_heard_after_meshing():
     """Where it would end the process, gmsh has taken its handler away."""
     program = """

@@ -315,6 +315,7 @@ def test_positions_that_are_not_solved_are_reported_and_end_with_code_1(computed
     assert "7/8" in outcome.stdout
 
 
+@pytest.mark.usefixtures("terminal_signals")
 def test_ctrl_c_ends_with_130_and_leaves_no_half_written_table(spur_case, tmp_path):
     out = tmp_path / "out"
     program = "from exugear.cli.app import main; main()"
@@ -331,6 +332,7 @@ def test_ctrl_c_ends_with_130_and_leaves_no_half_written_table(spur_case, tmp_pa
     assert not list(out.rglob("*.nc*"))
 
 
+@pytest.mark.usefixtures("terminal_signals")
 def test_ctrl_c_that_a_callback_swallowed_still_stops(capsys):
     with pytest.raises(SystemExit) as end, exit_codes():
         with contextlib.suppress(KeyboardInterrupt):  # what a finaliser or a library's callback does with it
@@ -340,6 +342,7 @@ def test_ctrl_c_that_a_callback_swallowed_still_stops(capsys):
     assert "Stopped" in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("terminal_signals")
 def test_work_after_a_stopped_one_is_not_stopped():
     with pytest.raises(SystemExit), exit_codes():
         signal.raise_signal(signal.SIGINT)

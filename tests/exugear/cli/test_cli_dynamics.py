@@ -178,6 +178,7 @@ def test_a_run_that_fails_ends_with_code_1(case, monkeypatch):
     assert "Failed: the state is not finite" in outcome.stderr
 
 
+@pytest.mark.usefixtures("terminal_signals")
 def test_ctrl_c_keeps_the_run_and_resume_ends_it_as_if_nothing_had_been(case, monkeypatch):
     def interrupted(*arguments, progress, **options):
         def press(at):

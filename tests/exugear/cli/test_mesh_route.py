@@ -106,6 +106,7 @@ def test_elastic_bodies_are_refused(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.usefixtures("terminal_signals")
 def test_a_stopped_run_does_not_go_on_by_the_other_route(case, tmp_path):
     project = Project.from_toml(case, tmp_path, Choice("bushing", "iso6336"))
     stopped = project.run(duration=2.0, progress=lambda at: os.kill(os.getpid(), signal.SIGINT))

@@ -93,6 +93,7 @@ def test_joint_forces_of_the_rigid_variant_balance_the_torque(grc: Gearbox, stif
     assert float(np.abs(carrier[:2]).max()) < 1.0  # N; three equal planets pull evenly
 
 
+@pytest.mark.usefixtures("terminal_signals")
 def test_stopped_run_resumes_where_it_was(
     grc: Gearbox, stiffness: dict, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -185,6 +185,7 @@ def test_each_limit_has_its_words_and_stops_where_it_says():
         assert seen(judge) == reasons  # what was reached is not forgotten
 
 
+@pytest.mark.usefixtures("terminal_signals")
 def test_a_resumed_run_keeps_its_verdict(tmp_path, monkeypatch):
     monkeypatch.setattr("exugear.runs.recorder.FLUSH_INTERVAL", 0.0125)
     gearbox = spur(REVERSED)

@@ -262,6 +262,7 @@ def test_repeated_runs_are_bitwise_equal(grc: Gearbox, stiffness: dict, tmp_path
     assert one.identical(two)
 
 
+@pytest.mark.usefixtures("terminal_signals")
 def test_resumed_run_is_bitwise_the_whole_one(
     grc: Gearbox, stiffness: dict, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -13,6 +13,7 @@ import pytest
 
 from fe_ste.tools.workers import StoppedError, Workers, stop_if_asked
 
+pytestmark = pytest.mark.usefixtures("terminal_signals")
 ROOT = Path(__file__).parents[3]
 #: Two workers that sleep, and more calls, too long for the pipe to the workers, that wait.
 SLEEPERS = """
