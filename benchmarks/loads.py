@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from timing import CASE, ROOT, median, say, timed
 
-from exugear.life.dynamic_factor import stated_factors
+from exugear.dynamic_factors.dynamic_factor import stated_factors
 from exugear.life.life import checked_loads, compute_life, rating_of
 from exugear.life.pair_stresses import pair_stresses
 from exugear.load_files.reading import read_channels

@@ -38,6 +38,7 @@ from fe_ste.transmission_error.table import MeshTable
 if TYPE_CHECKING:
     import xarray as xr
 
+    from exugear.load_spectrum.counted import CountedLoads
     from exugear.report.writer import Report
     from exugear.steady.settings import SteadySettings
 
@@ -255,6 +256,21 @@ class Project:
         """List the tables that a life needs, and find those that are there: of all pairs that get one."""
         return self.requested_tables(grid=LAWS[self.choice.mesh_law].needs_axes)
 
+    def checked_loads(self) -> CountedLoads:
+        """Read the loads of a life, and check all that is asked for before any work begins.
+
+        Raises
+        ------
+        CaseError
+            Loads that cannot be used, or that go far beyond the tables; strengths that do not fit the gears.
+        """
+        from exugear.life.life import checked_loads
+        from exugear.life.verdict import check_reach
+
+        counted = checked_loads(self.gearbox)
+        check_reach(self.gearbox, counted, {one.name: max(one.wanted.torque) for one in self.life_tables()})
+        return counted
+
     def life(
         self, begin: Callable[[str], None] | None = None, progress: Callable[[int, int], None] | None = None
     ) -> xr.Dataset:
@@ -270,18 +286,13 @@ class Project:
         progress : callable, optional
             Called with the number of static states that are solved, and of all.
         """
+        from exugear.dynamic_factors.response_factors import factors, source_hash
         from exugear.life.kept_angles import KeptAngles
-        from exugear.life.life import (
-            checked_loads,
-            compute_life,
-            life_hash,
-            rating_of,
-        )  # root stress, which a run needs not
+        from exugear.life.life import compute_life, life_hash, rating_of  # root stress, which a run needs not
         from exugear.life.life_file import stored_life, write_life
         from exugear.life.pair_stresses import pair_stresses
-        from exugear.life.response_factors import factors, source_hash
 
-        counted, assembly = checked_loads(self.gearbox), self.assembly()
+        counted, assembly = self.checked_loads(), self.assembly()
         if any(request.stored is None for request in self.life_tables()):
             self.tables(grid=LAWS[self.choice.mesh_law].needs_axes)
         requests = self.life_tables()

@@ -24,12 +24,16 @@ class ActingLoads:
         N m, N and N m.
     bins : int
         Bins of the distribution that the points belong to.
+    slowest, fastest : float
+        Least and largest speed of the body under a torque, rad/s without sign, extreme sources among them.
     """
 
     points: LoadPoints
     worst_torque: Floats
     worst_hub: Floats
     bins: int
+    slowest: float
+    fastest: float
 
     @property
     def torques(self) -> Floats:
@@ -57,9 +61,12 @@ def acting_loads(counted: CountedLoads) -> ActingLoads:
     found = counted.distribution
     extremes = [one for one in counted.sources if one.kind == "extreme"]
     ends = np.array([found.upper.max(), found.upper.min()])
+    loaded = np.concatenate([np.abs(one.speed[one.torque != 0.0]) for one in counted.sources])
     return ActingLoads(
         points=counted.points,
         worst_torque=np.concatenate([ends, *(one.torque for one in extremes)]),
         worst_hub=np.concatenate([np.zeros((2, counted.points.other.shape[1])), *(one.hub for one in extremes)]),
         bins=len(found.hours),
+        slowest=float(loaded.min()),
+        fastest=float(loaded.max()),
     )

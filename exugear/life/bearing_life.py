@@ -55,8 +55,8 @@ class BearingLife:
         C_0r over the largest static equivalent load.
     ratings : Ratings
     remarks : tuple of str
-    by_bin : array (bins,)
-        Parts of the damage by bin of torque, by L10r, or by L10 where there is none.
+    by_bin, reference_by_bin : array (bins,)
+        Parts of the damages by bin of torque, by L10 and by L10r.
     """
 
     name: str
@@ -72,6 +72,7 @@ class BearingLife:
     ratings: Ratings
     remarks: tuple[str, ...]
     by_bin: Floats
+    reference_by_bin: Floats
 
 
 def bearing_lives(
@@ -127,10 +128,10 @@ class _Case:
         by_bin = np.sum(share / (1e6 * basic), axis=1)
         damage = float(by_bin.sum())
         lives, pressure, remarks = self._reference(rows, ratings, loads, revolutions, worst)
-        reference = math.nan
+        by_reference = np.full(len(by_bin), math.nan)
         if lives is not None:
-            by_bin = np.sum(share / (1e6 * _interpolated(lives, radial)), axis=1)
-            reference = float(by_bin.sum())
+            by_reference = np.sum(share / (1e6 * _interpolated(lives, radial)), axis=1)
+        reference = float(by_reference.sum())
         static = max(
             equivalent_static_load(rows, section.type, math.hypot(one[0], one[1]), abs(one[2]))
             for one in worst.reshape(-1, 6)
@@ -156,6 +157,7 @@ class _Case:
             ratings=ratings,
             remarks=tuple(remarks),
             by_bin=self.acting.by_bin(by_bin),
+            reference_by_bin=self.acting.by_bin(by_reference),
         )
 
     def _reference(

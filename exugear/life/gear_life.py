@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 
+from exugear.dynamic_factors.dynamic_factor import DynamicFactor
 from exugear.life.acting_loads import ActingLoads
-from exugear.life.dynamic_factor import DynamicFactor
 from exugear.life.static_balance import StaticBalance
 from exugear.load_spectrum.exposure import FLANKS, ToothExposure
 from exugear.model.gearbox import Gearbox
@@ -46,18 +46,27 @@ PLAIN_TEST_GEAR = 2.0
 
 @dataclass(frozen=True)
 class FlankLife:
-    """What one flank of a gear's teeth, and the root below it, bear in one family of meshes.
+    """What one flank of a gear's teeth, and the root below it, bear in one family of meshes; the worst of planets.
 
     Attributes
     ----------
     gear, family, flank : str
         Flank ``+`` faces the sense of +z rotation.
+    contact_holder, root_holder : str
+        Body whose teeth are worn most, where several have them: which of the planets.
     cycles : float
         In the life.
     contact_stress, root_stress : float
         Largest of the life, K_v in them, Pa.
     compression : float
         Least principal stress of the root, Pa.
+    contact_worn, root_worn : float
+        Largest stress of what wears, extremes left out, Pa.
+    contact_limit, root_limit : float
+        Stress that not even the first cycles of the S-N curve endure, Pa: a larger one makes the damage infinite; NaN
+        without strength.
+    reach : float
+        Largest torque, K_v in it, over the largest of the pair's table.
     contact_damage, root_damage : float
         Miner's sums; NaN without strength.
     contact_safety, root_safety : float
@@ -77,10 +86,17 @@ class FlankLife:
     gear: str
     family: str
     flank: str
+    contact_holder: str
+    root_holder: str
     cycles: float
     contact_stress: float
     root_stress: float
     compression: float
+    contact_worn: float
+    root_worn: float
+    contact_limit: float
+    root_limit: float
+    reach: float
     contact_damage: float
     root_damage: float
     contact_safety: float
@@ -158,7 +174,7 @@ def flank_lives(
     dynamic : mapping of mesh family to DynamicFactor
     """
     pairs = {mesh.family: mesh.pair for mesh in gearbox.meshes}
-    lives = []
+    lives: dict[tuple[str, str, str], list[FlankLife]] = {}
     for tooth in teeth:
         pair = pairs[tooth.family]
         if pair.name not in stresses:
@@ -166,8 +182,32 @@ def flank_lives(
         for sense in (1, -1):
             if np.any(acting.torques * sense > 0.0):
                 case = _Case(gearbox, rating, tooth, pair, balance, stresses[pair.name], dynamic[tooth.family], sense)
-                lives.append(case.life(acting))
-    return tuple(lives)
+                one = case.life(acting)
+                lives.setdefault((one.gear, one.family, one.flank), []).append(one)
+    return tuple(worst_of(own) for own in lives.values())
+
+
+LEAST_COUNTS = ("compression", "contact_limit", "root_limit")
+"""Figures of a flank whose least, beside safeties, is the worst."""
+
+
+def worst_of(lives: Sequence[FlankLife]) -> FlankLife:
+    """Take the worst of each figure of flanks that are alike but for the planet that has them."""
+    contact = max(lives, key=lambda one: (np.nan_to_num(one.contact_damage, posinf=np.inf), one.contact_stress))
+    root = max(lives, key=lambda one: (np.nan_to_num(one.root_damage, posinf=np.inf), one.root_stress))
+    worst: dict[str, Any] = {}
+    for name in (one.name for one in fields(FlankLife) if one.type == "float"):
+        values = np.array([getattr(one, name) for one in lives])
+        least = name.endswith(("_safety", "_static")) or name in LEAST_COUNTS
+        worst[name] = float(values.min() if least else values.max())
+    return replace(
+        lives[0],
+        **worst,
+        contact_holder=contact.contact_holder if len(lives) > 1 else "",
+        root_holder=root.root_holder if len(lives) > 1 else "",
+        contact_by_bin=contact.contact_by_bin,
+        root_by_bin=root.root_by_bin,
+    )
 
 
 @dataclass(frozen=True)
@@ -192,7 +232,8 @@ class _Case:
         share = tooth.cycles / (len(tooth.meshes) * len(self.balance.angle))
         cycles = np.broadcast_to((points.revolutions[worn] * share)[:, None, None], hertz.shape)
         worst_torque, worst_hub = acting.worst(self.sense)
-        worst = self._stresses(worst_torque, worst_hub, np.full(len(worst_torque), self.dynamic.largest))
+        highest = self.dynamic.largest(acting.slowest, acting.fastest)
+        worst = self._stresses(worst_torque, worst_hub, np.full(len(worst_torque), highest))
         torque, tilt = self._loads(worst_torque, worst_hub)
         top = int(np.abs(worst_torque).argmax())
         force = tangential_force(self.pair.pinion, float(torque[top].mean()) / self.pair.pinion.base_radius)
@@ -206,8 +247,13 @@ class _Case:
             family=tooth.family,
             flank=FLANKS[self.sense * tooth.flank],
             cycles=float(points.revolutions[worn].sum()) * tooth.cycles,
+            contact_holder=tooth.holder,
+            root_holder=tooth.holder,
             contact_stress=float(worst[0].max()),
             root_stress=float(worst[1].max()),
+            contact_worn=float(hertz.max(initial=0.0)),
+            root_worn=float(root.max(initial=0.0)),
+            reach=highest * float(torque.max()) / float(stress.torque[-1]),
             compression=float(worst[2].min()),
             nominal_contact=nominal_contact_stress(self.pair, force),
             nominal_root=self._nominal_root(force),
@@ -248,7 +294,10 @@ class _Case:
         self, hertz: Floats, root: Floats, cycles: Floats, speed: Floats, worst_hertz: float, worst_root: float
     ) -> dict[str, Any]:
         strength = self.rating.gears.get(self.tooth.gear)
-        keys = ("contact_damage", "root_damage", "contact_safety", "root_safety", "contact_static", "root_static")
+        keys = (
+            *("contact_damage", "root_damage", "contact_safety", "root_safety", "contact_static", "root_static"),
+            *("contact_limit", "root_limit"),
+        )
         if strength is None:
             return {**dict.fromkeys(keys, math.nan), "by_point": np.nan}
         contact, bending = life_curves(strength)
@@ -265,6 +314,8 @@ class _Case:
             safety_factor(bending, root, endured, cycles),
             static / worst_hertz,
             endured * bending.factors[0] / worst_root,
+            float(allowed.min(initial=math.inf)) * contact.factors[0],
+            endured * bending.factors[0],
         )
         return {**dict(zip(keys, values, strict=True)), "by_point": np.stack([by_contact, by_root])}
 

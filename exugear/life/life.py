@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from exugear.counting.duration import DurationDistribution
+from exugear.dynamic_factors.dynamic_factor import WITHIN, DynamicFactor
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.fingerprint import input_hash
-from exugear.life.acting_loads import acting_loads
+from exugear.life.acting_loads import ActingLoads, acting_loads
 from exugear.life.bearing_life import BearingLife, bearing_lives
-from exugear.life.dynamic_factor import WITHIN, DynamicFactor
 from exugear.life.gear_life import FlankLife, beyond_tables, check_strengths, flank_lives
 from exugear.life.static_balance import AngleStore, StaticBalance, static_balance
+from exugear.life.verdict import failures, needs_of_relief, reaches, shortfalls
 from exugear.load_spectrum.counted import CountedLoads, count_loads
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import RPM
@@ -25,8 +24,8 @@ from exugear.model.sections.loads import RatingSection
 from exugear.model.versions import LIFE
 from fe_ste.root_stress.mesh_cycle import MeshCycleStress
 
-LEAST_OUTSIDE = 0.01
-"""Share of the load outside the path of contact below which no relief is asked for."""
+TOLD_SHARING = 1.0005
+"""K_gamma of a single mesh from which it is told: loads of a hub turn into forces of teeth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +44,11 @@ class Life:
     bearings : tuple of BearingLife
     unrated : tuple of str
         Why parts have no life.
+    failures : tuple of str
+        Parts whose damage is infinite, with the stress that causes it.
     shortfalls : tuple of str
-        Flanks and roots whose safety is less than `[rating]` asks for.
+        Parts whose safety is less than `[rating]` asks for, that live less long than `[loads]` asks for, or whose
+        stresses are not to be trusted.
     reliefs : tuple of str
         Pairs that carry load outside their path of contact: what relief of their tips would take away.
     assumptions : tuple of str
@@ -65,6 +67,7 @@ class Life:
     flanks: tuple[FlankLife, ...]
     bearings: tuple[BearingLife, ...]
     unrated: tuple[str, ...]
+    failures: tuple[str, ...]
     shortfalls: tuple[str, ...]
     reliefs: tuple[str, ...]
     assumptions: tuple[str, ...]
@@ -165,7 +168,7 @@ def compute_life(
         A static state that is not held.
     """
     gearbox, rating = assembly.gearbox, rating_of(assembly.gearbox)
-    found, acting = counted.distribution, acting_loads(counted)
+    acting = acting_loads(counted)
     balance = static_balance(
         assembly, counted.body, acting.torques, rating.carrier_angles, progress, 0.5 * acting.hub_sizes, store
     )
@@ -174,8 +177,9 @@ def compute_life(
     families: dict[str, list[int]] = {}
     for number, mesh in enumerate(gearbox.meshes):
         families.setdefault(mesh.family, []).append(number)
-    sharing = {family: balance.load_sharing(numbers) for family, numbers in families.items()}
-    several = {family: sharing[family] for family, numbers in families.items() if len(numbers) > 1}
+    hub = np.concatenate([acting.points.other, acting.worst_hub])
+    sharing = {family: balance.load_sharing(numbers, acting.torques, hub) for family, numbers in families.items()}
+    told = {name: one for name, one in sharing.items() if len(families[name]) > 1 or one > TOLD_SHARING}
     return Life(
         variant=assembly.variant,
         mesh_law=assembly.mesh_law,
@@ -187,45 +191,17 @@ def compute_life(
         flanks=flanks,
         bearings=bearings,
         unrated=tuple(_unrated(assembly, counted, stresses)),
-        shortfalls=tuple(shortfalls(rating, flanks)),
+        failures=tuple(failures(flanks)),
+        shortfalls=tuple(shortfalls(rating, flanks, bearings, float(acting.points.hours.sum()))),
         reliefs=tuple(needs_of_relief(flanks)),
         assumptions=(
-            *_assumptions(rating, counted, found, balance, stresses, dynamic),
-            *(f"K_gamma of {family} = {value:.3f}, in the forces of each mesh" for family, value in several.items()),
+            *_assumptions(rating, counted, acting, balance, stresses, dynamic),
+            *(f"K_gamma of {family} = {value:.3f}, in the forces of each mesh" for family, value in told.items()),
             *beyond_tables(gearbox, acting, balance, stresses),
+            *reaches(flanks),
         ),
         input_hash=digest,
     )
-
-
-def shortfalls(rating: RatingSection, flanks: Iterable[FlankLife]) -> Iterator[str]:
-    """Tell which flanks and roots have less safety, over the life or under the largest load, than is asked for.
-
-    Parameters
-    ----------
-    rating : RatingSection
-        Its `least_S_H` and `least_S_F`; nothing is asked for without.
-    flanks : iterable of FlankLife
-    """
-    for one in flanks:
-        of_flank, of_root = (one.contact_safety, one.contact_static), (one.root_safety, one.root_static)
-        for name, found, asked in (("S_H", of_flank, rating.least_S_H), ("S_F", of_root, rating.least_S_F)):
-            least = min((value for value in found if not math.isnan(value)), default=math.inf)
-            if asked is not None and least < asked:
-                yield f"{one.gear} {one.flank} {one.family}: {name} = {least:.2f}, {asked:g} is asked for"
-
-
-def needs_of_relief(flanks: Iterable[FlankLife]) -> Iterator[str]:
-    """Tell which pairs need relief of their tips: those that carry more than `LEAST_OUTSIDE` outside their path."""
-    largest: dict[str, float] = {}
-    for one in flanks:
-        largest[one.family] = max(one.outside, largest.get(one.family, 0.0))
-    for family, share in largest.items():
-        if share > LEAST_OUTSIDE:
-            yield (
-                f"{family}: up to {100.0 * share:.1f} % of its load lies outside the path of contact, where tip edges "
-                "dig in and no stress is rated: its flanks need tip relief"
-            )
 
 
 def _hub_in_words(counted: CountedLoads) -> str:
@@ -256,7 +232,7 @@ def _unrated(assembly: Assembly, counted: CountedLoads, stresses: Mapping[str, M
 def _assumptions(
     rating: RatingSection,
     counted: CountedLoads,
-    found: DurationDistribution,
+    acting: ActingLoads,
     balance: StaticBalance,
     stresses: Mapping[str, MeshCycleStress],
     dynamic: Mapping[str, DynamicFactor],
@@ -266,13 +242,14 @@ def _assumptions(
         _hub_in_words(counted),
         f"static balance at {count} torque{'s' * (count > 1)} and {turns} angle{'s' * (turns > 1)} of the carrier, "
         + ("proportional to torque" if balance.linear else "forces over torque linear between these"),
-        _dynamic_in_words(rating, dynamic, found) + "; none on bearings",
+        _dynamic_in_words(rating, dynamic, acting) + "; none on bearings",
         "face and transverse load factors are in the stresses of the contact of finite elements"
         + (
             ""
             if any(len(one.misalignment) > 1 for one in stresses.values())
             else ", of gears that stand aligned: tables with axes (--grid) have their misalignment"
         ),
+        f"S_H of {rating.least_S_H:g}, S_F of {rating.least_S_F:g} and S_0 of {rating.least_S_0:g} are asked for",
         "Z_W = Z_X = 1; S-N curves go on beyond their last point: no load is without damage",
         "lives of bearings are basic: lubricant, cleanliness, ribs and cages are left out",
     ]
@@ -281,21 +258,21 @@ def _assumptions(
             f"outside their tables under some load: {', '.join(balance.outside)}; tables go on in a straight line "
             "there; widen the axes of [ste]"
         )
-    if np.any(found.torque < 0.0):
+    if np.any(counted.distribution.torque < 0.0):
         lines.append("reversed torque presses the other flanks; teeth there are taken as the mirror of these")
     return [*lines, *counted.remarks]
 
 
-def _dynamic_in_words(rating: RatingSection, dynamic: Mapping[str, DynamicFactor], found: DurationDistribution) -> str:
+def _dynamic_in_words(rating: RatingSection, dynamic: Mapping[str, DynamicFactor], acting: ActingLoads) -> str:
     if rating.dynamic_factor is not None:
         return f"K_v = {rating.dynamic_factor:g} on all meshes as stated"
-    values = ", ".join(f"{family} {float(one.at(found.speed).max()):.3f}" for family, one in dynamic.items())
+    values = ", ".join(f"{name} {one.largest(acting.slowest, acting.fastest):.3f}" for name, one in dynamic.items())
     first = next(iter(dynamic.values()))
-    lowest, highest = np.abs(found.speed).min() / RPM, np.abs(found.speed).max() / RPM
+    lowest, highest = acting.slowest / RPM, acting.fastest / RPM
     slow, fast = first.speed[0] / RPM, first.speed[-1] / RPM
-    beyond = (
-        ""
-        if slow <= lowest * (1.0 + WITHIN) and highest <= fast * (1.0 + WITHIN)
-        else (f" (loads turn from {lowest:.4g} to {highest:.4g} rpm; beyond its speeds that of its end is taken)")
+    inside = slow <= lowest * (1.0 + WITHIN) and highest <= fast * (1.0 + WITHIN)
+    beyond = "" if inside else "; beyond its speeds that of its end is taken"
+    return (
+        f"K_v of {first.source}, taken from {lowest:.4g} to {highest:.4g} rpm, where the loads turn{beyond}, "
+        f"at least {rating.least_dynamic_factor:g}: {values}"
     )
-    return f"K_v of {first.source}{beyond}, at least {rating.least_dynamic_factor:g}: {values}"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from exugear.life.life_file import limits
+from exugear.life.life_file import DAMAGES, limits
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.drawing import COLOURS, WARNING_COLOUR, drawing_style, finish_figure, new_figure
 
@@ -19,8 +19,8 @@ SHOWN = 16
 """Most parts that are drawn."""
 LEAST_DAMAGE = 1e-6
 """Smaller damages are not drawn."""
-KINDS = {"pitting": ("flank", "contact_by_bin"), "root": ("flank", "root_by_bin"), "L10r": ("bearing", "by_bin")}
-"""Dimension and damage by bin of each kind of damage."""
+LARGEST_DAMAGE = 1e6
+"""Length of the bar of a larger one, infinite ones among them."""
 
 
 def draw_life(data: xr.Dataset, path: str | Path | None = None) -> Figure:
@@ -33,13 +33,13 @@ def draw_life(data: xr.Dataset, path: str | Path | None = None) -> Figure:
     path : path-like, optional
         Where to write the picture.
     """
-    shown = [one for one in limits(data) if one[2] > LEAST_DAMAGE and np.isfinite(one[2])][:SHOWN]
+    shown = [one for one in limits(data) if one[2] > LEAST_DAMAGE][:SHOWN]
     with drawing_style():
         figure = new_figure(8.5, max(2.2, 0.8 + 0.24 * len(shown)))
         bars, matrix = figure.subplots(1, 2, sharey=True, width_ratios=(1.0, 1.3))
-        names = [f"{part}, {kind}" for part, kind, _ in shown]
-        values = [damage for _, _, damage in shown]
-        colours = [COLOURS[list(KINDS).index(kind)] for _, kind, _ in shown]
+        names = [f"{part}, {kind}" + (": infinite" if np.isinf(damage) else "") for part, kind, damage in shown]
+        values = [min(damage, LARGEST_DAMAGE) for _, _, damage in shown]
+        colours = [COLOURS[list(DAMAGES).index(kind)] for _, kind, _ in shown]
         bars.barh(range(len(shown)), values, color=colours)
         bars.axvline(1.0, color=WARNING_COLOUR)
         bars.set(xscale="log", xlabel="damage in the life (1: worn out)", yticks=range(len(shown)), yticklabels=names)
@@ -68,9 +68,11 @@ def damage_matrix(data: xr.Dataset, parts: list[tuple[str, str, float]]) -> tupl
     order = np.argsort(torque)
     rows = []
     for part, kind, damage in parts:
-        name, key = KINDS[kind]
+        name, _, by_bin = DAMAGES[kind]
         place = data[name].to_numpy().tolist().index(part)
-        rows.append(data[f"{name}_{key}"].to_numpy()[place][order] / damage)
+        values = data[f"{name}_{by_bin}"].to_numpy()[place][order]
+        endless = np.isinf(values)
+        rows.append(endless / endless.sum() if endless.any() else values / damage)
     middles = 0.5 * (torque[order][1:] + torque[order][:-1])
     ends = torque[order][[0, -1]]
     return np.concatenate([ends[:1], middles, ends[1:]]), np.array(rows).reshape(len(parts), -1)

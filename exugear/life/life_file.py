@@ -24,9 +24,25 @@ from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
 if TYPE_CHECKING:
     import xarray as xr
 
-FLANK_UNITS = {
-    "contact_stress": "Pa", "root_stress": "Pa", "compression": "Pa", "nominal_contact": "Pa", "nominal_root": "Pa",
-}  # fmt: skip
+FLANK_UNITS = dict.fromkeys(
+    (
+        *("contact_stress", "root_stress", "compression", "nominal_contact", "nominal_root"),
+        *("contact_worn", "root_worn", "contact_limit", "root_limit"),
+    ),
+    "Pa",
+)
+FLANK_WORDS = ("contact_holder", "root_holder")
+INFINITE = "infinite"
+"""For programs in place of a number, where JSON has none: a damage without end, or a life that nothing ends."""
+DAMAGES = {
+    "pitting": ("flank", "contact_damage", "contact_by_bin"),
+    "root": ("flank", "root_damage", "root_by_bin"),
+    "L10": ("bearing", "damage", "by_bin"),
+    "L10r": ("bearing", "reference_damage", "reference_by_bin"),
+}
+"""Dimension, figure and figure by bin of each kind of damage."""
+LISTS = ("assumptions", "unrated", "failures", "shortfalls", "reliefs")
+"""What a life says in words, lists of sentences."""
 BEARING_UNITS = {"largest_load": "N", "equivalent": "N", "basic_hours": "h", "reference_hours": "h", "pressure": "Pa"}
 FLANK_NUMBERS = tuple(one.name for one in fields(FlankLife) if one.type in (float, "float"))
 BEARING_NUMBERS = tuple(one.name for one in fields(BearingLife) if one.type in (float, "float"))
@@ -37,20 +53,9 @@ _LAYOUT = Layout(
     | {f"bearing_{name}": ("bearing",) for name in (*BEARING_NUMBERS, "dynamic_rating", "static_rating")}
     | {name: ("bin",) for name in ("torque", "hours", "revolutions", "speed")}
     | {"flank": ("flank",), "bearing": ("bearing",)}
-    | {f"flank_{name}": ("flank", "bin") for name in ("contact_by_bin", "root_by_bin")}
-    | {"bearing_by_bin": ("bearing", "bin")},
-    (
-        "gearbox",
-        "variant",
-        "mesh_law",
-        "inertias",
-        "edition",
-        "input_hash",
-        "assumptions",
-        "unrated",
-        "shortfalls",
-        "reliefs",
-    ),
+    | {f"flank_{name}": ("flank",) for name in FLANK_WORDS}
+    | {f"{name}_{by_bin}": (name, "bin") for name, _, by_bin in DAMAGES.values()},
+    ("gearbox", "variant", "mesh_law", "inertias", "edition", "input_hash", *LISTS),
 )
 
 
@@ -78,11 +83,13 @@ def to_dataset(life: Life, gearbox: str) -> xr.Dataset:
         values = np.array([getattr(one, name) for one in life.bearings], dtype=np.float64)
         variables[f"bearing_{name}"] = (("bearing",), values, {"units": BEARING_UNITS.get(name, "1")})
     count, none = len(found.hours), {"units": "1", "long_name": "parts of the damage by bin of torque"}
-    for name in ("contact_by_bin", "root_by_bin"):
-        values = np.array([getattr(one, name) for one in life.flanks]).reshape(-1, count)
-        variables[f"flank_{name}"] = (("flank", "bin"), values, none)
-    values = np.array([one.by_bin for one in life.bearings]).reshape(-1, count)
-    variables["bearing_by_bin"] = (("bearing", "bin"), values, none)
+    parts = {"flank": life.flanks, "bearing": life.bearings}
+    for name, _, by_bin in DAMAGES.values():
+        values = np.array([getattr(one, by_bin) for one in parts[name]], dtype=np.float64).reshape(-1, count)
+        variables[f"{name}_{by_bin}"] = ((name, "bin"), values, none)
+    for name in FLANK_WORDS:
+        words = np.array([getattr(one, name) for one in life.flanks], dtype=object)
+        variables[f"flank_{name}"] = (("flank",), words, {})
     for name in ("dynamic", "static"):
         values = np.array([getattr(one.ratings, name) for one in life.bearings], dtype=np.float64)
         variables[f"bearing_{name}_rating"] = (("bearing",), values, {"units": "N"})
@@ -100,10 +107,7 @@ def to_dataset(life: Life, gearbox: str) -> xr.Dataset:
         "body": life.counted.body,
         "life_years": life.counted.life_years,
         "sources": json.dumps(life.counted.source_rows()),
-        "assumptions": json.dumps(life.assumptions),
-        "unrated": json.dumps(life.unrated),
-        "shortfalls": json.dumps(life.shortfalls),
-        "reliefs": json.dumps(life.reliefs),
+        **{name: json.dumps(getattr(life, name)) for name in LISTS},
         "bearing_remarks": json.dumps({one.name: one.remarks for one in life.bearings if one.remarks}),
         "input_hash": life.input_hash,
         "method_version": LIFE,
@@ -154,40 +158,40 @@ def _rows(dataset: xr.Dataset, name: str, numbers: Sequence[str]) -> Iterator[li
 
 
 def limits(dataset: xr.Dataset) -> list[tuple[str, str, float]]:
-    """Damages of all parts of a stored life, largest first: part, kind, Miner's sum."""
+    """Damages of all parts of a stored life, largest first: part, kind, Miner's sum, which may be infinite."""
     found = []
-    for name, kinds in {
-        "flank": {"pitting": "contact_damage", "root": "root_damage"},
-        "bearing": {"L10r": "reference_damage"},
-    }.items():
-        for kind, key in kinds.items():
-            values = dataset[f"{name}_{key}"].to_numpy().tolist()
-            found += [
-                (label, kind, value) for label, value in zip(dataset[name].to_numpy().tolist(), values, strict=True)
-            ]
+    for kind, (name, key, _) in DAMAGES.items():
+        values = dataset[f"{name}_{key}"].to_numpy().tolist()
+        found += [(part, kind, value) for part, value in zip(dataset[name].to_numpy().tolist(), values, strict=True)]
     return sorted((one for one in found if not math.isnan(one[2])), key=lambda one: -one[2])
 
 
 def summary(dataset: xr.Dataset) -> dict[str, Any]:
-    """Figures for programs, numbers that are none left out."""
+    """Figures for programs: numbers that are none are left out, those without end are `INFINITE`."""
     return {
+        "failures": json.loads(dataset.attrs["failures"]),
+        "shortfalls": json.loads(dataset.attrs["shortfalls"]),
         **{key: str(dataset.attrs[key]) for key in ("variant", "mesh_law", "edition", "input_hash")},
         "flanks": [*_entries(dataset, "flank", FLANK_NUMBERS)],
         "bearings": [*_entries(dataset, "bearing", BEARING_NUMBERS)],
         "load_sharing": dict(
             zip(dataset["family"].to_numpy().tolist(), dataset["load_sharing"].to_numpy().tolist(), strict=True)
         ),
-        "limits": [{"part": part, "by": kind, "damage": damage} for part, kind, damage in limits(dataset)[:10]
-                   if math.isfinite(damage)],
-        "assumptions": json.loads(dataset.attrs["assumptions"]),
-        "unrated": json.loads(dataset.attrs["unrated"]),
-        "shortfalls": json.loads(dataset.attrs["shortfalls"]),
-        "reliefs": json.loads(dataset.attrs["reliefs"]),
+        "limits": [
+            {"part": part, "by": kind, "damage": _number(damage)} for part, kind, damage in limits(dataset)[:10]
+        ],
+        **{name: json.loads(dataset.attrs[name]) for name in ("assumptions", "unrated", "reliefs")},
         "remarks": json.loads(dataset.attrs["bearing_remarks"]),
-    }  # fmt: skip
+    }
+
+
+def _number(value: float) -> float | str:
+    return INFINITE if math.isinf(value) else value
 
 
 def _entries(dataset: xr.Dataset, name: str, numbers: Sequence[str]) -> Iterator[Mapping[str, Any]]:
     for label, *values in _rows(dataset, name, numbers):
-        given = {key: value for key, value in zip(numbers, values, strict=True) if math.isfinite(float(value))}
-        yield {name: label, **given}
+        given = zip(numbers, map(float, values), strict=True)
+        words = FLANK_WORDS if name == "flank" else ()
+        told = {key: str(dataset[f"{name}_{key}"].sel({name: label}).item()) for key in words}
+        yield {name: label, **told, **{key: _number(value) for key, value in given if not math.isnan(value)}}

@@ -106,11 +106,27 @@ class StaticBalance:
             found[wanted] = inside.reshape(-1, *values.shape[1:])
         return found
 
-    def load_sharing(self, meshes: Sequence[int]) -> float:
-        """K_gamma of the meshes of a family: largest over mean force at the largest torque, over all angles."""
-        forces = np.abs(self.mesh_force.values[np.abs(self.torque).argmax()][:, list(meshes)])
-        mean = float(forces.mean())
-        return float(forces.max()) / mean if mean else 1.0
+    def load_sharing(self, meshes: Sequence[int], torque: Floats | None = None, hub: Floats | None = None) -> float:
+        """K_gamma of the meshes of a family, over all angles.
+
+        Parameters
+        ----------
+        meshes : sequence of int
+        torque, hub : array (n,), (n, 5), optional
+            Torques and loads of a hub; without them the largest torque alone.
+
+        Returns
+        -------
+        float
+            Largest of all forces over the mean that the same torque gives without loads of a hub.
+        """
+        if torque is None:
+            torque = self.torque[[np.abs(self.torque).argmax()]]
+        own = list(meshes)
+        forces = np.abs(self.at(self.mesh_force, torque, hub)[..., own]).max(axis=(1, 2))
+        worst = int(forces.argmax())
+        mean = float(np.abs(self.at(self.mesh_force, torque[[worst]])[..., own]).mean())
+        return float(forces[worst]) / mean if mean else 1.0
 
 
 class States(NamedTuple):

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from exugear.dynamic_factors.response_factors import source_hash
 from exugear.dynamics.assembly import Assembly
 from exugear.life.life import checked_loads, life_hash, rating_of
 from exugear.life.life_file import read_life
-from exugear.life.response_factors import source_hash
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError

@@ -11,7 +11,7 @@ import numpy as np
 
 from exugear.counting.duration import DurationDistribution, LoadPoints, equivalent_load
 from exugear.counting.rainflow import damage_equivalent_range
-from exugear.load_spectrum.exposure import FLANKS, ToothExposure, bearing_turns, tooth_exposures
+from exugear.load_spectrum.exposure import FLANKS, ToothExposure, bearing_turns, distinct, tooth_exposures
 from exugear.load_spectrum.sources import LoadSource, distribution, load_sources, points_of, section_of, told
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import RPM
@@ -100,7 +100,7 @@ class CountedLoads:
             own = np.sign(found.torque) == sense
             turns = float(found.revolutions[own].sum())
             largest = float(np.abs(found.torque[own]).max(initial=0.0))
-            for tooth in self.teeth if turns else ():
+            for tooth in distinct(self.teeth) if turns else ():
                 rows.append(
                     {
                         "part": f"{tooth.gear}, flank {FLANKS[sense * tooth.flank]}",

@@ -6,7 +6,7 @@ rotation.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from exugear.model.gearbox import Gearbox
@@ -21,8 +21,8 @@ class ToothExposure:
 
     Attributes
     ----------
-    gear, family : str
-        Gear, and the family of its meshes.
+    gear, family, holder : str
+        Gear, the family of its meshes, and the body whose teeth these are: one of equal planets.
     member : {0, 1}
         Whether it is gear 1 or gear 2 of the pair.
     flank : int
@@ -35,6 +35,7 @@ class ToothExposure:
 
     gear: str
     family: str
+    holder: str
     member: int
     flank: int
     meshes: tuple[int, ...]
@@ -42,7 +43,7 @@ class ToothExposure:
 
 
 def tooth_exposures(gearbox: Gearbox, body: str) -> tuple[ToothExposure, ...]:
-    """Tell what the teeth of all gears meet per revolution of a body; equal planets count once.
+    """Tell what the teeth of all gears meet per revolution of a body; of equal planets each by itself.
 
     Examples
     --------
@@ -52,11 +53,11 @@ def tooth_exposures(gearbox: Gearbox, body: str) -> tuple[ToothExposure, ...]:
     """
     spins = gearbox.train.rolling_speeds(body, 1.0)
     forces = gearbox.train.static_mesh_forces(_torque_on(gearbox, body))
-    found: dict[tuple[str, str], ToothExposure] = {}
+    found: dict[tuple[str, str, str], ToothExposure] = {}
     for mesh in gearbox.meshes:
         for member, holder in enumerate((mesh.pinion, mesh.gear)):
             gear = (mesh.pair.pinion, mesh.pair.gear)[member]
-            if (gear.name, mesh.family) in found:
+            if (gear.name, mesh.family, holder) in found:
                 continue
             passed = tuple(
                 number
@@ -65,14 +66,23 @@ def tooth_exposures(gearbox: Gearbox, body: str) -> tuple[ToothExposure, ...]:
             )
             opposite = member == 1 and gear.internal
             sign = 1 if forces[mesh.name] >= 0.0 else -1
-            found[gear.name, mesh.family] = ToothExposure(
+            found[gear.name, mesh.family, holder] = ToothExposure(
                 gear=gear.name,
                 family=mesh.family,
+                holder=holder,
                 member=member,
                 flank=-sign if opposite else sign,
                 meshes=passed,
                 cycles=len(passed) * abs(_against_frame(spins, mesh, holder)),
             )
+    return tuple(found.values())
+
+
+def distinct(teeth: Iterable[ToothExposure]) -> tuple[ToothExposure, ...]:
+    """One of equal planets for all of them: each gear in each family once."""
+    found: dict[tuple[str, str], ToothExposure] = {}
+    for one in teeth:
+        found.setdefault((one.gear, one.family), one)
     return tuple(found.values())
 
 

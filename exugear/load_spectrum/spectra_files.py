@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from exugear.load_spectrum.counted import CountedLoads
+from exugear.load_spectrum.exposure import distinct
 from exugear.model.parts import RPM
 from fe_ste.tools.files import write_file
 
@@ -16,7 +17,7 @@ def write_spectra(counted: CountedLoads, folder: Path) -> list[Path]:
     rows = zip(found.lower, found.upper, found.torque, found.speed / RPM, found.hours, found.revolutions, strict=True)
     headings = ("lower_N_m", "upper_N_m", "torque_N_m", "speed_rpm", "hours", "revolutions")
     paths = [write_table(folder / f"{counted.body}.csv", headings, rows)]
-    for tooth in counted.teeth:
+    for tooth in distinct(counted.teeth):
         for sense in (1, -1):
             own = found.torque * sense > 0.0
             if not own.any():

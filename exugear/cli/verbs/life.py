@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from exugear.cli.case import make_results_folder, open_project
 from exugear.cli.console import note, print_json, print_table, progress_bar, say
 from exugear.cli.dynamics import reduce_elastic_bodies
-from exugear.cli.errors import exit_codes, interruption, model_errors
+from exugear.cli.errors import FailedError, exit_codes, interruption, model_errors
 from exugear.cli.options import (
     USUAL_LAW,
     CaseArgument,
@@ -27,6 +27,8 @@ from exugear.cli.options import (
 from exugear.cli.tables import compute_tables
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import xarray as xr
 
     from exugear.project import Project
@@ -49,14 +51,13 @@ def life(
     Tables that are missing or do not fit the case are computed first.
     """
     with exit_codes():
-        from exugear.life.life import checked_loads
         from exugear.life.life_diagrams import draw_life
         from exugear.life.life_file import summary
         from exugear.model.choice import Choice
 
         project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
         with model_errors():
-            checked_loads(project.gearbox)
+            project.checked_loads()
         make_results_folder(project.folder)
         project.keep_case()
         with model_errors():
@@ -68,9 +69,17 @@ def life(
         draw_life(data, picture)
         if as_json:
             print_json({"case": str(case), **summary(data), "file": str(project.life_path)})
-            return
-        _tell(data)
-        say(f"Life in {project.life_path}, tables with commas and a picture beside it")
+        else:
+            _tell(data)
+            say(f"Life in {project.life_path}, tables with commas and a picture beside it")
+        _fail_if_short(data, project.life_path)
+
+
+def _fail_if_short(data: xr.Dataset, path: Path) -> None:
+    """End with code 1 where a part fails or falls short of what is asked for."""
+    lines = [line for key in ("failures", "shortfalls") for line in json.loads(data.attrs[key])]
+    if lines:
+        raise FailedError("\n".join(["the gearbox does not live as long as it shall:", *lines, f"It is in {path}"]))
 
 
 def _rate(project: Project) -> xr.Dataset:
@@ -93,6 +102,8 @@ def _rate(project: Project) -> xr.Dataset:
 def _tell(data: xr.Dataset) -> None:
     from exugear.life.life_file import limits
 
+    for line in json.loads(data.attrs["failures"]):
+        say(line)
     if data.sizes["flank"]:
         print_table("Flanks: largest contact stress of the life, safety against pitting", _contact_rows(data))
         print_table("Roots: largest stress of the life, safety against breakage", _root_rows(data))
@@ -100,9 +111,9 @@ def _tell(data: xr.Dataset) -> None:
         print_table("Bearings: basic rating life, static safety", _bearing_rows(data))
     worst = [one for one in limits(data) if one[2] > 0.0][:SHOWN_LIMITS]
     if worst:
-        rows = [{"limits": part, "by": kind, "damage": f"{damage:.3g}"} for part, kind, damage in worst]
+        rows = [{"limits": part, "by": kind, "damage": _told(damage, ".3g")} for part, kind, damage in worst]
         print_table(f"What limits the life of {float(data.attrs['life_years']):g} years", rows)
-    for key, style in (("assumptions", ""), ("unrated", "yellow"), ("reliefs", "yellow"), ("shortfalls", "red")):
+    for key, style in (("assumptions", ""), ("unrated", "yellow"), ("reliefs", "yellow")):
         for line in json.loads(data.attrs[key]):
             note(line, style=style)
 
@@ -110,7 +121,7 @@ def _tell(data: xr.Dataset) -> None:
 def _contact_rows(data: xr.Dataset) -> list[dict[str, str]]:
     return [
         {
-            "gear, flank, mesh": label,
+            "gear, flank, mesh": _with_holder(data, label, "contact"),
             "sigma_H\nMPa": _told(1e-6 * value("contact_stress"), ".0f"),
             "ISO\nMPa": _told(1e-6 * value("nominal_contact"), ".0f"),
             "outside\n%": _told(100.0 * value("outside"), ".1f"),
@@ -125,7 +136,7 @@ def _contact_rows(data: xr.Dataset) -> list[dict[str, str]]:
 def _root_rows(data: xr.Dataset) -> list[dict[str, str]]:
     return [
         {
-            "gear, flank, mesh": label,
+            "gear, flank, mesh": _with_holder(data, label, "root"),
             "sigma_F\nMPa": _told(1e-6 * value("root_stress"), ".0f"),
             "ISO\nMPa": _told(1e-6 * value("nominal_root"), ".0f"),
             "least\nMPa": _told(1e-6 * value("compression"), ".0f"),
@@ -160,9 +171,15 @@ def _entries(data: xr.Dataset, name: str) -> Iterator[tuple[str, Callable[[str],
         yield label, partial(_figure, data, name, place)
 
 
+def _with_holder(data: xr.Dataset, label: str, kind: str) -> str:
+    """Label of a flank, and which of several planets it is."""
+    holder = str(data[f"flank_{kind}_holder"].sel(flank=label).item())
+    return f"{label}\n  {holder}" if holder else label
+
+
 def _figure(data: xr.Dataset, name: str, place: int, key: str) -> float:
     return float(data[f"{name}_{key}"][place])
 
 
 def _told(value: float, form: str) -> str:
-    return "" if math.isnan(value) else "none" if math.isinf(value) else format(value, form)
+    return "" if math.isnan(value) else "infinite" if math.isinf(value) else format(value, form)

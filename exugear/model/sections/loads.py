@@ -130,10 +130,13 @@ class RatingSection(Section):
     """Angles of the input at which the static balance is taken."""
     gears: Entries[StrengthSection] = {}
     """What gears withstand, by name of the gear; others are not rated."""
-    least_S_H: q.SafetyFactor | None = None
-    """Safety against pitting that is asked for."""
-    least_S_F: q.SafetyFactor | None = None
-    """Safety against breakage that is asked for."""
+    least_S_H: q.SafetyFactor = 1.0
+    """Safety against pitting that is asked for, over the life and under the largest load; rules for machines ask for
+    more than 1."""
+    least_S_F: q.SafetyFactor = 1.0
+    """Safety against breakage that is asked for, likewise."""
+    least_S_0: q.SafetyFactor = 1.0
+    """Static safety of bearings that is asked for."""
 
     @model_validator(mode="after")
     def _dynamic_factor(self) -> RatingSection:

@@ -46,11 +46,14 @@ def life_section(material: Material) -> Part:
             context.notes.left_out.append(f"{context.name_of(stored.path)}: {stored.reason}")
         else:
             content.append(_of_variant(material, stored.data))
-            worst = limits(stored.data)[0]
-            context.notes.statements.append(
-                f"{words_of(choice_of(stored.data.attrs))}: in {float(stored.data.attrs['life_years']):g} years "
-                f"{material.words.told(worst[0])} wears most, damage {worst[2]:.3g} ({worst[1]})."
-            )
+            worst = limits(stored.data)
+            if worst:
+                part, kind, damage = worst[0]
+                size = "infinite" if math.isinf(damage) else f"{damage:.3g}"
+                context.notes.statements.append(
+                    f"{words_of(choice_of(stored.data.attrs))}: in {float(stored.data.attrs['life_years']):g} years "
+                    f"{material.words.told(part)} wears most, damage {size} ({kind})."
+                )
     if not content:
         return Part("")
     html = pieces.section("How long it lasts", *(pieces.paragraph(own, "note") for own in WORDS), *content, name="life")
@@ -65,9 +68,8 @@ def _of_variant(material: Material, data: xr.Dataset) -> str:
     rested = [line for key in ("assumptions", "unrated") for line in json.loads(data.attrs[key])]
     return (
         pieces.element("h3", pieces.text(f"{name[0].upper()}{name[1:]}, gears by {data.attrs['edition']}"))
-        + "".join(
-            pieces.paragraph(f"Too little safety: {told(line)}.") for line in json.loads(data.attrs["shortfalls"])
-        )
+        + "".join(pieces.paragraph(f"Fails: {told(line)}.") for line in json.loads(data.attrs["failures"]))
+        + "".join(pieces.paragraph(f"Falls short: {told(line)}.") for line in json.loads(data.attrs["shortfalls"]))
         + "".join(pieces.paragraph(f"{told(line)}.") for line in json.loads(data.attrs["reliefs"]))
         + _picture(data, f"What limits the life, {name}")
         + pieces.table(_flank_rows(data), caption=f"Gears, {name}", name=f"{label}-gears", sortable=True)
@@ -107,6 +109,7 @@ def _bearing_rows(data: xr.Dataset) -> list[dict[str, object]]:
         "equivalent load / kN": ("equivalent", 1e-3, ".4g"),
         "L10 / h": ("basic_hours", 1.0, ".3g"),
         "L10r / h": ("reference_hours", 1.0, ".3g"),
+        "damage by L10": ("damage", 1.0, ".3g"),
         "damage by L10r": ("reference_damage", 1.0, ".3g"),
         "pressure / MPa": ("pressure", 1e-6, ".0f"),
         "S_0": ("static_safety", 1.0, ".2f"),
@@ -128,7 +131,7 @@ def _told(data: xr.Dataset, name: str, place: int, key: str, factor: float, form
     if math.isnan(value):
         return "–"
     if math.isinf(value):
-        return "no end"
+        return "infinite"
     if key.endswith("damage") and value < LEAST_DAMAGE:
         return Cell(f"below {LEAST_DAMAGE:g}", value)
     return Cell(figure_text(float(format(value, form))) if key.endswith("hours") else format(value, form), value)

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from exugear.dynamic_factors.dynamic_factor import DynamicFactor, window_factors
+from exugear.dynamic_factors.response_factors import factors, family_factors, response_path
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
-from exugear.life.dynamic_factor import DynamicFactor, window_factors
 from exugear.life.life import rating_of
-from exugear.life.response_factors import factors, family_factors, response_path
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import RPM
@@ -44,7 +44,7 @@ def test_windows_that_samples_do_not_resolve_are_left_out():
 def test_the_largest_near_a_speed_counts_and_never_less_than_the_least():
     factor = DynamicFactor(np.array([10.0, 10.3, 20.0]), np.array([1.1, 1.3, 1.01]), least=1.05)
     assert factor.at(np.array([10.0, -20.0, 50.0])) == pytest.approx([1.3, 1.05, 1.05])
-    assert factor.largest == 1.3
+    assert factor.largest(0.0, 100.0) == 1.3
 
 
 def test_a_run_gives_factors_over_speed_and_must_fit(tmp_path):

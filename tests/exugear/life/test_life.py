@@ -15,12 +15,12 @@ from typer.testing import CliRunner
 
 from exugear.bearings.rolling.life import basic_rating_life
 from exugear.cli import app as cli
+from exugear.dynamic_factors.dynamic_factor import stated_factors
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly, VariantError
 from exugear.dynamics.statics import locked_equilibrium
 from exugear.kernels.meshes import FORCE
 from exugear.life.acting_loads import acting_loads
-from exugear.life.dynamic_factor import stated_factors
 from exugear.life.gear_life import beyond_tables, flank_lives
 from exugear.life.life import checked_loads, compute_life, rating_of, shortfalls
 from exugear.life.life_diagrams import damage_matrix
@@ -187,11 +187,12 @@ def test_safeties_below_what_is_asked_for_are_named(tmp_path, stresses):
     flanks = [*lives(spur_project(tmp_path, TABLE), stresses).values()]
     least = min(min(one.contact_safety, one.contact_static) for one in flanks)
     asked = {"dynamic_factor": 1.0, "viscosity_40_mm2_per_s": 320.0}
-    assert not list(shortfalls(RatingSection(**asked), flanks))
-    assert not list(shortfalls(RatingSection(**asked, least_S_H=0.999 * least), flanks))
-    told = list(shortfalls(RatingSection(**asked, least_S_H=1.001 * least), flanks))
+    assert least < 1.0
+    assert f"S_H = {least:.3g}, 1 is asked for" in next(shortfalls(RatingSection(**asked), flanks, [], 1.0))
+    assert not list(shortfalls(RatingSection(**asked, least_S_H=0.999 * least), flanks, [], 1.0))
+    told = list(shortfalls(RatingSection(**asked, least_S_H=1.001 * least), flanks, [], 1.0))
     assert len(told) == 1
-    assert f"S_H = {least:.2f}" in told[0]
+    assert f"S_H = {least:.3g}" in told[0]
 
 
 def test_bins_do_the_damage_of_the_series(tmp_path, stresses):
@@ -400,7 +401,7 @@ def test_the_verb_tells_what_limits_and_what_that_rests_on(tmp_path, first):
     for kept in ("tables", "stress"):
         shutil.copytree(first.folder / kept, tmp_path / "out" / kept)
     text = SPUR_CASE + "".join(
-        f'\n[rating.gears.{gear}]\nsigma_H_lim_MPa = 1500.0\nsigma_F_lim_MPa = 500.0\ncurve = "case_hardened"\n'
+        f'\n[rating.gears.{gear}]\nsigma_H_lim_MPa = 1900.0\nsigma_F_lim_MPa = 500.0\ncurve = "case_hardened"\n'
         "roughness_um = 4.8\nroot_factor = 1.0\n"
         for gear in ("pinion", "wheel")
     )

@@ -59,10 +59,11 @@ class DynamicFactor:
             found[place] = self.value[near].max() if near.any() else np.interp(one, self.speed, self.value)
         return np.maximum(found, self.least)
 
-    @property
-    def largest(self) -> float:
-        """Largest factor of all speeds."""
-        return max(float(self.value.max()), self.least)
+    def largest(self, slowest: float, fastest: float) -> float:
+        """Largest factor of a range of speeds (rad/s without sign)."""
+        inside = (self.speed >= slowest * (1.0 - WITHIN)) & (self.speed <= fastest * (1.0 + WITHIN))
+        ends = self.at(np.array([slowest, fastest]))
+        return float(max(self.value[inside].max(initial=self.least), ends.max()))
 
 
 def stated_factors(gearbox: Gearbox, value: float) -> dict[str, DynamicFactor]:

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from exugear.dynamic_factors.dynamic_factor import CYCLES, DynamicFactor, factors_of_run, merged, stated_factors
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.fingerprint import input_hash
-from exugear.life.dynamic_factor import CYCLES, DynamicFactor, factors_of_run, merged, stated_factors
 from exugear.model.choice import Choice
 from exugear.model.parts import RPM
 from exugear.model.sections.loads import RatingSection
@@ -54,7 +54,7 @@ def factors(assembly: Assembly, rating: RatingSection, folder: Path, body: str) 
     Raises
     ------
     CaseError
-        See `factors_of_response` and `exugear.life.dynamic_factor.factors_of_run`.
+        See `factors_of_response` and `exugear.dynamic_factors.dynamic_factor.factors_of_run`.
     """
     if rating.dynamic_factor is not None:
         return stated_factors(assembly.gearbox, rating.dynamic_factor)
