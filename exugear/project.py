@@ -32,7 +32,7 @@ from exugear.tooth_mesh.law import MeshData
 from exugear.tooth_mesh.laws.registry import LAWS
 from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.tooth_mesh.placement import MeshError
-from exugear.tooth_mesh.tables import TableRequest, missing_tables, requested_tables
+from exugear.tooth_mesh.tables import TableRequest, missing_tables, requested_tables, tables_at_work
 from fe_ste.transmission_error.table import MeshTable
 
 if TYPE_CHECKING:
@@ -174,6 +174,13 @@ class Project:
         if law is None or not law.needs_tables:
             return []
         return missing_tables(self.gearbox, self.folder, grid=law.needs_axes)
+
+    def tables_at_work(self) -> dict[str, MeshTable]:
+        """Tables that the mesh law reads, as far as they are there."""
+        law = LAWS.get(self.choice.mesh_law)
+        if law is None or not law.needs_tables:
+            return {}
+        return tables_at_work(self.gearbox, self.folder, grid=law.needs_axes)
 
     def stiffness(self) -> dict[str, MeshData]:
         """Mesh stiffness by gear pair, as the mesh law needs it; tables that are missing are computed first."""

@@ -1,4 +1,4 @@
-"""How near gear pairs are to what tables refuse or what wears out: form circles, tips, pressure at the pitch point.
+"""How near gear pairs are to what tables cut off or what wears out: form circles, tips, pressure at the pitch point.
 
 From macro geometry and the static load alone, so that it costs nothing before the finite elements do.
 """
@@ -19,8 +19,8 @@ from fe_ste.transmission_error.hertz import pitch_point_pressure
 LEAST_FORM_MARGIN = 0.02
 """Part of a flank that should be left between the mate's tip and the form circle.
 
-Positions of a table at which contact comes nearer than 0.01 are not solved, and elastic teeth meet a little before and
-after the path of contact.
+Elastic teeth meet a little before and after the path of contact; tables cut off what is beyond the form circle, and
+count it (`fe_ste.contact.flank_ends`).
 """
 PROPOSED_MARGIN = 0.025
 """Part of a flank that a proposed tip diameter leaves."""
@@ -140,7 +140,7 @@ def doubts_about_pairs(gearbox: Gearbox) -> Iterator[str]:
                 key = f"gears.{mate.name}.tip_diameter_mm = {2e3 * mate.tip_radius:.6g}"
                 yield (
                     f"{key}: its tip comes within {100 * margin:.2g} % of the flank to the form circle of {gear.name}, "
-                    f"and positions of the table of {name} may stay unsolved; "
+                    f"where contact under load ends; the table of {name} counts what it cuts off there; "
                     f"{1e3 * _clear_tip_diameter(spec.pair, mate):.6g} leaves {100 * PROPOSED_MARGIN:g} %"
                 )
     for name, gear in gearbox.gears.items():

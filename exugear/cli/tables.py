@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import nullcontext
 from typing import TYPE_CHECKING
 
@@ -26,10 +27,20 @@ def compute_missing_tables(project: Project) -> None:
     for request in requests:
         note(request.replaces or f"{request.name}: no table in {project.folder}; it is computed first")
     with time_noted(project.folder, "tables, computed before dynamics") if requests else nullcontext():
-        tables = compute_tables(requests)
-    failures = [f"{name}: {line}" for name, table in tables.items() for line in table.failures]
-    if failures:
-        raise FailedError("\n".join(["positions of the tables that are not solved:", *failures]))
+        compute_tables(requests)
+    # What a law cannot do with it refuses itself.
+    for doubt in tell_of_tables(project.tables_at_work()):
+        note(doubt, style="yellow")
+
+
+def tell_of_tables(tables: Mapping[str, MeshTable]) -> list[str]:
+    """Say what is missing or cut off in tables; return why they are not to be trusted, nothing if they are."""
+    from exugear.tooth_mesh.table_remarks import doubts_about_table, remarks_about_table
+
+    for name, table in tables.items():
+        for remark in remarks_about_table(name, table):
+            note(remark, style="yellow")
+    return [doubt for name, table in tables.items() for doubt in doubts_about_table(name, table)]
 
 
 def compute_tables(requests: list[TableRequest]) -> dict[str, MeshTable]:

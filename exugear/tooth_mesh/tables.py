@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
 from fe_ste.transmission_error.hertz import pitch_point_pressure
+from fe_ste.transmission_error.states import CUT_OFF
 from fe_ste.transmission_error.table import MeshTable, TableError, TableInput
 
 if TYPE_CHECKING:
@@ -233,15 +235,27 @@ def missing_tables(gearbox: Gearbox, out: Path, grid: bool = False) -> list[Tabl
     grid : bool
         Whether the mesh law interpolates over load, centre distance and misalignment.
     """
+    found = tables_at_work(gearbox, out, grid)
     requests = []
-    for name in dict.fromkeys(mesh.pair.name for mesh in gearbox.meshes):
-        if name in gearbox.stated_stiffness and not grid:
-            continue
-        try:
-            fitting_table(gearbox, name, out, grid)
-        except TableError:
+    for name in _with_tables(gearbox, grid):
+        if name not in found:
             requests += requested_tables(gearbox, out, [name], grid=grid)
     return requests
+
+
+def tables_at_work(gearbox: Gearbox, out: Path, grid: bool = False) -> dict[str, MeshTable]:
+    """Tables of the pairs at work that are there and fit; parameters as of `missing_tables`."""
+    found = {}
+    for name in _with_tables(gearbox, grid):
+        with suppress(TableError):
+            found[name] = fitting_table(gearbox, name, out, grid)
+    return found
+
+
+def _with_tables(gearbox: Gearbox, grid: bool) -> list[str]:
+    """Pairs at work whose tables dynamics read; of those with a stated stiffness only a law with axes does."""
+    names = dict.fromkeys(mesh.pair.name for mesh in gearbox.meshes)
+    return [name for name in names if grid or name not in gearbox.stated_stiffness]
 
 
 def _request(gearbox: Gearbox, name: str, out: Path, wanted: TableInput, grid: bool) -> TableRequest:
@@ -275,6 +289,9 @@ def summarise(request: TableRequest, table: MeshTable) -> dict[str, Any]:
         "positions": request.wanted.positions,
         "states": table.dataset["ste"].size,
         "not_converged": int((~table.dataset["converged"]).sum()),
+        "cut_off": int((table.dataset[CUT_OFF] > 0.0).sum()),
+        "largest_share_cut_off": figure(table.dataset[CUT_OFF].max()),
+        "static_share_cut_off": figure(data[CUT_OFF].max()),
         "ste_mean_um": figure(1e6 * data["ste"].mean()),
         "ste_peak_to_peak_um": figure(1e6 * (data["ste"].max() - data["ste"].min())),
         "mesh_stiffness_mean_N_per_m": figure(data["mesh_stiffness"].mean()),

@@ -17,6 +17,7 @@ import numpy as np
 from fe_ste.contact.cells import Cells, lay_cells
 from fe_ste.contact.complementarity import ContactSolution, solve_complementarity
 from fe_ste.contact.compliance import compliance_matrix
+from fe_ste.contact.flank_ends import continued_involutes, cut_at_form_circles, reaches_form_circle, share_beyond
 from fe_ste.contact.kinematics import ContactError, FlankPair
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.tools.arrays import Booleans, Floats, Integers
@@ -97,7 +98,7 @@ def contact_state(compliance: PairCompliance, torque: float, pmc: float, misalig
     Raises
     ------
     ContactError
-        If the contact does not settle, or leaves the flank.
+        If the contact does not settle.
     """
     (state,) = contact_states(compliance, torque, pmc, np.array([misalignment]), [new_start(compliance, torque)])
     if isinstance(state, ContactError):
@@ -126,8 +127,52 @@ def contact_states(
     -------
     list of ContactState or ContactError
         For each misalignment the state, or why there is none.
+
+    Notes
+    -----
+    Contact that reaches a form circle is solved again, cut off there, and once more on involutes that go on: see
+    `fe_ste.contact.flank_ends`.
     """
-    search = _Search(compliance, torque, pmc, misalignments, starts)
+    pair, roll = compliance.pair, compliance.flanks[0].roll
+    kinematics = FlankPair.from_pair(pair, roll[0], roll[-1])
+    states = _searched(compliance, kinematics, torque, pmc, misalignments, starts)
+    at_ends = [
+        index
+        for index, state in enumerate(states)
+        if isinstance(state, ContactState) and reaches_form_circle(compliance.flanks, state.cells, state.solution.force)
+    ]
+    if at_ends:
+        ends = (cut_at_form_circles(kinematics, compliance.flanks), continued_involutes(kinematics, compliance.flanks))
+        cut, whole = (
+            _searched(compliance, end, torque, pmc, misalignments[at_ends], [starts[index] for index in at_ends])
+            for end in ends
+        )
+        for index, cut_state, whole_state in zip(at_ends, cut, whole, strict=True):
+            states[index] = _counted(compliance, cut_state, whole_state)
+    return states
+
+
+def _counted(
+    compliance: PairCompliance, cut: ContactState | ContactError, whole: ContactState | ContactError
+) -> ContactState | ContactError:
+    """State cut off at the form circles, with the share of the load that is beyond them on involutes that go on."""
+    for state in (cut, whole):
+        if isinstance(state, ContactError):
+            return ContactError(f"contact reaches the form circle, where the involute ends, and beyond: {state}")
+    assert isinstance(cut, ContactState) and isinstance(whole, ContactState)
+    return replace(cut, cut_off_share=share_beyond(compliance.flanks, whole.cells, whole.solution.force))
+
+
+def _searched(
+    compliance: PairCompliance,
+    kinematics: FlankPair,
+    torque: float,
+    pmc: float,
+    misalignments: Floats,
+    starts: list[SearchStart],
+) -> list[ContactState | ContactError]:
+    """Search the contact of one position on flanks that end as `kinematics` has it; parameters of `contact_states`."""
+    search = _Search(compliance, kinematics, torque, pmc, misalignments, starts)
     for attempt in range(_WINDOW_ATTEMPTS):
         pending = search.pending()
         if not pending:
@@ -178,15 +223,16 @@ class _Search:
     def __init__(
         self,
         compliance: PairCompliance,
+        kinematics: FlankPair,
         torque: float,
         pmc: float,
         misalignments: Floats,
         starts: list[SearchStart],
     ) -> None:
         self.compliance, self.pmc, self.misalignments, self.starts = compliance, pmc, misalignments, starts
-        pair, roll = compliance.pair, compliance.flanks[0].roll
+        pair = compliance.pair
         self.load = normal_load(pair, torque)
-        self.kinematics = FlankPair.from_pair(pair, roll[0], roll[-1])
+        self.kinematics = kinematics
         self.rotation = pmc * pair.pinion.angular_pitch
         self.cell_width = _cell_width(compliance, self.load)
         self.too_deep = [math.inf] * len(starts)
@@ -283,7 +329,6 @@ class _Search:
         return True
 
     def _state(self, cells: Cells, solution: ContactSolution) -> ContactState:
-        _check_on_flanks(self.compliance, cells, solution.force)
         half_along = 0.5 * self.compliance.slice_width / self.kinematics.base_helix_cosine
         return ContactState(
             self.pmc, self.load, cells, solution, solution.force / (4.0 * cells.half_across * half_along)
@@ -342,17 +387,6 @@ def unloaded_states(compliance: PairCompliance, axes: StateAxes) -> xr.Dataset:
 
 def _flank_radii(gear: Gear) -> tuple[float, float]:
     return min(gear.form_radius, gear.tip_radius), max(gear.form_radius, gear.tip_radius)
-
-
-def _check_on_flanks(compliance: PairCompliance, cells: Cells, force: Floats) -> None:
-    """Refuse contact at a form circle, where the involute ends and the fillet begins."""
-    touching = force > 0
-    for flank, roll in zip(compliance.flanks, (cells.roll, cells.gear_roll), strict=True):
-        if flank.gear.has_relieved_root:
-            continue  # no cell lies beyond the edge there
-        margin = (roll - flank.roll[0]) if not flank.gear.internal else (flank.roll[-1] - roll)
-        if (margin[touching] < 0.01 * np.ptp(flank.roll)).any():
-            raise ContactError(f"gear {flank.gear.name}: contact reaches the form circle, where the involute ends")
 
 
 def _cell_width(compliance: PairCompliance, load: float) -> float:

@@ -39,6 +39,9 @@ class ContactState:
     solution : ContactSolution
     pressure : ndarray (n,)
         Pa.
+    cut_off_share : float
+        Share of the load that would be beyond the form circles, where contact is cut off: see
+        `fe_ste.contact.flank_ends`.
     """
 
     pmc: float
@@ -46,6 +49,7 @@ class ContactState:
     cells: Cells
     solution: ContactSolution
     pressure: Floats
+    cut_off_share: float = 0.0
 
     def __repr__(self) -> str:
         """Return one short line."""
@@ -156,6 +160,9 @@ class StateAxes:
         }
 
 
+CUT_OFF = "cut_off_share"
+"""Variable of what contact leaves out at form circles: see `fe_ste.contact.flank_ends`."""
+
 _UNITS = {
     "pmc": ("1", "position in the mesh cycle"),
     "torque": ("N m", "static torque on gear 1"),
@@ -174,6 +181,7 @@ _UNITS = {
     "tangent_load_share": ("1", "part of a little more load that a tooth pair carries: slope of ste by a gap there"),
     "max_pressure": ("Pa", "largest contact pressure away from tip edges"),
     "edge_pressure": ("Pa", "largest contact pressure in cells at a tip edge; depends on their size"),
+    CUT_OFF: ("1", "part of the load that would be beyond the form circles, where contact is cut off"),
     "iterations": ("1", "active-set iterations"),
     "converged": ("1", "whether the position was solved"),
 }
@@ -182,7 +190,27 @@ _UNITS = {
 STATE_AXES = ("torque", "centre_distance", "misalignment")
 
 #: Results of a state that are numbers by themselves.
-RESULTS = ("ste", "tangent_stiffness", "load_centre", "tangent_load_centre", "max_pressure", "edge_pressure")
+RESULTS = (
+    "ste",
+    "tangent_stiffness",
+    "load_centre",
+    "tangent_load_centre",
+    "max_pressure",
+    "edge_pressure",
+    CUT_OFF,
+)
+
+
+def _labelled(name: str, dimensions: tuple[str, ...], values: NDArray[Any]) -> xr.Variable:
+    import xarray as xr
+
+    unit, meaning = _UNITS[name]
+    return xr.Variable(dimensions, values, {"units": unit, "long_name": meaning}, fastpath=True)
+
+
+def cut_off_variable(values: Floats) -> xr.Variable:
+    """Label shares of the load that is cut off over (pmc, torque, centre_distance, misalignment)."""
+    return _labelled(CUT_OFF, ("pmc", *STATE_AXES), values)
 
 
 @dataclass
@@ -282,6 +310,7 @@ class StateResults:
         self.values["tangent_load_centre"][index] = solution.force_per_load @ axial
         self.values["max_pressure"][index] = state.pressure[~cells.cut].max(initial=0.0)
         self.values["edge_pressure"][index] = state.pressure[cells.cut].max(initial=0.0)
+        self.values[CUT_OFF][index] = state.cut_off_share
         loads = np.zeros((len(self.teeth), len(self.axial)))
         np.add.at(loads, (cells.tooth - self.teeth[0], cells.layer), solution.force)
         self.line_load[index] = loads * cosine / compliance.slice_width
@@ -320,11 +349,7 @@ class StateResults:
         coordinates |= {"tooth": self.teeth[shown], "axial_position": self.axial}
         variables |= {name: ((name,), values) for name, values in coordinates.items()}
         # As variables of arrays of numpy: else xarray loads Dask, where that is installed, to ask what they are.
-        labelled = {}
-        for name, (names, values) in variables.items():
-            unit, meaning = _UNITS[name]
-            labelled[name] = xr.Variable(names, values, {"units": unit, "long_name": meaning}, fastpath=True)
-        dataset = xr.Dataset(labelled)
+        dataset = xr.Dataset({name: _labelled(name, *value) for name, value in variables.items()})
         dataset.attrs["failures"] = "\n".join(self.failures)
         return dataset
 

@@ -32,7 +32,7 @@ from fe_ste.tools.workers import Workers
 from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance
 from fe_ste.transmission_error.grid import Checkpoint, Submits, solve_grid
 from fe_ste.transmission_error.search import unloaded_states
-from fe_ste.transmission_error.states import RESULTS, STATE_AXES, StateAxes
+from fe_ste.transmission_error.states import CUT_OFF, RESULTS, STATE_AXES, StateAxes, cut_off_variable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,7 +44,7 @@ _LAYOUT = Layout(
     "static transmission error table",
     TABLE,
     {name: (name,) for name in ("pmc", *STATE_AXES, "tooth", "axial_position")}
-    | {name: ("pmc", *STATE_AXES) for name in (*RESULTS, "mesh_stiffness", "converged")}
+    | {name: ("pmc", *STATE_AXES) for name in (*RESULTS, "mesh_stiffness", "converged") if name != CUT_OFF}
     | {name: ("pmc", *STATE_AXES, "tooth") for name in ("load_share", "tangent_load_share")},
     ("input_hash", "failures", "pair", "static_centre_distance", "static_misalignment"),
 )
@@ -207,7 +207,7 @@ class MeshTable:
             raise TableError(str(error)) from error
         if wanted is not None and dataset.attrs["input_hash"] != wanted.hash:
             raise TableError(f"{path}: was computed from another input; compute it again")
-        return cls(dataset)
+        return cls(_with_cut_off(dataset, path))
 
     def save(self, path: str | Path) -> None:
         """Write the table; a file of that name is replaced only by a complete one.
@@ -269,6 +269,22 @@ class MeshTable:
     def _ranges(self) -> dict[str, str]:
         positions, values = self.dataset.sizes["pmc"], (self.dataset[axis].to_numpy() for axis in STATE_AXES)
         return StateAxes(positions, *values).ranges()
+
+
+def _with_cut_off(dataset: xr.Dataset, path: Path) -> xr.Dataset:
+    """Add what a table lacks that was computed when contact could not end at a form circle: nothing was cut off.
+
+    Raises
+    ------
+    TableError
+        It has states that are unsolved for that reason.
+    """
+    if CUT_OFF in dataset:
+        return dataset
+    unsolved = int(np.count_nonzero(~dataset["converged"].to_numpy().astype(bool)))
+    if unsolved:
+        raise TableError(f"{path}: holds {unsolved} states that can be solved by now; compute it again")
+    return dataset.assign({CUT_OFF: cut_off_variable(np.zeros(dataset["ste"].shape))})
 
 
 def prepared_compliance(wanted: TableInput) -> PairCompliance:

@@ -15,7 +15,7 @@ from exugear.cli.case import make_results_folder, read_gearbox
 from exugear.cli.console import note, print_json, print_table, progress_bar, say
 from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption
 from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption, OutOption
-from exugear.cli.tables import compute_tables
+from exugear.cli.tables import compute_tables, tell_of_tables
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
@@ -226,9 +226,9 @@ def _tell_tables(
     else:
         print_table("Static transmission error", [_ste_row(summary) for summary in summaries])
         say(f"Tables in {folder / 'tables'}, pictures in {folder / 'pictures'}")
-    failures = [f"{name}: {line}" for name, table in tables.items() for line in table.failures]
-    if failures:
-        raise FailedError("\n".join(["positions that are not solved:", *failures]))
+    doubts = tell_of_tables(tables)
+    if doubts:
+        raise FailedError("\n".join(["tables that are not to be trusted:", *doubts]))
 
 
 def _ste_row(summary: dict[str, Any]) -> dict[str, str]:

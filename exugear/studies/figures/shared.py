@@ -13,6 +13,7 @@ import filelock
 
 from exugear.bodies.elastic_body import ElasticBody
 from exugear.model.gearbox import Gearbox
+from exugear.tooth_mesh.table_remarks import doubts_about_table
 from exugear.tooth_mesh.tables import requested_tables, wanted_table
 from fe_ste.transmission_error.table import MeshTable
 
@@ -32,7 +33,7 @@ UNRELATED = (
 
 
 class SharedTableError(RuntimeError):
-    """A table with positions that are not solved."""
+    """A table that is not to be trusted."""
 
 
 @contextmanager
@@ -69,7 +70,7 @@ class Shared:
         CaseError
             The pair carries no load.
         SharedTableError
-            Positions are not solved.
+            It is not to be trusted.
         """
         folder = self.results_folder(gearbox, pair, grid)
         (request,) = requested_tables(gearbox, folder, [pair], grid=grid)
@@ -78,8 +79,9 @@ class Shared:
             with _waiting(folder / "lock"):
                 (request,) = requested_tables(gearbox, folder, [pair], grid=grid)
                 table = request.stored or request.compute(progress)
-        if table.failures:
-            raise SharedTableError(f"{pair}: {len(table.failures)} positions are not solved, first {table.failures[0]}")
+        doubts = list(doubts_about_table(pair, table))
+        if doubts:
+            raise SharedTableError("; ".join(doubts))
         return table
 
     def bodies(self, gearbox: Gearbox, inertias: str) -> dict[str, ElasticBody]:

@@ -17,6 +17,7 @@ from exugear.tooth_mesh.placement import MeshError
 from exugear.tooth_mesh.tables import fitting_table, table_path
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import kernel
+from fe_ste.transmission_error.gaps import GapError, complete_cycle
 from fe_ste.transmission_error.surface import SteSurface
 from fe_ste.transmission_error.table import TableError
 
@@ -33,12 +34,11 @@ class LineOfAction(Law):
         if pair in gearbox.stated_stiffness:
             return np.array(gearbox.stated_stiffness[pair])
         try:
-            point = fitting_table(gearbox, pair, directory).static_state
+            point = complete_cycle(fitting_table(gearbox, pair, directory).static_state)
         except TableError as error:
             raise MeshError(f"pair {pair}: {error} (exugear ste)") from None
-        if not bool(np.all(point["converged"])):
-            unsolved = int(np.sum(~point["converged"].to_numpy().astype(bool)))
-            raise MeshError(f"pair {pair}: {table_path(directory, pair)} holds {unsolved} unsolved positions")
+        except GapError as error:
+            raise MeshError(f"pair {pair}: {table_path(directory, pair)}: {error}") from None
         return np.asarray(point["mesh_stiffness"].to_numpy(), dtype=np.float64)
 
 
