@@ -25,6 +25,7 @@ from exugear.model.choice import VARIANTS, Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Bearing, Body
 from exugear.model.seats import node_position, seat_key
+from exugear.tooth_mesh.contact_state import ContactState
 from exugear.tooth_mesh.element import mesh_elements
 from exugear.tooth_mesh.law import Angles, MeshData
 from exugear.tooth_mesh.laws.packing import pack
@@ -40,6 +41,7 @@ def assemble(
     *,
     flanks: Mapping[str, int] | None = None,
     angles: Angles = "reference",
+    contact: Mapping[str, ContactState] | None = None,
     before_balance: Callable[[Assembly], None] | None = None,
 ) -> Assembly:
     """Put the equations of motion of a gearbox together.
@@ -54,7 +56,7 @@ def assemble(
     bodies : mapping of body name to ElasticBody, optional
         Reduced elastic bodies, which the variant `flexible` needs; `reduced_bodies` of
         `exugear.bodies.of_gearbox.elastic_bodies` gives them.
-    flanks, angles
+    flanks, angles, contact
         As in `exugear.tooth_mesh.element.mesh_elements`.
     before_balance : callable, optional
         Called with the assembly before the static load is looked for that bearings take their stiffness from.
@@ -97,7 +99,7 @@ def assemble(
     travelling = _travelling(gearbox, flexible, size, coordinates, nodes)
     supports = _supports(gearbox, flexible) if variant in ON_BEARINGS else ()
     displaced = gearbox.pin_offsets if variant not in ON_BEARINGS else {}  # bearings carry the planets along
-    settings = (inertias, flanks, angles, displaced, nodes)
+    settings = (inertias, flanks, angles, displaced, nodes, contact)
     elements = () if only_rolls else mesh_elements(gearbox, stiffness, law_of(law), *settings)
     assembly = Assembly(
         gearbox=gearbox,

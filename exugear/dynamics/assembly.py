@@ -219,6 +219,11 @@ class Assembly:
         """Mesh arrays with stiffness and tables replaced by their mean over the cycle."""
         return pack(self.elements, self.coordinates, averaged=True)
 
+    @cached_property
+    def tangent_meshes(self) -> MeshArrays:
+        """Mesh arrays with laws along a row as straight lines: the tangents at the static load, mean over the cycle."""
+        return pack(self.elements, self.coordinates, averaged=True, tangent=True)
+
     def linear_meshes(self, reversed_flanks: NDArray[np.bool_] | None = None) -> MeshArrays:
         """Mesh arrays that are linear and bilateral, tables replaced by the mean stiffness at their static load.
 

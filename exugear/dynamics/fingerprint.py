@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from dataclasses import astuple
 
 import numpy as np
 
@@ -53,6 +54,16 @@ def input_hash(assembly: Assembly, load_case: str | None = None) -> str:
         "stiffness": {
             element.mesh.name: [f"{value:.9g}" for value in np.atleast_1d(element.stiffness)]
             for element in assembly.elements
+        },
+        "mesh_tangents": {
+            element.mesh.name: [f"{value:.9g}" for value in element.tangent]
+            for element in assembly.elements
+            if element.is_curved
+        },
+        "mesh_contact": {
+            element.mesh.name: [f"{value:.9g}" for value in astuple(element.contact)]
+            for element in assembly.elements
+            if element.contact is not None
         },
         "tables": {
             element.mesh.name: _digest(element.table.surface)

@@ -22,6 +22,7 @@ from exugear.dynamics.energy_shares import BODY_MOTIONS, kinetic_shares, mode_na
 from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.linearised import RIGID_BODY_LIMIT, Linearised, growth_rate, linearise, undamped_modes
 from exugear.dynamics.statics import static_state
+from exugear.kernels.meshes import STIFFNESS, TILT_COLUMNS, TILT_STIFFNESS
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.versions import MODES
@@ -250,7 +251,7 @@ def modes_of(assembly: Assembly, preload: bool = True) -> Modes:
         strain=strain,
         kinetic=kinetic,
         overall=np.abs(overall),
-        amplification=_amplification(assembly, linear, shapes, overall, omega, ratio, elastic),
+        amplification=_amplification(assembly, q, linear, shapes, overall, omega, ratio, elastic),
         names=tuple(
             mode_name(assembly, element_names, kinetic[m], strain[m]) if elastic[m] else FREE_ROTATION
             for m in range(frequency.size)
@@ -275,6 +276,7 @@ def overall_row(assembly: Assembly) -> Floats:
 
 def _amplification(
     assembly: Assembly,
+    q: Floats,
     linear: Linearised,
     shapes: Floats,
     overall: Floats,
@@ -282,16 +284,28 @@ def _amplification(
     ratio: Floats,
     elastic: NDArray[np.bool_],
 ) -> Floats:
-    """Overall DTE at resonance per unit STE of each mesh: |overall| |k w phi| / (2 zeta omega^2)."""
+    """Overall DTE at resonance per unit STE of each mesh: |overall| |k w phi| / (2 zeta omega^2), k tangent at q."""
     amplification = np.zeros((omega.size, len(assembly.mesh_names)))
     resonance = np.where(elastic, 2.0 * ratio * omega**2, np.inf)
     resonance = np.where(resonance > 0.0, resonance, np.inf)
-    for n, (name, element) in enumerate(zip(assembly.mesh_names, assembly.elements, strict=True)):
-        mean = float(np.mean(element.stiffness))
-        strain = np.einsum("im,ij,jm->m", shapes, linear.stiffness[name], shapes)
+    tangents = assembly.mesh_states(q, np.zeros_like(q), assembly.mean_meshes)[:, STIFFNESS]
+    for n, name in enumerate(assembly.mesh_names):
+        mean = float(tangents[n])
+        # What tilts against the resistance of the teeth does not close them.
+        closed = linear.stiffness[name] - _tilt_stiffness(assembly, q, n)
+        strain = np.einsum("im,ij,jm->m", shapes, closed, shapes)
         closing = np.sqrt(np.maximum(strain, 0.0) / mean)
         amplification[:, n] = np.abs(overall) * mean * closing / resonance
     return amplification
+
+
+def _tilt_stiffness(assembly: Assembly, q: Floats, n: int) -> Floats:
+    """Stiffness (size, size) that a mesh with a law along a row has against misalignment: zero without any."""
+    mesh, rest = assembly.mean_meshes.one(n), np.zeros(assembly.size)
+    if not mesh.tilt[0, TILT_STIFFNESS] > 0.0:
+        return np.zeros((assembly.size,) * 2)
+    twice = mesh._replace(tilt=mesh.tilt * (1.0 + (np.arange(TILT_COLUMNS) == TILT_STIFFNESS)))
+    return assembly.mesh_jacobians(q, rest, mesh)[0] - assembly.mesh_jacobians(q, rest, twice)[0]
 
 
 def counterparts(before: Modes, after: Modes) -> tuple[NDArray[np.int64], Floats]:

@@ -14,6 +14,7 @@ from exugear.dynamics.assembly import Assembly
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.results.folder import bodies_folder
+from exugear.tooth_mesh.law import MeshCurve
 from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 from fe_ste.tools.arrays import Floats
 from fe_ste.transmission_error.surface import SteSurface
@@ -85,9 +86,9 @@ class Context:
     tell: Callable[[str], None]
     notes: Notes = field(default_factory=Notes)
     assemblies: dict[Choice, Assembly] = field(default_factory=dict)
-    stiffnesses: dict[str, dict[str, Floats | SteSurface]] = field(default_factory=dict)
+    stiffnesses: dict[str, dict[str, Floats | MeshCurve | SteSurface]] = field(default_factory=dict)
 
-    def stiffness(self, law: str) -> dict[str, Floats | SteSurface]:
+    def stiffness(self, law: str) -> dict[str, Floats | MeshCurve | SteSurface]:
         """Mesh stiffness of a law from the tables of the folder, read once."""
         if law not in self.stiffnesses:
             self.stiffnesses[law] = mesh_stiffness(self.gearbox, law, self.folder)

@@ -34,6 +34,10 @@ PLAIN_ROWS = 2
 """Number of rows of meshes without a table."""
 FIXED, ALONG_COSINE, ALONG_SINE, SECOND = range(0, 4 * PADDED, PADDED)
 """First columns of the parts of each of them, and of those of the second gear."""
+TILT_ROW_X, TILT_ROW_Y, TILT_SHIFT, TILT_RESISTANCE, TILT_DAMPER, TILT_ARM, TILT_PUSH = range(7)
+"""Columns of `Meshes.tilt`: the misalignment's row over the tilts of gear 1, its negative being that of gear 2;
+misalignment at zero tilts against that of the contact's state (rad); tilt stiffness, damping, lever and moment as in
+`exugear.kernels.meshes.MeshArrays.tilt`."""
 TURNING = 2 * PADDED
 """Place of the frame's angle in a gradient of `MeshMemory.gradients`, behind two padded gears."""
 KINETIC, ELASTIC, OF_LOADS, DISSIPATED, OF_VARYING_STIFFNESS, NON_CONSERVATIVE, OF_BEARING_RATES = range(7)
@@ -53,6 +57,8 @@ class Meshes(NamedTuple):
     slot : (m,) where the cosine and sine of the frame's angle stand among those of all angles that turn anything
     axis : (m, 2, 2) zero for gears without translations
     conjugate : (m,) 1 where the force row is the deflection row
+    tilting : (m,) 1 where a law along a row resists misalignment
+    tilt : (m, 7) columns as named in this module
     spinning : (m,) 1 where the gears have their spins alone
     ends : (m, 2) numbers of the two gears' places
     rows : (m, r, 48) rows over both gears' padded places: parts W0, W1, W2 of the first, then of the second gear, whose
@@ -70,6 +76,8 @@ class Meshes(NamedTuple):
     deflection: Floats
     force: Floats
     conjugate: Integers
+    tilting: Integers
+    tilt: Floats
     spinning: Integers
     ends: Integers
     rows: Floats
@@ -159,6 +167,23 @@ def row_motion(
     put(gradient, PADDED, gradient_2)
     gradient[TURNING] = turning
     return value, rate
+
+
+@kernel
+def tilt_motion(
+    m: int, psi_rate: float, c: float, s: float, meshes: Meshes, places: Floats
+) -> tuple[float, float, float, float, float]:
+    """Misalignment of mesh m against that of its contact's state, and its rate; its gradient in three numbers.
+
+    These are those by both tilts of gear 1, whose negatives belong to gear 2, and by the frame's angle.
+    """
+    row, first, second = meshes.tilt[m], places[meshes.ends[m, 0]], places[meshes.ends[m, 1]]
+    x, y = c * row[TILT_ROW_X] - s * row[TILT_ROW_Y], s * row[TILT_ROW_X] + c * row[TILT_ROW_Y]
+    a, b = first[PADDED_TILT] - second[PADDED_TILT], first[PADDED_TILT + 1] - second[PADDED_TILT + 1]
+    turning = x * b - y * a
+    a_rate = first[PADDED + PADDED_TILT] - second[PADDED + PADDED_TILT]
+    b_rate = first[PADDED + PADDED_TILT + 1] - second[PADDED + PADDED_TILT + 1]
+    return row[TILT_SHIFT] + x * a + y * b, x * a_rate + y * b_rate + turning * psi_rate, x, y, turning
 
 
 @kernel

@@ -8,7 +8,10 @@ rotation by psi, p a gear's place relative to the frame's axis and S = z x,
     pmc   = phase + (spin_1 - psi) cycles                                  position in the mesh cycle
     f     = -F dg/dq,  g = sum_b V_b . z_b                                 generalized force of a scalar force F
 
-g does not change when everything turns with psi: the carrier's share of the force balances moments exactly.
+A law along a row that resists misalignment gamma has the deflection and the moment of
+`exugear.tooth_mesh.contact_state` instead: e = delta - zt (gamma - g0) for delta, and + M d gamma/dq beside it.
+
+The row g does not change when everything turns with psi: the carrier's share of the force balances moments exactly.
 Which force F a deflection raises is the matter of the mesh laws (`exugear.tooth_mesh.laws`). Errors of pitch and
 run-out, given over a revolution of each gear, are subtracted from the deflection of any law.
 
@@ -40,6 +43,9 @@ energy (J); powers (W): damped, of the stiffness that changes with pmc, of a for
 deflection; 1 where the mesh is outside its table.
 """
 STATE_SIZE = 10
+TILT_STIFFNESS, TILT_DAMPING, TILT_LEVER, TILT_MOMENT, TILT_REST = range(5)
+"""Columns of `MeshArrays.tilt`."""
+TILT_COLUMNS = 5
 
 
 class MeshArrays(NamedTuple):
@@ -54,8 +60,10 @@ class MeshArrays(NamedTuple):
     cycles : (m,) mesh cycles per rad of gear 1 relative to the frame, signed by the loaded flank
     phase : (m,) position in the mesh cycle at zero angles
     pieces : (m,) number of equal pieces over the mesh cycle
-    stiffness : (m, n, 4) coefficients of the law over each piece; of a stiffness those of a cubic, N/m
+    stiffness : (m, n, c) coefficients of the law over each piece; of a stiffness four of a cubic, N/m
     damping : (m,) N s/m
+    tilt : (m, 5) of a law along a row that resists misalignment: tilt stiffness kg (N m/rad) and damping (N m s/rad),
+        lever zt (m), moment F0 (zc - zt) (N m) and misalignment g0 (rad); zeros where it does not
     line_of_action : (m,) F_bt per scalar mesh force
     error_pieces : (m, 2) number of equal cubic pieces of each gear's error over its revolution; 0 for no error
     error : (m, 2, e, 4) coefficients of the error over each piece, m along the transverse line of action
@@ -72,6 +80,7 @@ class MeshArrays(NamedTuple):
     pieces: Integers
     stiffness: Floats
     damping: Floats
+    tilt: Floats
     line_of_action: Floats
     error_pieces: Integers
     error: Floats

@@ -323,7 +323,8 @@ def _response(parts: Sequence[Floats], sizes: Floats) -> Response:
 def is_linear(assembly: Assembly) -> bool:
     """Tell whether forces are proportional to torque: linear bearings and teeth, no weight."""
     weight = any(assembly.gearbox.case.gravity.acceleration_m_per_s2)
-    return not (assembly.has_rows or weight or LAWS[assembly.mesh_law].loses_contact)
+    curved = any(element.is_curved or element.bears_beside for element in assembly.elements)
+    return not (assembly.has_rows or weight or curved or LAWS[assembly.mesh_law].loses_contact)
 
 
 def _torques(torques: Floats, linear: bool) -> Floats:

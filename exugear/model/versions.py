@@ -10,12 +10,12 @@ from __future__ import annotations
 #: Reduced elastic bodies (`exugear.bodies`). Runs and modes rest on it.
 REDUCTION = 1
 #: Eigenmodes (`exugear.dynamics.modes`, and the laws and matrices of `exugear.dynamics.assembly`).
-MODES = 2
+MODES = 3
 #: Runs in time (`exugear.runs`, both solvers, the laws, signals and filters).
-RUN = 6
+RUN = 7
 #: Life of gears and bearings (`exugear.life`, and the root stress of `fe_ste.root_stress`).
-LIFE = 3
+LIFE = 4
 #: Steady responses (`exugear.steady`, and all that modes rest on).
-STEADY = 6
+STEADY = 7
 #: Points of studies (`exugear.studies`: their figures; what these rest on has its own version).
 STUDY = 1

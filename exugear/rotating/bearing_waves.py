@@ -276,7 +276,7 @@ def ports_with_bearings(ports: MeshPorts, bearings: BearingMean) -> MeshPorts:
     pushed[:count, : ports.forces.shape[1]] = ports.forces
     read[count:, :COMPONENTS], rates[count:, :COMPONENTS] = bearings.readings, bearings.rates
     static[count:, :COMPONENTS], pushed[count:, :COMPONENTS] = bearings.static, bearings.pushes
-    return MeshPorts(read, static, pushed, ports.positions, rates)
+    return MeshPorts(read, static, pushed, ports.positions, ports.levers, rates)
 
 
 def places_with_bearings(

@@ -1,6 +1,7 @@
 """What mesh laws read of the motion and what they push along: rows by the frame's coordinates, as waves.
 
-A law along a row reads its deflection and the position in the mesh cycle, and has one force. The law `table` reads the
+A law along a row reads its deflection and the position in the mesh cycle, and has one force; what it resists
+misalignment with is in the mean system. The law `table` reads the
 approach of both flanks, the centre distance, the misalignment of both flanks and the position, and pushes along all
 but the last (`exugear.tooth_mesh.laws.table`). Kernels of `fe_ste.tools.compilation` read the numbers of its rows.
 """
@@ -11,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exugear.kernels.meshes import MeshArrays
+from exugear.kernels.meshes import TILT_LEVER, TILT_REST, MeshArrays
 from exugear.kernels.table_law import NOMINAL_DEFLECTION, NOMINAL_DISTANCE, NOMINAL_MISALIGNMENT
 from exugear.rotating.mesh_waves import MeshWaves
 from fe_ste.tools.arrays import Floats
@@ -36,6 +37,9 @@ class MeshPorts:
         Rows along which its forces push.
     positions : (meshes,) array
         Position in the mesh cycle at zero angle of the input, of the waves of meshes alone.
+    levers : (m, size + 1) array
+        Rows by which the deflection at mid-face is more than what a law reads of it that bears beside the middle, of
+        the waves of meshes alone; in the last column that in the static state.
     rates : (m, r, size) array, optional
         Rows of what the law reads by the rates of the coordinates; non-linear bearings have some.
     """
@@ -44,6 +48,7 @@ class MeshPorts:
     static: Floats
     forces: Floats
     positions: Floats
+    levers: Floats
     rates: Floats | None = None
 
 
@@ -57,17 +62,25 @@ def mesh_ports(waves: MeshWaves, speed: float, parting: bool) -> MeshPorts:
     static = [waves.values(row, speed) + means * offset[firsts] for row, offset in zip(rows, offsets, strict=True)]
     # The mean position counts from the static state; what planets are ahead of each other by stays.
     ahead = np.where(means, 0.0, readings[-1] @ waves.system.static_at(speed))
-    forces = readings[:-1] if parting else [waves.gradients(meshes.force, speed)]
+    levers = meshes.tilt[:, [TILT_LEVER]] * meshes.table.misalignment
+    forces = readings[:-1] if parting else [waves.gradients(meshes.force - levers, speed)]
+    shift = meshes.tilt[:, TILT_LEVER] * (meshes.table.nominal[:, NOMINAL_MISALIGNMENT] - meshes.tilt[:, TILT_REST])
+    beside = waves.values(levers, speed) + means * shift[firsts]
     return MeshPorts(
         readings=np.stack(readings, axis=1),
         static=np.stack([*static, ahead], axis=1),
         forces=np.stack(forces, axis=1),
         positions=waves.positions(speed),
+        levers=np.column_stack([waves.gradients(levers, speed), beside]),
     )
 
 
 def _row_rows(meshes: MeshArrays) -> tuple[list[Floats], list[Floats]]:
-    return [meshes.deflection], [meshes.table.nominal[:, NOMINAL_DEFLECTION]]
+    """Row of the deflection that a law reads (`exugear.tooth_mesh.contact_state`), its value at zero coordinates."""
+    lever, nominal = meshes.tilt[:, TILT_LEVER], meshes.table.nominal
+    rest = lever * (nominal[:, NOMINAL_MISALIGNMENT] - meshes.tilt[:, TILT_REST])
+    row = meshes.deflection - lever[:, None] * meshes.table.misalignment
+    return [row], [nominal[:, NOMINAL_DEFLECTION] - rest]
 
 
 def _table_rows(meshes: MeshArrays) -> tuple[list[Floats], list[Floats]]:

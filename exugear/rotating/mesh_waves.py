@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from exugear.kernels.coordinates import BODY_SIZE, SPIN
 from exugear.kernels.meshes import FRAME, ROW_SIZE, frame_row
 from exugear.rotating.mean_system import MeanSystem
 from exugear.rotating.rotating_frame import PlanetSet, RotatingFrame
+from exugear.tooth_mesh.laws.line_of_action import CURVE_FORM, EXPONENT
 from fe_ste.tools.arrays import Complexes, Floats
 
 SAMPLES = 64
@@ -34,6 +36,9 @@ IN_PHASE = 1e-6
 """Mesh cycles by which planets in phase may differ."""
 SAME_BASE = 1e-9
 """Share by which mesh frequencies of one base may differ."""
+CycleQuantity = Literal["tangent", "secant", "exponent", "compliance"]
+"""Of a mesh at its static load: slope of the load, load over deflection (N/m), the curve's exponent less one, and one
+over the secant (m/N), which is the static transmission error of a unit load."""
 WAVES = ("mean", "cosine", "sine")
 """The first three, which central bodies feel."""
 
@@ -148,8 +153,19 @@ class MeshWaves:
 
     @cached_property
     def mean_stiffness(self) -> Floats:
-        """Mean stiffness of each wave's mesh in the law's coordinate, (m,), N/m."""
-        return np.array([float(np.mean(self.assembly.elements[wave.first].stiffness)) for wave in self.waves])
+        """Mean stiffness of each wave's mesh in the law's coordinate, (m,), N/m: of a curve the tangent."""
+        return np.array([float(np.mean(self.assembly.elements[wave.first].tangent)) for wave in self.waves])
+
+    @cached_property
+    def rest(self) -> Floats:
+        """Deflection at which the mean stiffness of each wave has no force, (m,), m: zero but for means of curves."""
+        return np.array([self.assembly.elements[wave.first].rest * (wave.wave == 0) for wave in self.waves])
+
+    @cached_property
+    def loads(self) -> Floats:
+        """Load of each wave's mesh at which stiffness and curve are, (m,), N; 0 of no curve."""
+        elements = [self.assembly.elements[wave.first] for wave in self.waves]
+        return np.array([element.load if element.is_curved else 0.0 for element in elements])
 
     @cached_property
     def damping(self) -> Floats:
@@ -203,17 +219,23 @@ class MeshWaves:
         mean = {wave.family: float(moved[n]) for n, wave in enumerate(self.waves) if wave.wave == 0}
         return np.asarray(own + np.array([mean[wave.family] for wave in self.waves]))
 
-    def cycle_coefficients(self, harmonics: int, reciprocal: bool = False) -> Complexes:
-        """Fourier coefficients (m, harmonics + 1) of the stiffness over the mesh cycle (N/m), or of 1 over it."""
-        return np.array([self._cycle_coefficients(wave.first, harmonics, reciprocal) for wave in self.waves])
+    def cycle_coefficients(self, quantity: CycleQuantity, harmonics: int) -> Complexes:
+        """Fourier coefficients (m, harmonics + 1) of a quantity over the mesh cycle."""
+        return np.array([fourier_coefficients(self._over_cycle(wave, quantity), harmonics) for wave in self.waves])
 
-    def _cycle_coefficients(self, mesh: int, harmonics: int, reciprocal: bool) -> Complexes:
-        """Fourier coefficients of a mesh's stiffness over its cycle."""
-        meshes = self.assembly.meshes
-        pieces = int(meshes.pieces[mesh])
-        powers = np.vander(np.arange(SAMPLES) / SAMPLES, 4, increasing=True)
-        values = (meshes.stiffness[mesh, :pieces] @ powers.T).ravel()
-        return fourier_coefficients(1.0 / values if reciprocal else values, harmonics)
+    def _over_cycle(self, wave: MeshWave, quantity: CycleQuantity) -> Floats:
+        """Sample a quantity over the cycle of a wave's mesh."""
+        meshes, mesh = self.assembly.meshes, wave.first
+        pieces, curved = int(meshes.pieces[mesh]), meshes.form[mesh] == CURVE_FORM
+        powers = np.vander(np.arange(SAMPLES) / SAMPLES, 4, increasing=True).T
+        secant = (meshes.stiffness[mesh, :pieces, :4] @ powers).ravel()
+        more = meshes.stiffness[mesh, :pieces, EXPONENT : EXPONENT + 4] if curved else np.zeros((pieces, 4))
+        exponent = (more @ powers).ravel()
+        if quantity == "secant":
+            return np.asarray(secant)
+        if quantity == "compliance":
+            return np.asarray(1.0 / secant)
+        return np.asarray(exponent if quantity == "exponent" else secant * (1.0 + exponent))
 
     def _waves_of(self, values: Floats) -> Floats:
         """Waves (m, ...) of values (meshes, ...) at zero angle of the input."""

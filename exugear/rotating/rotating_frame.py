@@ -156,11 +156,14 @@ class RotatingFrame:
     def mean_meshes(self) -> MeshArrays:
         """Meshes of the mean system: linear, their stiffness that of the mean over the mesh cycle.
 
-        Tables become their stiffness at the static load: as they are, stiffness would change with each planet's
-        misalignment.
+        Tables become their stiffness at the static load, curves their tangents there: as they are, stiffness would
+        change with each planet's misalignment and load.
         """
-        parting = LAWS[self.assembly.mesh_law].loses_contact
-        return self.assembly.linear_meshes() if parting else self.assembly.mean_meshes
+        if not LAWS[self.assembly.mesh_law].loses_contact:
+            return self.assembly.tangent_meshes
+        teeth = self.assembly.linear_meshes()
+        # What tables resist misalignment with is in the forces that they have beyond this.
+        return teeth._replace(tilt=np.zeros_like(teeth.tilt))
 
     @cached_property
     def speeds(self) -> dict[str, float]:

@@ -23,6 +23,7 @@ from exugear.kernels.table_law import (
     surface_tangent,
 )
 from exugear.rotating.mesh_ports import BACK, BACK_TILT, CENTRE, FRONT, TILT
+from exugear.tooth_mesh.laws.line_of_action import STRAIGHT
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import compiled
 
@@ -72,22 +73,51 @@ def widened(samples: LawSamples, forces: int, readings: int) -> LawSamples:
     return LawSamples(wide, *slopes)
 
 
-def sample_stiffness(stiffness: Floats, readings: Floats) -> LawSamples:
-    """Sample a law along a row without its damper, which is in the mean system.
+def sample_line(stiffness: Floats, readings: Floats) -> LawSamples:
+    """Sample a straight law along a row without its damper, which is in the mean system.
 
     Parameters
     ----------
-    stiffness : (3, s) array
-        Stiffness where the mean speed alone has brought the mesh, N/m, and its two derivatives per cycle.
+    stiffness : (6, s) array
+        Stiffness where the mean speed alone has brought the mesh, N/m, and its two derivatives per cycle; the same of
+        the force that it has less, N.
     readings : (s, 2) array
         Deflection, m, and how far the vibration has moved the position, cycles. It is a thousandth of a cycle or less,
         so that a parabola serves.
     """
     deflection, moved = readings.T
-    value = stiffness[0] + moved * (stiffness[1] + 0.5 * moved * stiffness[2])
-    by_position = (stiffness[1] + moved * stiffness[2]) * deflection
-    slope = np.stack([value, by_position], axis=1)[:, None]
-    return LawSamples((value * deflection)[:, None], slope, np.zeros_like(slope))
+    value, by_position = _moved(stiffness[:3], moved)
+    pull, pull_by_position = _moved(stiffness[3:], moved)
+    slope = np.stack([value, by_position * deflection - pull_by_position], axis=1)[:, None]
+    return LawSamples((value * deflection - pull)[:, None], slope, np.zeros_like(slope))
+
+
+def sample_curve(curve: Floats, readings: Floats, load: float) -> LawSamples:
+    """Sample a curve of load over deflection (`exugear.tooth_mesh.laws.line_of_action`), as `sample_line`.
+
+    Parameters
+    ----------
+    curve : (6, s) array
+        Load over deflection at a load, N/m, and its exponent less one; each with two derivatives per cycle.
+    readings : (s, 2) array
+    load : float
+        N.
+    """
+    deflection, moved = readings.T
+    (k, k_slope), (n, n_slope) = _moved(curve[:3], moved), _moved(curve[3:], moved)
+    pressed = k * np.abs(deflection) / load
+    bent = pressed > STRAIGHT
+    level = np.log(np.where(bent, pressed, STRAIGHT))
+    force = k * np.exp(n * level) * deflection
+    tangent = k * np.exp(n * level) * (1.0 + bent * n)
+    by_position = force * (n_slope * level + (1.0 + bent * n) * k_slope / k)
+    slope = np.stack([tangent, by_position], axis=1)[:, None]
+    return LawSamples(force[:, None], slope, np.zeros_like(slope))
+
+
+def _moved(values: Floats, moved: Floats) -> tuple[Floats, Floats]:
+    """Value and slope of a function (3, s) with two derivatives, beside its place by `moved` (s,)."""
+    return values[0] + moved * (values[1] + 0.5 * moved * values[2]), values[1] + moved * values[2]
 
 
 def sample_table(meshes: MeshArrays, mesh: int, readings: Floats, rates: Floats) -> LawSamples:

@@ -78,7 +78,7 @@ def stored_filter(assembly: Assembly, method: Method, step: float, factor: int) 
     first, before = layout["mesh_force"].start, layout["mesh_force"].start - layout["mesh_dte"].start
     for m in _meshes(assembly):
         element = assembly.elements[m]
-        remedy = _remedy_of_force(method, element.stiffness.mean(), element.damping / step, rows)
+        remedy = _remedy_of_force(method, element.tangent.mean(), element.damping / step, rows)
         other[:, first + m] = element.line_of_action * _after(low_pass, remedy)
     return Filter(own, other, before)
 

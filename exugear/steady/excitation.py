@@ -327,13 +327,28 @@ class Gearset:
 
     @cached_property
     def cycle_coefficients(self) -> Complexes:
-        """Fourier coefficients (m, harmonics + 1) of each wave's stiffness over its mesh cycle, N/m."""
-        return self.waves.cycle_coefficients(self.harmonics)
+        """Fourier coefficients (m, harmonics + 1) of the stiffness over the mesh cycle, N/m; of curves the tangent."""
+        return self.waves.cycle_coefficients("tangent", self.harmonics)
 
     @cached_property
     def cycle_compliances(self) -> Complexes:
-        """Fourier coefficients (m, harmonics + 1) of one over the stiffness, m/N."""
-        return self.waves.cycle_coefficients(self.harmonics, reciprocal=True)
+        """Fourier coefficients (m, harmonics + 1) of the static transmission error over the static load, m/N."""
+        return self.waves.cycle_coefficients("compliance", self.harmonics)
+
+    @cached_property
+    def cycle_curves(self) -> tuple[Complexes, Complexes]:
+        """Fourier coefficients (m, harmonics + 1) of load over deflection (N/m), and of the exponents less one."""
+        waves, harmonics = self.waves, self.harmonics
+        return waves.cycle_coefficients("secant", harmonics), waves.cycle_coefficients("exponent", harmonics)
+
+    @cached_property
+    def cycle_pulls(self) -> Complexes:
+        """Fourier coefficients (m, harmonics + 1) of what the tangent has more than the curve without deflection, N."""
+        return np.asarray(self.waves.loads[:, None] * self.cycle_curves[1])
+
+    def pressed(self, static: Floats) -> Floats:
+        """Deflections (m,) from where the mean stiffness has no force, at readings (m, r) of the static state, m."""
+        return np.asarray(static[: len(self.waves.waves), DEFLECTION] - self.waves.rest)
 
     @cached_property
     def products(self) -> tuple[Product, ...]:

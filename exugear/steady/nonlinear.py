@@ -17,7 +17,7 @@ from exugear.rotating.bearing_waves import COMPONENTS
 from exugear.rotating.mesh_places import MeshPlaces
 from exugear.rotating.mesh_ports import BACK, DEFLECTION, FRONT, POSITION
 from exugear.rotating.sampled_bearings import sample_rolling
-from exugear.rotating.sampled_laws import LawSamples, sample_stiffness, sample_table, widened
+from exugear.rotating.sampled_laws import LawSamples, sample_curve, sample_line, sample_table, widened
 from exugear.steady.excitation import Gearset, Interface
 from exugear.steady.response import Response, rates_of
 from fe_ste.tools.arrays import Complexes, Floats, Integers
@@ -69,8 +69,8 @@ class Balance:
     @cached_property
     def mean_force(self) -> Floats:
         """Forces (m, f) in the static state: those of the mean stiffness along the deflection, and of bearings."""
-        found, m = np.zeros(self.interface.ports.forces.shape[:2]), self.meshes
-        found[:m, DEFLECTION] = self.gearset.waves.mean_stiffness * self.interface.ports.static[:m, DEFLECTION]
+        found, m, gearset = np.zeros(self.interface.ports.forces.shape[:2]), self.meshes, self.gearset
+        found[:m, DEFLECTION] = gearset.waves.mean_stiffness * gearset.pressed(self.interface.ports.static)
         if self.interface.bearings is not None:
             found[m:, :COMPONENTS] = self.interface.bearings.load
         return found
@@ -87,23 +87,30 @@ class Balance:
         """Number of the meshes' waves, behind which those of bearings follow."""
         return len(self.gearset.waves.waves)
 
-    def _stiffness(self, places: MeshPlaces) -> Floats:
-        """Stiffness (3, s, u) in places, N/m, and two derivatives per cycle; none for laws that have tables.
+    @cached_property
+    def _curved(self) -> bool:
+        """Whether laws along a row are curves, and not their tangents."""
+        return bool(self.gearset.waves.loads.any()) and not self.frozen
 
-        No harmonics stand in it but those of the level `parametric`: others would alias.
+    def _stiffness(self, places: MeshPlaces) -> Floats:
+        """Stiffness in places, N/m, and two derivatives per cycle, (6, s, u); none for laws that have tables.
+
+        The last three are the curves' exponents less one; of tangents the forces that these have less, N. No harmonics
+        stand in it but those of the level `parametric`: others would alias.
         """
         if self.gearset.parting:
-            return np.zeros((3, 0, 0))
-        coefficients, positions = self.gearset.cycle_coefficients, places.positions
-        rate = 2j * np.pi * np.arange(coefficients.shape[1])
-        twice = np.where(np.arange(coefficients.shape[1]) > 0, 2.0, 1.0)
-        out = np.empty((3, *positions.shape))
+            return np.zeros((6, 0, 0))
+        gearset, positions = self.gearset, places.positions
+        both = gearset.cycle_curves if self._curved else (gearset.cycle_coefficients, gearset.cycle_pulls)
+        rate = 2j * np.pi * np.arange(both[0].shape[1])
+        twice = np.where(np.arange(both[0].shape[1]) > 0, 2.0, 1.0)
+        out = np.empty((6, *positions.shape))
         for u, n in enumerate(places.means[: positions.shape[1]]):
             if u and n == places.means[u - 1] and np.array_equal(positions[:, u], positions[:, u - 1]):
                 out[:, :, u] = out[:, :, u - 1]
                 continue
             waves = np.exp(positions[:, [u]] * rate)
-            out[:, :, u] = np.real([waves @ (twice * coefficients[n] * rate**order) for order in range(3)])
+            out[:, :, u] = np.real([waves @ (twice * own[n] * rate**order) for own in both for order in range(3)])
         return out
 
     @cached_property
@@ -111,7 +118,7 @@ class Balance:
         return self._stiffness(self.places)
 
     def _sample(self, readings: Floats, rates: Floats, places: MeshPlaces, stiffness: Floats) -> LawSamples:
-        """Sample the laws in all places: readings and rates (s, u, r), stiffness (3, s, u); results (s, u, ...)."""
+        """Sample the laws in all places: readings and rates (s, u, r), stiffness (6, s, u); results (s, u, ...)."""
         waves, meshes = self.gearset.waves, self.gearset.waves.assembly.meshes
         found = []
         for u, n in enumerate(places.means):
@@ -122,7 +129,10 @@ class Balance:
                 whole[:, POSITION] += places.positions[:, u]
                 found.append(sample_table(meshes, waves.waves[n].first, whole, rates[:, u]))
             else:
-                found.append(sample_stiffness(stiffness[:, :, u], readings[:, u][:, [DEFLECTION, POSITION]]))
+                own, load = readings[:, u][:, [DEFLECTION, POSITION]], float(waves.loads[n]) * self._curved
+                found.append(
+                    sample_curve(stiffness[..., u], own, load) if load else sample_line(stiffness[..., u], own)
+                )
         shape = self.interface.ports.forces.shape[1], readings.shape[2]
         found = [widened(own, *shape) for own in found]
         return LawSamples(*(np.stack(own, axis=1) for own in zip(*found, strict=True)))
@@ -391,6 +401,7 @@ def response_of_readings(balance: Balance, readings: Complexes, products: int = 
     else:
         rates = rates_of(gearset, interface, deflection)
         force = excess[:, :m, 0] + waves.mean_stiffness * deflection + waves.damping * rates
+        force[0] -= waves.mean_stiffness * waves.rest
     free = _free_shares(balance, whole)
     return Response(interface, deflection, excess, force * waves.line_of_action, products, apart, free)
 

@@ -6,6 +6,9 @@ With what the mesh laws read y, and the forces F that the meshes have beyond tho
 
 for every line k. Level `linear`: F is what the static transmission error excites under the mean force. Level
 `parametric`: F = (k(pmc) - k_mean) d, all mesh frequencies at once; the equations are linear and GMRES solves them.
+A curve of load over deflection is taken by its tangent k(pmc) at the static load F_0, with the exponent m(pmc):
+
+    force k d - (m - 1) F_0 = k (d - e),  e = s - F_0 / k,  s the static transmission error.
 """
 
 from __future__ import annotations
@@ -36,7 +39,7 @@ class Response:
     ----------
     interface : Interface
     deflection : (n, m) complex array
-        Deflections, m.
+        Deflections that the laws read, m.
     excess : (n, m, f) complex array
         Forces beyond those of the mean system, in the law's coordinates, N and N m.
     force : (n, m) complex array
@@ -73,7 +76,8 @@ class Response:
 def linear_response(gearset: Gearset, interface: Interface) -> Response:
     """Response to the static transmission errors as given displacements, of first order in the variation of stiffness.
 
-    F = -k_mean e with e = F_0 (1/k - mean of 1/k), the transmission error under the static force F_0 = k_mean d.
+    F = -k_mean e with e = s - mean of s, the transmission error under the static force F_0; of a curve k_mean is the
+    mean of the tangent.
     """
     static = interface.ports.static[:, DEFLECTION]
     excess = transmission_errors(gearset, interface)[..., 0]
@@ -113,7 +117,7 @@ def transmission_error_line(gearset: Gearset, ports: MeshPorts, speed: float, li
 def _errors_in_time(gearset: Gearset, ports: MeshPorts, speed: float) -> Complexes:
     """Find the forces of `transmission_errors` (n, m, 1) where each planet meshes out of phase with the others."""
     places = mesh_places(gearset.waves, speed, ports.positions, gearset.lattice.angles)
-    deflection, ahead = places.there @ ports.static[:, DEFLECTION], places.there @ ports.static[:, POSITION]
+    deflection, ahead = places.there @ gearset.pressed(ports.static), places.there @ ports.static[:, POSITION]
     mean = gearset.waves.mean_stiffness[list(places.means)]
     excess = np.empty_like(places.positions)
     for u, n in enumerate(places.means):
@@ -127,7 +131,7 @@ def _errors_in_time(gearset: Gearset, ports: MeshPorts, speed: float) -> Complex
 
 def _harmonics_of_errors(gearset: Gearset, ports: MeshPorts, speed: float) -> Complexes:
     """Harmonics (m, h + 1) of the static transmission errors by the bases' angles, m; the first is no error."""
-    force = gearset.waves.mean_stiffness * ports.static[:, DEFLECTION]
+    force = gearset.waves.mean_stiffness * gearset.pressed(ports.static)
     compliances = gearset.by_angle(gearset.cycle_compliances, ports.positions, speed)
     ahead = gearset.slopes(compliances, speed)
     return np.asarray(force[:, None] * compliances + force[gearset.mean_waves, None] * ahead)
@@ -138,18 +142,32 @@ def parametric_response(gearset: Gearset, interface: Interface) -> Response:
     coefficients, mean = gearset.coefficients(interface.speed), gearset.waves.mean_stiffness
     slopes, means = gearset.slopes(coefficients, interface.speed), gearset.mean_waves
 
-    def forces(deflection: Complexes) -> Complexes:
+    def following(deflection: Complexes) -> Complexes:
         found = gearset.stretched(coefficients, deflection) - mean * deflection
         return np.asarray(found + gearset.stretched(slopes, deflection[:, means]))
 
     def apply(deflection: Complexes) -> Complexes:
-        return np.asarray(deflection - _answer(interface, forces(deflection)))
+        return np.asarray(deflection - _answer(interface, following(deflection)))
 
-    static = interface.ports.static[:, DEFLECTION]
-    given = np.zeros((len(gearset.lines.index), len(static)), dtype=complex)
-    given[0] = static
-    deflection, products = solve_lines(apply, given, TOLERANCE)
-    return _response(gearset, interface, deflection, forces(deflection), products)
+    given = given_forces(gearset, interface)
+    start = _answer(interface, given)
+    start[0] += interface.ports.static[:, DEFLECTION]
+    deflection, products = solve_lines(apply, start, TOLERANCE)
+    return _response(gearset, interface, deflection, given + following(deflection), products)
+
+
+def given_forces(gearset: Gearset, interface: Interface) -> Complexes:
+    """Find the forces (n, m) of tangents without deflection beyond those of the mean system: of curves alone, N."""
+    waves, ports = gearset.waves, interface.ports
+    found = np.zeros((len(gearset.lines.index), len(waves.waves)), dtype=complex)
+    if not waves.loads.any():
+        return found
+    pulls = gearset.by_angle(gearset.cycle_pulls, ports.positions, interface.speed)
+    one, ahead = np.zeros_like(found), np.zeros_like(found)
+    one[0], ahead[0] = [wave.wave == 0 for wave in waves.waves], 1.0
+    found -= gearset.stretched(pulls, one) + gearset.stretched(gearset.slopes(pulls, interface.speed), ahead)
+    found[0] += waves.mean_stiffness * waves.rest
+    return found
 
 
 def _answer(interface: Interface, excess: Complexes) -> Complexes:
@@ -163,7 +181,9 @@ def _response(
     """Complete a response with the whole forces of its meshes, those of mean stiffness and damping among them."""
     waves = gearset.waves
     rates = rates_of(gearset, interface, deflection)
-    force = (excess + waves.mean_stiffness * deflection + waves.damping * rates) * waves.line_of_action
+    force = excess + waves.mean_stiffness * deflection + waves.damping * rates
+    force[0] -= waves.mean_stiffness * waves.rest
+    force *= waves.line_of_action
     return Response(interface, deflection, excess[..., None], force, products, np.zeros(len(waves.waves)), np.zeros(0))
 
 
@@ -182,7 +202,11 @@ def signals(gearset: Gearset, response: Response) -> Complexes:
     # Rows have the bearings of the mean system; what non-linear ones have beyond it acts on their bodies, too.
     beyond = response.excess[:, len(gearset.waves.waves) :, : gearset.bearing_signals.shape[1]]
     of_motion[:, gearset.bearing_signals] -= beyond
-    return np.concatenate([of_motion, response.deflection, response.force], axis=1)
+    levers, deflection = interface.ports.levers, response.deflection
+    if levers.any():
+        deflection = deflection + response.motion @ levers[:, :-1].T
+        deflection[0] += levers[:, -1]
+    return np.concatenate([of_motion, deflection, response.force], axis=1)
 
 
 def dissipated_and_given(gearset: Gearset, response: Response) -> tuple[float, float]:

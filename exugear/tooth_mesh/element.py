@@ -37,7 +37,8 @@ from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Body, Mesh
 from exugear.model.seats import node_position, seat_key
 from exugear.model.sections.entries import GROUND
-from exugear.tooth_mesh.law import Angles, Law, MeshData, TableFlanks
+from exugear.tooth_mesh.contact_state import ContactState, even_contact
+from exugear.tooth_mesh.law import Angles, Law, MeshCurve, MeshData, TableFlanks
 from exugear.tooth_mesh.placement import MeshError, loaded_flanks, position_rows, tooth_places
 from exugear.tooth_mesh.wheel_errors import wheel_errors
 from fe_ste.geometry.gears import Gear
@@ -57,8 +58,12 @@ class MeshElement:
     axis : (2, 2) axes of the two bodies relative to the frame's axis, m
     cycles : mesh cycles per rad of gear 1 relative to the frame
     phase : PMC at zero angles
-    stiffness : (n,) k over the mesh cycle, in the law's own coordinate, N/m
+    stiffness, tangent : (n,) load over deflection and slope of the load over the mesh cycle, in the law's own
+        coordinate, N/m; equal where the law is a straight line
+    load : at which they are, on the transverse line of action, N
+    contact : how the teeth resist misalignment, in the axes of the mesh; None of a law in which they do not
     damping : N s/m, in the law's own coordinate
+    damping_time : damping over stiffness, s
     line_of_action : F_bt per scalar force of the law
     centre, misalignment : (12,) rows of the centre distance and of the misalignment
     errors : errors of gear 1 and gear 2 over a revolution of each from zero angle, m; empty for none
@@ -75,13 +80,33 @@ class MeshElement:
     cycles: float
     phase: float
     stiffness: Floats
+    tangent: Floats
+    load: float
+    contact: ContactState | None
     damping: float
+    damping_time: float
     line_of_action: float
     centre: Floats
     misalignment: Floats
     errors: tuple[Floats, Floats]
     offset: Floats
     table: TableFlanks | None = None
+
+    @property
+    def is_curved(self) -> bool:
+        """Whether load over deflection is another line than a straight one."""
+        return self.table is None and not np.array_equal(self.stiffness, self.tangent)
+
+    @property
+    def bears_beside(self) -> bool:
+        """Whether the load bears beside the middle of the face where the gears stand straight."""
+        contact = self.contact
+        return contact is not None and any((contact.misalignment, contact.load_centre, contact.tangent_load_centre))
+
+    @property
+    def rest(self) -> float:
+        """Deflection at which the mean tangent at the static load has no force, m; zero of a straight law."""
+        return self.load / float(np.mean(self.stiffness)) - self.load / float(np.mean(self.tangent))
 
 
 def mesh_elements(
@@ -93,13 +118,14 @@ def mesh_elements(
     angles: Angles = "reference",
     displaced: Mapping[str, tuple[float, float]] | None = None,
     nodes: Mapping[str, Floats] | None = None,
+    contact: Mapping[str, ContactState] | None = None,
 ) -> tuple[MeshElement, ...]:
     """Elements of all meshes.
 
     Parameters
     ----------
     gearbox : Gearbox
-    stiffness : mapping of pair name to (n,) array, or to the table's surface
+    stiffness : mapping of pair name to (n,) array, to a curve, or to the table's surface
         F_bt / STE at pmc = 0, 1/n, ..., N/m; a single value for a constant. The law `table` needs surfaces.
     law : Law
         `exugear.tooth_mesh.laws.registry.law_of` knows it by its name.
@@ -113,13 +139,18 @@ def mesh_elements(
         Place of bodies at zero coordinates against their nominal one, x and y seen from the mesh's frame, m.
     nodes : mapping, optional
         Position (3,) of the node that carries a gear, by `seat_key` of body and gear; the body's own otherwise.
+    contact : mapping of mesh name to ContactState, optional
+        Contact at the static misalignment, in the axes of the pair's table (of the flank +1). A law that is curved has
+        its stiffness from there, the table's changes over the mesh cycle upon it. Meshes without one, or loaded on
+        the other flank, bear evenly along the common face (`even_contact`).
 
     Raises
     ------
     MeshError
         No stiffness for a pair at work, or none that the law can do with.
     """
-    flanks = loaded_flanks(gearbox) if flanks is None else flanks
+    usual = loaded_flanks(gearbox)
+    flanks = usual if flanks is None else flanks
     phases, orientation = tooth_places(gearbox, flanks)
     bodies = {body.name: body for body in gearbox.bodies(inertias)}
     time = gearbox.case.damping.mesh_time_s
@@ -131,12 +162,13 @@ def mesh_elements(
         data = stiffness[mesh.pair.name]
         flank, phase = flanks[mesh.name], phases[mesh.name]
         ends = (_node(mesh.pinion, mesh.pair.pinion, bodies, nodes), _node(mesh.gear, mesh.pair.gear, bodies, nodes))
-        samples = law.samples(data, mesh, static[mesh.name])
-        if not (np.all(np.isfinite(samples)) and np.all(samples > 0.0)):
-            raise MeshError(f"pair {mesh.pair.name}: mesh stiffness must be positive and finite")
+        known = contact.get(mesh.name) if contact and flank == usual[mesh.name] else None
+        secant, tangent, load = _at_load(law, data, mesh, static[mesh.name], known)
         deflection, force = law.rows(mesh, flank, ends, angles)
         centre, misalignment = position_rows(mesh, flank, ends)
-        mesh_stiffness, factor = law.stiffness(mesh, samples, angles)
+        mesh_stiffness, factor = law.stiffness(mesh, secant, angles)
+        mesh_tangent, _ = law.stiffness(mesh, tangent, angles)
+        even = even_contact(mesh.pair, load, float(np.mean(secant)), float(np.mean(tangent)))
         elements.append(
             MeshElement(
                 mesh=mesh,
@@ -148,7 +180,11 @@ def mesh_elements(
                 cycles=flank * mesh.pair.pinion.teeth / (2.0 * math.pi),
                 phase=phase,
                 stiffness=mesh_stiffness,
-                damping=time * float(np.mean(mesh_stiffness)),
+                tangent=mesh_tangent,
+                load=load,
+                contact=(even if known is None else known.seen_by(flank)) if law.tilts else None,
+                damping=time * float(np.mean(mesh_tangent)),
+                damping_time=time,
                 line_of_action=factor,
                 centre=centre,
                 misalignment=misalignment,
@@ -158,6 +194,22 @@ def mesh_elements(
             )
         )
     return tuple(elements)
+
+
+def _at_load(
+    law: Law, data: MeshData, mesh: Mesh, static_force: float, contact: ContactState | None
+) -> tuple[Floats, Floats, float]:
+    """Secant and tangent stiffness (n,) over the mesh cycle along the line of action, N/m, and their load, N."""
+    secant, tangent = law.samples(data, mesh, static_force)
+    load = abs(static_force) or (data.force if isinstance(data, MeshCurve) else 0.0)
+    if contact is not None and tangent is not secant:
+        secant = secant * (contact.force / contact.deflection / np.mean(secant))
+        tangent = tangent * (contact.tangent_stiffness / np.mean(tangent))
+        load = contact.force
+    for values in (secant, tangent):
+        if not (np.all(np.isfinite(values)) and np.all(values > 0.0)):
+            raise MeshError(f"pair {mesh.pair.name}: mesh stiffness must be positive and finite")
+    return secant, tangent, load
 
 
 def _offset(mesh: Mesh, displaced: Mapping[str, tuple[float, float]], deflection: Floats, centre: Floats) -> Floats:

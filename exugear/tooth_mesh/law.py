@@ -16,9 +16,42 @@ from exugear.tooth_mesh.placement import line_of_action_row
 from fe_ste.tools.arrays import Floats
 from fe_ste.transmission_error.surface import SteSurface
 
-MeshData = ArrayLike | SteSurface
-"""What a law knows of a pair: stiffness over the mesh cycle (N/m), or the table's surface."""
 Angles = Literal["reference", "operating"]
+
+
+@dataclass(frozen=True)
+class MeshCurve:
+    """Curve of load over deflection of a pair, a power of the deflection at each position in the mesh cycle.
+
+    Attributes
+    ----------
+    stiffness, tangent : (n,) arrays
+        Load over deflection, and the slope of the load, at pmc = 0, 1/n, ..., N/m.
+    force : float
+        Load on the transverse line of action at which they are, N.
+
+    Examples
+    --------
+    >>> half = MeshCurve(np.array([2e9]), np.array([2.5e9]), 40e3).at(20e3)
+    >>> round(half.tangent[0] / half.stiffness[0], 9), round(1e-9 * half.stiffness[0], 4)
+    (1.25, 1.7411)
+    """
+
+    stiffness: Floats
+    tangent: Floats
+    force: float
+
+    def at(self, force: float) -> MeshCurve:
+        """Return the same curve by its stiffness at another load (N); without any, at that of the table."""
+        if not force:
+            return self
+        exponent = self.tangent / self.stiffness
+        stiffness = self.stiffness * (abs(force) / self.force) ** (1.0 - 1.0 / exponent)
+        return MeshCurve(stiffness, exponent * stiffness, abs(force))
+
+
+MeshData = ArrayLike | MeshCurve | SteSurface
+"""What a law knows of a pair: stiffness over the mesh cycle (N/m), load over deflection, or the table's surface."""
 
 
 @dataclass(frozen=True)
@@ -48,11 +81,14 @@ class Law:
     Attributes
     ----------
     form : number of the law's compiled form in `exugear.tooth_mesh.laws.forms`
+    tilts : whether teeth resist misalignment by the state of their contact
+        (`exugear.tooth_mesh.contact_state`); a law that does not has no moment, or one of its own
     """
 
     form: ClassVar[int]
+    tilts: ClassVar[bool] = True
 
-    def read(self, gearbox: Gearbox, pair: str, directory: Path) -> Floats | SteSurface:
+    def read(self, gearbox: Gearbox, pair: str, directory: Path) -> Floats | MeshCurve | SteSurface:
         """Read or compute what the law knows of a pair.
 
         Parameters
@@ -74,9 +110,10 @@ class Law:
         row = line_of_action_row(mesh, flank, nodes)
         return row, row
 
-    def samples(self, data: MeshData, mesh: Mesh, static_force: float) -> Floats:
-        """F_bt over STE along the line of action (n,), N/m, over the mesh cycle; at the static force (N)."""
-        return np.atleast_1d(np.asarray(data, dtype=np.float64))
+    def samples(self, data: MeshData, mesh: Mesh, static_force: float) -> tuple[Floats, Floats]:
+        """F_bt over STE and its slope along the line of action, each (n,), N/m, at the static force (N)."""
+        values = data.stiffness if isinstance(data, MeshCurve) else np.atleast_1d(np.asarray(data, dtype=np.float64))
+        return values, values
 
     def stiffness(self, mesh: Mesh, line_of_action: Floats, angles: Angles) -> tuple[Floats, float]:
         """Stiffness (n,) in the law's own coordinate, N/m, from that of `samples`; F_bt per scalar force of the law."""

@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 
 from exugear.model.gearbox import Gearbox
+from exugear.tooth_mesh.law import MeshCurve
+
+from .contact_case import curves_of
 
 CASE = Path(__file__).parents[2] / "cases" / "grc750" / "gearbox.toml"
 
@@ -30,3 +33,9 @@ def stiffness() -> dict[str, np.ndarray]:
     mean = {"sun_planet": 3.77e9, "ring_planet": 4.85e9, "intermediate": 3.07e9, "high_speed": 1.93e9}
     shape = 1.0 + 0.05 * np.cos(cycle + 0.3) + 0.02 * np.cos(2 * cycle + 1.1) + 0.01 * np.cos(3 * cycle)
     return {name: value * shape for name, value in mean.items()}
+
+
+@pytest.fixture(scope="session")
+def curves(stiffness: dict[str, np.ndarray]) -> dict[str, MeshCurve]:
+    """Curves through that stiffness, as bent as teeth with strong relief have them."""
+    return curves_of(stiffness)

@@ -12,9 +12,17 @@ STIFFNESS = {"sun_planet": 3.77e9, "ring_planet": 4.85e9, "intermediate": 3.07e9
 
 
 def surface_of(
-    gearbox: Gearbox, name: str, positions: int = 50, variation: float = 1.0, stiffness: float | None = None
+    gearbox: Gearbox,
+    name: str,
+    positions: int = 50,
+    variation: float = 1.0,
+    stiffness: float | None = None,
+    hollow: float = 0.2,
 ) -> SteSurface:
-    """Table of a pair around its centre distance, up to twice its static load; `variation` times 5 % over the cycle."""
+    """Table of a pair around its centre distance, up to twice its static load; `variation` times 5 % over the cycle.
+
+    `hollow` is how the deflection bends with the misalignment; teeth resist tilting where it is negative.
+    """
     stiffness = stiffness or STIFFNESS[name]
     mesh = next(mesh for mesh in gearbox.meshes if mesh.pair.name == name)
     static = abs(gearbox.train.static_mesh_forces()[mesh.name])
@@ -26,13 +34,13 @@ def surface_of(
     p = shape[:, None, None, None]
     c = (centre - mesh.centre_distance)[None, :, None, None] / 2e-4
     a = misalignment[None, None, :, None] / 4e-4
-    softer = (1.0 + 0.03 * c) * (1.0 + 0.2 * a**2 + 0.05 * a)
+    softer = (1.0 + 0.03 * c) * (1.0 + hollow * a**2 + 0.05 * a)
     unloaded = -1e-6 * a[..., 0] ** 2 + 1e-6 * (1.0 + p[..., 0])
     per_force = p * softer / stiffness
     bend = 4e-6 * softer * p
     ste = unloaded[..., None] + per_force * force + bend * (force / static) ** 0.75
     slope = per_force + 0.75 * bend * (force / static) ** -0.25 / static
-    tilting = (1.0 + 0.03 * c) * (0.4 * a + 0.05) / 4e-4
+    tilting = (1.0 + 0.03 * c) * (2.0 * hollow * a + 0.05) / 4e-4
     centre_of_load = -2e-6 * a / 4e-4 + (ste - unloaded[..., None]) * tilting / softer
     return SteSurface.from_nodes(
         centre,

@@ -5,7 +5,7 @@ Machine code is kept by `fe_ste.tools.compilation`.
 
 from __future__ import annotations
 
-from exugear.kernels.coordinates import PADDED
+from exugear.kernels.coordinates import PADDED, PADDED_TILT
 from exugear.kernels.fast_meshes import (
     DEFLECTION_ROW,
     FORCE_ROW,
@@ -18,10 +18,15 @@ from exugear.kernels.fast_meshes import (
     LAST_OUTSIDE,
     LAST_RATE,
     TABLE_FORCE,
+    TILT_ARM,
+    TILT_DAMPER,
+    TILT_PUSH,
+    TILT_RESISTANCE,
     TURNING,
     Meshes,
     row_motion,
     subtract_errors,
+    tilt_motion,
 )
 from exugear.kernels.meshes import FRAME, ROW_SIZE, SPIN_1, SPIN_2
 from exugear.kernels.table_law import Scratch, TableArrays
@@ -116,10 +121,39 @@ def add_row_mesh(q: Floats, v: Floats, m: int, meshes: Meshes, work: Work) -> No
         _, acting = row_motion(m, FORCE_ROW, psi, psi_rate, c, s, meshes, work.places, gradient)
         if not clean:
             acting += subtract_errors(q, v, m, 1.0, meshes, gradient)[1]
+    if meshes.tilting[m] == 1:
+        add_tilting_mesh(q, v, m, delta, rate, c, s, meshes, work)
+        return
     elastic, _, _, energy, cycle_power = mesh_law(q, v, m, delta, meshes)
     force = elastic + meshes.damping[m] * rate
     push_apart(m, force, gradient, meshes, work)
     keep_state(m, delta, rate, acting, force, energy, cycle_power, meshes, work.mesh.states[m])
+
+
+@kernel
+def add_tilting_mesh(
+    q: Floats, v: Floats, m: int, delta: float, rate: float, c: float, s: float, meshes: Meshes, work: Work
+) -> None:
+    """Add force and moment of a mesh that resists misalignment; the gradient of its deflection is known."""
+    frame, resists, state = meshes.coordinates[m, FRAME], meshes.tilt[m], work.mesh.states[m]
+    turned, tilt_rate, x, y, turning = tilt_motion(m, v[frame], c, s, meshes, work.places)
+    arm, stiffness, lost = resists[TILT_ARM], resists[TILT_RESISTANCE], resists[TILT_DAMPER] * tilt_rate
+    # Where the load bears beside the middle of the face, it deflects with the misalignment.
+    approach, approaching = delta - arm * turned, rate - arm * tilt_rate
+    elastic, _, _, energy, cycle_power = mesh_law(q, v, m, approach, meshes)
+    force = elastic + meshes.damping[m] * approaching
+    push_apart(m, force, work.mesh.gradients[DEFLECTION_ROW], meshes, work)
+    moment = resists[TILT_PUSH] - stiffness * turned - lost + arm * force
+    first, second = work.loads[meshes.ends[m, 0]], work.loads[meshes.ends[m, 1]]
+    first[PADDED_TILT] += moment * x
+    first[PADDED_TILT + 1] += moment * y
+    second[PADDED_TILT] -= moment * x
+    second[PADDED_TILT + 1] -= moment * y
+    work.force[frame] += moment * turning
+    keep_state(m, delta, approaching, approaching, force, energy, cycle_power, meshes, state)
+    state[LAST_RATE] = rate
+    state[LAST_ENERGY] += (0.5 * stiffness * turned - resists[TILT_PUSH]) * turned
+    state[LAST_DAMPED] += lost * tilt_rate
 
 
 @kernel

@@ -8,10 +8,21 @@ from exugear.dynamics.assembly import Assembly
 from exugear.kernels.coordinates import BODY_SIZE, PADDED, PADDED_TILT, SPIN, TILT
 from exugear.kernels.elastic import elastic_motion, scratch_for
 from exugear.kernels.fast_meshes import STATES_SIZE, TURNING, Meshes, MeshMemory, padded_rows
-from exugear.kernels.meshes import FRAME, ROW_SIZE, SPIN_1, SPIN_2, MeshArrays
+from exugear.kernels.meshes import (
+    FRAME,
+    ROW_SIZE,
+    SPIN_1,
+    SPIN_2,
+    TILT_DAMPING,
+    TILT_LEVER,
+    TILT_MOMENT,
+    TILT_REST,
+    TILT_STIFFNESS,
+    MeshArrays,
+)
 from exugear.kernels.products import filled_up
 from exugear.kernels.rolling import rolling_memory
-from exugear.kernels.table_law import NOMINAL_DEFLECTION, scratch_memory
+from exugear.kernels.table_law import NOMINAL_DEFLECTION, NOMINAL_MISALIGNMENT, scratch_memory
 from exugear.kernels.travelling import travelling_memory
 from exugear.kernels.turning import turning_memory
 from exugear.model.sections.entries import GROUND
@@ -199,6 +210,8 @@ def _meshes(numbers: _Numbers, ends: Integers) -> Meshes:
         deflection=given.deflection,
         force=given.force,
         conjugate=np.all(given.deflection == given.force, axis=1).astype(np.int64),
+        tilting=(given.tilt[:, TILT_STIFFNESS] > 0.0).astype(np.int64),
+        tilt=_tilts(given),
         spinning=spinning_alone(given).astype(np.int64),
         ends=ends,
         rows=rows,
@@ -208,13 +221,20 @@ def _meshes(numbers: _Numbers, ends: Integers) -> Meshes:
         pieces=given.pieces,
         stiffness=given.stiffness,
         damping=given.damping,
-        mean=np.array([(e.stiffness.mean(), e.damping) for e in elements]).reshape(-1, 2),
+        mean=np.array([(e.tangent.mean(), e.damping) for e in elements]).reshape(-1, 2),
         line_of_action=given.line_of_action,
         error_pieces=given.error_pieces,
         error=given.error,
         nominal=table.nominal[:, NOMINAL_DEFLECTION].copy(),
         table=table if (given.form == TABLE_FORM).any() else None,
     )
+
+
+def _tilts(given: MeshArrays) -> Floats:
+    """How meshes resist misalignment, (m, 7): `Meshes.tilt`."""
+    rows = given.table.misalignment[:, TILT : TILT + 2]
+    shift = given.table.nominal[:, NOMINAL_MISALIGNMENT] - given.tilt[:, TILT_REST]
+    return np.column_stack([rows, shift, given.tilt[:, [TILT_STIFFNESS, TILT_DAMPING, TILT_LEVER, TILT_MOMENT]]])
 
 
 def _joints(numbers: _Numbers) -> Joints | None:

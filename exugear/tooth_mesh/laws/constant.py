@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 
 from exugear.model.parts import Mesh
@@ -11,7 +13,9 @@ from fe_ste.tools.arrays import Floats
 
 
 class Constant(LineOfAction):
-    """Mean stiffness over the mesh cycle."""
+    """Mean stiffness over the mesh cycle, a straight line of load over deflection."""
+
+    curved: ClassVar[bool] = False
 
     def stiffness(self, mesh: Mesh, line_of_action: Floats, angles: Angles) -> tuple[Floats, float]:
         """Mean of F_bt over STE, (1,), N/m."""

@@ -1,7 +1,8 @@
 """Compiled forces of all meshes: the form that each mesh's law has, chosen by its number, on one geometry.
 
 A law whose force depends on the deflection along a row and on pmc is one branch in `row_law`; forces, tangents, energy
-and powers follow for both solvers. The law `table` depends on where the gears stand as well and has forms of its own.
+and powers follow for both solvers, and so does what resists misalignment. The law `table` depends on where the gears
+stand as well and has forms of its own.
 """
 
 from __future__ import annotations
@@ -25,7 +26,13 @@ from exugear.kernels.meshes import (
     SPIN_1,
     STATE_SIZE,
     STIFFNESS,
+    TILT_DAMPING,
+    TILT_LEVER,
+    TILT_MOMENT,
+    TILT_REST,
+    TILT_STIFFNESS,
     MeshArrays,
+    frame_row,
     mesh_pmc,
     net_deflection,
     rate_gradient,
@@ -33,14 +40,14 @@ from exugear.kernels.meshes import (
     row_dot,
     turn_rows,
 )
-from exugear.kernels.table_law import NOMINAL_DEFLECTION, Scratch, TableArrays, scratch_memory
-from exugear.tooth_mesh.laws.line_of_action import stiffness_law
+from exugear.kernels.table_law import NOMINAL_DEFLECTION, NOMINAL_MISALIGNMENT, Scratch, TableArrays, scratch_memory
+from exugear.tooth_mesh.laws.line_of_action import CURVE_FORM, curve_law, stiffness_law
 from exugear.tooth_mesh.laws.table import TABLE_FORM, TABLE_MEMORY, add_table_tangent, table_force
-from fe_ste.tools.arrays import Floats
+from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import kernel
 from fe_ste.tools.inner_kernels import bundle, kept_bundle
 
-STATE, ACTING, ACTING_TURNING, GRADIENT, TURNING, BEND, SLOPE, BY_Q = range(8)
+STATE, ACTING, ACTING_TURNING, GRADIENT, TURNING, BEND, SLOPE, TILTING, TILT_TURNING, STILL, BY_Q = range(11)
 BY_V, OF_TABLE = BY_Q + ROW_SIZE, BY_Q + 2 * ROW_SIZE
 MEMORY = OF_TABLE + TABLE_MEMORY
 """Rows of the memory of `pass_meshes`, (`MEMORY`, 13): vectors of a mesh, and derivatives of its force."""
@@ -52,19 +59,46 @@ _NOTHING, _NO_ROWS = np.zeros(0), np.zeros((0, 0))
 def row_law(
     form: int, coefficients: Floats, pieces: int, delta: float, pmc: float, cycling: float
 ) -> tuple[float, float, float, float, float]:
-    """Elastic force of a law along a row; results as of `stiffness_law`, which is the form of most laws."""
+    """Elastic force of a law along a row; results as of `stiffness_law`, which is the form of stated stiffness."""
+    if form == CURVE_FORM:
+        return curve_law(coefficients, pieces, delta, pmc, cycling)
     return stiffness_law(coefficients, pieces, delta, pmc, cycling)
+
+
+@kernel
+def tilted(q: Floats, m: int, meshes: MeshArrays, memory: Floats) -> float:
+    """Misalignment of mesh m against that of its contact's state, rad; its gradient stays in `memory`.
+
+    Rows of the deflection that stand there become those of e (`exugear.tooth_mesh.contact_state`).
+    """
+    gradient, turning, tilting, tilt_turning = memory[GRADIENT], memory[TURNING], memory[TILTING], memory[TILT_TURNING]
+    table, lever = meshes.table, meshes.tilt[m, TILT_LEVER]
+    tilt: float = table.nominal[m, NOMINAL_MISALIGNMENT] - meshes.tilt[m, TILT_REST]
+    tilt += frame_row(q, meshes.coordinates[m], meshes.axis[m], table.misalignment[m], tilting, tilt_turning)
+    for i in range(ROW_SIZE):
+        gradient[i] -= lever * tilting[i]
+        turning[i] -= lever * tilt_turning[i]
+    return tilt
 
 
 @kernel
 def row_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Floats, out: Floats, acting: Floats) -> None:
     """Fill the state of a mesh with a law along a row, as in `mesh_state`, and its negative generalized force (13,)."""
-    gradient, turning, bend = memory[GRADIENT], memory[TURNING], memory[BEND]
-    index = meshes.coordinates[m]
+    gradient, turning, bend, tilting = memory[GRADIENT], memory[TURNING], memory[BEND], memory[TILTING]
+    index, resists = meshes.coordinates[m], meshes.tilt[m]
     # What deflects, and how fast.
     delta = meshes.table.nominal[m, NOMINAL_DEFLECTION]
     delta += net_deflection(q, m, meshes, meshes.deflection[m], 1.0, gradient, turning, bend)
     rate = row_dot(index, gradient, v)
+    out[DEFLECTION], out[RATE] = delta, rate
+    moment, turned, stored, lost = 0.0, 0.0, 0.0, 0.0
+    if resists[TILT_STIFFNESS] > 0.0:
+        turned = tilted(q, m, meshes, memory)
+        tilt_rate = row_dot(index, tilting, v)
+        delta, rate = delta - resists[TILT_LEVER] * turned, rate - resists[TILT_LEVER] * tilt_rate
+        moment = resists[TILT_MOMENT] - resists[TILT_STIFFNESS] * turned - resists[TILT_DAMPING] * tilt_rate
+        stored = (0.5 * resists[TILT_STIFFNESS] * turned - resists[TILT_MOMENT]) * turned
+        lost = resists[TILT_DAMPING] * tilt_rate * tilt_rate
     pmc = mesh_pmc(q, m, meshes)
     cycling = meshes.cycles[m] * relative_spin(v, index, 0)
     # The law, and its damper beside it.
@@ -74,15 +108,21 @@ def row_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Floats, 
     force = elastic + meshes.damping[m] * rate
     # It acts along a row of its own, which for most laws is that of the deflection.
     net_deflection(q, m, meshes, meshes.force[m], 1.0, acting, turning, bend)
-    out[DEFLECTION], out[RATE], out[PMC], out[STIFFNESS] = delta, rate, pmc - math.floor(pmc), k
+    if resists[TILT_STIFFNESS] > 0.0:
+        for i in range(ROW_SIZE):
+            acting[i] -= resists[TILT_LEVER] * tilting[i]
+    out[PMC], out[STIFFNESS] = pmc - math.floor(pmc), k
     out[FORCE] = force * meshes.line_of_action[m]
-    out[ENERGY] = energy
-    out[DAMPED_POWER] = meshes.damping[m] * rate * rate
+    out[ENERGY] = energy + stored
+    out[DAMPED_POWER] = meshes.damping[m] * rate * rate + lost
     out[CYCLE_POWER] = cycle_power
     out[OTHER_POWER] = force * (row_dot(index, acting, v) - rate)
     out[OUTSIDE] = 0.0
     for i in range(ROW_SIZE):
         acting[i] *= force
+    if resists[TILT_STIFFNESS] > 0.0:
+        for i in range(ROW_SIZE):
+            acting[i] -= moment * tilting[i]
 
 
 @kernel
@@ -90,8 +130,13 @@ def add_row_tangent(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Fl
     """Add the derivatives of the negative force of a mesh with a law along a row, (13, 13)."""
     gradient, turning, bend, slope = memory[GRADIENT], memory[TURNING], memory[BEND], memory[SLOPE]
     acting, acting_turning, index = memory[ACTING], memory[ACTING_TURNING], meshes.coordinates[m]
+    tilting, tilt_turning, resists = memory[TILTING], memory[TILT_TURNING], meshes.tilt[m]
     delta = meshes.table.nominal[m, NOMINAL_DEFLECTION]
     delta += net_deflection(q, m, meshes, meshes.deflection[m], 1.0, gradient, turning, bend)
+    if resists[TILT_STIFFNESS] > 0.0:
+        turned = tilted(q, m, meshes, memory)
+        delta -= resists[TILT_LEVER] * turned
+        add_tilt_tangent(v, index, turned, resists, memory, jq, jv)
     elastic, k, by_pmc, _, _ = row_law(
         meshes.form[m], meshes.stiffness[m], meshes.pieces[m], delta, mesh_pmc(q, m, meshes), 0.0
     )
@@ -105,11 +150,31 @@ def add_row_tangent(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Fl
     slope[FRAME] -= by_pmc * meshes.cycles[m]
     # Product rule: the row times the force's slope, and the row's own turning times the force.
     net_deflection(q, m, meshes, meshes.force[m], 1.0, acting, acting_turning, bend)
+    if resists[TILT_STIFFNESS] > 0.0:
+        for i in range(ROW_SIZE):
+            acting[i] -= resists[TILT_LEVER] * tilting[i]
+            acting_turning[i] -= resists[TILT_LEVER] * tilt_turning[i]
     for i in range(ROW_SIZE):
         for j in range(ROW_SIZE):
             jq[i, j] += acting[i] * slope[j]
             jv[i, j] += acting[i] * c * gradient[j]
     turn_rows(acting_turning, bend, force, jq)
+
+
+@kernel
+def add_tilt_tangent(
+    v: Floats, index: Integers, turned: float, resists: Floats, memory: Floats, jq: Floats, jv: Floats
+) -> None:
+    """Add the derivatives of what the tilt stiffness and its damper give to the negative force, (13, 13)."""
+    tilting, tilt_turning, slope, straight = memory[TILTING], memory[TILT_TURNING], memory[SLOPE], memory[STILL]
+    k, c = resists[TILT_STIFFNESS], resists[TILT_DAMPING]
+    straight[:] = 0.0  # errors of wheels do not tilt
+    rate_gradient(v, index, tilt_turning, straight, slope)
+    for i in range(ROW_SIZE):
+        for j in range(ROW_SIZE):
+            jq[i, j] += tilting[i] * (k * tilting[j] + c * slope[j])
+            jv[i, j] += tilting[i] * c * tilting[j]
+    turn_rows(tilt_turning, straight, k * turned + c * row_dot(index, tilting, v) - resists[TILT_MOMENT], jq)
 
 
 @kernel

@@ -11,13 +11,12 @@ from exugear.model.parts import PairSpec
 from exugear.tooth_mesh.laws.constant import Constant
 from fe_ste.standards.iso6336 import mesh_stiffness as iso_stiffness
 from fe_ste.tools.arrays import Floats
-from fe_ste.transmission_error.surface import SteSurface
 
 
 class Iso6336(Constant):
     """Mean stiffness by the standard."""
 
-    def read(self, gearbox: Gearbox, pair: str, directory: Path) -> Floats | SteSurface:
+    def read(self, gearbox: Gearbox, pair: str, directory: Path) -> Floats:
         """Mean mesh stiffness (1,), N/m; nothing is read."""
         return np.array([iso6336_stiffness(gearbox.pairs[pair])])
 

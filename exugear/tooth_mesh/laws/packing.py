@@ -6,11 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from exugear.kernels.coordinates import BODY_SIZE, SPIN
-from exugear.kernels.meshes import FRAME, ROW_SIZE, MeshArrays, periodic_cubic
+from exugear.kernels.coordinates import BODY_SIZE, SPIN, TILT
+from exugear.kernels.meshes import FRAME, ROW_SIZE, TILT_COLUMNS, MeshArrays, periodic_cubic
+from exugear.kernels.table_law import NOMINAL_DEFLECTION
 from exugear.model.seats import seat_key
 from exugear.tooth_mesh.element import MeshElement
-from exugear.tooth_mesh.laws.line_of_action import STIFFNESS_FORM
+from exugear.tooth_mesh.laws.line_of_action import CURVE_FORM, STIFFNESS_FORM, curve_coefficients
 from exugear.tooth_mesh.laws.table import pack_tables
 from fe_ste.tools.arrays import Floats, Integers
 
@@ -22,6 +23,7 @@ def pack(
     coordinates: Mapping[str, tuple[int, ...]],
     averaged: bool = False,
     linear: bool = False,
+    tangent: bool = False,
 ) -> MeshArrays:
     """Arrays for the kernel.
 
@@ -32,35 +34,65 @@ def pack(
     averaged : bool
         Replace stiffness and tables by their mean over the cycle, as eigenmodes need it.
     linear : bool
-        Replace laws that are no stiffness, such as tables, by the stiffness they have at the static load.
+        Replace laws that are no stiffness, such as tables, by the stiffness they have at the static load: force over
+        deflection.
+    tangent : bool
+        Replace curves by the straight line that touches them at the static load.
     """
     count = len(elements)
-    samples = [np.array([np.mean(e.stiffness)]) if averaged else e.stiffness for e in elements]
-    coefficients = [
-        periodic_cubic(values) if linear else e.law.coefficients(values)
-        for e, values in zip(elements, samples, strict=True)
-    ]
-    width = max((len(values) for values in coefficients), default=1)
-    stiffness = np.zeros((count, width, 4))
-    for block, values in zip(stiffness, coefficients, strict=True):
-        block[: len(values)] = values
+    forms = [_form(element, averaged, linear, tangent) for element in elements]
+    width = max((len(values) for _, values in forms), default=1)
+    stiffness = np.zeros((count, width, max((values.shape[1] for _, values in forms), default=4)))
+    for block, (_, values) in zip(stiffness, forms, strict=True):
+        block[: len(values), : values.shape[1]] = values
     index = _indices(elements, coordinates)
+    tables = pack_tables(elements, index, averaged, linear)
+    if tangent:
+        tables.nominal[:, NOMINAL_DEFLECTION] -= [element.rest for element in elements]
     return MeshArrays(
         coordinates=index,
         axis=np.array([e.axis for e in elements]).reshape(count, 2, 2),
-        form=np.array([STIFFNESS_FORM if linear else e.law.form for e in elements], dtype=np.int64),
+        form=np.array([form for form, _ in forms], dtype=np.int64),
         deflection=np.array([e.deflection for e in elements]).reshape(count, FRAME),
         force=np.array([e.force for e in elements]).reshape(count, FRAME),
         cycles=np.array([e.cycles for e in elements]),
         phase=np.array([e.phase for e in elements]),
-        pieces=np.array([len(values) for values in coefficients], dtype=np.int64),
+        pieces=np.array([len(values) for _, values in forms], dtype=np.int64),
         stiffness=stiffness,
         damping=np.array([e.damping for e in elements]),
+        tilt=_pack_tilts(elements, index, linear),
         line_of_action=np.array([e.line_of_action for e in elements]),
         error_pieces=np.array([[len(error) for error in e.errors] for e in elements], dtype=np.int64).reshape(count, 2),
         error=_pack_errors(elements),
-        table=pack_tables(elements, index, averaged, linear),
+        table=tables,
     )
+
+
+def _form(element: MeshElement, averaged: bool, linear: bool, straight: bool) -> tuple[int, Floats]:
+    """Choose the form that an element's law has, by its number, and its coefficients (n, c)."""
+    secant, tangent = element.stiffness, element.tangent
+    if averaged:
+        secant, tangent = np.array([np.mean(secant)]), np.array([np.mean(tangent)])
+    if linear:
+        return STIFFNESS_FORM, periodic_cubic(secant)
+    if element.is_curved and straight:
+        return STIFFNESS_FORM, periodic_cubic(tangent)
+    if element.is_curved:
+        return CURVE_FORM, curve_coefficients(secant, tangent, element.load)
+    return element.law.form, element.law.coefficients(secant)
+
+
+def _pack_tilts(elements: tuple[MeshElement, ...], index: Integers, linear: bool) -> Floats:
+    """Fill `MeshArrays.tilt`: not of gears that do not tilt, nor of tables, which have a potential of their own."""
+    tilts = np.zeros((len(elements), TILT_COLUMNS))
+    for row, element, own in zip(tilts, elements, index, strict=True):
+        contact, still = element.contact, bool((own[[TILT, BODY_SIZE + TILT]] < 0).all())
+        if contact is None or still or (element.table is not None and not linear):
+            continue
+        stiffness, lever = contact.tilt_stiffness, contact.tangent_load_centre
+        moment = contact.force * (contact.load_centre - lever)
+        row[:] = stiffness, element.damping_time * stiffness, lever, moment, contact.misalignment
+    return tilts
 
 
 def _indices(elements: tuple[MeshElement, ...], coordinates: Mapping[str, tuple[int, ...]]) -> Integers:

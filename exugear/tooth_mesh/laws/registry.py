@@ -41,14 +41,18 @@ class LawProperties:
 
 _TABLE_OF_LAWS = (
     LawProperties("rigid", "gears only roll; variant `rigid` alone", has_force=False, needs_tables=False),
-    LawProperties("constant", "as `line_of_action`, stiffness averaged over the mesh cycle"),
+    LawProperties("constant", "as `line_of_action` with the mean of load over deflection, a straight line"),
     LawProperties("iso6336", "as `constant`, stiffness by ISO 6336-1 method B", needs_tables=False),
     LawProperties(
         "seed",
         "the published tangential law: deflection along the pitch circle, force with radial and axial parts; "
         "not conservative",
     ),
-    LawProperties("line_of_action", "stiffness over the mesh cycle, all motions along the line of action"),
+    LawProperties(
+        "line_of_action",
+        "load over deflection over the mesh cycle by secant and tangent of the table, stiffness against misalignment; "
+        "all motions along the line of action",
+    ),
     LawProperties(
         "table",
         "the whole table: force by load, position, centre distance and misalignment; "

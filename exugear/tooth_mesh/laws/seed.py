@@ -7,6 +7,7 @@ k delta, with radial and axial parts that the deflection does not see. So it is 
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 import numpy as np
 
@@ -18,7 +19,13 @@ from fe_ste.tools.arrays import Floats
 
 
 class Seed(LineOfAction):
-    """Tangential deflection, force with radial and axial parts."""
+    """Tangential deflection, force with radial and axial parts.
+
+    As it was published, teeth do not resist misalignment, and load over deflection is a straight line.
+    """
+
+    curved: ClassVar[bool] = False
+    tilts: ClassVar[bool] = False
 
     def rows(self, mesh: Mesh, flank: int, nodes: tuple[Floats, Floats], angles: Angles) -> tuple[Floats, Floats]:
         """Row of the tangential deflection at the pitch point, and of the force there."""

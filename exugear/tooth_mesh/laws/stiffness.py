@@ -1,18 +1,23 @@
-"""What a mesh law knows of each pair of a gearbox: stiffness over the mesh cycle, or the surface of its table."""
+"""What a mesh law knows of each pair of a gearbox: its stiffness over the mesh cycle, or more of its table."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from exugear.model.gearbox import Gearbox
+from exugear.tooth_mesh.law import MeshCurve
 from exugear.tooth_mesh.laws.registry import LAWS, law_of
 from exugear.tooth_mesh.placement import MeshError
 from fe_ste.tools.arrays import Floats
 from fe_ste.transmission_error.surface import SteSurface
 
 
-def mesh_stiffness(gearbox: Gearbox, law: str, directory: str | Path | None = None) -> dict[str, Floats | SteSurface]:
-    """Stiffness F_bt / STE (N/m) at pmc = 0, 1/n, ... of each pair at work; for the law ``table`` its surface.
+def mesh_stiffness(
+    gearbox: Gearbox, law: str, directory: str | Path | None = None
+) -> dict[str, Floats | MeshCurve | SteSurface]:
+    """Stiffness F_bt / STE (N/m) at pmc = 0, 1/n, ... of each pair at work, as its law knows it.
+
+    The law ``line_of_action`` knows the curve of load over deflection where there is a table, ``table`` its surface.
 
     Parameters
     ----------

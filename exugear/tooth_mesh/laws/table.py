@@ -100,7 +100,7 @@ class Table(Law):
 
     form = TABLE_FORM
 
-    def read(self, gearbox: Gearbox, pair: str, directory: Path) -> Floats | SteSurface:
+    def read(self, gearbox: Gearbox, pair: str, directory: Path) -> SteSurface:
         """Surface through a pair's table over all axes, which must have been computed from exactly this case."""
         if pair in gearbox.stated_stiffness:
             raise MeshError(without_table(gearbox, [pair]))
@@ -111,10 +111,11 @@ class Table(Law):
         except InterpolationError as error:
             raise MeshError(f"pair {pair}: {table_path(directory, pair)}: {error}") from None
 
-    def samples(self, data: MeshData, mesh: Mesh, static_force: float) -> Floats:
+    def samples(self, data: MeshData, mesh: Mesh, static_force: float) -> tuple[Floats, Floats]:
         """Mean stiffness of the table at the static load, (1,), N/m: for damping and for linear models."""
         mean = _surface_of(mesh, data).mean_stiffness(abs(static_force), mesh.centre_distance)
-        return np.atleast_1d(np.asarray(mean, dtype=np.float64))
+        values = np.atleast_1d(np.asarray(mean, dtype=np.float64))
+        return values, values
 
     def table_flanks(
         self, mesh: Mesh, flank: int, nodes: tuple[Floats, Floats], phase: float, data: MeshData, time: float

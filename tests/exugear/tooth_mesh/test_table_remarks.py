@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from exugear.model.gearbox import Gearbox
+from exugear.tooth_mesh.law import MeshCurve
 from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.tooth_mesh.placement import MeshError
 from exugear.tooth_mesh.table_remarks import doubts_about_table, remarks_about_table
@@ -60,10 +61,11 @@ def test_few_missing_positions_are_a_remark_and_dynamics_go_on(
     assert not list(doubts_about_table("spur", few))
     few.save(table_path(tmp_path, "spur"))
     assert wanted_table(gearbox, "spur", 20).hash == few.input_hash
-    samples = np.asarray(mesh_stiffness(gearbox, "line_of_action", tmp_path)["spur"])
-    whole = table.static_state["mesh_stiffness"].to_numpy()
-    assert np.isfinite(samples).all()
-    assert samples.mean() == pytest.approx(whole.mean(), rel=0.01)
+    curve = mesh_stiffness(gearbox, "line_of_action", tmp_path)["spur"]
+    assert isinstance(curve, MeshCurve)
+    for samples, name in ((curve.stiffness, "mesh_stiffness"), (curve.tangent, "tangent_stiffness")):
+        assert np.isfinite(samples).all()
+        assert samples.mean() == pytest.approx(table.static_state[name].to_numpy().mean(), rel=0.01)
 
 
 def test_many_missing_positions_are_a_doubt_and_dynamics_refuse_them(

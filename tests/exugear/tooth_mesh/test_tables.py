@@ -15,6 +15,7 @@ from exugear.cli.app import app
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
 from exugear.report.writer import write_report
+from exugear.tooth_mesh.law import MeshCurve
 from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.tooth_mesh.placement import MeshError
 from exugear.tooth_mesh.tables import missing_tables, requested_tables, wanted_table
@@ -64,9 +65,13 @@ def test_a_grid_serves_where_only_the_static_state_is_needed(computed: tuple[Pat
     assert requested_tables(gearbox, out)[0].stored
     assert missing_tables(gearbox, out) == missing_tables(gearbox, out, grid=True) == []
     alone = requested_tables(gearbox, out.parent / "alone")[0].compute()
-    stiffness = alone.static_state["mesh_stiffness"].to_numpy()
     # One solution of one problem, found from other starts.
-    assert mesh_stiffness(gearbox, "line_of_action", out)["spur"] == pytest.approx(stiffness, rel=1e-9)
+    curve = mesh_stiffness(gearbox, "line_of_action", out)["spur"]
+    assert isinstance(curve, MeshCurve)
+    stiffness, tangent = (alone.static_state[name].to_numpy() for name in ("mesh_stiffness", "tangent_stiffness"))
+    assert curve.stiffness == pytest.approx(stiffness, rel=1e-9)
+    assert curve.tangent == pytest.approx(tangent, rel=1e-6)
+    assert curve.force == pytest.approx(float(alone.static_state["line_of_action_force"][0]), rel=1e-12)
 
 
 def test_one_state_does_not_serve_where_a_grid_is_needed_nor_a_grid_with_other_axes(

@@ -1,0 +1,31 @@
+"""Curves of load over deflection and states of contact, as bent and one-sided as those of strongly modified teeth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from exugear.model.gearbox import Gearbox
+from exugear.tooth_mesh.contact_state import ContactState
+from exugear.tooth_mesh.law import MeshCurve
+
+LOADS = {"sun_planet": 140e3, "ring_planet": 140e3, "intermediate": 180e3, "high_speed": 50e3}
+
+
+def curves_of(stiffness: Mapping[str, np.ndarray]) -> dict[str, MeshCurve]:
+    """Curves through a stiffness over the mesh cycle under 50 to 180 kN, exponents between 1.1 and 1.3."""
+    cycle = 2.0 * np.pi * np.arange(50) / 50
+    exponent = 1.2 + 0.08 * np.cos(cycle + 2.0) + 0.02 * np.cos(2 * cycle)
+    return {name: MeshCurve(values, exponent * values, LOADS[name]) for name, values in stiffness.items()}
+
+
+def contacts(gearbox: Gearbox) -> dict[str, ContactState]:
+    """States whose numbers are of the size that contact of the GRC has, no two meshes alike."""
+    found = {}
+    for n, mesh in enumerate(gearbox.meshes):
+        force = 1e5 * (1.0 + 0.1 * n)
+        found[mesh.name] = ContactState(
+            force, 30e-6 + 1e-6 * n, 4e9, 1e-4 - 3e-5 * n, -2e-3 + 4e-4 * n, 3e-3 - 7e-4 * n, 1e7 + 1e6 * n
+        )
+    return found
