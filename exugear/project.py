@@ -263,8 +263,13 @@ class Project:
         """List the tables that a life needs, and find those that are there: of all pairs that get one."""
         return self.requested_tables(grid=LAWS[self.choice.mesh_law].needs_axes)
 
-    def checked_loads(self) -> CountedLoads:
+    def checked_loads(self, progress: Callable[[int, int], None] | None = None) -> CountedLoads:
         """Read the loads of a life, and check all that is asked for before any work begins.
+
+        Parameters
+        ----------
+        progress : callable, optional
+            Called with the number of files of loads that are read, and of all.
 
         Raises
         ------
@@ -274,12 +279,15 @@ class Project:
         from exugear.life.life import checked_loads
         from exugear.life.verdict import check_reach
 
-        counted = checked_loads(self.gearbox)
+        counted = checked_loads(self.gearbox, progress)
         check_reach(self.gearbox, counted, {one.name: max(one.wanted.torque) for one in self.life_tables()})
         return counted
 
     def life(
-        self, begin: Callable[[str], None] | None = None, progress: Callable[[int, int], None] | None = None
+        self,
+        begin: Callable[[str], None] | None = None,
+        progress: Callable[[int, int], None] | None = None,
+        counted: CountedLoads | None = None,
     ) -> xr.Dataset:
         """Rate gears and bearings under the loads of the file, written to `life_path`; one that fits is taken as it is.
 
@@ -292,6 +300,8 @@ class Project:
             Called with the name of each pair before its root stress is computed.
         progress : callable, optional
             Called with the number of static states that are solved, and of all.
+        counted : CountedLoads, optional
+            What `checked_loads` gave; read anew without it.
         """
         from exugear.dynamic_factors.response_factors import factors, source_hash
         from exugear.life.kept_angles import KeptAngles
@@ -299,7 +309,7 @@ class Project:
         from exugear.life.life_file import stored_life, write_life
         from exugear.life.pair_stresses import pair_stresses
 
-        counted, assembly = self.checked_loads(), self.assembly()
+        counted, assembly = counted or self.checked_loads(), self.assembly()
         if any(request.stored is None for request in self.life_tables()):
             self.tables(grid=LAWS[self.choice.mesh_law].needs_axes)
         requests = self.life_tables()
@@ -307,13 +317,14 @@ class Project:
         rating = rating_of(self.gearbox)
         dynamic = factors(assembly, rating, self.folder, counted.body)
         digest = life_hash(assembly, counted, tables, source_hash(assembly, rating, self.folder))
+        angles = KeptAngles(self.life_path.with_suffix(".partial.npz"), digest)
         kept = stored_life(self.life_path, digest)
         if kept is not None:
+            angles.discard()  # what was killed behind its last file left them
             return kept
         self.keep_case()
         with time_noted(self.folder, f"life, {self.choice.variant}, {self.choice.mesh_law}"):
             stresses = pair_stresses(requests, self.folder, begin)
-            angles = KeptAngles(self.life_path.with_suffix(".partial.npz"), digest)
             life = compute_life(assembly, counted, stresses, dynamic, digest, progress, angles)
             data = write_life(self.life_path, life, self.gearbox.name)
             angles.discard()

@@ -47,7 +47,9 @@ class DurationDistribution:
         return self.upper if value == "upper" else self.torque
 
 
-def load_duration(torque: Floats, speed: Floats, hours: Floats, bins: int) -> DurationDistribution:
+def load_duration(
+    torque: Floats, speed: Floats, hours: Floats, bins: int, largest: float | None = None
+) -> DurationDistribution:
     """Sort samples of torque into bins of equal width, from zero to the largest.
 
     Parameters
@@ -56,6 +58,8 @@ def load_duration(torque: Floats, speed: Floats, hours: Floats, bins: int) -> Du
         N m, rad/s, and how long each sample lasts in the whole of the life.
     bins : int
         Bins of either sign.
+    largest : float, optional
+        Torque at which the last bin ends, N m, where the samples stand for larger ones; their largest by default.
 
     Examples
     --------
@@ -65,7 +69,7 @@ def load_duration(torque: Floats, speed: Floats, hours: Floats, bins: int) -> Du
     >>> found.torque.tolist(), found.hours.tolist(), (found.revolutions[1] / found.revolutions[0]).round(6).item()
     ([40.0, 100.0], [1.0, 1.0], 2.0)
     """
-    width = float(np.abs(torque).max(initial=0.0)) / bins or 1.0
+    width = (float(np.abs(torque).max(initial=0.0)) if largest is None else largest) / bins or 1.0
     place = np.minimum(np.floor(np.abs(torque) / width).astype(int), bins - 1) + 1
     place = np.where(torque < 0.0, -place, place)  # a torque of zero counts as positive
     turns = np.abs(speed) * hours * 3600.0 / (2.0 * np.pi)

@@ -5,10 +5,14 @@ For what does not turn through its load: housings, arms, pins, splines, coupling
 
 from __future__ import annotations
 
+from array import array
+
 import numpy as np
 
 from fe_ste.tools.arrays import Floats
 
+_AT_ONCE = 100_000
+"""Turning points that are Python's numbers at once."""
 NOISE = 1e-3
 """Share of the largest range below which a range is that of the resolution of packed files, and left out."""
 
@@ -27,6 +31,67 @@ def reversals(series: Floats) -> Floats:
     slopes = np.sign(np.diff(points))
     inner = np.flatnonzero(slopes[1:] != slopes[:-1]) + 1
     return np.asarray(points[np.unique(np.concatenate([[0], inner, [len(points) - 1]]))])
+
+
+class Rainflow:
+    """Cycles of a series that comes in pieces, counted as `rainflow` counts them; the series itself is not kept.
+
+    Examples
+    --------
+    >>> count = Rainflow()
+    >>> for piece in ([-2.0, 1.0, -3.0, 5.0, -1.0], [3.0, -4.0, 4.0, -2.0]):
+    ...     count.add(np.array(piece))
+    >>> count
+    <Rainflow: 4 cycles closed, 3 turning points open>
+    >>> sorted(set(count.cycles()[0].tolist()))
+    [3.0, 4.0, 6.0, 8.0, 9.0]
+    """
+
+    def __init__(self) -> None:
+        self._open: list[float] = []
+        self._closed = array("d")  # range, mean and count, one after the other
+        self._tail = np.zeros(0)
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<Rainflow: {len(self._closed) // 3} cycles closed, {len(self._open)} turning points open>"
+
+    def add(self, piece: Floats) -> None:
+        """Take the next piece of the series."""
+        if not len(piece):
+            return
+        points = reversals(np.concatenate([self._tail, piece]))
+        begun = len(self._tail) > 1  # its first point is a turning point that was taken
+        for begin in range(int(begun), len(points) - 1, _AT_ONCE):
+            for point in points[begin : min(begin + _AT_ONCE, len(points) - 1)].tolist():
+                _take(point, self._open, self._closed)
+        self._tail = points[-2:]
+
+    def cycles(self) -> tuple[Floats, Floats, Floats]:
+        """Ranges, means and counts of all cycles, (cycles,) each; what is open counts as half cycles."""
+        stack, closed = list(self._open), array("d", self._closed)
+        if len(self._tail):
+            _take(float(self._tail[-1]), stack, closed)
+        for one, other in zip(stack[:-1], stack[1:], strict=True):
+            closed.extend((abs(other - one), 0.5 * (one + other), 0.5))
+        table = np.frombuffer(closed, dtype=np.float64).reshape(-1, 3)
+        return table[:, 0], table[:, 1], table[:, 2]
+
+
+def _take(point: float, stack: list[float], closed: array[float]) -> None:
+    """Put a turning point on the stack of open ones, and close the cycles that it closes."""
+    stack.append(point)
+    while len(stack) >= 3:
+        before = abs(stack[-2] - stack[-3])
+        if abs(stack[-1] - stack[-2]) < before:
+            return
+        middle = 0.5 * (stack[-2] + stack[-3])
+        if len(stack) == 3:
+            closed.extend((before, middle, 0.5))
+            del stack[0]
+        else:
+            closed.extend((before, middle, 1.0))
+            del stack[-3:-1]
 
 
 def rainflow(series: Floats) -> tuple[Floats, Floats, Floats]:
@@ -49,31 +114,24 @@ def rainflow(series: Floats) -> tuple[Floats, Floats, Floats]:
     >>> [(size, float(counts[ranges == size].sum())) for size in sorted(set(ranges.tolist()))]
     [(3.0, 0.5), (4.0, 1.5), (6.0, 0.5), (8.0, 1.0), (9.0, 0.5)]
     """
-    found: list[tuple[float, float, float]] = []
-    stack: list[float] = []
-    for point in reversals(series).tolist():
-        stack.append(point)
-        while len(stack) >= 3:
-            last, before = abs(stack[-1] - stack[-2]), abs(stack[-2] - stack[-3])
-            if last < before:
-                break
-            count = 0.5 if len(stack) == 3 else 1.0
-            found.append((before, 0.5 * (stack[-2] + stack[-3]), count))
-            if len(stack) == 3:
-                del stack[0]
-            else:
-                del stack[-3:-1]
-    found += [(abs(b - a), 0.5 * (a + b), 0.5) for a, b in zip(stack[:-1], stack[1:], strict=True)]
-    table = np.array(found).reshape(-1, 3)
-    return table[:, 0], table[:, 1], table[:, 2]
+    count = Rainflow()
+    count.add(np.asarray(series, dtype=np.float64))
+    return count.cycles()
 
 
 def damage_equivalent_range(series: Floats, exponent: float, cycles: float) -> float:
-    """Range of `cycles` equal cycles that do the damage of a series, Miner's rule with one slope, means left out.
+    """Range of `cycles` equal cycles that do the damage of a series: see `equivalent_range`."""
+    ranges, _, counts = rainflow(series)
+    return equivalent_range(ranges, counts, exponent, cycles)
+
+
+def equivalent_range(ranges: Floats, counts: Floats, exponent: float, cycles: float) -> float:
+    """Range of `cycles` equal cycles that do the damage of counted ones, Miner's rule with one slope, means left out.
 
     Parameters
     ----------
-    series : array (samples,)
+    ranges, counts : array (n,)
+        Of `rainflow`.
     exponent : float
         Slope of the S-N curve.
     cycles : float
@@ -83,7 +141,6 @@ def damage_equivalent_range(series: Floats, exponent: float, cycles: float) -> f
     -----
     Ranges below `NOISE` of the largest are left out: packed files have such steps.
     """
-    ranges, _, counts = rainflow(series)
     largest = float(ranges.max(initial=0.0))
     if largest == 0.0:
         return 0.0

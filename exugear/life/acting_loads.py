@@ -61,12 +61,11 @@ def acting_loads(counted: CountedLoads) -> ActingLoads:
     found = counted.distribution
     extremes = [one for one in counted.sources if one.kind == "extreme"]
     ends = np.array([found.upper.max(), found.upper.min()])
-    loaded = np.concatenate([np.abs(one.speed[one.torque != 0.0]) for one in counted.sources])
     return ActingLoads(
         points=counted.points,
         worst_torque=np.concatenate([ends, *(one.torque for one in extremes)]),
-        worst_hub=np.concatenate([np.zeros((2, counted.points.other.shape[1])), *(one.hub for one in extremes)]),
+        worst_hub=np.concatenate([np.zeros((2, counted.points.other.shape[1])), *(one.hub_loads for one in extremes)]),
         bins=len(found.hours),
-        slowest=float(loaded.min()),
-        fastest=float(loaded.max()),
+        slowest=min(one.slowest for one in counted.sources),
+        fastest=max(one.fastest for one in counted.sources),
     )

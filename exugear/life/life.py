@@ -18,6 +18,7 @@ from exugear.life.gear_life import FlankLife, beyond_tables, check_strengths, fl
 from exugear.life.static_balance import AngleStore, StaticBalance, static_balance
 from exugear.life.verdict import failures, needs_of_relief, reaches, shortfalls
 from exugear.load_spectrum.counted import CountedLoads, count_loads
+from exugear.load_spectrum.sources import Progress
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import RPM
 from exugear.model.sections.loads import RatingSection
@@ -94,15 +95,21 @@ def rating_of(gearbox: Gearbox) -> RatingSection:
     return gearbox.case.rating
 
 
-def checked_loads(gearbox: Gearbox) -> CountedLoads:
+def checked_loads(gearbox: Gearbox, progress: Progress | None = None) -> CountedLoads:
     """Read the loads, and check what is asked for before any work begins.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    progress : callable, optional
+        Called with the number of files that are read, and of all.
 
     Raises
     ------
     CaseError
         Loads that cannot be used, or strengths that do not fit the gears.
     """
-    rating, counted = rating_of(gearbox), count_loads(gearbox)
+    rating, counted = rating_of(gearbox), count_loads(gearbox, progress)
     if rating.dynamic_factor_run is not None and rating.dynamic_factor_run not in gearbox.load_cases:
         known = ", ".join(gearbox.load_cases) or "none"
         raise gearbox.fault(f"rating.dynamic_factor_run = {rating.dynamic_factor_run!r}: load cases are {known}")

@@ -37,7 +37,7 @@ def check_reach(gearbox: Gearbox, counted: CountedLoads, tables: Mapping[str, fl
     CaseError
         Loads above `LARGEST_REACH` times the largest torque of a table.
     """
-    largest = max(float(abs(one.torque).max()) for one in counted.sources)
+    largest = max(max(one.largest, -one.least) for one in counted.sources)
     reach, name = 0.0, ""
     for mesh in gearbox.meshes:
         if mesh.pair.name in tables:

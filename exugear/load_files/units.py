@@ -13,7 +13,7 @@ class Unit:
     Attributes
     ----------
     quantity : str
-        What it measures: torque, force, speed, time, angle, or another.
+        What it measures: torque, force, speed, time, angle, velocity, or another.
     factor : float
         Its worth in SI.
     """
@@ -27,6 +27,13 @@ _TURN = 2.0 * math.pi
 UNITS: dict[str, Unit] = {
     "s": Unit("time", 1.0),
     "sec": Unit("time", 1.0),
+    "ms": Unit("time", 1e-3),
+    "min": Unit("time", 60.0),
+    "h": Unit("time", 3600.0),
+    "hr": Unit("time", 3600.0),
+    "m/s": Unit("velocity", 1.0),
+    "m/sec": Unit("velocity", 1.0),
+    "km/h": Unit("velocity", 1.0 / 3.6),
     "n": Unit("force", 1.0),
     "kn": Unit("force", 1e3),
     "mn": Unit("force", 1e6),
@@ -47,8 +54,8 @@ UNITS: dict[str, Unit] = {
     "rad": Unit("angle", 1.0),
 }
 """Units that are understood, as `plain_unit` writes them, without capitals."""
-SI_NAMES = {"torque": "N m", "force": "N", "speed": "rad/s", "time": "s", "angle": "rad"}
-USUAL_NAMES = {"torque": "kN-m", "force": "kN", "speed": "rpm", "time": "s", "angle": "deg"}
+SI_NAMES = {"torque": "N m", "force": "N", "speed": "rad/s", "time": "s", "angle": "rad", "velocity": "m/s"}
+USUAL_NAMES = {"torque": "kN-m", "force": "kN", "speed": "rpm", "time": "s", "angle": "deg", "velocity": "m/s"}
 """Units that a message names as examples."""
 
 

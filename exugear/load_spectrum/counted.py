@@ -10,15 +10,14 @@ from typing import Any
 import numpy as np
 
 from exugear.counting.duration import DurationDistribution, LoadPoints, equivalent_load
-from exugear.counting.rainflow import damage_equivalent_range
 from exugear.load_spectrum.exposure import FLANKS, ToothExposure, bearing_turns, distinct, tooth_exposures
-from exugear.load_spectrum.sources import LoadSource, distribution, load_sources, points_of, section_of, told
+from exugear.load_spectrum.pools import COMPONENTS, RANGE_EXPONENTS
+from exugear.load_spectrum.sources import LoadSource, Progress, distribution, load_sources, points_of, section_of, told
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import RPM
 
 EXPONENTS = (3.0, 10.0 / 3.0, 6.61, 8.74)
 """Slopes of the S-N curves of steel structures, of roller bearings, and of contact and bending of gears over torque."""
-RANGE_EXPONENTS = (3.0, 6.6, 10.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +34,9 @@ class CountedLoads:
         Of all sources of fatigue.
     points : LoadPoints
         Its bins, split where loads of a hub differ.
-    equivalent_ranges : mapping of float to float
-        Damage-equivalent range of torque of one cycle a second in the life, by slope, N m; NaN without series.
+    equivalent_ranges : mapping of str to mapping of float to float
+        Damage-equivalent range of one cycle a second in the life, by component (torque, forces and moments of a hub)
+        and slope, N m or N; none without series.
     teeth : tuple of ToothExposure
     bearings : mapping of str to float
         Revolutions of bearings per revolution of the body.
@@ -50,7 +50,7 @@ class CountedLoads:
     sources: tuple[LoadSource, ...]
     distribution: DurationDistribution
     points: LoadPoints
-    equivalent_ranges: Mapping[float, float]
+    equivalent_ranges: Mapping[str, Mapping[float, float]]
     teeth: tuple[ToothExposure, ...]
     bearings: Mapping[str, float]
     mesh_forces: Mapping[str, float]
@@ -78,16 +78,17 @@ class CountedLoads:
                 "source": source.name,
                 "case": source.case,
                 "kind": source.kind,
-                "file": source.path.name,
+                "file": source.file,
+                "files": source.files,
                 "sha256": source.digest,
-                "samples": len(source.torque),
+                "samples": source.count,
                 "skipped_s": source.skipped,
                 "hours": float(source.hours.sum()),
                 "torque_factor": source.factors[0],
                 "speed_factor": source.factors[1],
                 "mean_torque_kN_m": 1e-3 * float(np.average(source.torque, weights=_weights(source))),
-                "least_torque_kN_m": 1e-3 * float(source.torque.min()),
-                "largest_torque_kN_m": 1e-3 * float(source.torque.max()),
+                "least_torque_kN_m": 1e-3 * source.least,
+                "largest_torque_kN_m": 1e-3 * source.largest,
                 "mean_speed_rpm": float(np.average(source.speed, weights=_weights(source))) / RPM,
             }
             for source in self.sources
@@ -115,6 +116,9 @@ class CountedLoads:
                 rows.append({"part": name, "loaded_by": "", "cycles": cycles, "force_kN": math.nan})
         return rows
 
+    def _ranges(self, component: str) -> dict[str, float]:
+        return {f"{m:.4g}": 1e-3 * value for m, value in self.equivalent_ranges.get(component, {}).items()}
+
     def summary(self) -> dict[str, Any]:
         """Figures for programs: units in the keys."""
         return {
@@ -123,8 +127,11 @@ class CountedLoads:
             "hours": float(self.distribution.hours.sum()),
             "revolutions": float(self.distribution.revolutions.sum()),
             "equivalent_torque_kN_m": {f"{m:.4g}": 1e-3 * value for m, value in self.equivalents().items()},
-            "equivalent_range_1_Hz_kN_m": {
-                f"{m:.4g}": 1e-3 * value for m, value in self.equivalent_ranges.items() if math.isfinite(value)
+            "equivalent_range_1_Hz_kN_m": self._ranges("torque"),
+            "hub_equivalent_range_1_Hz": {
+                f"{name}_{'kN' if name.startswith('force') else 'kN_m'}": self._ranges(name)
+                for name in self.equivalent_ranges
+                if name != "torque"
             },
             "sources": self.source_rows(),
             "parts": [
@@ -134,15 +141,21 @@ class CountedLoads:
         }
 
 
-def count_loads(gearbox: Gearbox) -> CountedLoads:
+def count_loads(gearbox: Gearbox, progress: Progress | None = None) -> CountedLoads:
     """Read and count the loads of a gearbox file.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    progress : callable, optional
+        Called with the number of files that are read, and of all.
 
     Raises
     ------
     CaseError
         A source that cannot be used: see `exugear.load_spectrum.sources.load_sources`.
     """
-    loads, sources = section_of(gearbox), load_sources(gearbox)
+    loads, sources = section_of(gearbox), load_sources(gearbox, progress)
     found = distribution(gearbox, sources)
     teeth = tooth_exposures(gearbox, loads.body)
     forces = gearbox.train.static_mesh_forces({loads.body: 1.0})
@@ -155,7 +168,7 @@ def count_loads(gearbox: Gearbox) -> CountedLoads:
         sources=sources,
         distribution=found,
         points=points_of(gearbox, sources, found),
-        equivalent_ranges={m: _equivalent_range(sources, m) for m in RANGE_EXPONENTS},
+        equivalent_ranges=_equivalent_ranges(sources),
         teeth=teeth,
         bearings=bearing_turns(gearbox, loads.body),
         mesh_forces=families,
@@ -167,11 +180,15 @@ def _weights(source: LoadSource) -> Any:
     return source.hours if source.hours.sum() > 0.0 else None
 
 
-def _equivalent_range(sources: tuple[LoadSource, ...], exponent: float) -> float:
-    """Damage-equivalent range of all series of fatigue together, one cycle a second; NaN without any."""
+def _equivalent_ranges(sources: tuple[LoadSource, ...]) -> dict[str, dict[float, float]]:
+    """Damage-equivalent range of each component of all series of fatigue together, one cycle a second."""
     series = [one for one in sources if one.series and one.kind == "fatigue" and one.hours.sum() > 0.0]
-    if not series:
-        return math.nan
-    ranges = [damage_equivalent_range(one.torque, exponent, one.duration) for one in series]
-    hours = [float(one.hours.sum()) for one in series]
-    return equivalent_load(np.array(ranges), np.array(hours), exponent)
+    hours = np.array([float(one.hours.sum()) for one in series])
+    found: dict[str, dict[float, float]] = {}
+    for name in COMPONENTS:
+        if any((name, RANGE_EXPONENTS[0]) in one.equivalent_ranges for one in series):
+            found[name] = {
+                m: equivalent_load(np.array([one.equivalent_ranges.get((name, m), 0.0) for one in series]), hours, m)
+                for m in RANGE_EXPONENTS
+            }
+    return found

@@ -12,6 +12,7 @@ from exugear.cli.case import make_results_folder, open_project
 from exugear.cli.console import note, print_json, print_table, progress_bar, say
 from exugear.cli.dynamics import reduce_elastic_bodies
 from exugear.cli.errors import FailedError, exit_codes, interruption, model_errors
+from exugear.cli.load_files import files_bar
 from exugear.cli.options import (
     USUAL_LAW,
     CaseArgument,
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
+    from exugear.load_spectrum.counted import CountedLoads
     from exugear.project import Project
 
 SHOWN_LIMITS = 8
@@ -56,15 +58,15 @@ def life(
         from exugear.model.choice import Choice
 
         project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
-        with model_errors():
-            project.checked_loads()
+        with model_errors(), files_bar() as read:
+            counted = project.checked_loads(read)
         make_results_folder(project.folder)
         project.keep_case()
         with model_errors():
             requests = project.life_tables()
         compute_tables(requests)
         reduce_elastic_bodies(project)
-        data = _rate(project)
+        data = _rate(project, counted)
         picture = project.life_path.with_suffix(".png")
         draw_life(data, picture)
         if as_json:
@@ -82,7 +84,7 @@ def _fail_if_short(data: xr.Dataset, path: Path) -> None:
         raise FailedError("\n".join(["the gearbox does not live as long as it shall:", *lines, f"It is in {path}"]))
 
 
-def _rate(project: Project) -> xr.Dataset:
+def _rate(project: Project, counted: CountedLoads) -> xr.Dataset:
     """Rate behind a progress bar, or find what is kept."""
     with progress_bar() as bar:
         task = bar.add_task(f"{project.choice.variant}: stresses of pairs", total=None)
@@ -96,7 +98,7 @@ def _rate(project: Project) -> xr.Dataset:
             bar.update(task, completed=done, total=total, description=f"{project.choice.variant}: static balance")
 
         with model_errors():
-            return project.life(begin, show)
+            return project.life(begin, show, counted)
 
 
 def _tell(data: xr.Dataset) -> None:

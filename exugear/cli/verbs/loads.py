@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from exugear.cli.case import make_results_folder, read_gearbox
 from exugear.cli.console import note, print_json, print_table, say
 from exugear.cli.errors import exit_codes, model_errors
+from exugear.cli.load_files import files_bar
 from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption, OutOption, ScriptsOption
 
 if TYPE_CHECKING:
@@ -32,8 +34,8 @@ def loads(
         from exugear.project import default_folder
 
         gearbox = read_gearbox(case, files_below, scripts)
-        with model_errors():
-            counted = count_loads(gearbox)
+        with model_errors(), files_bar() as read:
+            counted = count_loads(gearbox, read)
         folder = (out or default_folder(case)) / "loads"
         make_results_folder(folder)
         picture = folder / "load_duration.png"
@@ -45,6 +47,9 @@ def loads(
         print_table("Sources of loads", [_source_row(row) for row in counted.source_rows()])
         title = f"Equivalent loads on {counted.body} over {counted.life_years:g} years: torque in as many revolutions,"
         print_table(f"{title} range of torque once a second", _equivalent_rows(counted))
+        hub = [_hub_row(name, ranges) for name, ranges in counted.equivalent_ranges.items() if name != "torque"]
+        if hub:
+            print_table(f"Loads of the hub on {counted.body}: range once a second by slope, kN and kN m", hub)
         print_table("What turns through its load", _part_rows(counted))
         for line in counted.remarks:
             note(line, style="yellow")
@@ -56,6 +61,7 @@ def _source_row(row: dict[str, Any]) -> dict[str, str]:
         "source": row["source"],
         "kind": row["kind"],
         "skipped\ns": f"{row['skipped_s']:.4g}",
+        "files": str(row["files"]),
         "hours": f"{row['hours']:.6g}",
         "mean\nkN m": f"{row['mean_torque_kN_m']:.4g}",
         "least\nkN m": f"{row['least_torque_kN_m']:.4g}",
@@ -72,11 +78,14 @@ def _equivalent_rows(counted: CountedLoads) -> list[dict[str, str]]:
     ]
     rows += [
         {"by damage with the slope": f"{m:.4g}", "torque\nkN m": "", "range\nkN m": f"{1e-3 * value:.4g}"}
-        for m, value in counted.equivalent_ranges.items()
-        if math.isfinite(value)
+        for m, value in counted.equivalent_ranges.get("torque", {}).items()
     ]
     say(f"{len(found.hours)} bins, {found.hours.sum():.6g} h, {found.revolutions.sum():.4g} revolutions")
     return rows
+
+
+def _hub_row(name: str, ranges: Mapping[float, float]) -> dict[str, str]:
+    return {"load": name.replace("_", " "), **{f"{m:.4g}": f"{1e-3 * value:.4g}" for m, value in ranges.items()}}
 
 
 def _part_rows(counted: CountedLoads) -> list[dict[str, str]]:

@@ -16,19 +16,43 @@ Curve = Annotated[tuple[_CurvePoint, ...], Field(strict=False, min_length=2, max
 """Life factor over load cycles, straight between its points in logarithms."""
 
 
-class SourceSection(Section):
-    """One file of loads, and how often in a year it happens."""
+FilePattern = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]+$", max_length=1000)]
+"""Names of files below the folder of the gearbox file, with `*` and `?` for what differs."""
 
-    file: FileName
+
+class WindSection(Section):
+    """How long the wind blows at each speed: a Weibull distribution, for files of one wind speed each."""
+
+    mean_m_per_s: q.WindSpeed
+    """Mean of the wind speed over the years."""
+    shape: q.WeibullShape = 2.0
+    """Exponent of the distribution; 2 is Rayleigh's."""
+    bin_m_per_s: q.WindSpeed = 2.0
+    """Width of the bins of wind speed, the first about 0; files of one bin share its hours by their length."""
+    hours_per_year: q.HoursPerYear = 8766.0
+    """Hours of all wind speeds together."""
+
+
+class SourceSection(Section):
+    """One file of loads, or many of one kind, and how often in a year they happen."""
+
+    file: FileName | None = None
     """OpenFAST output (`.outb`, `.out`), a table (`.csv`) or load cases (`.rexs`), beside the gearbox file."""
+    files: FilePattern | None = None
+    """Many series instead, such as `dlc/*.outb`: all that fit, each with the same channels."""
     kind: Literal["fatigue", "extreme"] = "fatigue"
     """Whether it wears the gearbox out, or only its largest values count."""
     case: Text = ""
     """Words for people, such as the design load case."""
     hours_per_year: q.HoursPerYear | None = None
-    """How long it acts in a year; or the next key."""
+    """How long it acts in a year, many files together, by their length; or one of the next keys. A table of counted
+    loads needs none: its hours are then those of the life."""
     events_per_year: q.EventsPerYear | None = None
-    """How often the file happens in a year as a whole, from what is skipped on."""
+    """How often each file happens in a year as a whole, from what is skipped on."""
+    hours_table: FileName | None = None
+    """Table `file,hours_per_year` with a line for each of `files`, by its name without folder."""
+    wind: ChannelName | None = None
+    """Channel of the wind speed, whose mean says which hours of `[loads.wind]` a file has."""
     skip_s: q.SkippedS | None = None
     """Beginning of a series that is left out, such as a start from rest; 0 for none, to be stated."""
     torque: ChannelName | None = None
@@ -51,13 +75,19 @@ class SourceSection(Section):
 
     @model_validator(mode="after")
     def _how_often(self) -> SourceSection:
-        given = (self.hours_per_year is not None) + (self.events_per_year is not None)
-        if self.kind == "fatigue" and given != 1:
-            raise ValueError("a source of fatigue needs one of hours_per_year and events_per_year")
+        ways = ("hours_per_year", "events_per_year", "hours_table", "wind")
+        given = sum(getattr(self, way) is not None for way in ways)
+        if (self.file is None) == (self.files is None):
+            raise ValueError("a source needs one of file and files")
+        if self.hours_table is not None and self.files is None:
+            raise ValueError("hours_table belongs to files; a single file has hours_per_year")
+        counted = self.file is not None and self.file.lower().endswith(".csv") and not given
+        if self.kind == "fatigue" and given != 1 and not counted:
+            raise ValueError(f"a source of fatigue needs one of {', '.join(ways)}")
         if self.kind == "fatigue" and self.partial_factor is not None:
             raise ValueError("partial_factor belongs to extreme sources; leave it out")
         if self.kind == "extreme" and (given or self.partial_factor is None):
-            raise ValueError("an extreme source needs partial_factor, and neither hours_per_year nor events_per_year")
+            raise ValueError(f"an extreme source needs partial_factor, and none of {', '.join(ways)}")
         if 0.0 in (self.torque_factor, self.speed_factor):
             raise ValueError("torque_factor and speed_factor must not be 0")
         return self
@@ -74,8 +104,19 @@ class LoadsSection(Section):
     """Bins of torque of either sign, from zero to the largest."""
     bin_value: Literal["mean", "upper"] = "mean"
     """Torque that stands for a bin: the mean of its revolutions, or its upper edge, which adds damage."""
+    wind: WindSection | None = None
+    """Wind of the site, for sources that name its channel."""
     sources: Annotated[Entries[SourceSection], Field(min_length=1)]
     """Files by name."""
+
+    @model_validator(mode="after")
+    def _wind(self) -> LoadsSection:
+        asked = [name for name, source in self.sources.items() if source.wind is not None]
+        if asked and self.wind is None:
+            raise ValueError(f"sources.{asked[0]}.wind needs the section [loads.wind] with mean_m_per_s")
+        if self.wind is not None and not asked:
+            raise ValueError("wind: no source names a channel of the wind speed (wind = ...)")
+        return self
 
 
 class StrengthSection(Section):

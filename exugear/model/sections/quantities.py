@@ -143,6 +143,8 @@ Acceleration = Annotated[float, _within(1000.0, 20.0, "m/s2")]
 # Loads over a life, and rating.
 HoursPerYear = Annotated[float, Range(0.0, 8766.0, why="a year has 8766 hours")]
 EventsPerYear = Annotated[float, Range(0.0, 1e7, (0.0, 1e5))]
+WindSpeed = Annotated[float, Range(0.1, 100.0, (0.5, 15.0))]
+WeibullShape = Annotated[float, Range(0.5, 10.0, (1.5, 3.0))]
 SkippedS = Annotated[float, Range(0.0, 1e6, (0.0, 3600.0))]
 ChannelFactor = Annotated[float, _within(1e6, 1e3)]
 PartialFactor = Annotated[float, Range(0.5, 5.0, (1.0, 2.0))]

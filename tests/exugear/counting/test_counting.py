@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from exugear.counting.duration import equivalent_load, load_duration
-from exugear.counting.rainflow import damage_equivalent_range, rainflow, reversals
+from exugear.counting.rainflow import Rainflow, damage_equivalent_range, rainflow, reversals
 from exugear.load_files.reading import read_channels
 
 EXAMPLE = Path(__file__).parents[3] / "cases/grc750/loads"
@@ -26,6 +26,29 @@ def test_rainflow_counts_every_reversal_half_once():
     series = np.random.default_rng(3).normal(size=2000)
     _, _, counts = rainflow(series)
     assert counts.sum() == pytest.approx(0.5 * (len(reversals(series)) - 1))
+
+
+@pytest.mark.parametrize("pieces", [1, 2, 7, 500, 2000])
+def test_a_series_in_pieces_has_the_cycles_of_the_whole(pieces):
+    """Pieces of any length, those of one sample and of equal samples among them."""
+    series = np.round(3.0 * np.random.default_rng(5).normal(size=2000))
+    series[700:760] = series[700]
+    count = Rainflow()
+    for piece in np.array_split(series, pieces):
+        count.add(piece)
+    for part, whole in zip(count.cycles(), rainflow(series), strict=True):
+        assert np.array_equal(part, whole)
+
+
+def test_a_series_that_never_turns_is_half_a_cycle_however_it_comes():
+    for pieces in ([[0.0], [1.0], [2.0]], [[0.0, 0.0], [], [0.0, 2.0, 2.0], [2.0]]):
+        count = Rainflow()
+        for piece in pieces:
+            count.add(np.array(piece))
+        assert [one.tolist() for one in count.cycles()] == [[2.0], [1.0], [0.5]]
+    still = Rainflow()
+    still.add(np.ones(4))
+    assert len(still.cycles()[0]) == 0
 
 
 def test_damage_equivalent_ranges_of_a_turbine_file():

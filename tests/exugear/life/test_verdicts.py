@@ -220,3 +220,15 @@ def test_l10_is_among_what_limits():
 def test_a_kept_life_is_summed_up_without_numbers_that_json_has_not(broken):
     _, out = broken
     json.dumps(summary(read_life(next(out.glob("*/*/life.nc")))), allow_nan=False)
+
+
+def test_what_a_kill_behind_the_last_file_left_is_removed(broken):
+    """The life is written, its solved angles are not yet removed: the next call takes the one and removes the others."""
+    case, out = broken
+    path = next(out.glob("*/*/life.nc"))
+    partial = path.with_suffix(".partial.npz")
+    partial.write_bytes(b"angles")
+    before = path.stat().st_mtime_ns
+    project = Project.from_toml(case, out, Choice("rigid", "iso6336"))
+    project.life()
+    assert not partial.exists() and path.stat().st_mtime_ns == before

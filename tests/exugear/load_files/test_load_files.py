@@ -181,4 +181,4 @@ def test_not_a_number_is_told_with_its_time(written):
 )
 def test_bad_files_are_one_clear_error_each(written, name, text, message):
     with pytest.raises(LoadFileError, match=message):
-        read_channels(written(text.encode(), name))
+        assert len(read_channels(written(text.encode(), name)).time)

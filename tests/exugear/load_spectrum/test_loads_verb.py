@@ -126,7 +126,7 @@ HEADED = "time_s,carrier_N_m,carrier_rpm\n"
         ("torque_N_m,speed_rpm,hours\n1,1,1\n2,2,-2\n", {}, "line 3 has 2,2,-2; .*hours not negative"),
         ("torque_N_m,speed_rpm,hours\n1,nan,1\n", {}, "line 2 has 1,nan,1"),
         ("torque_N_m,speed_rpm,hours\n1,1,0\n", {}, "all hours are 0"),
-        ("torque_N_m,speed_rpm,hours\n1e12,1,1\n", {}, "largest torque is 1e.12 N m; up to 1e.09"),
+        ("torque_N_m,speed_rpm,hours\n1e12,1,1\n", {}, "row 1 has 1e.12 N m; up to 1e.09"),
         ("torque_N_m,speed_rpm,hours\n", {}, "has headings alone"),
         ("torque_N_m;speed_rpm;hours\n1;1;1\n", {}, "separated by commas"),
         ("torque_N_m,speed_rpm,speed_rpm\n1,1,1\n", {}, "two columns are called 'speed_rpm'"),
@@ -145,7 +145,7 @@ def test_bad_sources_are_one_error_each(tmp_path, text, keys, message):
     ("keys", "message"),
     [
         ({"kind": "extreme"}, "an extreme source needs partial_factor"),
-        ({"events_per_year": 3.0}, "needs one of hours_per_year and events_per_year"),
+        ({"events_per_year": 3.0}, "needs one of hours_per_year, events_per_year"),
         ({"hours_per_year": 9000.0}, "must lie between 0 and 8766"),
         ({"torque_factor": 0.0}, "must not be 0"),
     ],
