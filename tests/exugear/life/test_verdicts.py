@@ -223,7 +223,7 @@ def test_a_kept_life_is_summed_up_without_numbers_that_json_has_not(broken):
 
 
 def test_what_a_kill_behind_the_last_file_left_is_removed(broken):
-    """The life is written, its solved angles are not yet removed: the next call takes the one and removes the others."""
+    """The life is written, its solved angles are not yet removed: the next call takes one and removes the others."""
     case, out = broken
     path = next(out.glob("*/*/life.nc"))
     partial = path.with_suffix(".partial.npz")
