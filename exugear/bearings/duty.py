@@ -24,7 +24,7 @@ from exugear.bearings.rolling.ratings import (
     equivalent_load,
     equivalent_static_load,
 )
-from exugear.bearings.rolling.rows import BearingError, BearingOfRows
+from exugear.bearings.rolling.rows import BearingError, BearingOfRows, is_rib
 from exugear.bearings.support_laws import LEAST_LOAD, holding_force, holds_one_way, law_in_words
 from exugear.model.sections.connections import CatalogueSection
 from fe_ste.tools.arrays import Floats
@@ -148,7 +148,7 @@ def duty_of(point: OperatingPoint, reaction: Floats | None = None) -> BearingDut
         stiffness=point.stiffness,
         radial_stiffness=point.radial_stiffness,
         misalignment=point.misalignment,
-        element_load=max(float(state.element_load.max()) for state in states),
+        element_load=max(_largest_load(state) for state in states),
         pressure=max(float(state.element_pressure.max()) for state in states),
         ratings=ratings,
         basic_life=basic_rating_life(ratings.dynamic, equivalent, section.type),
@@ -171,6 +171,13 @@ def loads_of_rows(state: BearingState) -> list[Floats]:
         state.element_load[begin:end] if laminae is None else laminae
         for laminae, begin, end in zip(state.lamina_load, first[:-1], first[1:], strict=True)
     ]
+
+
+def _largest_load(state: BearingState) -> float:
+    """Load of the most loaded element on its raceways, N."""
+    first = state.contacts.first
+    of_rows = zip(state.contacts.rows, first[:-1], first[1:], strict=True)
+    return max(float(state.element_load[begin:end].max()) for row, begin, end in of_rows if not is_rib(row))
 
 
 def _remarks(point: OperatingPoint, ratings: Ratings, reaction: Floats | None) -> list[str]:

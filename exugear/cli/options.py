@@ -35,6 +35,38 @@ class MeshLaw(StrEnum):
         members[law] = law
 
 
+class ShiftRule(StrEnum):
+    """Profile shifts of an industry file that contradict the centre distance: refused, or replaced."""
+
+    file = "file"
+    centre_distance = "centre-distance"
+
+
+class DistanceRule(StrEnum):
+    """Centre distances of an industry file unlike the positions of its gears: which of them counts."""
+
+    agreeing = "agreeing"
+    positions = "positions"
+    file = "file"
+
+
+ShiftsOption = Annotated[
+    ShiftRule,
+    typer.Option(
+        "--shifts",
+        help="Profile shifts that the centre distance contradicts: those of the file, which refuses them, or "
+        "those that the centre distance asks for.",
+    ),
+]
+DistancesOption = Annotated[
+    DistanceRule,
+    typer.Option(
+        "--distances",
+        help="Centre distances unlike the positions of the gears: those that agree with the profile shifts, those of "
+        "the positions, or those that the file states.",
+    ),
+]
+
 USUAL_LAW = MeshLaw("line_of_action")
 
 

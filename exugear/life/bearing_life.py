@@ -18,7 +18,7 @@ from exugear.bearings.rolling.catalogue import catalogue_rows
 from exugear.bearings.rolling.contact import BearingState, equilibrium
 from exugear.bearings.rolling.life import basic_rating_life, minimum_load, reference_life
 from exugear.bearings.rolling.ratings import equivalent_load, equivalent_static_load
-from exugear.bearings.rolling.rows import BearingError, BearingOfRows, RollerRow, RollingRow
+from exugear.bearings.rolling.rows import BearingError, BearingOfRows, RollerRow, RollingRow, on_raceways
 from exugear.life.acting_loads import ActingLoads
 from exugear.life.static_balance import StaticBalance
 from exugear.model.parts import Bearing
@@ -116,7 +116,7 @@ class _Case:
         worst = np.concatenate([self.balance.at(carried, *self.acting.worst(sense)) for sense in (1, -1)])
         section = self.support.catalogue
         assert section is not None
-        rows = tuple(_sliced(row) for row in catalogue_rows(section))
+        rows = tuple(_sliced(row) for row in on_raceways(catalogue_rows(section)))
         ratings = ratings_of(section)
         revolutions = points.revolutions * turns
         share = revolutions[:, None] / loads.shape[1]

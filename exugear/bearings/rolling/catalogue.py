@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from exugear.bearings.rolling import proportions
-from exugear.bearings.rolling.rows import BallRow, BearingError, RollerRow, RollingRow, moved, pair_rows
-from exugear.model.sections.connections import CONTACT_ANGLES_DEG, TYPES_OF_KEYS, CatalogueSection
+from exugear.bearings.rolling.rows import BallRow, BearingError, RollerRow, RollingRow, moved, pair_rows, rib_row
+from exugear.model.sections.connections import CONTACT_ANGLES_DEG, ROUNDING_MM, TYPES_OF_KEYS, CatalogueSection
 
 ALIGNING = ("spherical_roller", "self_aligning_ball")
 """Types whose outer raceway is a sphere about the middle of the bearing."""
@@ -72,7 +72,7 @@ def catalogue_rows(section: CatalogueSection) -> tuple[RollingRow, ...]:
     """
     full = _completed(section)
     row = _ball_row(full) if full.type.endswith("ball") else _roller_row(full)
-    return _placed(full, row)
+    return *_placed(full, row), *_ribs(full, row)
 
 
 def estimates(section: CatalogueSection) -> tuple[Estimate, ...]:
@@ -204,6 +204,12 @@ def _groove(key: str) -> Callable[[CatalogueSection], Estimate]:
     return lambda section: _scaled(key, proportions.GROOVE_RATIO, 1.0, "")
 
 
+def _rib_contact(section: CatalogueSection) -> Estimate | None:
+    if section.ribs == "none":
+        return None
+    return _scaled("rib_contact_mm", proportions.RIB_CONTACT, _given(section, "element_diameter_mm"), "mm")
+
+
 def _osculation(section: CatalogueSection) -> Estimate:
     return _scaled("osculation", proportions.OSCULATION, 1.0, "")
 
@@ -241,6 +247,7 @@ _ESTIMATED: Mapping[str, Callable[[CatalogueSection], Estimate | None]] = {
     "element_diameter_mm": _element_diameter,
     "element_count": _element_count,
     "element_length_mm": _element_length,
+    "rib_contact_mm": _rib_contact,
     "contact_angle_deg": _contact_angle,
     "inner_groove_ratio": _groove("inner_groove_ratio"),
     "outer_groove_ratio": _groove("outer_groove_ratio"),
@@ -265,7 +272,10 @@ def _common(section: CatalogueSection) -> dict[str, Any]:
     count = round(_given(section, "element_count"))
     # Across the contact the elements reach from groove to groove; rings need some wall.
     height = diameter * math.cos(math.radians(section.contact_angle_deg or 0.0))
-    if pitch - height <= section.bore_mm or pitch + height >= section.outer_diameter_mm:
+    # Needles without rings run on shaft and bore themselves.
+    wall = -ROUNDING_MM if section.type == "needle_roller" else 0.0
+    inside, outside = pitch - height - section.bore_mm, section.outer_diameter_mm - pitch - height
+    if min(inside, outside) < wall or (wall == 0.0 and min(inside, outside) == 0.0):
         raise BearingError(
             f"element_diameter_mm = {diameter:g} on pitch_diameter_mm = {pitch:g} reaches beyond the rings; between "
             f"bore_mm = {section.bore_mm:g} and outer_diameter_mm = {section.outer_diameter_mm:g} it must be smaller"
@@ -334,3 +344,12 @@ def _placed(section: CatalogueSection, row: RollerRow | BallRow) -> tuple[Rollin
         return moved(row, -angle, -place), moved(row, angle, place)
     distance = 1e-3 * _given(section, "row_distance_mm") if rows > 1 else 0.0
     return tuple(moved(row, signed, (number - 0.5 * (rows - 1)) * distance) for number in range(rows))
+
+
+def _ribs(section: CatalogueSection, row: RollerRow | BallRow) -> tuple[RollerRow, ...]:
+    """Ribs of cylindrical rollers as rows of their own, first those that hold the inner ring against +z."""
+    if section.ribs == "none" or not isinstance(row, RollerRow):
+        return ()
+    length = 1e-3 * _given(section, "rib_contact_mm")
+    senses = {"+z": (1,), "-z": (-1,), "both": (1, -1)}[section.ribs]
+    return tuple(rib_row(row, sense, length) for sense in senses)

@@ -30,7 +30,15 @@ from exugear.bearings.rolling.point_contact import (
     ball_state,
     ball_tangent,
 )
-from exugear.bearings.rolling.rows import STEEL_MODULUS, BallRow, BearingError, RollerRow, RollingBearing, RollingRow
+from exugear.bearings.rolling.rows import (
+    STEEL_MODULUS,
+    BallRow,
+    BearingError,
+    RollerRow,
+    RollingBearing,
+    RollingRow,
+    on_raceways,
+)
 from fe_ste.tools.arrays import Floats, Integers
 
 LINE_CONTACT_EXPONENT = 10.0 / 9.0
@@ -115,6 +123,8 @@ def _lamina_pressure(row: RollerRow) -> float:
 
     Hertz, two cylinders: ``p^2 = q E S / (2 pi (1 - nu^2))`` with the load q per length and the sum S of curvatures.
     """
+    if row.rib:
+        return 0.0  # the form of ribs is not known
     curvature = 2.0 / (row.element_diameter * (1.0 - row.diameter_ratio))
     length = row.effective_length / row.laminae
     return math.sqrt(STEEL_MODULUS * curvature / (2.0 * math.pi * length))
@@ -189,8 +199,8 @@ def _placed(rows: tuple[RollingRow, ...], first_roller_angle: float) -> RowConta
 
 
 def is_preloaded(rows: Sequence[RollingRow]) -> bool:
-    """Tell whether rolling elements carry before anything loads the bearing."""
-    return elastic_energy(row_contacts(rows), np.zeros(6)) > 0.0
+    """Tell whether rolling elements carry before anything loads the bearing; ribs that touch do not count."""
+    return elastic_energy(row_contacts(on_raceways(rows)), np.zeros(6)) > 0.0
 
 
 def elastic_energy(contacts: RowContacts, displacement: Floats) -> float:

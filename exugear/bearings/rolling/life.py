@@ -21,7 +21,7 @@ from exugear.bearings.rolling.ratings import (
     groove_ratio,
     row_count,
 )
-from exugear.bearings.rolling.rows import BallRow, BearingError, RollerRow, RollingRow
+from exugear.bearings.rolling.rows import BallRow, BearingError, RollerRow, RollingRow, is_rib
 from exugear.model.sections.connections import BearingType
 from fe_ste.tools.arrays import Floats
 
@@ -122,6 +122,8 @@ def reference_life(
         slope, exponent, row_rating = POINT_CONTACT_LIFE, 10.0 / 3.0, rating / count**0.7
     damage = 0.0
     for row, load in zip(rows, loads, strict=True):
+        if is_rib(row):
+            continue
         stressed = _stress_loads(row, load)
         capacities = _ring_capacities(row, row_rating, bearing_type)
         share = stressed.shape[1] ** (-7.0 / 9.0)

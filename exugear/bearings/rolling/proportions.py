@@ -102,6 +102,9 @@ TAPERED_PAIR_DISTANCE: Mapping[str, Proportion] = {
 }
 """The same of tapered roller bearings: the middle of their rollers is 0.42 (0.38 to 0.445) of the width away from the
 back face of the outer ring, as the effective centres of 54 bearings in SKF's General Catalogue have it."""
+RIB_CONTACT = Proportion(0.2, 0.1, 0.3)
+"""Length of the contact of a roller's end with a rib over the roller's diameter: assumed. It decides on the axial
+stiffness alone, not on which bearing holds the shaft."""
 GROOVE_RATIO = Proportion(0.52, 0.515, 0.53)
 """Groove radius over ball diameter; ISO 281 and ISO 76 take 0.52 for the ratings."""
 OSCULATION = Proportion(0.98, 0.965, 0.99)

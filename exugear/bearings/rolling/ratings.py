@@ -21,7 +21,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from exugear.bearings.rolling.rows import BallRow, BearingError, RollerRow, RollingRow
+from exugear.bearings.rolling.rows import BallRow, BearingError, RollerRow, RollingRow, on_raceways
 from exugear.model.sections.connections import BearingType
 
 MATERIAL_FACTOR: dict[BearingType, float] = {
@@ -216,6 +216,7 @@ def row_count(rows: Sequence[RollingRow], bearing_type: BearingType) -> int:
     The balls of a four-point bearing touch both halves of the rings. Where each pair of opposite contacts is
     given as a row of its own, rows at one place are one row of balls.
     """
+    rows = on_raceways(rows)
     return len({row.axial_position for row in rows}) if bearing_type == "four_point_ball" else len(rows)
 
 
@@ -320,7 +321,8 @@ def _ball_reduction(bearing_type: BearingType, count: int) -> float:
 
 
 def _common_row(rows: Sequence[RollingRow], bearing_type: BearingType) -> RollerRow | BallRow:
-    """Return the row that stands for all, or refuse rows that the standards cannot rate together."""
+    """Return the row that stands for all but ribs, or refuse rows that the standards cannot rate together."""
+    rows = on_raceways(rows)
     if not rows:
         raise BearingError("load rating: a bearing without rows has none")
     first = rows[0]

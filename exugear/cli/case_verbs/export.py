@@ -10,7 +10,16 @@ import typer
 from exugear.cli.case import read_gearbox
 from exugear.cli.console import note, print_json, say
 from exugear.cli.errors import BadInputError, exit_codes
-from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption, OutOption
+from exugear.cli.options import (
+    CaseArgument,
+    DistanceRule,
+    DistancesOption,
+    FilesBelowOption,
+    JsonOption,
+    OutOption,
+    ShiftRule,
+    ShiftsOption,
+)
 
 SHOWN = 10
 """Most replaced attributes that are told."""
@@ -28,16 +37,20 @@ def export(
     ] = None,
     out: OutOption = None,
     files_below: FilesBelowOption = None,
+    shifts: ShiftsOption = ShiftRule.file,
+    distances: DistancesOption = DistanceRule.agreeing,
     as_json: JsonOption = False,
 ) -> None:
     """Write a copy of a REXS file with results: what REXS has names for, and the rest as custom_exugear attributes.
 
     Geometry and static forces are always there; tables, modes, bearings and runs as far as the results folder has them.
+    --shifts and --distances are to be those of the import.
     """
     with exit_codes():
         from exugear.project import default_folder
         from exugear.rexs.export.export import with_results
         from exugear.rexs.faults import RexsError
+        from exugear.rexs.to_case.notes import Rules
         from fe_ste.tools.files import write_file
 
         target = to or rexs.with_name(_new_name(rexs.name))
@@ -45,7 +58,7 @@ def export(
             raise BadInputError(f"{target}: is there already; name another file with --to")
         gearbox = read_gearbox(case, files_below)
         try:
-            exported = with_results(gearbox, out or default_folder(case), rexs)
+            exported = with_results(gearbox, out or default_folder(case), rexs, Rules(shifts.value, distances.value))
         except RexsError as error:
             raise BadInputError(error) from error
         write_file(target, exported.content)

@@ -9,10 +9,11 @@ import typer
 
 from exugear.cli.console import note, print_json, say
 from exugear.cli.errors import BadInputError, exit_codes
-from exugear.cli.options import JsonOption
+from exugear.cli.options import DistanceRule, DistancesOption, JsonOption, ShiftRule, ShiftsOption
 
 if TYPE_CHECKING:
     from exugear.rexs.to_case.conversion import Imported
+    from exugear.rexs.to_case.notes import Rules
 
 NAME = "gearbox.toml"
 """Name of the file that is written."""
@@ -26,16 +27,19 @@ def import_(
         Path | None,
         typer.Option("--out", metavar="FOLDER", help="Folder for gearbox.toml. (default: the file's name without end)"),
     ] = None,
+    shifts: ShiftsOption = ShiftRule.file,
+    distances: DistancesOption = DistanceRule.agreeing,
     as_json: JsonOption = False,
 ) -> None:
     """Make a gearbox file of a REXS file (1.0 to 2.0): each value with its source, each assumption marked."""
     with exit_codes():
+        from exugear.rexs.to_case.notes import Rules
         from fe_ste.tools.files import write_file
 
         target = (out or Path(_stem(file))) / NAME
         if target.exists():
             raise BadInputError(f"{target}: is there already, and may have been edited; name another folder with --out")
-        imported = _imported(file, target)
+        imported = _imported(file, target, Rules(shifts.value, distances.value))
         write_file(target, imported.text.encode("utf-8"))
         if as_json:
             print_json(
@@ -63,7 +67,7 @@ def _stem(file: Path) -> str:
     return file.name.removesuffix(".zip").removesuffix(".xml").removesuffix(".json").rsplit(".rexs", 1)[0] or "imported"
 
 
-def _imported(file: Path, target: Path) -> Imported:
+def _imported(file: Path, target: Path, rules: Rules) -> Imported:
     from exugear.rexs.containers import read_rexs
     from exugear.rexs.faults import RexsError
     from exugear.rexs.to_case.conversion import to_case
@@ -71,7 +75,7 @@ def _imported(file: Path, target: Path) -> Imported:
     try:
         model = read_rexs(file)
         try:
-            return to_case(model, file.name, target)
+            return to_case(model, file.name, target, rules)
         except RexsError as error:
             raise RexsError(*(f"{file}: {fault}" for fault in error.faults)) from None
     except RexsError as error:

@@ -76,6 +76,7 @@ _ANGULAR = frozenset({"tapered_roller", "angular_contact_ball"})
 _SELF_ALIGNING = frozenset({"spherical_roller", "self_aligning_ball"})
 _PROFILED = frozenset({"cylindrical_roller", "needle_roller", "tapered_roller"})
 _PAIRED = frozenset({"cylindrical_roller", "needle_roller", "tapered_roller", "angular_contact_ball"})
+_CYLINDERS = frozenset({"cylindrical_roller", "needle_roller"})
 _RADIAL = frozenset({"cylindrical_roller", "needle_roller", "deep_groove_ball"})
 TYPES_OF_KEYS: dict[str, tuple[frozenset[str], str]] = {
     "element_length_mm": (_ROLLERS, "balls have none"),
@@ -84,6 +85,8 @@ TYPES_OF_KEYS: dict[str, tuple[frozenset[str], str]] = {
     "osculation": (frozenset({"spherical_roller"}), "only barrel rollers have one"),
     "profile": (_PROFILED, "balls have none, that of barrel rollers is their osculation"),
     "row_count": (_RADIAL | _SELF_ALIGNING, "two rows with a contact angle are an arrangement, X or O"),
+    "ribs": (_CYLINDERS, "only cylindrical rollers run against ribs that hold the shaft"),
+    "rib_contact_mm": (_CYLINDERS, "only cylindrical rollers run against ribs that hold the shaft"),
     "holds_towards": (_ANGULAR, "it holds both directions or none"),
     "axial_preload_um": (_ANGULAR, "only a pair with contact angles can be set along the axis"),
 }
@@ -96,6 +99,10 @@ CONTACT_ANGLES_DEG: dict[str, tuple[float, float]] = {
     "four_point_ball": (10.0, 45.0),
 }
 """Contact angles that can be, by type; other types have none. Beyond 45 degrees it is a thrust bearing."""
+
+
+ROUNDING_MM = 1e-6
+"""What sums of lengths in millimetres may differ by."""
 
 
 class CatalogueSection(Section):
@@ -120,6 +127,10 @@ class CatalogueSection(Section):
     """How two bearings of a pair stand to each other."""
     holds_towards: Literal["+z", "-z"] = "+z"
     """Which way of the inner ring a single bearing, or a tandem, holds."""
+    ribs: Literal["none", "+z", "-z", "both"] = "none"
+    """Which way of the inner ring the ribs of cylindrical rollers hold: "+z" a ring that is pushed towards +z."""
+    rib_contact_mm: q.LengthMm | None = None
+    """Length of the contact of a roller's end with a rib."""
     row_count: q.RollingRows | None = None
     """Rows of one bearing."""
     row_distance_mm: q.BoreMm | None = None
@@ -166,6 +177,8 @@ class CatalogueSection(Section):
             )
         if self.type in _ANGULAR and self.arrangement in ("X", "O") and "holds_towards" in self.model_fields_set:
             raise ValueError(f"holds_towards makes no sense for arrangement = {self.arrangement!r}: it holds both")
+        if self.rib_contact_mm is not None and self.ribs == "none":
+            raise ValueError("rib_contact_mm needs ribs = '+z', '-z' or 'both'")
         if self.axial_preload_um != 0.0 and self.arrangement not in ("X", "O"):
             raise ValueError("axial_preload_um needs arrangement = 'X' or 'O': one bearing alone has none")
         if self.axial_load_kN is not None and self.radial_load_kN is None:
@@ -191,7 +204,9 @@ class CatalogueSection(Section):
     def _dimensions(self) -> CatalogueSection:
         check_wall(self.bore_mm, self.outer_diameter_mm, "bore_mm")
         height = 0.5 * (self.outer_diameter_mm - self.bore_mm)
-        if self.element_diameter_mm is not None and self.element_diameter_mm >= height:
+        # Needle cages without rings: bore to outer diameter is two needles.
+        most = height + ROUNDING_MM if self.type == "needle_roller" else height - ROUNDING_MM
+        if self.element_diameter_mm is not None and self.element_diameter_mm > most:
             raise ValueError(
                 f"element_diameter_mm = {self.element_diameter_mm:g} must be below the {height:g} mm "
                 "between bore_mm and outer_diameter_mm"

@@ -17,6 +17,7 @@ from exugear.rexs.export.shafts import put_displacements, put_speeds
 from exugear.rexs.export.stored import StoredResults
 from exugear.rexs.export.teeth import Target, check_same_gears, put_gears, put_pairs, put_static_forces, put_tables
 from exugear.rexs.to_case.conversion import to_case
+from exugear.rexs.to_case.notes import Rules
 from exugear.rexs.tree import Model
 
 
@@ -49,7 +50,7 @@ class Exported:
         return f"<Exported: {self.named} attributes of REXS, {self.own} of exugear>"
 
 
-def with_results(gearbox: Gearbox, folder: Path, path: str | Path) -> Exported:
+def with_results(gearbox: Gearbox, folder: Path, path: str | Path, rules: Rules | None = None) -> Exported:
     """Put what is known of a gearbox into the REXS file that it was imported from.
 
     What its geometry and statics give is always there; tables, modes, bearings and runs as far as the results
@@ -63,6 +64,8 @@ def with_results(gearbox: Gearbox, folder: Path, path: str | Path) -> Exported:
         Its results.
     path : path-like
         The REXS file; it is read only.
+    rules : Rules, optional
+        Those that it was imported with.
 
     Raises
     ------
@@ -70,7 +73,7 @@ def with_results(gearbox: Gearbox, folder: Path, path: str | Path) -> Exported:
         The file cannot be read, or is one of another gearbox.
     """
     model = read_rexs(path)
-    imported = to_case(model, Path(path).name)
+    imported = to_case(model, Path(path).name, rules=rules)
     check_same_gears(gearbox, imported.gearbox)
     target = Target(model, origins_of(imported.found), _static_load_case(gearbox, model))
     stored = StoredResults(gearbox, folder)

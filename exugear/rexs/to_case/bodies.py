@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from exugear.rexs.faults import RexsError
@@ -23,6 +23,14 @@ JOINING = (
 """Types that can join their inner and outer part."""
 RIGID_TORSION = 1e12
 """Torsional stiffness (N m/rad) from which on a connection is one piece; the files mean rigid by 1e17."""
+RIGID_ABOVE = {"radial_stiffness": 1e14, "axial_stiffness": 1e14, "bending_stiffness": 1e11}
+"""Stiffness (N/m, N m/rad) from which on a file means rigid; no bearing has as much."""
+STIFFNESSES = {
+    "radial_stiffness": ("radial_N_per_m", "N / m", 1.0),
+    "axial_stiffness": ("axial_N_per_m", "N / m", 1.0),
+    "bending_stiffness": ("tilt_N_m_per_rad", "N mm / rad", 1e-3),
+}
+"""Attributes of bearings and couplings: key of the gearbox file, unit, and factor from it to SI."""
 COAXIAL = 2e-3
 """Largest distance of axes that count as one, mm."""
 
@@ -114,6 +122,27 @@ def torsional_stiffness(connection: Component) -> float | None:
     return None if value is None else 1e-3 * value
 
 
+def is_rigid_in_torsion(connection: Component) -> bool:
+    """Tell whether both sides turn as one."""
+    torsion = torsional_stiffness(connection)
+    return torsion is None or torsion >= RIGID_TORSION
+
+
+def is_one_piece(connection: Component) -> bool:
+    """Tell whether a coupling or fit makes one body of both sides: rigid in all that it says something of.
+
+    A shaft behind a coupling that is stiff in torsion and soft across the axis, such as a floating sun, moves for
+    itself.
+    """
+    if not is_rigid_in_torsion(connection) or connection.flag("radial_force_absorption") is False:
+        return False
+    for key, (_, unit, factor) in STIFFNESSES.items():
+        value = connection.quantity(key, unit)
+        if value is not None and factor * value < RIGID_ABOVE[key]:
+            return False
+    return True
+
+
 def is_engaged(model: Model, connection: Component) -> bool:
     """Tell whether a switchable coupling is closed in the gear that the file stands in."""
     unit = model.of_type("gear_unit")
@@ -136,7 +165,7 @@ def find_bodies(model: Model, places: Places, notes: Notes) -> Bodies:
     RexsError
         Planets that are not equal, or whose carrier cannot be told.
     """
-    union = _joined(model)
+    union = _joined(model, notes)
     groups: dict[int, list[Component]] = {}
     for part in model.of_type("shaft", "side_plate", "gear_casing", *GEARS):
         groups.setdefault(union.root(part.number), []).append(part)
@@ -154,13 +183,18 @@ def find_bodies(model: Model, places: Places, notes: Notes) -> Bodies:
         elif root not in planets and not _is_fixed(parts):
             notes.ignored.append(f"{', '.join(str(part) for part in parts)}: in no mesh, turns idly")
     by_root = {union.root(part.number): body for body in found for part in body.parts}
-    for number, members in enumerate(sets):
-        name = _lettered("planet", number, len(sets))
-        found.append(_planet_body(model, places, union, by_root, members, name, groups))
-    return Bodies(found)
+    carried = [
+        one for members in sets for one in _on_one_orbit(places, members, _carrier(model, union, by_root, members))
+    ]
+    planet_bodies: list[Body] = []
+    for number, (carrier, placed) in enumerate(carried):
+        name = _lettered("planet", number, len(carried))
+        placed = _beside_mates(model, groups, placed, planet_bodies)
+        planet_bodies.append(_planet_body(places, carrier, placed, name, groups))
+    return Bodies([*found, *planet_bodies])
 
 
-def _joined(model: Model) -> _Union:
+def _joined(model: Model, notes: Notes) -> _Union:
     parts = model.of_type("shaft", "side_plate", "gear_casing", *GEARS)
     union = _Union(part.number for part in parts)
     casings = [part.number for part in parts if part.type == "gear_casing"]
@@ -173,12 +207,25 @@ def _joined(model: Model) -> _Union:
             union.join(owner, part)
         elif part in union and owner in model.components and model.components[owner].type == "planet_carrier":
             union.join(carriers.setdefault(owner, part), part)
-    for connection in model.of_type(*JOINING):
-        both = ends(model, connection)
-        torsion = torsional_stiffness(connection)
-        rigid = torsion is None or torsion >= RIGID_TORSION
-        if both and rigid and is_engaged(model, connection) and all(end.number in union for end in both):
-            union.join(both[0].number, both[1].number)
+    stiff = [
+        (connection, both)
+        for connection in model.of_type(*JOINING)
+        if is_rigid_in_torsion(connection)
+        and is_engaged(model, connection)
+        and (both := ends(model, connection)) is not None
+        and all(end.number in union for end in both)
+    ]
+    for connection, (inner, outer) in stiff:
+        if is_one_piece(connection):
+            union.join(inner.number, outer.number)
+    for connection, (inner, outer) in stiff:
+        held = {union.root(end.number) for end in (inner, outer)}
+        if casings and union.root(casings[0]) in held and len(held) > 1:
+            notes.changed.append(
+                f"{connection}: holds {inner} against turning and yields otherwise; taken as rigid, since a body that "
+                "does not turn stands still here: loads of its gears that even out in the gearbox do so less"
+            )
+            union.join(inner.number, outer.number)
     return union
 
 
@@ -189,7 +236,7 @@ def _working(model: Model, union: _Union) -> set[int]:
     ties = []
     for connection in model.of_type(*JOINING):
         both = ends(model, connection)
-        if both and torsional_stiffness(connection) and is_engaged(model, connection):
+        if both and torsional_stiffness(connection) != 0.0 and is_engaged(model, connection):
             ties.append({union.root(end.number) for end in both if end.number in union and end.type != "gear_casing"})
     for _ in ties:
         working |= {root for tie in ties if tie & working for root in tie}
@@ -245,15 +292,20 @@ def _planet_sets(
     return list(sets.values())
 
 
-def _planet_body(
-    model: Model,
-    places: Places,
-    union: _Union,
-    by_root: Mapping[int, Body],
-    members: list[tuple[int, Component]],
-    name: str,
-    groups: Mapping[int, list[Component]],
+@dataclass(frozen=True)
+class _Planet:
+    """A planet on its carrier: angle in degrees, distance from the axis in mm, root of its parts, its shaft."""
+
+    angle: float
+    radius: float
+    root: int
+    shaft: Component
+
+
+def _carrier(
+    model: Model, union: _Union, by_root: Mapping[int, Body], members: Sequence[tuple[int, Component]]
 ) -> Body:
+    """Carrier of a set of planets."""
     shaft = members[0][1]
     stage = next(
         one.roles["planetary_stage"] for one in model.relations_of("planet_shaft") if one.roles["shaft"] == shaft.number
@@ -263,29 +315,63 @@ def _planet_body(
         for kind in ("planet_carrier_shaft", "planet_pin")
         for one in model.related(kind, "planetary_stage", stage, "shaft")
     ]
-    carriers = [by_root[root] for root in dict.fromkeys(union.root(one.number) for one in held) if root in by_root]
+    roots = dict.fromkeys(union.root(one.number) for one in held if one.number in union)
+    carriers = [by_root[root] for root in roots if root in by_root]
     if not carriers:
         raise RexsError(
             f"{model.components[stage]}: no planet_carrier_shaft or planet_pin tells which carrier {shaft} turns on"
         )
-    carrier = carriers[0]
-    placed = []
-    for root, one in members:
-        x, y, _ = places.position(one)
+    return carriers[0]
+
+
+def _on_one_orbit(
+    places: Places, members: Sequence[tuple[int, Component]], carrier: Body
+) -> Iterator[tuple[Body, list[_Planet]]]:
+    """Split planets into sets equally far from the carrier's axis, in the order of angles: a Ravigneaux set has two."""
+    orbits: list[list[_Planet]] = []
+    for root, shaft in members:
+        x, y, _ = places.position(shaft)
         dx, dy = x - carrier.axis[0], y - carrier.axis[1]
-        placed.append((round(math.degrees(math.atan2(dy, dx)) % 360.0, 9) % 360.0, math.hypot(dx, dy), root))
-    placed.sort()
-    if max(radius for _, radius, _ in placed) - min(radius for _, radius, _ in placed) > COAXIAL:
-        raise RexsError(f"{model.components[stage]}: its planets are not equally far from the carrier's axis")
-    parts = [tuple(_axial(groups[root])) for _, _, root in placed]
-    x, y, _ = places.position(next(one for root, one in members if root == placed[0][2]))
+        angle = round(math.degrees(math.atan2(dy, dx)) % 360.0, 9) % 360.0
+        planet = _Planet(angle, math.hypot(dx, dy), root, shaft)
+        orbit = next((one for one in orbits if abs(one[0].radius - planet.radius) <= COAXIAL), None)
+        if orbit is None:
+            orbits.append([planet])
+        else:
+            orbit.append(planet)
+    for orbit in sorted(orbits, key=lambda one: one[0].radius):
+        yield carrier, sorted(orbit, key=lambda planet: planet.angle)
+
+
+def _beside_mates(
+    model: Model, groups: Mapping[int, list[Component]], placed: list[_Planet], earlier: Sequence[Body]
+) -> list[_Planet]:
+    """Turn the order of planets so that each has the number of the one of another set that it meshes with."""
+    mates: dict[int, set[int]] = {}
+    for relation in model.relations_of("stage"):
+        one, other = (relation.roles.get(role, -1) for role in ("gear_1", "gear_2"))
+        mates.setdefault(one, set()).add(other)
+        mates.setdefault(other, set()).add(one)
+    first = {mate for part in groups[placed[0].root] for mate in mates.get(part.number, ())}
+    for body in earlier:
+        for number, parts in enumerate((body.parts, *body.others)):
+            if first & {part.number for part in parts} and len(body.angles) == len(placed):
+                return placed[-number:] + placed[:-number] if number else placed
+    return placed
+
+
+def _planet_body(
+    places: Places, carrier: Body, placed: Sequence[_Planet], name: str, groups: Mapping[int, list[Component]]
+) -> Body:
+    parts = [tuple(_axial(groups[planet.root])) for planet in placed]
+    x, y, _ = places.position(placed[0].shaft)
     return Body(
         name,
         parts[0],
         (x, y),
         others=tuple(parts[1:]),
-        angles=tuple(angle for angle, _, _ in placed),
-        orbit=round(placed[0][1], 6),
+        angles=tuple(planet.angle for planet in placed),
+        orbit=round(placed[0].radius, 6),
         carrier=carrier.name,
     )
 

@@ -25,10 +25,10 @@ from exugear.rexs.to_case.body_blocks import (
     meshes_of_bodies,
     sections_of_bodies,
 )
-from exugear.rexs.to_case.gear_blocks import Teeth, gear_blocks, mesh_blocks, pair_blocks, teeth_of
+from exugear.rexs.to_case.gear_blocks import Teeth, axes_to_move, gear_blocks, mesh_blocks, pair_blocks, teeth_of
 from exugear.rexs.to_case.loads import Ends, Loads, ends_of, load_case_blocks, loads_of, static_load
 from exugear.rexs.to_case.modifications import MODIFICATIONS
-from exugear.rexs.to_case.notes import Block, Entry, Notes, assumed, derived, read, tidy, toml_text
+from exugear.rexs.to_case.notes import Block, Entry, Notes, Rules, assumed, derived, read, tidy, toml_text
 from exugear.rexs.to_case.places import Places
 from exugear.rexs.to_case.supports import BEARINGS, PLAIN_BEARINGS, bearing_blocks, coupling_blocks, joint_blocks
 from exugear.rexs.tree import Model
@@ -134,7 +134,7 @@ class Imported:
         return f"<Imported {self.gearbox!r}: {len(self.changed)} assumptions, {len(self.ignored)} left out>"
 
 
-def to_case(model: Model, source: str, path: str | Path = "gearbox.toml") -> Imported:
+def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules: Rules | None = None) -> Imported:
     """Make a gearbox file of a REXS model, and check it as one.
 
     Parameters
@@ -144,13 +144,15 @@ def to_case(model: Model, source: str, path: str | Path = "gearbox.toml") -> Imp
         Name of the REXS file, for the comments.
     path : path-like
         Where the gearbox file is going to be, for messages.
+    rules : Rules, optional
+        What counts where the file contradicts itself.
 
     Raises
     ------
     RexsError
         Why the model cannot be imported, a sentence each.
     """
-    notes = Notes()
+    notes = Notes(rules or Rules())
     _refuse_types(model, notes)
     _refuse_misplaced(model, notes)
     notes.faults.tell()
@@ -201,8 +203,7 @@ class _Draft:
 
     def __init__(self, model: Model, places: Places, notes: Notes) -> None:
         self.model, self.notes = model, notes
-        bodies = find_bodies(model, places, notes)
-        self.teeth = teeth_of(model, places, bodies, notes)
+        bodies, self.teeth = _placed(model, places, notes)
         bearings = bearing_blocks(model, places, bodies, notes)
         self.found = Found(model, places, bodies, self.teeth, bearings)
         sections = sections_of_bodies(model, places, bodies, notes)
@@ -215,7 +216,7 @@ class _Draft:
             ("pairs", _named("pairs", pair_blocks(self.teeth))),
             ("bodies", _named("bodies", body_blocks(model, places, bodies, self.teeth, sections, notes))),
             ("meshes", _named("meshes", mesh_blocks(self.teeth))),
-            ("couplings", _named("couplings", coupling_blocks(model, bodies))),
+            ("couplings", _named("couplings", coupling_blocks(model, bodies, bearings))),
             (
                 "variant `rigid`: ideal joints",
                 _named("joints", joint_blocks(bodies, bearings, gear_places(self.teeth, bodies))),
@@ -281,6 +282,20 @@ class _Draft:
         top = {"name": Entry(plain(title, 200)), "default_inertias": Entry(INERTIAS)}
         groups = [("", self.settings), *self.groups, ("load cases", _named("load_cases", cases))]
         return toml_text(_head(self.model, source, self.notes), top, groups)
+
+
+def _placed(model: Model, places: Places, notes: Notes) -> tuple[Bodies, Teeth]:
+    """Bodies and gears where the centre distances that count want them."""
+    first = Notes(notes.rules)
+    bodies = find_bodies(model, places, first)
+    teeth = teeth_of(model, places, bodies, first)
+    moves = axes_to_move(teeth, bodies, places)
+    if moves:
+        notes.changed += [line for line in first.changed if "axes are moved" in line]
+        for parts, by in moves:
+            places.move(parts, by)
+    bodies = find_bodies(model, places, notes)
+    return bodies, teeth_of(model, places, bodies, notes)
 
 
 def _named(table: str, blocks: Mapping[str, Block]) -> dict[str, Block]:

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from exugear.rexs.faults import RexsError
 from exugear.rexs.to_case.bodies import Bodies, Body
 from exugear.rexs.to_case.meshing import (
+    PLACE_TOLERANCE,
     Stage,
     centre_distance,
     unchecked,
     with_clear_tips,
+    with_equal_racks,
+    with_fitting_tool,
     with_form_circles,
     with_possible_cutter,
     with_shifts,
@@ -74,7 +77,7 @@ def teeth_of(model: Model, places: Places, bodies: Bodies, notes: Notes) -> Teet
             if len(pair) == 1:
                 raise RexsError(f"{part}: planets of one set mesh with each other, which cannot be")
             met.setdefault(pair, (part, [model.components[number] for number in sorted(pair)]))
-            _check_place(places, part, both, notes, told=met[pair][0] is not part)
+            _check_direction(places, part, both, notes)
     notes.faults.tell()
     mates: dict[int, list[Component]] = {}
     for _, (one, other) in met.values():
@@ -88,8 +91,10 @@ def teeth_of(model: Model, places: Places, bodies: Bodies, notes: Notes) -> Teet
     stages = _ordered(model, places, met.values(), gears, notes)
     notes.faults.tell()
     _check_equal_planets(model, bodies, first, gears, notes)
+    gears = with_equal_racks(gears, stages, notes)
     gears = with_shifts(gears, stages, notes)
-    gears = {number: with_form_circles(with_possible_cutter(gear, notes), notes) for number, gear in gears.items()}
+    gears = {number: with_fitting_tool(with_possible_cutter(gear, notes), notes) for number, gear in gears.items()}
+    gears = {number: with_form_circles(gear, notes) for number, gear in gears.items()}
     gears = with_clear_tips(gears, stages, notes)
     owners = {number: body for number in gears if (body := bodies.of(model.components[number])) is not None}
     lost = [str(gears[number].part) for number in gears if number not in owners]
@@ -127,10 +132,9 @@ def _stage(model: Model, roles: Mapping[str, int]) -> tuple[Component, list[Comp
     return model.components[roles["stage"]], [model.components[roles[role]] for role in ("gear_1", "gear_2")]
 
 
-def _check_place(places: Places, stage: Component, gears: Sequence[Component], notes: Notes, *, told: bool) -> None:
-    """Compare the centre distance of each stage with positions; tell it for the first of those that are alike."""
+def _check_direction(places: Places, stage: Component, gears: Sequence[Component], notes: Notes) -> None:
+    """Compare the direction of the line of centres with positions."""
     one, other = (places.position(gear) for gear in gears)
-    centre_distance(stage, math.dist(one[:2], other[:2]), Notes() if told else notes)
     stated = stage.quantity("rotating_angle_around_neg_u_axis", "deg")
     # From v over w, with u: the angle of the second gear's centre as seen from the first, zero along w.
     angle = math.degrees(math.atan2(other[0] - one[0], other[1] - one[1]))
@@ -152,9 +156,10 @@ def _ordered(
                 raise RexsError(f"{part}: two ring gears cannot mesh")
             pinion, gear = sorted((one, other), key=lambda each: _size(gears[each.number]))
             apart = math.dist(places.position(one)[:2], places.position(other)[:2])
-            distance = centre_distance(part, apart, Notes())
-            common = _common_face(places, part, gears[pinion.number], gears[gear.number])
-            stages.append(Stage(part, pinion.number, gear.number, distance, common))
+            both = gears[pinion.number], gears[gear.number]
+            distance = centre_distance(part, apart, both, notes)
+            common = _common_face(places, part, *both)
+            stages.append(Stage(part, pinion.number, gear.number, distance, apart, common))
     return stages
 
 
@@ -187,6 +192,74 @@ def _check_equal_planets(
             if abs(getattr(other, key).value - getattr(mate, key).value) > 1e-9:
                 notes.faults.add(f"{other.part}: differs from {mate.part} in {key}; planets of a set must be equal")
     notes.faults.tell()
+
+
+def axes_to_move(
+    teeth: Teeth, bodies: Bodies, places: Places
+) -> list[tuple[tuple[Component, ...], tuple[float, float]]]:
+    """Parts and how far (mm) they have to move for the centre distances that count; none where all stand so.
+
+    The first body of a train stays. Bodies on one axis move together, planets along their own radii.
+
+    Raises
+    ------
+    RexsError
+        Moving one gear for its stage would take it out of another.
+    """
+    if all(abs(stage.distance.value - stage.apart) <= PLACE_TOLERANCE for stage in teeth.stages.values()):
+        return []
+    axes = {body.name: body.axis for body in bodies.members}
+    first = next(iter(teeth.stages.values()))
+    settled = set(_coaxial(bodies, teeth.bodies[first.pinion]))
+    open_stages = list(teeth.stages.values())
+    while open_stages:
+        stage = next((s for s in open_stages if settled & _names_of(teeth, s)), open_stages[0])
+        open_stages.remove(stage)
+        one, other = teeth.bodies[stage.pinion], teeth.bodies[stage.gear]
+        base, moving = (one, other) if one.name in settled else (other, one)
+        stands = axes[base.name], axes[moving.name]
+        apart = math.dist(*stands)
+        if moving.name in settled:
+            if abs(apart - stage.distance.value) > PLACE_TOLERANCE:
+                raise RexsError(
+                    f"{stage.part}: its centre distance of {stage.distance.value:g} mm and those of the other stages "
+                    "cannot all be; import with --distances positions, or correct them"
+                )
+            continue
+        share = stage.distance.value / apart - 1.0
+        by = share * (stands[1][0] - stands[0][0]), share * (stands[1][1] - stands[0][1])
+        for name in _coaxial(bodies, moving):
+            axes[name] = axes[name][0] + by[0], axes[name][1] + by[1]
+            settled.add(name)
+    return [move for body in bodies.members for move in _moves(places, bodies, body, axes)]
+
+
+def _names_of(teeth: Teeth, stage: Stage) -> set[str]:
+    return {teeth.bodies[stage.pinion].name, teeth.bodies[stage.gear].name}
+
+
+def _coaxial(bodies: Bodies, body: Body) -> list[str]:
+    """Names of the bodies that stand on one axis; planets stand for themselves."""
+    if body.carrier:
+        return [body.name]
+    return [one.name for one in bodies.members if not one.carrier and math.dist(one.axis, body.axis) <= PLACE_TOLERANCE]
+
+
+def _moves(
+    places: Places, bodies: Bodies, body: Body, axes: Mapping[str, tuple[float, float]]
+) -> Iterator[tuple[tuple[Component, ...], tuple[float, float]]]:
+    """How far the parts of a body move, each planet of a set along its own radius."""
+    new = axes[body.name]
+    if not body.carrier:
+        yield body.parts, (new[0] - body.axis[0], new[1] - body.axis[1])
+        return
+    carrier = next(one for one in bodies.members if one.name == body.carrier)
+    centre, orbit = axes[carrier.name], math.dist(new, axes[carrier.name])
+    for parts, degrees in zip((body.parts, *body.others), body.angles, strict=True):
+        angle = math.radians(degrees)
+        target = centre[0] + orbit * math.cos(angle), centre[1] + orbit * math.sin(angle)
+        x, y, _ = places.position(next(part for part in parts if part.given("support_vector")))
+        yield parts, (target[0] - x, target[1] - y)
 
 
 def _gear_names(gears: Mapping[int, Toothing], stages: Sequence[Stage], owners: Mapping[int, Body]) -> dict[int, str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 from exugear.rexs.faults import Faults, RexsError
 
@@ -54,12 +54,30 @@ def assumed(value: Any, source: str) -> Entry:
     return Entry(value, source, ASSUMED)
 
 
+@dataclass(frozen=True)
+class Rules:
+    """Which of two statements counts where a file contradicts itself.
+
+    Attributes
+    ----------
+    shifts : {"file", "centre-distance"}
+        Profile shifts that do not fit to the centre distance: refused, or replaced by those that it asks for.
+    distances : {"agreeing", "positions", "file"}
+        Centre distances unlike the positions of the gears: that with which the profile shifts agree, that of the
+        positions, or that of ``center_distance``, to which axes are moved.
+    """
+
+    shifts: Literal["file", "centre-distance"] = "file"
+    distances: Literal["agreeing", "positions", "file"] = "agreeing"
+
+
 @dataclass
 class Notes:
     """Lines gathered on the way.
 
     Attributes
     ----------
+    rules : Rules
     faults : Faults
         Why the file cannot be imported.
     changed : list of str
@@ -70,6 +88,7 @@ class Notes:
         What the file holds and the gearbox file does not.
     """
 
+    rules: Rules = Rules()
     faults: Faults = field(default_factory=Faults)
     changed: list[str] = field(default_factory=list)
     checked: list[str] = field(default_factory=list)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from exugear.rexs.faults import Faults, RexsError
@@ -31,6 +33,7 @@ class Places:
 
     def __init__(self, model: Model) -> None:
         self._model = model
+        self._moved: dict[int, tuple[float, float]] = {}
         self._frames: dict[int, tuple[Floats, Floats]] = {}
         _refuse_lost_vectors(model)
         faults = Faults()
@@ -60,7 +63,14 @@ class Places:
         if not part.given("support_vector"):
             raise RexsError(f"{part}: support_vector is missing, so that it has no place")
         x, y, z = (self._axes @ self._frame(part, 0)[0]).tolist()
+        by = self._moved.get(part.number, (0.0, 0.0))
+        x, y = x + by[0], y + by[1]
         return tidy(round(x, 9)), tidy(round(y, 9)), tidy(round(z, 9))
+
+    def move(self, parts: Iterable[Component], by: tuple[float, float]) -> None:
+        """Let components stand elsewhere by x and y, mm: where other statements of the file count more."""
+        for part in parts:
+            self._moved[part.number] = by
 
     def sense(self, part: Component) -> int:
         """Sense of a component's u axis: 1 along +z, -1 against it."""

@@ -9,11 +9,14 @@ from exugear.model.sections.connections import CONTACT_ANGLES_DEG, TYPES_OF_KEYS
 from exugear.rexs.faults import RexsError, plain
 from exugear.rexs.to_case.bodies import (
     JOINING,
-    RIGID_TORSION,
+    RIGID_ABOVE,
+    STIFFNESSES,
     Bodies,
     Body,
     ends,
     is_engaged,
+    is_one_piece,
+    is_rigid_in_torsion,
     torsional_stiffness,
 )
 from exugear.rexs.to_case.notes import Block, Entry, Notes, assumed, derived, read, tidy
@@ -34,17 +37,18 @@ ROLLING_TYPES = {
     "radial_tapered_roller_bearing": "tapered_roller",
 }
 """Types of rolling bearings, REXS to ours."""
+CYLINDERS = TYPES_OF_KEYS["ribs"][0]
+"""Types whose rollers hold a shaft along the axis by ribs alone."""
+ARRANGED = TYPES_OF_KEYS["axial_preload_um"][0]
+"""Types of which two rows stand in X, O or tandem."""
+GROOVE_RATIOS, OSCULATIONS = (0.501, 0.6), (0.5, 0.9999)
+"""Ratios of radii that rolling bearings can have."""
+LEAST_RADIUS = 0.03
+"""Radius (m) that stands for that of gears where two coupled bodies have none."""
 PLACE_TOLERANCE = 0.02
 """Largest difference of two statements on a place that needs no word, mm."""
-RIGID_ABOVE = {"radial_stiffness": 1e14, "axial_stiffness": 1e14, "bending_stiffness": 1e11}
-"""Stiffness (N/m, N m/rad) from which on a file means rigid; no bearing has as much."""
 RIGID = {"radial_stiffness": 1e10, "axial_stiffness": 1e10, "bending_stiffness": 1e7}
 """What stands for rigid: stiffer than teeth and bearings, and no more, for the step's sake."""
-KEYS = {
-    "radial_stiffness": ("radial_N_per_m", "N / m", 1.0),
-    "axial_stiffness": ("axial_N_per_m", "N / m", 1.0),
-    "bending_stiffness": ("tilt_N_m_per_rad", "N mm / rad", 1e-3),
-}
 
 
 def bearing_blocks(model: Model, places: Places, bodies: Bodies, notes: Notes) -> dict[str, Block]:
@@ -64,16 +68,36 @@ def bearing_blocks(model: Model, places: Places, bodies: Bodies, notes: Notes) -
     return blocks
 
 
-def coupling_blocks(model: Model, bodies: Bodies) -> dict[str, Block]:
-    """Tables of the connections whose torsion gives way, by name."""
+def coupling_blocks(model: Model, bodies: Bodies, bearings: Mapping[str, Block]) -> dict[str, Block]:
+    """Tables of the connections that turn two bodies together, by name; `bearings` hold them in other directions."""
     blocks: dict[str, Block] = {}
+    seats = {block.number: name for name, block in bearings.items()}
     for part, body, on in _flexible_connections(model, bodies):
-        torsion = torsional_stiffness(part) or 0.0
-        if torsion > 0.0 and not on.fixed:
-            names = read([body.name, on.name], "inner_part and outer_part")
-            entries = {"bodies": names, "stiffness_N_m_per_rad": read(tidy(torsion), "rotational_stiffness")}
-            blocks[f"coupling_{len(blocks) + 1}"] = Block(str(part), entries)
+        torsion = torsional_stiffness(part)
+        if torsion == 0.0 or on.fixed:
+            continue
+        entries = {"bodies": read([body.name, on.name], "inner_part and outer_part")}
+        if part.number in seats:
+            entries["seat"] = Entry(seats[part.number])
+        if torsion is None or is_rigid_in_torsion(part):
+            said = "none given" if torsion is None else f"rotational_stiffness of {torsion:g} N m/rad means rigid"
+            said += f": as much as {RIGID['radial_stiffness']:g} N/m at the teeth"
+            stiff = assumed(_stiff_torsion(body, on), said)
+        else:
+            stiff = read(tidy(torsion), "rotational_stiffness")
+        blocks[f"coupling_{len(blocks) + 1}"] = Block(str(part), entries | {"stiffness_N_m_per_rad": stiff})
     return blocks
+
+
+def _stiff_torsion(*bodies: Body) -> float:
+    """Find what stands for rigid in torsion, N m/rad: at the largest reference circle as in other directions."""
+    diameters = [
+        (gear.whole("number_of_teeth") or 0) * (gear.quantity("normal_module", "mm") or 0.0)
+        for body in bodies
+        for gear in body.gears
+    ]
+    radius = max([0.5e-3 * abs(one) for one in diameters], default=0.0) or LEAST_RADIUS
+    return float(f"{RIGID['radial_stiffness'] * radius**2:.2g}")
 
 
 def joint_blocks(bodies: Bodies, bearings: dict[str, Block], gear_places: dict[str, float]) -> dict[str, Block]:
@@ -93,11 +117,10 @@ def joint_blocks(bodies: Bodies, bearings: dict[str, Block], gear_places: dict[s
 
 
 def _flexible_connections(model: Model, bodies: Bodies) -> Iterator[tuple[Component, Body, Body]]:
-    """Couplings and fits between two bodies whose torsion is less than rigid, one of equal planets."""
+    """Couplings and fits between two bodies that are not one piece, one of equal planets."""
     for part in model.of_type(*JOINING):
         both = ends(model, part)
-        torsion = torsional_stiffness(part)
-        if both is None or torsion is None or torsion >= RIGID_TORSION or not is_engaged(model, part):
+        if both is None or is_one_piece(part) or not is_engaged(model, part):
             continue
         inner, outer = bodies.of(both[0]), bodies.of(both[1])
         if inner is not None and outer is not None and inner is not outer:
@@ -161,18 +184,66 @@ def _support(model: Model, part: Component, sense: int, notes: Notes) -> dict[st
         return {"stiffness": Block("", entries)}
     kind = ROLLING_TYPES.get(part.text("bearing_type"))
     sizes = _sizes(part, kind, notes)
-    rows = part.whole("number_of_bearing_rows") or 1
+    rows = part.whole("number_of_bearing_rows") or len(_parts_of(model, part, "rolling_bearing_row")) or 1
     paired = rows > 1 and kind in CONTACT_ANGLES_DEG and kind not in ("spherical_roller", "self_aligning_ball")
-    if kind and sizes and not paired:
-        return {"catalogue": Block("", _catalogue(model, part, kind, rows, sense, sizes, notes))}
+    arrangement = _arrangement(model, part, sense) if paired and rows == 2 and kind in ARRANGED else {}
+    if kind and sizes and (arrangement or not paired):
+        catalogue = _catalogue(model, part, kind, rows, sense, sizes, notes, arrangement)
+        return {"catalogue": Block("", catalogue), **_rib_stiffness(part, catalogue)}
+    if not sizes and part.quantity("radial_stiffness", "N / m"):
+        return {"stiffness": Block("", _stiffness(part, notes))}
     if not kind:
         why = f"a {part.text('bearing_type') or part.type} has no law here: give its stiffness"
     elif paired:
-        why = "a bearing of two rows with contact angles: give its catalogue with arrangement X, O or tandem"
+        why = (
+            f"a bearing of {rows} rows with contact angles, of which axial_force_absorption_of_row does not tell how "
+            "they stand: give its catalogue with arrangement X, O or tandem"
+        )
     else:
         why = "the file gives no dimensions, and no table here has them: give its catalogue, or its stiffness"
     notes.changed.append(f"{part}: BLANK, {why}; until then only the variant rigid runs")
     return {"designation": Block("", {"designation": Entry(_designation(part), f"BLANK: {why}")})}
+
+
+def _arrangement(model: Model, part: Component, sense: int) -> dict[str, Entry]:
+    """Tell how two rows stand to each other, by the way that each holds the inner ring; empty where a row is silent.
+
+    Rows follow each other along the u axis of the shaft. A first row that holds a ring pushed against u, with a second
+    one that holds it along u, is an X: the pressure lines meet towards the middle. A shaft that points the other way
+    turns the order and both senses, so that X stays X.
+    """
+    rows = _parts_of(model, part, "rolling_bearing_row")
+    held = [row.text("axial_force_absorption_of_row") for row in rows]
+    source = "axial_force_absorption_of_row, in the order of the rows"
+    if held in (["negative", "positive"], ["positive", "negative"]):
+        found = {"arrangement": read("X" if held[0] == "negative" else "O", source)}
+    elif held in (["positive", "positive"], ["negative", "negative"]):
+        towards = "+z" if (held[0] == "positive") == (sense > 0) else "-z"
+        found = {"arrangement": read("tandem", source), "holds_towards": read(towards, source)}
+    else:
+        return {}
+    distance = part.quantity("distance_between_bearing_rows", "mm")
+    if distance:
+        found["row_distance_mm"] = read(tidy(distance), "distance_between_bearing_rows")
+    preload, play = part.quantity("preload_distance", "mm"), part.quantity("operating_axial_bearing_clearance", "mm")
+    if found["arrangement"].value != "tandem" and (preload or play):
+        key = "preload_distance" if preload else "operating_axial_bearing_clearance"
+        found["axial_preload_um"] = read(tidy(1e3 * (preload or -(play or 0.0))), key)
+    return found
+
+
+def _rib_stiffness(part: Component, catalogue: Mapping[str, Entry]) -> dict[str, Block]:
+    """Stiffness that the file gives to ribs of cylindrical rollers, beside the catalogue, which leaves that free."""
+    value = part.quantity("axial_stiffness", "N / m")
+    if not value or catalogue["type"].value not in CYLINDERS or "ribs" in catalogue:
+        return {}
+    return {"stiffness": Block("", {"axial_N_per_m": _axial_stiffness(value)})}
+
+
+def _axial_stiffness(value: float) -> Entry:
+    if value >= RIGID_ABOVE["axial_stiffness"]:
+        return assumed(RIGID["axial_stiffness"], f"axial_stiffness of {value:g} means rigid")
+    return read(tidy(value), "axial_stiffness")
 
 
 def _sizes(part: Component, kind: str | None, notes: Notes) -> dict[str, Entry]:
@@ -195,8 +266,17 @@ def _designation(part: Component) -> str:
 
 
 def _catalogue(
-    model: Model, part: Component, kind: str, rows: int, sense: int, sizes: Mapping[str, Entry], notes: Notes
+    model: Model,
+    part: Component,
+    kind: str,
+    rows: int,
+    sense: int,
+    sizes: Mapping[str, Entry],
+    notes: Notes,
+    arrangement: Mapping[str, Entry],
 ) -> dict[str, Entry]:
+    if arrangement:  # the catalogue section has the width of one of two bearings
+        sizes = {**sizes, "width_mm": derived(tidy(0.5 * sizes["width_mm"].value), "width, for each of two rows")}
     entries = {
         "type": read(kind, f"bearing_type {part.text('bearing_type')}"),
         "designation": Entry(_designation(part)),
@@ -206,10 +286,12 @@ def _catalogue(
     angle = abs((row or part).quantity("pressure_angle", "deg") or 0.0)
     if kind in CONTACT_ANGLES_DEG and CONTACT_ANGLES_DEG[kind][0] <= angle <= CONTACT_ANGLES_DEG[kind][1]:
         entries["contact_angle_deg"] = read(tidy(angle), "pressure_angle of its row")
-    if rows > 1 or part.text("bearing_type") == "radial_spherical_roller_bearing":
+    if not arrangement and (rows > 1 or part.text("bearing_type") == "radial_spherical_roller_bearing"):
         entries["row_count"] = read(rows, "number_of_bearing_rows")
     if row is not None:
         entries |= _elements(model, row, kind)
+        entries |= _grooves(model, row, kind, notes)
+    entries |= arrangement
     clearance = part.quantity("operating_radial_bearing_clearance", "mm")
     if clearance:
         entries["radial_clearance_mm"] = read(tidy(clearance), "operating_radial_bearing_clearance")
@@ -220,7 +302,8 @@ def _catalogue(
         rating = part.quantity(key, "kN")
         if rating:
             entries[ours] = read(tidy(rating), key)
-    _tell_axial(part, kind, sense, entries, notes)
+    if not arrangement:
+        _tell_axial(part, kind, sense, entries, notes)
     return entries
 
 
@@ -230,10 +313,14 @@ def _tell_axial(part: Component, kind: str, sense: int, entries: dict[str, Entry
     if kind in TYPES_OF_KEYS["holds_towards"][0] and absorbed in ("positive", "negative"):
         towards = "+z" if (absorbed == "positive") == (sense > 0) else "-z"
         entries["holds_towards"] = read(towards, f"axial_force_absorption {absorbed}")
-    elif absorbed in ("positive", "negative", "no_direction") and kind not in ("cylindrical_roller", "needle_roller"):
+    elif kind in CYLINDERS:
+        if absorbed == "both_directions" and not part.quantity("axial_stiffness", "N / m"):
+            entries["ribs"] = read("both", "axial_force_absorption both_directions")
+        elif absorbed in ("positive", "negative"):
+            towards = "+z" if (absorbed == "positive") == (sense > 0) else "-z"
+            entries["ribs"] = read(towards, f"axial_force_absorption {absorbed}")
+    elif absorbed in ("positive", "negative", "no_direction"):
         notes.changed.append(f"{part}: axial_force_absorption {absorbed}, but the law of a {kind} holds both ways")
-    elif absorbed != "no_direction" and kind in ("cylindrical_roller", "needle_roller"):
-        notes.changed.append(f"{part}: axial_force_absorption {absorbed}, but the law of a {kind} holds no way")
 
 
 def _elements(model: Model, row: Component, kind: str) -> dict[str, Entry]:
@@ -254,6 +341,41 @@ def _elements(model: Model, row: Component, kind: str) -> dict[str, Entry]:
     return entries
 
 
+def _grooves(model: Model, row: Component, kind: str, notes: Notes) -> dict[str, Entry]:
+    """Radii of grooves over the diameter of the balls, of barrels that of their outline over that of the raceway."""
+    element = next(iter(_parts_of(model, row, "rolling_element")), None)
+    radii = {ring: row.quantity(f"raceway_radius_of_{ring}_ring", "mm") for ring in ("inner", "outer")}
+    entries: dict[str, Entry] = {}
+    if element is None:
+        return entries
+    diameter = element.quantity("diameter_of_rolling_element", "mm")
+    for ring, radius in radii.items():
+        key = f"{ring}_groove_ratio"
+        if kind in TYPES_OF_KEYS[key][0] and diameter and radius:
+            source = f"raceway_radius_of_{ring}_ring over diameter_of_rolling_element"
+            _put_within(entries, key, radius / diameter, GROOVE_RATIOS, source, row, notes)
+    outline = element.quantity("roller_crowning_radius", "mm")
+    if kind in TYPES_OF_KEYS["osculation"][0] and outline and radii["outer"]:
+        source = "roller_crowning_radius over raceway_radius_of_outer_ring"
+        _put_within(entries, "osculation", outline / radii["outer"], OSCULATIONS, source, row, notes)
+    return entries
+
+
+def _put_within(
+    entries: dict[str, Entry],
+    key: str,
+    ratio: float,
+    limits: tuple[float, float],
+    source: str,
+    row: Component,
+    notes: Notes,
+) -> None:
+    if limits[0] <= ratio <= limits[1]:
+        entries[key] = derived(tidy(round(ratio, 6)), source)
+    else:
+        notes.changed.append(f"{row}: {source} is {ratio:.4g}, which cannot be; the usual {key} is taken")
+
+
 def _parts_of(model: Model, owner: Component, kind: str) -> Sequence[Component]:
     found = [
         one
@@ -263,10 +385,15 @@ def _parts_of(model: Model, owner: Component, kind: str) -> Sequence[Component]:
     return [one for one in found if one.type == kind]
 
 
+def _was_rigid(part: Component) -> bool:
+    """Tell whether a connection is rigid in torsion: what it says nothing of is then rigid, too."""
+    return part.type in JOINING and is_rigid_in_torsion(part)
+
+
 def _stiffness(part: Component, notes: Notes) -> dict[str, Entry]:
     """Isotropic stiffness of a concept bearing or coupling; what is meant as rigid gets a bound."""
     entries = {}
-    for key, (ours, unit, factor) in KEYS.items():
+    for key, (ours, unit, factor) in STIFFNESSES.items():
         value = part.quantity(key, unit)
         value = None if value is None else factor * value
         if key == "radial_stiffness" and part.flag("radial_force_absorption") is False:
@@ -274,11 +401,13 @@ def _stiffness(part: Component, notes: Notes) -> dict[str, Entry]:
         absorbed = part.text("axial_force_absorption")
         if key == "axial_stiffness" and absorbed == "no_direction":
             continue
-        if value is None and (key == "bending_stiffness" or part.type in JOINING):
+        if value is None and (key == "bending_stiffness" or part.type in JOINING) and not _was_rigid(part):
             continue
-        if value is None and key == "axial_stiffness" and absorbed not in ("both_directions", "positive", "negative"):
+        one_way = absorbed in ("positive", "negative")
+        holds = one_way or absorbed == "both_directions" or _was_rigid(part)
+        if value is None and key == "axial_stiffness" and not holds:
             continue
-        if key == "axial_stiffness" and absorbed in ("positive", "negative"):
+        if key == "axial_stiffness" and one_way:
             notes.changed.append(f"{part}: holds the axis {absorbed} along u only, here both ways")
         if value is None or value >= RIGID_ABOVE[key]:
             said = "the file gives none" if value is None else f"{key} of {value:g} means rigid"

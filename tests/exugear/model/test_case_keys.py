@@ -82,6 +82,8 @@ def test_every_key_is_read(read_keys: set[tuple[str, str]], tmp_path: Path) -> N
     contents["spur"]["ste"] = {"method": "nonlinear", "positions": 8}
     for kind in get_args(connections.BearingType):
         catalogue_rows(connections.CatalogueSection(type=kind, bore_mm=50.0, outer_diameter_mm=90.0, width_mm=20.0))
+    ribbed = {"type": "cylindrical_roller", "ribs": "both"}
+    catalogue_rows(connections.CatalogueSection(bore_mm=50.0, outer_diameter_mm=90.0, width_mm=20.0, **ribbed))
     for name, content in contents.items():
         file = tmp_path / f"{name}.toml"
         file.write_text(toml_text(content), encoding="utf-8")
