@@ -64,6 +64,9 @@ _UNITS = {
     "kg": ("mass", 1.0),
     "kg m^2": ("inertia", 1.0),
     "m / s^2": ("acceleration", 1.0),
+    "h": ("time", 3600.0),
+    "s": ("time", 1.0),
+    "mm^2 / s": ("viscosity", 1e-6),
 }
 
 

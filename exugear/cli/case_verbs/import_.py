@@ -33,13 +33,19 @@ def import_(
 ) -> None:
     """Make a gearbox file of a REXS file (1.0 to 2.0): each value with its source, each assumption marked."""
     with exit_codes():
+        from exugear.rexs.to_case.loads import SPECTRUM
         from exugear.rexs.to_case.notes import Rules
         from fe_ste.tools.files import write_file
 
         target = (out or Path(_stem(file))) / NAME
-        if target.exists():
-            raise BadInputError(f"{target}: is there already, and may have been edited; name another folder with --out")
+        for one in (target, target.with_name(SPECTRUM)):
+            if one.exists():
+                raise BadInputError(
+                    f"{one}: is there already, and may have been edited; name another folder with --out"
+                )
         imported = _imported(file, target, Rules(shifts.value, distances.value))
+        if imported.spectrum:
+            write_file(target.with_name(SPECTRUM), imported.spectrum.encode("utf-8"))
         write_file(target, imported.text.encode("utf-8"))
         if as_json:
             print_json(

@@ -26,12 +26,12 @@ from exugear.rexs.to_case.body_blocks import (
     sections_of_bodies,
 )
 from exugear.rexs.to_case.gear_blocks import Teeth, axes_to_move, gear_blocks, mesh_blocks, pair_blocks, teeth_of
-from exugear.rexs.to_case.loads import Ends, Loads, ends_of, load_case_blocks, loads_of, static_load
+from exugear.rexs.to_case.loads import Ends, Loads, ends_of, life_blocks, load_case_blocks, loads_of, static_load
 from exugear.rexs.to_case.modifications import MODIFICATIONS
 from exugear.rexs.to_case.notes import Block, Entry, Notes, Rules, assumed, derived, read, tidy, toml_text
 from exugear.rexs.to_case.places import Places
 from exugear.rexs.to_case.supports import BEARINGS, PLAIN_BEARINGS, bearing_blocks, coupling_blocks, joint_blocks
-from exugear.rexs.tree import Model
+from exugear.rexs.tree import Component, Model
 
 OTHER_GEARS = {"bevel": "bevel gears", "worm": "worm gears", "hypoid": "hypoid gears"}
 """Beginnings of the types of gears that are not cylindrical."""
@@ -73,6 +73,7 @@ READ_TYPES = frozenset(
         "rolling_bearing_row",
         "rolling_element",
         "external_load",
+        "lubricant",
     )
 )
 """Types of components of which something is read."""
@@ -120,6 +121,9 @@ class Imported:
         What the file says twice, compared.
     found : Found
         What parts of the gearbox file stand for which components.
+    spectrum : str
+        Table of the loads over the life, which belongs beside the gearbox file under the name
+        `exugear.rexs.to_case.loads.SPECTRUM`; empty where the file tells too little.
     """
 
     text: str
@@ -128,6 +132,7 @@ class Imported:
     ignored: tuple[str, ...]
     checked: tuple[str, ...]
     found: Found
+    spectrum: str
 
     def __repr__(self) -> str:
         """Return one short line."""
@@ -164,13 +169,15 @@ def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules:
     gearbox = draft.checked(draft.text(source, {}), path)
     ratio = gearbox.train.ratio
     cases = load_case_blocks(draft.loads, draft.ends, static, ratio)
+    life = life_blocks(model, draft.loads, draft.ends, ratio, draft.rated_gears())
+    draft.settings |= life.blocks
     _compare_speeds(gearbox, draft.loads, draft.ends, notes)
     notes.faults.tell()
     _note_ignored(model, notes)
     text = draft.text(source, cases)
     gearbox = draft.checked(text, path)
     changed, ignored, checked = (tuple(lines) for lines in (notes.changed, notes.ignored, notes.checked))
-    return Imported(text, gearbox, changed, ignored, checked, draft.found)
+    return Imported(text, gearbox, changed, ignored, checked, draft.found, life.spectrum)
 
 
 def _refuse_types(model: Model, notes: Notes) -> None:
@@ -265,6 +272,11 @@ class _Draft:
         for body, reason in reasons.items():
             self.notes.changed.append(f"bodies.{body}: rigid in the variant flexible, too: {reason}")
             blocks[f"bodies.{body}"].entries["flexibility"] = assumed("none", "its sections give no seats, see above")
+
+    def rated_gears(self) -> dict[str, tuple[Component, bool]]:
+        """Gears by name, and whether their teeth bend both ways: those with several mates do."""
+        met = [number for stage in self.teeth.stages.values() for number in (stage.pinion, stage.gear)]
+        return {name: (self.model.components[n], met.count(n) > 1) for n, name in self.teeth.names.items()}
 
     def _output_gear(self) -> str:
         for number, body in self.teeth.bodies.items():

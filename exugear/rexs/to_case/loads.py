@@ -1,4 +1,4 @@
-"""Torques and speeds of a REXS file, at rest and by load case, on the bodies of the gearbox file."""
+"""Torques and speeds of a REXS file, at rest, by load case and over the life, and what withstands them."""
 
 from __future__ import annotations
 
@@ -10,11 +10,33 @@ from exugear.rexs.faults import RexsError
 from exugear.rexs.to_case.bodies import Bodies, Body
 from exugear.rexs.to_case.notes import Block, Entry, Notes, assumed, derived, read, tidy
 from exugear.rexs.to_case.places import Places
+from exugear.rexs.to_case.toothing import material_of
 from exugear.rexs.tree import Attribute, Component, LoadCase, Model
 
 FORCES = ("force_u_direction", "force_v_direction", "force_w_direction")
 UNKNOWN_TORQUE = 100.0
 """Torque where the file gives none, N m."""
+SPECTRUM = "load_spectrum.csv"
+"""Name of the table of loads beside the gearbox file."""
+HOURS_PER_YEAR = 8766.0
+USUAL_YEARS, USUAL_VISCOSITY, USUAL_DYNAMIC_FACTOR, USUAL_ROUGHNESS, USUAL_ROOT_FACTOR, BOTH_WAYS = (
+    20.0,
+    220.0,
+    1.2,
+    4.8,
+    0.95,
+    0.7,
+)
+"""What is assumed for a life: years, viscosity at 40 degrees (mm2/s), K_v, Rz (um), Y_drelT Y_RrelT Y_X, Y_M."""
+HARD_FLANK = 1100.0
+"""Endurance limit of flanks (MPa) from which on they are case hardened, if nothing else is said (ISO 6336-5)."""
+_NITRIDED = (((1e5, 1.3), (2e6, 1.0), (1e10, 0.85)), ((1e3, 1.6), (3e6, 1.0), (1e10, 0.85)))
+CURVES = {
+    "nitrided": _NITRIDED,
+    "grey_cast": _NITRIDED,
+    "through_hardened": (((1e5, 1.6), (5e7, 1.0), (1e10, 0.85)), ((1e4, 2.5), (3e6, 1.0), (1e10, 0.85))),
+}
+"""Life factors for contact and bending over load cycles, by words in the heat treatment; case hardened else."""
 LEAST_SHARE = 0.1
 """Speed at the start of a run-up over that at its end."""
 
@@ -29,12 +51,15 @@ class Loads:
         Of the load case.
     description : str
     torques, speeds : mapping of body name to float
+    share : float, optional
+        Of the operating time, %; None where the file gives none.
     """
 
     name: str
     description: str
     torques: Mapping[str, float]
     speeds: Mapping[str, float]
+    share: float | None = None
 
 
 @dataclass(frozen=True)
@@ -80,7 +105,7 @@ def _loads(model: Model, places: Places, bodies: Bodies, case: LoadCase | None) 
     for unit in _changed(model.of_type("gear_unit"), changes):
         share = unit.quantity("operating_time_fraction", "%")
     name = f"load_case_{case.number}" if case else "nominal"
-    return Loads(name, "" if share is None else f"{share:g} % of the operating time", torques, speeds)
+    return Loads(name, "" if share is None else f"{share:g} % of the operating time", torques, speeds, share)
 
 
 def _changed(parts: Sequence[Component], changes: Mapping[int, Mapping[str, Attribute]]) -> list[Component]:
@@ -219,3 +244,138 @@ def _input_speed(loads: Loads, ends: Ends, ratio: float) -> float:
 
 def _rounded(torque: float) -> float:
     return float(f"{torque:.8g}") + 0.0
+
+
+# -- loads over the life, and what withstands them -----------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class LifeLoads:
+    """Loads of a life as a table, and the sections of the gearbox file on them.
+
+    Attributes
+    ----------
+    spectrum : str
+        Text of the table `SPECTRUM`, which lies beside the gearbox file; empty where the file tells too little.
+    blocks : mapping of str to Block
+        Sections by name.
+    """
+
+    spectrum: str
+    blocks: Mapping[str, Block]
+
+
+def life_blocks(
+    model: Model, loads: Sequence[Loads], ends: Ends, ratio: float, gears: Mapping[str, tuple[Component, bool]]
+) -> LifeLoads:
+    """Sections on service, loads and rating, as far as the file has what `life` needs.
+
+    Parameters
+    ----------
+    model : Model
+    loads : sequence of Loads
+    ends : Ends
+    ratio : float
+        Speed of the output over that of the input.
+    gears : mapping of str to (Component, bool)
+        Gears by name, and whether their teeth bend both ways.
+    """
+    rated = max(loads, key=lambda one: abs(one.torques.get(ends.input, 0.0)))
+    speed = abs(_input_speed(rated, ends, ratio))
+    blocks = {}
+    if speed:
+        source = "rotational_speed at the torque of the static state"
+        blocks["operation"] = Block("", {"rated_speed_rpm": read(tidy(speed), source)})
+    rows = _spectrum(model, loads, ends, ratio)
+    if rows is None:
+        return LifeLoads("", blocks)
+    body, life, lines = rows
+    of_life = {"body": Entry(body), "life_years": life}
+    file = read(SPECTRUM, "load_case: torque, speed and operating_time_fraction of each")
+    source_block = Block("", {"file": file, "hours_per_year": assumed(HOURS_PER_YEAR, "always at work")})
+    blocks["loads"] = Block("", of_life, {"sources.load_spectrum": source_block})
+    blocks["rating"] = _rating(model, gears)
+    return LifeLoads("torque_N_m,speed_rpm,hours\n" + "".join(lines), blocks)
+
+
+def _spectrum(model: Model, loads: Sequence[Loads], ends: Ends, ratio: float) -> tuple[str, Entry, list[str]] | None:
+    """Body that is loaded, years, and lines of torque, speed and hours; None where the file does not tell them."""
+    body = next((end for end in (ends.input, ends.output) if all(one.torques.get(end) for one in loads)), None)
+    shares = [100.0] if len(loads) == 1 else [one.share or 0.0 for one in loads]
+    speeds = [_input_speed(one, ends, ratio) * (ratio if body == ends.output else 1.0) for one in loads]
+    if body is None or not sum(shares) or not all(speeds):
+        return None
+    hours = next((h for unit in model.of_type("gear_unit") if (h := unit.quantity("operating_time", "h"))), None)
+    life = assumed(USUAL_YEARS, "the file gives no operating_time")
+    if hours:
+        life = derived(_rounded(hours / HOURS_PER_YEAR), f"operating_time of {hours:g} h")
+    each = [(hours or life.value * HOURS_PER_YEAR) * share / sum(shares) for share in shares]
+    lines = [
+        f"{one.torques[body]!r},{tidy(speed)!r},{_rounded(duration)!r}\n"
+        for one, speed, duration in zip(loads, speeds, each, strict=True)
+    ]
+    return body, life, lines
+
+
+def _rating(model: Model, gears: Mapping[str, tuple[Component, bool]]) -> Block:
+    """Tell what gears withstand by their materials, and the oil; gears without both endurance limits are not rated."""
+    viscosities = [
+        one for oil in model.of_type("lubricant") if (one := oil.quantity("viscosity_at_40_degree_celsius", "mm^2 / s"))
+    ]
+    viscosity = (
+        read(tidy(min(viscosities)), "viscosity_at_40_degree_celsius of the lubricant")
+        if viscosities
+        else assumed(USUAL_VISCOSITY, "the file gives no lubricant")
+    )
+    keys = ("dynamic_factor_iso_6336_2006", "dynamic_factor_din_3990_1987")
+    factors = [one for stage in model.of_type("cylindrical_stage") for key in keys if (one := stage.quantity(key))]
+    dynamic = (
+        read(tidy(max(1.0, *factors)), "the largest dynamic_factor of the stages")
+        if factors
+        else assumed(USUAL_DYNAMIC_FACTOR, "the file gives none; a run or `steady` gives it, see dynamic_factor_run")
+    )
+    block = Block("", {"dynamic_factor": dynamic, "viscosity_40_mm2_per_s": viscosity})
+    for name, (gear, both_ways) in gears.items():
+        strength = _strength(material_of(model, gear), gear, both_ways)
+        if strength is not None:
+            block.blocks[f"gears.{name}"] = strength
+    return block
+
+
+def _strength(material: Component | None, gear: Component, both_ways: bool) -> Block | None:
+    """Tell what a gear withstands; None without both of its endurance limits."""
+    limits = {
+        ours: material.quantity(key, "MPa") if material else None
+        for ours, key in (("sigma_H_lim_MPa", "endurance_limit_flank"), ("sigma_F_lim_MPa", "endurance_limit_root"))
+    }
+    if material is None or not all(limits.values()):
+        return None
+    entries = {
+        ours: read(tidy(value or 0.0), f"endurance_limit_{'flank' if 'H' in ours else 'root'} of {material}")
+        for ours, value in limits.items()
+    }
+    entries |= _curves(material.text("heat_treated_material_type_iso_6336_2006"), limits["sigma_H_lim_MPa"] or 0.0)
+    roughness = gear.quantity("arithmetic_average_roughness_flank", "mum")
+    entries["roughness_um"] = (
+        derived(tidy(round(6.0 * roughness, 6)), f"six times arithmetic_average_roughness_flank of {roughness:g} um")
+        if roughness
+        else assumed(USUAL_ROUGHNESS, "Rz; the file gives none")
+    )
+    entries["root_factor"] = assumed(USUAL_ROOT_FACTOR, "Y_drelT Y_RrelT Y_X, near 1 by ISO 6336-3")
+    if both_ways:
+        entries["mean_stress_factor"] = assumed(BOTH_WAYS, "Y_M of ISO 6336-3, annex B, for teeth that bend both ways")
+    return Block(str(material), entries)
+
+
+def _curves(kind: str, flank_limit: float) -> dict[str, Entry]:
+    """S-N curves of a heat treatment: ISO 6336-2:2006, table 2, and ISO 6336-3:2006, table 1."""
+    source = f"heat_treated_material_type_iso_6336_2006 {kind}"
+    if kind.lower() in ("", "false", "none"):
+        hard = flank_limit >= HARD_FLANK
+        kind = "case_hardened" if hard else "through_hardened"
+        source = f"no heat treatment given; {flank_limit:g} MPa are those of {'' if hard else 'un'}hardened flanks"
+    found = next((curves for word, curves in CURVES.items() if word in kind), None)
+    if found is None:
+        return {"curve": assumed("case_hardened", source)}
+    contact, bending = ([list(point) for point in curve] for curve in found)
+    return {"contact_curve": derived(contact, source), "bending_curve": derived(bending, source)}

@@ -30,6 +30,10 @@ UNITS = {
     "radial_dynamic_load_rating": "kN",
     "radial_static_load_rating": "kN",
     "u_coordinate_on_shaft": "mm",
+    "endurance_limit_flank": "N / mm^2",
+    "endurance_limit_root": "N / mm^2",
+    "viscosity_at_40_degree_celsius": "mm^2 / s",
+    "operating_time": "h",
     "elastic_modulus": "N / mm^2",
     "density": "kg / dm^3",
 }

@@ -362,7 +362,7 @@ def test_the_verb_writes_a_case_that_check_accepts_and_never_over_another(tmp_pa
     assert outcome.exit_code == 0, outcome.output
     summary = json.loads(outcome.stdout)
     assert summary["ratio"] == pytest.approx(IMPORTED[SEW], rel=1e-12)
-    assert [path.name for path in out.iterdir()] == ["gearbox.toml"]
+    assert sorted(path.name for path in out.iterdir()) == ["gearbox.toml", "load_spectrum.csv"]
     assert Gearbox.from_toml(out / "gearbox.toml").train.ratio == summary["ratio"]
     before = (out / "gearbox.toml").read_bytes()
     again = CliRunner().invoke(app, ["import", str(DATA / SEW), "--out", str(out)])
