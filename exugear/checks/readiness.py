@@ -13,6 +13,7 @@ from exugear.bearings.rolling.rows import BearingError
 from exugear.bearings.support_laws import linear_law, misplaced_factor
 from exugear.bearings.supports import ON_BEARINGS, elastic_names, unsupported
 from exugear.checks.margins import doubts_about_pairs
+from exugear.checks.plausibility import doubts_about_parts
 from exugear.checks.restraint import free_motion
 from exugear.loads.torque_series import torque_series
 from exugear.model.gearbox import Gearbox
@@ -92,13 +93,13 @@ def _misplaced_factors(gearbox: Gearbox, variant: str) -> str:
 
 
 def remarks(gearbox: Gearbox) -> tuple[str, ...]:
-    """Tell what is possible and unusual, and what some verbs will refuse; a line each."""
+    """Tell what is possible and unusual, and how it is taken; a line each. Every verb tells the same."""
     lines = list(gearbox.warnings)
-    for name, spec in gearbox.pairs.items():
-        if spec.static_torque > 0.0 or spec.stiffness:
-            continue
-        if any(mesh.pair.name == name for mesh in gearbox.meshes):
-            lines.append(f"pairs.{name}: carries no torque in [static_load], and so gets no table")
+    lines += (
+        f"pairs.{name}: carries no torque in [static_load], and so gets no table: its teeth are as stiff as "
+        "ISO 6336-1 says, and excite nothing"
+        for name in gearbox.idle_pairs
+    )
     train = gearbox.train
     if train.degrees_of_freedom > 1:
         others = ", ".join(train.independent[1:])
@@ -107,7 +108,17 @@ def remarks(gearbox: Gearbox) -> tuple[str, ...]:
             f"input hold while {others} stand{'s' if len(train.independent) == 2 else ''}"
         )
     lines += doubts_about_pairs(gearbox)
-    return tuple(lines)
+    lines += doubts_about_parts(gearbox)
+    lines += _narrowed_seats(gearbox)
+    return tuple(dict.fromkeys(lines))
+
+
+def _narrowed_seats(gearbox: Gearbox) -> Iterator[str]:
+    from exugear.bodies.of_gearbox.shafts import narrowed_seats
+
+    for name in elastic_names(gearbox):
+        if gearbox.case.bodies[gearbox.body(name).family].solid is None:
+            yield from narrowed_seats(gearbox, name)
 
 
 def _build_bearing(gearbox: Gearbox, bearing: Bearing) -> None:

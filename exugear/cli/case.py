@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 def read_gearbox(case: Path, files_below: Path | None = None, scripts: bool = False, *, tell: bool = True) -> Gearbox:
     """Read a gearbox file for a verb, with what the user permits it, and try all its parts; tell what is unusual."""
-    from exugear.checks.readiness import check_parts, faults_of_bearings
+    from exugear.checks.readiness import check_parts, faults_of_bearings, remarks
     from exugear.model.gearbox import Gearbox
     from exugear.model.named_files import Permissions
     from exugear.model.reading import CaseError, read_toml
@@ -33,7 +33,7 @@ def read_gearbox(case: Path, files_below: Path | None = None, scripts: bool = Fa
         check_parts(gearbox)
     except CaseError as error:
         raise BadInputError(error) from error
-    for line in gearbox.warnings if tell else ():
+    for line in remarks(gearbox) if tell else ():
         note(f"Warning: {line}", style="yellow")
     return gearbox
 
@@ -57,7 +57,27 @@ def open_project(
     gearbox = read_gearbox(case, files_below, scripts)
     folder = out or default_folder(case)
     check_choice(gearbox, choice, folder)
+    check_results_folder(folder)
     return Project(gearbox, folder, choice)
+
+
+def check_results_folder(folder: Path) -> None:
+    """Refuse a folder that a verb could not write into, before it works, and make none."""
+    there = next(parent for parent in (folder, *folder.absolute().parents) if parent.exists())
+    if not there.is_dir():
+        raise BadInputError(f"--out {folder}: {there} is no folder; name one that can be made")
+    if not os.access(there, os.W_OK):
+        raise BadInputError(f"--out {folder}: {there} is not writable; name another folder")
+
+
+def begin_results(project: Project) -> None:
+    """Make the folder of a project that a verb writes into, after the last refusal.
+
+    That is of tables whose axes ask for what the gears cannot do.
+    """
+    with model_errors():
+        project.missing_tables()
+    make_results_folder(project.folder)
 
 
 def make_results_folder(folder: Path) -> None:
@@ -68,6 +88,29 @@ def make_results_folder(folder: Path) -> None:
         raise BadInputError(f"--out {folder}: {error.strerror}; name a folder that can be made") from error
     if not os.access(folder, os.W_OK):
         raise BadInputError(f"--out {folder}: not writable; name another folder")
+
+
+def steady_lack(gearbox: Gearbox, variant: str) -> str:
+    """Say why a variant has no steady response over speed; empty where it has one.
+
+    What speaks against it does not depend on finite elements: teeth are as stiff as ISO 6336-1 says, bodies rigid.
+
+    Raises
+    ------
+    FailedError
+        The variant finds no balance so.
+    """
+    from exugear.bearings.supports import elastic_names
+    from exugear.dynamics.assemble import assemble
+    from exugear.model.choice import Choice
+    from exugear.rotating.mean_system import unsuitable
+    from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+
+    law = "iso6336"
+    elastic, rigid = (elastic_names(gearbox), Variant.bushing) if variant == Variant.flexible else ((), variant)
+    with model_errors():
+        assembly = assemble(gearbox, Choice(str(rigid), law), mesh_stiffness(gearbox, law))
+    return unsuitable(assembly, elastic)
 
 
 def check_choice(gearbox: Gearbox, choice: Choice, folder: Path) -> None:

@@ -237,7 +237,8 @@ def modes_of(assembly: Assembly, preload: bool = True) -> Modes:
     elastic = frequency > RIGID_BODY_LIMIT
     with np.errstate(over="ignore"):  # a static load beyond anything: its modes are damped infinitely
         ratio = np.divide(modal_damping, 2.0 * omega, out=np.zeros_like(omega), where=elastic)
-    strain = np.array([np.einsum("im,ij,jm->m", shapes, k, shapes) for k in linear.stiffness.values()]).T
+    strain = np.array([np.einsum("im,ij,jm->m", shapes, k, shapes) for k in linear.stiffness.values()])
+    strain = strain.reshape(len(linear.stiffness), len(frequency)).T  # gears that only roll have no element
     strain = np.where(elastic[:, None], strain / np.maximum(strain.sum(axis=1, keepdims=True), 1e-300), 0.0)
     kinetic = kinetic_shares(assembly, shapes, q)
     overall = overall_row(assembly) @ shapes

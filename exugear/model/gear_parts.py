@@ -311,7 +311,7 @@ def pair_specs(
     mesh_forces : mapping of pair name to list of float
         Static force F_bt of each of the pair's meshes at work, N; the pair's own is the mean of their amounts.
     stated : mapping of pair name to tuple of float
-        Mesh stiffness of pairs of which the file states it.
+        Mesh stiffness of pairs that need no table.
     """
     specs = {}
     for name, pair in pairs.items():
@@ -321,7 +321,7 @@ def pair_specs(
             name=name,
             pair=pair,
             static_torque=force * pair.pinion.base_radius,
-            table=section.table and section.stiffness is None,
+            table=section.table and name not in stated and force > 0.0,
             flank=-1 if sum(forces) < 0.0 else 1,
             modifications=(modifications[pair.pinion.name], modifications[pair.gear.name]),
             stiffness=stated.get(name, ()),

@@ -33,6 +33,7 @@ from exugear.model.sections.quantities import unusual_values
 from exugear.train.train import Train
 from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.gears import Gear, GearPair
+from fe_ste.standards import iso6336
 from fe_ste.tools.notebook import html_table
 
 BESIDE_EQUATIONS = ("labels", "load_cases", "loads", "operation", "rating", "report", "ste")
@@ -362,9 +363,22 @@ class Gearbox:
         )
 
     @cached_property
+    def idle_pairs(self) -> tuple[str, ...]:
+        """Pairs at work that carry no torque in the static state, and whose stiffness the file does not state."""
+        forces = self.train.static_mesh_forces()
+        loaded = {mesh.pair.name for mesh in self.meshes if forces[mesh.name] != 0.0}
+        at_work = dict.fromkeys(mesh.pair.name for mesh in self.meshes)
+        return tuple(name for name in at_work if name not in loaded and self.case.pairs[name].stiffness is None)
+
+    @cached_property
     def stated_stiffness(self) -> dict[str, tuple[float, ...]]:
-        """Mesh stiffness of the pairs of which the file states it, N/m at equal distances over the mesh cycle."""
-        return gear_parts.stated_stiffness(self._origin)
+        """Mesh stiffness of the pairs that need no table, N/m at equal distances over the mesh cycle.
+
+        It is what the file states. A pair that carries no torque has no table, since it has no loaded flank: its teeth
+        are as stiff as ISO 6336-1 says of loaded ones, and excite nothing.
+        """
+        stated = gear_parts.stated_stiffness(self._origin)
+        return stated | {name: (iso6336.mesh_stiffness(self.gear_pairs[name]).stiffness,) for name in self.idle_pairs}
 
     def table_distances(self, pair: str) -> tuple[float, ...]:
         """Centre distances (m) of a pair's table with axes.
@@ -401,7 +415,7 @@ def _checks_of_parts(gearbox: Gearbox) -> Iterator[checks.Check]:
     yield checks.Check("bodies", lambda: refuse(checks.faults_of_bodies(case)))
     yield checks.Check("masses", lambda: refuse(checks.faults_of_mass_properties(case)))
     yield checks.Check("gears", lambda: gearbox.gears)
-    yield checks.Check("stiffness", lambda: gearbox.stated_stiffness)
+    yield checks.Check("stiffness", lambda: gear_parts.stated_stiffness(gearbox._origin))
     yield checks.Check("supports", lambda: refuse(checks.faults_of_supports(case)))
     yield checks.Check("places", lambda: _check_inertia_sets(gearbox), ("bodies", "masses"))
     yield checks.Check("modifications", lambda: gearbox.modifications, ("gears",))

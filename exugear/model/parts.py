@@ -372,7 +372,7 @@ class PairSpec:
     modifications : tuple of FlankModification
         Gear 1, gear 2, in the axes of the gearbox.
     stiffness : tuple of float
-        Mesh stiffness that the file states, at equal distances over the mesh cycle, N/m; empty if it states none.
+        Mesh stiffness of a pair that needs no table, at equal distances over the mesh cycle, N/m; empty of others.
     """
 
     name: str

@@ -20,6 +20,8 @@ import scipy.linalg
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.statics import BalanceError, static_state
 from exugear.harmonics.side_by_side import Elimination, elimination, solve_side_by_side
+from exugear.model.gearbox import Gearbox
+from exugear.model.parts import Mesh
 from exugear.rotating.equal_planets import with_equal_planets
 from exugear.rotating.rotating_frame import RotatingFrame, SteadyError, planet_sets
 from fe_ste.tools.arrays import Complexes, Floats
@@ -48,6 +50,10 @@ PLACES = 4
 
 A thousandth of a light resonance's amplitude hangs on it: 5e-6 of a frequency."""
 
+ELASTIC_RING = (
+    "the ring gear is elastic, and meshes travel around its seats: stiffness changes with the carrier's angle, "
+    "which the steady response cannot treat; make the ring's body rigid (flexibility = 'none')"
+)
 LEAST_ENERGY = 1e-6
 """Share of the kinetic energy from which what a line does in the mean is looked at."""
 
@@ -269,8 +275,17 @@ def unsuitable(assembly: Assembly, elastic: Collection[str] = ()) -> str:
         planet_sets(assembly)
     except SteadyError as error:
         return str(error)
+    if any(_has_sectors(assembly.gearbox, mesh) for mesh in assembly.gearbox.meshes if mesh.gear in elastic):
+        return ELASTIC_RING
     turning = {name for body in assembly.bodies if body.carrier is not None for name in (body.name, body.carrier)}
     return ", ".join(f"bodies.{name}: elastic and turning with planets" for name in elastic if name in turning)
+
+
+def _has_sectors(gearbox: Gearbox, mesh: Mesh) -> bool:
+    """Whether a mesh travels around the sectors of its elastic gear."""
+    solid = gearbox.case.bodies[gearbox.body(mesh.gear).family].solid
+    seat = None if solid is None else solid.seats.get(mesh.pair.gear.name)
+    return seat is not None and seat.sectors is not None
 
 
 def _check(assembly: Assembly) -> None:
@@ -284,10 +299,7 @@ def _check(assembly: Assembly) -> None:
     if not gearbox.meshes:
         raise SteadyError("the train has no meshes, and so nothing that excites it; run a load case in time instead")
     if assembly.travelling.first.size:
-        raise SteadyError(
-            "the ring gear is elastic, and meshes travel around its seats: stiffness changes with the carrier's angle, "
-            "which the steady response cannot treat; make the ring's body rigid (flexibility = 'none')"
-        )
+        raise SteadyError(ELASTIC_RING)
     if gearbox.deviations:
         raise SteadyError(
             "deviations: errors of pitch and run-out return with the wheels' turns, which the steady response does not "

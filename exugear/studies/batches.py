@@ -12,6 +12,7 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
+from exugear.checks.readiness import check_parts
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.named_files import Permissions
@@ -102,6 +103,7 @@ def compute_point(task: Task, work: Work) -> Record:
     folder = task.folder / WORK_FOLDER / work.point[:32]
     try:
         gearbox = Gearbox.from_dict(changed(task.content, work.changes), task.source, task.permissions)
+        check_parts(gearbox)
         results = PointResults(gearbox, task.choice, task.settings, Shared(task.folder / SHARED_FOLDER), folder)
         values = {name: _finite(kept.of(results)) for name, kept in task.figures.items()}
         doubts = list(results.doubts)

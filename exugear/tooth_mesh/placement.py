@@ -112,8 +112,14 @@ class ToothContact:
 
 
 def loaded_flanks(gearbox: Gearbox, torques: Mapping[str, float] | None = None) -> dict[str, int]:
-    """Tell the loaded flank s of each mesh under the static load, or other torques at the same locks."""
+    """Tell the loaded flank s of each mesh under the static load, or other torques at the same locks.
+
+    Of a mesh that they leave without force, the one by which what it drives is dragged along.
+    """
     forces = gearbox.train.static_mesh_forces(torques)
+    if not all(forces.values()):
+        dragged = gearbox.train.dragging_forces()
+        forces = {name: force or dragged.get(name, 0.0) for name, force in forces.items()}
     return {name: -1 if force < 0.0 else 1 for name, force in forces.items()}
 
 

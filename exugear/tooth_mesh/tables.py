@@ -99,27 +99,28 @@ def requested_tables(
         if name not in gearbox.pairs:
             known = ", ".join(gearbox.pairs)
             raise CaseError(f"{gearbox.source}: no gear pair {name!r}; the pairs are {known}")
-        if name in gearbox.stated_stiffness:
+        if not gearbox.pairs[name].static_torque > 0.0 or name in gearbox.stated_stiffness:
             raise gearbox.fault(without_table(gearbox, [name]))
-        if not gearbox.pairs[name].static_torque > 0.0:
-            raise CaseError(
-                f"{gearbox.source}: pairs.{name}: carries no torque in [static_load]; "
-                "a table needs one, for it belongs to one loaded flank"
-            )
     grid = grid or gearbox.ste.grid
     wanted = {name: wanted_table(gearbox, name, positions or gearbox.ste.positions, grid) for name in chosen}
     return [_request(gearbox, name, out, table, grid) for name, table in wanted.items()]
 
 
 def without_table(gearbox: Gearbox, names: Iterable[str]) -> str:
-    """Say which of these pairs get no table because the file states their stiffness; empty if none."""
-    stated = [name for name in names if name in gearbox.stated_stiffness]
-    if not stated:
-        return ""
-    return (
-        f"pairs.{stated[0]}.stiffness: is stated, so the pair has no table; leave it out to have one computed, "
-        "or take a mesh law that needs a stiffness alone (line_of_action, constant, seed, iso6336)"
-    )
+    """Say why the first of these pairs without a table has none, and what would be right; empty if all have one."""
+    law = "take a mesh law that needs a stiffness alone (line_of_action, constant, seed, iso6336)"
+    for name in names:
+        if gearbox.case.pairs[name].stiffness is not None:
+            return (
+                f"pairs.{name}.stiffness: is stated, so the pair has no table; leave it out to have one computed, "
+                f"or {law}"
+            )
+        if not gearbox.pairs[name].static_torque > 0.0:
+            return (
+                f"pairs.{name}: carries no torque in [static_load]; a table needs one, for it belongs to one loaded "
+                f"flank; put a torque on what it drives, or {law}"
+            )
+    return ""
 
 
 def table_path(out: Path, name: str) -> Path:

@@ -203,6 +203,21 @@ class Train:
         loaded = without_round_off(forces[: len(self.meshes)], np.abs(applied).max(), smallest_radius)
         return {mesh.name: float(force) for mesh, force in zip(self.meshes, loaded, strict=True)}
 
+    def dragging_forces(self) -> dict[str, float]:
+        """Line-of-action force of each mesh (N) where a drag of 1 N m holds each body back, at the static locks.
+
+        It says by its sign which flank touches where the static load leaves none pressed. The train rolls as the static
+        torques drive it, or against them where the input is locked and they are the load; nothing where that leaves
+        open how it rolls.
+        """
+        speeds = self.rolling_speeds(self.input, 1.0)
+        power = sum(torque * speeds[name] for name, torque in self.torques.items())
+        sense = math.copysign(1.0, power) * (-1.0 if self.input in self.locked else 1.0)
+        drag = -sense * np.sign(without_round_off(np.array([speeds[name] for name in self.spins]), 1.0, 1.0))
+        locks = np.array([[float(name == lock) for name in self.spins] for lock in self.locked])
+        forces = holding_forces(np.vstack([self.spin_rows, locks.reshape(-1, len(self.spins))]), drag)
+        return {} if forces is None else dict(zip((mesh.name for mesh in self.meshes), forces.tolist(), strict=False))
+
     def _check_load(self, torques: Mapping[str, float]) -> None:
         """Refuse loads and locks on bodies that do not turn, and more locks than degrees of freedom."""
         for key, names in (("torques_N_m", tuple(torques)), ("locked", self.locked)):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,10 @@ MOST_ELEMENTS = 50_000
 """Most elements over a half-section: 10 m of shaft with 3 m diameter; 4 GB."""
 SAME = 1e-9
 """Two places (m) this close are one."""
+REACH = 2e-3
+"""Length (m) by which a seat may reach across a shoulder or the end of its shaft: chamfers, and rounded drawings."""
+REACHING_SHARE = 0.25
+"""Part of its width by which it may at most."""
 
 
 class ShaftError(ValueError):
@@ -133,6 +137,31 @@ def locate(sections: Sequence[ShaftSection], seat: SeatBand) -> tuple[int, float
     if seat.width > 0.0 and len(under) > 1 and len(ends) > 1:
         raise ShaftError(f"seat {seat.name}: a shoulder lies between {low:g} and {high:g} m; move or narrow it")
     return max(under, key=lambda one: sections[one].outer_at(seat.z - float(places[one]))), low, high
+
+
+def narrowed(sections: Sequence[ShaftSection], seat: SeatBand) -> SeatBand:
+    """Return a seat that reaches a little across a shoulder, or beyond the shaft, as one that ends there.
+
+    It stays about its middle, where what sits on it acts, so that the other side ends as far from there. One that
+    reaches further stays as it is; `locate` refuses it.
+
+    Examples
+    --------
+    A bearing of 20 mm whose shoulder stands 19 mm from its far side:
+
+    >>> sections = (ShaftSection(0.019, 0.040), ShaftSection(0.100, 0.050))
+    >>> round(narrowed(sections, SeatBand("bearing", 0.010, 0.020)).width, 6)
+    0.018
+    """
+    places = np.concatenate([[0.0], np.cumsum([section.length for section in sections])])
+    outer = [section.outer_diameter for section in sections]
+    ends = [section.outer_end for section in sections]
+    steps = [n for n in range(1, len(sections)) if outer[n] != ends[n - 1]]
+    half = min((abs(seat.z - float(places[n])) for n in (0, *steps, len(sections))), default=0.0)
+    across = seat.width / 2.0 - half
+    if not SAME < across <= min(REACH, REACHING_SHARE * seat.width) + SAME:
+        return seat
+    return replace(seat, width=2.0 * half)
 
 
 def check_shaft(sections: Sequence[ShaftSection], seats: Sequence[SeatBand], size: MeshSize = STANDARD_SIZE) -> None:

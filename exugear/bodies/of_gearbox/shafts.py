@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from exugear.bearings.supports import mounts_at_work
-from exugear.bodies.finite_elements.shaft_sections import MeshSize, SeatBand, ShaftError, ShaftSection
+from exugear.bodies.finite_elements.shaft_sections import MeshSize, SeatBand, ShaftError, ShaftSection, narrowed
 from exugear.bodies.finite_elements.solid_seats import SolidSeat
 from exugear.bodies.finite_elements.turned_hexahedra import turned_hexahedra
 from exugear.bodies.finite_elements.turned_section import Shaft
@@ -33,13 +33,11 @@ def shaft_model(gearbox: Gearbox, name: str) -> ShaftModel:
         The body has no shape, or a shape that its gears and bearings do not fit on.
     """
     body = gearbox.body(name)
-    shape = gearbox.case.bodies[body.family].shape
-    if shape is None:
-        raise gearbox.fault(f"bodies.{body.family}: no shape; give a [bodies.{body.family}.shape] table")
+    shape = _shape_of(gearbox, body)
     if frame_of(gearbox, body) == "carrier":
         raise gearbox.fault(f"bodies.{body.family}.shape: the body carries planets; give a .solid table instead")
-    start = shape.start_z_mm * 1e-3
-    seats = tuple(SeatBand(seat, z - start, width) for seat, z, width in _seats(gearbox, body, shape))
+    sections = tuple(map(_section_of, shape.sections))
+    seats = tuple(narrowed(sections, seat) for seat in _seats(gearbox, body, shape))
     names = [seat.name for seat in seats]
     doubled = next((seat for seat in names if names.count(seat) > 1), None)
     if doubled is not None:
@@ -50,14 +48,36 @@ def shaft_model(gearbox: Gearbox, name: str) -> ShaftModel:
         raise gearbox.fault(f"{key}.blanks.{unknown}: no such seat; seats are {', '.join(names)}")
     return ShaftModel(
         name=name,
-        sections=tuple(map(_section_of, shape.sections)),
+        sections=sections,
         material=material_of(shape.material),
-        origin=(*body.axis, start),
+        origin=(*body.axis, shape.start_z_mm * 1e-3),
         seats=seats,
         blanks={seat: blank_of(blank) for seat, blank in shape.blanks.items()},
         band=gearbox.case.elasticity.band_Hz,
         limit=gearbox.case.elasticity.limit_Hz,
     )
+
+
+def narrowed_seats(gearbox: Gearbox, name: str) -> Iterator[str]:
+    """Say which seats of a body's shaft reach a little across a shoulder, or beyond its end, and so end there."""
+    body = gearbox.body(name)
+    shape = _shape_of(gearbox, body)
+    sections = tuple(map(_section_of, shape.sections))
+    for seat in _seats(gearbox, body, shape):
+        across = 500.0 * (seat.width - narrowed(sections, seat).width)
+        if across > 0.0:
+            yield (
+                f"bodies.{body.family}.shape: the seat of {seat.name} reaches {across:.3g} mm across a shoulder or the "
+                f"end of the shaft; it ends there, and as far from its middle on the other side"
+            )
+
+
+def _shape_of(gearbox: Gearbox, body: Body) -> ShapeSection:
+    """Section of a body's shape, which must be there."""
+    shape = gearbox.case.bodies[body.family].shape
+    if shape is None:
+        raise gearbox.fault(f"bodies.{body.family}: no shape; give a [bodies.{body.family}.shape] table")
+    return shape
 
 
 def _section_of(section: ShaftSectionSection) -> ShaftSection:
@@ -78,18 +98,19 @@ def _section_of(section: ShaftSectionSection) -> ShaftSection:
     )
 
 
-def _seats(gearbox: Gearbox, body: Body, shape: ShapeSection) -> Iterator[tuple[str, float, float]]:
-    """Name, z and width (m) of each seat."""
+def _seats(gearbox: Gearbox, body: Body, shape: ShapeSection) -> Iterator[SeatBand]:
+    """Each seat as the file has it, from the beginning of the shaft."""
+    start = shape.start_z_mm * 1e-3
     for gear, z in body.wheels.items():
-        yield gear, z, gearbox.gears[gear].face_width
+        yield SeatBand(gear, z - start, gearbox.gears[gear].face_width)
     for bearing in gearbox.bearings:
         if body.name in (bearing.body, bearing.on):
-            yield bearing.name, bearing.position[2], seat_width(bearing)
+            yield SeatBand(bearing.name, bearing.position[2] - start, seat_width(bearing))
     for mount in mounts_at_work(gearbox):
         if mount.body == body.name:
-            yield mount.name, mount.position[2], 0.0
+            yield SeatBand(mount.name, mount.position[2] - start, 0.0)
     if shape.torque_z_mm is not None:
-        yield TORQUE_SEAT, shape.torque_z_mm * 1e-3, 0.0
+        yield SeatBand(TORQUE_SEAT, shape.torque_z_mm * 1e-3 - start, 0.0)
 
 
 def solid_of_shaft(model: ShaftModel, size: MeshSize = SOLID_SIZE) -> SolidModel:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from exugear.cli.case import read_gearbox
+from exugear.cli.case import read_gearbox, steady_lack
 from exugear.cli.console import note, print_json, print_table, say
 from exugear.cli.errors import BadInputError, FailedError, exit_codes, model_errors
 from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption
@@ -82,24 +82,12 @@ def _read(case: Path, files_below: Path | None, as_json: bool) -> Gearbox:
 
 def _steady_lacks(gearbox: Gearbox, variants: dict[str, str]) -> dict[str, str]:
     """Say of each variant that is possible why it has no steady response over speed; empty where it has one."""
-    from exugear.bearings.supports import elastic_names
-    from exugear.dynamics.assemble import assemble
-    from exugear.model.choice import Choice
-    from exugear.rotating.mean_system import unsuitable
-    from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
-
-    law, reasons = "iso6336", {}
+    reasons = {}
     for variant in (name for name, lack in variants.items() if not lack):
-        elastic = elastic_names(gearbox) if variant == "flexible" else ()
-        # What speaks against it does not depend on finite elements: bodies stay rigid here.
-        rigid = "bushing" if variant == "flexible" else variant
         try:
-            with model_errors():
-                assembly = assemble(gearbox, Choice(rigid, law), mesh_stiffness(gearbox, law))
+            reasons[variant] = steady_lack(gearbox, variant)
         except FailedError as error:
             reasons[variant] = str(error)
-            continue
-        reasons[variant] = unsuitable(assembly, elastic)
     return reasons
 
 

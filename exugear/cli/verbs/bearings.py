@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from exugear.cli.case import make_results_folder, open_project
+from exugear.cli.case import begin_results, open_project
 from exugear.cli.console import note, print_json, print_table, say
 from exugear.cli.dynamics import reduce_elastic_bodies
 from exugear.cli.errors import BadInputError, exit_codes, model_errors
@@ -51,7 +51,7 @@ def bearings(
         project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
         if not any(bearing.catalogue for bearing in project.gearbox.bearings):
             raise BadInputError(f"{case}: no bearing has catalogue data; add a [bearings.NAME.catalogue]")
-        make_results_folder(project.folder)
+        begin_results(project)
         compute_missing_tables(project)
         reduce_elastic_bodies(project)
         with model_errors():

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from exugear.cli.case import make_results_folder, read_gearbox
+from exugear.cli.case import check_results_folder, make_results_folder, read_gearbox
 from exugear.cli.console import note, print_json, print_table, say
 from exugear.cli.errors import exit_codes, model_errors
 from exugear.cli.load_files import files_bar
@@ -34,9 +34,10 @@ def loads(
         from exugear.project import default_folder
 
         gearbox = read_gearbox(case, files_below, scripts)
+        folder = (out or default_folder(case)) / "loads"
+        check_results_folder(folder)
         with model_errors(), files_bar() as read:
             counted = count_loads(gearbox, read)
-        folder = (out or default_folder(case)) / "loads"
         make_results_folder(folder)
         picture = folder / "load_duration.png"
         draw_duration(counted.distribution, counted.body, picture)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from exugear.cli.case import make_results_folder, open_project
+from exugear.cli.case import begin_results, open_project
 from exugear.cli.console import note, print_json, print_table, say
 from exugear.cli.dynamics import compute_modes, label_of
 from exugear.cli.errors import exit_codes
@@ -45,7 +45,7 @@ def modes(
         from exugear.results.folder import time_noted
 
         project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
-        make_results_folder(project.folder)
+        begin_results(project)
         compute_missing_tables(project)
         with time_noted(project.folder, f"modes, {variant}, {project.choice.inertias}, {mesh_law}"):
             found, path = compute_modes(project), project.modes_path

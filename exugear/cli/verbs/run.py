@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from exugear.cli.case import make_results_folder, open_project
+from exugear.cli.case import begin_results, open_project
 from exugear.cli.console import note, print_json, progress_bar, say
 from exugear.cli.dynamics import reduce_elastic_bodies
 from exugear.cli.errors import (
@@ -107,7 +107,7 @@ def run(
         if integrator and solver is Solver.exudyn:
             raise BadInputError(f"--integrator {integrator}: is a method of the compiled solver; leave it out")
         if not resume:
-            make_results_folder(project.folder)
+            begin_results(project)
         _check_run_directory(project.run_directory, resume)
         _tell_doubts(project, duration)
         compute_missing_tables(project)

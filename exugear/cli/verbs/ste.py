@@ -101,13 +101,16 @@ def _requested_tables(
     from exugear.model.reading import CaseError
     from exugear.project import default_folder
     from exugear.results.folder import keep_case
-    from exugear.tooth_mesh.tables import requested_tables
+    from exugear.tooth_mesh.tables import requested_tables, without_table
 
     folder = out or default_folder(case)
     try:
         requests = requested_tables(gearbox, folder, names, positions, grid)
     except CaseError as error:
         raise BadInputError(error) from error
+    if not requests:
+        why = without_table(gearbox, gearbox.pairs) or "pairs: none wants a table; give table = true, or --mesh NAME"
+        raise BadInputError(gearbox.fault(why))
     make_results_folder(folder)
     keep_case(gearbox, folder)
     for request in requests:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from exugear.cli.case import make_results_folder, open_project
+from exugear.cli.case import begin_results, open_project, steady_lack
 from exugear.cli.console import note, print_json, print_table, progress_bar, say
 from exugear.cli.dynamics import reduce_elastic_bodies
-from exugear.cli.errors import FailedError, exit_codes, interruption, model_errors
+from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption, model_errors
 from exugear.cli.options import (
     USUAL_LAW,
     CaseArgument,
@@ -88,11 +89,19 @@ def steady(
         project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
         with model_errors():
             settings = _settings(project, level, speeds, branches)
-        make_results_folder(project.folder)
+        _refuse_what_has_none(project)
+        begin_results(project)
         compute_missing_tables(project)
         reduce_elastic_bodies(project)
         data = _respond(project, settings)
         _tell(project, settings, data, as_json)
+
+
+def _refuse_what_has_none(project: Project) -> None:
+    """Refuse a variant without a steady response before tables and finite elements."""
+    with suppress(FailedError):  # which says nothing of the law that is asked for
+        if reason := steady_lack(project.gearbox, project.choice.variant):
+            raise BadInputError(reason)
 
 
 def _settings(project: Project, level: Level, speeds: str | None, branches: bool) -> SteadySettings:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from exugear.cli.case import make_results_folder, open_project
+from exugear.cli.case import begin_results, open_project
 from exugear.cli.console import note, print_json, say
 from exugear.cli.dynamics import compute_modes, label_of
 from exugear.cli.errors import BadInputError, exit_codes
@@ -50,7 +50,7 @@ def view(
         from exugear.model.choice import Choice
 
         project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
-        make_results_folder(project.folder)
+        begin_results(project)
         compute_missing_tables(project)
         found = compute_modes(project)
         wanted = project.gearbox.case.report.reference_frequency_Hz if near is None else near

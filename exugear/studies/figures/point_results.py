@@ -97,7 +97,7 @@ class PointResults:
         reader = law_of(self.choice.mesh_law)
         for pair in dict.fromkeys(mesh.pair.name for mesh in self.gearbox.meshes):
             folder = Path()
-            if law is not None and law.needs_tables:
+            if law is not None and law.needs_tables and (law.needs_axes or pair not in self.gearbox.stated_stiffness):
                 self.shared.table(self.gearbox, pair, law.needs_axes, _between_steps)
                 folder = self.shared.results_folder(self.gearbox, pair, law.needs_axes)
             found[pair] = reader.read(self.gearbox, pair, folder)

@@ -266,7 +266,7 @@ def test_a_topography_deeper_than_half_a_module_is_refused(case: Any, cases: Any
 def test_what_carries_nothing_in_the_static_load_is_told(case: Any) -> None:
     gearbox = case("spur", static_load={"torques_N_m": {"shaft_1": 100.0}, "locked": ["shaft_1"]})
     assert gearbox.train.static_mesh_forces() == {"spur": 0.0}  # not the rounding of zero
-    assert "pairs.spur: carries no torque in [static_load], and so gets no table" in remarks(gearbox)
+    assert any(line.startswith("pairs.spur: carries no torque in [static_load]") for line in remarks(gearbox))
     still = case("grc", static_load__torques_N_m={"carrier": 0.0})
     assert set(still.train.static_mesh_forces().values()) == {0.0}
     (loads,) = {summarise_loads(still, still.load_cases["reference"]).reversed_flanks}
