@@ -74,6 +74,8 @@ def _after_kicks(state: Floats, advance: Floats, pushes: Floats, reads: Floats, 
     whole matrix are needed once for all of them.
     """
     count = len(kicks)
+    if not pushes.shape[1] or not len(reads):  # nothing varies: the constant part acts alone
+        return np.asarray(np.linalg.matrix_power(advance, count) @ state)
     rows, columns = [reads], [advance @ pushes]
     for _ in range(count - 1):
         rows.append(rows[-1] @ advance)

@@ -257,6 +257,20 @@ class Gearset:
         other.lines = self.lines.part(which)
         return other
 
+    @property
+    def usual_harmonics(self) -> int:
+        """Harmonics of each mesh frequency among its usual lines."""
+        return self._usual.harmonics // 2
+
+    def with_harmonics(self, harmonics: int) -> Gearset:
+        """Copy with the usual lines of other harmonics of each mesh frequency."""
+        other, combinations = self._copied(), self._usual.combinations
+        other.harmonics, other._least = 2 * harmonics, 0
+        other._usual = other._reach = Reach(2 * harmonics, combinations)
+        other.lines = _lines_within(self.waves, Reach(harmonics, combinations // 2))
+        other.larger = _lines_within(self.waves, other._usual)
+        return other
+
     @cached_property
     def finer(self) -> Gearset:
         """The same with twice the usual harmonics of each mesh frequency, and the usual combinations of several."""

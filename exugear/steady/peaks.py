@@ -9,16 +9,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from exugear.harmonics.curve_peaks import standing_peaks
 from exugear.rotating.rotating_frame import SteadyError
 from exugear.spectra.order_cut import OrderCut
 from exugear.spectra.orders import OrderLine
 from exugear.spectra.sweeps import sweep_severity
-from fe_ste.tools.arrays import Floats
+from fe_ste.tools.arrays import Floats, Integers
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
+LEAST_SPEEDS = 3
+"""Speeds without which nothing stands out."""
 SAME_ORDER = 1e-6
 """Share by which orders of one line may differ."""
 SAME_SPEED = 0.02
@@ -75,7 +78,7 @@ def line_name(index: tuple[int, ...], bases: tuple[str, ...]) -> str:
 
 
 def peaks(data: xr.Dataset, signal: str = "overall_dte", least: float = 0.01) -> tuple[Peak, ...]:
-    """Local maxima over speed of all lines of a signal, the loudest first.
+    """Local maxima over speed of all lines of a signal that stand out on both sides, the loudest first.
 
     Parameters
     ----------
@@ -95,8 +98,8 @@ def peaks(data: xr.Dataset, signal: str = "overall_dte", least: float = 0.01) ->
         raise SteadyError(f"no signal {signal!r}; signals are {', '.join(names)}")
     values: Floats = data["amplitude"].to_numpy()[:, 1:, names.index(signal)].astype(np.float64)
     speed: Floats = data["speed"].to_numpy()
-    padded = np.pad(values, ((1, 1), (0, 0)), constant_values=-np.inf)
-    highest = (values >= padded[:-2]) & (values > padded[2:]) & (values >= least * values.max(initial=0.0))
+    floor = least * values.max(initial=0.0)
+    highest = [(point, line) for line, own in enumerate(values.T) for point in _tops(own) if own[point] >= floor]
     bases = tuple(str(name) for name in data["base"].to_numpy())
     index, orders = data["index"].to_numpy(), data["order"].to_numpy()
     found = [
@@ -107,7 +110,7 @@ def peaks(data: xr.Dataset, signal: str = "overall_dte", least: float = 0.01) ->
             frequency=float(orders[line + 1] * abs(speed[point]) / (2.0 * np.pi)),
             amplitude=float(values[point, line]),
         )
-        for point, line in zip(*np.nonzero(highest), strict=True)
+        for point, line in highest
     ]
     return tuple(sorted(found, key=lambda peak: -peak.amplitude))
 
@@ -135,6 +138,13 @@ class Sideband:
     amplitude: float
     share: float
     cause: str
+
+
+def _tops(values: Floats) -> Integers:
+    """Places of the peaks among values over speed; of one speed or two the higher, which is all that is known."""
+    if len(values) < LEAST_SPEEDS:
+        return np.array([np.argmax(values)])
+    return standing_peaks(values)
 
 
 def sidebands(data: xr.Dataset, peak: Peak, signal: str = "overall_dte", least: float = 0.01) -> tuple[Sideband, ...]:

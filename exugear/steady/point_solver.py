@@ -19,13 +19,14 @@ from exugear.harmonics.lattice import Lattice
 from exugear.harmonics.lines import LineSet, joined, largest
 from exugear.rotating.mean_system import mean_system
 from exugear.rotating.mesh_ports import DEFLECTION
-from exugear.rotating.mesh_waves import mesh_waves
+from exugear.rotating.mesh_waves import FEWEST, mesh_waves
 from exugear.settling.settled import Leg, SettlingRun, cannot_settle
 from exugear.steady.excitation import Gearset, Interface
 from exugear.steady.nonlinear import Balance, nonlinear_response, response_of_readings, solve_balance
 from exugear.steady.response import Response, linear_response, parametric_response, signals, transmission_errors
 from exugear.steady.settings import SteadySettings
 from exugear.steady.stability import CHECKED, candidates, growth_at, growth_of_state, mean_growth
+from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Complexes, Floats
 
 LEFT_OUT = 2e-4
@@ -60,9 +61,14 @@ PUSHED = 1.02
 """Factor on the motion of an unstable state from which a run begins."""
 
 
-def gearset_of(assembly: Assembly, speeds: Floats, harmonics: int = 10, combinations: int = 3) -> Gearset:
-    """Gearset of an assembly for speeds of the input (rad/s), with lines as `SteadySettings` says; bearings linear."""
-    return Gearset(mesh_waves(mean_system(assembly, speeds)), harmonics, combinations)
+def gearset_of(assembly: Assembly, speeds: Floats, harmonics: int | None = None, combinations: int = 3) -> Gearset:
+    """Gearset of an assembly for speeds of the input (rad/s), with lines as `SteadySettings` says; bearings linear.
+
+    Where teeth may part, each state takes the lines that it needs: then it begins with few.
+    """
+    waves = mesh_waves(mean_system(assembly, speeds))
+    usual = FEWEST if LAWS[assembly.mesh_law].loses_contact else waves.needed_harmonics()
+    return Gearset(waves, usual if harmonics is None else harmonics, combinations)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,34 +2,44 @@
 
 With half a per mille of damping a peak is as wide as a per mille of its speed: even steps miss it. Modes are those of
 the Campbell diagram, followed over speed by their shapes; where a line passes a mode, the linear response of that mode
-tells whether it matters.
+tells whether it matters. One speed there and its neighbours then tell where the top is.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from exugear.campbell.mode_tracks import ModeTracks
+from exugear.harmonics.curve_peaks import NEIGHBOURS, predicted_top, standing_peaks
 from exugear.rotating.mean_system import MeanSystem
 from exugear.rotating.mesh_ports import DEFLECTION
+from exugear.rotating.quantities import Quantity
 from exugear.steady.excitation import Gearset, Interface
-from fe_ste.tools.arrays import Complexes, Floats
+from fe_ste.tools.arrays import Booleans, Complexes, Floats
 from fe_ste.tools.threads import side_by_side
 
 Forcing = Callable[[Interface], Complexes]
 HARMONICS = 3
-"""Lines of each base that are looked at."""
-LEAST_SHARE = 0.01
-"""Peaks below this share of the largest of their signal are left to the even steps."""
-AROUND = (-2.0, -0.7, 0.0, 0.7, 2.0)
-"""Speeds around a crossing in half-widths of its peak."""
-MOST = 120
+"""Multiples of the fastest mesh frequency up to which modes are followed."""
+LEAST_SHARE = 1e-3
+"""Peaks below this share of the largest of their signal, in the range of operation too, are left to the even steps."""
+MOST = 240
 """Crossings at most, the strongest first."""
+LOUDEST = 100
+"""Peaks of each quantity whose tops are looked for, of all speeds and of the range of operation."""
+LEAST_STAND = 1e-4
+"""Share by which a peak stands out at the known speeds to be looked at: more of it may show."""
+GAIN = 1e-3
+"""Share by which a top is higher than its peak at the known speeds, from which it is looked at."""
+APART = 0.25
+"""Share of the distance of a peak's neighbours within which two tops are looked at once; what is left shows then."""
 ROUNDS = 4
 """Iterations to a mode at the speed where a line meets it; their error is squared each time."""
+COINCIDE = 1e-6
+"""Share of the speed within which two crossings are looked at once."""
 SAME = 0.5
 """Least MAC with the followed mode for what they end in to be that mode."""
 
@@ -80,17 +90,27 @@ class _Mode:
         return abs(between(self, other) * between(other, self) / own)
 
 
-def crossings(gearset: Gearset, tracks: ModeTracks, forcing: Forcing) -> tuple[Crossing, ...]:
+def crossings(
+    gearset: Gearset, tracks: ModeTracks, forcing: Forcing, operation: tuple[float, float] | None = None
+) -> tuple[Crossing, ...]:
     """Crossings of lines of single bases with modes over the speeds of these, the strongest first.
 
-    `forcing` gives the forces of the meshes (lines, m, f), N, that vary in the static state.
+    `forcing` gives the forces of the meshes (lines, m, f), N, that vary in the static state. Between the speeds
+    `operation` (rad/s, without sign) peaks are held against the largest of those there.
     """
     lines = _looked_at(gearset)
     forces = forcing(gearset.at(float(gearset.system.speeds[1])))[lines]
     met = _passages(tracks, gearset.lines.orders[lines])
+    if not met:
+        return ()
     peaks = np.array([_peak(gearset, tracks, mode, speed, forces[at]) for mode, at, speed in met])
-    shares = np.max(peaks / np.maximum(peaks.max(axis=0, initial=0.0), 1e-300), axis=1) if met else np.zeros(0)
-    strongest = [n for n in np.argsort(-shares, kind="stable") if shares[n] >= LEAST_SHARE][:MOST]
+    shares, counted = _shares(peaks), _shares(peaks)
+    if operation is not None:
+        speeds = np.abs([speed for _, _, speed in met])
+        inside = (speeds >= operation[0]) & (speeds <= operation[1])
+        counted[inside] = _shares(peaks[inside])
+    strongest = [n for n in np.argsort(-counted, kind="stable") if counted[n] >= LEAST_SHARE][:MOST]
+    strongest.sort(key=lambda n: -shares[n])
 
     def exact(n: int) -> Crossing:
         mode, at, speed = met[n]
@@ -102,18 +122,69 @@ def crossings(gearset: Gearset, tracks: ModeTracks, forcing: Forcing) -> tuple[C
     return tuple(crossing for crossing in side_by_side(exact, strongest) if low <= crossing.speed <= high)
 
 
-def refined(speeds: Floats, found: tuple[Crossing, ...]) -> Floats:
-    """Speeds (n,) with others around each crossing, ascending."""
-    around = [crossing.speed * (1.0 + offset * crossing.damping) for crossing in found for offset in AROUND]
-    inside = [speed for speed in around if speeds.min() <= speed <= speeds.max()]
-    return np.unique(np.concatenate([speeds, inside]))
+def _shares(peaks: Floats) -> Floats:
+    """Peaks (n, signals) over the largest of their signal, of whichever signal shows it most, (n,)."""
+    return np.asarray(np.max(peaks / np.maximum(peaks.max(axis=0, initial=0.0), 1e-300), axis=1))
+
+
+def with_crossings(speeds: Floats, found: tuple[Crossing, ...]) -> Floats:
+    """Speeds (n,) and those of crossings between them, ascending; what all but coincides is one."""
+    inside = [crossing.speed for crossing in found if speeds.min() <= crossing.speed <= speeds.max()]
+    both = np.sort(np.concatenate([speeds, inside]))
+    return both[np.append(True, np.diff(both) > COINCIDE * np.abs(both[1:]))]
+
+
+def missed_tops(
+    speeds: Floats,
+    amplitude: Complexes,
+    smooth: Booleans,
+    quantities: Sequence[Quantity],
+    operation: tuple[float, float] | None,
+) -> Floats:
+    """Speeds at which the loudest peaks are higher than at any known speed, by curves through five neighbours.
+
+    Parameters
+    ----------
+    speeds : (n,) array
+        Ascending, rad/s.
+    amplitude : (n, lines, signals) complex array
+        Of all signals, the mean as the first line.
+    smooth : (n,) array
+        Where the response is smooth over speed: not where teeth part.
+    quantities : sequence of Quantity
+        Whose peaks count.
+    operation : (float, float) or None
+        Speeds between which the loudest count by themselves, rad/s without sign.
+    """
+    if len(speeds) < NEIGHBOURS:
+        return np.zeros(0)
+    found: list[float] = []
+    inside = np.ones(len(speeds), dtype=bool)
+    if operation is not None:
+        inside = (np.abs(speeds) >= operation[0]) & (np.abs(speeds) <= operation[1])
+    for quantity in quantities:
+        sizes = quantity.sizes(amplitude[:, 1:])
+        places = sizes.argmax(axis=2)
+        highest = np.take_along_axis(sizes, places[..., None], axis=2)[..., 0]
+        peaks = [(point, line) for line in range(highest.shape[1]) for point in standing_peaks(highest[:, line], LEAST_STAND)]
+        peaks.sort(key=lambda peak: -highest[peak])
+        loudest = dict.fromkeys(peaks[:LOUDEST]) | dict.fromkeys([own for own in peaks if inside[own[0]]][:LOUDEST])
+        for point, line in loudest:
+            around = slice(max(point - NEIGHBOURS, 0), point + NEIGHBOURS + 1)
+            if not smooth[around].all():
+                continue
+            values = quantity.at(amplitude[around, line + 1], int(places[point, line]))
+            top, height = predicted_top(speeds[around], values, point - around.start)
+            near = APART * (speeds[point + 1] - speeds[point - 1])
+            if height > (1.0 + GAIN) * highest[point, line] and all(abs(top - other) > near for other in found):
+                found.append(top)
+    return np.sort(np.array(found))
 
 
 def _looked_at(gearset: Gearset) -> list[int]:
-    """Lines of a single mesh frequency, and those beside it, up to the highest harmonic that is looked at."""
-    index = np.abs(gearset.lines.index[:, : len(gearset.waves.base_orders)])
-    alone = (np.count_nonzero(index, axis=1) == 1) & (index.sum(axis=1) <= HARMONICS)
-    return [int(line) for line in np.flatnonzero(alone)]
+    """Lines of a single mesh frequency, and those beside it."""
+    index = gearset.lines.index[:, : len(gearset.waves.base_orders)]
+    return [int(line) for line in np.flatnonzero(np.count_nonzero(index, axis=1) == 1)]
 
 
 def _passages(tracks: ModeTracks, orders: Floats) -> list[tuple[int, int, float]]:

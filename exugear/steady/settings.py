@@ -12,6 +12,7 @@ import numpy as np
 
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.fingerprint import input_hash
+from exugear.loads.operating_range import operating_range
 from exugear.loads.summary import BURSTING_RIM_SPEED, rim_radii, summarise_loads
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import RPM
@@ -24,6 +25,7 @@ Level = Literal["linear", "parametric", "nonlinear"]
 LEVELS: tuple[Level, ...] = get_args(Level)
 USUAL_COUNT = 400
 MOST_COUNT = 20000
+MOST_HARMONICS = 100
 SLOWEST = 1e-6
 """Share of the fastest speed below which the input stands, and nothing is excited in time."""
 
@@ -86,23 +88,31 @@ class SpeedRange:
 
 
 def usual_speeds(gearbox: Gearbox) -> SpeedRange:
-    """Speeds that the first load case passes, from standstill on.
+    """Speeds that the first load case passes, from standstill on, and those of operation.
 
     Raises
     ------
     SteadyError
-        There is no load case, or it does not turn the train.
+        No load case turns the train, and the file names no speed of operation.
 
     Examples
     --------
     >>> usual_speeds(Gearbox.from_toml("cases/grc750/gearbox.toml")).text
     '0:-214.5...:400'
     """
+    fastest = (operating_range(gearbox) or (0.0, 0.0))[1]
+    sense = 1.0
     for case in gearbox.load_cases.values():
         loads = summarise_loads(gearbox, case)
         if loads.fastest_speed > 0.0:
-            return SpeedRange(0.0, math.copysign(loads.fastest_speed, loads.end_speed), USUAL_COUNT)
-    raise SteadyError("speeds: no load case turns the train; name them, as 0:215:400 in rpm of the input")
+            fastest, sense = max(fastest, loads.fastest_speed), loads.end_speed
+            break
+    if fastest == 0.0:
+        raise SteadyError(
+            "speeds: no load case turns the train, and [operation] names no speed; name them, as 0:215:400 in rpm of "
+            "the input"
+        )
+    return SpeedRange(0.0, math.copysign(fastest, sense), USUAL_COUNT)
 
 
 def check_speeds(gearbox: Gearbox, speeds: SpeedRange) -> None:
@@ -152,8 +162,8 @@ class SteadySettings:
     level : {"linear", "parametric", "nonlinear"}
         The static transmission error as excitation, stiffness that varies with the mesh cycle, or laws evaluated in
         time, the position in the cycle moving with the vibration.
-    harmonics : int
-        Harmonics of each mesh frequency.
+    harmonics : int, optional
+        Harmonics of each mesh frequency; by default as many as the mesh stiffness asks for.
     combinations : int
         Largest sum of multiples of several mesh frequencies.
     at_resonances : bool
@@ -165,19 +175,26 @@ class SteadySettings:
 
     speeds: SpeedRange
     level: Level = "parametric"
-    harmonics: int = 10
+    harmonics: int | None = None
     combinations: int = 3
     at_resonances: bool = True
     branches: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse what is no level, and branches where there are none."""
+        """Refuse what is no level, too many harmonics, and branches where there are none."""
         if self.level not in LEVELS:
             raise SteadyError(f"level {self.level!r} is unknown; levels are {', '.join(LEVELS)}")
+        if self.harmonics is not None and not 1 <= self.harmonics <= MOST_HARMONICS:
+            raise SteadyError(f"harmonics {self.harmonics}: must be from 1 to {MOST_HARMONICS}")
         if self.branches and self.level != "nonlinear":
             raise SteadyError(f"branches: the level {self.level} has one state at each speed; take the level nonlinear")
 
     def hash_with(self, assembly: Assembly) -> str:
         """SHA-256 of all that a response depends on."""
-        content = {"method_version": STEADY, "input": input_hash(assembly), "settings": asdict(self)}
+        content = {
+            "method_version": STEADY,
+            "input": input_hash(assembly),
+            "settings": asdict(self),
+            "operation": operating_range(assembly.gearbox),
+        }
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

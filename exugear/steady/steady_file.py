@@ -40,10 +40,11 @@ _LAYOUT = Layout(
         "growth": ("point",),
         "remark": ("point",),
         "apart_share": ("point", "mesh_wave"),
+        "left_out": ("mesh_wave",),
     }
     | {name: (name,) for name in ("base", "signal", "mesh_wave")}
     | LAYOUT,
-    ("gearbox", "variant", "mesh_law", "inertias", "level", "input_hash", "growth_rate", "unsolved"),
+    ("gearbox", "variant", "mesh_law", "inertias", "level", "input_hash", "growth_rate", "unsolved", "harmonics"),
 )
 
 
@@ -77,6 +78,11 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
         "energy_error": (("point",), solved.energy_error, {"units": "1"}),
         "growth": (("point",), solved.growth, {"units": "1/s", "long_name": "fastest growth of a disturbance"}),
         "remark": (("point",), solved.remark.astype(object), {}),
+        "left_out": (
+            ("mesh_wave",),
+            response.left_out,
+            {"units": "1", "long_name": "share of the compliance's variation above the harmonics"},
+        ),
         "apart_share": (("point", "mesh_wave"), solved.apart, {"units": "1", "long_name": "share of time apart"}),
     }
     if response.bearing_names:
@@ -105,6 +111,8 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
         "growth_rate": response.growth_rate,
         "planet_spread": response.planet_spread,
         "stiffness_variation": response.stiffness_variation,
+        "harmonics": response.harmonics,
+        "change_with_more": response.change_with_more,
         "shared_lines": "; ".join(_shared(row, response.base_names) for row in response.lines.shared()),
         "contributions": json.dumps([{"line": line, **asdict(own)} for line, own in response.contributions]),
         "folds": json.dumps(response.folds),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
@@ -13,22 +14,25 @@ from exugear.campbell.campbell import Campbell, campbell_of, modes_over_speed
 from exugear.campbell.mode_tracks import ModeTracks
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
+from exugear.harmonics.curve_peaks import standing_peaks
 from exugear.harmonics.krylov import HarmonicBalanceError
 from exugear.harmonics.lines import LineSet
+from exugear.loads.operating_range import operating_range
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import RPM
+from exugear.rotating.quantities import quantities_of
 from exugear.rotating.rotating_frame import SteadyError
 from exugear.rotating.signals import SignalName
 from exugear.steady.contributions import Contributions, contributions, loudest_near
 from exugear.steady.excitation import Gearset
 from exugear.steady.gearbox_branches import follow_branch
 from exugear.steady.point_solver import PointSolver, gearset_of
-from exugear.steady.resonances import HARMONICS, Crossing, crossings, refined
+from exugear.steady.resonances import HARMONICS, Crossing, crossings, missed_tops, with_crossings
 from exugear.steady.response import Response, dissipated_and_given, signals
 from exugear.steady.settings import SteadySettings, check_law, check_speeds, usual_speeds
 from exugear.tooth_mesh.law import MeshData
-from fe_ste.tools.arrays import Booleans, Complexes, Floats, Texts
+from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers, Texts
 from fe_ste.tools.notebook import html_table, value_range
 from fe_ste.tools.threads import one_dense_thread
 
@@ -69,9 +73,15 @@ class Solved:
     growth: Floats
     remark: Texts
 
-    def part(self, which: slice | Booleans) -> Solved:
+    def part(self, which: slice | Booleans | Integers) -> Solved:
         """Take some of the points."""
         return Solved(**{own.name: getattr(self, own.name)[which] for own in fields(self)})
+
+    def joined_with(self, other: Solved) -> Solved:
+        """Put the points of another behind these."""
+        return Solved(
+            **{own.name: np.concatenate([getattr(self, own.name), getattr(other, own.name)]) for own in fields(self)}
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +118,13 @@ class SteadyResponse:
         Largest change of planet bearings' stiffness that made the planets equal, over that stiffness.
     stiffness_variation : float
         Largest change of stiffness over the carrier's places, over the stiffness, whose mean counts.
+    harmonics : int
+        Harmonics of each mesh frequency.
+    left_out : (waves,) array
+        Share of the variation of each mesh's compliance that is above them.
+    change_with_more : float
+        Largest relative change of the ten loudest peaks by half as many harmonics again; NaN where each state has the
+        lines that it needs.
     campbell : Campbell
         Modes over the speeds, as far up as the lines that `crossings` looks at.
     """
@@ -128,6 +145,9 @@ class SteadyResponse:
     growth_rate: float
     planet_spread: float
     stiffness_variation: float
+    harmonics: int
+    left_out: Floats
+    change_with_more: float
     campbell: Campbell
 
     def __repr__(self) -> str:
@@ -168,8 +188,12 @@ class SteadyResponse:
         return np.conj(found) if mirrored else found
 
 
+CHECKED, MORE = 10, 1.5
+"""Loudest peaks that are computed again, and with how many times the harmonics."""
 EXPLAINED = 20
 """Crossings whose peaks are taken apart."""
+ROUNDS = 5
+"""Times that tops are looked for between speeds, at most."""
 SLOWEST_BRANCH = 0.01
 """Share of the fastest speed at which a branch from standstill begins."""
 LONGEST_REMARK = 300
@@ -252,12 +276,13 @@ def response_of(
     solver = PointSolver(gearset, settings)
     told = progress or (lambda done, total: None)
     tracks = _tracks(gearset, even)
-    found = crossings(gearset, tracks, solver.forcing) if settings.at_resonances else ()
+    operation = operating_range(assembly.gearbox)
+    found = crossings(gearset, tracks, solver.forcing, operation) if settings.at_resonances else ()
     folds: tuple[float, ...] = ()
     if settings.branches:
         solved, folds = _along_branch(solver, settings.speeds.first, settings.speeds.last, told)
     else:
-        solved = _solve(solver, refined(even, found), known, told, keep, keep_every)
+        solved = _solve(solver, settings, found, _Work(known, told, keep, keep_every))
     there = np.isfinite(solved.drive_torque)
     if not there.any():
         raise HarmonicBalanceError(str(solved.remark[0]))
@@ -279,6 +304,9 @@ def response_of(
         growth_rate=float(np.fmax.reduce(solved.growth, initial=growth)),
         planet_spread=gearset.system.planet_spread,
         stiffness_variation=gearset.system.variation,
+        harmonics=gearset.usual_harmonics,
+        left_out=gearset.waves.left_out(gearset.usual_harmonics),
+        change_with_more=_change_with_more(solver, settings, solved.part(there)),
         campbell=campbell,
     )
 
@@ -301,37 +329,89 @@ def _tracks(gearset: Gearset, speeds: Floats) -> ModeTracks:
     return modes_over_speed(gearset.system, low, high, highest)
 
 
-def _solve(
-    solver: PointSolver,
-    speeds: Floats,
-    known: Solved | None,
-    progress: Callable[[int, int], None],
-    keep: Kept | None,
-    keep_every: float,
-) -> Solved:
-    """Solve all speeds, beginning with what is known of them."""
-    count = 0 if known is None else _same_beginning(known.speed, speeds)
+@dataclass(frozen=True)
+class _Work:
+    """What goes beside the solution of points: what is known of them, who is told, and who keeps them."""
+
+    known: Solved | None
+    progress: Callable[[int, int], None]
+    keep: Kept | None
+    keep_every: float
+
+
+def _solve(solver: PointSolver, settings: SteadySettings, found: tuple[Crossing, ...], work: _Work) -> Solved:
+    """Solve even speeds and those of crossings, then those of tops between them; in ascending order."""
+    speeds = with_crossings(settings.speeds.values, found)
+    solved = _continued(_empty(solver.gearset, speeds), 0, lambda: solver, work)
+    if settings.at_resonances:
+        solved = _with_tops(solver, settings, solved, work)
+    return solved.part(np.argsort(solved.speed, kind="stable"))
+
+
+def _with_tops(solver: PointSolver, settings: SteadySettings, solved: Solved, work: _Work) -> Solved:
+    """Solve where neighbours tell that peaks are higher than at any speed yet, until none is.
+
+    Each such state begins anew: it hangs on no other, so that what is stopped goes on to the same numbers.
+    """
+    quantities = quantities_of([own.name for own in solver.gearset.signal_names])
+    operation = operating_range(solver.gearset.waves.assembly.gearbox)
+    for _ in range(ROUNDS):
+        there = np.flatnonzero(np.isfinite(solved.drive_torque))
+        known = solved.part(there[np.argsort(solved.speed[there], kind="stable")])
+        smooth = ~(known.apart.any(axis=1) | known.free.any(axis=1))
+        more = missed_tops(known.speed, known.amplitude, smooth, quantities, operation)
+        if not more.size:
+            break
+        longer = solved.joined_with(_empty(solver.gearset, more))
+        ahead = _continued(longer, len(solved.speed), lambda: PointSolver(solver.linear, settings), work)
+        # A speed that nobody asked for and that has no state is none to tell of.
+        asked = np.arange(len(ahead.speed)) < len(solved.speed)
+        solved = ahead.part(asked | np.isfinite(ahead.drive_torque))
+    return solved
+
+
+def _change_with_more(solver: PointSolver, settings: SteadySettings, solved: Solved) -> float:
+    """Find the largest relative change of the loudest peaks of the transmission error by more harmonics."""
     gearset = solver.gearset
-    if known is not None and gearset.bent:
-        count = _in_contact(known, count)
-        if count:
-            solver.response(float(speeds[count - 1]))
-    out = _empty(gearset, speeds)
+    if gearset.bent or settings.branches:
+        return math.nan
+    other = PointSolver(solver.linear.with_harmonics(math.ceil(MORE * gearset.usual_harmonics)), settings)
+    values = np.abs(solved.amplitude[:, :, 0])
+    found = [(point, line) for line in range(1, values.shape[1]) for point in standing_peaks(values[:, line])]
+    found.sort(key=lambda peak: -values[peak])
+    changes = [0.0]
+    for point, line in found[:CHECKED]:
+        place, _ = other.gearset.lines.find(gearset.lines.index[line])
+        response = other.response(float(solved.speed[point]))
+        own = 2.0 * abs(complex(signals(other.gearset, response)[int(place), 0]))
+        changes.append(abs(own / float(values[point, line]) - 1.0))
+    return max(changes)
+
+
+def _continued(out: Solved, first: int, solver: Callable[[], PointSolver], work: _Work) -> Solved:
+    """Solve all points from one on, but for those that are known."""
+    count, known = first, work.known
     if known is not None:
-        for own in fields(Solved):
-            getattr(out, own.name)[:count] = getattr(known, own.name)[:count]
+        count = max(first, _same_beginning(known.speed, out.speed))
+        own = solver()
+        if not first and own.gearset.bent and count < len(out.speed):
+            count = _in_contact(known, count)
+            if count:
+                own.response(float(out.speed[count - 1]))
+        for field in fields(Solved):
+            getattr(out, field.name)[first:count] = getattr(known, field.name)[first:count]
     kept, done = time.monotonic(), count
     try:
-        for n in range(count, len(speeds)):
-            _solve_one(out, n, solver)
+        for n in range(count, len(out.speed)):
+            _solve_one(out, n, solver())
             done = n + 1
-            progress(done, len(speeds))
-            if keep is not None and time.monotonic() - kept > keep_every:
-                keep(out.part(slice(done)))
+            work.progress(done, len(out.speed))
+            if work.keep is not None and time.monotonic() - kept > work.keep_every:
+                work.keep(out.part(slice(done)))
                 kept = time.monotonic()
     except KeyboardInterrupt:
-        if keep is not None and done:
-            keep(out.part(slice(done)))
+        if work.keep is not None and done:
+            work.keep(out.part(slice(done)))
         raise
     return out
 

@@ -125,11 +125,24 @@ class GravitySection(Section):
     """Vector in the axes of the gearbox."""
 
 
+_ServiceSpeed = Annotated[q.SpeedRpm, Field(ge=0.0)]
+
+
 class OperationSection(Section):
     """How the gearbox works in service; what a report sets its speeds against."""
 
     rated_speed_rpm: Annotated[q.SpeedRpm, Field(gt=0.0)] | None = None
     """Speed of the overall input at rated power, without sign."""
+    speed_range_rpm: (
+        Annotated[tuple[_ServiceSpeed, _ServiceSpeed], Field(strict=False)] | None
+    ) = None
+    """Lowest and highest speed of the overall input in service, without sign; 0.5 to 1.25 of rated by default."""
+
+    @model_validator(mode="after")
+    def _rising(self) -> OperationSection:
+        if self.speed_range_rpm is not None and not self.speed_range_rpm[0] < self.speed_range_rpm[1]:
+            raise ValueError(f"speed_range_rpm = {list(self.speed_range_rpm)}: the lower speed comes first")
+        return self
 
 
 class ReportSection(Section):

@@ -164,8 +164,8 @@ class SteadySection(StudyPart):
     """FIRST:LAST:COUNT in rpm of the input."""
     level: Literal["linear", "parametric", "nonlinear"] = "parametric"
     """What varies."""
-    harmonics: Annotated[int, Field(ge=1, le=100)] = 10
-    """Harmonics of each mesh frequency."""
+    harmonics: Annotated[int, Field(ge=1, le=100)] | None = None
+    """Harmonics of each mesh frequency; by default as many as the mesh stiffness asks for."""
     combinations: Annotated[int, Field(ge=1, le=20)] = 3
     """Largest sum of multiples of several mesh frequencies."""
     at_resonances: bool = True
