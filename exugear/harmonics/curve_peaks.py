@@ -66,7 +66,15 @@ def predicted_top(places: Floats, values: Complexes, highest: int) -> tuple[floa
     >>> round(place, 4), round(height, 4)
     (0.9999, 1.0001)
     """
-    first = min(max(highest - NEIGHBOURS // 2, 0), len(places) - NEIGHBOURS)
+    found = [float(places[highest]), float(np.linalg.norm(values[highest]))]
+    # Where curves through other neighbours differ, the highest is to be looked at.
+    for first in range(max(highest - 3, 0), min(highest, len(places) - NEIGHBOURS + 1)):
+        found = max(found, list(_top(places, values, highest, first)), key=lambda own: own[1])
+    return found[0], found[1]
+
+
+def _top(places: Floats, values: Complexes, highest: int, first: int) -> tuple[float, float]:
+    """Place and height of the top near a place by the curve through five places from one on."""
     middle, width = places[highest], places[highest + 1] - places[highest - 1]
     x, f = (places[first : first + NEIGHBOURS] - middle) / width, values[first : first + NEIGHBOURS]
     carrying, others = x[SUPPORT], x[OTHERS]

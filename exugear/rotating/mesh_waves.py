@@ -257,6 +257,11 @@ class MeshWaves:
         """
         return np.array([self._tails[wave.first][harmonics] for wave in self.waves])
 
+    @property
+    def varies(self) -> bool:
+        """Whether any mesh has a compliance that changes over its cycle: else nothing excites the gearbox."""
+        return any(bool(tails[0]) for tails in self._tails.values())
+
     def needed_harmonics(self) -> int:
         """Count the harmonics of each mesh frequency that the compliance asks for.
 

@@ -55,7 +55,11 @@ class Quantity:
         return np.stack(own, axis=-1)
 
 
-SIGNALS = {"error": ("overall_dte", "m"), "force": ("support_force", "N"), "acceleration": ("seat_acceleration", "m/s2")}
+SIGNALS = {
+    "error": ("overall_dte", "m"),
+    "force": ("support_force", "N"),
+    "acceleration": ("seat_acceleration", "m/s2"),
+}
 """Signals of each quantity and their units."""
 
 

@@ -39,7 +39,7 @@ APART = 0.25
 ROUNDS = 4
 """Iterations to a mode at the speed where a line meets it; their error is squared each time."""
 COINCIDE = 1e-6
-"""Share of the speed within which two crossings are looked at once."""
+"""Share of the speed within which two speeds are one."""
 SAME = 0.5
 """Least MAC with the followed mode for what they end in to be that mode."""
 
@@ -124,7 +124,9 @@ def crossings(
 
 def _shares(peaks: Floats) -> Floats:
     """Peaks (n, signals) over the largest of their signal, of whichever signal shows it most, (n,)."""
-    return np.asarray(np.max(peaks / np.maximum(peaks.max(axis=0, initial=0.0), 1e-300), axis=1))
+    largest: Floats = np.maximum(peaks.max(axis=0, initial=0.0), 1e-300)
+    shares: Floats = (peaks / largest).max(axis=1)
+    return shares
 
 
 def with_crossings(speeds: Floats, found: tuple[Crossing, ...]) -> Floats:
@@ -166,7 +168,9 @@ def missed_tops(
         sizes = quantity.sizes(amplitude[:, 1:])
         places = sizes.argmax(axis=2)
         highest = np.take_along_axis(sizes, places[..., None], axis=2)[..., 0]
-        peaks = [(point, line) for line in range(highest.shape[1]) for point in standing_peaks(highest[:, line], LEAST_STAND)]
+        peaks = [
+            (point, line) for line in range(highest.shape[1]) for point in standing_peaks(highest[:, line], LEAST_STAND)
+        ]
         peaks.sort(key=lambda peak: -highest[peak])
         loudest = dict.fromkeys(peaks[:LOUDEST]) | dict.fromkeys([own for own in peaks if inside[own[0]]][:LOUDEST])
         for point, line in loudest:
@@ -176,7 +180,9 @@ def missed_tops(
             values = quantity.at(amplitude[around, line + 1], int(places[point, line]))
             top, height = predicted_top(speeds[around], values, point - around.start)
             near = APART * (speeds[point + 1] - speeds[point - 1])
-            if height > (1.0 + GAIN) * highest[point, line] and all(abs(top - other) > near for other in found):
+            new = all(abs(top - other) > near for other in found)
+            new &= bool((np.abs(speeds[around] - top) > COINCIDE * abs(top)).all())
+            if new and height > (1.0 + GAIN) * highest[point, line]:
                 found.append(top)
     return np.sort(np.array(found))
 

@@ -57,8 +57,7 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
     """Labelled arrays with units, what `write_response` writes."""
     import xarray as xr
 
-    assembly, solved = response.assembly, response.solved
-    amplitude = solved.amplitude
+    solved, amplitude = response.solved, response.solved.amplitude
     variables: dict[str, tuple[tuple[str, ...], Any, dict[str, str]]] = {
         "speed": (("point",), solved.speed, {"units": "rad/s", "long_name": "speed of the overall input"}),
         "index": (("line", "base"), response.lines.index, {"units": "1", "long_name": "multiples of the bases"}),
@@ -96,7 +95,13 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
     }
     if response.bearing_names:
         coordinates["bearing"] = np.array(response.bearing_names, dtype=object)
-    attributes = {
+    return xr.Dataset(variables, coordinates, _attributes(response))
+
+
+def _attributes(response: SteadyResponse) -> dict[str, Any]:
+    """What holds for a response as a whole."""
+    assembly = response.assembly
+    return {
         "gearbox": assembly.gearbox.name,
         "variant": assembly.variant,
         "mesh_law": assembly.mesh_law,
@@ -119,7 +124,6 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
         "unsolved": json.dumps([{"speed": speed, "reason": reason} for speed, reason in response.unsolved]),
         "crossings": json.dumps([asdict(crossing) for crossing in response.crossings]),
     }
-    return xr.Dataset(variables, coordinates, attributes)
 
 
 def _shared(multiples: tuple[int, ...], bases: tuple[str, ...]) -> str:

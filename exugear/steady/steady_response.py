@@ -277,12 +277,13 @@ def response_of(
     told = progress or (lambda done, total: None)
     tracks = _tracks(gearset, even)
     operation = operating_range(assembly.gearbox)
-    found = crossings(gearset, tracks, solver.forcing, operation) if settings.at_resonances else ()
+    looked_for = settings.at_resonances and (gearset.parting or gearset.waves.varies)
+    found = crossings(gearset, tracks, solver.forcing, operation) if looked_for else ()
     folds: tuple[float, ...] = ()
     if settings.branches:
         solved, folds = _along_branch(solver, settings.speeds.first, settings.speeds.last, told)
     else:
-        solved = _solve(solver, settings, found, _Work(known, told, keep, keep_every))
+        solved = _solve(solver, settings, found, looked_for, _Work(known, told, keep, keep_every))
     there = np.isfinite(solved.drive_torque)
     if not there.any():
         raise HarmonicBalanceError(str(solved.remark[0]))
@@ -339,11 +340,13 @@ class _Work:
     keep_every: float
 
 
-def _solve(solver: PointSolver, settings: SteadySettings, found: tuple[Crossing, ...], work: _Work) -> Solved:
-    """Solve even speeds and those of crossings, then those of tops between them; in ascending order."""
+def _solve(
+    solver: PointSolver, settings: SteadySettings, found: tuple[Crossing, ...], tops: bool, work: _Work
+) -> Solved:
+    """Solve even speeds and those of crossings, then those of tops between them if wanted; in ascending order."""
     speeds = with_crossings(settings.speeds.values, found)
     solved = _continued(_empty(solver.gearset, speeds), 0, lambda: solver, work)
-    if settings.at_resonances:
+    if tops:
         solved = _with_tops(solver, settings, solved, work)
     return solved.part(np.argsort(solved.speed, kind="stable"))
 
@@ -358,7 +361,7 @@ def _with_tops(solver: PointSolver, settings: SteadySettings, solved: Solved, wo
     for _ in range(ROUNDS):
         there = np.flatnonzero(np.isfinite(solved.drive_torque))
         known = solved.part(there[np.argsort(solved.speed[there], kind="stable")])
-        smooth = ~(known.apart.any(axis=1) | known.free.any(axis=1))
+        smooth = np.asarray(~(known.apart.any(axis=1) | known.free.any(axis=1)))
         more = missed_tops(known.speed, known.amplitude, smooth, quantities, operation)
         if not more.size:
             break
@@ -375,17 +378,25 @@ def _change_with_more(solver: PointSolver, settings: SteadySettings, solved: Sol
     gearset = solver.gearset
     if gearset.bent or settings.branches:
         return math.nan
+    if not gearset.waves.varies:
+        return 0.0
     other = PointSolver(solver.linear.with_harmonics(math.ceil(MORE * gearset.usual_harmonics)), settings)
     values = np.abs(solved.amplitude[:, :, 0])
-    found = [(point, line) for line in range(1, values.shape[1]) for point in standing_peaks(values[:, line])]
+    found = [(point, line) for line in range(1, values.shape[1]) for point in _tops_of(values[:, line])]
     found.sort(key=lambda peak: -values[peak])
     changes = [0.0]
     for point, line in found[:CHECKED]:
         place, _ = other.gearset.lines.find(gearset.lines.index[line])
         response = other.response(float(solved.speed[point]))
         own = 2.0 * abs(complex(signals(other.gearset, response)[int(place), 0]))
-        changes.append(abs(own / float(values[point, line]) - 1.0))
+        changes.append(abs(own / max(float(values[point, line]), 1e-300) - 1.0))
     return max(changes)
+
+
+def _tops_of(values: Floats) -> Integers:
+    """Places of the peaks among values over speed; of a line without one, where it is loudest."""
+    found = standing_peaks(values)
+    return found if found.size else np.array([np.argmax(values)])
 
 
 def _continued(out: Solved, first: int, solver: Callable[[], PointSolver], work: _Work) -> Solved:

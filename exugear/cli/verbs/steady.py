@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from contextlib import suppress
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated, Any
@@ -36,6 +37,8 @@ if TYPE_CHECKING:
 LEAST_AMPLITUDE = 1e-12
 """Amplitude of the overall transmission error below which a peak is round-off, m."""
 SHOWN_PEAKS = 15
+NOTICED_CHANGE = 1e-2
+"""Change of the loudest peaks by more harmonics that is to be minded."""
 NOTICED_VARIATION = 1e-3
 """Change of stiffness with the carrier's angle that is told."""
 
@@ -68,6 +71,13 @@ def steady(
             show_default=False,
         ),
     ] = None,
+    harmonics: Annotated[
+        int | None,
+        typer.Option(
+            help="Harmonics of each mesh frequency. (default: as many as the mesh stiffness asks for)",
+            show_default=False,
+        ),
+    ] = None,
     branches: Annotated[
         bool,
         typer.Option(
@@ -88,7 +98,7 @@ def steady(
 
         project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
         with model_errors():
-            settings = _settings(project, level, speeds, branches)
+            settings = _settings(project, level, speeds, harmonics, branches)
         _refuse_what_has_none(project)
         begin_results(project)
         compute_missing_tables(project)
@@ -104,13 +114,15 @@ def _refuse_what_has_none(project: Project) -> None:
             raise BadInputError(reason)
 
 
-def _settings(project: Project, level: Level, speeds: str | None, branches: bool) -> SteadySettings:
+def _settings(
+    project: Project, level: Level, speeds: str | None, harmonics: int | None, branches: bool
+) -> SteadySettings:
     from exugear.steady.settings import SpeedRange, SteadySettings, check_law, check_speeds, usual_speeds
 
     check_law(project.choice.mesh_law, level.value)
     asked = usual_speeds(project.gearbox) if speeds is None else SpeedRange.from_text(speeds)
     check_speeds(project.gearbox, asked)
-    return SteadySettings(asked, level.value, branches=branches)
+    return SteadySettings(asked, level.value, harmonics, branches=branches)
 
 
 def _respond(project: Project, settings: SteadySettings) -> xr.Dataset:
@@ -137,8 +149,16 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
     _tell_of_bearings(data)
     if data.attrs["shared_lines"]:
         note(f"Mesh frequencies share lines, each of which is named after one of them: {data.attrs['shared_lines']}")
-    if not found:
-        note(f"Nothing resonates: by the mesh law {data.attrs['mesh_law']} hardly anything excites the gearbox")
+    excited = bool((data["amplitude"][:, 1:, 0] > LEAST_AMPLITUDE).any())
+    if not excited:
+        note(
+            f"Nothing excites the gearbox: by the mesh law {data.attrs['mesh_law']} no stiffness varies over the mesh "
+            "cycle, and all lines are zero; take the law line_of_action"
+        )
+    elif not found:
+        note("No peak stands out over these speeds")
+    if excited:
+        _tell_of_harmonics(data)
     if as_json:
         print_json(
             {
@@ -147,6 +167,10 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
                 "speeds": int(data.sizes["point"]),
                 "lines": int(data.sizes["line"]),
                 "growth_rate_1_per_s": growth,
+                "excited": excited,
+                "harmonics": int(data.attrs["harmonics"]),
+                "left_out_of_compliance": _left_out(data),
+                "change_with_more_harmonics": _known(float(data.attrs["change_with_more"])),
                 "meshes_that_pull": [_pull_summary(pull) for pull in pulling],
                 "unsolved": [
                     {"speed_rpm": own["speed"] / RPM, "reason": own["reason"]}
@@ -218,6 +242,29 @@ def _tell_of_stability(data: xr.Dataset, growth: float) -> None:
         speeds = data["speed"].values[data["growth"].values == growth]
         where = f" (at {float(speeds[0]) / RPM:.4g} rpm)" if speeds.size else ""
         note(f"Unstable: disturbances grow by up to {growth:.3g} 1/s{where}; no steady state lasts", style="yellow")
+
+
+def _left_out(data: xr.Dataset) -> dict[str, float]:
+    """Share of the variation of each mesh's compliance that is above the harmonics, of planets by their family."""
+    shares = zip(data["mesh_wave"].values, data["left_out"].values, strict=True)
+    return {str(wave): float(share) for wave, share in shares if " " not in str(wave)}
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _tell_of_harmonics(data: xr.Dataset) -> None:
+    """Say how many harmonics there are, what they leave out, and what more of them change."""
+    mesh, share = max(_left_out(data).items(), key=lambda own: own[1])
+    change = _known(float(data.attrs["change_with_more"]))
+    said = f"{data.attrs['harmonics']} harmonics of each mesh frequency leave out {100.0 * share:.2g} % of what {mesh} "
+    said += "excites"
+    if change is None:
+        note(f"{said}, but for the lines that a state needs besides")
+        return
+    style = "yellow" if change > NOTICED_CHANGE else ""
+    note(f"{said}; with half as many again the ten loudest peaks change by up to {100.0 * change:.2g} %", style=style)
 
 
 def _tell_of_bearings(data: xr.Dataset) -> None:

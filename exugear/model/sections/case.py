@@ -133,9 +133,7 @@ class OperationSection(Section):
 
     rated_speed_rpm: Annotated[q.SpeedRpm, Field(gt=0.0)] | None = None
     """Speed of the overall input at rated power, without sign."""
-    speed_range_rpm: (
-        Annotated[tuple[_ServiceSpeed, _ServiceSpeed], Field(strict=False)] | None
-    ) = None
+    speed_range_rpm: Annotated[tuple[_ServiceSpeed, _ServiceSpeed], Field(strict=False)] | None = None
     """Lowest and highest speed of the overall input in service, without sign; 0.5 to 1.25 of rated by default."""
 
     @model_validator(mode="after")

@@ -82,9 +82,33 @@ def test_the_range_of_the_load_case_is_the_usual_one(case):
     assert json.loads(outcome.stdout)["speeds"] >= 399
 
 
+@pytest.mark.parametrize("law", ["iso6336", "constant"])
+def test_a_law_without_a_wave_excites_nothing_and_says_so(case, law):
+    outcome = steady(case, "--variant", "bushing", "--mesh-law", law, "--speeds", "500:8000:20", "--json")
+    assert outcome.exit_code == 0, outcome.stderr
+    summary = json.loads(outcome.stdout)
+    assert (summary["excited"], summary["speeds"], summary["peaks_of_overall_dte"]) == (False, 20, [])
+    assert f"Nothing excites the gearbox: by the mesh law {law}" in outcome.stderr
+    assert Path(summary["file"]).exists()
+
+
+def test_harmonics_are_told_and_may_be_asked_for(case):
+    options = "--variant", "bushing", "--speeds", "1400:1500:5"
+    usual = json.loads(steady(case, *options, "--json").stdout)
+    assert usual["harmonics"] >= 10
+    outcome = steady(case, *options, "--harmonics", "3", "--json")
+    summary = json.loads(outcome.stdout)
+    assert summary["harmonics"] == 3
+    assert summary["left_out_of_compliance"]["spur"] > usual["left_out_of_compliance"]["spur"]
+    assert summary["change_with_more_harmonics"] > usual["change_with_more_harmonics"]
+    assert "3 harmonics of each mesh frequency leave out" in outcome.stderr
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
+        (("--variant", "rigid", "--harmonics", "0"), "must be from 1 to 100"),
+        (("--variant", "rigid", "--harmonics", "1000"), "must be from 1 to 100"),
         (("--variant", "rigid", "--speeds", "5"), "must be FIRST:LAST:COUNT"),
         (("--variant", "rigid", "--speeds", "-5:5:10"), "change their sense"),
         (("--variant", "rigid", "--speeds", "0:1e6:10"), "wheels of steel burst"),

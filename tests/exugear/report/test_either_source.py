@@ -80,7 +80,7 @@ def test_the_ranking_of_steady_responses_alone_is_that_of_the_largest_amplitudes
         loudest = next(peak for peak in peaks(data) if np.isclose(told, peak.order).any())
         first = group["variants"][variant]["resonances"][0]
         # Levels have four digits and speeds five on the page.
-        assert first["level"] == pytest.approx(20.0 * np.log10(loudest.amplitude / 1e-6), abs=0.02)
+        assert first["level"] == pytest.approx(20.0 * np.log10(loudest.amplitude / 1e-6), abs=0.051)
         assert first["speed"] == pytest.approx(loudest.speed * 30.0 / np.pi, rel=1e-4)
         channels = {channel["words"] for channel in group["variants"][variant]["channels"]}
         assert {"Overall transmission error", "Force: mesh spur"} <= channels

@@ -1,0 +1,182 @@
+"""Heights of peaks against dense sweeps, and harmonics against more of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.optimize
+
+from exugear.dynamics.assemble import assemble
+from exugear.harmonics.curve_peaks import standing_peaks
+from exugear.model.choice import Choice
+from exugear.model.gearbox import Gearbox
+from exugear.model.parts import RPM
+from exugear.rotating.quantities import quantities_of
+from exugear.rotating.rotating_frame import SteadyError
+from exugear.steady.point_solver import PointSolver, gearset_of
+from exugear.steady.response import signals
+from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear.steady.steady_response import response_of
+from exugear.templates.kinds import template
+
+BUSHING = Choice("bushing")
+CYCLE = 2.0 * np.pi * np.arange(50) / 50
+CLEARLY = 0.03
+"""What a peak of a dense sweep stands above both sides: of one that hardly does, either sweep may see nothing."""
+NEAR = 0.01
+"""Share of the speed within which a listed peak is the one of a dense sweep."""
+
+
+def stiff(mean, *amplitudes):
+    """Stiffness over the mesh cycle with harmonics of given shares, N/m."""
+    return mean * (1.0 + sum(own * np.cos(n * CYCLE + 0.7 * n) for n, own in enumerate(amplitudes, start=1)))
+
+
+@pytest.fixture(scope="module")
+def parallel(tmp_path_factory):
+    path = tmp_path_factory.mktemp("parallel") / "gearbox.toml"
+    path.write_text(template("parallel"), encoding="utf-8")
+    gearbox = Gearbox.from_toml(path)
+    stiffness = {"stage_1": stiff(6e8, 0.03, 0.015, 0.01, 0.005), "stage_2": stiff(9e8, 0.05, 0.02, 0.01, 0.005)}
+    return assemble(gearbox, BUSHING, stiffness)
+
+
+def dense_peaks(assembly, speeds, harmonics, count, most):
+    """Loudest peaks of the three quantities by a dense sweep, each then searched for by itself: line, speed, height."""
+    settings = SteadySettings(speeds, harmonics=harmonics)
+    gearset = gearset_of(assembly, np.array([speeds.first, speeds.last]), harmonics)
+    solver, sense = PointSolver(gearset, settings), np.sign(speeds.first + speeds.last)
+
+    def sizes(speed):
+        amplitude = 2.0 * signals(gearset, solver.response(sense * speed))[1:]
+        return [own.sizes(amplitude).max(axis=1) for own in quantities]
+
+    quantities = quantities_of([own.name for own in gearset.signal_names])
+    at = np.geomspace(abs(speeds.first), abs(speeds.last), count)
+    swept = [np.array(own) for own in zip(*(sizes(speed) for speed in at), strict=True)]
+    found = {}
+    for number, (quantity, values) in enumerate(zip(quantities, swept, strict=True)):
+        peaks = [(point, line) for line in range(values.shape[1]) for point in standing_peaks(values[:, line], CLEARLY)]
+        peaks = sorted(peaks, key=lambda peak: -values[peak])[:most]
+        own = []
+        for point, line in peaks:
+            top = scipy.optimize.minimize_scalar(
+                lambda speed, number=number, line=line: -sizes(speed)[number][line],
+                bounds=(at[point - 1], at[point + 1]),
+                method="bounded",
+                options={"xatol": 1e-6 * at[point], "maxiter": 20},
+            )
+            own.append((line, float(top.x), max(-float(top.fun), float(values[point, line]))))
+        found[quantity.name] = own
+    return found
+
+
+def differences(response, truth):
+    """Relative difference of each peak of a dense sweep from the one that is listed near it, 1 where none is."""
+    speed = np.abs(response.solved.speed)
+    found = {}
+    for quantity in quantities_of([own.name for own in response.signals]):
+        sizes = quantity.sizes(response.solved.amplitude[:, 1:]).max(axis=2)
+        own = []
+        for line, at, height in truth[quantity.name]:
+            places = standing_peaks(sizes[:, line])
+            near = places[np.abs(speed[places] / at - 1.0) < NEAR]
+            own.append(float(np.abs(sizes[near, line] / height - 1.0).min(initial=1.0)))
+        found[quantity.name] = np.array(own)
+    return found
+
+
+def test_the_loudest_peaks_are_those_of_a_dense_sweep(parallel):
+    """Two stages between 300 and 900 rpm: the twenty loudest of each quantity, by fewer speeds than the sweep has."""
+    speeds = SpeedRange(300.0 * RPM, 900.0 * RPM, 120)
+    response = response_of(parallel, SteadySettings(speeds, harmonics=6))
+    off = differences(response, dense_peaks(parallel, speeds, 6, 900, 20))
+    assert len(response.solved.speed) < 400
+    for quantity in ("error", "force", "acceleration"):
+        assert off[quantity].max() < 2e-3, quantity
+
+
+@pytest.mark.validation
+def test_the_sixty_loudest_peaks_of_the_grc_are_those_of_a_dense_sweep(grc, stiffness):
+    """All speeds above a tenth: of bearing forces two shoulders of other bearings' peaks stand between the speeds."""
+    assembly = assemble(grc, BUSHING, stiffness)
+    whole = SpeedRange(0.0, -22.46, 400)
+    response = response_of(assembly, SteadySettings(whole))
+    assert len(response.solved.speed) < 999  # as many as five speeds a crossing took
+    truth = dense_peaks(assembly, SpeedRange(-2.246, -22.46, 2), response.harmonics, 8000, 60)
+    off = differences(response, truth)
+    assert np.count_nonzero(off["error"] > 2e-3) == 0
+    assert np.count_nonzero(off["force"] > 2e-3) <= 3
+    assert np.count_nonzero(off["acceleration"] > 2e-3) <= 3
+
+
+def test_what_was_stopped_between_tops_goes_on_to_the_same_numbers(parallel):
+    settings, kept, seen = SteadySettings(SpeedRange(30.0, 60.0, 20), harmonics=4), [], []
+    whole = response_of(parallel, settings, progress=lambda done, total: seen.append(done)).solved
+    tops = seen[-1] - 3
+    assert tops > 20
+
+    def stop(done, total):
+        if done == tops:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        response_of(parallel, settings, progress=stop, keep=kept.append)
+    seen.clear()
+    again = response_of(parallel, settings, known=kept[-1], progress=lambda done, total: seen.append(done)).solved
+    assert seen == [tops + 1, tops + 2, tops + 3]
+    np.testing.assert_array_equal(again.speed, whole.speed)
+    np.testing.assert_array_equal(again.amplitude, whole.amplitude)
+
+
+def spur(swing):
+    """Stiffness of spur teeth: one pair or two in contact, with short ramps between."""
+    edge = np.clip(np.minimum(np.arange(50) - 5.0, 30.0 - np.arange(50)) / 3.0, 0.0, 1.0)
+    return 4e8 * (1.0 + swing * edge)
+
+
+def test_harmonics_follow_from_the_stiffness_and_more_change_little(parallel):
+    """A smooth mesh takes the fewest; one that swings in steps as many as leave 2e-2 of its compliance out."""
+    smooth = gearset_of(parallel, np.array([30.0, 60.0]))
+    assert smooth.usual_harmonics == 10
+    assembly = assemble(parallel.gearbox, BUSHING, {"stage_1": spur(0.5), "stage_2": stiff(9e8, 0.05)})
+    response = response_of(assembly, SteadySettings(SpeedRange(30.0, 60.0, 20)))
+    assert 10 < response.harmonics <= 25
+    compliance = 1.0 / spur(0.5)
+    tails = np.abs(np.fft.rfft(compliance - compliance.mean()))
+    left = np.linalg.norm(tails[response.harmonics + 1 :]) / np.linalg.norm(tails)
+    # By its positions alone; the law runs smoothly between them.
+    assert response.left_out[0] == pytest.approx(left, rel=0.5)
+    assert response.change_with_more < 1e-2
+    few = response_of(assembly, SteadySettings(SpeedRange(30.0, 60.0, 20), harmonics=3))
+    assert few.harmonics == 3
+    assert few.left_out[0] > 0.1
+    assert few.change_with_more > response.change_with_more
+
+
+def test_the_change_with_more_harmonics_is_that_of_the_loudest_peaks(parallel):
+    speeds = SpeedRange(30.0, 60.0, 20)
+    few, more = (response_of(parallel, SteadySettings(speeds, harmonics=n)) for n in (2, 3))
+    peaks = np.abs(few.solved.amplitude[:, 1:, 0])
+    point, line = np.unravel_index(np.argmax(peaks), peaks.shape)
+    index = tuple(few.lines.index[line + 1].tolist())
+    same = np.interp(few.solved.speed[point], more.solved.speed, np.abs(more.amplitude("overall_dte", index)))
+    # The loudest is one of the ten; between speeds of the other a straight line.
+    assert abs(same / peaks[point, line] - 1.0) < few.change_with_more + 2e-2
+
+
+@pytest.mark.parametrize("count", [0, 101])
+def test_harmonics_that_cannot_be_are_refused(count):
+    with pytest.raises(SteadyError, match="must be from 1 to 100"):
+        SteadySettings(SpeedRange(1.0, 2.0, 2), harmonics=count)
+
+
+def test_a_stiffness_that_does_not_vary_excites_nothing(parallel):
+    """Two bases without a wave: every line is zero, and disturbances decay as the mean system has them decay."""
+    assembly = assemble(parallel.gearbox, BUSHING, {"stage_1": np.full(50, 6e8), "stage_2": np.full(50, 9e8)})
+    response = response_of(assembly, SteadySettings(SpeedRange(30.0, 60.0, 5)))
+    assert np.abs(response.solved.amplitude[:, 1:, 0]).max() < 1e-15
+    assert not response.left_out.any()
+    gearset = gearset_of(assembly, np.array([30.0, 60.0]))
+    values = np.concatenate([gearset.system.eigenvalues(speed) for speed in (30.0, 45.0, 60.0)])
+    assert response.growth_rate == pytest.approx(values.real[np.abs(values.imag) > 10.0].max(), rel=1e-6)
