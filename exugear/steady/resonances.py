@@ -28,7 +28,7 @@ LEAST_SHARE = 1e-3
 """Peaks below this share of the largest of their signal, in the range of operation too, are left to the even steps."""
 MOST = 240
 """Crossings at most, the strongest first."""
-LOUDEST = 100
+LOUDEST = 120
 """Peaks of each quantity whose tops are looked for, of all speeds and of the range of operation."""
 LEAST_STAND = 1e-4
 """Share by which a peak stands out at the known speeds to be looked at: more of it may show."""
@@ -124,16 +124,15 @@ def crossings(
 
 def _shares(peaks: Floats) -> Floats:
     """Peaks (n, signals) over the largest of their signal, of whichever signal shows it most, (n,)."""
-    largest: Floats = np.maximum(peaks.max(axis=0, initial=0.0), 1e-300)
-    shares: Floats = (peaks / largest).max(axis=1)
-    return shares
+    largest = np.maximum(peaks.max(axis=0, initial=0.0), 1e-300)
+    return np.asarray(np.max(peaks / largest, axis=1), dtype=np.float64)
 
 
 def with_crossings(speeds: Floats, found: tuple[Crossing, ...]) -> Floats:
     """Speeds (n,) and those of crossings between them, ascending; what all but coincides is one."""
     inside = [crossing.speed for crossing in found if speeds.min() <= crossing.speed <= speeds.max()]
     both = np.sort(np.concatenate([speeds, inside]))
-    return both[np.append(True, np.diff(both) > COINCIDE * np.abs(both[1:]))]
+    return np.asarray(both[np.append(True, np.diff(both) > COINCIDE * np.abs(both[1:]))])
 
 
 def missed_tops(

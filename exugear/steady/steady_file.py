@@ -99,7 +99,7 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
 
 
 def _attributes(response: SteadyResponse) -> dict[str, Any]:
-    """What holds for a response as a whole."""
+    """Tell what holds for a response as a whole."""
     assembly = response.assembly
     return {
         "gearbox": assembly.gearbox.name,
