@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from exugear.bearings.rolling import proportions
@@ -17,6 +17,8 @@ from exugear.model.sections.connections import CONTACT_ANGLES_DEG, ROUNDING_MM, 
 
 ALIGNING = ("spherical_roller", "self_aligning_ball")
 """Types whose outer raceway is a sphere about the middle of the bearing."""
+SPHERES = (*ALIGNING, "thrust_spherical_roller")
+"""Types whose outer raceway is a sphere about a point of the axis."""
 
 
 @dataclass(frozen=True)
@@ -291,7 +293,7 @@ def _common(section: CatalogueSection) -> dict[str, Any]:
         "pitch_diameter": 1e-3 * pitch,
         "element_count": count,
         "radial_clearance": 1e-3 * section.radial_clearance_mm,
-        "aligning": section.type in ALIGNING,
+        "aligning": section.type in SPHERES,
     }
 
 
@@ -300,7 +302,7 @@ def _roller_row(section: CatalogueSection) -> RollerRow:
     common = _common(section)
     length = 1e-3 * _given(section, "element_length_mm")
     profile: dict[str, Any] = {}
-    if section.type == "spherical_roller":
+    if section.type in SPHERES:
         raceway = _outer_raceway_radius(section)
         profile["crown_curvature"] = (1.0 / _given(section, "osculation") - 1.0) / raceway
     elif section.profile == "standard":
@@ -337,6 +339,10 @@ def _placed(section: CatalogueSection, row: RollerRow | BallRow) -> tuple[Rollin
     if section.arrangement != "single":
         distance, preload = 1e-3 * _given(section, "row_distance_mm"), 1e-6 * section.axial_preload_um
         return pair_rows(moved(row, signed, 0.0), section.arrangement, distance, preload)
+    if section.type == "thrust_spherical_roller":
+        # All rollers press on one point of the axis, beside the bearing.
+        centre = -0.5 * row.pitch_diameter * math.tan(signed)
+        return (replace(moved(row, signed, 0.0), sphere_centre=centre),)
     rows = row_count(section)
     if section.type in ALIGNING and rows == 2:
         # Both rows point to the middle of the bearing.

@@ -108,7 +108,7 @@ def _row_laminae(row: RollerRow, first: int, first_roller_angle: float) -> Lamin
     radius = 0.5 * row.pitch_diameter - along * sine
     point = np.column_stack([radius * np.cos(polar), radius * np.sin(polar), row.axial_position + along * cosine])
     if row.aligning:
-        point[:] = 0.0  # the raceway is a sphere: contact forces pass through its centre, that of the bearing
+        point[:] = 0.0, 0.0, row.sphere_centre  # contact forces pass through the centre of the raceway's sphere
     return LaminaArrays(
         direction=np.hstack([normal, np.cross(point, normal)]),
         gap=0.5 * row.radial_clearance * cosine + 2.0 * row.drop(along),

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from exugear.bearings.rolling.ratings import (
+    THRUST,
     basic_dynamic_rating,
     groove_conformities,
     groove_ratio,
@@ -185,6 +186,10 @@ def _ring_capacities(row: RollingRow, row_rating: float, bearing_type: BearingTy
         weaker = (1.044 * ratio**1.72 * groove_ratio(*groove_conformities(row, bearing_type))) ** (10.0 / 3.0)
         common = row_rating / (row.element_count * cosine**0.7)
         return common / 0.407 * (1.0 + weaker) ** 0.3, common / 0.389 * (1.0 + 1.0 / weaker) ** 0.3
+    if bearing_type in THRUST:  # ISO/TS 16281 for thrust bearings; without its lambda the life is rather too short
+        weaker = ratio ** (143.0 / 108.0 * 4.5)
+        common = row_rating / (row.element_count * math.sin(abs(row.contact_angle)))
+        return common * (1.0 + weaker) ** (2.0 / 9.0), common * (1.0 + 1.0 / weaker) ** (2.0 / 9.0)
     weaker = (1.038 * ratio ** (143.0 / 108.0)) ** 4.5
     common = row_rating / (ROLLER_REDUCTION * row.element_count * cosine)
     power = 2.0 / 9.0

@@ -239,7 +239,9 @@ class _Packing:
         layout, geometry = [0] * LAYOUT_SIZE, np.zeros(GEOMETRY_SIZE)
         layout[COUNT], layout[CIRCLE] = row.element_count, self._circle(row.element_count)
         geometry[[COSINE, SINE, GAP]] = cosine, sine, 0.5 * row.radial_clearance * cosine
-        if not row.aligning:
+        if row.aligning:
+            geometry[LEVER] = -row.sphere_centre * cosine
+        else:
             lever = 0.5 * row.pitch_diameter * sine - row.axial_position * cosine
             geometry[LEVER], geometry[TILTING] = lever, 1.0
         if isinstance(row, RollerRow):
@@ -265,6 +267,7 @@ class _Packing:
             contact_angle=0.0,
             axial_position=0.0,
             radial_clearance=0.0,
+            sphere_centre=0.0,
             laminae=SLICES,
         )
         table = roller_table(kind)

@@ -72,6 +72,7 @@ PROPORTIONS: Mapping[str, Proportions] = {
     "angular_contact_ball": Proportions(Proportion(0.32, 0.29, 0.335), Proportion(1.08, 1.04, 1.20)),
     "self_aligning_ball": Proportions(Proportion(0.26, 0.22, 0.31), Proportion(1.25, 1.15, 1.40)),
     "four_point_ball": Proportions(Proportion(0.3175, 0.29, 0.335), Proportion(1.12, 1.05, 1.20)),
+    "thrust_spherical_roller": Proportions(Proportion(0.26, 0.23, 0.29), Proportion(1.15, 1.05, 1.25)),
 }
 """Proportions by type."""
 PITCH_BEYOND_MEAN = Proportion(0.0, -0.02, 0.03)
@@ -81,12 +82,14 @@ ROLLER_LENGTH: Mapping[str, Proportion] = {
     "needle_roller": Proportion(0.68, 0.60, 0.76),
     "tapered_roller": Proportion(0.68, 0.58, 0.76),
     "spherical_roller": Proportion(0.74, 0.65, 0.82),
+    "thrust_spherical_roller": Proportion(0.60, 0.50, 0.68),
 }
 """Effective length of rollers over the width of their row, by type."""
 CONTACT_ANGLE_DEG: Mapping[str, Proportion] = {
     "tapered_roller": Proportion(16.0, 11.0, 29.0),
     "angular_contact_ball": Proportion(40.0, 15.0, 40.0),
     "four_point_ball": Proportion(35.0, 30.0, 40.0),
+    "thrust_spherical_roller": Proportion(48.0, 45.0, 51.0),
 }
 """Contact angles by type; those of bearings that align themselves follow from the distance of their rows."""
 ALIGNING_ROW_DISTANCE: Mapping[str, Proportion] = {

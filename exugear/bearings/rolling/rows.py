@@ -55,7 +55,9 @@ class RollingRow:
     radial_clearance : float
         Diametral clearance of the mounted row in the radial plane, m. Negative: preload.
     aligning : bool
-        Whether the outer raceway is a sphere about the middle of the bearing: tilting the rings loads nothing.
+        Whether the outer raceway is a sphere, in which no element tilts: tilting rings about its centre loads nothing.
+    sphere_centre : float
+        Where that centre stands on the axis, m: in the middle of radial bearings, beside thrust bearings.
     """
 
     element_diameter: float
@@ -65,6 +67,7 @@ class RollingRow:
     axial_position: float = 0.0
     radial_clearance: float = 0.0
     aligning: bool = False
+    sphere_centre: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse what cannot be built."""

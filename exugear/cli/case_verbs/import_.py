@@ -38,14 +38,13 @@ def import_(
         from fe_ste.tools.files import write_file
 
         target = (out or Path(_stem(file))) / NAME
-        for one in (target, target.with_name(SPECTRUM)):
-            if one.exists():
-                raise BadInputError(
-                    f"{one}: is there already, and may have been edited; name another folder with --out"
-                )
+        _refuse_existing(target)
         imported = _imported(file, target, Rules(shifts.value, distances.value))
         if imported.spectrum:
-            write_file(target.with_name(SPECTRUM), imported.spectrum.encode("utf-8"))
+            table, content = target.with_name(SPECTRUM), imported.spectrum.encode("utf-8")
+            if not (table.is_file() and table.read_bytes() == content):  # as an import that was killed leaves it
+                _refuse_existing(table)
+                write_file(table, content)
         write_file(target, imported.text.encode("utf-8"))
         if as_json:
             print_json(
@@ -66,6 +65,11 @@ def import_(
             f"{len(imported.gearbox.bearings)} bearings"
         )
         say(f"Values marked A are assumed: look them over, then: exugear check {target}")
+
+
+def _refuse_existing(path: Path) -> None:
+    if path.exists():
+        raise BadInputError(f"{path}: is there already, and may have been edited; name another folder with --out")
 
 
 def _stem(file: Path) -> str:

@@ -68,9 +68,11 @@ BearingType = Literal[
     "angular_contact_ball",
     "self_aligning_ball",
     "four_point_ball",
+    "thrust_spherical_roller",
 ]
 """Types of rolling bearings that a catalogue section can describe."""
-_ROLLERS = frozenset({"cylindrical_roller", "needle_roller", "tapered_roller", "spherical_roller"})
+_BARRELS = frozenset({"spherical_roller", "thrust_spherical_roller"})
+_ROLLERS = _BARRELS | {"cylindrical_roller", "needle_roller", "tapered_roller"}
 _BALLS = frozenset({"deep_groove_ball", "angular_contact_ball", "self_aligning_ball", "four_point_ball"})
 _ANGULAR = frozenset({"tapered_roller", "angular_contact_ball"})
 _SELF_ALIGNING = frozenset({"spherical_roller", "self_aligning_ball"})
@@ -82,12 +84,12 @@ TYPES_OF_KEYS: dict[str, tuple[frozenset[str], str]] = {
     "element_length_mm": (_ROLLERS, "balls have none"),
     "inner_groove_ratio": (_BALLS, "rollers run in no groove"),
     "outer_groove_ratio": (_BALLS - _SELF_ALIGNING, "only balls run in grooves, self-aligning ones in a sphere"),
-    "osculation": (frozenset({"spherical_roller"}), "only barrel rollers have one"),
+    "osculation": (_BARRELS, "only barrel rollers have one"),
     "profile": (_PROFILED, "balls have none, that of barrel rollers is their osculation"),
     "row_count": (_RADIAL | _SELF_ALIGNING, "two rows with a contact angle are an arrangement, X or O"),
     "ribs": (_CYLINDERS, "only cylindrical rollers run against ribs that hold the shaft"),
     "rib_contact_mm": (_CYLINDERS, "only cylindrical rollers run against ribs that hold the shaft"),
-    "holds_towards": (_ANGULAR, "it holds both directions or none"),
+    "holds_towards": (_ANGULAR | {"thrust_spherical_roller"}, "it holds both directions or none"),
     "axial_preload_um": (_ANGULAR, "only a pair with contact angles can be set along the axis"),
 }
 """Keys of a catalogue section that only some types have, and why."""
@@ -97,8 +99,10 @@ CONTACT_ANGLES_DEG: dict[str, tuple[float, float]] = {
     "angular_contact_ball": (5.0, 45.0),
     "self_aligning_ball": (2.0, 25.0),
     "four_point_ball": (10.0, 45.0),
+    "thrust_spherical_roller": (40.0, 58.0),
 }
-"""Contact angles that can be, by type; other types have none. Beyond 45 degrees it is a thrust bearing."""
+"""Contact angles that can be, by type; other types have none. Beyond 45 degrees it is a thrust bearing, of which
+one type is known."""
 
 
 ROUNDING_MM = 1e-6

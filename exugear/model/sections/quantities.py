@@ -119,7 +119,7 @@ CouplingDamping = Annotated[float, Range(0.0, 1e9, (0.0, 1e7), "N m s/rad")]
 DampingTimeS = Annotated[
     float, Range(0.0, 1e-2, (0.0, 1e-3), "stiffness times it is the damping: 1 ms is critical at 320 Hz")
 ]
-ContactAngleDeg = Annotated[float, Range(0.0, 59.0, (0.0, 46.0))]
+ContactAngleDeg = Annotated[float, Range(0.0, 59.0, (0.0, 52.0))]
 ClearanceMm = Annotated[float, Range(-1.0, 5.0, (-0.2, 1.0), "on the diameter")]
 RollingRows = Annotated[int, Range(1, 8, (1, 6))]
 RollingElements = Annotated[int, Range(3, 1000, (5, 300), "balls or rollers of one row")]

@@ -157,6 +157,8 @@ def _ordered(
             pinion, gear = sorted((one, other), key=lambda each: _size(gears[each.number]))
             apart = math.dist(places.position(one)[:2], places.position(other)[:2])
             both = gears[pinion.number], gears[gear.number]
+            if both[1].internal and both[1].teeth <= both[0].teeth:
+                raise RexsError(f"{part}: a ring of {both[1].teeth} teeth has no room for {both[0].teeth}")
             distance = centre_distance(part, apart, both, notes)
             common = _common_face(places, part, *both)
             stages.append(Stage(part, pinion.number, gear.number, distance, apart, common))

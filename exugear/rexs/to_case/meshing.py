@@ -421,6 +421,12 @@ def _tip_bound(gears: Mapping[int, Toothing], stage: Stage, which: int) -> float
     """Tip diameter (mm) at which a gear keeps clear of its mate's form circle; None if it does so already."""
     pinion, gear = unchecked("pinion", gears[stage.pinion]), unchecked("gear", gears[stage.gear])
     pair = UncheckedPair(name="", pinion=pinion, gear=gear, centre_distance=1e-3 * stage.distance.value)
+    for one, of in ((pinion, stage.pinion), (gear, stage.gear)):
+        if one.tip_radius <= one.base_radius:
+            raise RexsError(
+                f"{gears[of].part}: its tip circle of {2e3 * one.tip_radius:.6g} mm lies inside of its base circle of "
+                f"{2e3 * one.base_radius:.6g} mm: no flank is left; correct tip_diameter or its tooth data"
+            )
     tip = gear if which == stage.gear else pinion
     margin = (MARGIN if gears[which].tip else fitting.ROOT_MARGIN) * tip.normal_module
     diameter = 1e3 * fitting.clear_tip_diameter(pair, tip, margin)

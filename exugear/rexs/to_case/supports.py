@@ -27,10 +27,12 @@ BEARINGS = ("concept_bearing", "rolling_bearing_with_catalog_geometry", "rolling
 PLAIN_BEARINGS = ("hydrodynamic_radial_plain_bearing", "slide_bearing")
 ROLLING_TYPES = {
     "angular_contact_ball_bearing": "angular_contact_ball",
+    "axial_self_aligning_roller_bearing": "thrust_spherical_roller",
     "four_point_contact_ball_bearing": "four_point_ball",
     "radial_grooved_ball_bearing": "deep_groove_ball",
     "radial_needle_roller_bearing": "needle_roller",
     "radial_roller_bearing": "cylindrical_roller",
+    "radial_self-aligning_ball_bearing": "self_aligning_ball",
     "radial_self_aligning_ball_bearing": "self_aligning_ball",
     "radial_self_aligning_roller_bearing": "spherical_roller",
     "radial_spherical_roller_bearing": "spherical_roller",
@@ -295,9 +297,10 @@ def _catalogue(
     clearance = part.quantity("operating_radial_bearing_clearance", "mm")
     if clearance:
         entries["radial_clearance_mm"] = read(tidy(clearance), "operating_radial_bearing_clearance")
+    sense_of_rating = "axial" if kind == "thrust_spherical_roller" else "radial"
     for key, ours in (
-        ("radial_dynamic_load_rating", "dynamic_rating_kN"),
-        ("radial_static_load_rating", "static_rating_kN"),
+        (f"{sense_of_rating}_dynamic_load_rating", "dynamic_rating_kN"),
+        (f"{sense_of_rating}_static_load_rating", "static_rating_kN"),
     ):
         rating = part.quantity(key, "kN")
         if rating:

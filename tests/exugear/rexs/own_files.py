@@ -29,6 +29,8 @@ UNITS = {
     "operating_time_fraction": "%",
     "radial_dynamic_load_rating": "kN",
     "radial_static_load_rating": "kN",
+    "axial_dynamic_load_rating": "kN",
+    "axial_static_load_rating": "kN",
     "u_coordinate_on_shaft": "mm",
     "endurance_limit_flank": "N / mm^2",
     "endurance_limit_root": "N / mm^2",

@@ -19,6 +19,8 @@ from exugear.rexs.faults import RexsError
 from exugear.rexs.parsing import parse_model
 from exugear.rexs.to_case.conversion import to_case
 
+from .test_rexs_industry import FLOATING, cylindrical, helical, planetary, two_row_tapered
+
 DATA = Path(__file__).parent / "data"
 SEW = "SEW_3-stage_cylindrical_gearbox_1.0.rexs"
 PLANETARY = "FVA_Planetary_stage_-_Minus_gearing_1.1.rexs"
@@ -28,7 +30,21 @@ VALUE = re.compile(r"<attribute [^>]*>([^<]+)</attribute>")
 ODD = ("0", "-1", "1e300", "-1e-300", "1e-9", "nan", "", "abc", "1e9", "0.001", "true", "9" * 5000)
 
 
+def ribbed(file, shaft):
+    for u in (20.0, 180.0):
+        cylindrical(file, shaft, u, "both_directions")
+
+
+OWN = {
+    "floating sun": lambda: planetary(FLOATING).text(),
+    "two rows": lambda: helical(two_row_tapered(("negative", "positive"))).text(),
+    "ribs": lambda: helical(ribbed).text(),
+}
+
+
 def text_of(name):
+    if name in OWN:
+        return OWN[name]()
     return (DATA / name).read_bytes().decode("utf-8-sig")
 
 
@@ -67,7 +83,7 @@ DAMAGES = (
 
 def damaged(seed):
     chance = random.Random(seed)
-    text = text_of(chance.choice((SEW, PLANETARY, SPECTRUM)))
+    text = text_of(chance.choice((SEW, PLANETARY, SPECTRUM, *OWN)))
     damage = chance.choice(DAMAGES)
     for _ in range(chance.choice((1, 1, 2, 4))):
         text = damage(text, chance)

@@ -247,6 +247,9 @@ def test_speeds_that_the_file_leaves_out_are_put_into_each_load_case(tmp_path):
 def test_shafts_move_by_what_their_bearings_carry_over_their_stiffness(tmp_path):
     """Levers by hand: of the load at 40 mm the bearing at 10 mm takes 5/8, that at 90 mm 3/8; each yields by 1e-9 m/N.
 
+    That the teeth resist misalignment moves the load along the face by less than a hundredth of the lever; the sum of
+    both bearings stays.
+
     A shaft that points against z has its nodes in its own sense, its displacements along its own axes.
     """
     file, shafts = spur_pair()
@@ -272,8 +275,11 @@ def test_shafts_move_by_what_their_bearings_carry_over_their_stiffness(tmp_path)
     shares = [0.625, 0.53125, 0.375]  # in the middle by the line between the ends
     for axis, sizes in (("v", radial), ("w", force)):
         moved = [1e-3 * sizes * share for share in shares]
-        assert [abs(one) for one in second[f"displacement_{axis}_of_nodes"]] == pytest.approx(moved, rel=2e-4)
-        assert [abs(one) for one in first[f"displacement_{axis}_of_nodes"]][::-1] == pytest.approx(moved, rel=2e-4)
+        assert [abs(one) for one in second[f"displacement_{axis}_of_nodes"]] == pytest.approx(moved, rel=5e-3)
+        assert [abs(one) for one in first[f"displacement_{axis}_of_nodes"]][::-1] == pytest.approx(moved, rel=5e-3)
+        for one in (first, second):
+            ends = one[f"displacement_{axis}_of_nodes"][::2]
+            assert abs(sum(ends)) == pytest.approx(1e-3 * sizes, rel=3e-4)
     # Torque about -z on the first shaft: its teeth are pushed along +y of the gear unit, away from the mate along -x;
     # v of a shaft that is turned about w points against that of the gear unit.
     assert first["displacement_v_of_nodes"][0] * second["displacement_v_of_nodes"][0] > 0.0

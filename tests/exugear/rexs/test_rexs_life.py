@@ -87,6 +87,8 @@ def test_the_verbs_import_and_count_the_loads_and_never_write_over_a_table(tmp_p
     case = tmp_path / "case" / "gearbox.toml"
     assert Gearbox.from_toml(case).case.loads.sources["load_spectrum"].file == "load_spectrum.csv"
     assert exugear("loads", case, "--out", tmp_path / "results").exit_code == 0
+    case.unlink()  # as if the import had been killed between its two files
+    assert exugear("import", path, "--out", tmp_path / "case").exit_code == 0
     other = tmp_path / "other"
     other.mkdir()
     (other / "load_spectrum.csv").write_text("mine")
