@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from typing import TYPE_CHECKING
 
@@ -41,6 +41,20 @@ def tell_of_tables(tables: Mapping[str, MeshTable]) -> list[str]:
         for remark in remarks_about_table(name, table):
             note(remark, style="yellow")
     return [doubt for name, table in tables.items() for doubt in doubts_about_table(name, table)]
+
+
+def refuse_unsolved(meshes: Sequence[str]) -> None:
+    """End with code 1 where meshes read their tables beside states that are not solved.
+
+    Raises
+    ------
+    FailedError
+    """
+    if meshes:
+        raise FailedError(
+            f"not to be trusted: at the static load {', '.join(meshes)} come beside states of their tables that are "
+            "not solved, where others stand in; exugear ste says which states these are and why"
+        )
 
 
 def compute_tables(requests: list[TableRequest]) -> dict[str, MeshTable]:

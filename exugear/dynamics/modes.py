@@ -21,7 +21,7 @@ from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.energy_shares import BODY_MOTIONS, kinetic_shares, mode_name
 from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.linearised import RIGID_BODY_LIMIT, Linearised, growth_rate, linearise, undamped_modes
-from exugear.dynamics.statics import static_state
+from exugear.dynamics.statics import beside_unsolved_states, static_state
 from exugear.kernels.meshes import STIFFNESS, TILT_COLUMNS, TILT_STIFFNESS
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
@@ -129,6 +129,7 @@ class Modes:
             "housing_factor": assembly.housing_factor,
             "bearing_laws": assembly.bearing_laws,
             "growth_rate": self.growth_rate,
+            "beside_unsolved_states": ", ".join(beside_unsolved_states(assembly)),
         }
         return xr.Dataset(variables, coordinates, attributes)
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from exugear.dynamics.assembly import Assembly
+from exugear.kernels.table_law import GUESSED, LEFT_TABLE
 from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Booleans, Floats
 
@@ -190,7 +191,15 @@ SIGNALS = (
         "s",
         "time in which load, centre distance or misalignment lay outside the table, which then goes on in a straight "
         "line",
-        formula=lambda layout, rows: layout.values("outside_table", rows) > 0.0,
+        formula=lambda layout, rows: layout.values("outside_table", rows) == LEFT_TABLE,
+        laws="table",
+    ),
+    Signal(
+        "unsolved_time",
+        ("mesh",),
+        "s",
+        "time in which the table was read beside states that are not solved, where others stand in for them",
+        formula=lambda layout, rows: layout.values("outside_table", rows) == GUESSED,
         laws="table",
     ),
     Signal(
@@ -217,7 +226,8 @@ SIGNALS = (
         "outside_table",
         ("time", "mesh"),
         "1",
-        "1 where load, centre distance or misalignment lies outside the table, else 0",
+        "1 where load, centre distance or misalignment lies outside the table, 2 beside states of it that are not "
+        "solved, else 0",
         filled_by=("observe_meshes",),
         laws="table",
         stored=False,

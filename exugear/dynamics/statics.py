@@ -18,7 +18,8 @@ import scipy.linalg
 
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.linearised import tangent_stiffness
-from exugear.kernels.meshes import FORCE, MeshArrays
+from exugear.kernels.meshes import FORCE, OUTSIDE, MeshArrays
+from exugear.kernels.table_law import GUESSED
 from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
 
@@ -266,6 +267,17 @@ def static_state(assembly: Assembly) -> StaticState:
     """
     load = assembly.gearbox.case.static_load
     return StaticState(assembly, locked_equilibrium(assembly, load.torques_N_m, load.locked, assembly.mean_meshes))
+
+
+def beside_unsolved_states(assembly: Assembly) -> tuple[str, ...]:
+    """Meshes that, at the static load, read their table beside states that are not solved; see `SteSurface.guessed`."""
+    if not any(
+        element.table is not None and element.table.surface.guessed is not None for element in assembly.elements
+    ):
+        return ()
+    state = static_state(assembly)
+    read = assembly.mesh_states(state.q, np.zeros_like(state.q), assembly.mean_meshes)[:, OUTSIDE]
+    return tuple(name for name, how in zip(assembly.mesh_names, read, strict=True) if how == GUESSED)
 
 
 def _held(assembly: Assembly, torques: Mapping[str, float], locked: Sequence[str]) -> list[str]:

@@ -60,7 +60,7 @@ class RunFigures:
     residual : float
         Share of energy that is not accounted for.
     times : tuple of float
-        Longest pull of a mesh, longest time that teeth are apart, longest time outside a table, s.
+        Longest pull of a mesh, longest time that teeth are apart, outside a table, beside unsolved states of it, s.
     end : float
         Simulated time, s.
     """
@@ -98,7 +98,7 @@ def verdicts_of(context: Context, group: RunGroup) -> tuple[Verdict, ...]:
 
 
 def _of_run(run: VariantRun, figures: RunFigures) -> list[Verdict]:
-    residual, (pulling, apart, outside) = abs(figures.residual), figures.times
+    residual, (pulling, apart, outside, _) = abs(figures.residual), figures.times
     verdicts = (
         []
         if math.isnan(residual)

@@ -46,6 +46,8 @@ ENERGY_BELOW = 4
 LAW_FORCE, LAW_STIFFNESS, LAW_POTENTIAL, LAW_BY_DISTANCE, LAW_BY_MISALIGNMENT, LAW_BY_PMC, LAW_OUTSIDE = range(7)
 """Entries of `Scratch.law`."""
 LAW_SIZE = 7
+LEFT_TABLE, GUESSED = 1.0, 2.0
+"""What the law may have at `LAW_OUTSIDE` beside zero: it left an axis, or interpolated over a state not solved."""
 
 
 class TableArrays(NamedTuple):
@@ -68,6 +70,8 @@ class TableArrays(NamedTuple):
     back_phase : (m,) position of the other flank in its mesh cycle at zero angles
     damping_time : (m,) damping over tangent stiffness, s
     sense : (m,) the loaded flank of gear 1, 1 or -1: the table is that of 1, or of -1 turned about the line of centres
+    has_guesses : (m,) 1 where states that were not solved have others standing in for them
+    near_guesses : (m, k) 1 between nodes where one of these acts (`SteSurface.near_guesses`, flat)
     """
 
     shape: Integers
@@ -87,6 +91,8 @@ class TableArrays(NamedTuple):
     back_phase: Floats
     damping_time: Floats
     sense: Floats
+    has_guesses: Integers
+    near_guesses: Integers
 
 
 class Scratch(NamedTuple):
@@ -98,7 +104,7 @@ class Scratch(NamedTuple):
     node : (3,) first node on each axis
     cubic : (9, 8) the surface's derivatives in the order of `ORDERS`, over one load piece, filled up
     law : (7,) force (N), tangent stiffness (N/m), potential (J), its derivatives by centre distance (N), by
-        misalignment (N m) and by pmc (J), 1 where an axis was left
+        misalignment (N m) and by pmc (J), `LEFT_TABLE` where an axis was left, `GUESSED` near unsolved states
     """
 
     basis: Floats
@@ -285,6 +291,18 @@ def position_on_piece(delta: float, c: Floats, flat: bool) -> float:
 
 
 @kernel
+def guess_acts(first: int, distance: int, misalignment: int, piece: int, m: int, tables: TableArrays) -> bool:
+    """Whether a state that is not solved acts on an interval; `first` is the first position that acts there."""
+    shape = tables.shape[m]
+    # Four positions act between the second and the third of them; a mean over the cycle has one.
+    position = (first + 1) % shape[POSITIONS]
+    place = position * max(1, tables.axes[m, 0] - 1) + distance
+    place = place * max(1, tables.axes[m, 1] - 1) + misalignment
+    marked: bool = tables.near_guesses[m, place * shape[LOAD_PIECES] + piece] != 0
+    return marked
+
+
+@kernel
 def surface_law(
     delta: float,
     pmc: float,
@@ -311,6 +329,7 @@ def surface_law(
         Position in it: below 0 where the flanks are apart, above 1 beyond the last load.
     """
     law, cubic, shape = memory.law, memory.cubic, tables.shape[m]
+    between_distances, between_misalignments = 0, 0
     for i in range(LAW_SIZE):
         law[i] = 0.0
     # Weights on the three axes; with them the surface becomes a function of the load alone.
@@ -321,8 +340,12 @@ def surface_law(
             x, tables.axes[m, axis], tables.knots[m, axis], tables.weights[m, axis], memory.basis[AXIS_DISTANCE + axis]
         )
         if i < 0:
-            law[LAW_OUTSIDE] = 1.0
+            law[LAW_OUTSIDE] = LEFT_TABLE
             i = -1 - i
+        if axis == 0:
+            between_distances = i
+        else:
+            between_misalignments = i
         memory.node[AXIS_DISTANCE + axis] = tables.first_node[m, axis, i]
     # Walk to the load piece whose ends enclose delta. In one direction only: where the surface is not monotonic by
     # round-off, a walk that may turn round would not end.
@@ -344,9 +367,13 @@ def surface_law(
     # Below the surface at no load the flanks are apart.
     if delta <= c[0] and piece == 0:
         return 0, -1.0
+    if tables.has_guesses[m] == 1 and guess_acts(
+        memory.node[AXIS_PMC], between_distances, between_misalignments, piece, m, tables
+    ):
+        law[LAW_OUTSIDE] = GUESSED
     end = c[0] + c[1] + c[2] + c[3]
     if delta > end and piece == last:
-        law[LAW_OUTSIDE] = 1.0
+        law[LAW_OUTSIDE] = max(law[LAW_OUTSIDE], LEFT_TABLE)
         beyond_last(delta, start, step, count, memory)
         return piece, 2.0
     # On the piece: F = r^2, dF/d delta = 2 r (dr/dt) / (ds/dt), U = F delta - U*, dU/dx = -dU*/dx.

@@ -20,7 +20,6 @@ from exugear.runs.account import EnergyAccount
 from exugear.runs.extent import buffer_rows
 from exugear.runs.plan import RunPlan
 from exugear.runs.start import RunStart
-from exugear.runs.trust import PULLING
 from exugear.solvers.compiled.observers import Observer
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.threads import second_thread
@@ -268,7 +267,7 @@ class Recorder:
         return self._reasons(self.last_time)
 
     def _reasons(self, time: float) -> tuple[str, ...]:
-        return self._judge.reasons(self._mesh_times[PULLING], time)
+        return self._judge.reasons(self._mesh_times, time)
 
     def note_verdict(self) -> None:
         """Add to the pieces that follow what the run may claim so far, and what speaks against it."""

@@ -19,7 +19,7 @@ from exugear.results.run_file import EARLIER_PARTIAL_NAME
 from exugear.runs.outcome import RunError
 from exugear.runs.plan import EXPECTATIONS, RunPlan
 from exugear.runs.run_folder import refuse_to_resume
-from exugear.runs.trust import PULLING, Judge
+from exugear.runs.trust import Judge
 from exugear.solvers.loads import DriveLaw, LoadTable
 from fe_ste.tools.arrays import Floats
 
@@ -87,7 +87,7 @@ def _pieces_to_resume(plan: RunPlan, layout: SignalLayout) -> RunPieces:
 def _take_over_judgement(plan: RunPlan, judge: Judge, state: Checkpoint) -> None:
     judge.figures = state.judgement
     if judge.stop:
-        reasons = judge.reasons(state.mesh_times[PULLING], state.step * plan.step)
+        reasons = judge.reasons(state.mesh_times, state.step * plan.step)
         raise RunError(f"{plan.partial_path}: stopped for good: {'; '.join(reasons)}; run it anew")
 
 

@@ -34,6 +34,8 @@ EXPLAINING = [number for number, term in enumerate(BALANCE_TERMS) if term != "wo
 """Terms of the account that explain where the work of the loads went."""
 PULLING = MESH_TIMES.index("pulling_time")
 """Row of the times of meshes in which they pull."""
+UNSOLVED = MESH_TIMES.index("unsolved_time")
+"""Row of those in which they read a table beside states that are not solved."""
 WHOLLY = 0.9
 """Part of a run in which a mesh pulls that is not swaying about no load, but load on the other flank."""
 LEAST_ENERGY = 1e-9
@@ -203,13 +205,13 @@ class Judge:
         most = (limits.energy_stopped, limits.rim_speed_stopped, 1.0, limits.deflection_stopped)
         return bool(np.any(self.figures[:ACCOUNT, LARGEST] > most))
 
-    def reasons(self, pulling: Floats, simulated: float) -> tuple[str, ...]:
+    def reasons(self, mesh_times: Floats, simulated: float) -> tuple[str, ...]:
         """Reasons why the run is not to be trusted, none if it is.
 
         Parameters
         ----------
-        pulling : (meshes,) array
-            Time in which each mesh pulled, s.
+        mesh_times : (times, meshes) array
+            Times of each mesh, s, as in `exugear.dynamics.signals.MESH_TIMES`.
         simulated : float
             Time so far, s.
         """
@@ -217,7 +219,8 @@ class Judge:
             *self._energy_words(),
             *self._speed_words(),
             *self._deflection_words(),
-            *self._pulling_words(pulling / max(simulated, 1e-300)),
+            *self._pulling_words(mesh_times[PULLING] / max(simulated, 1e-300)),
+            *self._unsolved_words(mesh_times[UNSOLVED]),
         )
 
     def _energy_words(self) -> Iterator[str]:
@@ -273,6 +276,14 @@ class Judge:
                 f"pulling: {', '.join(names)} pull for up to {_percent(share.max())} of the run (limit "
                 f"{_percent(limit)}), which no teeth do, but the law {self._law} does; {cause}, or take the law table, "
                 "which has both flanks"
+            )
+
+    def _unsolved_words(self, times: Floats) -> Iterator[str]:
+        names = [name for name, time in zip(self._meshes, times, strict=True) if time > 0.0]
+        if names:
+            yield (
+                f"table: {', '.join(names)} come beside states of their tables that are not solved, where others stand "
+                f"in, for up to {times.max():.3g} s; exugear ste says which states these are and why"
             )
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from exugear.campbell.campbell import LAYOUT
 from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.statics import beside_unsolved_states
 from exugear.model.choice import Choice
 from exugear.model.versions import STEADY
 from exugear.results.folder import modes_path
@@ -114,6 +115,7 @@ def _attributes(response: SteadyResponse) -> dict[str, Any]:
         "bearing_laws": assembly.bearing_laws,
         "bearings_in_time": ", ".join(response.bearing_names),
         "growth_rate": response.growth_rate,
+        "beside_unsolved_states": ", ".join(beside_unsolved_states(assembly)),
         "planet_spread": response.planet_spread,
         "stiffness_variation": response.stiffness_variation,
         "harmonics": response.harmonics,

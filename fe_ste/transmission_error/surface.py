@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.arrays import Booleans, Floats, Integers
 from fe_ste.tools.notebook import html_table, value_range
+from fe_ste.transmission_error.gaps import GapError, complete_loads
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -138,12 +139,15 @@ class SteSurface:
         At each node of the other axes, on each piece of the load axis: cubic of s in t from 0 to 1 (m), and the
         integral of s over the force from zero to the start of the piece (J). Along misalignment the same of the
         slope follows each node, unless there is one node only.
+    guessed : (p, c, a, l) array or None
+        Nodes that are not solved, where a guess stands in; none if there are none.
     """
 
     centre_distance: Floats
     misalignment: Floats
     root_force: Floats
     coefficients: Floats
+    guessed: Booleans | None = None
 
     @classmethod
     def from_table(cls, dataset: xr.Dataset) -> SteSurface:
@@ -152,13 +156,10 @@ class SteSurface:
         Raises
         ------
         InterpolationError
-            If states are unsolved, or more load gives less deflection.
+            If too many states are not solved for others to stand in, or more load gives less deflection.
         """
         axes = ("pmc", "centre_distance", "misalignment", "torque")
         table = dataset.transpose(*axes, ...)
-        if not bool(table["converged"].all()):
-            unsolved = int((~table["converged"].astype(bool)).sum())
-            raise InterpolationError(f"the table holds {unsolved} unsolved states")
         position_axes = axes[:3]
         return cls.from_nodes(
             table["centre_distance"].to_numpy(),
@@ -169,6 +170,7 @@ class SteSurface:
             table["tangent_load_centre"].to_numpy(),
             table["unloaded_ste"].transpose(*position_axes).to_numpy(),
             table["unloaded_centre"].transpose(*position_axes).to_numpy(),
+            table["converged"].to_numpy().astype(bool),
         )
 
     @classmethod
@@ -182,6 +184,7 @@ class SteSurface:
         tangent_load_centre: ArrayLike = 0.0,
         unloaded: ArrayLike = 0.0,
         unloaded_centre: ArrayLike = 0.0,
+        solved: ArrayLike = True,
     ) -> SteSurface:
         """Lay the surface through values at the nodes.
 
@@ -195,11 +198,13 @@ class SteSurface:
             m, N/m, m: the last is the derivative of the first by misalignment.
         unloaded, unloaded_centre : (p, c, a) arrays or floats
             Transmission error at no load, and its derivative by misalignment, m.
+        solved : (p, c, a, l) array or True
+            States that are solved; others stand in for the rest (`fe_ste.transmission_error.gaps`).
 
         Raises
         ------
         InterpolationError
-            If more load gives less deflection.
+            If too many states are not solved, or more load gives less deflection.
 
         Examples
         --------
@@ -214,28 +219,65 @@ class SteSurface:
         values = np.asarray(ste, dtype=np.float64)
         root = np.concatenate([[0.0], np.sqrt(loads)])
         nodes = _from_no_load(unloaded, values)
-        slopes = _load_slopes(root, nodes, np.asarray(tangent_stiffness, dtype=np.float64))
+        tangent = np.asarray(tangent_stiffness, dtype=np.float64)
+        load_centre: Floats = np.broadcast_to(np.asarray(tangent_load_centre, dtype=np.float64), values.shape)
+        known: Booleans = np.broadcast_to(np.asarray(solved, dtype=np.bool_), values.shape)
+        if not known.all():
+            try:
+                nodes, tangent, load_centre = complete_loads(root, nodes, tangent, load_centre, known)
+            except GapError as error:
+                raise InterpolationError(str(error)) from None
+        slopes = _load_slopes(root, nodes, tangent)
         pieces = _load_pieces(root, nodes, slopes)
         misalignments = np.atleast_1d(np.asarray(misalignment, dtype=np.float64))
         if misalignments.size > 1:
-            centres = _from_no_load(unloaded_centre, np.broadcast_to(tangent_load_centre, values.shape))
+            centres = _from_no_load(unloaded_centre, load_centre)
             by_misalignment = _load_pieces(root, centres, centres @ _slope_matrix(root).T)
             pieces = np.stack([pieces, by_misalignment], axis=3).reshape(*values.shape[:2], -1, *pieces.shape[3:])
-        surface = cls(np.atleast_1d(np.asarray(centre_distance, dtype=np.float64)), misalignments, root, pieces)
+        distances = np.atleast_1d(np.asarray(centre_distance, dtype=np.float64))
+        surface = cls(distances, misalignments, root, pieces, None if known.all() else ~known)
         surface._check_rising()
         return surface
 
     def at_nominal(self, centre_distance: float, misalignment: float = 0.0) -> SteSurface:
         """Surface of gears that stay where they are: the same without the two axes of their position."""
-        values = self.coefficients
-        values = np.einsum("pcalj,c->palj", values, _weights_at(self.centre_distance, centre_distance))
-        values = np.einsum("palj,a->plj", values, _slope_weights_at(self.misalignment, misalignment))[:, None, None]
-        return SteSurface(np.array([centre_distance]), np.array([misalignment]), self.root_force, values)
+        by_distance = _weights_at(self.centre_distance, centre_distance)
+        by_misalignment = _slope_weights_at(self.misalignment, misalignment)
+        values = np.einsum("pcalj,c->palj", self.coefficients, by_distance)
+        values = np.einsum("palj,a->plj", values, by_misalignment)[:, None, None]
+        guessed = self.guessed
+        if guessed is not None:
+            acting = by_misalignment.reshape(len(self.misalignment), -1).any(axis=1)
+            guessed = np.asarray(guessed[:, by_distance != 0.0][:, :, acting].any(axis=(1, 2), keepdims=True))
+        return SteSurface(np.array([centre_distance]), np.array([misalignment]), self.root_force, values, guessed)
 
     def averaged(self) -> SteSurface:
         """Surface of the mean over the mesh cycle at each load."""
         mean = self.coefficients.mean(axis=0, keepdims=True)
-        return SteSurface(self.centre_distance, self.misalignment, self.root_force, mean)
+        guessed = None if self.guessed is None else np.asarray(self.guessed.any(axis=0, keepdims=True))
+        return SteSurface(self.centre_distance, self.misalignment, self.root_force, mean, guessed)
+
+    def near_guesses(self) -> Booleans:
+        """Tell between which nodes a guess acts: intervals of pmc, centre distance, misalignment, pieces of load.
+
+        Returns
+        -------
+        (p, max(1, c - 1), max(1, a - 1), l) array
+        """
+        positions, distances, misalignments, loads = self.coefficients.shape[:4]
+        if self.guessed is None:
+            shape = positions, max(1, distances - 1), max(1, len(self.misalignment) - 1), loads
+            return np.zeros(shape, dtype=np.bool_)
+        near = self.guessed
+        if positions > 1:
+            near = np.logical_or.reduce([np.roll(near, -step, axis=0) for step in (-1, 0, 1, 2)])
+        first, _ = axis_weights(self.centre_distance)
+        near = np.stack([near[:, i : i + STENCIL].any(axis=1) for i in first], axis=1)
+        if len(self.misalignment) > 1:
+            near = near[:, :, :-1] | near[:, :, 1:]
+        # The energy of a piece of load holds all below it; its slopes are those of the next node, too.
+        near = np.logical_or.accumulate(near, axis=-1)
+        return np.concatenate([near[..., 1:], near[..., -1:]], axis=-1)
 
     def ste(self, force: float, pmc: float, centre_distance: float | None = None, misalignment: float = 0.0) -> float:
         """Return the static transmission error (m) at a force (N, from zero to the last of the axis).

@@ -20,7 +20,7 @@ from exugear.cli.options import (
     ScriptsOption,
     VariantOption,
 )
-from exugear.cli.tables import compute_missing_tables
+from exugear.cli.tables import compute_missing_tables, refuse_unsolved
 
 if TYPE_CHECKING:
     from exugear.dynamics.modes import Modes
@@ -41,6 +41,7 @@ def modes(
     Tables that are missing or do not fit the case are computed first.
     """
     with exit_codes():
+        from exugear.dynamics.statics import beside_unsolved_states
         from exugear.model.choice import Choice
         from exugear.results.folder import time_noted
 
@@ -57,9 +58,10 @@ def modes(
             assembly = found.assembly
             label = {"variant": assembly.variant, "mesh_law": assembly.mesh_law, "inertias": assembly.inertias}
             print_json({"case": str(case), **label, "modes": rows, "file": str(path), "picture": str(picture)})
-            return
-        print_table(f"Modes of {label_of(found)}", [_mode_row(row) for row in rows], ("what moves",))
-        say(f"Modes in {path}, diagram in {picture}")
+        else:
+            print_table(f"Modes of {label_of(found)}", [_mode_row(row) for row in rows], ("what moves",))
+            say(f"Modes in {path}, diagram in {picture}")
+        refuse_unsolved(beside_unsolved_states(found.assembly))
 
 
 def _draw_campbell(found: Modes, path: Path) -> Path:

@@ -252,6 +252,7 @@ def _tell_run(case: Path, finished: Run, as_json: bool) -> None:
         "longest_pull_of_a_mesh_s": longest["pulling_time"],
         "longest_time_apart_s": longest["apart_time"],
         "longest_time_outside_table_s": outside,
+        "longest_time_beside_unsolved_states_s": longest["unsolved_time"],
         "complete": finished.complete,
         "trusted": finished.trusted,
         "reasons": list(finished.reasons),

@@ -25,7 +25,7 @@ from exugear.cli.options import (
     ScriptsOption,
     VariantOption,
 )
-from exugear.cli.tables import compute_missing_tables
+from exugear.cli.tables import compute_missing_tables, refuse_unsolved
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -187,7 +187,7 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
                 "file": str(path),
             }
         )
-        _fail_if_unstable(data, growth)
+        _fail_if_doubtful(data, growth)
         return
     shown = [_row(peak) for peak in found[:SHOWN_PEAKS]]
     title = f"Overall transmission error, {project.choice.variant}, {settings.level}: its loudest peaks"
@@ -196,11 +196,15 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
     fastest = float(abs(data["speed"]).max()) / RPM
     decay = f"slowest decay {-growth:.3g} 1/s" if growth <= 0.0 else f"fastest growth {growth:.3g} 1/s"
     say(f"{data.sizes['point']} speeds up to {fastest:.4g} rpm, {decay}, in {path}")
-    _fail_if_unstable(data, growth)
+    _fail_if_doubtful(data, growth)
 
 
-def _fail_if_unstable(data: xr.Dataset, growth: float) -> None:
-    """End with code 1 where no speed has a steady state; where each has its own stability, its file tells which."""
+def _fail_if_doubtful(data: xr.Dataset, growth: float) -> None:
+    """End with code 1 where no speed has a steady state; where each has its own stability, its file tells which.
+
+    Likewise where teeth read tables beside states that are not solved.
+    """
+    refuse_unsolved([mesh for mesh in str(data.attrs["beside_unsolved_states"]).split(", ") if mesh])
     if growth > 0.0 and not bool(data["growth"].notnull().any()):
         raise FailedError(f"the steady response is not to be trusted: disturbances grow by up to {growth:.3g} 1/s")
 

@@ -23,7 +23,12 @@ from exugear.web.libraries import libraries, licences
 
 PACKAGES = ("exugear", "exudyn", "numpy", "scipy", "numba", "scikit-fem", "xarray", "h5netcdf", "matplotlib", "pyvista")
 """Packages whose versions a report names."""
-MESH_TIME_LABELS = ("longest pull of a mesh", "longest time teeth are apart", "longest time outside a table")
+MESH_TIME_LABELS = (
+    "longest pull of a mesh",
+    "longest time teeth are apart",
+    "longest time outside a table",
+    "longest time beside unsolved states of a table",
+)
 """Labels of `exugear.dynamics.signals.MESH_TIMES`, in their order."""
 GLOSSARY = {
     "overall transmission error": "Angle of the output less the ratio times the angle of the input, as a length on the "

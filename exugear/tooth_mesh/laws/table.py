@@ -385,6 +385,7 @@ def pack_tables(elements: tuple[MeshElement, ...], index: Integers, averaged: bo
     count = len(elements)
     size = max((s.coefficients.size // CUBIC_SIZE * NODE_SIZE for s in surfaces), default=0)
     loads = max((s.root_force.size for s in surfaces), default=0)
+    marks = [surface.near_guesses().ravel() if surface.guessed is not None else np.zeros(0) for surface in surfaces]
     longest = max((len(knots) for s in surfaces for knots in (s.centre_distance, s.misalignment)), default=0)
     arrays = TableArrays(
         shape=np.zeros((count, 4), dtype=np.int64),
@@ -404,6 +405,8 @@ def pack_tables(elements: tuple[MeshElement, ...], index: Integers, averaged: bo
         back_phase=np.zeros(count),
         damping_time=np.zeros(count),
         sense=np.array([e.flank for e in elements], dtype=np.float64),
+        has_guesses=np.zeros(count, dtype=np.int64),
+        near_guesses=np.zeros((count, max((len(mark) for mark in marks), default=0)), dtype=np.int64),
     )
     for m, (element, surface) in enumerate(zip(elements, by_mesh, strict=True)):
         if surface is not None and element.table is not None:
@@ -439,6 +442,9 @@ def _fill_table(arrays: TableArrays, m: int, flanks: TableFlanks, surface: SteSu
     arrays.back[m], arrays.back_misalignment[m] = flanks.back, flanks.back_misalignment
     arrays.backlash[m], arrays.back_phase[m] = flanks.backlash, flanks.back_phase
     arrays.damping_time[m] = flanks.damping_time
+    if surface.guessed is not None:
+        near = surface.near_guesses().ravel()
+        arrays.has_guesses[m], arrays.near_guesses[m, : near.size] = 1, near
 
 
 LAW = Table()

@@ -26,7 +26,7 @@ from exugear.tooth_mesh.laws.forms import add_mesh_forces
 from exugear.tooth_mesh.laws.packing import pack
 from fe_ste.transmission_error.surface import SteSurface
 
-from ..assembled import assembled, simulated
+from ..assembled import assembled, modes_with_bodies, simulated
 from ..plain_signals import energies_of, sampled
 from ..spur_case import SPUR_CASE
 from ..table_case import surfaces
@@ -283,6 +283,41 @@ def test_teeth_apart_and_tables_left_are_counted(grc: Gearbox, tables: dict, tmp
     run = simulate(heavy, Choice("rigid", "table"), tables, tmp_path / "heavy", duration=0.01)
     data = xr.load_dataset(run.path, engine="h5netcdf")
     assert float(data["outside_time"].min()) == pytest.approx(0.01, rel=0.05)
+
+
+def marked_at(surface: SteSurface, load: int) -> SteSurface:
+    """The same surface, whose states at one load, position, and place of the gears count as not solved."""
+    guessed = np.zeros((*surface.coefficients.shape[:2], len(surface.misalignment), len(surface.root_force) - 1), bool)
+    guessed[7, 2, 2, load] = True
+    return replace(surface, guessed=guessed)
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_a_run_beside_states_that_are_not_solved_says_so(
+    grc: Gearbox, tables: dict, tmp_path: Path, variant: str
+) -> None:
+    """The fourth load is the static one; the fast pair passes one position of its cycle again and again."""
+    marked = tables | {"high_speed": marked_at(tables["high_speed"], 3)}
+    run = simulate(grc, Choice(variant, "table"), marked, tmp_path / variant, duration=0.1)
+    data = xr.load_dataset(run.path, engine="h5netcdf")
+    beside = dict(zip(data.mesh.values, data.unsolved_time.values, strict=True))
+    # Three intervals of fifty, of a train that stands still at first.
+    assert 0.0 < beside.pop("high_speed") < 0.1
+    assert not any(beside.values())
+    assert not run.trusted and not int(data.attrs["trusted"])
+    assert "high_speed come beside states of their tables that are not solved" in data.attrs["verdict"]
+    plain = simulate(grc, Choice(variant, "table"), tables, tmp_path / f"{variant}-plain", duration=0.1)
+    assert plain.trusted
+    other = xr.load_dataset(plain.path, engine="h5netcdf")
+    assert np.array_equal(data["mesh_force"].to_numpy(), other["mesh_force"].to_numpy())  # a mark moves nothing
+
+
+@pytest.mark.parametrize("load", [3, 5])
+def test_modes_beside_states_that_are_not_solved_say_so(grc: Gearbox, tables: dict, load: int) -> None:
+    """Pieces of load: the static one ends at the fourth load and lies before the sixth, at twice the static load."""
+    marked = tables | {"high_speed": marked_at(tables["high_speed"], load)}
+    found = modes_with_bodies(grc, Choice("rigid", "table"), marked)
+    assert found.to_dataset().attrs["beside_unsolved_states"] == ("high_speed" if load == 3 else "")
 
 
 def test_resumed_run_is_bitwise_the_whole_one(grc: Gearbox, tables: dict, tmp_path: Path) -> None:

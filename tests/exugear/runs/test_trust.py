@@ -20,6 +20,7 @@ from typer.testing import CliRunner
 
 from exugear.cli import app as cli
 from exugear.dynamics.assemble import assemble
+from exugear.dynamics.signals import MESH_TIMES
 from exugear.kernels.table_law import piece_at
 from exugear.loads.summary import summarise_loads
 from exugear.model.choice import Choice
@@ -156,11 +157,21 @@ def judged() -> Judge:
     return Judge(assembly, summarise_loads(gearbox, gearbox.load_cases["run_up"]))
 
 
+def test_a_mesh_beside_unsolved_states_of_its_table_is_a_reason_not_to_trust() -> None:
+    judge = judged()
+    seen(judge)
+    times = np.zeros((len(MESH_TIMES), 1))
+    times[MESH_TIMES.index("unsolved_time")] = 0.02
+    (reason,) = judge.reasons(times, 0.1)
+    assert reason.startswith("table: spur come beside states of their tables that are not solved")
+    assert "for up to 0.02 s" in reason
+
+
 def seen(judge: Judge, deflection: float = 0.0, spin: float = 0.0, left: float = 0.0) -> tuple[str, ...]:
     """Judge one more state, of 100 J and some energy that is left over."""
     account = np.array([[0.0, 50.0, 50.0 + left, 0.0, 0.0, 0.0, 0.0]])
     judge.see(np.array([0.1]), np.array([[deflection]]), np.array([[spin, 0.0]]), np.array([0.1]), account)
-    return judge.reasons(np.zeros(1), 0.1)
+    return judge.reasons(np.zeros((len(MESH_TIMES), 1)), 0.1)
 
 
 def test_each_limit_has_its_words_and_stops_where_it_says():

@@ -7,6 +7,7 @@ import pytest
 
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.signals import BALANCE_TERMS, ENERGIES, MESH_TIMES, POWERS, SIGNALS, signal_layout, signals_of
+from exugear.kernels.table_law import GUESSED, LEFT_TABLE
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.solvers.compiled import observers, sampling
@@ -73,8 +74,10 @@ def test_times_of_meshes_count_the_samples_of_their_law(grc: Gearbox) -> None:
     rows = np.ones((4, layout.count))
     rows[:3, layout["mesh_force"].start] = 0.0
     rows[:, layout["outside_table"]] = 0.0
-    rows[0, layout["outside_table"].stop - 1] = 1.0
+    rows[0, layout["outside_table"].stop - 1] = LEFT_TABLE
+    rows[:2, layout["outside_table"].start] = GUESSED
     counts = dict(zip(MESH_TIMES, layout.mesh_times(rows), strict=True))
     assert counts["apart_time"].tolist() == [3.0] + [0.0] * (len(layout.names["mesh"]) - 1)
     assert counts["outside_time"].tolist() == [0.0] * (len(layout.names["mesh"]) - 1) + [1.0]
+    assert counts["unsolved_time"].tolist() == [2.0] + [0.0] * (len(layout.names["mesh"]) - 1)
     assert not counts["pulling_time"].any()

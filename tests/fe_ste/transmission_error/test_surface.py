@@ -106,3 +106,59 @@ def test_axis_that_does_not_increase_is_refused() -> None:
         axis_weights([0.1, 0.1])
     with pytest.raises(InterpolationError, match="positive and increase"):
         SteSurface.from_nodes([0.1], [0.0], [0.0], np.ones((1, 1, 1, 1)), np.ones((1, 1, 1, 1)))
+
+
+@pytest.mark.parametrize("axes", ["all", "place alone", "load alone"])
+def test_a_guess_is_told_wherever_it_acts(axes: str) -> None:
+    """A state and a guess at it make two surfaces: wherever these differ the interval is marked."""
+    centre, tilt, force = CENTRE, TILT, FORCE
+    if axes == "place alone":
+        force = FORCE[-1:]
+    elif axes == "load alone":
+        centre, tilt = np.array([0.1]), np.array([0.0])
+    pmc = np.arange(12) / 12
+    grid = np.meshgrid(pmc, centre, tilt, force, indexing="ij")
+    ste, slope, tilting = shape(*grid)
+    solved = np.ones(ste.shape, dtype=bool)
+    lost = 5, len(centre) // 2, len(tilt) // 2, len(force) // 2
+    solved[lost] = False
+    one = SteSurface.from_nodes(centre, tilt, force, ste, 1.0 / slope, tilting, solved=solved)
+    assert one.guessed is not None and one.guessed[lost] and one.guessed.sum() == 1
+    whole = SteSurface.from_nodes(centre, tilt, force, ste, 1.0 / slope, tilting)
+    assert whole.guessed is None and not whole.near_guesses().any()
+    near = one.near_guesses()
+    assert near.shape == (12, max(1, len(centre) - 1), max(1, len(tilt) - 1), len(force))
+    assert 0 < near.sum() < 0.9 * near.size
+    differing = 0
+    for p, c, a, piece in np.ndindex(near.shape):
+        place = (
+            (p + 0.37) / 12,
+            centre[c] if len(centre) == 1 else 0.6 * centre[c] + 0.4 * centre[c + 1],
+            tilt[a] if len(tilt) == 1 else 0.6 * tilt[a] + 0.4 * tilt[a + 1],
+        )
+        root = 0.5 * (one.root_force[piece] + one.root_force[piece + 1])
+        differs = abs(one.ste(root**2, *place) - whole.ste(root**2, *place)) > 1e-12
+        assert near[p, c, a, piece] or not differs
+        differing += differs
+    assert differing > 0.2 * near.sum() > 0
+
+
+def test_marks_stay_where_gears_stay_and_in_the_mean() -> None:
+    solved = np.ones((24, 5, 5, 4), dtype=bool)
+    solved[3, 0, 4, 3] = False
+    pmc = np.arange(24) / 24
+    ste, slope, tilting = shape(*np.meshgrid(pmc, CENTRE, TILT, FORCE, indexing="ij"))
+    surface = SteSurface.from_nodes(CENTRE, TILT, FORCE, ste, 1.0 / slope, tilting, solved=solved)
+    beside, away = surface.at_nominal(float(CENTRE[0]), float(TILT[4])), surface.at_nominal(0.1, 0.0)
+    assert beside.near_guesses().any() and not away.near_guesses().any()
+    assert surface.averaged().near_guesses()[:, 0, 3].any()
+    assert not surface.averaged().near_guesses()[:, 3, 0].any()
+
+
+def test_too_many_unsolved_states_are_refused() -> None:
+    solved = np.ones((24, 5, 5, 4), dtype=bool)
+    solved[:, :, :, 3] = False
+    pmc = np.arange(24) / 24
+    ste, slope, tilting = shape(*np.meshgrid(pmc, CENTRE, TILT, FORCE, indexing="ij"))
+    with pytest.raises(InterpolationError, match="600 of 2400 states are not solved"):
+        SteSurface.from_nodes(CENTRE, TILT, FORCE, ste, 1.0 / slope, tilting, solved=solved)
