@@ -12,13 +12,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from exugear.bearings.duty import BearingDuty
+from exugear.bearings.rolling.rows import BearingError
 from exugear.bodies.elastic_body import ElasticBody
 from exugear.dynamics.assemble import assemble
-from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.assembly import Assembly, VariantError
 from exugear.dynamics.bearing_duties import bearing_duties
 from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.modes import Modes, eigenmodes
+from exugear.dynamics.statics import BalanceError, static_state
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.named_files import NOTHING_MORE, Permissions
@@ -28,6 +32,7 @@ from exugear.results.run_file import FINAL_NAME
 from exugear.runs.outcome import Run
 from exugear.runs.run_folder import run_directory
 from exugear.runs.runup import simulate
+from exugear.tooth_mesh.grid_axes import GridAxes, axes_reaching
 from exugear.tooth_mesh.law import MeshData
 from exugear.tooth_mesh.laws.registry import LAWS
 from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
@@ -141,7 +146,30 @@ class Project:
         self, names: Iterable[str] = (), positions: int | None = None, *, grid: bool = False
     ) -> list[TableRequest]:
         """List tables and find those that are there: see `exugear.tooth_mesh.tables.requested_tables`."""
-        return requested_tables(self.gearbox, self.folder, names, positions, grid)
+        axes = self.grid_axes() if grid or self.gearbox.ste.grid else {}
+        return requested_tables(self.gearbox, self.folder, names, positions, grid, axes)
+
+    def grid_axes(self) -> dict[str, GridAxes]:
+        """Axes of tables over centre distance and misalignment where the file names none, by gear pair.
+
+        They reach three times as far as the gears stand from their nominal place at rest on their bearings, with teeth
+        as stiff as ISO 6336 has them; usual ones where that state is not known.
+        """
+        ste = self.gearbox.ste
+        if ste.misalignment_um is not None and ste.centre_distance_offsets_um is not None:
+            return {}
+        choice = replace(self.choice, variant="bushing", mesh_law="iso6336")
+        try:
+            at_rest = static_state(assemble(self.gearbox, choice, mesh_stiffness(self.gearbox, choice.mesh_law)))
+        except (VariantError, BalanceError, MeshError, BearingError):
+            return {}
+        found: dict[str, list[tuple[float, float]]] = {}
+        places = zip(self.gearbox.meshes, at_rest.misalignment, at_rest.centre_distance, strict=True)
+        for mesh, misalignment, distance in places:
+            place = (abs(misalignment) * mesh.pair.face_width, abs(distance - mesh.centre_distance))
+            found.setdefault(mesh.pair.name, []).append(place)
+        pairs = self.gearbox.gear_pairs
+        return {name: axes_reaching(pairs[name], *np.max(where, axis=0)) for name, where in found.items()}
 
     def tables(
         self,
@@ -173,7 +201,8 @@ class Project:
         law = LAWS.get(self.choice.mesh_law)
         if law is None or not law.needs_tables:
             return []
-        return missing_tables(self.gearbox, self.folder, grid=law.needs_axes)
+        axes = self.grid_axes() if law.needs_axes else {}
+        return missing_tables(self.gearbox, self.folder, grid=law.needs_axes, axes=axes)
 
     def tables_at_work(self) -> dict[str, MeshTable]:
         """Tables that the mesh law reads, as far as they are there."""

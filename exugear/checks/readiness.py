@@ -23,6 +23,8 @@ from exugear.tooth_mesh.placement import MeshError, loaded_flanks, tooth_places
 
 MOST_STATES = 200_000
 """Most states of one table: at 50 ms each, three hours."""
+_FOLLOWING = range(5)
+"""As many values as an axis usually has that follows from the static state."""
 
 
 def check_parts(gearbox: Gearbox) -> None:
@@ -139,15 +141,15 @@ def _place_teeth(gearbox: Gearbox) -> None:
 
 def _count_states(gearbox: Gearbox) -> None:
     axes = gearbox.ste
-    states = axes.positions * len(axes.torque_factors) * len(axes.centre_distance_offsets_um)
-    states *= len(axes.misalignment_um)
+    states = axes.positions * len(axes.torque_factors) * len(axes.centre_distance_offsets_um or _FOLLOWING)
+    states *= len(axes.misalignment_um or _FOLLOWING)
     if states > MOST_STATES:
         raise gearbox.fault(f"ste: its axes make {states} states of a table; {MOST_STATES} are the most")
 
 
 def _pairs_with_axes(gearbox: Gearbox) -> list[str]:
     """Pairs whose tables go over centre distances; none where nobody asked for these."""
-    if not gearbox.ste.grid and "centre_distance_offsets_um" not in gearbox.ste.model_fields_set:
+    if gearbox.ste.centre_distance_offsets_um is None:
         return []
     at_work = {mesh.pair.name for mesh in gearbox.meshes}
     return [name for name, section in gearbox.case.pairs.items() if section.table or name in at_work]

@@ -381,14 +381,14 @@ class Gearbox:
         return stated | {name: (iso6336.mesh_stiffness(self.gear_pairs[name]).stiffness,) for name in self.idle_pairs}
 
     def table_distances(self, pair: str) -> tuple[float, ...]:
-        """Centre distances (m) of a pair's table with axes.
+        """Centre distances (m) that the file asks for in a pair's table with axes; none if they follow from the state.
 
         Raises
         ------
         CaseError
             The gears cannot run at one of them.
         """
-        static, offsets = self.gear_pairs[pair], self.ste.centre_distance_offsets_um
+        static, offsets = self.gear_pairs[pair], self.ste.centre_distance_offsets_um or ()
         distances = tuple(static.centre_distance + 1e-6 * offset for offset in offsets)
         for offset, distance in zip(offsets, distances, strict=True):
             key = f"ste.centre_distance_offsets_um: {offset:g}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
+from exugear.tooth_mesh.grid_axes import GridAxes, axes_reaching, reaches
 from fe_ste.transmission_error.hertz import pitch_point_pressure
 from fe_ste.transmission_error.states import CUT_OFF
 from fe_ste.transmission_error.table import MeshTable, TableError, TableInput
@@ -67,6 +68,7 @@ def requested_tables(
     names: Iterable[str] = (),
     positions: int | None = None,
     grid: bool = False,
+    axes: Mapping[str, GridAxes] | None = None,
 ) -> list[TableRequest]:
     """List the tables of a gearbox and find those that are there; computes and writes nothing.
 
@@ -82,6 +84,8 @@ def requested_tables(
         Positions of the mesh cycle; without it what the file says.
     grid : bool
         Ask for the axes of the file even if its section ``ste`` does not.
+    axes : mapping of pair name to GridAxes, optional
+        Axes where the file names none; usual ones by default.
 
     Raises
     ------
@@ -102,8 +106,9 @@ def requested_tables(
         if not gearbox.pairs[name].static_torque > 0.0 or name in gearbox.stated_stiffness:
             raise gearbox.fault(without_table(gearbox, [name]))
     grid = grid or gearbox.ste.grid
-    wanted = {name: wanted_table(gearbox, name, positions or gearbox.ste.positions, grid) for name in chosen}
-    return [_request(gearbox, name, out, table, grid) for name, table in wanted.items()]
+    own, count = axes or {}, positions or gearbox.ste.positions
+    wanted = {name: wanted_table(gearbox, name, count, grid, own.get(name)) for name in chosen}
+    return [_request(gearbox, name, out, table, grid, own.get(name)) for name, table in wanted.items()]
 
 
 def without_table(gearbox: Gearbox, names: Iterable[str]) -> str:
@@ -128,7 +133,9 @@ def table_path(out: Path, name: str) -> Path:
     return out / TABLE_FOLDER / f"{name}.nc"
 
 
-def wanted_table(gearbox: Gearbox, name: str, positions: int, grid: bool = False) -> TableInput:
+def wanted_table(
+    gearbox: Gearbox, name: str, positions: int, grid: bool = False, axes: GridAxes | None = None
+) -> TableInput:
     """All that the numbers of a pair's table depend on.
 
     Parameters
@@ -139,6 +146,8 @@ def wanted_table(gearbox: Gearbox, name: str, positions: int, grid: bool = False
     positions : int
     grid : bool
         Over the axes of the file's section ``ste``, else the static state alone.
+    axes : GridAxes, optional
+        Axes where the file names none; usual ones by default.
 
     Raises
     ------
@@ -159,12 +168,14 @@ def wanted_table(gearbox: Gearbox, name: str, positions: int, grid: bool = False
     )
     if not grid:
         return static
-    axes, width = gearbox.ste, spec.pair.face_width
+    ste, pair = gearbox.ste, spec.pair
+    usual = axes or axes_reaching(pair)
+    openings = usual.openings if ste.misalignment_um is None else tuple(1e-6 * um for um in ste.misalignment_um)
     return replace(
         static,
-        torque=tuple(torque if factor == 1.0 else _rounded(torque * factor) for factor in axes.torque_factors),
-        centre_distance=gearbox.table_distances(name),
-        misalignment=tuple(1e-6 * opening / width for opening in axes.misalignment_um),
+        torque=tuple(torque if factor == 1.0 else _rounded(torque * factor) for factor in ste.torque_factors),
+        centre_distance=gearbox.table_distances(name) or tuple(pair.centre_distance + one for one in usual.offsets),
+        misalignment=tuple(opening / pair.face_width for opening in openings),
     )
 
 
@@ -172,7 +183,9 @@ def _rounded(value: float) -> float:
     return float(f"{value:.12g}")
 
 
-def fitting_table(gearbox: Gearbox, name: str, out: Path, grid: bool = False) -> MeshTable:
+def fitting_table(
+    gearbox: Gearbox, name: str, out: Path, grid: bool = False, axes: GridAxes | None = None
+) -> MeshTable:
     """Read the table of a pair, however many positions it has, if all else is the case's.
 
     Parameters
@@ -183,7 +196,10 @@ def fitting_table(gearbox: Gearbox, name: str, out: Path, grid: bool = False) ->
     out : Path
         Results folder.
     grid : bool
-        Whether it must have exactly the axes of the file's section ``ste``; else any axes with the static state serve.
+        Whether it must have exactly the axes that the file's section ``ste`` names, and the others at all; else any
+        axes with the static state serve.
+    axes : GridAxes, optional
+        What axes must reach that the file does not name.
 
     Raises
     ------
@@ -193,8 +209,11 @@ def fitting_table(gearbox: Gearbox, name: str, out: Path, grid: bool = False) ->
     path = table_path(out, name)
     table = _opened(path)
     wanted = wanted_table(gearbox, name, table.dataset.sizes["pmc"], grid)
-    if not (table.input_hash == wanted.hash or (not grid and _holds(table, wanted))):
+    fits = _with_named_axes(gearbox, table, wanted) if grid else _holds(table, wanted)
+    if not (table.input_hash == wanted.hash or fits):
         raise TableError(f"{path}: was computed from another input; compute it again")
+    if grid and axes is not None and not reaches(table, wanted_table(gearbox, name, wanted.positions, grid, axes)):
+        raise TableError(f"{path}: its axes end too near to the static state; compute it again")
     return table
 
 
@@ -218,14 +237,30 @@ def _holds(table: MeshTable, static: TableInput) -> bool:
         torque = float(table.static_state["torque"])
     except TableError:
         return False
-    torques, distances, misalignments = (
-        tuple(table.dataset[name].to_numpy().tolist()) for name in ("torque", "centre_distance", "misalignment")
-    )
+    torques, distances, misalignments = (_values(table, name) for name in ("torque", "centre_distance", "misalignment"))
     wider = replace(static, torque=torques, centre_distance=distances, misalignment=misalignments)
     return torque == static.torque[0] and table.input_hash == wider.hash
 
 
-def missing_tables(gearbox: Gearbox, out: Path, grid: bool = False) -> list[TableRequest]:
+def _with_named_axes(gearbox: Gearbox, table: MeshTable, wanted: TableInput) -> bool:
+    """Whether a table has the axes that the file names, and any values along those that it does not."""
+    ste, named, follow = gearbox.ste, wanted, []
+    if ste.centre_distance_offsets_um is None:
+        follow.append(_values(table, "centre_distance"))
+        named = replace(named, centre_distance=follow[-1])
+    if ste.misalignment_um is None:
+        follow.append(_values(table, "misalignment"))
+        named = replace(named, misalignment=follow[-1])
+    return table.input_hash == named.hash and all(len(values) > 1 for values in follow)
+
+
+def _values(table: MeshTable, axis: str) -> tuple[float, ...]:
+    return tuple(table.dataset[axis].to_numpy().tolist())
+
+
+def missing_tables(
+    gearbox: Gearbox, out: Path, grid: bool = False, axes: Mapping[str, GridAxes] | None = None
+) -> list[TableRequest]:
     """List the tables that dynamics need and that are not there, or belong to another input.
 
     Parameters
@@ -235,21 +270,25 @@ def missing_tables(gearbox: Gearbox, out: Path, grid: bool = False) -> list[Tabl
         Results folder.
     grid : bool
         Whether the mesh law interpolates over load, centre distance and misalignment.
+    axes : mapping of pair name to GridAxes, optional
+        What axes must reach that the file does not name.
     """
-    found = tables_at_work(gearbox, out, grid)
+    found = tables_at_work(gearbox, out, grid, axes)
     requests = []
     for name in _with_tables(gearbox, grid):
         if name not in found:
-            requests += requested_tables(gearbox, out, [name], grid=grid)
+            requests += requested_tables(gearbox, out, [name], grid=grid, axes=axes)
     return requests
 
 
-def tables_at_work(gearbox: Gearbox, out: Path, grid: bool = False) -> dict[str, MeshTable]:
+def tables_at_work(
+    gearbox: Gearbox, out: Path, grid: bool = False, axes: Mapping[str, GridAxes] | None = None
+) -> dict[str, MeshTable]:
     """Tables of the pairs at work that are there and fit; parameters as of `missing_tables`."""
     found = {}
     for name in _with_tables(gearbox, grid):
         with suppress(TableError):
-            found[name] = fitting_table(gearbox, name, out, grid)
+            found[name] = fitting_table(gearbox, name, out, grid, (axes or {}).get(name))
     return found
 
 
@@ -259,12 +298,14 @@ def _with_tables(gearbox: Gearbox, grid: bool) -> list[str]:
     return [name for name in names if grid or name not in gearbox.stated_stiffness]
 
 
-def _request(gearbox: Gearbox, name: str, out: Path, wanted: TableInput, grid: bool) -> TableRequest:
+def _request(
+    gearbox: Gearbox, name: str, out: Path, wanted: TableInput, grid: bool, axes: GridAxes | None
+) -> TableRequest:
     path = table_path(out, name)
     if not path.exists():
         return TableRequest(name, wanted, path, None)
     try:
-        stored = fitting_table(gearbox, name, out, grid)
+        stored = fitting_table(gearbox, name, out, grid, axes)
     except TableError as error:
         return TableRequest(name, wanted, path, None, str(error))
     if stored.dataset.sizes["pmc"] != wanted.positions:

@@ -99,13 +99,13 @@ def _requested_tables(
     gearbox: Gearbox, case: Path, out: Path | None, names: list[str], positions: int | None, grid: bool
 ) -> tuple[list[TableRequest], Path]:
     from exugear.model.reading import CaseError
-    from exugear.project import default_folder
+    from exugear.project import Project, default_folder
     from exugear.results.folder import keep_case
-    from exugear.tooth_mesh.tables import requested_tables, without_table
+    from exugear.tooth_mesh.tables import without_table
 
     folder = out or default_folder(case)
     try:
-        requests = requested_tables(gearbox, folder, names, positions, grid)
+        requests = Project(gearbox, folder).requested_tables(names, positions, grid=grid)
     except CaseError as error:
         raise BadInputError(error) from error
     if not requests:
@@ -116,8 +116,12 @@ def _requested_tables(
     for request in requests:
         if request.stored:
             note(f"{request.name}: kept {request.path}, computed from the same input")
-        elif request.replaces:
+            continue
+        if request.replaces:
             note(request.replaces)
+        if len(request.wanted.misalignment) > 1:
+            ranges = request.wanted.axes().ranges()
+            note(f"{request.name}: grid over {', '.join(f'{axis} {values}' for axis, values in ranges.items())}")
     return requests, folder
 
 

@@ -165,10 +165,10 @@ class SteSection(Section):
     """Whether tables go over load, centre distance and misalignment."""
     torque_factors: _Factors = (0.05, 0.2, 0.5, 1.0, 2.0, 3.0)
     """Loads of a grid over the static torque of the pair; 1 among them."""
-    centre_distance_offsets_um: _Offsets = (-100.0, -50.0, 0.0, 50.0, 100.0)
-    """Centre distances of a grid less that of the pair; 0 among them."""
-    misalignment_um: _Offsets = (-60.0, -30.0, 0.0, 30.0, 60.0)
-    """Openings of a grid at the +z end over the common face width; 0 among them."""
+    centre_distance_offsets_um: _Offsets | None = None
+    """Centre distances of a grid less that of the pair; 0 among them. Without it they follow from the static state."""
+    misalignment_um: _Offsets | None = None
+    """Openings of a grid at the +z end over the common face width; 0 among them. Without it as above."""
 
     @model_validator(mode="after")
     def _axes(self) -> SteSection:
@@ -177,6 +177,8 @@ class SteSection(Section):
             ("centre_distance_offsets_um", self.centre_distance_offsets_um, 0.0),
             ("misalignment_um", self.misalignment_um, 0.0),
         ):
+            if values is None:
+                continue
             if list(values) != sorted(set(values)):
                 raise ValueError(f"{key} = {list(values)}: values must rise")
             if static not in values:

@@ -19,6 +19,7 @@ from exugear.loads.summary import summarise_loads
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
+from exugear.tooth_mesh.tables import wanted_table
 
 from .. import gear_trains
 from ..assembled import assembled, modes_with_bodies
@@ -372,11 +373,10 @@ def test_parts_that_cannot_be_built_are_refused_before_anything_is_written(
     assert not (tmp_path / "out").exists()
 
 
-def test_axes_that_nobody_asked_for_are_no_fault(case: Any) -> None:
+def test_axes_that_follow_from_the_static_state_stay_where_the_gears_run(case: Any) -> None:
     fine = case("spur", gears__pinion__tooth_thinning_mm=0.0)
-    assert min(fine.ste.centre_distance_offsets_um) == -100.0
-    with pytest.raises(CaseError, match="centre_distance_offsets_um: -100"):
-        fine.table_distances("spur")
+    assert fine.ste.centre_distance_offsets_um is None and fine.table_distances("spur") == ()
+    assert wanted_table(fine, "spur", 8, grid=True).centre_distance[0] == fine.gear_pairs["spur"].centre_distance
     check_parts(fine)
 
 

@@ -12,6 +12,7 @@ import pytest
 import xarray as xr
 
 from exugear.model.gearbox import Gearbox
+from exugear.tooth_mesh.grid_axes import axes_reaching
 from fe_ste.contact.cells import ContactSettings
 from fe_ste.elasticity.flank import flank_compliance
 from fe_ste.flanks.modifications import FlankModification, Relief, radius_at_roll_length_from_tip
@@ -94,8 +95,8 @@ def deviation(surface: SteSurface, compliance: PairCompliance, direct: xr.Datase
 
 def test_default_axes_interpolate_what_is_computed_directly(grc: tuple[PairCompliance, float, Gearbox]) -> None:
     compliance, torque, gearbox = grc
-    axes = gearbox.ste
-    loads = [factor * torque for factor in axes.torque_factors]
+    axes = axes_reaching(compliance.pair)
+    loads = [factor * torque for factor in gearbox.ste.torque_factors]
     static = float(table(compliance, [torque], [0.0], [0.0]).ste.mean())
 
     def worst(nodes: xr.Dataset, direct: xr.Dataset) -> np.ndarray:
@@ -104,12 +105,12 @@ def test_default_axes_interpolate_what_is_computed_directly(grc: tuple[PairCompl
     between = [factor * torque for factor in (0.1, 0.7, 1.4)]
     load = worst(table(compliance, loads, [0.0], [0.0]), table(compliance, between, [0.0], [0.0]))
     distance = worst(
-        table(compliance, loads, list(axes.centre_distance_offsets_um), [0.0]),
+        table(compliance, loads, [1e6 * offset for offset in axes.offsets], [0.0]),
         table(compliance, [torque], [-75.0, 10.0, 80.0], [0.0]),
     )
     openings = [-50.0, -40.0, -15.0, 10.0, 40.0, 55.0]
     tilt = worst(
-        table(compliance, loads, [0.0], list(axes.misalignment_um)),
+        table(compliance, loads, [0.0], [1e6 * opening for opening in axes.openings]),
         table(compliance, [0.5 * torque, torque], [0.0], openings),
     )
     print(
@@ -129,7 +130,7 @@ def test_forty_micrometres_of_misalignment_change_the_ripple_as_computed_directl
     """40 um lies between the nodes; computed as misalignment and, another way, as a helix slope of gear 1."""
     compliance, torque, gearbox = grc
     loads = [factor * torque for factor in gearbox.ste.torque_factors]
-    nodes = table(compliance, loads, [0.0], list(gearbox.ste.misalignment_um))
+    nodes = table(compliance, loads, [0.0], [1e6 * opening for opening in axes_reaching(compliance.pair).openings])
     direct = table(compliance, [torque], [0.0], [40.0])
     curve = direct.ste.values.ravel()
     interpolated = curve + deviation(SteSurface.from_table(nodes), compliance, direct).ravel()
