@@ -45,6 +45,8 @@ class OperatingPoint:
         Whether it carries so little that its stiffness is that at the least load.
     first_roller_angle : float
         Polar angle of the first rolling element at which the displacement holds the load, rad.
+    load_stands_still : bool
+        Whether the load keeps its direction in these axes.
     """
 
     bearing: Bearing
@@ -54,6 +56,7 @@ class OperatingPoint:
     stiffness: Floats
     is_unloaded: bool
     first_roller_angle: float = 0.0
+    load_stands_still: bool = True
 
     def __repr__(self) -> str:
         """Name and load in one line."""
@@ -123,4 +126,6 @@ def operating_point(
         stiffness = pitch_averaged_tangent(BearingOfRows(rows), holding_force(rows, least))
     if is_unloaded or not load_stands_still:
         stiffness = matrices.axially_symmetric(stiffness)
-    return OperatingPoint(bearing, rows, displacement, load, stiffness, is_unloaded, first_roller_angle)
+    return OperatingPoint(
+        bearing, rows, displacement, load, stiffness, is_unloaded, first_roller_angle, load_stands_still
+    )

@@ -1,18 +1,18 @@
 """Laws of supports: stiffness and damping as matrices, or rows of rolling elements with a law of their own.
 
-A bearing with `law = "stiffness"` is linear: given matrices, or the tangent of its rows at a load. One with
-`law = "iso16281"` keeps its rows. The housing factor f stands for the seat: it gives way in proportion to the
-bearing, so that the bearing takes the share f of a deflection under any load. A linear bearing is then f times as
-stiff, and the rows of a non-linear one see f times the deflection: both agree in the limit of small motions, and
-forces keep a potential. A clearance closes without load, which no share of a deflection does: such rows want an
-elastic housing or no factor.
+A bearing with `law = "stiffness"` is linear: given matrices through the origin, or the tangent of its rows through the
+point that they are in under the static load. One with `law = "iso16281"` keeps its rows. The housing factor f stands
+for the seat: it gives way in proportion to the bearing, so that the bearing takes the share f of a deflection under any
+load. A linear bearing is then f times as stiff, and the rows of a non-linear one see f times the deflection: both agree
+in the limit of small motions, and forces keep a potential. A clearance closes without load, which no share of a
+deflection does: such rows want an elastic housing or no factor.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
@@ -24,7 +24,7 @@ from exugear.bearings.rolling.potential import rolling_arrays
 from exugear.bearings.rolling.ratings import basic_dynamic_rating
 from exugear.bearings.rolling.rows import BearingError, BearingOfRows, RollingRow
 from exugear.kernels.connectors import ConnectorArrays
-from exugear.model.parts import Bearing, stiffness_matrix
+from exugear.model.parts import Bearing, Body, stiffness_matrix
 from exugear.model.sections.connections import CatalogueSection
 from fe_ste.tools.arrays import Floats
 
@@ -57,6 +57,8 @@ class SupportLaw:
         Turns of the cage per turn of the body against what it sits on; 0 for a cage that stands still.
     phase : float
         Polar angle of the first rolling element, rad.
+    point_strain, point_load : (6,) arrays
+        Displacement (m, rad) and load (N, N m) that the linear part passes; the origin by default.
     """
 
     stiffness: Floats
@@ -66,23 +68,35 @@ class SupportLaw:
     damping_time: float = 0.0
     cage_ratio: float = 0.0
     phase: float = 0.0
+    point_strain: Floats = field(default_factory=lambda: np.zeros(6))
+    point_load: Floats = field(default_factory=lambda: np.zeros(6))
 
 
-def law_in_words(bearing: Bearing) -> str:
-    """Say what a bearing's force follows.
+def load_stands_still(bearing: Bearing, bodies: Mapping[str, Body]) -> bool:
+    """Tell whether a bearing's load keeps its direction in the axes of what it sits on, of bodies by their names.
+
+    So it does on the ground, and where planets sit on their carrier.
+    """
+    return bearing.on not in bodies or bodies[bearing.on].fixed or bodies[bearing.body].carrier == bearing.on
+
+
+def law_in_words(bearing: Bearing, stands_still: bool = True) -> str:
+    """Say what a bearing's force follows; one whose load does not stand still knows but the axial part of its point.
 
     Examples
     --------
     >>> from exugear.model.gearbox import Gearbox
     >>> bearings = {bearing.family: bearing for bearing in Gearbox.from_toml("cases/grc750/gearbox.toml").bearings}
     >>> [law_in_words(bearings[name]) for name in ("plc_a", "pl_a")]
-    ['linear, at a stated load', 'linear, at the static load']
+    ['linear, at a stated load, through the origin', 'linear, at the static load']
     """
     if bearing.catalogue is None:
         return "linear, stiffness given"
     if bearing.law == "iso16281":
         return f"rows by ISO/TS 16281, cage {bearing.cage}"
-    return "linear, at the static load" if is_catalogued(bearing) else "linear, at a stated load"
+    if not is_catalogued(bearing):
+        return "linear, at a stated load, through the origin"
+    return f"linear, at the static load{'' if stands_still else ', across the axis through the origin'}"
 
 
 def is_catalogued(bearing: Bearing) -> bool:
@@ -183,6 +197,16 @@ def rolling_law(bearing: Bearing, damping_time: float, of_rows: Floats, directio
     )
 
 
+def through_point(law: SupportLaw, strain: Floats, load: Floats, stands_still: bool) -> SupportLaw:
+    """Linear law that passes a point: its load (6,) at the displacement (6,) in the axes of what the bearing sits on.
+
+    It resists no spin there. Of a load that turns in these axes only the part along the axis stays what it is: the law
+    then passes the origin across the axis.
+    """
+    kept = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 0.0] if stands_still else [0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    return replace(law, point_strain=kept * strain, point_load=kept * load)
+
+
 def cage_ratio(row: RollingRow, outer_ring_turns: bool) -> float:
     """Find the turns of a cage per turn of one ring while the other one stands still, without slip.
 
@@ -201,6 +225,8 @@ def with_laws(connectors: ConnectorArrays, laws: Sequence[SupportLaw]) -> Connec
     return connectors._replace(
         stiffness=np.array([law.stiffness for law in laws]).reshape(-1, 6, 6),
         damping=np.array([law.damping for law in laws]).reshape(-1, 6, 6),
+        point_strain=np.array([law.point_strain for law in laws]).reshape(-1, 6),
+        point_load=np.array([law.point_load for law in laws]).reshape(-1, 6),
         rolling=rolling_arrays(
             [law.rows for law in laws],
             scale=[law.scale for law in laws],

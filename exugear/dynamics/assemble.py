@@ -327,6 +327,8 @@ def _connectors(
         node=np.array(places),
         stiffness=np.zeros((0, 6, 6)),
         damping=np.zeros((0, 6, 6)),
+        point_strain=np.zeros((len(supports), 6)),
+        point_load=np.zeros((len(supports), 6)),
         rolling=no_rolling(0),
     )
     return with_laws(connectors, [linear_law(bearing, gearbox.case.damping.bearing_time_s) for bearing in supports])

@@ -21,11 +21,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exugear.bearings.operating_point import OperatingPoint
-from exugear.bearings.support_laws import law_in_words
+from exugear.bearings.support_laws import law_in_words, load_stands_still
 from exugear.bodies.elastic_body import ElasticBody
 from exugear.bodies.floating_body import FloatingBody
 from exugear.bodies.turning_frame import TurningBody, turning_arrays
-from exugear.kernels.connectors import ConnectorArrays, add_connector_forces, connector_loads, connector_strains
+from exugear.kernels.connectors import (
+    ConnectorArrays,
+    add_connector_forces,
+    connector_loads,
+    connector_strains,
+    loads_at_rest,
+)
 from exugear.kernels.elastic import ElasticArrays, add_elastic_forces, scratch_for, set_elastic_accelerations
 from exugear.kernels.inertia import InertiaArrays, accelerations
 from exugear.kernels.meshes import STATE_SIZE, MeshArrays, gear_positions
@@ -73,9 +79,12 @@ class Assembly:
     elastic_bodies : elastic bodies by name, in the order of their coordinates
     elastic : matrices of those whose frame does not turn
     motions : (size, n) motions that are free; the identity, but for the law `rigid` the rolling ones
-    rows_stiffness : (supports, 6, 6) stiffness of the rows of non-linear bearings at their static load, for methods
-        that begin with linear ones; zero for linear supports
+    rows_stiffness : (supports, 6, 6) stiffness of the rows of catalogue bearings at their static load, for methods
+        that begin with linear ones; zero for other supports
     operating_points : of each support, None for those that are no catalogue bearings; empty where there are none
+    connectors_at_rest : connectors of static states, in which all catalogue bearings follow their rows; None where
+        they are those of motion
+    planet_spread : largest change of stiffness that made bearings of equal planets equal, over that stiffness
     """
 
     gearbox: Gearbox
@@ -96,6 +105,8 @@ class Assembly:
     motions: Floats
     rows_stiffness: Floats
     operating_points: tuple[OperatingPoint | None, ...] = ()
+    connectors_at_rest: ConnectorArrays | None = None
+    planet_spread: float = 0.0
 
     def __repr__(self) -> str:
         """One line."""
@@ -155,22 +166,40 @@ class Assembly:
         """Whether bearings are non-linear."""
         return bool(self.connectors.rolling.first[-1] > 0)
 
+    @cached_property
+    def at_rest(self) -> Assembly:
+        """The same as static states see it: all catalogue bearings follow their rows, whatever their law in motion."""
+        if self.connectors_at_rest is None:
+            return self
+        return replace(self, connectors=self.connectors_at_rest, connectors_at_rest=None)
+
+    @cached_property
+    def unloaded(self) -> Assembly:
+        """The same with linear bearings through the origin: in balance at zero coordinates, where nothing loads it."""
+        none = np.zeros_like(self.connectors.point_load)
+        return replace(self, connectors=self.connectors._replace(point_strain=none, point_load=none))
+
+    @cached_property
+    def _of_rows(self) -> Floats:
+        """Stiffness (supports, 6, 6) at the static load of what rows there are; zero for linear supports."""
+        return np.where(np.diff(self.connectors.rolling.first)[:, None, None] > 0, self.rows_stiffness, 0.0)
+
     def with_linear_supports(self, factor: float = 1.0) -> Assembly:
         """Replace the rows of non-linear bearings by their stiffness at the static load times a factor."""
         connectors = self.connectors
         if not self.has_rows:
             return self
-        of_rows, time = factor * self.rows_stiffness, connectors.rolling.time[:, None, None]
+        of_rows, time = factor * self._of_rows, connectors.rolling.time[:, None, None]
         linear = connectors._replace(
             stiffness=connectors.stiffness + of_rows,
             damping=connectors.damping + time * of_rows,
             rolling=no_rolling(len(of_rows)),
         )
-        return replace(self, connectors=linear, rows_stiffness=np.zeros_like(of_rows))
+        return replace(self, connectors=linear)
 
     def eased(self, share: float) -> Assembly:
         """Let a share of the stiffness of non-linear bearings act beside their rows."""
-        stiffness = self.connectors.stiffness + share * self.rows_stiffness
+        stiffness = self.connectors.stiffness + share * self._of_rows
         return replace(self, connectors=self.connectors._replace(stiffness=stiffness)) if self.has_rows else self
 
     def rigid_part(self, vector: Floats) -> Floats:
@@ -196,7 +225,12 @@ class Assembly:
     def bearing_laws(self) -> str:
         """What the force of each bearing follows, planets together: an attribute of files."""
         held = {bearing.name for bearing in self.gearbox.bearings}
-        laws = {support.family: law_in_words(support) for support in self.supports if support.name in held}
+        bodies = {body.name: body for body in self.gearbox.bodies()}
+        laws = {
+            support.family: law_in_words(support, load_stands_still(support, bodies))
+            for support in self.supports
+            if support.name in held
+        }
         return "; ".join(f"{name}: {words}" for name, words in laws.items())
 
     @cached_property
@@ -390,6 +424,10 @@ class Assembly:
     def bearing_loads(self, q: Floats, v: Floats) -> Floats:
         """Force and moment that each bearing takes from its body, (bearings, 6), global axes, N and N m."""
         return connector_loads(q, v, self.connectors)
+
+    def support_loads_at_rest(self, q: Floats) -> Floats:
+        """Force and moment that each support takes from its body, (supports, 6), in the axes of what it sits on."""
+        return loads_at_rest(q, self.connectors)
 
     def support_strains(self, q: Floats) -> Floats:
         """Displacement of each support's body against what it sits on, (supports, 6), in the axes of the latter."""

@@ -225,6 +225,7 @@ def eigenmodes(
 
 def modes_of(assembly: Assembly, preload: bool = True) -> Modes:
     """Eigenmodes of an assembly, at its static load or (preload False) unloaded."""
+    assembly = assembly if preload else assembly.unloaded
     q = static_state(assembly).q if preload else np.zeros(assembly.size)
     linear = linearise(assembly, q)
     frequency, shapes = undamped_modes(linear.mass, linear.total_stiffness, assembly.motions)

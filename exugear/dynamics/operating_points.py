@@ -1,18 +1,30 @@
 """Catalogue bearings at the loads that they really carry: the static state with the full law of their rows.
 
 A bearing's stiffness depends on its load, and the load on the stiffness of all bearings. The static state is solved
-with the non-linear law of every row, so that both belong to each other to round-off; a linear bearing then has the
-tangent there. The problem is convex, and starts from the bearings' stiffness at a nominal load. A linear model's own
-static state then shares loads a little otherwise, since tangents yield less than rows do.
+with the non-linear law of every row, so that both belong to each other to round-off. The problem is convex, and starts
+from the bearings' stiffness at a nominal load. A linear bearing then passes the point that its rows are in, and has
+their tangent there: its own static state is that of the rows.
+
+What lasts in motion is the mean over the turn of each carrier, which equal planets tell at one of its angles: bearings
+of planets get the mean of their set. Unequal ones, by their pins or their spacing, are looked at over the whole turn.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
+from exugear.bearings.equal_planets import (
+    PlanetSupports,
+    equally_spaced,
+    planet_families,
+    planet_supports,
+    with_equal_planets,
+)
 from exugear.bearings.operating_point import OperatingPoint, operating_point
 from exugear.bearings.rolling.contact import bearing_load, equilibrium, row_contacts
 from exugear.bearings.rolling.rows import BearingOfRows
@@ -23,13 +35,34 @@ from exugear.bearings.support_laws import (
     holds_one_way,
     is_catalogued,
     linear_law,
+    load_stands_still,
     rolling_law,
+    through_point,
     with_laws,
 )
 from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.statics import BalanceError, static_state
-from exugear.model.parts import Bearing
+from exugear.dynamics.statics import BalanceError, locked_equilibrium, rolled_coordinates
+from exugear.kernels.connectors import ConnectorArrays
+from exugear.model.parts import Bearing, Body
 from fe_ste.tools.arrays import Floats
+
+CARRIER_ANGLES = 8
+"""Angles of a carrier over its turn, over which bearings are averaged where its planets are not equal."""
+
+
+class _State(NamedTuple):
+    """All supports in one static state; points only of those from a catalogue.
+
+    Attributes
+    ----------
+    strain, load : (supports, 6) arrays
+        Displacement (m, rad) and load (N, N m), in the axes of what each sits on.
+    points : operating points, None for supports that are not from a catalogue
+    """
+
+    strain: Floats
+    load: Floats
+    points: tuple[OperatingPoint | None, ...]
 
 
 def at_static_load(assembly: Assembly) -> Assembly:
@@ -43,8 +76,9 @@ def at_static_load(assembly: Assembly) -> Assembly:
     Returns
     -------
     Assembly
-        With the operating points of its catalogue bearings; those without `radial_load_kN` in the file have the
-        stiffness there, non-linear ones keep their rows.
+        With the operating points of its catalogue bearings. Those without `radial_load_kN` in the file follow their
+        rows at rest; in motion linear ones have the stiffness there and pass that point, non-linear ones keep their
+        rows.
 
     Raises
     ------
@@ -54,27 +88,26 @@ def at_static_load(assembly: Assembly) -> Assembly:
     if not any(is_catalogued(support) for support in assembly.supports):
         return assembly
     q, searched = _loaded_state(assembly)
-    points = tuple(
-        _point(assembly, support, law, strain) if is_catalogued(support) else None
-        for support, law, strain in zip(assembly.supports, searched, assembly.support_strains(q), strict=True)
-    )
-    laws = [_final_law(assembly, support, point) for support, point in zip(assembly.supports, points, strict=True)]
-    stiffness = [
-        point.bearing.factor * point.stiffness if point is not None and law.rows else np.zeros((6, 6))
-        for point, law in zip(points, laws, strict=True)
-    ]
+    nominal = _points(assembly, searched, assembly.support_strains(q))
+    resting, laws = _resting(assembly, nominal)
+    here, over_turns = _states(resting, laws, q)
+    moving, spread = _in_motion(resting, laws, here, over_turns)
     return replace(
-        assembly,
-        connectors=with_laws(assembly.connectors, laws),
-        rows_stiffness=np.array(stiffness),
-        operating_points=points,
+        resting,
+        connectors=moving,
+        connectors_at_rest=resting.connectors,
+        operating_points=here.points,
+        planet_spread=spread,
     )
 
 
 def _loaded_state(assembly: Assembly) -> tuple[Floats, tuple[SupportLaw, ...]]:
     """Coordinates under the static load with the rows of all bearings whose load is looked for, and the laws there."""
     laws = tuple(
-        _searched_law(support) if is_catalogued(support) else linear_law(support, 0.0) for support in assembly.supports
+        _law_at_rest(support, catalogue_stiffness(support.catalogue), 0.0, 0.0)
+        if support.catalogue is not None and is_catalogued(support)
+        else linear_law(support, 0.0)
+        for support in assembly.supports
     )
     nominal = [
         support.factor * catalogue_stiffness(support.catalogue) if is_catalogued(support) else np.zeros((6, 6))
@@ -83,20 +116,27 @@ def _loaded_state(assembly: Assembly) -> tuple[Floats, tuple[SupportLaw, ...]]:
     searched = replace(
         assembly, connectors=with_laws(assembly.connectors, laws), rows_stiffness=np.array(nominal).reshape(-1, 6, 6)
     )
+    return _balance(searched, laws), laws
+
+
+def _balance(
+    assembly: Assembly, laws: Sequence[SupportLaw], about: Floats | None = None, near: Floats | None = None
+) -> Floats:
+    """Coordinates under the static load, of the train rolled to `about`, from a state that is near it."""
+    load, meshes = assembly.gearbox.case.static_load, assembly.mean_meshes
     try:
-        return static_state(searched).q, laws
+        return locked_equilibrium(assembly, load.torques_N_m, load.locked, meshes, about, near=near)
     except BalanceError as error:
         raise BalanceError(f"{error}; {_what_holds_one_way(laws, assembly.connector_names)}") from None
 
 
-def _searched_law(support: Bearing) -> SupportLaw:
-    """Law of a bearing's rows for the search of its load.
+def _law_at_rest(support: Bearing, of_rows: Floats, direction: float, damping_time: float) -> SupportLaw:
+    """Law of a bearing's rows in static states, placed by the direction of its load.
 
     The seat of a bearing with clearance yields under load only: the share of a deflection that the bearing takes counts
     beyond the clearance.
     """
-    assert support.catalogue is not None
-    law = rolling_law(support, 0.0, catalogue_stiffness(support.catalogue), 0.0)
+    law = rolling_law(support, damping_time, of_rows, direction)
     share = abs(law.scale)
     rows = tuple(
         replace(row, radial_clearance=share * row.radial_clearance) if row.radial_clearance > 0.0 else row
@@ -105,7 +145,20 @@ def _searched_law(support: Bearing) -> SupportLaw:
     return replace(law, rows=rows)
 
 
-def _point(assembly: Assembly, support: Bearing, law: SupportLaw, strain: Floats) -> OperatingPoint:
+def _points(assembly: Assembly, laws: Sequence[SupportLaw], strains: Floats) -> tuple[OperatingPoint | None, ...]:
+    """Operating points of catalogue bearings at the strains (supports, 6) of all supports."""
+    bodies = _bodies(assembly)
+    return tuple(
+        _point(support, bodies, law, strain) if is_catalogued(support) else None
+        for support, law, strain in zip(assembly.supports, laws, strains, strict=True)
+    )
+
+
+def _bodies(assembly: Assembly) -> dict[str, Body]:
+    return {body.name: body for body in assembly.gearbox.bodies()}
+
+
+def _point(support: Bearing, bodies: dict[str, Body], law: SupportLaw, strain: Floats) -> OperatingPoint:
     """Operating point of a bearing at the displacement of its body against what it sits on."""
     displacement = law.scale * strain
     rows = bearing_rows(support)
@@ -114,18 +167,80 @@ def _point(assembly: Assembly, support: Bearing, law: SupportLaw, strain: Floats
         if force.any():
             tilt, angle = displacement[3:5], law.phase
             displacement = equilibrium(BearingOfRows(rows), force, tilt=tilt, first_roller_angle=angle).displacement
-    bodies = {body.name: body for body in assembly.gearbox.bodies()}
-    sits_still = support.on not in bodies or bodies[support.on].fixed or bodies[support.body].carrier == support.on
-    return operating_point(support, displacement, sits_still, law.phase)
+    return operating_point(support, displacement, load_stands_still(support, bodies), law.phase)
 
 
-def _final_law(assembly: Assembly, support: Bearing, point: OperatingPoint | None) -> SupportLaw:
+def _resting(assembly: Assembly, points: Sequence[OperatingPoint | None]) -> tuple[Assembly, tuple[SupportLaw, ...]]:
+    """Assembly with the rows of all catalogue bearings, placed by their loads, and their laws."""
     time = assembly.gearbox.case.damping.bearing_time_s
-    if point is None:
-        return linear_law(support, time)
-    if support.law == "iso16281":
-        return rolling_law(support, time, point.stiffness, point.direction)
-    return linear_law(support, time, point.stiffness)
+    laws = tuple(
+        linear_law(support, time) if point is None else _law_at_rest(support, point.stiffness, point.direction, time)
+        for support, point in zip(assembly.supports, points, strict=True)
+    )
+    of_rows = [np.zeros((6, 6)) if point is None else point.bearing.factor * point.stiffness for point in points]
+    connectors = with_laws(assembly.connectors, laws)
+    connectors, _ = with_equal_planets(connectors, _equal_supports(assembly))
+    placed = tuple(replace(law, phase=float(phase)) for law, phase in zip(laws, connectors.rolling.phase, strict=True))
+    return replace(assembly, connectors=connectors, rows_stiffness=np.array(of_rows)), placed
+
+
+def _state(assembly: Assembly, laws: Sequence[SupportLaw], q: Floats) -> _State:
+    strain = assembly.support_strains(q)
+    return _State(strain, assembly.support_loads_at_rest(q), _points(assembly, laws, strain))
+
+
+def _states(assembly: Assembly, laws: Sequence[SupportLaw], near: Floats) -> tuple[_State, dict[str, list[_State]]]:
+    """State at the angles zero, from a state that is near it; those over the turn of carriers with unequal planets."""
+    here = _state(assembly, laws, _balance(assembly, laws, near=near))
+    over_turns: dict[str, list[_State]] = {}
+    for carrier in sorted({planets[0].carrier or "" for planets in _unequal(assembly)}):
+        over_turns[carrier] = [here]
+        for turn in 2.0 * math.pi / CARRIER_ANGLES * np.arange(1, CARRIER_ANGLES):
+            about = rolled_coordinates(assembly, carrier, float(turn))
+            over_turns[carrier].append(_state(assembly, laws, _balance(assembly, laws, about)))
+    return here, over_turns
+
+
+def _in_motion(
+    assembly: Assembly, laws: Sequence[SupportLaw], here: _State, over_turns: dict[str, list[_State]]
+) -> tuple[ConnectorArrays, float]:
+    """Connectors with the laws that last in motion, and how far bearings of equal planets were apart in stiffness."""
+    bodies, time = _bodies(assembly), assembly.gearbox.case.damping.bearing_time_s
+    all_around = [state for states in over_turns.values() for state in states] or [here]
+    equal = {planet.name for planets in _equal(assembly) for planet in planets}
+    found = []
+    for n, (support, law) in enumerate(zip(assembly.supports, laws, strict=True)):
+        if not is_catalogued(support) or support.law == "iso16281":
+            found.append(law)
+            continue
+        states = [here] if support.body in equal else over_turns.get(bodies[support.body].carrier or "", all_around)
+        points = [state.points[n] for state in states]
+        of_rows = np.mean([point.stiffness for point in points if point is not None], axis=0)
+        strain, load = np.mean([(state.strain[n], state.load[n]) for state in states], axis=0)
+        linear = linear_law(support, time, of_rows)
+        found.append(through_point(linear, strain, load, load_stands_still(support, bodies)))
+    return with_equal_planets(with_laws(assembly.connectors, found), _equal_supports(assembly))
+
+
+def _equal(assembly: Assembly) -> list[list[Body]]:
+    """Planet sets whose planets pass the same loads, one after the other."""
+    if assembly.gearbox.pin_offsets:
+        return []
+    return [planets for planets in planet_families(assembly.bodies) if equally_spaced(planets)]
+
+
+def _unequal(assembly: Assembly) -> list[list[Body]]:
+    equal = _equal(assembly)
+    return [planets for planets in planet_families(assembly.bodies) if planets not in equal]
+
+
+def _equal_supports(assembly: Assembly) -> list[PlanetSupports]:
+    """Catalogue bearings of equal planets."""
+    found = []
+    for planets in _equal(assembly):
+        names, angles = [planet.name for planet in planets], np.array([planet.orbit_angle for planet in planets])
+        found += planet_supports(assembly.supports, names, angles)
+    return [own for own in found if all(is_catalogued(assembly.supports[n]) for n in own.numbers)]
 
 
 def _what_holds_one_way(laws: Sequence[SupportLaw], names: Sequence[str]) -> str:

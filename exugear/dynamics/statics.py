@@ -6,6 +6,7 @@ that a few steps reach round-off.
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -37,6 +38,8 @@ CLOSING_SHARES = (1.0, 0.1, 1e-2, 1e-3, 1e-5, 0.0)
 """Shares of the stiffness of linear teeth that act beside tables where teeth that are apart hold nothing."""
 SHORTEST_STEP = 1e-4
 """Share of a step of Newton's method to which it is halved while it does not lower the residual."""
+LONGEST_TURN = 0.02
+"""Longest step, rad, in which a train is rolled to an angle."""
 
 
 class BalanceError(RuntimeError):
@@ -209,6 +212,26 @@ def locked_equilibrium(
     return np.asarray(origin + free @ x)
 
 
+def rolled_coordinates(assembly: Assembly, body: str, angle: float) -> Floats:
+    """Coordinates of a rigid train rolled until a body has turned by an angle (rad), (size,).
+
+    Notes
+    -----
+    Velocities of rolling are integrated by the classical Runge-Kutta method: planets go round in a circle to 1e-9.
+    """
+    speeds = assembly.gearbox.train.rolling_speeds(body, 1.0)
+    steps = math.ceil(abs(angle) / LONGEST_TURN)
+    q = np.zeros(assembly.size)
+    for _ in range(steps):
+        h = angle / steps
+        first = assembly.rolling_velocity(q, speeds)
+        second = assembly.rolling_velocity(q + 0.5 * h * first, speeds)
+        third = assembly.rolling_velocity(q + 0.5 * h * second, speeds)
+        fourth = assembly.rolling_velocity(q + h * third, speeds)
+        q = q + h / 6.0 * (first + 2.0 * second + 2.0 * third + fourth)
+    return q
+
+
 @dataclass(frozen=True)
 class StaticState:
     """A variant at rest under the static load of its gearbox file, mesh stiffness at its mean over the cycle.
@@ -247,7 +270,9 @@ class StaticState:
 
 
 def static_state(assembly: Assembly) -> StaticState:
-    """Rest under the static load of the gearbox file, its locked bodies held.
+    """Rest under the static load of the gearbox file, its locked bodies held; catalogue bearings follow their rows.
+
+    The assembly of the state is that with these rows.
 
     Raises
     ------
@@ -265,8 +290,8 @@ def static_state(assembly: Assembly) -> StaticState:
     >>> bool((state.mesh_force > 0.0).all())
     True
     """
-    load = assembly.gearbox.case.static_load
-    return StaticState(assembly, locked_equilibrium(assembly, load.torques_N_m, load.locked, assembly.mean_meshes))
+    load, resting = assembly.gearbox.case.static_load, assembly.at_rest
+    return StaticState(resting, locked_equilibrium(resting, load.torques_N_m, load.locked, resting.mean_meshes))
 
 
 def beside_unsolved_states(assembly: Assembly) -> tuple[str, ...]:

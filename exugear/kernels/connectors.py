@@ -1,5 +1,7 @@
 """Law of 6x6 connectors (bearings) on arrays of coordinates, all at once; rolling laws in parallel to the matrices.
 
+A linear connector has the load F0 + K (u - u0) + D u': it passes the point (u0, F0) at which K is the tangent of its
+rows. Where no such point is known both are zero.
 Displacement and rate are those of Exudyn's RigidBodySpringDamper: the second attachment against the first in the first
 body's axes; the rate is not corrected for the turning of those axes. Coordinates are those of
 `exugear.kernels.coordinates`. Nothing is compiled here: states of rest ask for a few hundred evaluations, and the loop
@@ -31,6 +33,7 @@ class ConnectorArrays(NamedTuple):
     local : (c, 2, 3) attachment in each body's axes, relative to its node, m
     node : (c, 2, 3) node positions at zero angles, m (for ground: zero)
     stiffness, damping : (c, 6, 6) N/m .. N m/rad, and times s
+    point_strain, point_load : (c, 6) displacement u0 (m, rad) and load F0 (N, N m) that the linear law passes
     rolling : rolling laws, which act in parallel to the matrices
     """
 
@@ -39,7 +42,14 @@ class ConnectorArrays(NamedTuple):
     node: Floats
     stiffness: Floats
     damping: Floats
+    point_strain: Floats
+    point_load: Floats
     rolling: RollingArrays
+
+    @property
+    def offset(self) -> Floats:
+        """Load (c, 6) of the linear law without displacement, F0 - K u0, N and N m."""
+        return self.point_load - _times(self.stiffness, self.point_strain)
 
     def one(self, n: int) -> ConnectorArrays:
         """Arrays of connector n alone."""
@@ -53,6 +63,8 @@ class ConnectorArrays(NamedTuple):
             node=self.node[numbers],
             stiffness=self.stiffness[numbers],
             damping=self.damping[numbers],
+            point_strain=self.point_strain[numbers],
+            point_load=self.point_load[numbers],
             rolling=selected_rolling(self.rolling, numbers),
         )
 
@@ -118,14 +130,14 @@ def _strains(ends: _Ends) -> tuple[Floats, Floats]:
     return np.concatenate([place, np.stack(angles, axis=-1)], axis=-1), np.concatenate([speed, spin], axis=-1)
 
 
-def _loads(x: Floats, u: Floats, connectors: ConnectorArrays) -> tuple[_Ends, Floats, Floats]:
-    """Both ends; force and moment (..., c, 2, 3) taken from the second one, global axes; torque of a cage (..., c).
+def _own_loads(x: Floats, ends: _Ends, connectors: ConnectorArrays) -> tuple[Floats, Floats]:
+    """Force and moment (..., c, 6) in the first bodies' axes; torque of a cage (..., c).
 
     This torque is the generalized force that the cage takes from the second body's spin and gives to that of the first.
     """
-    ends = _ends(x, u, connectors)
     strain, rate = _strains(ends)
-    local = _times(connectors.stiffness, strain) + _times(connectors.damping, rate)
+    local = _times(connectors.stiffness, strain - connectors.point_strain) + _times(connectors.damping, rate)
+    local += connectors.point_load
     torque = np.zeros(local.shape[:-1])
     with_rows = np.flatnonzero(np.diff(connectors.rolling.first))
     if with_rows.size:
@@ -134,6 +146,13 @@ def _loads(x: Floats, u: Floats, connectors: ConnectorArrays) -> tuple[_Ends, Fl
         turned = turned[..., with_rows]
         forces, torque[..., with_rows] = rolling_loads(with_rows, strain[rows], rate[rows], turned, connectors.rolling)
         local[rows] += forces
+    return local, torque
+
+
+def _loads(x: Floats, u: Floats, connectors: ConnectorArrays) -> tuple[_Ends, Floats, Floats]:
+    """Both ends; force and moment (..., c, 2, 3) taken from the second one, global axes; torque of a cage (..., c)."""
+    ends = _ends(x, u, connectors)
+    local, torque = _own_loads(x, ends, connectors)
     vectors = local.reshape(*local.shape[:-1], 2, 3)
     return ends, vectors @ ends.axes[..., 0, :, :].swapaxes(-1, -2), torque
 
@@ -181,6 +200,12 @@ def connector_loads(q: Floats, v: Floats, connectors: ConnectorArrays) -> Floats
     places = _places(connectors, q.size)
     _, load, _ = _loads(_local(q, places), _local(v, places), connectors)
     return load.reshape(-1, BODY_SIZE)
+
+
+def loads_at_rest(q: Floats, connectors: ConnectorArrays) -> Floats:
+    """Force and moment (c, 6) that each connector takes from its second body at rest, in the axes of the first."""
+    x = _local(q, _places(connectors, q.size))
+    return _own_loads(x, _ends(x, np.zeros_like(x), connectors), connectors)[0]
 
 
 def connector_strains(q: Floats, connectors: ConnectorArrays) -> Floats:
@@ -267,4 +292,7 @@ def no_connectors() -> ConnectorArrays:
     """Arrays of a system without bearings."""
     empty = np.zeros((0, 2, 3))
     matrices = np.zeros((0, BODY_SIZE, BODY_SIZE))
-    return ConnectorArrays(np.zeros((0, 2), dtype=np.int64), empty, empty, matrices, matrices, no_rolling(0))
+    points = np.zeros((0, BODY_SIZE))
+    return ConnectorArrays(
+        np.zeros((0, 2), dtype=np.int64), empty, empty, matrices, matrices, points, points, no_rolling(0)
+    )

@@ -16,15 +16,13 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from exugear.dynamics.assembly import Assembly, VariantError
-from exugear.dynamics.statics import BalanceError, locked_equilibrium
+from exugear.dynamics.statics import BalanceError, locked_equilibrium, rolled_coordinates
 from exugear.kernels.meshes import FORCE, OUTSIDE
 from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
 
 TORQUE_SHARES = (0.1, 0.25, 0.5, 0.75, 1.0)
 """Torques over the largest at which laws that are not linear are solved."""
-LONGEST_TURN = 0.02
-"""Longest step, rad, in which a train is rolled to an angle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,26 +158,6 @@ def _like(weights: Floats, values: Floats) -> Floats:
     return weights.reshape(-1, *(1,) * (values.ndim - 1))
 
 
-def rolled_coordinates(assembly: Assembly, body: str, angle: float) -> Floats:
-    """Coordinates of a rigid train rolled until a body has turned by an angle (rad), (size,).
-
-    Notes
-    -----
-    Velocities of rolling are integrated by the classical Runge-Kutta method: planets go round in a circle to 1e-9.
-    """
-    speeds = assembly.gearbox.train.rolling_speeds(body, 1.0)
-    steps = math.ceil(abs(angle) / LONGEST_TURN)
-    q = np.zeros(assembly.size)
-    for _ in range(steps):
-        h = angle / steps
-        first = assembly.rolling_velocity(q, speeds)
-        second = assembly.rolling_velocity(q + 0.5 * h * first, speeds)
-        third = assembly.rolling_velocity(q + 0.5 * h * second, speeds)
-        fourth = assembly.rolling_velocity(q + h * third, speeds)
-        q = q + h / 6.0 * (first + 2.0 * second + 2.0 * third + fourth)
-    return q
-
-
 class AngleStore(Protocol):
     """What keeps solved angles of the carrier, so that a computation that was stopped goes on behind them."""
 
@@ -224,6 +202,7 @@ def static_balance(
     VariantError
         Loads of a hub on a body that has no place in space.
     """
+    assembly = assembly.at_rest
     linear, sizes = is_linear(assembly), np.zeros(5) if hub is None else hub
     solved, turns = _torques(torques, linear), _angles(assembly, angles)
     wrenches = _wrenches(assembly, body, sizes)
@@ -321,10 +300,12 @@ def _response(parts: Sequence[Floats], sizes: Floats) -> Response:
 
 
 def is_linear(assembly: Assembly) -> bool:
-    """Tell whether forces are proportional to torque: linear bearings and teeth, no weight."""
+    """Tell whether forces are proportional to torque: teeth and bearings linear and through the origin, no weight."""
     weight = any(assembly.gearbox.case.gravity.acceleration_m_per_s2)
+    through_points = bool(assembly.connectors.point_load.any())
     curved = any(element.is_curved or element.bears_beside for element in assembly.elements)
-    return not (assembly.has_rows or weight or curved or LAWS[assembly.mesh_law].loses_contact)
+    not_linear = assembly.at_rest.has_rows or through_points or curved or LAWS[assembly.mesh_law].loses_contact
+    return not (not_linear or weight)
 
 
 def _torques(torques: Floats, linear: bool) -> Floats:

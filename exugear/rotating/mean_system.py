@@ -11,19 +11,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 import scipy.linalg
 
+from exugear.bearings.equal_planets import planet_supports, with_equal_planets
+from exugear.bearings.support_laws import load_stands_still
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.statics import BalanceError, static_state
 from exugear.harmonics.side_by_side import Elimination, elimination, solve_side_by_side
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Mesh
-from exugear.rotating.equal_planets import with_equal_planets
-from exugear.rotating.rotating_frame import RotatingFrame, SteadyError, planet_sets
+from exugear.rotating.rotating_frame import PlanetSet, RotatingFrame, SteadyError, planet_sets
 from fe_ste.tools.arrays import Complexes, Floats
 
 PLACE_STEP, RATE_STEP = 1e-6, 1e-3
@@ -197,7 +198,7 @@ def mean_system(assembly: Assembly, speeds: Floats) -> MeanSystem:
     """
     _check(assembly)
     sets = planet_sets(assembly)
-    assembly, spread = with_equal_planets(assembly, sets)
+    assembly, spread = _with_equal_planets(assembly, sets)
     frame = RotatingFrame(assembly, sets)
     drive, load = _drive_and_load(assembly)
     low, high = float(np.min(speeds)), float(np.max(speeds))
@@ -217,6 +218,16 @@ def mean_system(assembly: Assembly, speeds: Floats) -> MeanSystem:
         mass, dampings, stiffnesses = mass + more[0], dampings + more[1], stiffnesses + more[2]
     pinned = assembly.spin[assembly.gearbox.case.overall.input]
     return MeanSystem(frame, at, mass, dampings, stiffnesses, static, torques, drive, pinned, spread, variation)
+
+
+def _with_equal_planets(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> tuple[Assembly, float]:
+    """Assembly whose planets stand on equal bearings, and the largest change of stiffness that this took, over it.
+
+    Those from a catalogue are equal already: what is left are matrices of the file that are not the same all around.
+    """
+    supports = [own for planets in sets for own in planet_supports(assembly.supports, planets.names, planets.angles)]
+    connectors, spread = with_equal_planets(assembly.connectors, supports)
+    return replace(assembly, connectors=connectors), max(spread, assembly.planet_spread)
 
 
 def torque_of_vibration(system: MeanSystem, speed: float, frequencies: Floats, motion: Complexes) -> float:
@@ -323,8 +334,7 @@ def _check_rows(assembly: Assembly) -> None:
                 f"bearings.{support.family}.cage = 'turning': elements that pass are a cause of their own beside the "
                 "meshes, which the steady response cannot treat; take cage = 'averaged', or run the load case in time"
             )
-        stands = support.on not in bodies or bodies[support.on].fixed or bodies[support.body].carrier == support.on
-        if not stands:
+        if not load_stands_still(support, bodies):
             raise SteadyError(
                 f"bearings.{support.family}.law = 'iso16281': its elements turn with {support.on} against the load, "
                 "which the steady response cannot treat; take law = 'stiffness', or run the load case in time"

@@ -19,18 +19,13 @@ from typing import TypeAlias
 
 import numpy as np
 
+from exugear.bearings.equal_planets import FEWEST, equally_spaced, planet_families
 from exugear.dynamics.assembly import Assembly
 from exugear.kernels.coordinates import TILT
 from exugear.kernels.meshes import MeshArrays
 from exugear.model.parts import Body
 from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats, Integers
-
-SPACING = 1e-6
-"""Largest departure of planets from equal spacing, rad."""
-FEWEST = 3
-"""Planets that a set needs: fewer do not average out what their turning does to the others."""
-
 
 Jet: TypeAlias = tuple[Floats, Floats, Floats]
 """A function of the input's angle with two derivatives by it."""
@@ -105,12 +100,9 @@ def planet_sets(assembly: Assembly) -> tuple[PlanetSet, ...]:
     gearbox = assembly.gearbox
     bodies = {body.name: body for body in assembly.bodies}
     speeds = gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)
-    families: dict[tuple[str, str], list[Body]] = {}
-    for body in assembly.bodies:
-        if body.carrier is not None:
-            families.setdefault((body.carrier, body.family), []).append(body)
     sets = []
-    for (carrier, family), planets in families.items():
+    for planets in planet_families(assembly.bodies):
+        carrier, family = str(planets[0].carrier), planets[0].family
         elastic = [name for name in (carrier, *(p.name for p in planets)) if name in assembly.elastic_bodies]
         if elastic:
             raise SteadyError(
@@ -130,9 +122,7 @@ def _check_spacing(family: str, planets: Sequence[Body]) -> None:
             f"bodies.{family}: {len(planets)} planets; the matrices of fewer than {FEWEST} equally spaced ones turn "
             "with their carrier, which the steady response cannot treat; run the load case in time instead"
         )
-    spacing = 2.0 * math.pi / len(planets)
-    turned = np.array([planet.orbit_angle - planets[0].orbit_angle for planet in planets]) % (2.0 * math.pi)
-    if np.abs(turned - spacing * np.arange(len(planets))).max() > SPACING:
+    if not equally_spaced(planets):
         raise SteadyError(
             f"bodies.{family}.planet_angles_deg: planets are not equally spaced, so that the matrices turn with their "
             "carrier, which the steady response cannot treat; run the load case in time instead"

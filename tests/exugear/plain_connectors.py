@@ -148,8 +148,9 @@ def connector_load(q: Floats, v: Floats, n: int, connectors: ConnectorArrays, ar
     # Loops, because a product of arrays takes numba two seconds to compile.
     local = np.zeros(BODY_SIZE)
     for i in range(BODY_SIZE):
+        local[i] = connectors.point_load[n, i]
         for j in range(BODY_SIZE):
-            local[i] += connectors.stiffness[n, i, j] * motion[DISPLACEMENT, j]
+            local[i] += connectors.stiffness[n, i, j] * (motion[DISPLACEMENT, j] - connectors.point_strain[n, j])
             local[i] += connectors.damping[n, i, j] * motion[RATE, j]
     torque = 0.0
     if connectors.rolling.first[n] < connectors.rolling.first[n + 1]:

@@ -160,8 +160,9 @@ def bearing_energies(q, v, connectors, out) -> None:
     forces = memory_for(connectors.rolling)
     for n in range(connectors.bodies.shape[0]):
         connector_motion(q, v, n, connectors, turn, arms, motion)
-        elastic = connectors.stiffness[n] @ motion[0]
-        out[0] += 0.5 * np.dot(motion[0], elastic)
+        offset = connectors.point_load[n] - connectors.stiffness[n] @ connectors.point_strain[n]
+        elastic = connectors.stiffness[n] @ motion[0] + offset
+        out[0] += 0.5 * np.dot(motion[0], elastic + offset)
         out[4] += np.dot(elastic, motion[1] - motion[2])
         out[1] += np.dot(motion[1], connectors.damping[n] @ motion[1])
         if connectors.rolling.first[n] < connectors.rolling.first[n + 1]:

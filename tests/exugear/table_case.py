@@ -27,7 +27,7 @@ def surface_of(
     mesh = next(mesh for mesh in gearbox.meshes if mesh.pair.name == name)
     static = abs(gearbox.train.static_mesh_forces()[mesh.name])
     centre = mesh.centre_distance + np.linspace(-2e-4, 2e-4, 5)
-    misalignment = np.linspace(-4e-4, 4e-4, 5)
+    misalignment = np.linspace(-6e-4, 6e-4, 7)
     force = static * LOADS
     cycle = 2.0 * np.pi * np.arange(positions) / positions
     shape = 1.0 + variation * (0.05 * np.cos(cycle + 0.3) + 0.02 * np.cos(2 * cycle + 1.1))

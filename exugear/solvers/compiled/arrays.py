@@ -27,9 +27,9 @@ WRENCH = PADDED
 RELATIVE_PLACE, RELATIVE_AXIS, RELATIVE_VELOCITY, FIRST_TURNING, SECOND_TURNING, RELATIVE_TILT = range(0, 18, 3)
 RELATIVE_SIZE = 18
 """First columns of `Work.relative` and their number: all seen in the first body's axes."""
-FIRST_ARM, LAG, SECOND_ARM, OFF_AXIS, GAP, NODES, DAMPED = 48, 51, 52, 55, 56, 59, 62
+OFFSET, FIRST_ARM, LAG, SECOND_ARM, OFF_AXIS, GAP, NODES, DAMPED = 48, 56, 59, 60, 63, 64, 67, 70
 """Columns of `Pairs.data` behind the six columns of the stiffness, `PADDED` each."""
-PAIR_SIZE = 64
+PAIR_SIZE = 72
 SUPPORT_LOAD, SUPPORT_SIZE = 12, 18
 """Column of force and moment in `Work.supports`, behind strain and rate, and number of columns."""
 
@@ -72,6 +72,7 @@ class Connectors(NamedTuple):
     repeated : (c,) 1 where the one before has the same ends, so that angles and their rates are known
     twisting : (c,) 1 where the angle about z acts on these ends, else 0
     stiffness : (c, 6, 6) by column and row, N/m .. N m/rad
+    offset : (c, 6) load of the linear law without displacement, N and N m
     time : (c,) damping over stiffness where the two are in proportion, s
     damping : (c, 6, 6) by column and row where they are not
     damped : (c,) 1 where they are not, else 0
@@ -85,6 +86,7 @@ class Connectors(NamedTuple):
     repeated: Integers
     twisting: Integers
     stiffness: Floats
+    offset: Floats
     time: Floats
     damping: Floats
     damped: Integers
@@ -112,9 +114,10 @@ class Pairs(NamedTuple):
     ends : (p, 2) numbers of the two bodies in `Bodies`
     first : (p + 1,) first connector of each pair
     twisting : (p,) 1 where the angle about z acts, else 0
-    data : (c, 64) stiffness by column, rows padded to x y z 0 a b c 0; then attachment in the first body's axes,
-        damping over stiffness (s), attachment in the second one's axes, 1 where that is off its z axis, the second
-        attachment and the second node against the first at zero angles, 1 where damping has a matrix of its own
+    data : (c, 72) stiffness by column, rows padded to x y z 0 a b c 0, and padded alike the load without displacement;
+        then attachment in the first body's axes, damping over stiffness (s), attachment in the second one's axes, 1
+        where that is off its z axis, the second attachment and the second node against the first at zero angles, 1
+        where damping has a matrix of its own
     """
 
     ends: Integers

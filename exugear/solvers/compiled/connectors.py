@@ -17,6 +17,7 @@ from exugear.solvers.compiled.arrays import (
     LAG,
     NODES,
     OFF_AXIS,
+    OFFSET,
     RELATIVE_AXIS,
     RELATIVE_PLACE,
     RELATIVE_TILT,
@@ -141,7 +142,9 @@ def strain_connector(
 @kernel
 def load_connector(n: int, one: Floats, damping: Floats, support: Floats) -> None:
     """Fill force and moment of connector n on its first body from strain and rate."""
-    x, y, z, _x, a, b, c, _a = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0  # two vectors of four sums in registers
+    # Two vectors of four sums in registers.
+    x, y, z, _x = one[OFFSET], one[OFFSET + 1], one[OFFSET + 2], one[OFFSET + 3]
+    a, b, c, _a = one[OFFSET + 4], one[OFFSET + 5], one[OFFSET + 6], one[OFFSET + 7]
     time = one[LAG]
     for column in range(BODY_SIZE):
         # Damping in proportion to the stiffness acts as a strain that is ahead of itself.

@@ -36,6 +36,7 @@ from exugear.solvers.compiled.arrays import (
     LAG,
     NODES,
     OFF_AXIS,
+    OFFSET,
     PAIR_SIZE,
     RELATIVE_SIZE,
     SECOND_ARM,
@@ -116,6 +117,7 @@ def _connectors(numbers: _Numbers) -> tuple[Connectors, Integers]:
         repeated=np.append(0, (ends[1:] == ends[:-1]).all(axis=1)).astype(np.int64)[: len(ends)],
         twisting=twisting,
         stiffness=matrices[0],
+        offset=given.offset,
         time=time,
         damping=matrices[1],
         damped=matrices[1].any(axis=(1, 2)).astype(np.int64),
@@ -134,6 +136,8 @@ def _pairs(connectors: Connectors, nodes: Floats) -> Pairs:
         connectors.stiffness[:, :, :TILT],
         connectors.stiffness[:, :, TILT:],
     )
+    data[:, OFFSET : OFFSET + TILT] = connectors.offset[:, :TILT]
+    data[:, OFFSET + PADDED_TILT : OFFSET + PADDED_TILT + TILT] = connectors.offset[:, TILT:]
     data[:, FIRST_ARM : FIRST_ARM + 3] = connectors.local[:, 0]
     data[:, LAG] = connectors.time
     data[:, SECOND_ARM : SECOND_ARM + 3] = connectors.local[:, 1]

@@ -38,6 +38,7 @@ from exugear.solvers.compiled.arrays import (
     COSINE,
     DAMPED,
     LAG,
+    OFFSET,
     SIN_B,
     SINE,
     SUPPORT_LOAD,
@@ -181,12 +182,13 @@ def observe_connectors(
         for row in range(BODY_SIZE):
             place = row if row < TILT else row - TILT + PADDED_TILT
             force, damped = work.motion[PADDED + place], work.motion[2 * PADDED + place]
+            offset = one[OFFSET + place]
             if one[DAMPED] == 1.0:
                 for column in range(BODY_SIZE):
                     damped += connectors.damping[n, column, row] * rate[column]
-            stored += force * strain[row]
+            stored += (force + 2.0 * offset) * strain[row]
             lost += damped * rate[row]
-            turned += force * (rate[row] - derivative[row])
+            turned += (force + offset) * (rate[row] - derivative[row])
         energy[ELASTIC] += 0.5 * stored
         energy[DISSIPATED] += stride * lost
         energy[OF_BEARING_RATES] += stride * turned

@@ -95,7 +95,7 @@ def eigenvalues(assembly: Assembly) -> Complexes:
 
 def _at_rest(assembly: Assembly) -> Linearised:
     """Linearised equations with all teeth in contact, meshes and non-linear bearings as stiff as they become."""
-    stiffest = assembly.with_linear_supports(STIFFENING)
+    stiffest = assembly.unloaded.with_linear_supports(STIFFENING)
     meshes = stiffest.linear_meshes()
     peaks = np.array([np.max(np.abs(e.tangent)) / np.abs(np.mean(e.stiffness)) for e in stiffest.elements])
     meshes = meshes._replace(stiffness=meshes.stiffness * peaks.reshape(-1, 1, 1))

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from exugear.kernels.connectors import ConnectorArrays
 from exugear.kernels.coordinates import BODY_SIZE, SPIN
 from exugear.kernels.rolling import CAGE_TORQUE, ELASTIC_PART, rolling_force, rolling_memory
 from exugear.model.parts import Joint
@@ -39,13 +40,28 @@ def add_supports(parts: Parts) -> None:
                 markerNumbers=[parts.support_marker(body, bearing.name, at) for body, at in ends],
                 stiffness=assembly.connectors.stiffness[n],
                 damping=assembly.connectors.damping[n],
+                offset=_offset(assembly.connectors, n),
                 springForceTorqueUserFunction=law,
             )
         )
 
 
+def _offset(connectors: ConnectorArrays, n: int) -> Floats:
+    """Displacement (6,) at which the linear law of connector n has no load, m and rad.
+
+    It has none where the matrix resists nothing: rows that do not resist do not push either.
+    """
+    size = np.sqrt(np.abs(np.diag(connectors.stiffness[n])))
+    scale = np.divide(1.0, size, out=np.zeros(BODY_SIZE), where=size > 0.0)
+    # Forces and moments differ by orders of magnitude: to a unit diagonal before a rank is decided.
+    matrix = scale[:, None] * connectors.stiffness[n] * scale
+    found = np.linalg.pinv(matrix, rcond=1e-12, hermitian=True) @ (scale * connectors.offset[n])
+    return np.asarray(-scale * found)
+
+
 def _rolling_law(parts: Parts, n: int) -> Callable[..., Floats]:
-    """User function of a support whose rolling law acts beside its matrices; it stands in for both."""
+    """User function of a support whose rolling law acts beside its linear one; it stands in for both."""
+    offset = parts.assembly.connectors.offset[n]
     bearing, rolling = parts.assembly.supports[n], parts.assembly.connectors.rolling
     first, second = (parts.support_spin(body, bearing.name) for body in (bearing.on, bearing.body))
     forces = rolling_memory(rolling)
@@ -64,7 +80,7 @@ def _rolling_law(parts: Parts, n: int) -> Callable[..., Floats]:
     ) -> Floats:
         strain, rate = np.array([*displacement, *rotation]), np.array([*velocity, *angular_velocity])
         rolling_force(n, strain, rate, second() - first(), rolling, forces)
-        load: Floats = stiffness @ strain + damping @ rate
+        load: Floats = offset + stiffness @ strain + damping @ rate
         load += forces[ELASTIC_PART : ELASTIC_PART + BODY_SIZE]
         load[SPIN] += forces[CAGE_TORQUE]
         return load

@@ -43,6 +43,8 @@ def connectors(request: pytest.FixtureRequest) -> ConnectorArrays:
         node=node,
         stiffness=stiffness + stiffness.swapaxes(1, 2),
         damping=rng.normal(0.0, 1e3, (count, 6, 6)),
+        point_strain=rng.normal(0.0, 1e-3, (count, 6)),
+        point_load=rng.normal(0.0, 1e5, (count, 6)),
         rolling=rolling if request.param == "rows" else no_rolling(count),
     )
 

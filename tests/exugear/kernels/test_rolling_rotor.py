@@ -85,6 +85,8 @@ def rotor(row: RollingRow, time: float = 0.0, cage_ratio: float = 0.0) -> Rotor:
         node=node,
         stiffness=np.stack([FLOOR, FLOOR]),
         damping=time * np.stack([FLOOR, FLOOR]),
+        point_strain=np.zeros((2, 6)),
+        point_load=np.zeros((2, 6)),
         rolling=rolling,
     )
     one, none = np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64)

@@ -18,7 +18,7 @@ from exugear.cli import app as cli
 from exugear.dynamic_factors.dynamic_factor import stated_factors
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly, VariantError
-from exugear.dynamics.statics import locked_equilibrium
+from exugear.dynamics.statics import locked_equilibrium, rolled_coordinates
 from exugear.kernels.meshes import FORCE
 from exugear.life.acting_loads import acting_loads
 from exugear.life.gear_life import beyond_tables, flank_lives
@@ -26,7 +26,7 @@ from exugear.life.life import checked_loads, compute_life, rating_of, shortfalls
 from exugear.life.life_diagrams import damage_matrix
 from exugear.life.life_file import limits, read_life
 from exugear.life.pair_stresses import pair_stresses
-from exugear.life.static_balance import rolled_coordinates, static_balance
+from exugear.life.static_balance import static_balance
 from exugear.load_spectrum.counted import count_loads
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
