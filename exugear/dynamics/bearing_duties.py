@@ -68,5 +68,6 @@ def is_stated(bearing: Bearing) -> bool:
 
 def reaction_loads(assembly: Assembly) -> dict[str, Floats]:
     """Force and moment (6,) of each bearing on its body by name, under the static load, N and N m."""
-    q = static_state(assembly).q
-    return dict(zip(assembly.connector_names, assembly.bearing_loads(q, np.zeros_like(q)), strict=True))
+    state = static_state(assembly)
+    loads = state.assembly.bearing_loads(state.q, np.zeros_like(state.q))
+    return dict(zip(assembly.connector_names, loads, strict=True))
