@@ -12,6 +12,7 @@ from exugear.rexs.to_case.meshing import (
     PLACE_TOLERANCE,
     Stage,
     centre_distance,
+    told_if_impossible,
     unchecked,
     with_clear_tips,
     with_equal_racks,
@@ -93,8 +94,9 @@ def teeth_of(model: Model, places: Places, bodies: Bodies, notes: Notes) -> Teet
     _check_equal_planets(model, bodies, first, gears, notes)
     gears = with_equal_racks(gears, stages, notes)
     gears = with_shifts(gears, stages, notes)
-    gears = {number: with_fitting_tool(with_possible_cutter(gear, notes), notes) for number, gear in gears.items()}
-    gears = {number: with_form_circles(gear, notes) for number, gear in gears.items()}
+    for number, gear in gears.items():
+        with told_if_impossible(gear):
+            gears[number] = with_form_circles(with_fitting_tool(with_possible_cutter(gear, notes), notes), notes)
     gears = with_clear_tips(gears, stages, notes)
     owners = {number: body for number in gears if (body := bodies.of(model.components[number])) is not None}
     lost = [str(gears[number].part) for number in gears if number not in owners]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -68,6 +69,8 @@ def centre_distance(stage: Component, apart: float, pair: tuple[Toothing, Toothi
         The file says two different distances, and neither profile shifts nor rules tell which one counts.
     """
     stated = stage.quantity("center_distance", "mm")
+    if apart <= PLACE_TOLERANCE:
+        raise RexsError(f"{stage}: both of its gears stand on one axis; correct support_vector of one of them")
     if stated is None:
         return derived(tidy(round(apart, 9)), "distance of the gears' positions")
     stated = abs(stated)
@@ -75,7 +78,7 @@ def centre_distance(stage: Component, apart: float, pair: tuple[Toothing, Toothi
     if abs(stated - apart) <= PLACE_TOLERANCE:
         return Entry(tidy(stated), "center_distance")
     rule, why = notes.rules.distances, "as asked for"
-    if rule == "agreeing":
+    if rule == "agreeing" and stated > PLACE_TOLERANCE:
         rule, why = _confirmed(pair, stated, apart), "with which the profile shifts agree"
     both = f"center_distance = {stated:g} mm, but its gears stand {apart:.4f} mm apart"
     if rule == "agreeing":
@@ -346,6 +349,20 @@ def _cutter(gear: Toothing) -> PinionCutter | None:
     )
 
 
+@contextmanager
+def told_if_impossible(*gears: Toothing) -> Iterator[None]:
+    """Tell numbers of gears that no geometry follows from: their relations have no solution there."""
+    try:
+        yield
+    except RexsError:
+        raise
+    except (ArithmeticError, ValueError) as error:
+        parts = " and ".join(str(gear.part) for gear in gears)
+        raise RexsError(
+            f"{parts}: tooth numbers, diameters, shift and tool make no gear together ({error}); correct them"
+        ) from None
+
+
 def with_possible_cutter(gear: Toothing, notes: Notes) -> Toothing:
     """Leave out a cutter that cannot make the ring as the file describes it, and say why."""
     if gear.cutter is None:
@@ -404,7 +421,8 @@ def with_clear_tips(gears: dict[int, Toothing], stages: Sequence[Stage], notes: 
     cleared = dict(gears)
     for stage in stages:
         for tip, mate in ((stage.gear, stage.pinion), (stage.pinion, stage.gear)):
-            bound = _tip_bound(cleared, stage, tip)
+            with told_if_impossible(cleared[tip], cleared[mate]):
+                bound = _tip_bound(cleared, stage, tip)
             if bound is None:
                 continue
             own = 2e3 * unchecked("", cleared[tip]).tip_radius
