@@ -158,6 +158,37 @@ def test_flanks_that_end_in_edges_count_nothing(spur: PairCompliance) -> None:
     assert kinematics.form_roll_1 == pytest.approx(pinion.root_form_roll_length / pinion.base_radius)
 
 
+def test_a_large_misalignment_presses_on_one_end_of_the_face_in_balance() -> None:
+    """0.6 mm over the face of 491 mm, and three times the load: a wedge bears at its end, and comes to form circles.
+
+    Moments: the load's centre is where the forces' sum of moments says. A mesh and cells twice as fine as the others
+    move the transmission error by 2 %: four layers of elements are coarse for a wedge.
+    """
+    pair, torque = planet_and_ring()
+    misalignment = 0.6e-3 / pair.face_width
+    coarse, fine = (
+        pair_compliance(pair, mesh, ContactSettings(slices=slices))
+        for mesh, slices in ((COARSE, 12), (MeshSettings(layers=8, flank=12, thickness=8), 24))
+    )
+    for pmc in (0.0, 0.92, 0.96):
+        state = contact_state(coarse, 3.0 * torque, pmc, misalignment)
+        force = state.solution.force
+        assert force.sum() == pytest.approx(state.normal_load, rel=1e-10)
+        assert (force >= 0.0).all() and share_beyond(coarse.flanks, state.cells, force) < 1e-9
+        centre = force @ coarse.axial[state.cells.layer] / force.sum()
+        assert -0.5 * pair.face_width < centre < -0.05 * pair.face_width
+        # Derivative of the transmission error by misalignment is the centre of a little more load.
+        step = 1e-7
+        ahead, behind = (
+            contact_state(coarse, 3.0 * torque, pmc, misalignment + turn).solution.approach for turn in (step, -step)
+        )
+        per_load = state.solution.force_per_load @ coarse.axial[state.cells.layer]
+        cosine = math.cos(pair.pinion.base_helix_angle)
+        assert (ahead - behind) / (2.0 * step) == pytest.approx(per_load * cosine, rel=1e-3)
+        finer = contact_state(fine, 3.0 * torque, pmc, misalignment)
+        assert state.solution.approach == pytest.approx(finer.solution.approach, rel=0.03)
+
+
 # --- stored tables -------------------------------------------------------------------------------
 
 
