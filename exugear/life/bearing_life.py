@@ -1,7 +1,7 @@
 """Life of rolling bearings under a load duration distribution: L10 of ISO 281, L10r of ISO/TS 16281, static safety.
 
-Both are basic: lubricant, cleanliness, ribs and cages are left out. Loads are those of the static balance; each turn
-meets each angle of the carrier once.
+Both are basic; L10m of ISO 281 has lubricant and cleanliness where the gearbox file gives them. Ribs and cages are left
+out. Loads are those of the static balance; each turn meets each angle of the carrier once.
 """
 
 from __future__ import annotations
@@ -17,11 +17,20 @@ from exugear.bearings.operating_point import cage_angles
 from exugear.bearings.rolling.catalogue import catalogue_rows
 from exugear.bearings.rolling.contact import BearingState, equilibrium
 from exugear.bearings.rolling.life import basic_rating_life, minimum_load, reference_life
+from exugear.bearings.rolling.lubrication import (
+    LEAST_RATIO,
+    contamination_factor,
+    fatigue_limit,
+    life_factor,
+    viscosity_at,
+    viscosity_ratio,
+)
 from exugear.bearings.rolling.ratings import equivalent_load, equivalent_static_load
 from exugear.bearings.rolling.rows import BearingError, BearingOfRows, RollerRow, RollingRow, on_raceways
 from exugear.life.acting_loads import ActingLoads
 from exugear.life.static_balance import StaticBalance
 from exugear.model.parts import Bearing
+from exugear.model.sections.lubricant import LubricantSection
 from fe_ste.tools.arrays import Floats
 
 LAMINAE = 40
@@ -49,6 +58,12 @@ class BearingLife:
         Miner's sum, and hours of operation until it is one, by L10.
     reference_damage, reference_hours : float
         The same by L10r; NaN where no balance of the rollers was found.
+    modified_damage, modified_hours : float
+        The same by L10m, with a_ISO at each load and speed; NaN without oil.
+    viscosity_ratio : float
+        Least kappa of all speeds under load; NaN likewise.
+    minimum_load : float
+        Radial load below which elements may slide, N.
     pressure : float
         Largest of rollers or balls under the largest load, Pa; NaN likewise.
     static_safety : float
@@ -67,6 +82,10 @@ class BearingLife:
     basic_hours: float
     reference_damage: float
     reference_hours: float
+    modified_damage: float
+    modified_hours: float
+    viscosity_ratio: float
+    minimum_load: float
     pressure: float
     static_safety: float
     ratings: Ratings
@@ -80,6 +99,7 @@ def bearing_lives(
     turns: Mapping[str, float],
     acting: ActingLoads,
     balance: StaticBalance,
+    oil: LubricantSection | None = None,
 ) -> tuple[BearingLife, ...]:
     """Rate all bearings that turn and have catalogue data.
 
@@ -91,12 +111,13 @@ def bearing_lives(
         Revolutions per revolution of the loaded body.
     acting : ActingLoads
     balance : StaticBalance
+    oil : LubricantSection, optional
     """
     lives = []
     for number, support in enumerate(supports):
         if support.catalogue is None or not turns.get(support.name, 0.0):
             continue
-        case = _Case(support, acting, balance, number)
+        case = _Case(support, acting, balance, number, oil)
         lives.append(case.life(turns[support.name]))
     return tuple(lives)
 
@@ -109,6 +130,7 @@ class _Case:
     acting: ActingLoads
     balance: StaticBalance
     number: int
+    oil: LubricantSection | None
 
     def life(self, turns: float) -> BearingLife:
         points, carried = self.acting.points, self.balance.bearing_load.of(self.number)
@@ -126,6 +148,8 @@ class _Case:
         )(radial, loads[..., 2])
         basic = np.vectorize(lambda load: basic_rating_life(ratings.dynamic, load, section.type))(equivalents)
         by_bin = np.sum(share / (1e6 * basic), axis=1)
+        factor, ratio = self._life_factor(rows, ratings, equivalents, points.speed * turns)
+        modified = float(np.sum(share / (1e6 * basic * factor)))
         damage = float(by_bin.sum())
         lives, pressure, remarks = self._reference(rows, ratings, loads, revolutions, worst)
         by_reference = np.full(len(by_bin), math.nan)
@@ -137,7 +161,10 @@ class _Case:
             for one in worst.reshape(-1, 6)
         )
         largest = float(np.hypot(worst[..., 0], worst[..., 1]).max())
-        if largest < minimum_load(ratings.dynamic, section.type):
+        least = minimum_load(ratings.dynamic, section.type)
+        if ratio < LEAST_RATIO:
+            remarks.append(f"viscosity ratio {ratio:.2g} at its slowest: L10m has no a_ISO below {LEAST_RATIO:g}")
+        if largest < least:
             remarks.append(f"carries {1e-3 * largest:.3g} kN at most, below the usual least load: elements may slide")
         if ratings.estimated:
             remarks.append("ratings estimated from its dimensions")
@@ -152,6 +179,10 @@ class _Case:
             basic_hours=hours / damage if damage else math.inf,
             reference_damage=reference,
             reference_hours=hours / reference if reference else math.inf,
+            modified_damage=modified,
+            modified_hours=hours / modified if modified else math.inf,
+            viscosity_ratio=ratio,
+            minimum_load=least,
             pressure=pressure,
             static_safety=ratings.static / static if static else math.inf,
             ratings=ratings,
@@ -159,6 +190,29 @@ class _Case:
             by_bin=self.acting.by_bin(by_bin),
             reference_by_bin=self.acting.by_bin(by_reference),
         )
+
+    def _life_factor(
+        self, rows: tuple[RollingRow, ...], ratings: Ratings, loads: Floats, speed: Floats
+    ) -> tuple[Floats, float]:
+        """a_ISO of equivalent loads (points, angles) at speeds (points,) of the rings, and the least viscosity ratio.
+
+        NaN where the gearbox file does not say what oil, how warm, and how clean.
+        """
+        oil, section = self.oil, self.support.catalogue
+        assert section is not None
+        if oil is None or oil.viscosity_100_mm2_per_s is None or oil.temperature_C is None or oil.cleanliness is None:
+            return np.full(loads.shape, math.nan), math.nan
+        viscosity = viscosity_at(oil.temperature_C, oil.viscosity_40_mm2_per_s, oil.viscosity_100_mm2_per_s)
+        pitch = rows[0].pitch_diameter
+        limit = fatigue_limit(ratings.static, pitch, section.type)
+        clean = contamination_factor(oil.cleanliness, pitch)
+        ratios = np.array([viscosity_ratio(viscosity, float(one), pitch) for one in speed])
+        factors = [
+            [life_factor(ratio, clean * limit / max(load, 1e-9), section.type) for load in row]
+            for ratio, row in zip(ratios.tolist(), loads.tolist(), strict=True)
+        ]
+        turning = ratios[speed != 0.0]
+        return np.array(factors).reshape(loads.shape), float(turning.min(initial=math.inf))
 
     def _reference(
         self, rows: tuple[RollingRow, ...], ratings: Ratings, loads: Floats, revolutions: Floats, worst: Floats

@@ -324,8 +324,8 @@ class _Case:
         other = (self.pair.gear, self.pair.pinion)[self.tooth.member].name
         mate = self.rating.gears.get(other, strength)
         softer = 1e6 * min(strength.sigma_H_lim_MPa, mate.sigma_H_lim_MPa)
-        roughness = 0.5e-6 * (strength.roughness_um + mate.roughness_um)
-        still = lubricant_factor(softer, self.rating.viscosity_40_mm2_per_s)
+        roughness = 0.5 * (strength.roughness + mate.roughness)
+        still = lubricant_factor(softer, self.gearbox.viscosity_40)
         still *= roughness_factor(softer, roughness, reduced_radius(self.pair))
         moving = np.array([velocity_factor(softer, self._velocity(float(one))) for one in speed])
         return 1e6 * strength.sigma_H_lim_MPa * still * moving

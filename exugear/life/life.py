@@ -22,6 +22,7 @@ from exugear.load_spectrum.sources import Progress
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import RPM
 from exugear.model.sections.loads import RatingSection
+from exugear.model.sections.lubricant import LubricantSection
 from exugear.model.versions import LIFE
 from fe_ste.root_stress.mesh_cycle import MeshCycleStress
 
@@ -89,8 +90,8 @@ def rating_of(gearbox: Gearbox) -> RatingSection:
     """
     if gearbox.case.rating is None:
         raise gearbox.fault(
-            "rating: this section is missing; [rating] needs dynamic_factor and viscosity_40_mm2_per_s, and "
-            "[rating.gears.NAME] what a gear withstands"
+            "rating: this section is missing; [rating] needs dynamic_factor, [rating.gears.NAME] what a gear "
+            "withstands, and [lubricant] viscosity_40_mm2_per_s"
         )
     return gearbox.case.rating
 
@@ -109,7 +110,8 @@ def checked_loads(gearbox: Gearbox, progress: Progress | None = None) -> Counted
     CaseError
         Loads that cannot be used, or strengths that do not fit the gears.
     """
-    rating, counted = rating_of(gearbox), count_loads(gearbox, progress)
+    rating, _ = rating_of(gearbox), gearbox.viscosity_40
+    counted = count_loads(gearbox, progress)
     if rating.dynamic_factor_run is not None and rating.dynamic_factor_run not in gearbox.load_cases:
         known = ", ".join(gearbox.load_cases) or "none"
         raise gearbox.fault(f"rating.dynamic_factor_run = {rating.dynamic_factor_run!r}: load cases are {known}")
@@ -135,6 +137,7 @@ def life_hash(assembly: Assembly, counted: CountedLoads, tables: Mapping[str, st
         "assembly": input_hash(assembly),
         "loads": case.get("loads"),
         "rating": case.get("rating"),
+        "lubricant": case.get("lubricant"),
         "files": {one.name: one.digest for one in counted.sources},
         "tables": dict(tables),
         "run": run,
@@ -180,7 +183,7 @@ def compute_life(
         assembly, counted.body, acting.torques, rating.carrier_angles, progress, 0.5 * acting.hub_sizes, store
     )
     flanks = flank_lives(gearbox, rating, counted.teeth, acting, balance, stresses, dynamic)
-    bearings = bearing_lives(assembly.supports, counted.bearings, acting, balance)
+    bearings = bearing_lives(assembly.supports, counted.bearings, acting, balance, gearbox.case.lubricant)
     families: dict[str, list[int]] = {}
     for number, mesh in enumerate(gearbox.meshes):
         families.setdefault(mesh.family, []).append(number)
@@ -202,7 +205,7 @@ def compute_life(
         shortfalls=tuple(shortfalls(rating, flanks, bearings, float(acting.points.hours.sum()))),
         reliefs=tuple(needs_of_relief(flanks)),
         assumptions=(
-            *_assumptions(rating, counted, acting, balance, stresses, dynamic),
+            *_assumptions(rating, counted, acting, balance, stresses, dynamic, gearbox.case.lubricant),
             *(f"K_gamma of {family} = {value:.3f}, in the forces of each mesh" for family, value in told.items()),
             *beyond_tables(gearbox, acting, balance, stresses),
             *reaches(flanks),
@@ -243,6 +246,7 @@ def _assumptions(
     balance: StaticBalance,
     stresses: Mapping[str, MeshCycleStress],
     dynamic: Mapping[str, DynamicFactor],
+    oil: LubricantSection | None,
 ) -> list[str]:
     count, turns = len(balance.torque), len(balance.angle)
     lines = [
@@ -258,7 +262,7 @@ def _assumptions(
         ),
         f"S_H of {rating.least_S_H:g}, S_F of {rating.least_S_F:g} and S_0 of {rating.least_S_0:g} are asked for",
         "Z_W = Z_X = 1; S-N curves go on beyond their last point: no load is without damage",
-        "lives of bearings are basic: lubricant, cleanliness, ribs and cages are left out",
+        _oil_in_words(oil),
     ]
     if balance.outside:
         lines.append(
@@ -268,6 +272,19 @@ def _assumptions(
     if np.any(counted.distribution.torque < 0.0):
         lines.append("reversed torque presses the other flanks; teeth there are taken as the mirror of these")
     return [*lines, *counted.remarks]
+
+
+def _oil_in_words(oil: LubricantSection | None) -> str:
+    given = oil is not None and None not in (oil.viscosity_100_mm2_per_s, oil.temperature_C, oil.cleanliness)
+    if oil is None or not given:
+        return (
+            "lives of bearings are basic: ribs and cages are left out; L10m, with oil and cleanliness, needs "
+            "viscosity_100_mm2_per_s, temperature_C and cleanliness of [lubricant]"
+        )
+    return (
+        f"L10m of bearings by ISO 281 for oil at {oil.temperature_C:g} C and cleanliness {oil.cleanliness!r}, with the "
+        "lower end of its range of e_C; ribs and cages are left out"
+    )
 
 
 def _dynamic_in_words(rating: RatingSection, dynamic: Mapping[str, DynamicFactor], acting: ActingLoads) -> str:

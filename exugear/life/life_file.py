@@ -44,6 +44,7 @@ DAMAGES = {
 LISTS = ("assumptions", "unrated", "failures", "shortfalls", "reliefs")
 """What a life says in words, lists of sentences."""
 BEARING_UNITS = {"largest_load": "N", "equivalent": "N", "basic_hours": "h", "reference_hours": "h", "pressure": "Pa"}
+BEARING_UNITS |= {"modified_hours": "h", "minimum_load": "N"}
 FLANK_NUMBERS = tuple(one.name for one in fields(FlankLife) if one.type in (float, "float"))
 BEARING_NUMBERS = tuple(one.name for one in fields(BearingLife) if one.type in (float, "float"))
 _LAYOUT = Layout(

@@ -100,7 +100,11 @@ def shortfalls(
                 "torque_factors and grid = true"
             )
     for bearing in bearings:
-        for name, lasting in (("L10", bearing.basic_hours), ("L10r", bearing.reference_hours)):
+        for name, lasting in (
+            ("L10", bearing.basic_hours),
+            ("L10r", bearing.reference_hours),
+            ("L10m", bearing.modified_hours),
+        ):
             if lasting < hours:
                 yield f"{bearing.name}: {name} = {lasting:,.0f} h, {hours:,.0f} h are asked for"
         if bearing.static_safety < rating.least_S_0:

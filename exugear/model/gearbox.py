@@ -36,7 +36,7 @@ from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.standards import iso6336
 from fe_ste.tools.notebook import html_table
 
-BESIDE_EQUATIONS = ("labels", "load_cases", "loads", "operation", "rating", "report", "ste")
+BESIDE_EQUATIONS = ("labels", "load_cases", "loads", "lubricant", "operation", "rating", "report", "ste")
 """Tables of the file that change nothing in the equations: words and speeds for pages, what acts over a life, how parts
 are rated, settings of reports and of tables, whose content goes into hashes by itself, and load cases: a run adds its
 own."""
@@ -158,6 +158,23 @@ class Gearbox:
     def name(self) -> str:
         """Title of the gearbox."""
         return self.case.name
+
+    @property
+    def viscosity_40(self) -> float:
+        """Kinematic viscosity of the oil at 40 degrees Celsius, mm2/s.
+
+        Raises
+        ------
+        CaseError
+            None is given, or two.
+        """
+        sections = (self.case.lubricant, self.case.rating)
+        found = [one.viscosity_40_mm2_per_s for one in sections if one is not None]
+        given = [value for value in found if value is not None]
+        if len(given) != 1:
+            what = "is given twice; leave that of [rating] out" if given else "this key is missing"
+            raise self.fault(f"lubricant.viscosity_40_mm2_per_s: {what}")
+        return given[0]
 
     @property
     def ste(self) -> SteSection:

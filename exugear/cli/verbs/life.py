@@ -159,7 +159,8 @@ def _bearing_rows(data: xr.Dataset) -> list[dict[str, str]]:
             "equivalent\nkN": _told(1e-3 * value("equivalent"), ".4g"),
             "L10\nh": _told(value("basic_hours"), ".3g"),
             "L10r\nh": _told(value("reference_hours"), ".3g"),
-            "damage\nL10r": _told(value("reference_damage"), ".3g"),
+            "L10m\nh": _told(value("modified_hours"), ".3g"),
+            "kappa": _told(value("viscosity_ratio"), ".2g"),
             "pressure\nMPa": _told(1e-6 * value("pressure"), ".0f"),
             "S_0": _told(value("static_safety"), ".2f"),
         }

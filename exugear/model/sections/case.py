@@ -18,6 +18,7 @@ from exugear.model.sections.connections import BearingSection, CouplingSection, 
 from exugear.model.sections.entries import LONGEST_VALUE, MOST_ENTRIES, Entries, FileName, Name, Section, Text
 from exugear.model.sections.gears import DeviationSection, GearSection, PairSection, PinSection
 from exugear.model.sections.loads import LoadsSection, RatingSection
+from exugear.model.sections.lubricant import LubricantSection
 
 
 class LoadCaseSection(Section):
@@ -251,6 +252,8 @@ class CaseFile(Section):
     """Loads over the life of the gearbox."""
     rating: RatingSection | None = None
     """How gears are rated."""
+    lubricant: LubricantSection | None = None
+    """The oil."""
 
     @model_validator(mode="after")
     def _labels_of_entries(self) -> CaseFile:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
@@ -119,6 +119,10 @@ class LoadsSection(Section):
         return self
 
 
+RZ_OF_RA = 6.0
+"""Rz over Ra, ISO 6336-2:2006, 12.3."""
+
+
 class StrengthSection(Section):
     """What a gear withstands, by ISO 6336:2006; numbers of its material from ISO 6336-5 or from tests."""
 
@@ -132,12 +136,34 @@ class StrengthSection(Section):
     """Life factor Z_NT over load cycles."""
     bending_curve: Curve | None = None
     """Life factor Y_NT over load cycles."""
-    roughness_um: q.RoughnessUm
-    """Mean peak-to-valley roughness Rz of the flanks."""
+    roughness_Rz_um: q.RoughnessUm | None = None
+    """Mean peak-to-valley roughness Rz of the flanks; or the next key."""
+    roughness_Ra_um: q.MeanRoughnessUm | None = None
+    """Arithmetic mean roughness Ra of the flanks; Rz is six times as much (ISO 6336-2)."""
     root_factor: q.StrengthFactor
     """Product of the relative notch sensitivity, surface and size factors of the root (Y_drelT Y_RrelT Y_X)."""
     mean_stress_factor: q.StrengthFactor | None = None
     """Y_M of gears whose teeth bend both ways, such as planets and idlers; they need it."""
+
+    @property
+    def roughness(self) -> float:
+        """Rz, m."""
+        return 1e-6 * (self.roughness_Rz_um or RZ_OF_RA * (self.roughness_Ra_um or 0.0))
+
+    @model_validator(mode="before")
+    @classmethod
+    def _renamed(cls, content: Any) -> Any:
+        if isinstance(content, dict) and "roughness_um" in content:
+            raise ValueError(
+                f"roughness_um = {content['roughness_um']}: is called roughness_Rz_um now; of Ra it is roughness_Ra_um"
+            )
+        return content
+
+    @model_validator(mode="after")
+    def _roughness(self) -> StrengthSection:
+        if (self.roughness_Rz_um is None) == (self.roughness_Ra_um is None):
+            raise ValueError("give one of roughness_Rz_um and roughness_Ra_um")
+        return self
 
     @model_validator(mode="after")
     def _curves(self) -> StrengthSection:
@@ -165,8 +191,8 @@ class RatingSection(Section):
     """Level of the steady response that gives K_v over speed, by the same windows."""
     least_dynamic_factor: q.LoadFactorK | None = None
     """Least K_v beside a run or a response: without errors of the wheels these have too little."""
-    viscosity_40_mm2_per_s: q.Viscosity
-    """Kinematic viscosity of the oil at 40 degrees Celsius."""
+    viscosity_40_mm2_per_s: q.Viscosity | None = None
+    """Kinematic viscosity of the oil at 40 degrees Celsius, where there is no section `[lubricant]`."""
     carrier_angles: q.CarrierAngles = 12
     """Angles of the input at which the static balance is taken."""
     gears: Entries[StrengthSection] = {}

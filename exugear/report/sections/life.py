@@ -20,8 +20,8 @@ from exugear.web.pieces import Cell
 
 WORDS = (
     "Loads of the gearbox file over its life, through the balance at rest of the variant and the contact of its teeth "
-    "by finite elements. Damage is Miner's sum: one is worn out. Lives of bearings are basic, without lubricant and "
-    "cleanliness; L10 is by ISO 281, L10r by ISO/TS 16281.",
+    "by finite elements. Damage is Miner's sum: one is worn out. Lives of bearings are basic but for L10m, which "
+    "has oil and cleanliness; L10 and L10m are by ISO 281, L10r is by ISO/TS 16281.",
     "σ_H is the largest contact stress, σ_F the largest stress at the tooth root, σ_H0 and σ_F0 the nominal ones of "
     "ISO 6336-2 and -3. S_H and S_F are the factors on stress at which the damage is one; the static ones stand for "
     "extreme loads. Outside the path: share of the load that edges of tips carry. + is the flank that faces the sense "
@@ -109,6 +109,9 @@ def _bearing_rows(data: xr.Dataset) -> list[dict[str, object]]:
         "equivalent load / kN": ("equivalent", 1e-3, ".4g"),
         "L10 / h": ("basic_hours", 1.0, ".3g"),
         "L10r / h": ("reference_hours", 1.0, ".3g"),
+        "L10m / h": ("modified_hours", 1.0, ".3g"),
+        "κ": ("viscosity_ratio", 1.0, ".2g"),
+        "least load / kN": ("minimum_load", 1e-3, ".3g"),
         "damage by L10": ("damage", 1.0, ".3g"),
         "damage by L10r": ("reference_damage", 1.0, ".3g"),
         "pressure / MPa": ("pressure", 1e-6, ".0f"),

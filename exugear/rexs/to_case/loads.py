@@ -356,11 +356,10 @@ def _strength(material: Component | None, gear: Component, both_ways: bool) -> B
     }
     entries |= _curves(material.text("heat_treated_material_type_iso_6336_2006"), limits["sigma_H_lim_MPa"] or 0.0)
     roughness = gear.quantity("arithmetic_average_roughness_flank", "mum")
-    entries["roughness_um"] = (
-        derived(tidy(round(6.0 * roughness, 6)), f"six times arithmetic_average_roughness_flank of {roughness:g} um")
-        if roughness
-        else assumed(USUAL_ROUGHNESS, "Rz; the file gives none")
-    )
+    if roughness:
+        entries["roughness_Ra_um"] = read(tidy(roughness), "arithmetic_average_roughness_flank")
+    else:
+        entries["roughness_Rz_um"] = assumed(USUAL_ROUGHNESS, "the file gives none")
     entries["root_factor"] = assumed(USUAL_ROOT_FACTOR, "Y_drelT Y_RrelT Y_X, near 1 by ISO 6336-3")
     if both_ways:
         entries["mean_stress_factor"] = assumed(BOTH_WAYS, "Y_M of ISO 6336-3, annex B, for teeth that bend both ways")

@@ -46,7 +46,7 @@ STRENGTH = {
     "sigma_H_lim_MPa": 1500.0,
     "sigma_F_lim_MPa": 500.0,
     "curve": "case_hardened",
-    "roughness_um": 4.8,
+    "roughness_Rz_um": 4.8,
     "root_factor": 1.0,
 }
 CATALOGUE = {
@@ -407,7 +407,7 @@ def test_the_verb_tells_what_limits_and_what_that_rests_on(tmp_path, first):
         shutil.copytree(first.folder / kept, tmp_path / "out" / kept)
     text = SPUR_CASE + "".join(
         f'\n[rating.gears.{gear}]\nsigma_H_lim_MPa = 1900.0\nsigma_F_lim_MPa = 500.0\ncurve = "case_hardened"\n'
-        "roughness_um = 4.8\nroot_factor = 1.0\n"
+        "roughness_Rz_um = 4.8\nroot_factor = 1.0\n"
         for gear in ("pinion", "wheel")
     )
     text += "\n[rating]\ndynamic_factor = 1.05\nviscosity_40_mm2_per_s = 320.0\n"

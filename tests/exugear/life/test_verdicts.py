@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from exugear.bearings.rolling.lubrication import fatigue_limit, life_factor, viscosity_at, viscosity_ratio
 from exugear.cli import app as cli
 from exugear.dynamic_factors.dynamic_factor import DynamicFactor, stated_factors
 from exugear.life.acting_loads import acting_loads
+from exugear.life.bearing_life import BearingLife, bearing_lives
 from exugear.life.gear_life import FlankLife, flank_lives, worst_of
 from exugear.life.life import checked_loads, rating_of
 from exugear.life.life_diagrams import damage_matrix, draw_life
@@ -24,6 +26,7 @@ from exugear.life.verdict import LARGEST_REACH, check_reach, failures, shortfall
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
+from exugear.model.sections.loads import StrengthSection
 from exugear.project import Project
 from exugear.report.writer import write_report
 from fe_ste.root_stress.mesh_cycle import MeshCycleStress
@@ -32,6 +35,7 @@ from ..spur_case import SPUR_CASE
 from .test_life import TABLE, content_of, hub_assembly
 
 GRC = Path("cases/grc750/gearbox.toml")
+TYPE = "cylindrical_roller"
 
 
 def hertzian(torque: float) -> MeshCycleStress:
@@ -133,7 +137,7 @@ def broken(tmp_path_factory) -> tuple[Path, Path]:
     (folder / "loads.csv").write_text(TABLE)
     text = SPUR_CASE + "".join(
         f"\n[rating.gears.{gear}]\nsigma_H_lim_MPa = {limit}\nsigma_F_lim_MPa = 500.0\n"
-        'curve = "case_hardened"\nroughness_um = 4.8\nroot_factor = 1.0\n'
+        'curve = "case_hardened"\nroughness_Rz_um = 4.8\nroot_factor = 1.0\n'
         for gear, limit in (("pinion", 300.0), ("wheel", 1500.0))
     )
     text += "\n[rating]\ndynamic_factor = 1.05\nviscosity_40_mm2_per_s = 320.0\n"
@@ -187,8 +191,6 @@ def test_no_stress_below_the_curve_is_called_a_failure():
 
 def test_bearing_lives_below_the_hours_asked_for_are_shortfalls_and_limit(tmp_path, broken):
     """L10 (25,000 h of 50,000 asked for) counts whether or not L10r is longer."""
-    from exugear.life.bearing_life import bearing_lives
-
     content = content_of("torque_N_m,speed_rpm,hours\n150,1500,1\n", tmp_path)
     content["bearings"]["bearing_1"]["catalogue"] |= {"dynamic_rating_kN": 25.0}
     gearbox = Gearbox.from_dict(content, str(tmp_path / "gearbox.toml"))
@@ -232,3 +234,71 @@ def test_what_a_kill_behind_the_last_file_left_is_removed(broken):
     project = Project.from_toml(case, out, Choice("rigid", "iso6336"))
     project.life()
     assert not partial.exists() and path.stat().st_mtime_ns == before
+
+
+OIL = {"viscosity_40_mm2_per_s": 220.0, "viscosity_100_mm2_per_s": 19.0, "temperature_C": 70.0, "cleanliness": "normal"}
+
+
+def rated_bearing(folder: Path, oil: dict[str, Any] | None) -> BearingLife:
+    """The bearing of the spur pair under one torque at one speed."""
+    content = content_of("torque_N_m,speed_rpm,hours\n150,1500,1\n", folder)
+    if oil is not None:
+        content["rating"].pop("viscosity_40_mm2_per_s")
+        content["lubricant"] = oil
+    gearbox = Gearbox.from_dict(content, str(folder / "gearbox.toml"))
+    project = Project(gearbox, folder, Choice("bushing", "iso6336"))
+    counted = checked_loads(gearbox)
+    acting = acting_loads(counted)
+    balance = static_balance(project.assembly(), counted.body, acting.torques, 1)
+    (one,) = bearing_lives(project.assembly().supports, counted.bearings, acting, balance, gearbox.case.lubricant)
+    return one
+
+
+def test_modified_lives_have_oil_and_cleanliness(tmp_path):
+    """At one load and speed L10m is a_ISO times L10; without what the oil is like there is none."""
+    one = rated_bearing(tmp_path, OIL)
+    pitch = 0.06
+    ratio = viscosity_ratio(viscosity_at(70.0, 220.0, 19.0), 1500.0 * math.pi / 30.0, pitch)
+    assert one.viscosity_ratio == pytest.approx(ratio, rel=0.02)
+    factor = life_factor(ratio, 0.5 * fatigue_limit(53e3, pitch, "cylindrical_roller") / one.equivalent, TYPE)
+    assert one.modified_hours == pytest.approx(factor * one.basic_hours, rel=0.03)
+    for key in ("viscosity_100_mm2_per_s", "temperature_C", "cleanliness"):
+        less = {name: value for name, value in OIL.items() if name != key}
+        assert math.isnan(rated_bearing(tmp_path, less).modified_hours)
+    assert rated_bearing(tmp_path, OIL | {"cleanliness": "severe"}).modified_hours == pytest.approx(
+        0.1 * one.basic_hours
+    )
+    assert one.minimum_load == pytest.approx(0.02 * 60e3)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda content: content["rating"].pop("viscosity_40_mm2_per_s"), "lubricant.viscosity_40_mm2_per_s: this key"),
+        (lambda content: content.update(lubricant=OIL), "viscosity_40_mm2_per_s: is given twice"),
+        (
+            lambda content: content["rating"]["gears"]["pinion"].update(roughness_um=4.8),
+            "roughness_um = 4.8: is called roughness_Rz_um now; of Ra it is roughness_Ra_um",
+        ),
+        (
+            lambda content: content["rating"]["gears"]["pinion"].update(roughness_Ra_um=0.8),
+            "one of roughness_Rz_um and roughness_Ra_um",
+        ),
+        (
+            lambda content: content.update(lubricant=OIL | {"viscosity_100_mm2_per_s": 300.0}),
+            "must be below viscosity_40_mm2_per_s",
+        ),
+    ],
+)
+def test_oil_and_roughness_are_told_once_and_by_their_names(tmp_path, change, message):
+    content = content_of(TABLE, tmp_path)
+    change(content)
+    with pytest.raises(CaseError, match=message):
+        checked_loads(Gearbox.from_dict(content, str(tmp_path / "gearbox.toml")))
+
+
+def test_ra_counts_as_a_sixth_of_rz(tmp_path):
+    content = content_of(TABLE, tmp_path)
+    section = {**content["rating"]["gears"]["pinion"]}
+    section.pop("roughness_Rz_um")
+    assert StrengthSection(**section, roughness_Ra_um=0.8).roughness == pytest.approx(4.8e-6)

@@ -18,7 +18,7 @@ STRENGTH = {
     "sigma_H_lim_MPa": 1500.0,
     "sigma_F_lim_MPa": 500.0,
     "curve": "case_hardened",
-    "roughness_um": 4.8,
+    "roughness_Rz_um": 4.8,
     "root_factor": 1.0,
 }
 
