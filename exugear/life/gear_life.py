@@ -40,6 +40,8 @@ from fe_ste.standards.service_life import (
 from fe_ste.standards.tooth_root import root_stress_factors
 from fe_ste.tools.arrays import Floats
 
+RZ_OF_RA = 6.0
+"""Rz over Ra (ISO 6336-2)."""
 PLAIN_TEST_GEAR = 2.0
 """Y_ST: stress correction of the test gears that sigma_F_lim belongs to (ISO 6336-3)."""
 
@@ -324,7 +326,7 @@ class _Case:
         other = (self.pair.gear, self.pair.pinion)[self.tooth.member].name
         mate = self.rating.gears.get(other, strength)
         softer = 1e6 * min(strength.sigma_H_lim_MPa, mate.sigma_H_lim_MPa)
-        roughness = 0.5 * (strength.roughness + mate.roughness)
+        roughness = 0.5 * (roughness_of(strength) + roughness_of(mate))
         still = lubricant_factor(softer, self.gearbox.viscosity_40)
         still *= roughness_factor(softer, roughness, reduced_radius(self.pair))
         moving = np.array([velocity_factor(softer, self._velocity(float(one))) for one in speed])
@@ -334,6 +336,11 @@ class _Case:
         """Pitch line velocity (m/s) at a speed (rad/s) of the loaded body."""
         gear = (self.pair.pinion, self.pair.gear)[self.tooth.member]
         return speed * self.tooth.cycles / len(self.tooth.meshes) * gear.reference_radius
+
+
+def roughness_of(strength: StrengthSection) -> float:
+    """Rz of a gear's flanks, m."""
+    return 1e-6 * (strength.roughness_Rz_um or RZ_OF_RA * (strength.roughness_Ra_um or 0.0))
 
 
 def life_curves(strength: StrengthSection) -> tuple[LifeCurve, LifeCurve]:

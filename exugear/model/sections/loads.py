@@ -119,10 +119,6 @@ class LoadsSection(Section):
         return self
 
 
-RZ_OF_RA = 6.0
-"""Rz over Ra, ISO 6336-2:2006, 12.3."""
-
-
 class StrengthSection(Section):
     """What a gear withstands, by ISO 6336:2006; numbers of its material from ISO 6336-5 or from tests."""
 
@@ -144,11 +140,6 @@ class StrengthSection(Section):
     """Product of the relative notch sensitivity, surface and size factors of the root (Y_drelT Y_RrelT Y_X)."""
     mean_stress_factor: q.StrengthFactor | None = None
     """Y_M of gears whose teeth bend both ways, such as planets and idlers; they need it."""
-
-    @property
-    def roughness(self) -> float:
-        """Rz, m."""
-        return 1e-6 * (self.roughness_Rz_um or RZ_OF_RA * (self.roughness_Ra_um or 0.0))
 
     @model_validator(mode="before")
     @classmethod

@@ -19,12 +19,6 @@ class LubricantSection(Section):
     """Kinematic viscosity at 40 degrees Celsius."""
     viscosity_100_mm2_per_s: q.Viscosity | None = None
     """Kinematic viscosity at 100 degrees Celsius; modified lives of bearings need it."""
-    density_15_kg_per_m3: q.OilDensity | None = None
-    """Density at 15 degrees Celsius."""
-    kind: Literal["mineral", "polyalphaolefin", "polyglycol"] = "mineral"
-    """Base of the oil."""
-    supply: Literal["bath", "injection"] = "bath"
-    """How it comes to teeth and bearings."""
     temperature_C: q.OilTemperature | None = None
     """Of the oil in service; modified lives of bearings need it."""
     cleanliness: Cleanliness | None = None

@@ -17,7 +17,7 @@ from exugear.cli import app as cli
 from exugear.dynamic_factors.dynamic_factor import DynamicFactor, stated_factors
 from exugear.life.acting_loads import acting_loads
 from exugear.life.bearing_life import BearingLife, bearing_lives
-from exugear.life.gear_life import FlankLife, flank_lives, worst_of
+from exugear.life.gear_life import FlankLife, flank_lives, roughness_of, worst_of
 from exugear.life.life import checked_loads, rating_of
 from exugear.life.life_diagrams import damage_matrix, draw_life
 from exugear.life.life_file import INFINITE, limits, read_life, summary
@@ -301,4 +301,4 @@ def test_ra_counts_as_a_sixth_of_rz(tmp_path):
     content = content_of(TABLE, tmp_path)
     section = {**content["rating"]["gears"]["pinion"]}
     section.pop("roughness_Rz_um")
-    assert StrengthSection(**section, roughness_Ra_um=0.8).roughness == pytest.approx(4.8e-6)
+    assert roughness_of(StrengthSection(**section, roughness_Ra_um=0.8)) == pytest.approx(4.8e-6)

@@ -23,7 +23,7 @@ from exugear.dynamics.bearing_duties import bearing_duties
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import stiffness_matrix
-from exugear.model.sections import bodies, case, connections, entries, gears, loads
+from exugear.model.sections import bodies, case, connections, entries, gears, loads, lubricant
 from exugear.model.sections.entries import Section
 from exugear.results.folder import keep_case
 from exugear.tooth_mesh.tables import wanted_table
@@ -31,7 +31,7 @@ from exugear.tooth_mesh.tables import wanted_table
 from .. import gear_trains
 from ..case_mutations import bases, toml_text
 
-ELSEWHERE = {"CaseFile.labels", "CaseFile.operation", "CaseFile.loads", "CaseFile.rating"}
+ELSEWHERE = {f"CaseFile.{table}" for table in ("labels", "operation", "loads", "rating", "lubricant")}
 """Keys of pages and of a life, whose computation takes too long here: another test looks for them in the program."""
 FOR_PEOPLE = {"LoadCaseSection.description", "BearingSection.designation", "CatalogueSection.designation"}
 """Keys that stand in the file and its copy in the results for people to read."""
@@ -40,6 +40,8 @@ FOR_PEOPLE = {"LoadCaseSection.description", "BearingSection.designation", "Cata
 LIFE_SECTIONS = (
     loads.LoadsSection,
     loads.SourceSection,
+    loads.WindSection,
+    lubricant.LubricantSection,
     loads.RatingSection,
     loads.StrengthSection,
     case.OperationSection,
