@@ -265,9 +265,8 @@ def test_modified_lives_have_oil_and_cleanliness(tmp_path):
     for key in ("viscosity_100_mm2_per_s", "temperature_C", "cleanliness"):
         less = {name: value for name, value in OIL.items() if name != key}
         assert math.isnan(rated_bearing(tmp_path, less).modified_hours)
-    assert rated_bearing(tmp_path, OIL | {"cleanliness": "severe"}).modified_hours == pytest.approx(
-        0.1 * one.basic_hours
-    )
+    dirty = rated_bearing(tmp_path, OIL | {"cleanliness": "severe"})
+    assert dirty.modified_hours == pytest.approx(0.1 * dirty.basic_hours)
     assert one.minimum_load == pytest.approx(0.02 * 60e3)
 
 
