@@ -192,7 +192,8 @@ def test_no_stress_below_the_curve_is_called_a_failure():
 def test_bearing_lives_below_the_hours_asked_for_are_shortfalls_and_limit(tmp_path, broken):
     """L10 (25,000 h of 50,000 asked for) counts whether or not L10r is longer."""
     content = content_of("torque_N_m,speed_rpm,hours\n150,1500,1\n", tmp_path)
-    content["bearings"]["bearing_1"]["catalogue"] |= {"dynamic_rating_kN": 25.0}
+    section = content["bearings"]["bearing_1"]
+    section["catalogue"] = {**section["catalogue"], "dynamic_rating_kN": 25.0}
     gearbox = Gearbox.from_dict(content, str(tmp_path / "gearbox.toml"))
     project = Project(gearbox, tmp_path, Choice("bushing", "iso6336"))
     counted = checked_loads(gearbox)
