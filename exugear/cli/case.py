@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from exugear.cli.console import note
+from exugear.cli.console import counted, note
 from exugear.cli.errors import BadInputError, model_errors
 from exugear.cli.options import Variant
 
@@ -33,8 +33,8 @@ def read_gearbox(case: Path, files_below: Path | None = None, scripts: bool = Fa
         check_parts(gearbox)
     except CaseError as error:
         raise BadInputError(error) from error
-    for line in remarks(gearbox) if tell else ():
-        note(f"Warning: {line}", style="yellow")
+    for line in counted([f"Warning: {line}" for line in remarks(gearbox)]) if tell else ():
+        note(line, style="yellow")
     return gearbox
 
 

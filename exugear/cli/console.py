@@ -30,6 +30,8 @@ from rich.text import Text
 
 LONGEST_LINE = 400
 """Letters of a line of a message; of a longer one the middle is left out, for file and remedy stand at its ends."""
+MOST_LINES = 25
+"""Lines of a message."""
 _TURNS = frozenset("\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
 """Characters that turn the direction of writing and so can show a text that is not there."""
 results = Console()
@@ -86,9 +88,24 @@ def say_what_is_logged() -> None:
 
 
 def note(message: str, style: str = "") -> None:
-    """Say something that is no result, unwrapped, so that paths in it can be copied; its lines stay lines."""
-    lines = [shortened(plain(line)) for line in message.split("\n")]
+    """Say something that is no result, unwrapped, so that paths in it can be copied; its lines stay lines.
+
+    Of more than `MOST_LINES` the rest is counted.
+    """
+    lines = [shortened(plain(line)) for line in counted(message.split("\n"))]
     messages.print(Text("\n".join(lines), style=style), soft_wrap=True)
+
+
+def counted(lines: list[str]) -> list[str]:
+    """Return what is shown of lines: all, or as many as leave one to say how many more there are.
+
+    Examples
+    --------
+    >>> shown = counted([f"position {n}" for n in range(50)])
+    >>> len(shown), shown[-1]
+    (25, 'and 26 more')
+    """
+    return lines if len(lines) <= MOST_LINES else [*lines[: MOST_LINES - 1], f"and {len(lines) - MOST_LINES + 1} more"]
 
 
 class _Description(ProgressColumn):

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ValidationError
 from exugear.model.named_files import LARGEST_CASE, NamedFileError, check_regular
 from exugear.model.sections.case import CaseFile
 
-SHOWN_FAULTS = 100
+SHOWN_FAULTS = 24
 """Most faults that one message shows; the error has all."""
 LONGEST_FAULT = 280
 """Characters of a fault after the name of the file."""

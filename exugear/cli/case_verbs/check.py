@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from exugear.cli.case import read_gearbox, steady_lack
-from exugear.cli.console import note, print_json, print_table, say
+from exugear.cli.console import counted, note, print_json, print_table, say
 from exugear.cli.errors import BadInputError, FailedError, exit_codes, model_errors
 from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption
 
@@ -61,8 +61,8 @@ def check(case: CaseArgument, files_below: FilesBelowOption = None, as_json: Jso
             for reason in dict.fromkeys(filter(None, steady.values())):
                 names = ", ".join(variant for variant in steady if steady[variant] == reason)
                 say(f"steady response ({names}): not possible, {reason}")
-            for line in warnings:
-                note(f"Warning: {line}", style="yellow")
+            for line in counted([f"Warning: {line}" for line in warnings]):
+                note(line, style="yellow")
         for one in loads:
             for doubt in one["doubts"]:
                 note(f"load_cases.{one['load_case']}: {doubt}", style="yellow")

@@ -118,7 +118,7 @@ class CatalogueSection(Section):
     type: BearingType
     """Type of the bearing."""
     designation: Text = ""
-    """Words for people; nothing is looked up."""
+    """Words for people; `check` compares bore and outer diameter with those of ISO 15 and 355."""
     bore_mm: q.LengthMm
     """Bore."""
     outer_diameter_mm: q.LengthMm
