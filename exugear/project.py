@@ -19,7 +19,7 @@ from exugear.bearings.rolling.rows import BearingError
 from exugear.bodies.elastic_body import ElasticBody
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly, VariantError
-from exugear.dynamics.bearing_duties import bearing_duties
+from exugear.dynamics.bearing_duties import bearing_duties, mesh_duties
 from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.modes import Modes, eigenmodes
 from exugear.dynamics.statics import BalanceError, static_state
@@ -36,6 +36,7 @@ from exugear.tooth_mesh.grid_axes import GridAxes, axes_reaching
 from exugear.tooth_mesh.law import MeshData
 from exugear.tooth_mesh.laws.registry import LAWS
 from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear.tooth_mesh.mesh_duty import MeshDuty
 from exugear.tooth_mesh.placement import MeshError
 from exugear.tooth_mesh.tables import TableRequest, missing_tables, requested_tables, tables_at_work
 from fe_ste.transmission_error.table import MeshTable
@@ -280,13 +281,21 @@ class Project:
 
         return steady_path(self.folder, self.choice, settings)
 
-    def bearings(self) -> tuple[BearingDuty, ...]:
-        """Find what catalogue bearings bear at the static load, written to `bearings_path`."""
+    def duties(self) -> tuple[tuple[BearingDuty, ...], tuple[MeshDuty, ...]]:
+        """Find what catalogue bearings and meshes bear at the static load, written to `bearings_path`."""
         assembly = self.assembly()
-        duties = bearing_duties(assembly)
+        duties, meshes = bearing_duties(assembly), mesh_duties(assembly)
         self.keep_case()
-        write_duties(self.bearings_path, duties, input_hash(assembly))
-        return duties
+        write_duties(self.bearings_path, duties, meshes, input_hash(assembly))
+        return duties, meshes
+
+    def bearings(self) -> tuple[BearingDuty, ...]:
+        """Find what catalogue bearings bear at the static load: see `duties`."""
+        return self.duties()[0]
+
+    def meshes(self) -> tuple[MeshDuty, ...]:
+        """Find how gears stand at the static load, and how evenly their teeth bear: see `duties`."""
+        return self.duties()[1]
 
     def life_tables(self) -> list[TableRequest]:
         """List the tables that a life needs, and find those that are there: of all pairs that get one."""

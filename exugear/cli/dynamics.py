@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
 from exugear.cli.console import note, progress_bar
-from exugear.cli.errors import BadInputError, FailedError, model_errors
+from exugear.cli.errors import BadInputError, FailedError, interruption, model_errors
 from exugear.cli.options import Variant
 
 if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
+
     from exugear.bodies.elastic_body import ElasticBody
     from exugear.dynamics.modes import Modes
     from exugear.project import Project
@@ -36,12 +40,35 @@ def reduce_elastic_bodies(project: Project) -> dict[str, ElasticBody]:
         return bodies
 
 
+@contextmanager
+def contacts_shown(bar: Progress | None = None, task: TaskID | None = None) -> Iterator[None]:
+    """Tell of contact that is solved where gears stand: in the words of a bar that is there, else by one of its own."""
+    from fe_ste.transmission_error.known_contacts import contacts_told
+
+    with ExitStack() as shown:
+        own: list[tuple[Progress, TaskID]] = []
+
+        def solved(done: int, of: int) -> None:
+            interruption.check()
+            words = f"contact of teeth where gears stand: {done} of {of}"
+            if bar is not None and task is not None:
+                bar.update(task, description=words)
+                return
+            if not own:
+                mine = shown.enter_context(progress_bar())
+                own.append((mine, mine.add_task("", total=of)))
+            own[0][0].update(own[0][1], completed=done, total=of, description=words)
+
+        shown.enter_context(contacts_told(solved))
+        yield
+
+
 def compute_modes(project: Project) -> Modes:
     """Compute the eigenmodes and store them; elastic bodies come first."""
     from exugear.dynamics.modes import eigenmodes
 
     bodies = reduce_elastic_bodies(project)
-    with model_errors():
+    with model_errors(), contacts_shown():
         modes = eigenmodes(project.gearbox, project.choice, project.stiffness(), bodies)
     for name, body in modes.assembly.elastic_bodies.items():
         figures = body.reduced.summary

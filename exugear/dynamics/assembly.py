@@ -53,6 +53,7 @@ from exugear.model.parts import Bearing, Body
 from exugear.tooth_mesh.element import MeshElement
 from exugear.tooth_mesh.laws.forms import add_mesh_forces, add_mesh_jacobian, mesh_state
 from exugear.tooth_mesh.laws.packing import pack
+from exugear.tooth_mesh.static_contact import StaticContacts
 from fe_ste.tools.arrays import Floats
 
 
@@ -84,6 +85,7 @@ class Assembly:
     operating_points : of each support, None for those that are no catalogue bearings; empty where there are none
     connectors_at_rest : connectors of static states, in which all catalogue bearings follow their rows; None where
         they are those of motion
+    contacts : contact of meshes at the static misalignment, where it was solved
     planet_spread : largest change of stiffness that made bearings of equal planets equal, over that stiffness
     """
 
@@ -106,6 +108,7 @@ class Assembly:
     rows_stiffness: Floats
     operating_points: tuple[OperatingPoint | None, ...] = ()
     connectors_at_rest: ConnectorArrays | None = None
+    contacts: StaticContacts = StaticContacts()
     planet_spread: float = 0.0
 
     def __repr__(self) -> str:
@@ -160,6 +163,15 @@ class Assembly:
     def turning_arrays(self) -> TurningArrays:
         """Arrays of the same bodies."""
         return turning_arrays((self.elastic_slices[name].start, body) for name, body in self.turning.items())
+
+    def with_contacts(self, contacts: StaticContacts) -> Assembly:
+        """Let meshes resist deflection and misalignment by contacts that were solved."""
+        states = contacts.states
+        elements = tuple(
+            element.with_contact(states[element.mesh.name]) if element.mesh.name in states else element
+            for element in self.elements
+        )
+        return replace(self, elements=elements, meshes=pack(elements, self.coordinates), contacts=contacts)
 
     @cached_property
     def has_rows(self) -> bool:

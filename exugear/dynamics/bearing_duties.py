@@ -1,4 +1,4 @@
-"""What all catalogue bearings of a gearbox bear under its static load."""
+"""What all catalogue bearings and all meshes of a gearbox bear under its static load."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ from exugear.bearings.rolling.contact import equilibrium
 from exugear.bearings.rolling.rows import BearingOfRows
 from exugear.bearings.support_laws import catalogue_stiffness
 from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.operating_points import contact_places
 from exugear.dynamics.statics import static_state
 from exugear.model.parts import Bearing
+from exugear.tooth_mesh.mesh_duty import MeshDuty, with_contact
 from fe_ste.tools.arrays import Floats
 
 
@@ -71,3 +73,31 @@ def reaction_loads(assembly: Assembly) -> dict[str, Floats]:
     state = static_state(assembly)
     loads = state.assembly.bearing_loads(state.q, np.zeros_like(state.q))
     return dict(zip(assembly.connector_names, loads, strict=True))
+
+
+def mesh_duties(assembly: Assembly) -> tuple[MeshDuty, ...]:
+    """Find how the gears of all meshes stand under the static load, and how evenly their teeth bear there.
+
+    Each mesh has its own contact here, over more of the mesh cycle than its law needs.
+
+    Raises
+    ------
+    BalanceError
+        The static load cannot be held.
+    """
+    state = static_state(assembly)
+    places = contact_places(state.assembly, state.q)
+    duties = []
+    for element, (distance, misalignment), force in zip(
+        assembly.elements, state.assembly.gear_positions(state.q), state.mesh_force, strict=True
+    ):
+        mesh = element.mesh
+        duty = MeshDuty(
+            name=mesh.name,
+            force=float(force),
+            misalignment=float(misalignment),
+            opening=float(misalignment) * mesh.pair.face_width,
+            centre_distance_change=float(distance) - mesh.centre_distance,
+        )
+        duties.append(with_contact(duty, places.get(mesh.name), element.flank))
+    return tuple(duties)

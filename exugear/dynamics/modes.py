@@ -128,6 +128,7 @@ class Modes:
             "method_version": MODES,
             "housing_factor": assembly.housing_factor,
             "bearing_laws": assembly.bearing_laws,
+            "mesh_contact": assembly.contacts.in_words,
             "growth_rate": self.growth_rate,
             "beside_unsolved_states": ", ".join(beside_unsolved_states(assembly)),
         }

@@ -362,7 +362,8 @@ def _touching(
 ) -> tuple[Floats, MeshArrays | None]:
     """Begin where linear teeth would be, on the flanks that they press; these teeth, where they may part."""
     if not LAWS[assembly.mesh_law].loses_contact:
-        return start, None
+        curved = any(element.is_curved for element in assembly.elements)
+        return (solve(assembly, start, assembly.linear_meshes()) if curved else start), None
     teeth = assembly.linear_meshes()
     x = solve(assembly, start, teeth)
     q = to_coordinates(x)

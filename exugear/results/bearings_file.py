@@ -1,4 +1,4 @@
-"""The file of what bearings bear: JSON, units in the keys, with the hash of its input and its method's version."""
+"""The file of what bearings and meshes bear: JSON, units in the keys, hash of its input, version of its method."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 
 from exugear.bearings.duty import BearingDuty
 from exugear.model.versions import MODES
+from exugear.tooth_mesh.mesh_duty import MeshDuty
 from fe_ste.tools.files import FileError, read_text, write_file
 
 
@@ -38,6 +39,26 @@ def duty_summary(duty: BearingDuty) -> dict[str, Any]:
     }
 
 
+def mesh_summary(duty: MeshDuty) -> dict[str, Any]:
+    """Figures of a mesh by key; what no contact was solved for is None."""
+    return {
+        "mesh": duty.name,
+        "force_kN": 1e-3 * duty.force,
+        "misalignment_mrad": 1e3 * duty.misalignment,
+        "opening_um": 1e6 * duty.opening,
+        "centre_distance_change_um": 1e6 * duty.centre_distance_change,
+        "load_centre_mm": _finite(1e3 * duty.load_centre),
+        "K_Hbeta": _finite(duty.face_load_factor),
+        "contact_pressure_MPa": _finite(1e-6 * duty.pressure),
+        "remark": duty.remark,
+    }
+
+
+def duties_summary(duties: Iterable[BearingDuty], meshes: Iterable[MeshDuty]) -> dict[str, Any]:
+    """Figures of all bearings and of all meshes."""
+    return {"bearings": [*map(duty_summary, duties)], "meshes": [*map(mesh_summary, meshes)]}
+
+
 def read_duties(path: Path) -> dict[str, Any]:
     """Read what `write_duties` wrote.
 
@@ -55,17 +76,17 @@ def read_duties(path: Path) -> dict[str, Any]:
     raise FileError(f"{path}: was written by another version; run `exugear bearings` again")
 
 
-def _finite(life: float) -> float | None:
-    return life if math.isfinite(life) else None
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
-def write_duties(path: Path, duties: Iterable[BearingDuty], input_hash: str) -> Path:
-    """Write what bearings bear (atomically) and return the path."""
+def write_duties(path: Path, duties: Iterable[BearingDuty], meshes: Iterable[MeshDuty], input_hash: str) -> Path:
+    """Write what bearings and meshes bear (atomically) and return the path."""
     content = {
         "input_hash": input_hash,
         "method_version": MODES,
         "life": "basic: by ISO 281 and ISO/TS 16281 without lubricant and cleanliness; ribs and cages left out",
-        "bearings": [duty_summary(duty) for duty in duties],
+        **duties_summary(duties, meshes),
     }
     path.parent.mkdir(parents=True, exist_ok=True)
     write_file(path, (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())

@@ -113,6 +113,7 @@ def _attributes(response: SteadyResponse) -> dict[str, Any]:
         "method_version": STEADY,
         "housing_factor": assembly.housing_factor,
         "bearing_laws": assembly.bearing_laws,
+        "mesh_contact": assembly.contacts.in_words,
         "bearings_in_time": ", ".join(response.bearing_names),
         "growth_rate": response.growth_rate,
         "beside_unsolved_states": ", ".join(beside_unsolved_states(assembly)),

@@ -5,8 +5,9 @@ With the deflection d at mid-face and the misalignment g, both of the loaded fla
     e = d - zt (g - g0),   force F(e),   moment M = F0 zc + zt (F - F0) - kg (g - g0),
 
 which has a potential, U = U(e) + (zt - zc) F0 (g - g0) + kg (g - g0)^2 / 2: the generalized force of the mesh is
--F dd/dq + M dg/dq. The load centre zc and that of a load more, zt, are means over the mesh cycle, in the transverse
-plane of action from the middle of the common face towards +z.
+-F dd/dq + M dg/dq. Teeth yield otherwise where the axes stand apart, by sa (a - a0) for a centre distance a: the row of
+d has that in it, so that the load pushes between the axes as well. The load centre zc and that of a load more, zt, are
+means over the mesh cycle, in the transverse plane of action from the middle of the common face towards +z.
 """
 
 from __future__ import annotations
@@ -37,6 +38,8 @@ class ContactState:
         misalignment under constant load, m/rad.
     tilt_stiffness : float
         kg: how much the load's moment falls with the misalignment while the load stays, N m/rad.
+    centre_distance, deflection_by_distance : float
+        a0 (m), and sa: change of the deflection with the centre distance under constant load.
 
     Examples
     --------
@@ -52,6 +55,8 @@ class ContactState:
     load_centre: float
     tangent_load_centre: float
     tilt_stiffness: float
+    centre_distance: float = 0.0
+    deflection_by_distance: float = 0.0
 
     def seen_by(self, flank: int) -> ContactState:
         """Take the state from the axes of a table to those of a mesh with this flank, or back.

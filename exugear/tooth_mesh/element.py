@@ -28,7 +28,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -43,6 +43,7 @@ from exugear.tooth_mesh.placement import MeshError, loaded_flanks, position_rows
 from exugear.tooth_mesh.wheel_errors import wheel_errors
 from fe_ste.geometry.gears import Gear
 from fe_ste.tools.arrays import Floats
+from fe_ste.transmission_error.table import TableInput
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,7 @@ class MeshElement:
     errors : errors of gear 1 and gear 2 over a revolution of each from zero angle, m; empty for none
     offset : (3,) deflection (m), change of centre distance (m) and misalignment (rad) at zero coordinates
     table : for a law that follows a table; `stiffness` and `damping` are then what it has at the static load
+    computed_from : input of the pair's table where contact is to be solved at the static misalignment
     """
 
     mesh: Mesh
@@ -91,6 +93,31 @@ class MeshElement:
     errors: tuple[Floats, Floats]
     offset: Floats
     table: TableFlanks | None = None
+    computed_from: TableInput | None = None
+
+    def with_contact(self, contact: ContactState) -> MeshElement:
+        """Return the mesh with a contact that was solved, in the axes of its pair's table.
+
+        The mean of a curved law's stiffness is then that of the contact, the table's changes over the mesh cycle upon
+        it.
+        """
+        secant, tangent, load = self.stiffness, self.tangent, self.load
+        if self.is_curved:
+            secant = secant * (contact.force / contact.deflection / np.mean(secant))
+            tangent = tangent * (contact.tangent_stiffness / np.mean(tangent))
+            load = contact.force
+        slope, shift = np.array(_by_distance(contact, self)) - _by_distance(self.contact, self)
+        return replace(
+            self,
+            stiffness=secant,
+            tangent=tangent,
+            load=load,
+            contact=contact.seen_by(self.flank),
+            damping=self.damping_time * float(np.mean(tangent)),
+            deflection=self.deflection - slope * self.centre,
+            force=self.force - slope * self.centre,
+            offset=self.offset - np.array([shift, 0.0, 0.0]),
+        )
 
     @property
     def is_curved(self) -> bool:
@@ -163,53 +190,55 @@ def mesh_elements(
         flank, phase = flanks[mesh.name], phases[mesh.name]
         ends = (_node(mesh.pinion, mesh.pair.pinion, bodies, nodes), _node(mesh.gear, mesh.pair.gear, bodies, nodes))
         known = contact.get(mesh.name) if contact and flank == usual[mesh.name] else None
-        secant, tangent, load = _at_load(law, data, mesh, static[mesh.name], known)
+        secant, tangent, load = _at_load(law, data, mesh, static[mesh.name])
         deflection, force = law.rows(mesh, flank, ends, angles)
         centre, misalignment = position_rows(mesh, flank, ends)
         mesh_stiffness, factor = law.stiffness(mesh, secant, angles)
         mesh_tangent, _ = law.stiffness(mesh, tangent, angles)
         even = even_contact(mesh.pair, load, float(np.mean(secant)), float(np.mean(tangent)))
-        elements.append(
-            MeshElement(
-                mesh=mesh,
-                law=law,
-                flank=flank,
-                deflection=deflection,
-                force=force,
-                axis=_gear_axes(mesh, bodies),
-                cycles=flank * mesh.pair.pinion.teeth / (2.0 * math.pi),
-                phase=phase,
-                stiffness=mesh_stiffness,
-                tangent=mesh_tangent,
-                load=load,
-                contact=(even if known is None else known.seen_by(flank)) if law.tilts else None,
-                damping=time * float(np.mean(mesh_tangent)),
-                damping_time=time,
-                line_of_action=factor,
-                centre=centre,
-                misalignment=misalignment,
-                errors=wheel_errors(gearbox, mesh, flank, phase, orientation),
-                offset=_offset(mesh, displaced or {}, deflection, centre),
-                table=law.table_flanks(mesh, flank, ends, phase, data, time),
-            )
+        element = MeshElement(
+            mesh=mesh,
+            law=law,
+            flank=flank,
+            deflection=deflection,
+            force=force,
+            axis=_gear_axes(mesh, bodies),
+            cycles=flank * mesh.pair.pinion.teeth / (2.0 * math.pi),
+            phase=phase,
+            stiffness=mesh_stiffness,
+            tangent=mesh_tangent,
+            load=load,
+            contact=even if law.tilts else None,
+            damping=time * float(np.mean(mesh_tangent)),
+            damping_time=time,
+            line_of_action=factor,
+            centre=centre,
+            misalignment=misalignment,
+            errors=wheel_errors(gearbox, mesh, flank, phase, orientation),
+            offset=_offset(mesh, displaced or {}, deflection, centre),
+            table=law.table_flanks(mesh, flank, ends, phase, data, time),
+            computed_from=data.table if isinstance(data, MeshCurve) and flank == usual[mesh.name] else None,
         )
+        elements.append(element if known is None or not law.tilts else element.with_contact(known))
     return tuple(elements)
 
 
-def _at_load(
-    law: Law, data: MeshData, mesh: Mesh, static_force: float, contact: ContactState | None
-) -> tuple[Floats, Floats, float]:
+def _at_load(law: Law, data: MeshData, mesh: Mesh, static_force: float) -> tuple[Floats, Floats, float]:
     """Secant and tangent stiffness (n,) over the mesh cycle along the line of action, N/m, and their load, N."""
     secant, tangent = law.samples(data, mesh, static_force)
     load = abs(static_force) or (data.force if isinstance(data, MeshCurve) else 0.0)
-    if contact is not None and tangent is not secant:
-        secant = secant * (contact.force / contact.deflection / np.mean(secant))
-        tangent = tangent * (contact.tangent_stiffness / np.mean(tangent))
-        load = contact.force
     for values in (secant, tangent):
         if not (np.all(np.isfinite(values)) and np.all(values > 0.0)):
             raise MeshError(f"pair {mesh.pair.name}: mesh stiffness must be positive and finite")
     return secant, tangent, load
+
+
+def _by_distance(contact: ContactState | None, element: MeshElement) -> tuple[float, float]:
+    """How much teeth yield by the centre distance: its slope, and at zero coordinates (m)."""
+    if contact is None:
+        return 0.0, 0.0
+    apart = element.mesh.centre_distance + element.offset[1] - contact.centre_distance
+    return contact.deflection_by_distance, contact.deflection_by_distance * float(apart)
 
 
 def _offset(mesh: Mesh, displaced: Mapping[str, tuple[float, float]], deflection: Floats, centre: Floats) -> Floats:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar, Literal
 
@@ -15,6 +15,7 @@ from exugear.model.parts import Mesh
 from exugear.tooth_mesh.placement import line_of_action_row
 from fe_ste.tools.arrays import Floats
 from fe_ste.transmission_error.surface import SteSurface
+from fe_ste.transmission_error.table import TableInput
 
 Angles = Literal["reference", "operating"]
 
@@ -29,6 +30,8 @@ class MeshCurve:
         Load over deflection, and the slope of the load, at pmc = 0, 1/n, ..., N/m.
     force : float
         Load on the transverse line of action at which they are, N.
+    table : TableInput, optional
+        What they were computed from: contact at other loads and misalignments can be solved then.
 
     Examples
     --------
@@ -40,6 +43,7 @@ class MeshCurve:
     stiffness: Floats
     tangent: Floats
     force: float
+    table: TableInput | None = None
 
     def at(self, force: float) -> MeshCurve:
         """Return the same curve by its stiffness at another load (N); without any, at that of the table."""
@@ -47,7 +51,7 @@ class MeshCurve:
             return self
         exponent = self.tangent / self.stiffness
         stiffness = self.stiffness * (abs(force) / self.force) ** (1.0 - 1.0 / exponent)
-        return MeshCurve(stiffness, exponent * stiffness, abs(force))
+        return replace(self, stiffness=stiffness, tangent=exponent * stiffness, force=abs(force))
 
 
 MeshData = ArrayLike | MeshCurve | SteSurface

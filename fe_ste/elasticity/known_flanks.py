@@ -26,11 +26,9 @@ import numpy as np
 from fe_ste.elasticity.flank import TOOTH_REACH, FlankCompliance, flank_compliance
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.geometry.gears import Gear
+from fe_ste.tools.files import kept_folder
 from fe_ste.tools.sealed import read_sealed, write_sealed
 from fe_ste.tools.threads import one_dense_thread, side_by_side
-
-#: Environment variable: another folder for the files, or "off" for none.
-FOLDER_VARIABLE = "EXUGEAR_FLANKS"
 
 #: Flanks kept in memory, and bytes of files; of the default mesh each takes 5 MB.
 _IN_MEMORY = 16
@@ -149,17 +147,6 @@ def _path(key: str) -> Path | None:
     """File of a flank, or None where none is kept."""
     folder = kept_folder()
     return None if folder is None else folder / f"flank-{key}.npz"
-
-
-def kept_folder() -> Path | None:
-    """Folder of the files; None where none are kept."""
-    asked = os.environ.get(FOLDER_VARIABLE, "")
-    if asked:
-        return None if asked == "off" else Path(asked)
-    import platformdirs  # needed for a table only: not worth its time at each start
-
-    user = platformdirs.user_cache_path("exugear", appauthor=False)
-    return user / "flanks" if user.is_absolute() else None  # a user without a home has none
 
 
 def _read(path: Path, gear: Gear) -> FlankCompliance | None:

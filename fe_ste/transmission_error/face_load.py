@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-import xarray as xr
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def load_along_face(states: xr.Dataset) -> xr.DataArray:
@@ -36,6 +39,7 @@ def face_load_factor(states: xr.Dataset) -> xr.DataArray:
     Examples
     --------
     >>> import numpy as np
+    >>> import xarray as xr
     >>> load = xr.DataArray(np.array([[[1.0, 2.0, 3.0]]]), dims=("pmc", "tooth", "axial_position"))
     >>> float(face_load_factor(xr.Dataset({"line_load": load})))
     1.5

@@ -15,15 +15,16 @@ import os
 import threading
 import zipfile
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fe_ste.contact.kinematics import ContactError
-from fe_ste.elasticity.known_flanks import kept_folder
+from fe_ste.tools.files import kept_folder
 from fe_ste.tools.sealed import read_sealed, write_sealed
 from fe_ste.tools.threads import one_dense_thread, side_by_side
 from fe_ste.tools.versions import MEAN_CONTACT
@@ -35,13 +36,29 @@ _IN_MEMORY = 1000
 _FILES = 5000
 
 _log = logging.getLogger(__name__)
+_told: ContextVar[Callable[[int, int], None] | None] = ContextVar("_told", default=None)
 _memory: OrderedDict[str, MeanContact] = OrderedDict()
 _memory_lock = threading.Lock()
 
 
-def known_contacts(
-    wanted: Sequence[TableInput], progress: Callable[[int, int], None] | None = None
-) -> list[MeanContact | ContactError]:
+@contextmanager
+def contacts_told(progress: Callable[[int, int], None]) -> Iterator[None]:
+    """Let somebody hear of contacts that are solved inside the context, however deep they are asked for.
+
+    Parameters
+    ----------
+    progress : callable
+        Called with the number of contacts that are there, and of all that have to be solved. What it raises, such as
+        Ctrl-C, ends the work.
+    """
+    token = _told.set(progress)
+    try:
+        yield
+    finally:
+        _told.reset(token)
+
+
+def known_contacts(wanted: Sequence[TableInput]) -> list[MeanContact | ContactError]:
     """Return contacts as `fe_ste.transmission_error.mean_contact.mean_contact` does, each solved at most once.
 
     Files are kept where `fe_ste.elasticity.known_flanks.known_flanks` keeps its own; each is written when it is solved,
@@ -50,9 +67,6 @@ def known_contacts(
     Parameters
     ----------
     wanted : sequence of TableInput
-    progress : callable, optional
-        Called with the number of contacts that are there, and of all that had to be solved. What it raises, such as
-        Ctrl-C, ends the work.
 
     Returns
     -------
@@ -63,6 +77,7 @@ def known_contacts(
     asked = dict(zip(keys, wanted, strict=True))
     found: dict[str, MeanContact | ContactError] = {key: kept for key in asked if (kept := _known(key)) is not None}
     missing = [key for key in asked if key not in found]
+    progress = _told.get()
 
     def solve(key: str) -> MeanContact | ContactError:
         try:

@@ -1,17 +1,18 @@
 """Contact of a pair about the state that it stands in: means over the mesh cycle, and their slopes by misalignment.
 
 A table over load, centre distance and misalignment takes thousands of states. What shafts and bearings need to know
-about teeth at rest takes ten: some positions of the mesh cycle under two misalignments on either side of the real one.
-Between these all is linear. They stand on a lattice whose steps are small against what teeth yield, so that all states
-nearby share one contact: those of equal planets, of a later step of the same search, of a gearbox that varies a little.
+about teeth at rest takes fifteen: some positions of the mesh cycle under two misalignments on either side of the real
+one, and at a centre distance beside it. Between these all is linear. They stand on a lattice whose steps are small
+against what teeth yield, so that all states nearby share one contact: those of equal planets, of a later step of the
+same search, of a gearbox that varies a little.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,6 +27,9 @@ from fe_ste.transmission_error.states import StateAxes
 from fe_ste.transmission_error.table import TableInput
 from fe_ste.transmission_error.transmission_error import solve_positions
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 POSITIONS = 5
 """Positions of the mesh cycle: twice as many move the misalignment of a gearbox in balance by 0.4 %."""
 FORCE_STEP = 0.02
@@ -34,6 +38,8 @@ OPENING_STEP = 0.05
 """Step of the lattice in misalignment: how far it opens the gap over the face, as a part of what teeth yield."""
 DISTANCE_STEP = 5e-3
 """Step of the lattice in centre distance, in normal modules."""
+DISTANCE_CHANGE = 0.02
+"""Change of the centre distance, in normal modules, over which the slope by it is taken: towards more backlash."""
 YIELDING = 14e9
 """Force per face width and deflection, Pa, of usual teeth (c' of ISO 6336-1): it sets steps, no result."""
 _SHARED_PAIRS = 8
@@ -43,7 +49,7 @@ _SHARED_PAIRS = 8
 class MeanContact:
     """Contact of a pair over its mesh cycle under one force, at two misalignments.
 
-    Lengths and forces are along the transverse line of action. Each array is over the misalignments.
+    Lengths and forces are along the transverse line of action. Arrays are over the misalignments.
 
     Attributes
     ----------
@@ -61,6 +67,8 @@ class MeanContact:
         Axial position of the resultant, m from the middle of the common face; mean under the constant force.
     tangent_load_centre : ndarray (2,)
         That of a little more force, m: derivative of the deflection by the misalignment.
+    deflection_by_distance : float
+        Slope of the deflection by the centre distance under constant force, between both misalignments.
     face_load_factor : ndarray (2,)
         K_Hbeta: highest over mean line load along the face, see `fe_ste.transmission_error.face_load`.
     max_pressure, edge_pressure : ndarray (2,)
@@ -78,6 +86,7 @@ class MeanContact:
     stiffness: Floats
     load_centre: Floats
     tangent_load_centre: Floats
+    deflection_by_distance: float
     face_load_factor: Floats
     max_pressure: Floats
     edge_pressure: Floats
@@ -100,7 +109,7 @@ class MeanContact:
         Examples
         --------
         >>> two = np.array([0.0, 1.0])
-        >>> contact = MeanContact(1.0, 1.0, 1e-5 * two, *[two] * 9)
+        >>> contact = MeanContact(1.0, 1.0, 1e-5 * two, *[two] * 10)
         >>> float(contact.at(contact.load_centre, 5e-6))
         0.5
         """
@@ -165,15 +174,13 @@ def _rounded(value: float) -> float:
     return float(f"{value:.12g}")
 
 
-def mean_contact(wanted: TableInput, progress: Callable[[int, int], None] | None = None) -> MeanContact:
+def mean_contact(wanted: TableInput) -> MeanContact:
     """Solve the contact of a pair at two misalignments.
 
     Parameters
     ----------
     wanted : TableInput
         With one torque, one centre distance and two misalignments, as `contact_input` gives it.
-    progress : callable, optional
-        Called with the number of solved states and of all.
 
     Raises
     ------
@@ -184,12 +191,11 @@ def mean_contact(wanted: TableInput, progress: Callable[[int, int], None] | None
     compliance = _compliance(pair, wanted.mesh, wanted.contact)
     compliance = compliance.with_modifications(wanted.pinion_modification, wanted.gear_modification)
     axes = StateAxes.checked(pair, torque, wanted.positions, distance, wanted.misalignment)
-    total = math.prod(axes.shape)
-    tell = None if progress is None else lambda solved: progress(solved, total)
-    data = solve_positions(compliance, axes, range(wanted.positions), tell).dataset(axes)
-    data = data.isel(torque=0, centre_distance=0)
-    if not bool(data["converged"].all()):
-        raise ContactError(f"pair {pair.name}: {str(data.attrs['failures']).splitlines()[0]}")
+    change = DISTANCE_CHANGE * pair.pinion.normal_module * (-1.0 if pair.gear.internal else 1.0)
+    beside = replace(
+        axes, centre_distance=axes.centre_distance + change, misalignment=axes.misalignment.mean(keepdims=True)
+    )
+    data, other = _cycle(compliance, axes), _cycle(compliance, beside)
     mean, largest = data.mean("pmc"), data.max("pmc")
     return MeanContact(
         force=torque / pair.pinion.base_radius,
@@ -199,12 +205,21 @@ def mean_contact(wanted: TableInput, progress: Callable[[int, int], None] | None
         stiffness=1.0 / (1.0 / data["tangent_stiffness"]).mean("pmc").to_numpy(),
         load_centre=mean["load_centre"].to_numpy(),
         tangent_load_centre=mean["tangent_load_centre"].to_numpy(),
+        deflection_by_distance=(float(other["ste"].mean()) - float(mean["ste"].mean())) / change,
         face_load_factor=face_load_factor(data).to_numpy(),
         max_pressure=largest["max_pressure"].to_numpy(),
         edge_pressure=largest["edge_pressure"].to_numpy(),
         axial=data["axial_position"].to_numpy(),
         line_load=load_along_face(data).to_numpy(),
     )
+
+
+def _cycle(compliance: PairCompliance, axes: StateAxes) -> xr.Dataset:
+    """States over the mesh cycle, at one torque and one centre distance."""
+    data = solve_positions(compliance, axes, range(axes.positions)).dataset(axes)
+    if not bool(data["converged"].all()):
+        raise ContactError(f"pair {compliance.pair.name}: {str(data.attrs['failures']).splitlines()[0]}")
+    return data.isel(torque=0, centre_distance=0)
 
 
 @lru_cache(maxsize=_SHARED_PAIRS)

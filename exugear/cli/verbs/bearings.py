@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from exugear.cli.case import begin_results, open_project
 from exugear.cli.console import note, print_json, print_table, say
-from exugear.cli.dynamics import reduce_elastic_bodies
+from exugear.cli.dynamics import contacts_shown, reduce_elastic_bodies
 from exugear.cli.errors import BadInputError, exit_codes, model_errors
 from exugear.cli.options import (
+    USUAL_LAW,
     CaseArgument,
     FilesBelowOption,
     InertiasOption,
     JsonOption,
     LawOption,
-    MeshLaw,
     OutOption,
     ScriptsOption,
     Variant,
@@ -24,14 +25,13 @@ from exugear.cli.tables import compute_missing_tables
 
 if TYPE_CHECKING:
     from exugear.bearings.duty import BearingDuty
-
-LAW_WITHOUT_TABLES = MeshLaw("iso6336")
+    from exugear.tooth_mesh.mesh_duty import MeshDuty
 
 
 def bearings(
     case: CaseArgument,
     variant: VariantOption = Variant.bushing,
-    mesh_law: LawOption = LAW_WITHOUT_TABLES,
+    mesh_law: LawOption = USUAL_LAW,
     inertias: InertiasOption = None,
     out: OutOption = None,
     files_below: FilesBelowOption = None,
@@ -40,11 +40,13 @@ def bearings(
 ) -> None:
     """Tell load, stiffness, contact pressure and life of each catalogue bearing under the static load.
 
-    How teeth push each other hardly matters here: the law of ISO 6336 needs no tables.
+    Told as well: how the gears of each mesh stand there, and how evenly their teeth bear. Teeth resist misalignment by
+    the contact of finite elements, and so share the load among the bearings; the law iso6336 needs no tables and lets
+    them bear evenly. Tables that are missing or do not fit the case are computed first.
     """
     with exit_codes():
         from exugear.model.choice import Choice
-        from exugear.results.bearings_file import duty_summary
+        from exugear.results.bearings_file import duties_summary
 
         if variant == Variant.rigid:
             raise BadInputError("--variant rigid: has ideal joints in place of bearings; use bushing or flexible")
@@ -54,16 +56,17 @@ def bearings(
         begin_results(project)
         compute_missing_tables(project)
         reduce_elastic_bodies(project)
-        with model_errors():
-            duties = project.bearings()
+        with model_errors(), contacts_shown():
+            duties, meshes = project.duties()
         path = project.bearings_path
         if as_json:
             choice = {"variant": variant.value, "mesh_law": mesh_law.value, "inertias": project.choice.inertias}
-            print_json({"case": str(case), **choice, "bearings": [*map(duty_summary, duties)], "file": str(path)})
+            print_json({"case": str(case), **choice, **duties_summary(duties, meshes), "file": str(path)})
             return
         title = f"Bearings under the static load, {variant.value}"
         print_table(title, [_load_row(duty) for duty in duties])
         print_table("Contact, ratings, basic rating life", [*map(_life_row, duties)])
+        print_table("Meshes", [*map(_mesh_row, meshes)])
         if any(duty.ratings.estimated for duty in duties):
             say("* rating estimated; dynamic_rating_kN and static_rating_kN of the file replace it")
         say("Lives are basic: lubricant and cleanliness are left out, and so are ribs")
@@ -71,6 +74,9 @@ def bearings(
         for duty in duties:
             for remark in duty.remarks:
                 note(f"bearings.{duty.name}: {remark}", style="yellow")
+        for mesh in meshes:
+            if mesh.remark:
+                note(f"meshes.{mesh.name}: {mesh.remark}", style="yellow")
 
 
 def _load_row(duty: BearingDuty) -> dict[str, str]:
@@ -95,4 +101,19 @@ def _life_row(duty: BearingDuty) -> dict[str, str]:
         "C_0r\nkN": f"{1e-3 * duty.ratings.static:.4g}{sign}",
         "L10\nMrev": f"{duty.basic_life:.3g}",
         "L10r\nMrev": f"{duty.reference_life:.3g}",
+    }
+
+
+def _mesh_row(duty: MeshDuty) -> dict[str, str]:
+    def shown(value: float, form: str) -> str:
+        return "-" if math.isnan(value) else format(value, form)
+
+    return {
+        "mesh": duty.name,
+        "force\nkN": f"{1e-3 * duty.force:.4g}",
+        "misaligned\nmrad": f"{1e3 * duty.misalignment:.3f}",
+        "opens +z\nµm": f"{1e6 * duty.opening:.1f}",
+        "load centre\nmm": shown(1e3 * duty.load_centre, ".1f"),
+        "K_Hbeta": shown(duty.face_load_factor, ".2f"),
+        "pressure\nMPa": shown(1e-6 * duty.pressure, ".0f"),
     }

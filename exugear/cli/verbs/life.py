@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from exugear.cli.case import make_results_folder, open_project
 from exugear.cli.console import note, print_json, print_table, progress_bar, say
-from exugear.cli.dynamics import reduce_elastic_bodies
+from exugear.cli.dynamics import contacts_shown, reduce_elastic_bodies
 from exugear.cli.errors import FailedError, exit_codes, interruption, model_errors
 from exugear.cli.load_files import files_bar
 from exugear.cli.options import (
@@ -97,7 +97,7 @@ def _rate(project: Project, counted: CountedLoads) -> xr.Dataset:
             interruption.check()
             bar.update(task, completed=done, total=total, description=f"{project.choice.variant}: static balance")
 
-        with model_errors():
+        with model_errors(), contacts_shown(bar, task):
             return project.life(begin, show, counted)
 
 

@@ -11,7 +11,7 @@ import typer
 
 from exugear.cli.case import begin_results, open_project
 from exugear.cli.console import note, print_json, progress_bar, say
-from exugear.cli.dynamics import reduce_elastic_bodies
+from exugear.cli.dynamics import contacts_shown, reduce_elastic_bodies
 from exugear.cli.errors import (
     BadInputError,
     FailedError,
@@ -211,7 +211,7 @@ def _simulate(project: Project, resume: bool, **options: Any) -> Run:
             bar.update(task, completed=at.simulated, total=at.total, description=text)
 
         try:
-            with model_errors():
+            with model_errors(), contacts_shown(bar, task):
                 return project.run(resume=resume, progress=show, **options)
         except LimitError as error:
             return error.run

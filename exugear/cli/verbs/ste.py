@@ -13,6 +13,7 @@ import typer
 
 from exugear.cli.case import make_results_folder, read_gearbox
 from exugear.cli.console import note, print_json, print_table, progress_bar, say
+from exugear.cli.dynamics import contacts_shown
 from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption
 from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption, OutOption
 from exugear.cli.tables import compute_tables, tell_of_tables
@@ -92,7 +93,33 @@ def ste(
             with _curves_beside({**beside, **tables}, folder, requests) as curves:
                 contacts = _draw_contacts(requests, tables, folder)
             pictures = curves.result() + contacts
+        _tell_misalignment(gearbox, folder)
         _tell_tables(case, folder, requests, tables, pictures, as_json)
+
+
+def _tell_misalignment(gearbox: Gearbox, folder: Path) -> None:
+    """Say how far the gears stand off straight, for which static tables are; nothing where bearings are unknown."""
+    from exugear.bearings.rolling.rows import BearingError
+    from exugear.bearings.supports import unsupported
+    from exugear.dynamics.statics import BalanceError, static_state
+    from exugear.model.choice import Choice
+    from exugear.project import Project
+    from exugear.tooth_mesh.placement import MeshError
+    from exugear.tooth_mesh.tables import missing_tables
+
+    if unsupported(gearbox, "bushing") or missing_tables(gearbox, folder):
+        return
+    try:
+        with contacts_shown():
+            state = static_state(Project(gearbox, folder, Choice("bushing")).assembly())
+    except (BalanceError, BearingError, MeshError):  # of which the verbs tell that need it
+        return
+    largest: dict[str, float] = {}
+    for element, misalignment in zip(state.assembly.elements, state.misalignment, strict=True):
+        pair = element.mesh.pair
+        largest[pair.name] = max(largest.get(pair.name, 0.0), abs(float(misalignment)) * pair.face_width)
+    words = ", ".join(f"{name} {1e6 * opening:.1f} um" for name, opening in largest.items())
+    note(f"Under the static load on bearings gaps open over the face by up to: {words} (exugear bearings tells more)")
 
 
 def _requested_tables(

@@ -12,7 +12,7 @@ import typer
 
 from exugear.cli.case import begin_results, open_project, steady_lack
 from exugear.cli.console import note, print_json, print_table, progress_bar, say
-from exugear.cli.dynamics import reduce_elastic_bodies
+from exugear.cli.dynamics import contacts_shown, reduce_elastic_bodies
 from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption, model_errors
 from exugear.cli.options import (
     USUAL_LAW,
@@ -134,7 +134,7 @@ def _respond(project: Project, settings: SteadySettings) -> xr.Dataset:
             interruption.check()
             bar.update(task, completed=done, total=total, description=f"{project.choice.variant}: steady response")
 
-        with model_errors():
+        with model_errors(), contacts_shown(bar, task):
             return project.steady(settings, show)
 
 

@@ -13,7 +13,7 @@ from exugear.bearings.duty import BearingDuty
 from exugear.bearings.rolling.rows import BearingError
 from exugear.bearings.supports import ON_BEARINGS
 from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.bearing_duties import bearing_duties
+from exugear.dynamics.bearing_duties import bearing_duties, mesh_duties
 from exugear.dynamics.statics import BalanceError
 from exugear.findings.context import choice_of, words_of
 from exugear.findings.groups import RunGroup
@@ -21,6 +21,7 @@ from exugear.findings.words import VARIANTS, figure_text
 from exugear.model.parts import RPM
 from exugear.report.parts.material import Material, Part, only_for
 from exugear.steady.peaks import line_name
+from exugear.tooth_mesh.mesh_duty import MeshDuty
 from exugear.web import pieces
 from exugear.web.pieces import Cell
 
@@ -199,7 +200,41 @@ def _duties(material: Material, assembly: Assembly) -> str:
         "so are ribs. A rating with a star is estimated from the rows. Linear bearings have the tangent at this load."
     )
     content = pieces.paragraph(words, "note") + table + (pieces.bullets(remarks) if remarks else "")
+    content += _meshes(material, assembly)
     return pieces.folded(f"Bearings at the static load: {name}", content)
+
+
+def _meshes(material: Material, assembly: Assembly) -> str:
+    """How gears stand under the static load, and how evenly their teeth bear; nothing where no contact was solved."""
+    if not assembly.contacts.contacts:
+        return ""
+    name = words_of(assembly.choice)
+    duties = mesh_duties(assembly)
+    rows = [_mesh_row(material, duty) for duty in duties]
+    words = (
+        "Where the gears stand under the static load, and how teeth bear there by the contact of finite elements: the "
+        "opening is that of the gap at the +z end over the common face, K_Hbeta the highest over the mean line load "
+        "along the face."
+    )
+    table = pieces.table(
+        rows, (), caption=f"Meshes at the static load, {name}", name=f"meshes-{'-'.join(name.split())}"
+    )
+    return pieces.paragraph(words, "note") + table
+
+
+def _mesh_row(material: Material, duty: MeshDuty) -> dict[str, object]:
+    def shown(value: float, form: str) -> str:
+        return "–" if math.isnan(value) else format(value, form)
+
+    return {
+        "mesh": material.words.of(duty.name),
+        "force / kN": f"{1e-3 * duty.force:.4g}",
+        "misaligned / mrad": f"{1e3 * duty.misalignment:.3f}",
+        "opens / µm": f"{1e6 * duty.opening:.1f}",
+        "load centre / mm": shown(1e3 * duty.load_centre, ".1f"),
+        "K_Hbeta": shown(duty.face_load_factor, ".2f"),
+        "pressure / MPa": shown(1e-6 * duty.pressure, ".0f"),
+    }
 
 
 def _duty_row(material: Material, duty: BearingDuty) -> dict[str, object]:

@@ -24,7 +24,7 @@ from exugear.model.gearbox import Gearbox
 from exugear.model.parts import Mesh
 from exugear.tooth_mesh.law import Law, MeshCurve, MeshData
 from exugear.tooth_mesh.placement import MeshError
-from exugear.tooth_mesh.tables import fitting_table, table_path
+from exugear.tooth_mesh.tables import fitting_table, table_path, wanted_table
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import kernel
 from fe_ste.transmission_error.gaps import GapError, complete_cycle
@@ -60,7 +60,8 @@ class LineOfAction(Law):
         if not self.curved:
             return stiffness
         tangent = np.asarray(point["tangent_stiffness"].to_numpy(), dtype=np.float64)
-        return MeshCurve(stiffness, tangent, float(point["line_of_action_force"].mean()))
+        computed_from = wanted_table(gearbox, pair, len(stiffness))
+        return MeshCurve(stiffness, tangent, float(point["line_of_action_force"].mean()), computed_from)
 
     def samples(self, data: MeshData, mesh: Mesh, static_force: float) -> tuple[Floats, Floats]:
         """Secant and tangent stiffness along the line of action, as `Law.samples`."""

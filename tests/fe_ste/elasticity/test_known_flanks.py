@@ -16,8 +16,9 @@ import pytest
 import fe_ste.elasticity.known_flanks
 from fe_ste.elasticity.flank import FlankCompliance, flank_compliance
 from fe_ste.elasticity.hexmesh import MeshSettings
-from fe_ste.elasticity.known_flanks import FOLDER_VARIABLE, forget_flanks, known_flanks
+from fe_ste.elasticity.known_flanks import forget_flanks, known_flanks
 from fe_ste.geometry.gears import Gear
+from fe_ste.tools.files import FOLDER_VARIABLE
 
 COARSE = MeshSettings(layers=3, flank=6, thickness=4, fillet=1, root=1, rim=3)
 HELICAL = Gear(
