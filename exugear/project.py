@@ -301,6 +301,17 @@ class Project:
         """List the tables that a life needs, and find those that are there: of all pairs that get one."""
         return self.requested_tables(grid=LAWS[self.choice.mesh_law].needs_axes)
 
+    def stress_tables(self, counted: CountedLoads) -> list[TableRequest]:
+        """List the tables that stresses of a life come from, and find those that are there.
+
+        Without axes of the file they go over load and misalignment around where the gears stand.
+        """
+        from exugear.life.stress_tables import stress_requests
+
+        if LAWS[self.choice.mesh_law].needs_axes:
+            return self.life_tables()
+        return stress_requests(self.assembly(), self.life_tables(), counted, self.folder)
+
     def checked_loads(self, progress: Callable[[int, int], None] | None = None) -> CountedLoads:
         """Read the loads of a life, and check all that is asked for before any work begins.
 
@@ -350,8 +361,8 @@ class Project:
         counted, assembly = counted or self.checked_loads(), self.assembly()
         if any(request.stored is None for request in self.life_tables()):
             self.tables(grid=LAWS[self.choice.mesh_law].needs_axes)
-        requests = self.life_tables()
-        tables = {request.name: request.stored.input_hash for request in requests if request.stored is not None}
+        requests = self.stress_tables(counted)
+        tables = {request.name: request.wanted.hash for request in requests}
         rating = rating_of(self.gearbox)
         dynamic = factors(assembly, rating, self.folder, counted.body)
         digest = life_hash(assembly, counted, tables, source_hash(assembly, rating, self.folder))
@@ -362,7 +373,10 @@ class Project:
             return kept
         self.keep_case()
         with time_noted(self.folder, f"life, {self.choice.variant}, {self.choice.mesh_law}"):
-            stresses = pair_stresses(requests, self.folder, begin)
+            for request in requests:
+                if request.stored is None:
+                    request.compute()
+            stresses = pair_stresses(self.stress_tables(counted), self.folder, begin)
             life = compute_life(assembly, counted, stresses, dynamic, digest, progress, angles)
             data = write_life(self.life_path, life, self.gearbox.name)
             angles.discard()

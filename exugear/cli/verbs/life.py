@@ -66,6 +66,9 @@ def life(
             requests = project.life_tables()
         compute_tables(requests)
         reduce_elastic_bodies(project)
+        with model_errors(), contacts_shown():
+            states = project.stress_tables(counted)
+        compute_tables(states)
         data = _rate(project, counted)
         picture = project.life_path.with_suffix(".png")
         draw_life(data, picture)
