@@ -24,7 +24,15 @@ def unsupported(gearbox: Gearbox, variant: str) -> str:
     if variant not in ON_BEARINGS:
         held = {joint.body for joint in gearbox.joints}
         missing = [b.name for b in gearbox.bodies() if not (b.fixed or b.spin_only or b.name in held)]
-        return f"no joint holds {', '.join(missing)}; add one under [joints]" if missing else ""
+        if missing:
+            return f"no joint holds {', '.join(missing)}; add one under [joints]"
+        sprung = list(gearbox.held_by_torsion)
+        if sprung:
+            return (
+                f"{', '.join(sprung)}: held against turning by the torsion of a bearing, which this variant does not "
+                f"have; take the variant bushing, or let the body stand (bodies.{sprung[0]}.fixed = true)"
+            )
+        return ""
     if gearbox.unknown_bearings:
         names = ", ".join(f"bearings.{name} ({text})" for name, text in gearbox.unknown_bearings.items())
         return f"only the designation is known of {names}; give each a [.catalogue] or a [.stiffness] table"

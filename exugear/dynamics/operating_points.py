@@ -173,7 +173,7 @@ def _balance(
     """Coordinates under the static load, of the train rolled to `about`, from a state that is near it."""
     load, meshes = assembly.gearbox.case.static_load, assembly.mean_meshes
     try:
-        return locked_equilibrium(assembly, load.torques_N_m, load.locked, meshes, about, near=near)
+        return locked_equilibrium(assembly, load.torques_N_m, assembly.gearbox.locked, meshes, about, near=near)
     except BalanceError as error:
         raise BalanceError(f"{error}; {_what_holds_one_way(laws, assembly.connector_names)}") from None
 

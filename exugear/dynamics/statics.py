@@ -290,8 +290,9 @@ def static_state(assembly: Assembly) -> StaticState:
     >>> bool((state.mesh_force > 0.0).all())
     True
     """
-    load, resting = assembly.gearbox.case.static_load, assembly.at_rest
-    return StaticState(resting, locked_equilibrium(resting, load.torques_N_m, load.locked, resting.mean_meshes))
+    gearbox, resting = assembly.gearbox, assembly.at_rest
+    torques = gearbox.case.static_load.torques_N_m
+    return StaticState(resting, locked_equilibrium(resting, torques, gearbox.locked, resting.mean_meshes))
 
 
 def beside_unsolved_states(assembly: Assembly) -> tuple[str, ...]:

@@ -107,6 +107,8 @@ def _of_run(run: VariantRun, figures: RunFigures) -> list[Verdict]:
     doubtful = verdict_of(run.attributes)
     if doubtful:
         verdicts.append(Verdict(False, f"the run is not to be trusted: {doubtful}"))
+    if run.attributes.get("bearing_doubt"):
+        verdicts.append(Verdict(False, str(run.attributes["bearing_doubt"])))
     if pulling > 0.0:
         verdicts.append(Verdict(False, f"teeth had to pull for {figure_text(pulling)} s: they would have parted"))
     if apart > 0.0:

@@ -264,7 +264,7 @@ def _at_rest(
     assembly: Assembly, body: str, torque: float, about: Floats, wrench: Floats | None, near: Floats | None
 ) -> Floats:
     """Coordinates at rest, (size,)."""
-    locked = assembly.gearbox.case.static_load.locked
+    locked = assembly.gearbox.locked
     try:
         return locked_equilibrium(assembly, {body: torque}, locked, assembly.mean_meshes, about, wrench, near)
     except BalanceError as error:

@@ -26,6 +26,8 @@ BURSTING_RIM_SPEED = 300.0
 """Rim speed that no wheel of steel survives, m/s: density times its square is 0.7 GPa, the yield strength
 of gear steels. The fastest turbo gears run at two thirds of it.
 """
+LEAST_SHARE = 0.25
+"""Share of the static load below which the straight line of a linear bearing leads a quarter off its rows."""
 INSTANTS = 2001
 """Instants at which a torque that changes is looked at, beside those of its own lines."""
 
@@ -56,6 +58,8 @@ class LoadSummary:
         Loaded flanks in the course of the load case: ``+``, ``-``, ``+-`` for both, ``0`` for none.
     reversed_flanks : tuple of str
         Mesh families with a loaded flank that is not the one of the static load, which their tables are of.
+    least_shares : mapping of mesh family to float
+        Smallest mesh force in the course of the load case over that of the static load; negative where it reverses.
     """
 
     name: str
@@ -70,6 +74,7 @@ class LoadSummary:
     mesh_forces: Mapping[str, float]
     flanks: Mapping[str, str]
     reversed_flanks: tuple[str, ...]
+    least_shares: Mapping[str, float]
 
     def __repr__(self) -> str:
         """Return one short line."""
@@ -159,6 +164,7 @@ def summarise_loads(
         mesh_forces={mesh.name: float(force) for mesh, force in zip(gearbox.meshes, forces[0], strict=True)},
         flanks=flanks,
         reversed_flanks=reversed_flanks,
+        least_shares=_least_shares(gearbox, forces),
     )
 
 
@@ -182,6 +188,33 @@ def doubts_about(loads: LoadSummary) -> tuple[str, ...]:
             f"at some {BURSTING_RIM_SPEED:g} m/s; a run stops there"
         )
     return tuple(doubts)
+
+
+def doubt_about_bearings(gearbox: Gearbox, loads: LoadSummary, variant: str) -> str:
+    """Say where linear bearings are led far from the static load that their law is of, and the remedy; empty if not.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> loads = summarise_loads(gearbox, gearbox.load_cases["reference"])
+    >>> doubt_about_bearings(gearbox, loads, "bushing")
+    ''
+    """
+    led = [
+        own
+        for own in gearbox.bearings
+        if own.catalogue is not None and own.catalogue.radial_load_kN is None and own.law == "stiffness"
+    ]
+    light = {family: share for family, share in loads.least_shares.items() if share < LEAST_SHARE}
+    if not led or not light or variant == "rigid":
+        return ""
+    turned = [family for family, share in light.items() if share < 0.0]
+    least = min(light.values())
+    how = f"reverses the load of {', '.join(turned)}" if turned else f"takes {', '.join(light)} to {least:.2g} of it"
+    return (
+        f"linear bearings are of the static load, and the load case {loads.name} {how}: "
+        'displacements and loads there want law = "iso16281" on the bearings'
+    )
 
 
 def rim_radii(gearbox: Gearbox) -> dict[str, float]:
@@ -295,3 +328,15 @@ def _flanks(gearbox: Gearbox, forces: Floats) -> tuple[dict[str, str], tuple[str
         if np.any(mesh_forces * np.sign(static[mesh.name]) < -least):
             turned.append(mesh.family)
     return {family: signs or "0" for family, signs in flanks.items()}, tuple(dict.fromkeys(turned))
+
+
+def _least_shares(gearbox: Gearbox, forces: Floats) -> dict[str, float]:
+    """Find the smallest force (times, meshes) of each family over that of the static load; unloaded ones have none."""
+    static = gearbox.train.static_mesh_forces()
+    largest = max(map(abs, static.values()), default=0.0)
+    found: dict[str, float] = {}
+    for m, mesh in enumerate(gearbox.meshes):
+        if abs(static[mesh.name]) > UNLOADED * largest:
+            share = float((forces[:, m] / static[mesh.name]).min())
+            found[mesh.family] = min(share, found.get(mesh.family, math.inf))
+    return found

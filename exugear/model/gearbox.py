@@ -30,6 +30,7 @@ from exugear.model.parts import (
 from exugear.model.reading import CaseError, parse_case, read_toml, readable, shortened
 from exugear.model.sections.case import CaseFile, SteSection, labels_in_use
 from exugear.model.sections.quantities import unusual_values
+from exugear.train.kinematics import Tie
 from exugear.train.train import Train
 from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.gears import Gear, GearPair
@@ -192,7 +193,8 @@ class Gearbox:
         lines = [f"{key} = {value:g}: {warning}" for key, value, warning in unusual_values(self.case)]
         for bearing in self.bearings:
             torsion = stiffness_matrix(bearing.stiffness)[5, 5]
-            if torsion and bearing.body in self.spinning and bearing.on not in self.spinning:
+            ends = (self.case.overall.input, self.case.overall.output)
+            if torsion and bearing.body in ends and bearing.on not in self.spinning:
                 key = f"bearings.{bearing.family}.stiffness"
                 lines.append(f"{key}: torsion {torsion:g} N m/rad holds {bearing.body} back, which turns")
         lines += gear_parts.margins_of_roots(self.gear_pairs.values())
@@ -344,13 +346,34 @@ class Gearbox:
         return Train(
             spins=self.spinning,
             meshes=self.meshes,
-            couplings=self.couplings,
+            couplings=(*self.couplings, *self.held_by_torsion.values()),
             input=self.case.overall.input,
             output=self.case.overall.output,
             torques=self.case.static_load.torques_N_m,
-            locked=self.case.static_load.locked,
+            locked=self.locked,
             fault=self.fault,
         )
+
+    @cached_property
+    def held_by_torsion(self) -> dict[str, Tie]:
+        """What holds bodies that can turn by torsion on what stands, such as a ring on a torque arm, by their names.
+
+        The train rolls without them. One that holds the input or the output of the train is no part of how it rolls.
+        """
+        ends = (self.case.overall.input, self.case.overall.output)
+        return {
+            own.body: Tie(own.on, own.body)
+            for own in self.bearings
+            if stiffness_matrix(own.stiffness)[5, 5]
+            and own.body in self.spinning
+            and own.body not in ends
+            and own.on not in self.spinning
+        }
+
+    @property
+    def locked(self) -> tuple[str, ...]:
+        """Bodies that hold the static load, less those that torsion holds."""
+        return tuple(name for name in self.case.static_load.locked if name not in self.held_by_torsion)
 
     @property
     def output_radius(self) -> float:

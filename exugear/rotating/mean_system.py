@@ -347,7 +347,8 @@ def _drive_and_load(assembly: Assembly) -> tuple[Floats, Floats]:
     What the file locks is what keeps the speed: its torque is whatever balances the others.
     """
     load, overall = assembly.gearbox.case.static_load, assembly.gearbox.case.overall
-    keeper = load.locked[0] if load.locked else overall.input
+    locked = assembly.gearbox.locked
+    keeper = locked[0] if locked else overall.input
     return assembly.torque_vector({keeper: 1.0}), assembly.torque_vector(load.torques_N_m)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.signals import BALANCE_TERMS, MESH_TIMES, POWERS, SignalLayout, signal_layout
 from exugear.dynamics.statics import accelerating_start
-from exugear.loads.summary import drive_rate, driven_start_speed, summarise_loads
+from exugear.loads.summary import doubt_about_bearings, drive_rate, driven_start_speed, summarise_loads
 from exugear.loads.torque_series import torque_series
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import LoadCase
@@ -59,7 +59,8 @@ def prepare_start(plan: RunPlan, resume: bool) -> RunStart:
     assembly, case = plan.assembly, plan.case
     gearbox = assembly.gearbox
     series = torque_series(gearbox, case)
-    judge = Judge(assembly, summarise_loads(gearbox, case, assembly.inertias, plan.duration, series))
+    summary = summarise_loads(gearbox, case, assembly.inertias, plan.duration, series)
+    judge = Judge(assembly, summary)
     layout = signal_layout(assembly)
     if resume:
         pieces = _pieces_to_resume(plan, layout)
@@ -68,7 +69,8 @@ def prepare_start(plan: RunPlan, resume: bool) -> RunStart:
     else:
         state = _first_state(assembly, case, series, layout, judge)
         (plan.directory / EARLIER_PARTIAL_NAME).unlink(missing_ok=True)
-        pieces = RunPieces(plan.partial_path, layout, plan.attributes())
+        doubt = doubt_about_bearings(gearbox, summary, assembly.variant)
+        pieces = RunPieces(plan.partial_path, layout, {**plan.attributes(), "bearing_doubt": doubt})
     return RunStart(_load_table(case, series, state.start_angle, gearbox), state, pieces, judge, resume)
 
 

@@ -101,8 +101,8 @@ class SettlingRun:
         u = system.static_at(speed) + motion[0].real + 2.0 * motion[1:].sum(axis=0).real
         q, v, _ = frame.state(0.0, speed, u, 2.0 * (1j * w * motion[1:]).sum(axis=0).real)
         self._torques = dict(assembly.gearbox.case.static_load.torques_N_m)
-        load = assembly.gearbox.case.static_load
-        self._keeper = load.locked[0] if load.locked else assembly.gearbox.case.overall.input
+        locked = assembly.gearbox.locked
+        self._keeper = locked[0] if locked else assembly.gearbox.case.overall.input
         self._torques[self._keeper] = self._torques.get(self._keeper, 0.0) + system.torque_at(speed)
         self._rolling = np.linalg.solve(
             frame.matrices(0.0)[0], assembly.rolling_velocity(np.zeros(assembly.size), frame.speeds)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -48,6 +49,14 @@ class CoupledBodies(Protocol):
     @property
     def second(self) -> str:
         """The other body."""
+
+
+@dataclass(frozen=True)
+class Tie:
+    """Two bodies that roll at one speed; a name that is no spin stands still."""
+
+    first: str
+    second: str
 
 
 def mesh_row(spins: Sequence[str], mesh: MeshedBodies) -> Floats:

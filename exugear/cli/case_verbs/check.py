@@ -244,7 +244,7 @@ def _bearing_row(summary: dict[str, Any]) -> dict[str, str]:
 
 def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
     """Sum up what each load case does to the rolling train; one that no run could take is bad input."""
-    from exugear.loads.summary import doubts_about, summarise_loads
+    from exugear.loads.summary import doubt_about_bearings, doubts_about, summarise_loads
     from exugear.model.parts import RPM
     from exugear.runs.extent import check_duration
     from exugear.runs.runup import BAND
@@ -269,7 +269,11 @@ def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
                     "fastest_rim_on": body,
                     "loaded_flanks": dict(loads.flanks),
                     "reversed_flanks": list(loads.reversed_flanks),
-                    "doubts": [*doubts_about(loads), *_beyond_band(loads.mesh_frequencies, BAND)],
+                    "doubts": [
+                        *doubts_about(loads),
+                        *filter(None, [doubt_about_bearings(gearbox, loads, "bushing")]),
+                        *_beyond_band(loads.mesh_frequencies, BAND),
+                    ],
                 }
             )
     return found

@@ -182,13 +182,14 @@ def _check_run_directory(directory: Path, resume: bool) -> None:
 
 
 def _tell_doubts(project: Project, duration: float | None) -> None:
-    """Say what looks like the wrong sign of a torque."""
-    from exugear.loads.summary import doubts_about, summarise_loads
+    """Say what looks like the wrong sign of a torque, or leads bearings far from the load that their law is of."""
+    from exugear.loads.summary import doubt_about_bearings, doubts_about, summarise_loads
 
     load_case = _load_case(project)
     with model_errors():
-        doubts = doubts_about(summarise_loads(project.gearbox, load_case, project.choice.inertias, duration))
-    for doubt in doubts:
+        loads = summarise_loads(project.gearbox, load_case, project.choice.inertias, duration)
+    of_bearings = doubt_about_bearings(project.gearbox, loads, project.choice.variant)
+    for doubt in (*doubts_about(loads), *([of_bearings] if of_bearings else [])):
         note(f"load_cases.{load_case.name}: {doubt}", style="yellow")
 
 
@@ -249,6 +250,7 @@ def _tell_run(case: Path, finished: Run, as_json: bool) -> None:
         **{key: float(attributes[key]) for key in EXPECTATIONS if key in attributes},
         "input_speed_rpm": float(data["input_speed"][-1]) / RPM,
         "energy_not_accounted_for": energy_residual(data),
+        "bearing_doubt": str(attributes.get("bearing_doubt", "")),
         "longest_pull_of_a_mesh_s": longest["pulling_time"],
         "longest_time_apart_s": longest["apart_time"],
         "longest_time_outside_table_s": outside,

@@ -14,7 +14,13 @@ from typer.testing import CliRunner
 from exugear.cli import app as cli
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.statics import accelerating_start
-from exugear.loads.summary import BURSTING_RIM_SPEED, LoadSummary, doubts_about, summarise_loads
+from exugear.loads.summary import (
+    BURSTING_RIM_SPEED,
+    LoadSummary,
+    doubt_about_bearings,
+    doubts_about,
+    summarise_loads,
+)
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import RPM
@@ -153,3 +159,25 @@ def test_planets_count_with_their_orbits(grc: Gearbox) -> None:
     found = summarise_loads(grc, grc.load_cases["rated"]).inertia
     assert found == pytest.approx(spins + orbits, rel=1e-9)
     assert orbits > 1e-3 * found
+
+
+@pytest.mark.parametrize(
+    ("torques", "said"),
+    [
+        ({"carrier": 240e3, "hss": -2945.1}, ""),
+        ({"carrier": 40e3, "hss": -490.0}, "takes sun_planet, ring_planet, intermediate, high_speed to 0.17 of it"),
+        ({"carrier": -240e3, "hss": 2945.1}, "reverses the load of sun_planet, ring_planet, intermediate, high_speed"),
+    ],
+)
+def test_a_load_case_far_from_the_static_load_asks_for_rows(grc, torques, said):
+    """Linear bearings are of the static load: below a quarter of it, or reversed, the remedy is named."""
+    varied = grc.varied({"load_cases.rated.torques_N_m": torques})
+    loads = summarise_loads(varied, varied.load_cases["rated"])
+    doubt = doubt_about_bearings(varied, loads, "bushing")
+    assert bool(doubt) == bool(said)
+    assert said in doubt
+    assert not doubt or 'law = "iso16281"' in doubt
+    assert doubt_about_bearings(varied, loads, "rigid") == ""
+    names = [name for name, one in grc.case.bearings.items() if one.catalogue and one.catalogue.radial_load_kN is None]
+    rows = varied.varied({f"bearings.{name}.law": "iso16281" for name in names})
+    assert doubt_about_bearings(rows, loads, "bushing") == ""
