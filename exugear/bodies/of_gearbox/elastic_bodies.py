@@ -18,7 +18,7 @@ from exugear.bodies.finite_elements.second_order import SolidError
 from exugear.bodies.finite_elements.shaft_sections import ShaftError, check_shaft
 from exugear.bodies.floating import load_or_reduce_floating, with_inertia
 from exugear.bodies.floating_body import FloatingBody
-from exugear.bodies.of_gearbox.shafts import TORQUE_SEAT, shaft_model, solid_of_shaft
+from exugear.bodies.of_gearbox.shafts import TORQUE_SEAT, shaft_model, shared_seats, solid_of_shaft
 from exugear.bodies.of_gearbox.solids import solid_body
 from exugear.bodies.reduced_body import ReducedBody, ReductionError, RigidInertia
 from exugear.bodies.reduction import with_rigid_inertia
@@ -76,8 +76,10 @@ def _elastic_body(gearbox: Gearbox, body: Body, folder: Path | None) -> ElasticB
     if solid is not None:
         digest = hashlib.sha256(solid.model.mesh.path.read_bytes()).hexdigest()
         return ElasticBody(reduced, inertia, solid.main_seat, solid.sectors, solid.shared_seats, floating, digest)
-    seats = [seat.name for seat in of_shape.seats]
-    return ElasticBody(reduced, inertia, TORQUE_SEAT if TORQUE_SEAT in seats else seats[0], floating=floating)
+    seats, shared = [seat.name for seat in of_shape.seats], shared_seats(gearbox, body.name)
+    torque = shared.get(TORQUE_SEAT, TORQUE_SEAT)
+    main = torque if torque in seats else seats[0]
+    return ElasticBody(reduced, inertia, main, shared_seats=shared, floating=floating)
 
 
 def check_elastic_body(gearbox: Gearbox, name: str) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from exugear.bearings.supports import mounts_at_work
 from exugear.bodies.finite_elements.shaft_sections import MeshSize, SeatBand, ShaftError, ShaftSection, narrowed
@@ -20,6 +20,8 @@ POINT = 0.01
 """Bore over that of the other end where a conical bore has its point: elements cannot begin in one."""
 TORQUE_SEAT = "torque"
 """Name of the seat where torques and couplings act."""
+SAME_PLACE = 1e-6
+"""Distance of places, and difference of widths, below which two seats are one, m."""
 SOLID_SIZE = MeshSize(0.05, 0.05, 1)
 """Elements of a shaft as a solid: frequencies of its normal modes come out up to 0.6 % too high."""
 
@@ -46,16 +48,41 @@ def shaft_model(gearbox: Gearbox, name: str) -> ShaftModel:
     unknown = next((blank for blank in shape.blanks if blank not in names), None)
     if unknown is not None:
         raise gearbox.fault(f"{key}.blanks.{unknown}: no such seat; seats are {', '.join(names)}")
+    shared = _shared(seats)
+    blanks = {shared.get(seat, seat): blank_of(blank) for seat, blank in shape.blanks.items()}
+    if len(blanks) < len(shape.blanks):
+        raise gearbox.fault(f"{key}.blanks: two of {', '.join(shape.blanks)} sit on one seat; give one blank for both")
     return ShaftModel(
         name=name,
         sections=sections,
         material=material_of(shape.material),
         origin=(*body.axis, shape.start_z_mm * 1e-3),
-        seats=seats,
-        blanks={seat: blank_of(blank) for seat, blank in shape.blanks.items()},
+        seats=tuple(seat for seat in seats if seat.name not in shared),
+        blanks=blanks,
         band=gearbox.case.elasticity.band_Hz,
         limit=gearbox.case.elasticity.limit_Hz,
     )
+
+
+def shared_seats(gearbox: Gearbox, name: str) -> dict[str, str]:
+    """Seats of a body's shaft that another one stands for, which has their place and width, by their names.
+
+    Two of one place and width would move alike: nothing could tell what each carries.
+    """
+    body = gearbox.body(name)
+    shape = _shape_of(gearbox, body)
+    sections = tuple(map(_section_of, shape.sections))
+    return _shared(tuple(narrowed(sections, seat) for seat in _seats(gearbox, body, shape)))
+
+
+def _shared(seats: Sequence[SeatBand]) -> dict[str, str]:
+    shared: dict[str, str] = {}
+    for n, seat in enumerate(seats):
+        for other in seats[:n]:
+            if other.name not in shared and max(abs(seat.z - other.z), abs(seat.width - other.width)) < SAME_PLACE:
+                shared[seat.name] = other.name
+                break
+    return shared
 
 
 def narrowed_seats(gearbox: Gearbox, name: str) -> Iterator[str]:

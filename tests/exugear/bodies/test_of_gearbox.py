@@ -304,3 +304,20 @@ def test_a_scene_shows_every_shaft_with_its_gears(flexible: Assembly, tmp_path: 
 def test_a_variant_without_elastic_bodies_has_no_such_scene(grc: Gearbox, stiffness: dict) -> None:
     with pytest.raises(ValueError, match="variant bushing has no elastic bodies"):
         elastic_scene(assemble(grc, Choice("bushing"), stiffness), np.zeros(43))
+
+
+def test_a_torque_in_the_plane_of_a_bearing_acts_on_its_seat(grc: Gearbox, stiffness: dict) -> None:
+    """Two seats of no width in one place would move alike; the torque winds the shaft up as it does a micrometre on."""
+    place = grc.content["bearings"]["hss_a"]["z_mm"]
+    held = {"radial_N_per_m": 1e9, "axial_N_per_m": 1e9, "tilt_N_m_per_rad": 1e6}
+    of_bearing = {"body": "hss", "on": "housing", "z_mm": place, "stiffness": held}
+    spins = []
+    for beside in (0.0, 2.0):
+        varied = grc.varied({"bearings.hss_a": of_bearing, "bodies.hss.shape.torque_z_mm": place + beside})
+        bodies = reduced_bodies(varied, "assemblies")
+        assert bodies["hss"].shared_seats == ({} if beside else {"torque": "hss_a"})
+        assert bodies["hss"].main_seat == ("torque" if beside else "hss_a")
+        assembly = assemble(varied, Choice("flexible"), stiffness, bodies)
+        spins.append(locked_equilibrium(assembly, {"carrier": 240e3}, ["hss"])[assembly.spin["carrier"]])
+        assert assembly.coordinates["hss"] == assembly.coordinates["hss.hss_a"] or beside
+    assert spins[0] == pytest.approx(spins[1], rel=5e-3)
