@@ -32,6 +32,8 @@ from fe_ste.tools.drawing import WARNING_COLOUR, drawing_style, finish_figure, n
 NAMES = {"planet_bearings": "Planet bearings", "all_bearings": "All bearings"}
 HIGHEST_HZ, LOWEST_DB = 4000.0, -70.0
 """Frequency and level at which waterfalls end."""
+GEARS_SHARE = 0.148
+"""Axial inertia of the high-speed shaft in the set `gears` over that in `assemblies`."""
 
 
 def draw_map(found: Sequence[Mapping[str, Any]], path: Path) -> None:
@@ -61,13 +63,17 @@ def draw_map(found: Sequence[Mapping[str, Any]], path: Path) -> None:
         finish_figure(figure, path)
 
 
-def _rest(one: Mapping[str, Any]) -> tuple[float, float, float]:
-    return one["housing_factor"], one["spin"], one["mass"]
+def _rest(one: Mapping[str, Any]) -> tuple[float, str, float, float]:
+    return one["housing_factor"], one["inertias"], one["spin"], one["mass"]
 
 
 def distance(one: Mapping[str, Any]) -> float:
-    """How far a set is from the file: decades of its shaft's inertia and mass and, at a quarter, of its coupling."""
-    shaft = abs(math.log10(one["spin"])) + abs(math.log10(one["mass"]))
+    """How far a set is from the file: decades of its shaft's inertia and mass and, at a quarter, of its coupling.
+
+    The inertia set counts as what it makes of the shaft's inertia.
+    """
+    spin = one["spin"] * (1.0 if one["inertias"] == "assemblies" else GEARS_SHARE)
+    shaft = abs(math.log10(spin)) + abs(math.log10(one["mass"]))
     return shaft + 0.25 * abs(math.log10(one["coupling"] / 1e6))
 
 
@@ -82,7 +88,7 @@ def chosen(found: Sequence[Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
     }
 
 
-def draw_waterfalls(project: Project, gearbox: Gearbox, path: Path) -> None:
+def draw_waterfalls(project: Project, gearbox: Gearbox, inertias: str, path: Path) -> None:
     """Draw all lines of the overall transmission error of both variants of a gearbox, as they stand over speed."""
     settings = SteadySettings(SpeedRange.from_text("1:215:429"), at_resonances=False)
     with drawing_style():
@@ -90,7 +96,8 @@ def draw_waterfalls(project: Project, gearbox: Gearbox, path: Path) -> None:
         panels = figure.subplots(1, 2, sharey=True)
         shades = None
         for panel, variant in zip(panels, ("rigid", "bushing"), strict=True):
-            response = steady_response(gearbox, Choice(variant), project.stiffness(), settings=settings)
+            choice = Choice(variant, inertias=inertias)
+            response = steady_response(gearbox, choice, project.stiffness(), settings=settings)
             names = [own.name for own in response.signals]
             lines = np.abs(response.solved.amplitude[:, 1:, names.index("overall_dte")])
             speed = np.abs(response.solved.speed)[:, None] + 0.0 * lines
@@ -111,9 +118,9 @@ def draw_waterfalls(project: Project, gearbox: Gearbox, path: Path) -> None:
         finish_figure(figure, path)
 
 
-def draw_nearest_mode(project: Project, gearbox: Gearbox, frequency: float, path: Path) -> str:
+def draw_nearest_mode(project: Project, gearbox: Gearbox, inertias: str, frequency: float, path: Path) -> str:
     """Draw the mode of `bushing` nearest to a frequency (Hz), and tell its name."""
-    modes = eigenmodes(gearbox, Choice("bushing"), project.stiffness())
+    modes = eigenmodes(gearbox, Choice("bushing", inertias=inertias), project.stiffness())
     number = int(np.argmin(np.abs(modes.frequency - frequency)))
     title = f"{modes.frequency[number]:.0f} Hz: {modes.names[number]}"
     shapes = bodies_of(gearbox)
@@ -137,8 +144,9 @@ def main() -> None:
         for which, one in picked.items():
             print(f"{name}, {which}: {one}")
             gearbox, stem = search.varied(project.gearbox, one, float(one["radial_N_per_m"])), f"search-3215-{which}"
-            draw_waterfalls(project, gearbox, project.folder / f"{stem}.png")
-            print(draw_nearest_mode(project, gearbox, float(one["Hz"]), project.folder / f"{stem}-mode.png"))
+            inertias = str(one["inertias"])
+            draw_waterfalls(project, gearbox, inertias, project.folder / f"{stem}.png")
+            print(draw_nearest_mode(project, gearbox, inertias, float(one["Hz"]), project.folder / f"{stem}-mode.png"))
 
 
 if __name__ == "__main__":
