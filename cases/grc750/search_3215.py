@@ -23,6 +23,7 @@ import itertools
 import json
 import time
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +38,7 @@ from exugear.model.gearbox import Gearbox
 from exugear.steady.excitation import Gearset
 from exugear.steady.point_solver import gearset_of
 from exugear.steady.response import transmission_error_line
+from exugear.tooth_mesh.contact_state import ContactState
 
 TARGET_HZ, NEAR, AROUND = 3215.0, 0.02, 0.10
 FASTEST = 215.0 * np.pi / 30.0
@@ -64,7 +66,25 @@ SEEN, BESIDE = 2.0, (0.94, 0.97, 1.03, 1.06)
 WANTED = 6.0
 """Rise of the reference's peak, dB."""
 
-Given = tuple[Gearbox, Mapping[str, Any]]
+
+
+@dataclass(frozen=True)
+class Given:
+    """What all sets share: the gearbox, its mesh stiffness, and the contact of its teeth at rest.
+
+    The contact is that of the file as it is: solved for each set anew it would take minutes of a set, and moves what is
+    looked for by less than the range that is looked in.
+    """
+
+    gearbox: Gearbox
+    stiffness: Mapping[str, Any]
+    contact: Mapping[str, ContactState]
+
+
+def given_by(project: Project) -> Given:
+    """Take it from a project, whose tables are there."""
+    bare = {name: replace(curve, table=None) for name, curve in project.stiffness().items()}
+    return Given(project.gearbox, bare, project.assembly().contacts.states)
 
 
 def sets() -> list[dict[str, float | str]]:
@@ -99,7 +119,8 @@ def varied(gearbox: Gearbox, own: Mapping[str, Any], radial: float) -> Gearbox:
 
 def gearset_with(given: Given, own: Mapping[str, Any], radial: float, variant: str) -> Gearset:
     """Mean system and meshes of a variant."""
-    assembly = assemble(varied(given[0], own, radial), Choice(variant, inertias=own["inertias"]), given[1])
+    choice = Choice(variant, inertias=own["inertias"])
+    assembly = assemble(varied(given.gearbox, own, radial), choice, given.stiffness, contact=given.contact)
     return gearset_of(assembly, np.array([0.0, FASTEST]), HARMONICS, 0)
 
 
@@ -172,7 +193,7 @@ def search(project: Project) -> list[dict[str, Any]]:
     """Search all sets, and go on where a search was stopped."""
     path = project.folder / "search-3215.jsonl"
     head = {"input": input_hash(project.assembly()), "script": 2}
-    given = project.gearbox, project.stiffness()
+    given = given_by(project)
     wanted, done = sets(), kept_rows(path, head)
     first, begun = len(done), time.monotonic()
     path.parent.mkdir(parents=True, exist_ok=True)
