@@ -42,7 +42,7 @@ VARIATION = 2e-4
 
 Static tilts that are not the same for all planets bend the geometry by 5e-5 in the GRC; unequal planets bring 1e-3."""
 ROWS_VARIATION = 2e-2
-"""The same where planets stand on non-linear bearings: they share the load unequally, the more loaded is the stiffer.
+"""The same on non-linear bearings and curved teeth: planets share the load unequally, the more loaded is the stiffer.
 
 Shares go around with the carrier's angle. In the GRC, whose sun is pushed aside, it is 8e-3, at three times the
 carrier's frequency: lines stay as they are to 1e-3, and what stands beside them is left out."""
@@ -457,7 +457,8 @@ def _mean_over_places(
     """
     period = max(2.0 * math.pi / abs(planets.waves * planets.ratio) for planets in frame.sets)
     more, largest = tuple(np.zeros_like(own) for own in here), 0.0
-    most = ROWS_VARIATION if frame.assembly.has_rows else VARIATION
+    curved = any(element.is_curved for element in frame.assembly.elements)
+    most = ROWS_VARIATION if frame.assembly.has_rows or curved else VARIATION
     for psi in period * np.arange(1, PLACES) / PLACES:
         there = (_mass(frame, float(psi), u), *tangents(frame, float(psi), speed, u))
         largest = max(largest, _checked_change(here[2], there[2], most))

@@ -45,6 +45,9 @@ from fe_ste.geometry.gears import Gear
 from fe_ste.tools.arrays import Floats
 from fe_ste.transmission_error.table import TableInput
 
+STEEPEST = 2.0
+"""Largest exponent of a curve of load over deflection: flanks that touch on one end first, the contact growing."""
+
 
 @dataclass(frozen=True)
 class MeshElement:
@@ -99,11 +102,15 @@ class MeshElement:
         """Return the mesh with a contact that was solved, in the axes of its pair's table.
 
         The mean of a curved law's stiffness is then that of the contact, the table's changes over the mesh cycle upon
-        it.
+        it. Where gears stand so askew that flanks touch long before or after their middles would, the deflection at
+        mid-face is mostly that gap, and no measure of how teeth yield: the curve then begins at the gap.
         """
-        secant, tangent, load = self.stiffness, self.tangent, self.load
+        secant, tangent, load, gap = self.stiffness, self.tangent, self.load, 0.0
         if self.is_curved:
-            secant = secant * (contact.force / contact.deflection / np.mean(secant))
+            straight = contact.force / contact.tangent_stiffness
+            yielding = float(np.clip(contact.deflection, straight, STEEPEST * straight))
+            gap = contact.deflection - yielding
+            secant = secant * (contact.force / yielding / np.mean(secant))
             tangent = tangent * (contact.tangent_stiffness / np.mean(tangent))
             load = contact.force
         slope, shift = np.array(_by_distance(contact, self)) - _by_distance(self.contact, self)
@@ -116,7 +123,7 @@ class MeshElement:
             damping=self.damping_time * float(np.mean(tangent)),
             deflection=self.deflection - slope * self.centre,
             force=self.force - slope * self.centre,
-            offset=self.offset - np.array([shift, 0.0, 0.0]),
+            offset=self.offset - np.array([shift + gap, 0.0, 0.0]),
         )
 
     @property
