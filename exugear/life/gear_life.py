@@ -37,7 +37,7 @@ from fe_ste.standards.service_life import (
     damages,
     safety_factor,
 )
-from fe_ste.standards.tooth_root import root_stress_factors
+from fe_ste.standards.tooth_root import root_face_load_factor, root_stress_factors
 from fe_ste.tools.arrays import Floats
 
 RZ_OF_RA = 6.0
@@ -77,6 +77,10 @@ class FlankLife:
         Safety under the largest load, extremes with their partial factors among them; NaN without strength.
     nominal_contact, nominal_root : float
         sigma_H0 of ISO 6336-2 and sigma_F0 of ISO 6336-3 at the largest load, for comparison; NaN for roots of rings.
+    standard_contact_safety, standard_root_safety : float
+        S_H and S_F over the life by the nominal stresses of ISO 6336-2 and -3 with K_gamma and K_v of each load,
+        K_Hbeta of the finite elements and K_Fbeta of it, K_Halpha = K_Falpha = 1; NaN without strength, and for roots
+        of rings.
     outside : float
         Largest share of the load outside the path of contact: what tip relief would take away.
     face_load : float
@@ -107,6 +111,8 @@ class FlankLife:
     root_static: float
     nominal_contact: float
     nominal_root: float
+    standard_contact_safety: float
+    standard_root_safety: float
     outside: float
     face_load: float
     contact_by_bin: Floats
@@ -240,6 +246,7 @@ class _Case:
         top = int(np.abs(worst_torque).argmax())
         force = tangential_force(self.pair.pinion, float(torque[top].mean()) / self.pair.pinion.base_radius)
         rated = self._rated(hertz, root, cycles, speed, float(worst[0].max()), float(worst[1].max()))
+        by_standard = self._by_standard(points.torque[worn], points.other[worn], speed, cycles)
         by_point = np.zeros((2, len(points.torque)))
         by_point[:, worn] = rated.pop("by_point")
         return FlankLife(
@@ -259,6 +266,8 @@ class _Case:
             compression=float(worst[2].min()),
             nominal_contact=nominal_contact_stress(self.pair, force),
             nominal_root=self._nominal_root(force),
+            standard_contact_safety=by_standard[0],
+            standard_root_safety=by_standard[1],
             outside=float(stress.at(stress.outside, 0.0, torque, tilt).max()),
             face_load=float(stress.at(stress.face_load, 0.0, torque[top], tilt[top]).max()),
             **rated,
@@ -304,8 +313,7 @@ class _Case:
             return {**dict.fromkeys(keys, math.nan), "by_point": np.nan}
         contact, bending = life_curves(strength)
         allowed = self._contact_strength(strength, speed)[:, None, None]
-        both_ways = strength.mean_stress_factor or 1.0
-        endured = 1e6 * strength.sigma_F_lim_MPa * PLAIN_TEST_GEAR * strength.root_factor * both_ways
+        endured = root_strength(strength)
         static = 1e6 * strength.sigma_H_lim_MPa * contact.factors[0]
         by_contact = damages(contact, hertz / allowed, 1.0, cycles).sum(axis=(1, 2))
         by_root = damages(bending, root, endured, cycles).sum(axis=(1, 2))
@@ -320,6 +328,25 @@ class _Case:
             endured * bending.factors[0],
         )
         return {**dict(zip(keys, values, strict=True)), "by_point": np.stack([by_contact, by_root])}
+
+    def _by_standard(self, torques: Floats, hub: Floats, speed: Floats, cycles: Floats) -> tuple[float, float]:
+        """S_H and S_F of the nominal stresses of the standard, with K_Hbeta of the finite elements."""
+        strength = self.rating.gears.get(self.tooth.gear)
+        if strength is None:
+            return math.nan, math.nan
+        torque, tilt = self._loads(torques, hub)
+        torque = torque * self.dynamic.at(speed)[:, None, None]
+        face = self.stress.at(self.stress.face_load, 0.0, torque, tilt)
+        force = tangential_force(self.pair.pinion, 1.0) * torque / self.pair.pinion.base_radius
+        contact, bending = life_curves(strength)
+        allowed = self._contact_strength(strength, speed)[:, None, None]
+        hertz = nominal_contact_stress(self.pair, 1.0) * np.sqrt(force * face)
+        flank = safety_factor(contact, hertz / allowed, 1.0, cycles)
+        one = self._nominal_root(1.0)
+        if math.isnan(one):
+            return flank, math.nan
+        root = one * force * root_face_load_factor(face, self.pair)
+        return flank, safety_factor(bending, root, root_strength(strength), cycles)
 
     def _contact_strength(self, strength: StrengthSection, speed: Floats) -> Floats:
         """Pa at a life factor of one, for each speed (rad/s) of the loaded body."""
@@ -341,6 +368,12 @@ class _Case:
 def roughness_of(strength: StrengthSection) -> float:
     """Rz of a gear's flanks, m."""
     return 1e-6 * (strength.roughness_Rz_um or RZ_OF_RA * (strength.roughness_Ra_um or 0.0))
+
+
+def root_strength(strength: StrengthSection) -> float:
+    """Root stress (Pa) that a gear withstands at a life factor of one."""
+    both_ways = strength.mean_stress_factor or 1.0
+    return 1e6 * strength.sigma_F_lim_MPa * PLAIN_TEST_GEAR * strength.root_factor * both_ways
 
 
 def life_curves(strength: StrengthSection) -> tuple[LifeCurve, LifeCurve]:

@@ -261,6 +261,7 @@ def _assumptions(
             else ", of gears that stand aligned: tables with axes (--grid) have their misalignment"
         ),
         f"S_H of {rating.least_S_H:g}, S_F of {rating.least_S_F:g} and S_0 of {rating.least_S_0:g} are asked for",
+        "S_H and S_F by ISO stand for nominal stresses with K_Hbeta of the finite elements and K_Halpha = K_Falpha = 1",
         "Z_W = Z_X = 1; S-N curves go on beyond their last point: no load is without damage",
         _oil_in_words(oil),
     ]

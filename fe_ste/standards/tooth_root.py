@@ -10,8 +10,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.geometry.involute import involute
+from fe_ste.tools.arrays import Floats
 
 _ROOT_ANGLE = math.pi / 3.0
 """60 deg: the tangents at the critical section lean by 30 deg from the middle of an external tooth."""
@@ -75,6 +78,32 @@ def root_stress_factors(pair: GearPair, member: int) -> RootStressFactors:
         f"virtual contact ratio {contact_ratio:.2f} is not below 2": contact_ratio >= 2.0,
     }
     return RootStressFactors(form, correction, helix, tuple(text for text, applies in remarks.items() if applies))
+
+
+def root_face_load_factor(face_load: Floats, pair: GearPair) -> Floats:
+    """K_Fbeta of K_Hbeta, by the face width over the tooth height (ISO 6336-1:2006, 7.4).
+
+    Parameters
+    ----------
+    face_load : array
+        K_Hbeta.
+    pair : GearPair
+
+    Examples
+    --------
+    The helical stage of the NREL 5 MW gearbox as a rating program has it: b / h = 360 / 30.562, K_Hbeta 1.150:
+
+    >>> round(float(1.150 ** _face_exponent(360.0 / 30.562)), 3)
+    1.137
+    """
+    heights = [abs(gear.tip_radius - gear.root_radius) for gear in (pair.pinion, pair.gear)]
+    return np.asarray(face_load ** _face_exponent(pair.face_width / max(heights)))
+
+
+def _face_exponent(slenderness: float) -> float:
+    """N_F of b / h, which counts as no less than 3."""
+    ratio = max(slenderness, 3.0)
+    return ratio**2 / (1.0 + ratio + ratio**2)
 
 
 def form_and_correction(gear: Gear, virtual: float, loaded: float) -> tuple[float, float, float]:

@@ -133,6 +133,7 @@ def _contact_rows(data: xr.Dataset) -> list[dict[str, str]]:
             "K_Hb": _told(value("face_load"), ".3f"),
             "damage": _told(value("contact_damage"), ".3g"),
             "S_H": _told(value("contact_safety"), ".2f"),
+            "ISO\nS_H": _told(value("standard_contact_safety"), ".2f"),
         }
         for label, value in _entries(data, "flank")
     ]
@@ -147,6 +148,7 @@ def _root_rows(data: xr.Dataset) -> list[dict[str, str]]:
             "least\nMPa": _told(1e-6 * value("compression"), ".0f"),
             "damage": _told(value("root_damage"), ".3g"),
             "S_F": _told(value("root_safety"), ".2f"),
+            "ISO\nS_F": _told(value("standard_root_safety"), ".2f"),
             "static\nS_H": _told(value("contact_static"), ".2f"),
             "static\nS_F": _told(value("root_static"), ".2f"),
         }

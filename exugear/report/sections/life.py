@@ -93,10 +93,12 @@ def _flank_rows(data: xr.Dataset) -> list[dict[str, object]]:
         "K_Hbeta": ("face_load", 1.0, ".3f"),
         "pitting damage": ("contact_damage", 1.0, ".3g"),
         "S_H": ("contact_safety", 1.0, ".2f"),
+        "S_H, ISO": ("standard_contact_safety", 1.0, ".2f"),
         "σ_F / MPa": ("root_stress", 1e-6, ".0f"),
         "σ_F0, ISO / MPa": ("nominal_root", 1e-6, ".0f"),
         "root damage": ("root_damage", 1.0, ".3g"),
         "S_F": ("root_safety", 1.0, ".2f"),
+        "S_F, ISO": ("standard_root_safety", 1.0, ".2f"),
         "static S_H": ("contact_static", 1.0, ".2f"),
         "static S_F": ("root_static", 1.0, ".2f"),
     }

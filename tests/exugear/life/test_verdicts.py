@@ -83,6 +83,22 @@ def test_the_worst_of_all_planets_is_rated_and_told():
     assert by_planet[2].root_holder == by_planet[2].contact_holder
 
 
+def test_both_safeties_are_told_and_that_of_the_standard_has_its_factors():
+    """One torque: stresses by hand from sigma_H0 and sigma_F0, K_v, K_gamma and K_Hbeta; its curve gives S."""
+    one = planets_with({})["im_pinion intermediate"]
+    gearbox = Gearbox.from_toml(GRC)
+    pair = gearbox.gear_pairs["intermediate"]
+    ratio = (one.root_safety * one.root_stress) / (one.standard_root_safety * one.nominal_root)
+    height = max(one.tip_radius - one.root_radius for one in (pair.pinion, pair.gear))
+    slender = pair.face_width / height
+    exponent = slender**2 / (1.0 + slender + slender**2)
+    # Both stresses are proportional to torque at one K_Hbeta: safeties are as strengths over stresses are.
+    assert ratio == pytest.approx(1.05 * 1.2**exponent / 1.0, rel=2e-3)
+    contact = (one.contact_safety * one.contact_stress) / (one.standard_contact_safety * one.nominal_contact)
+    assert contact == pytest.approx(math.sqrt(1.05 * 1.2), rel=2e-3)
+    assert math.isnan(planets_with({})["ring ring_planet"].standard_root_safety)
+
+
 def test_the_worst_of_each_figure_is_told_of_flanks_that_are_alike():
     one = planets_with({})["planet sun_planet"]
     other = replace(one, contact_holder="planet_2", contact_damage=2.0 * one.contact_damage, root_static=0.5)
