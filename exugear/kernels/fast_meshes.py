@@ -22,12 +22,12 @@ from fe_ste.tools.octets import eight, put, sum_of
 ALONG_DEFLECTION, ALONG_FORCE, TABLE_FORCE = range(3)
 """Rows of `MeshMemory.gradient`."""
 LAST_DEFLECTION, LAST_RATE, LAST_OUTSIDE, LAST_FORCE, LAST_ENERGY, LAST_DAMPED, LAST_CYCLE, LAST_OTHER = range(8)
-LAST_CENTRE, LAST_MISALIGNMENT = range(8, 10)
+LAST_CENTRE, LAST_MISALIGNMENT, LAST_CENTRE_RATE = range(8, 11)
 """Columns of `MeshMemory.states`: deflection (m), rate (m/s), 1 outside a table, scalar force (N; of a table F_bt), and
 what an account of energy takes of the mesh: elastic energy (J); power damped, of the stiffness that changes with pmc,
-and of a force that is not conjugate to its deflection (W); of a table change of centre distance (m) and
-misalignment (rad)."""
-STATES_SIZE = 10
+and of a force that is not conjugate to its deflection (W); of a table change of centre distance (m),
+misalignment (rad) and rate of the centre distance (m/s)."""
+STATES_SIZE = 11
 DEFLECTION_ROW, FORCE_ROW, CENTRE_ROW, MISALIGNMENT_ROW, BACK_ROW, BACK_MISALIGNMENT_ROW = range(6)
 """Rows of `Meshes.rows`."""
 PLAIN_ROWS = 2
@@ -102,10 +102,11 @@ class MeshMemory(NamedTuple):
     ----------
     gradient : (3, 13) gradients of the deflection and of the force row, and the force of a mesh with a table
     gradients : (4, 17) gradients over two padded places and the frame's angle; the last one is a sum
-    states : (m, 10) what each mesh does, columns as named in this module
+    states : (m, 11) what each mesh does, columns as named in this module
     pieces : (m, 2) load piece of each flank's table that was used last
     law : memory of the law `table`; None where no mesh has it
     row : (12,) row of the push between the axes and the moment of misalignment
+    damping : (5,) directions and sizes of the damping of a table
     """
 
     gradient: Floats
@@ -114,6 +115,7 @@ class MeshMemory(NamedTuple):
     pieces: Integers
     law: Scratch | None
     row: Floats
+    damping: Floats
 
 
 def padded_rows(rows: Floats, axis: Floats) -> tuple[Floats, Floats]:

@@ -30,6 +30,8 @@ ORDERS = np.array(
 """Derivatives of the surface in this order: times by pmc, by centre distance, by misalignment."""
 ENERGY_DERIVATIVES = 4
 """Number of them that force, energy and power need: value and all slopes; a tangent needs all."""
+DAMPING_DERIVATIVES = 7
+"""Number of them that damping needs, which goes with the tangent at a frozen position."""
 ROUNDS = 60
 """Newton and bisection steps at most: bisection alone would reach round-off."""
 
@@ -48,6 +50,9 @@ LAW_FORCE, LAW_STIFFNESS, LAW_POTENTIAL, LAW_BY_DISTANCE, LAW_BY_MISALIGNMENT, L
 LAW_SIZE = 7
 LEFT_TABLE, GUESSED = 1.0, 2.0
 """What the law may have at `LAW_OUTSIDE` beside zero: it left an axis, or interpolated over a state not solved."""
+BY_DISTANCE, BY_MISALIGNMENT, OF_DISTANCE, OF_BOTH, OF_MISALIGNMENT = range(5)
+"""Entries of what `surface_damping` fills."""
+DAMPING_SIZE = 5
 
 
 class TableArrays(NamedTuple):
@@ -220,10 +225,53 @@ def contract_for_force(values: Floats, shape: Integers, piece: int, memory: Scra
 
 
 @kernel
+def contract_for_damping(values: Floats, shape: Integers, piece: int, memory: Scratch) -> None:
+    """Do as `contract_for_force`, second derivatives by centre distance and misalignment included."""
+    basis, node, cubic = memory.basis, memory.node, memory.cubic
+    stride = NODE_SIZE * shape[LOAD_PIECES]
+    level = all_eight(0.0)
+    by_distance, by_misalignment, by_pmc = level, level, level
+    by_distances, by_both, by_misalignments = level, level, level
+    for p in range(4 if shape[POSITIONS] > 1 else 1):
+        position = node[AXIS_PMC] + p
+        while position >= shape[POSITIONS]:
+            position -= shape[POSITIONS]
+        for c in range(min(4, shape[DISTANCES])):
+            row = (position * shape[DISTANCES] + node[AXIS_DISTANCE] + c) * shape[MISALIGNMENTS]
+            start = NODE_SIZE * ((row + node[AXIS_MISALIGNMENT]) * shape[LOAD_PIECES] + piece)
+            part, slope, bend = all_eight(0.0), all_eight(0.0), all_eight(0.0)
+            for a in range(min(4, shape[MISALIGNMENTS])):
+                entries = eight(values, start)
+                part = part + entries * basis[AXIS_MISALIGNMENT, 0, a]
+                slope = slope + entries * basis[AXIS_MISALIGNMENT, 1, a]
+                bend = bend + entries * basis[AXIS_MISALIGNMENT, 2, a]
+                start += stride
+            of_position, of_distance = basis[AXIS_PMC, 0, p], basis[AXIS_DISTANCE, 0, c]
+            along, across = of_position * basis[AXIS_DISTANCE, 1, c], of_position * of_distance
+            level = level + part * across
+            by_distance = by_distance + part * along
+            by_misalignment = by_misalignment + slope * across
+            by_pmc = by_pmc + part * (basis[AXIS_PMC, 1, p] * of_distance)
+            by_distances = by_distances + part * (of_position * basis[AXIS_DISTANCE, 2, c])
+            by_both = by_both + slope * along
+            by_misalignments = by_misalignments + bend * across
+    put(cubic[0], 0, level)
+    put(cubic[1], 0, by_distance)
+    put(cubic[2], 0, by_misalignment)
+    put(cubic[3], 0, by_pmc)
+    put(cubic[4], 0, by_distances)
+    put(cubic[5], 0, by_both)
+    put(cubic[6], 0, by_misalignments)
+
+
+@kernel
 def contract(values: Floats, shape: Integers, piece: int, count: int, memory: Scratch) -> None:
     """Fill `cubic` with the first `count` derivatives of the surface over one load piece."""
     if count <= ENERGY_DERIVATIVES:
         contract_for_force(values, shape, piece, memory)
+        return
+    if count <= DAMPING_DERIVATIVES:
+        contract_for_damping(values, shape, piece, memory)
         return
     cubic, basis, node = memory.cubic, memory.basis, memory.node
     for d in range(count):
@@ -454,3 +502,42 @@ def surface_tangent(t: float, piece: int, m: int, tables: TableArrays, memory: S
             )
             # dU*/dx at given force, plus the force's own change at given deflection
             out[row, column] = -across - (-out[0, row] / k) * out[0, column]
+
+
+@kernel
+def surface_damping(t: float, piece: int, m: int, tables: TableArrays, memory: Scratch, out: Floats) -> None:
+    """Directions and sizes of the damping, in proportion to the tangent, after `surface_law` with its derivatives.
+
+    At a frozen position the tangent of the potential in x = (delta, a, gamma) is that of the force on
+    e = delta - s_a a - s_gamma gamma at a constant load, and beside it what the load keeps: -U*_xx. Where teeth would
+    bend the wrong way, its diagonal is cut off at zero, and what stands beside the diagonal at what a damper may have.
+
+    Parameters
+    ----------
+    out : (5,) array
+        s_a (m/m), s_gamma (m/rad); the tangent at constant load by a twice (N/m), a and gamma (N), gamma twice (N m).
+    """
+    for i in range(DAMPING_SIZE):
+        out[i] = 0.0
+    if t < 0.0:
+        return
+    start = tables.root[m, piece]
+    step = tables.root[m, piece + 1] - start
+    inside = min(t, 1.0)
+    cubic = memory.cubic
+    # Beyond the last load the surface goes on in proportion to the force: `more` of it, in ends of the last piece.
+    more, per_force = 0.0, 2.0 * (start + step) * step
+    if t > 1.0:
+        more = memory.law[LAW_FORCE] - (start + step) ** 2
+    for d in range(1, 3):
+        c = cubic[d]
+        rate = (c[1] + 2.0 * c[2] + 3.0 * c[3]) / per_force
+        out[BY_DISTANCE + d - 1] = c[0] + inside * (c[1] + inside * (c[2] + inside * c[3])) + more * rate
+    for d in range(4, 7):
+        c = cubic[d]
+        rate = (c[1] + 2.0 * c[2] + 3.0 * c[3]) / per_force
+        beyond = more * (c[0] + c[1] + c[2] + c[3] + 0.5 * rate * more)
+        out[OF_DISTANCE + d - 4] = -energy(c, start, step, inside) - beyond
+    out[OF_DISTANCE], out[OF_MISALIGNMENT] = max(0.0, out[OF_DISTANCE]), max(0.0, out[OF_MISALIGNMENT])
+    most = math.sqrt(out[OF_DISTANCE] * out[OF_MISALIGNMENT])
+    out[OF_BOTH] = min(most, max(-most, out[OF_BOTH]))

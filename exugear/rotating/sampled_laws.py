@@ -12,13 +12,18 @@ import numpy as np
 
 from exugear.kernels.meshes import MeshArrays
 from exugear.kernels.table_law import (
+    BY_DISTANCE,
+    BY_MISALIGNMENT,
+    DAMPING_SIZE,
     LAW_BY_DISTANCE,
     LAW_BY_MISALIGNMENT,
     LAW_FORCE,
     LAW_STIFFNESS,
+    OF_DISTANCE,
     ORDERS,
     TableArrays,
     scratch_memory,
+    surface_damping,
     surface_law,
     surface_tangent,
 )
@@ -149,7 +154,8 @@ def _fill_flank(
     position = readings.shape[1] - 1
     sense = side * tables.sense[m]
     time = tables.damping_time[m]
-    memory, second = scratch_memory(), np.empty((4, 4))
+    memory, second, sizes = scratch_memory(), np.empty((4, 4)), np.empty(DAMPING_SIZE)
+    along, moving = np.ones(3), np.empty(3)
     places = np.array([own, CENTRE, tilt, position])
     signs = np.array([1.0, 1.0, sense, side])
     piece = 0
@@ -172,14 +178,24 @@ def _fill_flank(
             x = (delta - cubic[0, 0]) / whole
             if x < 1.0:
                 ramp, ramp_slope = x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x) / whole
-        force[s, own] += law[LAW_FORCE] + time * ramp * stiffness * rate
+        surface_damping(t, piece, m, tables, memory, sizes)
+        # Along the three that teeth push along, in the axes of the table: the own one of misalignment has a sense.
+        along[1], along[2] = -sizes[BY_DISTANCE], -sizes[BY_MISALIGNMENT]
+        moving[0], moving[1], moving[2] = rate, rates[s, CENTRE], sense * rates[s, tilt]
+        approaching = moving[0] + along[1] * moving[1] + along[2] * moving[2]
+        force[s, own] += law[LAW_FORCE]
         force[s, CENTRE] += law[LAW_BY_DISTANCE]
         force[s, tilt] += sense * law[LAW_BY_MISALIGNMENT]
-        damping[s, own, own] += time * ramp * stiffness
+        for a in range(3):
+            for b in range(3):
+                by_rate = time * ramp * stiffness * along[a] * along[b]
+                if a > 0 and b > 0:
+                    by_rate += time * ramp * sizes[OF_DISTANCE + a + b - 2]
+                force[s, places[a]] += signs[a] * by_rate * moving[b]
+                damping[s, places[a], places[b]] += signs[a] * signs[b] * by_rate
         for b in range(4):
             # First touch itself moves with centre distance, misalignment and position.
             touch = 1.0 if b == 0 else -cubic[b, 0]
-            by = second[0, b] + time * rate * (ramp * second[3, b] + ramp_slope * touch * stiffness)
-            slope[s, own, places[b]] += signs[b] * by
-            slope[s, CENTRE, places[b]] += signs[b] * second[1, b]
-            slope[s, tilt, places[b]] += sense * signs[b] * second[2, b]
+            changing = time * approaching * (ramp * second[3, b] + ramp_slope * touch * stiffness)
+            for a in range(3):
+                slope[s, places[a], places[b]] += signs[a] * signs[b] * (second[a, b] + along[a] * changing)

@@ -22,7 +22,7 @@ from exugear.kernels.meshes import (
 )
 from exugear.kernels.products import filled_up
 from exugear.kernels.rolling import rolling_memory
-from exugear.kernels.table_law import NOMINAL_DEFLECTION, NOMINAL_MISALIGNMENT, scratch_memory
+from exugear.kernels.table_law import DAMPING_SIZE, NOMINAL_DEFLECTION, NOMINAL_MISALIGNMENT, scratch_memory
 from exugear.kernels.travelling import travelling_memory
 from exugear.kernels.turning import turning_memory
 from exugear.model.sections.entries import GROUND
@@ -355,6 +355,7 @@ def work_for(equations: Equations, q: Floats, v: Floats) -> Work:
             pieces=np.zeros((count, 2), dtype=np.int64),
             law=None if equations.meshes.table is None else scratch_memory(),
             row=np.zeros(FRAME),
+            damping=np.zeros(DAMPING_SIZE),
         ),
         series=equations.loads.first[:-1].copy(),
         shares=np.zeros((0, 0, 0)) if equations.travelling is None else travelling_memory(equations.travelling),

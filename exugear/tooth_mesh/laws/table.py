@@ -5,6 +5,8 @@ misalignment gamma, each a row of the same coordinates. The generalized force is
 
     f = -(F d delta/dq + U_a da/dq + U_gamma d gamma/dq).
 
+Damping is a time times the tangent of the potential at a frozen position, along the same rows: where the tangent has a
+negative part, that does not damp (`exugear.kernels.table_law.surface_damping`). It fades as the teeth part.
 Teeth are apart in the backlash; beyond it the other flank touches. A table is that of the flank s = +1; the flank
 s = -1 is it turned by pi about the line of centres: the same table with misalignment reversed. Two forms of the force
 stand here, `table_force` with its tangent, and `fast_table_force` for the compiled solver, which tests hold together.
@@ -21,6 +23,7 @@ from exugear.kernels.fast_meshes import (
     ALONG_DEFLECTION,
     ALONG_FORCE,
     LAST_CENTRE,
+    LAST_CENTRE_RATE,
     LAST_CYCLE,
     LAST_DAMPED,
     LAST_DEFLECTION,
@@ -59,7 +62,10 @@ from exugear.kernels.meshes import (
     turn_rows,
 )
 from exugear.kernels.table_law import (
+    BY_DISTANCE,
+    BY_MISALIGNMENT,
     CUBIC_SIZE,
+    DAMPING_DERIVATIVES,
     ENERGY_DERIVATIVES,
     LAW_BY_DISTANCE,
     LAW_BY_MISALIGNMENT,
@@ -72,9 +78,13 @@ from exugear.kernels.table_law import (
     NOMINAL_DEFLECTION,
     NOMINAL_DISTANCE,
     NOMINAL_MISALIGNMENT,
+    OF_BOTH,
+    OF_DISTANCE,
+    OF_MISALIGNMENT,
     ORDERS,
     Scratch,
     TableArrays,
+    surface_damping,
     surface_law,
     surface_tangent,
 )
@@ -90,8 +100,8 @@ from fe_ste.transmission_error.surface import InterpolationError, SteSurface, ax
 from fe_ste.transmission_error.table import TableError
 
 TABLE_FORM = 1
-GRADIENT, TURNING, BEND, CHANGING, PUSH, GRADIENTS = range(6)
-SLOPES, SECOND, TABLE_MEMORY = GRADIENTS + 4, GRADIENTS + 8, GRADIENTS + 12
+GRADIENT, TURNING, BEND, CHANGING, PUSH, DAMPING, RATES = range(7)
+GRADIENTS, SLOPES, SECOND, TABLE_MEMORY = RATES + 3, RATES + 7, RATES + 11, RATES + 15
 """Rows of the memory of `table_force` and `add_table_tangent`, (`TABLE_MEMORY`, 13)."""
 
 
@@ -160,6 +170,23 @@ def position_by(
 
 
 @kernel
+def damped_forces(
+    time: float, stiffness: float, damping: Floats, rate: float, centre_rate: float, tilt_rate: float
+) -> tuple[float, float, float, float]:
+    """Damping along deflection (N), centre distance (N) and misalignment (N m) at their rates, and its power (W).
+
+    `damping` is what `surface_damping` fills, `time` that of the damping (s), `stiffness` the slope of the force (N/m).
+    """
+    by_distance, by_misalignment = damping[BY_DISTANCE], damping[BY_MISALIGNMENT]
+    approaching = rate - by_distance * centre_rate - by_misalignment * tilt_rate
+    damped = time * stiffness * approaching
+    centre = time * (damping[OF_DISTANCE] * centre_rate + damping[OF_BOTH] * tilt_rate)
+    tilt = time * (damping[OF_BOTH] * centre_rate + damping[OF_MISALIGNMENT] * tilt_rate)
+    lost = damped * approaching + centre * centre_rate + tilt * tilt_rate
+    return damped, centre - by_distance * damped, tilt - by_misalignment * damped, lost
+
+
+@kernel
 def table_force(
     q: Floats,
     v: Floats,
@@ -178,8 +205,9 @@ def table_force(
     if table is None or law_memory is None:
         return
     gradient, turning, bend, changing, push = rows[GRADIENT], rows[TURNING], rows[BEND], rows[CHANGING], rows[PUSH]
-    index = meshes.coordinates[m]
+    index, damping = meshes.coordinates[m], rows[DAMPING]
     centre = position_by(q, m, meshes, table.centre[m], table.nominal[m, NOMINAL_DISTANCE], gradient, changing)
+    centre_rate = row_dot(index, gradient, v)
     spin, cycling = relative_spin(q, index, 0), relative_spin(v, index, 0)
     pmc = mesh_pmc(q, m, meshes)
     out[:] = 0.0
@@ -198,24 +226,28 @@ def table_force(
         sense = side * table.sense[m]
         nominal = table.nominal[m, NOMINAL_MISALIGNMENT]
         misalignment = sense * position_by(q, m, meshes, misalignment_row, nominal, push, changing)
+        tilt_rate = sense * row_dot(index, push, v)
         pmc = phase + cycles * spin
-        surface_law(delta, pmc, centre, misalignment, m, table, 0, ORDERS.shape[0], law_memory)
+        piece, t = surface_law(delta, pmc, centre, misalignment, m, table, 0, DAMPING_DERIVATIVES, law_memory)
         law = law_memory.law
-        # Damping goes with the tangent stiffness, so that it fades as the teeth part.
-        damping = table.damping_time[m] * law[LAW_STIFFNESS]
-        force = law[LAW_FORCE] + damping * rate
+        surface_damping(t, piece, m, table, law_memory, damping)
+        damped, along_centre, along_tilt, lost = damped_forces(
+            table.damping_time[m], law[LAW_STIFFNESS], damping, rate, centre_rate, tilt_rate
+        )
+        force = law[LAW_FORCE] + damped
         for i in range(ROW_SIZE):
             acting[i] += force * gradient[i]
         # Push between the axes and moment of misalignment, as one row.
+        apart, moment = law[LAW_BY_DISTANCE] + along_centre, sense * (law[LAW_BY_MISALIGNMENT] + along_tilt)
         for i in range(FRAME):
-            push[i] = law[LAW_BY_DISTANCE] * table.centre[m, i] + law[LAW_BY_MISALIGNMENT] * sense * misalignment_row[i]
+            push[i] = apart * table.centre[m, i] + moment * misalignment_row[i]
         frame_row(q, index, meshes.axis[m], push, gradient, turning)
         for i in range(ROW_SIZE):
             acting[i] += gradient[i]
         out[STIFFNESS] += law[LAW_STIFFNESS]
         out[FORCE] += side * force
         out[ENERGY] += law[LAW_POTENTIAL]
-        out[DAMPED_POWER] += damping * rate * rate
+        out[DAMPED_POWER] += lost
         out[CYCLE_POWER] -= law[LAW_BY_PMC] * cycles * cycling
         out[OUTSIDE] = max(out[OUTSIDE], law[LAW_OUTSIDE])
 
@@ -241,15 +273,20 @@ def add_table_tangent(
     # Gradients of the four arguments of the law: delta, centre distance, misalignment, pmc.
     gradients, slopes, second = rows[GRADIENTS:SLOPES], rows[SLOPES:SECOND], rows[SECOND:TABLE_MEMORY]
     turning, bend, changing, tilting = rows[TURNING], rows[BEND], rows[CHANGING], rows[PUSH]
+    rates, damping = rows[RATES:GRADIENTS], rows[DAMPING]
     delta = offset + net_deflection(q, m, meshes, row, float(side), gradients[0], turning, bend)
     if delta <= table.lowest[m]:
         return
+    rate_gradient(v, index, turning, bend, rates[0])
     centre = table.nominal[m, NOMINAL_DISTANCE] + frame_row(q, index, axis, table.centre[m], gradients[1], changing)
+    damping[:] = 0.0  # errors of wheels neither move axes nor tilt them
+    rate_gradient(v, index, changing, damping, rates[1])
     sense = side * table.sense[m]
     for i in range(FRAME):
         tilting[i] = sense * misalignment_row[i]
     misalignment = sense * table.nominal[m, NOMINAL_MISALIGNMENT]
     misalignment += frame_row(q, index, axis, tilting, gradients[2], changing)
+    rate_gradient(v, index, changing, damping, rates[2])
     pmc = phase + cycles * relative_spin(q, index, 0)
     gradients[3, :] = 0.0
     gradients[3, SPIN_1], gradients[3, FRAME] = cycles, -cycles
@@ -257,32 +294,69 @@ def add_table_tangent(
     if t < 0.0:
         return
     surface_tangent(t, piece, m, table, law_memory, second)
+    surface_damping(t, piece, m, table, law_memory, damping)
     law, time = law_memory.law, table.damping_time[m]
-    rate = row_dot(index, gradients[0], v)
-    # Slopes of F, U_a and U_gamma over the coordinates, by the chain rule; those of the damping go with F.
-    rate_gradient(v, index, turning, bend, changing)
+    damped, along_centre, along_tilt, _ = damped_forces(
+        time,
+        law[LAW_STIFFNESS],
+        damping,
+        row_dot(index, gradients[0], v),
+        row_dot(index, gradients[1], v),
+        row_dot(index, gradients[2], v),
+    )
+    # Slopes of F, U_a and U_gamma over the coordinates, by the chain rule.
     for i in range(ROW_SIZE):
         for a in range(3):
             slopes[a, i] = 0.0
             for b in range(4):
                 slopes[a, i] += second[a, b] * gradients[b, i]
-        for b in range(4):
-            slopes[0, i] += time * rate * second[3, b] * gradients[b, i]
-        slopes[0, i] += time * law[LAW_STIFFNESS] * changing[i]
+    add_damping_slopes(time, law[LAW_STIFFNESS], damped, damping, gradients, rates, second, slopes, jv)
     for a in range(3):
         for i in range(ROW_SIZE):
             for j in range(ROW_SIZE):
                 jq[i, j] += gradients[a, i] * slopes[a, j]
-    for i in range(ROW_SIZE):
-        for j in range(ROW_SIZE):
-            jv[i, j] += time * law[LAW_STIFFNESS] * gradients[0, i] * gradients[0, j]
     # The rows turn with the frame: second derivatives of all three times what acts along them.
-    turn_rows(turning, bend, law[LAW_FORCE] + time * law[LAW_STIFFNESS] * rate, jq)
+    turn_rows(turning, bend, law[LAW_FORCE] + damped, jq)
     bend[:] = 0.0
+    apart, moment = law[LAW_BY_DISTANCE] + along_centre, law[LAW_BY_MISALIGNMENT] + along_tilt
     for i in range(FRAME):
-        tilting[i] = law[LAW_BY_DISTANCE] * table.centre[m, i] + law[LAW_BY_MISALIGNMENT] * tilting[i]
+        tilting[i] = apart * table.centre[m, i] + moment * tilting[i]
     frame_row(q, index, axis, tilting, gradients[0], turning)
     turn_rows(turning, bend, 1.0, jq)
+
+
+@kernel
+def add_damping_slopes(
+    time: float,
+    stiffness: float,
+    damped: float,
+    damping: Floats,
+    gradients: Floats,
+    rates: Floats,
+    second: Floats,
+    slopes: Floats,
+    jv: Floats,
+) -> None:
+    """Add what damping gives to the slopes over the coordinates, and its derivatives by the velocities, (13, 13).
+
+    The slope of the force changes with the place; that directions and the tangent at constant load do is left out,
+    which is a share of 1e-4 of damping, and of nothing at rest.
+    """
+    per_stiffness = damped / stiffness if stiffness > 0.0 else 0.0
+    for a in range(3):
+        along = 1.0 if a == 0 else -damping[BY_DISTANCE + a - 1]
+        for b in range(3):
+            across = 1.0 if b == 0 else -damping[BY_DISTANCE + b - 1]
+            by_rate = time * stiffness * along * across
+            if a > 0 and b > 0:
+                by_rate += time * damping[OF_DISTANCE + a + b - 2]
+            for i in range(ROW_SIZE):
+                slopes[a, i] += by_rate * rates[b, i]
+                for j in range(ROW_SIZE):
+                    jv[i, j] += by_rate * gradients[a, i] * gradients[b, j]
+        for b in range(4):
+            for i in range(ROW_SIZE):
+                slopes[a, i] += along * per_stiffness * second[3, b] * gradients[b, i]
 
 
 @kernel
@@ -318,8 +392,10 @@ def fast_flank_force(
     misalignment = table.nominal[m, NOMINAL_MISALIGNMENT]
     # Gears with their spin alone neither move apart nor tilt; of the other flank one is told only where it touches.
     spinning = meshes.spinning[m] == 1
+    tilt_rate = 0.0
     if not spinning and (side > 0 or delta > table.lowest[m]):
-        misalignment += mesh_row(q, v, index, axis, misalignment_row, c, s, memory.gradient[ALONG_FORCE])[0]
+        tilt, tilt_rate = mesh_row(q, v, index, axis, misalignment_row, c, s, memory.gradient[ALONG_FORCE])
+        misalignment += tilt
     if side > 0:
         state[LAST_DEFLECTION], state[LAST_RATE], state[LAST_MISALIGNMENT] = delta, rate, misalignment
     if delta <= table.lowest[m]:
@@ -329,25 +405,32 @@ def fast_flank_force(
     centre = table.nominal[m, NOMINAL_DISTANCE] + state[LAST_CENTRE]
     # From step to step the load stays on a piece: the search begins where it ended.
     guess = memory.pieces[m, number]
-    piece, _ = surface_law(delta, pmc, centre, sense * misalignment, m, table, guess, ENERGY_DERIVATIVES, law_memory)
+    wanted = ENERGY_DERIVATIVES if spinning else DAMPING_DERIVATIVES
+    piece, t = surface_law(delta, pmc, centre, sense * misalignment, m, table, guess, wanted, law_memory)
     memory.pieces[m, number] = piece
-    law = law_memory.law
-    damping = table.damping_time[m] * law[LAW_STIFFNESS]
-    force = law[LAW_FORCE] + damping * rate
+    law, damping = law_memory.law, memory.damping
+    # Gears that stay where they are damp along the deflection alone.
+    if spinning:
+        damping[:] = 0.0
+    else:
+        surface_damping(t, piece, m, table, law_memory, damping)
+    damped, along_centre, along_tilt, lost = damped_forces(
+        table.damping_time[m], law[LAW_STIFFNESS], damping, rate, state[LAST_CENTRE_RATE], sense * tilt_rate
+    )
+    force = law[LAW_FORCE] + damped
     for i in range(ROW_SIZE):
         total[i] += force * gradient[i]
     if not spinning:
+        apart, moment = law[LAW_BY_DISTANCE] + along_centre, sense * (law[LAW_BY_MISALIGNMENT] + along_tilt)
         for i in range(FRAME):
-            memory.row[i] = (
-                law[LAW_BY_DISTANCE] * table.centre[m, i] + law[LAW_BY_MISALIGNMENT] * sense * misalignment_row[i]
-            )
+            memory.row[i] = apart * table.centre[m, i] + moment * misalignment_row[i]
         mesh_row(q, v, index, axis, memory.row, c, s, memory.gradient[ALONG_FORCE])
         for i in range(ROW_SIZE):
             total[i] += memory.gradient[ALONG_FORCE, i]
     state[LAST_FORCE] += side * force
     state[LAST_OUTSIDE] = max(state[LAST_OUTSIDE], law[LAW_OUTSIDE])
     state[LAST_ENERGY] += law[LAW_POTENTIAL]
-    state[LAST_DAMPED] += damping * rate * rate
+    state[LAST_DAMPED] += lost
     state[LAST_CYCLE] -= law[LAW_BY_PMC] * cycles * (v[index[SPIN_1]] - v[index[FRAME]])
 
 
@@ -371,7 +454,8 @@ def fast_table_force(
     memory.states[m, :] = 0.0
     if meshes.spinning[m] == 0:
         index, gradient = meshes.coordinates[m], memory.gradient[ALONG_FORCE]
-        memory.states[m, LAST_CENTRE] = mesh_row(q, v, index, meshes.axis[m], table.centre[m], c, s, gradient)[0]
+        centre, rate = mesh_row(q, v, index, meshes.axis[m], table.centre[m], c, s, gradient)
+        memory.states[m, LAST_CENTRE], memory.states[m, LAST_CENTRE_RATE] = centre, rate
     for side in (1, -1):
         fast_flank_force(q, v, m, side, meshes, table, c, s, law_memory, memory)
 

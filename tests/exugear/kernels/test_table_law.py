@@ -16,6 +16,7 @@ import xarray as xr
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.statics import locked_equilibrium
+from exugear.kernels.meshes import DAMPED_POWER
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.runs.runup import simulate
@@ -29,7 +30,7 @@ from fe_ste.transmission_error.surface import SteSurface
 from ..assembled import assembled, modes_with_bodies, simulated
 from ..plain_signals import energies_of, sampled
 from ..spur_case import SPUR_CASE
-from ..table_case import surfaces
+from ..table_case import STIFFNESS, surface_of, surfaces
 
 VARIANTS = ["rigid", "bushing"]
 
@@ -82,9 +83,40 @@ def test_jacobian_equals_finite_differences(grc: Gearbox, tables: dict, variant:
     h = 2e-8  # of 50 um of deflection: the law bends within a micrometre
     found_q = np.array([(force(q + h * e, v) - force(q - h * e, v)) / (2 * h) for e in np.eye(assembly.size)]).T
     found_v = np.array([(force(q, v + e) - force(q, v - e)) / 2.0 for e in np.eye(assembly.size)]).T
-    # Round-off of 1e5 N over 2e-8 m, against 1e10 N/m.
-    assert np.abs(jq - found_q).max() < 1e-6 * np.abs(jq).max()
+    # The tangent leaves out how directions of the damping change with the place, which acts at speed alone.
+    assert np.abs(jq - found_q).max() < 1e-5 * np.abs(jq).max()
     assert np.abs(jv - found_v).max() < 1e-6 * np.abs(jv).max()
+    rest = np.zeros(assembly.size)
+    found_q = np.array([(force(q + h * e, rest) - force(q - h * e, rest)) / (2 * h) for e in np.eye(assembly.size)]).T
+    # Round-off of 1e5 N over 2e-8 m, against 1e10 N/m.
+    still = assembly.mesh_jacobians(q, rest)[0]
+    assert np.abs(still - found_q).max() < 1e-6 * np.abs(still).max()
+
+
+@pytest.mark.parametrize("flank", [1, -1])
+def test_damping_is_a_time_times_the_tangent_along_all_that_moves(grc: Gearbox, flank: int) -> None:
+    """Of teeth that resist tilting; of others the part of the tangent that pushes the wrong way does not damp."""
+    time = grc.case.damping.mesh_time_s
+    for hollow, same in ((-0.2, True), (0.2, False)):
+        given = {name: surface_of(grc, name, hollow=hollow) for name in STIFFNESS}
+        assembly = frozen(assembled(grc, Choice("bushing", "table"), given))
+        q, v = in_contact(assembly, 2, flank)
+        # These tables have no stiffness between the axes, but a coupling to tilts, which no damper can have.
+        meshes = assembly.meshes
+        rigid = meshes._replace(table=meshes.table._replace(centre=np.zeros_like(meshes.table.centre)))
+        assembly = replace(assembly, meshes=rigid)
+        jq, jv = assembly.mesh_jacobians(q, np.zeros_like(v))
+        found = np.linalg.eigvalsh(jv)
+        assert found.max() < 1e-9 * -found.min()
+        # Rows that turn with the carrier under load are no stiffness of the teeth: planets' spins and tilts alone.
+        moved = [assembly.coordinates[body][i] for body in ("ims", "hss") for i in range(6)]
+        place = np.ix_(moved, moved)
+        apart = np.abs(jv[place] - time * jq[place]).max()
+        assert (apart < 1e-9 * np.abs(jv[place]).max()) == same
+        states = assembly.mesh_states(q, v)
+        assert (states[:, DAMPED_POWER] >= 0.0).all()
+        damped = assembly.mesh_forces(q, v, assembly.meshes) - assembly.mesh_forces(q, 0.0 * v, assembly.meshes)
+        assert -damped @ v == pytest.approx(states[:, DAMPED_POWER].sum(), rel=1e-9)
 
 
 @pytest.mark.parametrize("variant", VARIANTS)

@@ -161,7 +161,7 @@ def test_the_state_itself_is_a_balance_with_its_moment(bent: Assembly) -> None:
 
 @pytest.mark.parametrize("flank", [1, -1])
 def test_contact_of_a_table_is_its_law_near_the_state_on_either_flank(grc: Gearbox, flank: int) -> None:
-    """Moment and tangent of the law `table` in deflection and tilts are those of the state that it gives.
+    """Moment, tangent and damping of the law `table` in deflection and tilts are those of the state that it gives.
 
     Gear 1 is turned by hand so that it presses and tilts; the push between the axes, which the state leaves out, is
     taken off the table's law.
@@ -190,9 +190,10 @@ def test_contact_of_a_table_is_its_law_near_the_state_on_either_flank(grc: Gearb
     # In motions that tilt and that close the teeth, all others being free.
     motions = np.zeros((table.size, 2))
     motions[own[:2], 0], motions[own[2], 1] = row, 1.0
-    ours, theirs = (-motions.T @ table.mesh_jacobians(q, rest, meshes)[0] @ motions for meshes in (plain, one))
-    basis = np.linalg.cholesky(theirs)
-    assert np.abs(np.linalg.solve(basis, np.linalg.solve(basis, ours).T) - np.eye(2)).max() < 1e-3
+    for ours, theirs in zip(table.mesh_jacobians(q, rest, plain), table.mesh_jacobians(q, rest, one), strict=True):
+        basis = np.linalg.cholesky(-motions.T @ theirs @ motions)
+        both = np.linalg.solve(basis, np.linalg.solve(basis, motions.T @ ours @ motions).T)
+        assert np.abs(both + np.eye(2)).max() < 1e-3
 
 
 def contact_of(tables: TableArrays, force: float, misalignment: float) -> ContactState:
