@@ -67,7 +67,6 @@ WANTED = 6.0
 """Rise of the reference's peak, dB."""
 
 
-
 @dataclass(frozen=True)
 class Given:
     """What all sets share: the gearbox, its mesh stiffness, and the contact of its teeth at rest.

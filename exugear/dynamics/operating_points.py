@@ -112,10 +112,10 @@ def at_static_load(assembly: Assembly) -> Assembly:
 
 def _with_contacts(assembly: Assembly) -> tuple[Assembly, Floats | None]:
     """Let teeth bear as finite elements have it where gears stand at rest; with the last state of the search."""
-    near = None
+    near, even = None, assembly
     for _ in range(CONTACT_STEPS if contact_places(assembly, np.zeros(assembly.size)) else 0):
         near, _laws = _loaded_state(assembly, near)
-        assembly = assembly.with_contacts(static_contacts(contact_places(assembly, near)))
+        assembly = even.with_contacts(static_contacts(contact_places(assembly, near)))
     for remark in assembly.contacts.remarks:
         _tell(remark)
     return assembly, near

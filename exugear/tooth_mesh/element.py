@@ -99,7 +99,7 @@ class MeshElement:
     computed_from: TableInput | None = None
 
     def with_contact(self, contact: ContactState) -> MeshElement:
-        """Return the mesh with a contact that was solved, in the axes of its pair's table.
+        """Return the mesh, whose teeth bear evenly so far, with a contact that was solved, in the axes of its table.
 
         The mean of a curved law's stiffness is then that of the contact, the table's changes over the mesh cycle upon
         it. Where gears stand so askew that flanks touch long before or after their middles would, the deflection at
@@ -113,7 +113,8 @@ class MeshElement:
             secant = secant * (contact.force / yielding / np.mean(secant))
             tangent = tangent * (contact.tangent_stiffness / np.mean(tangent))
             load = contact.force
-        slope, shift = np.array(_by_distance(contact, self)) - _by_distance(self.contact, self)
+        slope = contact.deflection_by_distance
+        shift = slope * (self.mesh.centre_distance + float(self.offset[1]) - contact.centre_distance)
         return replace(
             self,
             stiffness=secant,
@@ -238,14 +239,6 @@ def _at_load(law: Law, data: MeshData, mesh: Mesh, static_force: float) -> tuple
         if not (np.all(np.isfinite(values)) and np.all(values > 0.0)):
             raise MeshError(f"pair {mesh.pair.name}: mesh stiffness must be positive and finite")
     return secant, tangent, load
-
-
-def _by_distance(contact: ContactState | None, element: MeshElement) -> tuple[float, float]:
-    """How much teeth yield by the centre distance: its slope, and at zero coordinates (m)."""
-    if contact is None:
-        return 0.0, 0.0
-    apart = element.mesh.centre_distance + element.offset[1] - contact.centre_distance
-    return contact.deflection_by_distance, contact.deflection_by_distance * float(apart)
 
 
 def _offset(mesh: Mesh, displaced: Mapping[str, tuple[float, float]], deflection: Floats, centre: Floats) -> Floats:

@@ -140,7 +140,7 @@ def test_dynamics_refuses_a_table_of_another_input_but_not_of_other_positions(ca
     gearbox = Gearbox.from_toml(case)
     requested_tables(gearbox, out, positions=9)[0].compute()
     assert not missing_tables(gearbox, out)
-    assert mesh_stiffness(gearbox, "line_of_action", out)["spur"].shape == (9,)
+    assert mesh_stiffness(gearbox, "line_of_action", out)["spur"].stiffness.shape == (9,)
     wider = gearbox.varied({"gears.wheel.face_width_mm": 16.0})
     assert [request.name for request in missing_tables(wider, out)] == ["spur"]
     with pytest.raises(MeshError, match="another input"):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import astuple
+from dataclasses import astuple, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.templates.kinds import template
 from exugear.tooth_mesh.law import MeshCurve
+from exugear.tooth_mesh.static_contact import StaticContacts, static_contacts
 from fe_ste.contact.kinematics import ContactError
 from fe_ste.tools.arrays import Floats
 from fe_ste.transmission_error.known_contacts import forget_contacts
@@ -143,6 +144,27 @@ def test_equal_planets_share_one_contact_and_others_have_their_own() -> None:
     suns = [contacts[f"sun_planet_{number}"] for number in (1, 2, 3)]
     assert suns[0] is suns[1] is suns[2]
     assert len({id(contact) for contact in contacts.values()}) == 4
+
+
+def test_teeth_far_askew_press_with_their_force_at_their_deflection(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A deflection at mid-face that is mostly gap shifts the curve once, however many steps there are."""
+
+    def askew(places: Any) -> StaticContacts:
+        found = static_contacts(places)
+        moved = {mesh: replace(one, deflection=one.deflection - 60e-6) for mesh, one in found.contacts.items()}
+        return StaticContacts(moved, found.unsolved)
+
+    monkeypatch.setattr(exugear.dynamics.operating_points, "static_contacts", askew)
+    curves = curves_of("grc")
+    assembly = assemble(gearbox_of("grc"), Choice("bushing", "line_of_action"), curves)
+    even = assemble(gearbox_of("grc"), Choice("bushing", "iso6336"), {name: np.array([2e9]) for name in curves})
+    for element, plain in zip(assembly.elements, even.elements, strict=True):
+        contact = element.contact
+        assert contact.deflection < 0.0
+        apart = element.mesh.centre_distance - contact.centre_distance
+        # At zero coordinates, the deflection that the curve sees where that at mid-face is the contact's.
+        seen = contact.deflection + element.offset[0] - plain.offset[0] + contact.deflection_by_distance * apart
+        assert float(np.mean(element.stiffness)) * seen == pytest.approx(contact.force, rel=1e-9)
 
 
 def test_what_is_kept_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
