@@ -26,6 +26,6 @@ def contacts(gearbox: Gearbox) -> dict[str, ContactState]:
     for n, mesh in enumerate(gearbox.meshes):
         force = 1e5 * (1.0 + 0.1 * n)
         found[mesh.name] = ContactState(
-            force, 30e-6 + 1e-6 * n, 4e9, 1e-4 - 3e-5 * n, -2e-3 + 4e-4 * n, 3e-3 - 7e-4 * n, 1e7 + 1e6 * n
+            force, 30e-6 + 1e-6 * n, 6e9, 1e-4 - 3e-5 * n, -2e-3 + 4e-4 * n, 3e-3 - 7e-4 * n, 1e7 + 1e6 * n
         )
     return found
