@@ -118,13 +118,18 @@ def constant_speed_of(response: xr.Dataset) -> ConstantSpeed:
     return ConstantSpeed(speed[rising], response["order"].to_numpy(), level)
 
 
-def truest_of(responses: Iterable[xr.Dataset], choice: Choice) -> ConstantSpeed | None:
-    """Levels of a choice by the response that leaves least out; None if there is none over a range of speeds.
+def truest_response(responses: Iterable[xr.Dataset], choice: Choice) -> xr.Dataset | None:
+    """Steady response of a choice that leaves least out; None if there is none over a range of speeds.
 
     Branches are no function of speed and are left to the section on steady responses.
     """
     own = [data for data in responses if choice_of(data.attrs) == choice and not settings_of(data.attrs).branches]
-    best = max(own, key=lambda data: LEVELS.index(data.attrs["level"]), default=None)
+    return max(own, key=lambda data: LEVELS.index(data.attrs["level"]), default=None)
+
+
+def truest_of(responses: Iterable[xr.Dataset], choice: Choice) -> ConstantSpeed | None:
+    """Levels of a choice by the response that leaves least out, as `truest_response` finds it."""
+    best = truest_response(responses, choice)
     return None if best is None else constant_speed_of(best)
 
 

@@ -13,6 +13,7 @@ from exugear.findings.groups import RankedResonance, RunGroup
 from exugear.findings.levers import Lever, levers_of
 from exugear.findings.variations import GAIN, BestChange, ModelVariations, best_change
 from exugear.findings.words import VARIANTS, Words, figure_text
+from exugear.loudness.ranking import Loudness, Ranking
 from exugear.model.parts import RPM
 from exugear.spectra.orders import order_lines
 from exugear.steady.peaks import peaks
@@ -107,6 +108,8 @@ def facts_of_response(words: Words, response: xr.Dataset) -> tuple[Fact, ...]:
 
 
 def _loudest(context: Context, words: Words, group: RunGroup) -> Fact | None:
+    if group.in_operation is not None:
+        return _in_operation(words, group, group.in_operation)
     top = group.loudest
     if top is None:
         highest = max(float(run.spectra.speed.max()) for run in group.runs.values())
@@ -127,6 +130,31 @@ def _loudest(context: Context, words: Words, group: RunGroup) -> Fact | None:
     )
     beside = f"at {speed_text(top.speed)}, {VARIANTS[group.main]}"
     return Fact("Loudest resonance", frequency_text(top.frequency), beside, said, "rings")
+
+
+def _in_operation(words: Words, group: RunGroup, ranking: Ranking) -> Fact:
+    """Tell the resonance that comes first by any of three quantities at constant speed, where the gearbox works."""
+    low, high = (speed_text(speed) for speed in ranking.speeds)
+    where = f"from {low} to {high}" + ("" if ranking.whole else ", the speeds of operation")
+    if not ranking.resonances:
+        return Fact("Loudest resonance", "none", "that stands out", f"No peak stands out {where}.", "ranking")
+    top = ranking.resonances[0]
+    parts = [quantity_text(words, name, own, ranking) for name, own in top.loudness.items()]
+    said = f"Excited by {words.told(top.line)}. At constant speed, {where}: {'; '.join(parts)}."
+    beside = f"at {speed_text(top.speed)}, {VARIANTS[group.main]}"
+    return Fact("Loudest resonance", frequency_text(top.frequency), beside, said, "ranking")
+
+
+def quantity_text(words: Words, name: str, own: Loudness, ranking: Ranking) -> str:
+    """Amplitude of a resonance in one of the three quantities, with its place and where it is largest."""
+    count = sum(name in other.loudness for other in ranking.resonances)
+    place = "no peak of its own" if own.place is None else f"place {own.place} of {count}"
+    if name == "error":
+        return f"the overall transmission error swings by ±{figure_text(1e6 * own.amplitude)} µm ({place})"
+    at = words.of(own.at)
+    if name == "force":
+        return f"the largest bearing force by ±{figure_text(1e-3 * own.amplitude)} kN, {at} ({place})"
+    return f"the {ranking.accelerates} at bearings by ±{figure_text(own.amplitude)} m/s², {at} ({place})"
 
 
 def _unseen(context: Context, words: Words, group: RunGroup, top: RankedResonance) -> Fact | None:

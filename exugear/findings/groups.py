@@ -19,9 +19,11 @@ from exugear.findings.constant_speed import (
     is_over_speed,
     response_spectra,
     truest_of,
+    truest_response,
 )
 from exugear.findings.context import REFERENCE_VARIANT, Context, choice_of
 from exugear.findings.stored import StoredResults, run_key
+from exugear.loudness.ranking import Ranking, ranking_of
 from exugear.model.choice import Choice
 from exugear.spectra.comparison import AbsenceRule, Comparison, compare, only_in_first
 from exugear.spectra.line_spectra import pick_line_peaks
@@ -104,6 +106,8 @@ class RunGroup:
         Levels at constant speed of run-ups that have a steady response.
     responses : mapping of variant to Dataset
         Steady responses that the group is made of; none where it is made of run-ups.
+    in_operation : Ranking or None
+        Resonances of the main variant's steady response at speeds of operation, by three quantities; None without one.
     """
 
     source: str
@@ -114,6 +118,7 @@ class RunGroup:
     comparisons: Mapping[str, Comparison]
     constant: Mapping[str, ConstantSpeed]
     responses: Mapping[str, xr.Dataset] = field(default_factory=dict)
+    in_operation: Ranking | None = None
 
     @property
     def name(self) -> str:
@@ -166,7 +171,9 @@ def _group(context: Context, key: tuple[str, str, str], runs: Sequence[VariantRu
         for variant, run in by_variant.items()
         if reference is not None and run is not reference
     }
-    return RunGroup(f"run-up {key[0]}", *key[1:], by_variant, ranked, comparisons, constant)
+    response = truest_response(results.steady, Choice(ordered[-1].variant, *key[1:]))
+    loud = None if response is None or not is_over_speed(response) else ranking_of(response)
+    return RunGroup(f"run-up {key[0]}", *key[1:], by_variant, ranked, comparisons, constant, in_operation=loud)
 
 
 def response_groups(context: Context, results: StoredResults) -> tuple[RunGroup, ...]:
@@ -193,7 +200,8 @@ def _response_group(
     reference, rule = runs.get(REFERENCE_VARIANT), AbsenceRule()
     others = {variant: run for variant, run in runs.items() if run is not reference}
     comparisons = {} if reference is None else {name: Comparison(run, reference, rule) for name, run in others.items()}
-    return RunGroup(f"constant speed, level {key[0]}", *key[1:], runs, ranked, comparisons, {}, own)
+    loud = ranking_of(list(own.values())[-1])
+    return RunGroup(f"constant speed, level {key[0]}", *key[1:], runs, ranked, comparisons, {}, own, loud)
 
 
 def _as_run(context: Context, data: xr.Dataset, results: StoredResults) -> VariantRun:

@@ -66,6 +66,16 @@ class Lattice:
         spectrum[slot[mirrored]] = coefficients[mirrored].conj()
         return np.asarray(np.fft.irfft(spectrum, self.samples, axis=0) * self.samples)
 
+    def along_base(self, base: int, coefficients: Complexes) -> Floats:
+        """Sample (..., samples) functions of the angle of one base with harmonics (..., h + 1), fewer than samples / 2.
+
+        One transform gives them at all angles that samples have; each sample then takes its own.
+        """
+        spectrum = np.zeros((*coefficients.shape[:-1], self.samples // 2 + 1), dtype=complex)
+        spectrum[..., : coefficients.shape[-1]] = coefficients
+        even = np.fft.irfft(spectrum, self.samples, axis=-1) * self.samples
+        return np.asarray(even[..., np.arange(self.samples) * self.generator[base] % self.samples])
+
     def coefficients(self, values: Floats) -> Complexes:
         """Find the coefficients (lines, ...) of the lines in samples (samples, ...)."""
         slot, mirrored = self._slots

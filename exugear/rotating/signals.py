@@ -107,15 +107,27 @@ def _slopes(function: Callable[[Floats], Floats], size: int, step: float) -> Flo
     return np.array(columns).T
 
 
+def carried_seats(assembly: Assembly) -> dict[str, bool]:
+    """Tell of each bearing, planets' by their family, whether its seat's acceleration is that of what carries it.
+
+    It is where that is elastic, as a housing may be; else it is that of the shaft.
+    """
+    return {own.family: carried for own, carried in zip(assembly.supports, _carried(assembly), strict=True)}
+
+
+def _carried(assembly: Assembly) -> list[bool]:
+    starts = assembly.connectors.bodies
+    return [bool(starts[n][0] >= 0 and own.on in assembly.elastic_bodies) for n, own in enumerate(assembly.supports)]
+
+
 def _seat_rows(assembly: Assembly) -> Floats:
     """Displacement of the seat of each support by the coordinates, (3 supports, size).
 
     The seat is that in the housing where it is elastic, else that on the body.
     """
-    rows = np.zeros((3 * len(assembly.supports), assembly.size))
+    rows, carried = np.zeros((3 * len(assembly.supports), assembly.size)), _carried(assembly)
     for n, (starts, local) in enumerate(zip(assembly.connectors.bodies, assembly.connectors.local, strict=True)):
-        fixed_moves = starts[0] >= 0 and assembly.supports[n].on in assembly.elastic_bodies
-        end = 0 if fixed_moves or starts[1] < 0 else 1
+        end = 0 if carried[n] or starts[1] < 0 else 1
         if starts[end] < 0:
             continue
         x, y, z = local[end]

@@ -26,6 +26,8 @@ BALANCED = 1e-8
 """Residual of the balance over the size of the deflections."""
 STEP_TOLERANCE = 1e-3
 """Residual of a Newton step's linear equations over that of the balance."""
+LINEAR_TOLERANCE = 1e-9
+"""The same where forces are linear in the readings."""
 MOST_STEPS = 40
 PATIENCE, STALLED = 6, 0.5
 """Newton steps over which the residual has to fall to this share, or the search is given up."""
@@ -100,22 +102,41 @@ class Balance:
         """
         if self.gearset.parting:
             return np.zeros((6, 0, 0))
-        gearset, positions = self.gearset, places.positions
-        both = gearset.cycle_curves if self._curved else (gearset.cycle_coefficients, gearset.cycle_pulls)
-        rate = 2j * np.pi * np.arange(both[0].shape[1])
-        twice = np.where(np.arange(both[0].shape[1]) > 0, 2.0, 1.0)
+        positions, spectra = places.positions, self._cycle_spectra
+        rate = 2j * np.pi * np.arange(spectra.shape[2])
+        twice = np.where(np.arange(spectra.shape[2]) > 0, 2.0, 1.0)
         out = np.empty((6, *positions.shape))
         for u, n in enumerate(places.means[: positions.shape[1]]):
             if u and n == places.means[u - 1] and np.array_equal(positions[:, u], positions[:, u - 1]):
                 out[:, :, u] = out[:, :, u - 1]
                 continue
-            waves = np.exp(positions[:, [u]] * rate)
-            out[:, :, u] = np.real([waves @ (twice * own[n] * rate**order) for own in both for order in range(3)])
+            out[:, :, u] = (np.exp(positions[:, [u]] * rate) @ (twice * spectra[n]).T).real.T
         return out
 
     @cached_property
+    def _cycle_spectra(self) -> Complexes:
+        """Harmonics (m, 6, h + 1) over the mesh cycle of what `_stiffness` has."""
+        gearset = self.gearset
+        both = gearset.cycle_curves if self._curved else (gearset.cycle_coefficients, gearset.cycle_pulls)
+        rate = 2j * np.pi * np.arange(both[0].shape[1])
+        return np.stack([own * rate**order for own in both for order in range(3)], axis=1)
+
+    @cached_property
     def _on_lattice(self) -> Floats:
-        return self._stiffness(self.places)
+        """As `_stiffness` has it, on the samples of the lattice: each mesh follows the angle of one base."""
+        if self.gearset.parting:
+            return self._stiffness(self.places)
+        waves, positions = self.gearset.waves.waves, self.places.positions
+        forward, spectra = self.gearset.forward(self.interface.speed), self._cycle_spectra
+        out = np.empty((6, *positions.shape))
+        for u, n in enumerate(self.places.means[: positions.shape[1]]):
+            if u and n == self.places.means[u - 1] and positions[0, u] == positions[0, u - 1]:
+                out[:, :, u] = out[:, :, u - 1]
+                continue
+            # All angles are zero at the first sample.
+            own = spectra[n] * np.exp(2j * np.pi * positions[0, u] * np.arange(spectra.shape[2]))
+            out[:, :, u] = self.lattice.along_base(waves[n].base, own if forward[n] else own.conj())
+        return out
 
     def _sample(self, readings: Floats, rates: Floats, places: MeshPlaces, stiffness: Floats) -> LawSamples:
         """Sample the laws in all places: readings and rates (s, u, r), stiffness (6, s, u); results (s, u, ...)."""
@@ -195,7 +216,9 @@ class Balance:
         n, m, r = self.static.shape
         means = []
         for slopes in (sampled.slope, sampled.damping):
-            if there.ndim == 2:
+            if not slopes.any():
+                found = np.zeros((m, slopes.shape[2], m, slopes.shape[3]))
+            elif there.ndim == 2:
                 found = np.einsum("mu,ufr,uw->mfwr", back, slopes.mean(axis=0), there, optimize=True)
             else:
                 found = _mean_of_waves(there, back, slopes)
@@ -368,7 +391,8 @@ def solve_balance(balance: Balance, readings: Complexes, enough: float = BALANCE
         if error > STALLED * before[-PATIENCE]:
             break
         before.append(error)
-        step, took = tangent.solved(-missing)
+        # Forces that are linear in the readings take one step, which is as good as its equations are solved.
+        step, took = tangent.solved(-missing, LINEAR_TOLERANCE if balance.frozen else STEP_TOLERANCE)
         products += took
         share = 1.0
         while True:

@@ -28,7 +28,7 @@ LEAST_SHARE = 1e-3
 """Peaks below this share of the largest of their signal, in the range of operation too, are left to the even steps."""
 MOST = 240
 """Crossings at most, the strongest first."""
-LOUDEST = 120
+LOUDEST = 100
 """Peaks of each quantity whose tops are looked for, of all speeds and of the range of operation."""
 LEAST_STAND = 1e-4
 """Share by which a peak stands out at the known speeds to be looked at: more of it may show."""

@@ -15,9 +15,11 @@ import numpy as np
 from exugear.campbell.campbell import LAYOUT
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.statics import beside_unsolved_states
+from exugear.loads.operating_range import operating_range
 from exugear.model.choice import Choice
 from exugear.model.versions import STEADY
 from exugear.results.folder import modes_path
+from exugear.rotating.signals import carried_seats
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_response import Solved, SteadyResponse, response_of
 from fe_ste.tools.files import FileError
@@ -45,7 +47,19 @@ _LAYOUT = Layout(
     }
     | {name: (name,) for name in ("base", "signal", "mesh_wave")}
     | LAYOUT,
-    ("gearbox", "variant", "mesh_law", "inertias", "level", "input_hash", "growth_rate", "unsolved", "harmonics"),
+    (
+        "gearbox",
+        "variant",
+        "mesh_law",
+        "inertias",
+        "level",
+        "input_hash",
+        "growth_rate",
+        "unsolved",
+        "harmonics",
+        "operating_range",
+        "carried_seats",
+    ),
 )
 
 
@@ -119,6 +133,8 @@ def _attributes(response: SteadyResponse) -> dict[str, Any]:
         "beside_unsolved_states": ", ".join(beside_unsolved_states(assembly)),
         "planet_spread": response.planet_spread,
         "stiffness_variation": response.stiffness_variation,
+        "operating_range": json.dumps(operating_range(assembly.gearbox)),
+        "carried_seats": json.dumps(carried_seats(assembly)),
         "harmonics": response.harmonics,
         "change_with_more": response.change_with_more,
         "shared_lines": "; ".join(_shared(row, response.base_names) for row in response.lines.shared()),

@@ -30,13 +30,18 @@ from exugear.cli.tables import compute_missing_tables, refuse_unsolved
 if TYPE_CHECKING:
     import xarray as xr
 
+    from exugear.loudness.ranking import Ranking, Resonance
     from exugear.project import Project
     from exugear.steady.peaks import Peak, Pull
     from exugear.steady.settings import SteadySettings
 
 LEAST_AMPLITUDE = 1e-12
 """Amplitude of the overall transmission error below which a peak is round-off, m."""
-SHOWN_PEAKS = 15
+SHOWN_RESONANCES = 15
+KEYS = {"error": "m", "force": "N", "acceleration": "m_per_s2"}
+"""Units in the keys of `--json`."""
+COLUMNS = {"error": ("um", 1e6), "force": ("kN", 1e-3), "acceleration": ("m/s2", 1.0)}
+"""Titles of the table, which are units, and what one of SI is in them."""
 NOTICED_CHANGE = 1e-2
 """Change of the loudest peaks by more harmonics that is to be minded."""
 NOTICED_VARIATION = 1e-3
@@ -139,11 +144,10 @@ def _respond(project: Project, settings: SteadySettings) -> xr.Dataset:
 
 
 def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json: bool) -> None:
+    from exugear.loudness.ranking import ranking_of
     from exugear.model.parts import RPM
-    from exugear.steady.peaks import peaks
 
-    path, found = project.steady_path(settings), [peak for peak in peaks(data) if peak.amplitude > LEAST_AMPLITUDE]
-    growth = float(data.attrs["growth_rate"])
+    growth, ranking = float(data.attrs["growth_rate"]), ranking_of(data)
     _tell_of_stability(data, growth)
     pulling = _tell_of_pulls(data)
     _tell_of_bearings(data)
@@ -155,48 +159,85 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
             f"Nothing excites the gearbox: by the mesh law {data.attrs['mesh_law']} no stiffness varies over the mesh "
             "cycle, and all lines are zero; take the law line_of_action"
         )
-    elif not found:
-        note("No peak stands out over these speeds")
-    if excited:
+    else:
         _tell_of_harmonics(data)
+        _tell_of_range(ranking)
     if as_json:
-        print_json(
-            {
-                "case": project.gearbox.source,
-                **{key: str(data.attrs[key]) for key in ("variant", "mesh_law", "inertias", "level")},
-                "speeds": int(data.sizes["point"]),
-                "lines": int(data.sizes["line"]),
-                "growth_rate_1_per_s": growth,
-                "excited": excited,
-                "harmonics": int(data.attrs["harmonics"]),
-                "left_out_of_compliance": _left_out(data),
-                "change_with_more_harmonics": _known(float(data.attrs["change_with_more"])),
-                "meshes_that_pull": [_pull_summary(pull) for pull in pulling],
-                "unsolved": [
-                    {"speed_rpm": own["speed"] / RPM, "reason": own["reason"]}
-                    for own in json.loads(data.attrs["unsolved"])
-                ],
-                "unstable_points": int((data["growth"] > 0.0).sum()),
-                "largest_energy_error": float(abs(data["energy_error"]).max()),
-                "folds_rpm": [fold / RPM for fold in json.loads(data.attrs["folds"])],
-                "planet_spread": float(data.attrs["planet_spread"]),
-                "stiffness_variation": float(data.attrs["stiffness_variation"]),
-                "bearings_in_time": str(data.attrs["bearings_in_time"]),
-                "shared_lines": str(data.attrs["shared_lines"]),
-                "peaks_of_overall_dte": [_summary(peak) for peak in found],
-                "file": str(path),
-            }
-        )
+        print_json(_whole_summary(project, settings, data, ranking, pulling, excited))
         _fail_if_doubtful(data, growth)
         return
-    shown = [_row(peak) for peak in found[:SHOWN_PEAKS]]
-    title = f"Overall transmission error, {project.choice.variant}, {settings.level}: its loudest peaks"
-    if shown:
-        print_table(title, shown)
+    title = f"Loudest resonances, {_speeds_of(ranking)}, {project.choice.variant}, {settings.level}"
+    if ranking.resonances:
+        print_table(title, [_row(own) for own in ranking.resonances[:SHOWN_RESONANCES]])
+        say(
+            "Overall transmission error, dynamic bearing force, acceleration at bearings (of the "
+            f"{ranking.accelerates}), each with its place"
+        )
     fastest = float(abs(data["speed"]).max()) / RPM
     decay = f"slowest decay {-growth:.3g} 1/s" if growth <= 0.0 else f"fastest growth {growth:.3g} 1/s"
+    path = project.steady_path(settings)
     say(f"{data.sizes['point']} speeds up to {fastest:.4g} rpm, {decay}, in {path}")
     _fail_if_doubtful(data, growth)
+
+
+def _whole_summary(
+    project: Project,
+    settings: SteadySettings,
+    data: xr.Dataset,
+    ranking: Ranking,
+    pulling: tuple[Pull, ...],
+    excited: bool,
+) -> dict[str, Any]:
+    from exugear.model.parts import RPM
+    from exugear.steady.peaks import peaks
+
+    found = [peak for peak in peaks(data) if peak.amplitude > LEAST_AMPLITUDE]
+    return {
+        "case": project.gearbox.source,
+        **{key: str(data.attrs[key]) for key in ("variant", "mesh_law", "inertias", "level")},
+        "speeds": int(data.sizes["point"]),
+        "lines": int(data.sizes["line"]),
+        "growth_rate_1_per_s": float(data.attrs["growth_rate"]),
+        "excited": excited,
+        "harmonics": int(data.attrs["harmonics"]),
+        "left_out_of_compliance": _left_out(data),
+        "change_with_more_harmonics": _known(float(data.attrs["change_with_more"])),
+        "meshes_that_pull": [_pull_summary(pull) for pull in pulling],
+        "unsolved": [
+            {"speed_rpm": own["speed"] / RPM, "reason": own["reason"]} for own in json.loads(data.attrs["unsolved"])
+        ],
+        "unstable_points": int((data["growth"] > 0.0).sum()),
+        "largest_energy_error": float(abs(data["energy_error"]).max()),
+        "folds_rpm": [fold / RPM for fold in json.loads(data.attrs["folds"])],
+        "planet_spread": float(data.attrs["planet_spread"]),
+        "stiffness_variation": float(data.attrs["stiffness_variation"]),
+        "bearings_in_time": str(data.attrs["bearings_in_time"]),
+        "shared_lines": str(data.attrs["shared_lines"]),
+        "ranked_speeds_rpm": [speed / RPM for speed in ranking.speeds],
+        "ranked_over_all_speeds": ranking.whole,
+        "accelerations_of": ranking.accelerates,
+        "resonances": [_resonance_summary(own) for own in ranking.resonances],
+        "peaks_of_overall_dte": [_summary(peak) for peak in found],
+        "file": str(project.steady_path(settings)),
+    }
+
+
+def _speeds_of(ranking: Ranking) -> str:
+    from exugear.model.parts import RPM
+
+    low, high = (speed / RPM for speed in ranking.speeds)
+    return f"{low:.4g} to {high:.4g} rpm"
+
+
+def _tell_of_range(ranking: Ranking) -> None:
+    """Say which speeds are ranked, where they are all, and where nothing stands out."""
+    if ranking.whole:
+        note(
+            "All speeds are ranked: none of those computed is one of operation, or the file names none "
+            "([operation] rated_speed_rpm, or speed_range_rpm)"
+        )
+    if not ranking.resonances:
+        note(f"No peak stands out at {_speeds_of(ranking)}")
 
 
 def _fail_if_doubtful(data: xr.Dataset, growth: float) -> None:
@@ -298,12 +339,32 @@ def _summary(peak: Peak) -> dict[str, Any]:
     }
 
 
-def _row(peak: Peak) -> dict[str, str]:
+def _resonance_summary(own: Resonance) -> dict[str, Any]:
     from exugear.model.parts import RPM
 
-    return {
-        "line": peak.line,
-        "rpm": f"{peak.speed / RPM:.2f}",
-        "Hz": f"{peak.frequency:.1f}",
-        "um": f"{1e6 * peak.amplitude:.3f}",
+    found: dict[str, Any] = {
+        "line": own.line,
+        "order": own.order,
+        "speed_rpm": own.speed / RPM,
+        "frequency_Hz": own.frequency,
+        "best_place": own.best,
     }
+    for quantity, loudness in own.loudness.items():
+        found[f"{quantity}_{KEYS[quantity]}"] = loudness.amplitude
+        found[f"{quantity}_place"] = loudness.place
+        if loudness.at:
+            found[f"{quantity}_at"] = loudness.at
+    return found
+
+
+def _row(own: Resonance) -> dict[str, str]:
+    from exugear.model.parts import RPM
+
+    found = {"line": own.line, "rpm": f"{own.speed / RPM:.2f}", "Hz": f"{own.frequency:.1f}"}
+    for quantity, loudness in own.loudness.items():
+        unit, factor = COLUMNS[quantity]
+        place = "" if loudness.place is None else f" ({loudness.place})"
+        found[unit] = f"{factor * loudness.amplitude:.3g}{place}"
+        if quantity == "force":
+            found["at"] = loudness.at
+    return found

@@ -6,6 +6,8 @@ import math
 
 from exugear.findings.groups import RankedResonance, RunGroup
 from exugear.findings.words import VARIANTS, figure_text, percentages
+from exugear.loudness.ranking import Resonance
+from exugear.model.parts import RPM
 from exugear.report.parts.material import Material, Part, only_for, told_groups
 from exugear.spectra.comparison import AbsenceRule
 from exugear.spectra.run_spectra import VariantRun
@@ -18,11 +20,20 @@ SHOWN_SPAN = 60.0
 BUILT_UP = 3.0
 """dB below the level at constant speed from which a run-up counts as too fast for a resonance."""
 NOT_NEAR = "no mode near"
+SHOWN = 10
+"""Resonances in the table by three quantities."""
+QUANTITIES = {
+    "error": ("Transmission error / µm", 1e6),
+    "force": ("Bearing force / kN", 1e-3),
+    "acceleration": ("Acceleration / m/s²", 1.0),
+}
+"""Titles of the three quantities, and their units over those of SI."""
 AT_CONSTANT = "Constant speed / dB, Hz"
 
 
 def ranking_section(material: Material) -> Part:
     """Rank the resonances of each run-up, and of each steady response, in a table."""
+    in_operation = [only_for(_in_operation(material, group), group.name) for group in material.groups]
     tables = [
         only_for(_table(material, group, variant), group.name, variant)
         for group in material.groups
@@ -34,9 +45,46 @@ def ranking_section(material: Material) -> Part:
         return Part("")
     controls = pieces.element("div", _variant_choice() + _filters(), class_="controls scripts-only")
     html = pieces.section(
-        "Resonances, loudest first", controls, *tables, pieces.paragraph(_rules(), "note"), name="ranking"
+        "Resonances, loudest first",
+        *in_operation,
+        controls,
+        *tables,
+        pieces.paragraph(_rules(), "note"),
+        name="ranking",
     )
     return Part(html, {}, "Ranking", "ranking")
+
+
+def _in_operation(material: Material, group: RunGroup) -> str:
+    """Table of the resonances of the main variant at constant speed, where the gearbox works, by three quantities."""
+    ranking = group.in_operation
+    if ranking is None or not ranking.resonances:
+        return ""
+    low, high = (figure_text(speed / RPM, 4) for speed in ranking.speeds)
+    which = "all speeds" if ranking.whole else "speeds of operation"
+    rows = [_loud_row(material, own) for own in ranking.resonances[:SHOWN]]
+    title = f"At constant speed, {VARIANTS[group.main]}, {which}, {low} to {high} rpm: the first {len(rows)}"
+    table = pieces.table(rows, ("Excited by", "At"), caption=title, name=f"in-operation-{group.name}", sortable=True)
+    note = (
+        f"In the order of the best place in any of the three; the place stands in brackets. Accelerations are those of "
+        f"the {ranking.accelerates} at bearings. Of planets it is the root of the mean square over them."
+    )
+    return pieces.element("h3", pieces.text(title)) + table + pieces.paragraph(note, "note")
+
+
+def _loud_row(material: Material, own: Resonance) -> dict[str, object]:
+    row: dict[str, object] = {
+        "Excited by": material.words.told(own.line),
+        "Speed / rpm": Cell(figure_text(abs(own.speed) / RPM, 4), abs(own.speed) / RPM),
+        "Frequency / Hz": Cell(f"{own.frequency:.1f}", own.frequency),
+    }
+    for name, loudness in own.loudness.items():
+        title, factor = QUANTITIES[name]
+        place = "" if loudness.place is None else f" ({loudness.place})"
+        row[title] = Cell(f"{figure_text(factor * loudness.amplitude)}{place}", loudness.amplitude)
+        if name == "force":
+            row["At"] = material.words.of(loudness.at)
+    return row
 
 
 def _variant_choice() -> str:
