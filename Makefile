@@ -38,8 +38,9 @@ done & \
 compiling=$$!; $(EXUGEAR) ste $(CASE) --out $(1) $(2); code=$$?; wait $$compiling; rm -rf $(1)/.kernels; exit $$code
 endef
 
-# The inertia sets side by side: each runs up both variants and takes their modes, one process after the other; the
-# first shows its progress, the others speak when all are done. Then the report, which compares them.
+# The inertia sets side by side: each runs up both variants, takes their modes and the steady response on bearings, one
+# process after the other; the first shows its progress, the others speak when all are done. Then the report, which
+# compares them, and whose headline is that of the steady response.
 #   $(call dynamics,FOLDER,INERTIA SETS,OPTIONS OF run)
 define dynamics
 @mkdir -p $(1)
@@ -50,6 +51,7 @@ define dynamics
 	for variant in rigid bushing; do \
 		$(EXUGEAR) modes $(CASE) --variant $$variant --inertias $$1 --out $(1) >$(1)/modes-$$variant-$$1.txt || return; \
 	done; \
+	$(EXUGEAR) steady $(CASE) --variant bushing --inertias $$1 --out $(1) >$(1)/steady-bushing-$$1.txt || return; \
 }; \
 others=; \
 for inertias in $(wordlist 2,9,$(2)); do of_set $$inertias >$(1)/run-$$inertias.log 2>&1 & others="$$others $$!"; done; \

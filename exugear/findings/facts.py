@@ -20,6 +20,8 @@ from exugear.steady.peaks import peaks
 
 DAMPING = "mesh damping"
 """Begin of the label of the parameter that damps."""
+SAME_MODE = 0.01
+"""Share of the frequency within which resonances belong to one mode."""
 NO_GAIN = 0.1
 """Gain (dB) below which a change makes no difference."""
 AROUND_RATED = 1.25
@@ -119,17 +121,21 @@ def _loudest(context: Context, words: Words, group: RunGroup) -> Fact | None:
     unseen = _unseen(context, words, group, top)
     if unseen is not None:
         return unseen
-    peak, modes = top.peak, group.runs[group.main].modes
-    moves = f": {words.told(top.finding.mode_name)}" if top.finding.mode_name else ""
-    if top.finding.mode is not None and modes is not None:
-        moves = f": {words.moves(modes, top.finding.mode)}"
     said = (
-        f"Excited by {words.line_sentence(peak.line)}. The overall transmission error swings by "
-        f"{amplitude_text(top.loudness)} ({figure_text(top.loudness)} dB){_how(group, top)}{moves}."
+        f"Excited by {words.line_sentence(top.peak.line)}. The overall transmission error swings by "
+        f"{amplitude_text(top.loudness)} ({figure_text(top.loudness)} dB){_how(group, top)}{_moves(words, group, top)}."
         f"{_against_rated(context, group)}"
     )
     beside = f"at {speed_text(top.speed)}, {VARIANTS[group.main]}"
     return Fact("Loudest resonance", frequency_text(top.frequency), beside, said, "rings")
+
+
+def _moves(words: Words, group: RunGroup, own: RankedResonance) -> str:
+    """Tell what moves in the mode of a resonance, after a colon; nothing where none is known."""
+    modes = group.runs[group.main].modes
+    if own.finding.mode is not None and modes is not None:
+        return f": {words.moves(modes, own.finding.mode)}"
+    return f": {words.told(own.finding.mode_name)}" if own.finding.mode_name else ""
 
 
 def _in_operation(words: Words, group: RunGroup, ranking: Ranking) -> Fact:
@@ -140,21 +146,24 @@ def _in_operation(words: Words, group: RunGroup, ranking: Ranking) -> Fact:
         return Fact("Loudest resonance", "none", "that stands out", f"No peak stands out {where}.", "ranking")
     top = ranking.resonances[0]
     parts = [quantity_text(words, name, own, ranking) for name, own in top.loudness.items()]
-    said = f"Excited by {words.told(top.line)}. At constant speed, {where}: {'; '.join(parts)}."
+    near = (own for own in group.ranked[group.main] if abs(own.frequency / top.frequency - 1.0) < SAME_MODE)
+    moves = next((told for told in (_moves(words, group, own) for own in near) if told), "")
+    mode = f" What moves{moves}." if moves else ""
+    said = f"Excited by {words.told(top.line)}. At constant speed, {where}: {'; '.join(parts)}.{mode}"
     beside = f"at {speed_text(top.speed)}, {VARIANTS[group.main]}"
     return Fact("Loudest resonance", frequency_text(top.frequency), beside, said, "ranking")
 
 
 def quantity_text(words: Words, name: str, own: Loudness, ranking: Ranking) -> str:
     """Amplitude of a resonance in one of the three quantities, with its place and where it is largest."""
-    count = sum(name in other.loudness for other in ranking.resonances)
+    count = sum(other.loudness[name].place is not None for other in ranking.resonances)
     place = "no peak of its own" if own.place is None else f"place {own.place} of {count}"
     if name == "error":
         return f"the overall transmission error swings by ±{figure_text(1e6 * own.amplitude)} µm ({place})"
     at = words.of(own.at)
     if name == "force":
         return f"the largest bearing force by ±{figure_text(1e-3 * own.amplitude)} kN, {at} ({place})"
-    return f"the {ranking.accelerates} at bearings by ±{figure_text(own.amplitude)} m/s², {at} ({place})"
+    return f"the {ranking.accelerates} accelerate at bearings by ±{figure_text(own.amplitude)} m/s², {at} ({place})"
 
 
 def _unseen(context: Context, words: Words, group: RunGroup, top: RankedResonance) -> Fact | None:

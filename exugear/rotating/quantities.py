@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fe_ste.tools.arrays import Complexes, Floats, Integers
+from fe_ste.tools.arrays import Complexes, Floats, Integers, SingleComplexes
 
 MEAN_OF_OTHERS = 0.5
 """What the square of a wave around the carrier has in the mean over the planets, but for that which all share."""
@@ -42,11 +42,11 @@ class Quantity:
     signals: tuple[Integers, ...]
     weights: tuple[Floats, ...]
 
-    def at(self, amplitude: Complexes, place: int) -> Complexes:
+    def at(self, amplitude: Complexes | SingleComplexes, place: int) -> Complexes:
         """Weighted amplitudes (..., k) at a place from those of all signals (..., signals)."""
         return np.asarray(amplitude[..., self.signals[place]] * self.weights[place])
 
-    def sizes(self, amplitude: Complexes | Floats) -> Floats:
+    def sizes(self, amplitude: Complexes | SingleComplexes | Floats) -> Floats:
         """Size (..., places) at each place from the amplitudes (..., signals) of all signals, complex or not."""
         own = [
             np.linalg.norm(amplitude[..., signals] * weights, axis=-1)

@@ -18,7 +18,7 @@ from exugear.rotating.mean_system import MeanSystem
 from exugear.rotating.mesh_ports import DEFLECTION
 from exugear.rotating.quantities import Quantity
 from exugear.steady.excitation import Gearset, Interface
-from fe_ste.tools.arrays import Booleans, Complexes, Floats
+from fe_ste.tools.arrays import Booleans, Complexes, Floats, SingleComplexes
 from fe_ste.tools.threads import side_by_side
 
 Forcing = Callable[[Interface], Complexes]
@@ -137,7 +137,7 @@ def with_crossings(speeds: Floats, found: tuple[Crossing, ...]) -> Floats:
 
 def missed_tops(
     speeds: Floats,
-    amplitude: Complexes,
+    amplitude: SingleComplexes,
     smooth: Booleans,
     quantities: Sequence[Quantity],
     operation: tuple[float, float] | None,

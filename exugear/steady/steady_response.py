@@ -21,7 +21,7 @@ from exugear.loads.operating_range import operating_range
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import RPM
-from exugear.rotating.quantities import quantities_of
+from exugear.rotating.quantities import Quantity, quantities_of
 from exugear.rotating.rotating_frame import SteadyError
 from exugear.rotating.signals import SignalName
 from exugear.steady.contributions import Contributions, contributions, loudest_near
@@ -32,7 +32,7 @@ from exugear.steady.resonances import HARMONICS, Crossing, crossings, missed_top
 from exugear.steady.response import Response, dissipated_and_given, signals
 from exugear.steady.settings import SteadySettings, check_law, check_speeds, usual_speeds
 from exugear.tooth_mesh.law import MeshData
-from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers, Texts
+from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers, SingleComplexes, Texts
 from fe_ste.tools.notebook import html_table, value_range
 from fe_ste.tools.threads import one_dense_thread
 
@@ -46,7 +46,7 @@ class Solved:
     speed : (points,) array
         Of the overall input, rad/s.
     amplitude : (points, lines, signals) complex array
-        Peak amplitudes; of line 0 the mean of the vibration about the static state.
+        Peak amplitudes; of line 0 the mean of the vibration about the static state. Single precision, as in the file.
     drive_torque : (points,) array
         N m.
     energy_error : (points,) array
@@ -64,7 +64,7 @@ class Solved:
     """
 
     speed: Floats
-    amplitude: Complexes
+    amplitude: SingleComplexes
     drive_torque: Floats
     energy_error: Floats
     products: Floats
@@ -184,7 +184,7 @@ class SteadyResponse:
         place, mirrored = self.lines.find(np.array(line, dtype=np.int64))
         if place < 0:
             raise SteadyError(f"no line {line}; single bases go up to {self.settings.harmonics}")
-        found = self.solved.amplitude[:, int(place), names.index(signal)]
+        found = self.solved.amplitude[:, int(place), names.index(signal)].astype(np.complex128)
         return np.conj(found) if mirrored else found
 
 
@@ -359,18 +359,26 @@ def _with_tops(solver: PointSolver, settings: SteadySettings, solved: Solved, wo
     quantities = quantities_of([own.name for own in solver.gearset.signal_names])
     operation = operating_range(solver.gearset.waves.assembly.gearbox)
     for _ in range(ROUNDS):
-        there = np.flatnonzero(np.isfinite(solved.drive_torque))
-        known = solved.part(there[np.argsort(solved.speed[there], kind="stable")])
-        smooth = np.asarray(~(known.apart.any(axis=1) | known.free.any(axis=1)))
-        more = missed_tops(known.speed, known.amplitude, smooth, quantities, operation)
+        more = _missed(solved, quantities, operation)
         if not more.size:
             break
-        longer = solved.joined_with(_empty(solver.gearset, more))
-        ahead = _continued(longer, len(solved.speed), lambda: PointSolver(solver.linear, settings), work)
+        count = len(solved.speed)
+        solved = solved.joined_with(_empty(solver.gearset, more))
+        solved = _continued(solved, count, lambda: PointSolver(solver.linear, settings), work)
         # A speed that nobody asked for and that has no state is none to tell of.
-        asked = np.arange(len(ahead.speed)) < len(solved.speed)
-        solved = ahead.part(asked | np.isfinite(ahead.drive_torque))
+        told = np.isfinite(solved.drive_torque)
+        told[:count] = True
+        if not told.all():
+            solved = solved.part(told)
     return solved
+
+
+def _missed(solved: Solved, quantities: tuple[Quantity, ...], operation: tuple[float, float] | None) -> Floats:
+    """Speeds of tops between those of solved points, which stand in any order."""
+    there = np.flatnonzero(np.isfinite(solved.drive_torque))
+    known = solved.part(there[np.argsort(solved.speed[there], kind="stable")])
+    smooth = np.asarray(~(known.apart.any(axis=1) | known.free.any(axis=1)))
+    return missed_tops(known.speed, known.amplitude, smooth, quantities, operation)
 
 
 def _change_with_more(solver: PointSolver, settings: SteadySettings, solved: Solved) -> float:
@@ -381,7 +389,7 @@ def _change_with_more(solver: PointSolver, settings: SteadySettings, solved: Sol
     if not gearset.waves.varies:
         return 0.0
     other = PointSolver(solver.linear.with_harmonics(math.ceil(MORE * gearset.usual_harmonics)), settings)
-    values = np.abs(solved.amplitude[:, :, 0])
+    values: Floats = np.abs(solved.amplitude[:, :, 0].astype(np.complex128))
     found = [(point, line) for line in range(1, values.shape[1]) for point in _tops_of(values[:, line])]
     found.sort(key=lambda peak: -values[peak])
     changes = [0.0]
@@ -470,7 +478,7 @@ def _empty(gearset: Gearset, speeds: Floats) -> Solved:
     shape = (points, len(gearset.lines.orders), len(gearset.signal_names))
     return Solved(
         speed=speeds,
-        amplitude=np.zeros(shape, dtype=complex),
+        amplitude=np.zeros(shape, dtype=np.complex64),
         drive_torque=np.zeros(points),
         energy_error=np.zeros(points),
         products=np.zeros(points),
@@ -483,8 +491,9 @@ def _empty(gearset: Gearset, speeds: Floats) -> Solved:
 
 def _fill(out: Solved, n: int, gearset: Gearset, response: Response) -> None:
     """Enter the response at one speed as point n."""
-    out.amplitude[n] = signals(gearset, response)
-    out.amplitude[n, 1:] *= 2.0
+    found = signals(gearset, response)
+    found[1:] *= 2.0
+    out.amplitude[n] = found
     taken, given = dissipated_and_given(gearset, response)
     out.drive_torque[n], out.products[n] = response.torque, response.products
     out.apart[n], out.free[n] = response.apart, response.free

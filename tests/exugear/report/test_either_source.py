@@ -90,7 +90,10 @@ def test_words_say_that_figures_are_of_constant_speed_and_name_the_mode_without_
     report = write_report(folder)
     page = html.unescape(report.path.read_text(encoding="utf-8"))
     (card,) = [line for line in report.statements if line.startswith("Loudest resonance")]
-    assert "at constant speed: shaft" in card
+    for words in ("At constant speed, from 50 rpm to 8000 rpm: the overall transmission error", "(place 1 of"):
+        assert words in card
+    assert "the shafts accelerate at bearings by" in card and "What moves: shaft" in card
+    assert "Accelerations are those of the shafts at bearings" in page
     for words in (
         "Read from: constant speed, level parametric",
         "On bearings, inertias disc, constant speed, level parametric",
