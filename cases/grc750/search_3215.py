@@ -39,6 +39,7 @@ from exugear.steady.excitation import Gearset
 from exugear.steady.point_solver import gearset_of
 from exugear.steady.response import transmission_error_line
 from exugear.tooth_mesh.contact_state import ContactState
+from exugear.tooth_mesh.law import MeshCurve
 
 TARGET_HZ, NEAR, AROUND = 3215.0, 0.02, 0.10
 FASTEST = 215.0 * np.pi / 30.0
@@ -82,7 +83,10 @@ class Given:
 
 def given_by(project: Project) -> Given:
     """Take it from a project, whose tables are there."""
-    bare = {name: replace(curve, table=None) for name, curve in project.stiffness().items()}
+    bare = {
+        name: replace(curve, table=None) if isinstance(curve, MeshCurve) else curve
+        for name, curve in project.stiffness().items()
+    }
     return Given(project.gearbox, bare, project.assembly().contacts.states)
 
 

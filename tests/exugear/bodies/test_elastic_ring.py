@@ -91,14 +91,16 @@ def test_load_and_deflection_do_not_depend_on_where_the_planets_stand(stage: Gea
 
 
 def test_the_ring_winds_up_between_its_flanges(ringed: Assembly, stage: Gearbox) -> None:
-    # By hand: half of the ring's torque on each flange, which yields by 1e-9 rad/(N m).
+    # By hand: half of the ring's torque on each flange, which yields by 1e-9 rad/(N m). Teeth that resist tilting
+    # bear a little beside the middle of the face, so that the flanges share unequally.
     load = stage.case.static_load
     q = locked_equilibrium(ringed, load.torques_N_m, load.locked, ringed.mean_meshes)
     torque = 240e3 * 99.0 / 120.0  # z_ring / (z_sun + z_ring)
     place = ringed.elastic_slices["housing"].start
     reduced = ringed.elastic_bodies["housing"].reduced
     flanges = [q[place + reduced.first_coordinate(name) + 5] for name in ("front", "rear")]
-    assert 1e9 * np.array(flanges) == pytest.approx([torque / 2.0, torque / 2.0], rel=1e-6)
+    assert 1e9 * np.sum(flanges) == pytest.approx(torque, rel=1e-6)
+    assert 1e9 * np.array(flanges) == pytest.approx([torque / 2.0, torque / 2.0], rel=2e-3)
 
 
 def test_the_tangent_of_the_meshes_is_the_derivative_of_their_forces(ringed: Assembly) -> None:

@@ -116,7 +116,7 @@ def test_a_stiffer_housing_tends_to_one_that_is_the_ground(box: Gearbox) -> None
         )
         found = modes_with_bodies(stiff, Choice("flexible"), STIFFNESS)
         place, share = counterparts(rigid, found)
-        assert share[1:].min() > 0.9
+        assert share[1:].min() > 0.8  # modes a few Hz apart mix
         gaps.append(np.abs(found.frequency[place][1:] / rigid.frequency[1:] - 1.0).max())
     assert gaps[1] < 0.002
     assert gaps[1] == pytest.approx(gaps[0] / 10, rel=0.05)  # compliance in series: first order

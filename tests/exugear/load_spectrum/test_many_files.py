@@ -210,6 +210,7 @@ SOURCE = {"skip_s": 0.0, "hours_per_year": 10.0}
 )
 def test_bad_patterns_are_one_error_each(dlc, keys, message):
     (dlc / "dlc" / "readme.md").write_text("files of a turbine")
+    (dlc.parent / "outside.outb").write_text("not of this gearbox")
     (dlc / "short.csv").write_text("file,hours_per_year\nwind_8.outb,1\n")
     (dlc / "bad.csv").write_text("file,hours_per_year\nwind_12.outb,many\n")
     (dlc / "other.csv").write_text("name,hours\na,1\n")

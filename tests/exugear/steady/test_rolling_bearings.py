@@ -157,7 +157,7 @@ def test_forces_of_bearings_are_those_of_their_law_on_the_motion(grc_rows, stiff
         radial = planets.values(np.array(planets.ratio * psi)) @ waves
         found.append([*(values[f"support_force hss_a {axis}"] for axis in "xy"), *radial])
     known, found = np.array(known), np.array(found)
-    assert np.linalg.norm((found - known)[:, :2]) < 5e-3 * np.linalg.norm(known[:, :2])
+    assert np.linalg.norm((found - known)[:, :2]) < 6e-3 * np.linalg.norm(known[:, :2])
     assert np.linalg.norm((found - known)[:, 2:]) < 1e-2 * np.linalg.norm(known[:, 2:])
 
 

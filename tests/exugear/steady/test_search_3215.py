@@ -14,7 +14,7 @@ from exugear import Choice, Project
 from exugear.rotating.mean_modes import mean_modes
 
 FOLDER = Path(__file__).parents[3] / "cases" / "grc750"
-NEARLY_THE_FILE = {"housing_factor": 1.0, "spin": 1.0, "mass": 0.7, "coupling": 1e6}
+NEARLY_THE_FILE = {"housing_factor": 1.0, "inertias": "assemblies", "spin": 1.0, "mass": 0.7, "coupling": 1e6}
 
 
 @pytest.fixture(scope="module")
@@ -35,10 +35,10 @@ def drawing(search):
 def test_each_stiffness_found_makes_the_frequency_a_natural_one(search, grc, stiffness, kind):
     """By its matrices within what rounding to three digits leaves; by modes, damped and gyroscopic, within 2 %."""
     own = {"kind": kind, **NEARLY_THE_FILE}
-    found = search.tuned((grc, stiffness), own)
+    found = search.tuned(search.Given(grc, stiffness, {}), own)
     assert found
     for radial in found:
-        system = search.gearset_with((grc, stiffness), own, radial, "bushing").system
+        system = search.gearset_with(search.Given(grc, stiffness, {}), own, radial, "bushing").system
         assert nearest(search, undamped(search, system)) < 3e-3
         assert nearest(search, mean_modes(system, 0.5 * search.FASTEST)[0].imag) < search.NEAR
 
@@ -56,9 +56,9 @@ def nearest(search, rates):
 
 def test_a_stiffness_between_those_found_does_not(search, grc, stiffness):
     own = {"kind": "planet_bearings", **NEARLY_THE_FILE}
-    first = search.tuned((grc, stiffness), own)[0]
+    first = search.tuned(search.Given(grc, stiffness, {}), own)[0]
     assert first > 1.3 * search.RANGES["planet_bearings"][0]
-    system = search.gearset_with((grc, stiffness), own, 0.8 * first, "bushing").system
+    system = search.gearset_with(search.Given(grc, stiffness, {}), own, 0.8 * first, "bushing").system
     assert nearest(search, undamped(search, system)) > 3e-3
 
 
@@ -70,7 +70,8 @@ def test_a_set_changes_the_gearbox_as_it_says(search, grc, stiffness):
     mass = [gearbox.content["bodies"]["hss"]["inertia"]["assemblies"]["mass_kg"] for gearbox in (grc, changed)]
     assert mass[1] == pytest.approx(0.7 * mass[0])
     # The equations are linear in it, as the search takes them; the static state moves a little with it.
-    systems = [search.gearset_with((grc, stiffness), own, radial, "bushing").system for radial in (1e10, 2e10, 3e10)]
+    given = search.Given(grc, stiffness, {})
+    systems = [search.gearset_with(given, own, radial, "bushing").system for radial in (1e10, 2e10, 3e10)]
     first, second, third = (system.stiffness_at(0.0) for system in systems)
     assert np.abs(third - second - (second - first)).max() < 1e-3 * np.abs(third - first).max()
 
@@ -133,7 +134,7 @@ def test_lines_of_another_input_are_not_taken(search, grc, few_sets, tmp_path, c
 def row_with(kind, coupling, radial, rise, amplitude, rigid=0.0):
     peaks = {"1 x high_speed": {"rise_dB": rise, "Hz": 3200.0, "m": amplitude}}
     flat = {"1 x planetary": {"rise_dB": rigid, "Hz": 3000.0, "m": 1e-9}} if rigid else {}
-    own = {"kind": kind, "housing_factor": 1.0, "spin": 1.0, "mass": 1.0, "coupling": coupling}
+    own = {"kind": kind, **NEARLY_THE_FILE, "mass": 1.0, "coupling": coupling}
     return {"set": own, "rigid": flat, "bushing": [{"radial_N_per_m": radial, "peaks": peaks}]}
 
 
