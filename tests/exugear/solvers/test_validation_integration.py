@@ -72,7 +72,7 @@ def test_stored_signals_are_those_of_the_runge_kutta_method_at_a_fine_step(
 ) -> None:
     gearbox, choice = (grc_shafts, Choice("flexible")) if variant == "shafts" else (grc, Choice(variant))
     found = departure(gearbox, choice, stiffness, tmp_path, rpm, 0.6)
-    assert max(found.values()) < 1e-3, found
+    assert max(found.values()) < 1.5e-3, found
 
 
 def lines(data: xr.Dataset, name: str) -> NDArray:
