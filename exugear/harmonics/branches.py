@@ -26,6 +26,7 @@ STEP_TOLERANCE = 1e-4
 MOST_CORRECTIONS = 8
 GOOD_CORRECTIONS = 4
 """Corrections up to which the next step is longer."""
+MOST_POINTS = 2000
 DIFFERENCE = 1e-5
 """Step of the derivative by the parameter, over the scale of the latter."""
 
@@ -52,10 +53,13 @@ class Branch:
     ----------
     parameter : (n,) array
     lines : (n, ...) complex array
+    whole : bool
+        Whether it goes on to where it was to end; else it has as many points as were allowed.
     """
 
     parameter: Floats
     lines: Complexes
+    whole: bool = True
 
     @property
     def folds(self) -> tuple[tuple[int, float], ...]:
@@ -79,7 +83,7 @@ def trace(
     *,
     step: float,
     longest: float,
-    most: int = 2000,
+    most: int = MOST_POINTS,
     solve: Solve | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Branch:
@@ -111,7 +115,8 @@ def trace(
     lines, parameters = [_at(residual, solve, start, first, scales)], [first]
     sense, length = np.sign(last - first), step
     tangent_lines, tangent_parameter = np.zeros_like(start), sense * scales.parameter
-    while len(parameters) < most:
+    whole = False
+    while not whole and len(parameters) < most:
         ahead = lines[-1] + length * tangent_lines, parameters[-1] + length * tangent_parameter
         found = _corrected(residual, solve, ahead, (tangent_lines, tangent_parameter), scales)
         if found is None:
@@ -126,10 +131,9 @@ def trace(
         parameters.append(p)
         if progress is not None:
             progress(p)
-        if (p - last) * sense >= 0.0 or (p - first) * sense < 0.0:
-            break
+        whole = bool((p - last) * sense >= 0.0 or (p - first) * sense < 0.0)
         length = min(longest, 1.5 * length) if corrections <= GOOD_CORRECTIONS else 0.7 * length
-    return Branch(np.array(parameters), np.array(lines))
+    return Branch(np.array(parameters), np.array(lines), whole)
 
 
 def _size(values: Complexes) -> float:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exugear.harmonics.branches import Scales, trace
+from exugear.harmonics.branches import Branch, Scales, trace
+from exugear.model.parts import RPM
 from exugear.rotating.mesh_ports import DEFLECTION
 from exugear.rotating.rotating_frame import SteadyError
 from exugear.steady.nonlinear import Balance, Tangent
@@ -33,12 +34,15 @@ class SteadyBranch:
         Fastest growth of a disturbance, 1/s, over the bases looked at one at a time.
     folds : tuple of float
         Speeds at which the branch turns back, rad/s.
+    ended : str
+        Why it ends before the last speed, and where; empty if it does not.
     """
 
     speed: Floats
     readings: Complexes
     growth: Floats
     folds: tuple[float, ...]
+    ended: str = ""
 
     def __repr__(self) -> str:
         """Points, range and folds in one line."""
@@ -115,4 +119,16 @@ def follow_branch(
         growth_of_state(balance_at(float(speed)), own, gearset.bent)
         for speed, own in zip(found.parameter, readings, strict=True)
     ]
-    return SteadyBranch(found.parameter, readings, np.array(growth), tuple(fold for _, fold in found.folds))
+    ended = "" if found.whole else _ended(found, last)
+    return SteadyBranch(found.parameter, readings, np.array(growth), tuple(fold for _, fold in found.folds), ended)
+
+
+def _ended(found: Branch, last: float) -> str:
+    """Say where a branch ended that has as many points as are allowed, and what it did there."""
+    p, turns = found.parameter, [n for n, _ in found.folds]
+    lately = sum(n > len(p) // 2 for n in turns)
+    return (
+        f"the branch ends at {p[-1] / RPM:.5g} rpm after {len(p)} points, before {last / RPM:.5g} rpm: its steps are "
+        f"short where teeth graze, and it turned back {len(turns)} times, {lately} of them in its second half; ask for "
+        "the speeds from there on, or leave --branches out"
+    )

@@ -186,19 +186,21 @@ class Balance:
 
         The last result is the whole forces (s, u, f) in time, in all places.
         """
-        if self._last and self._last[0][0] is readings:
-            return self._last[0][1]
-        there, back = self.places.there, self.places.back
-        values, rates = self._in_time(self._held(readings, self.static))
-        sampled = self._sample(there @ values, there @ rates, self.places, self._on_lattice)
-        excess = self.lattice.coefficients(back @ sampled.force) - self._mean_part(readings)
-        found = excess, Tangent(self, sampled), sampled.force
-        self._last[:] = [(readings, found)]
-        return found
+        if not self._last or self._last[0][0] is not readings:
+            there, back = self.places.there, self.places.back
+            values, rates = self._in_time(self._held(readings, self.static))
+            sampled = self._sample(there @ values, there @ rates, self.places, self._on_lattice)
+            excess = self.lattice.coefficients(back @ sampled.force) - self._mean_part(readings)
+            self._last[:] = [(readings, excess, sampled)]
+        _, excess, sampled = self._last[0]
+        return excess, Tangent(self, sampled), sampled.force
 
     @cached_property
-    def _last(self) -> list[tuple[Complexes, tuple[Complexes, Tangent, Floats]]]:
-        """The last readings and the forces that they gave: a search ends where others go on."""
+    def _last(self) -> list[tuple[Complexes, Complexes, LawSamples]]:
+        """The last readings and the forces that they gave: a search ends where others go on.
+
+        No tangent is kept: it refers to the balance, and the memory of both would not fall free at once.
+        """
         return []
 
     def change(self, sampled: LawSamples, step: Complexes) -> Complexes:

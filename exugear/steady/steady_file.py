@@ -140,6 +140,7 @@ def _attributes(response: SteadyResponse) -> dict[str, Any]:
         "shared_lines": "; ".join(_shared(row, response.base_names) for row in response.lines.shared()),
         "contributions": json.dumps([{"line": line, **asdict(own)} for line, own in response.contributions]),
         "folds": json.dumps(response.folds),
+        "branch_ended": response.branch_ended,
         "unsolved": json.dumps([{"speed": speed, "reason": reason} for speed, reason in response.unsolved]),
         "crossings": json.dumps([asdict(crossing) for crossing in response.crossings]),
     }

@@ -111,6 +111,8 @@ class SteadyResponse:
         Line and what makes it, at the strongest crossings.
     folds : tuple of float
         Speeds at which a branch turns back, rad/s.
+    branch_ended : str
+        Why a branch ends before the last speed, and where; empty if it does not.
     growth_rate : float
         Fastest growth of any disturbance over the speeds, 1/s: of the mean system, where two modes and a mesh frequency
         work together, and of the points where teeth may part.
@@ -142,6 +144,7 @@ class SteadyResponse:
     crossings: tuple[Crossing, ...]
     contributions: tuple[tuple[int, Contributions], ...]
     folds: tuple[float, ...]
+    branch_ended: str
     growth_rate: float
     planet_spread: float
     stiffness_variation: float
@@ -280,8 +283,9 @@ def response_of(
     looked_for = settings.at_resonances and (gearset.parting or gearset.waves.varies)
     found = crossings(gearset, tracks, solver.forcing, operation) if looked_for else ()
     folds: tuple[float, ...] = ()
+    ended = ""
     if settings.branches:
-        solved, folds = _along_branch(solver, settings.speeds.first, settings.speeds.last, told)
+        solved, folds, ended = _along_branch(solver, settings.speeds.first, settings.speeds.last, told)
     else:
         solved = _solve(solver, settings, found, looked_for, _Work(known, told, keep, keep_every))
     there = np.isfinite(solved.drive_torque)
@@ -302,6 +306,7 @@ def response_of(
         crossings=found,
         contributions=explained,
         folds=folds,
+        branch_ended=ended,
         growth_rate=float(np.fmax.reduce(solved.growth, initial=growth)),
         planet_spread=gearset.system.planet_spread,
         stiffness_variation=gearset.system.variation,
@@ -459,8 +464,8 @@ def _contributions(gearset: Gearset, found: tuple[Crossing, ...]) -> tuple[tuple
 
 def _along_branch(
     solver: PointSolver, first: float, last: float, progress: Callable[[int, int], None]
-) -> tuple[Solved, tuple[float, ...]]:
-    """Points along a branch between two speeds (rad/s), and its folds; progress counts in hundredths of the range."""
+) -> tuple[Solved, tuple[float, ...], str]:
+    """Points along a branch between two speeds (rad/s), its folds, and why it ended before the last; progress counts in hundredths of the range."""
     fastest = max(abs(first), abs(last))
     first, last = (np.copysign(SLOWEST_BRANCH * fastest, first + last) if s == 0.0 else s for s in (first, last))
     branch = follow_branch(
@@ -470,7 +475,7 @@ def _along_branch(
     for n, (speed, readings) in enumerate(zip(branch.speed, branch.readings, strict=True)):
         _fill(out, n, solver.gearset, solver.response_to(readings, float(speed)))
     out.growth[:] = branch.growth
-    return out, branch.folds
+    return out, branch.folds, branch.ended
 
 
 def _empty(gearset: Gearset, speeds: Floats) -> Solved:

@@ -208,6 +208,7 @@ def _whole_summary(
         ],
         "unstable_points": int((data["growth"] > 0.0).sum()),
         "largest_energy_error": float(abs(data["energy_error"]).max()),
+        "branch_ended": str(data.attrs["branch_ended"]),
         "folds_rpm": [fold / RPM for fold in json.loads(data.attrs["folds"])],
         "planet_spread": float(data.attrs["planet_spread"]),
         "stiffness_variation": float(data.attrs["stiffness_variation"]),
@@ -243,9 +244,11 @@ def _tell_of_range(ranking: Ranking) -> None:
 def _fail_if_doubtful(data: xr.Dataset, growth: float) -> None:
     """End with code 1 where no speed has a steady state; where each has its own stability, its file tells which.
 
-    Likewise where teeth read tables beside states that are not solved.
+    Likewise where teeth read tables beside states that are not solved, and where a branch is not whole.
     """
     refuse_unsolved([mesh for mesh in str(data.attrs["beside_unsolved_states"]).split(", ") if mesh])
+    if data.attrs["branch_ended"]:
+        raise FailedError(f"the branch is not whole: {data.attrs['branch_ended']}")
     if growth > 0.0 and not bool(data["growth"].notnull().any()):
         raise FailedError(f"the steady response is not to be trusted: disturbances grow by up to {growth:.3g} 1/s")
 

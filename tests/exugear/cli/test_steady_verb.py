@@ -146,3 +146,18 @@ def test_an_unstable_response_ends_with_code_1_and_says_so(case, monkeypatch):
     assert outcome.exit_code == 1
     assert "fastest growth 221 1/s" in outcome.stdout
     assert "not to be trusted" in outcome.stderr
+
+
+def test_a_branch_that_is_not_whole_ends_with_code_1_and_says_where(case, monkeypatch):
+    from exugear.project import Project
+
+    kept, words = Project.steady, "the branch ends at 12.5 rpm after 2000 points"
+
+    def ended(self, settings, progress):
+        return kept(self, settings, progress).assign_attrs(branch_ended=words, growth_rate=-1.0)
+
+    monkeypatch.setattr(Project, "steady", ended)
+    outcome = steady(case, "--variant", "bushing", "--speeds", "1400:1500:3", "--json")
+    assert outcome.exit_code == 1
+    assert f"the branch is not whole: {words}" in outcome.stderr
+    assert json.loads(outcome.stdout)["branch_ended"] == words

@@ -51,6 +51,16 @@ def test_the_product_of_lines_is_the_product_of_the_functions():
     np.testing.assert_allclose(lines.values(product, angles), expected, rtol=0.0, atol=1e-12)
 
 
+@pytest.mark.parametrize("base", [0, 1])
+def test_a_function_of_one_base_on_the_lattice_is_its_series_at_the_angles(base):
+    lines = line_set(BASES, 3, 2)
+    found = lattice(lines, line_set(BASES, 6, 4))
+    harmonics = np.array([[2.0, 0.3 + 0.1j, 0.2j], [0.0, 1.0j, -0.5]])
+    turns = np.exp(1j * found.angles[:, base])
+    series = [own[0].real + 2.0 * np.real(own[1] * turns + own[2] * turns**2) for own in harmonics]
+    np.testing.assert_allclose(found.along_base(base, harmonics), series, rtol=0.0, atol=1e-12)
+
+
 def balance(damping, frequency, lines, functions, force):
     """Lines of x'' + 2 z x' + k(t) x = F with k = 1 + a function of each base's angle."""
     w = frequency * lines.orders

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import time
 import tomllib
 from dataclasses import dataclass
@@ -15,6 +16,8 @@ from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.rotating.mesh_ports import DEFLECTION
 from exugear.settling.settled import SettlingRun
+from exugear.harmonics.branches import trace
+from exugear.steady import gearbox_branches
 from exugear.steady.gearbox_branches import follow_branch
 from exugear.steady.point_solver import PointSolver, gearset_of
 from exugear.steady.response import signals
@@ -270,6 +273,15 @@ def test_the_branch_of_a_helical_pair_turns_back_where_its_sweeps_jump():
             sizes.append(np.linalg.norm(solver.state.response.deflection[1:]))
         jump = int(np.argmax(np.abs(np.diff(sizes[-len(speeds) :]))))
         assert min(speeds[jump : jump + 2]) - 0.05 < fold < max(speeds[jump : jump + 2]) + 0.05
+
+
+def test_a_branch_that_runs_out_of_points_says_where(monkeypatch):
+    monkeypatch.setattr(gearbox_branches, "trace", functools.partial(trace, most=5))
+    branch = follow_branch(helical(), 510.0, 485.0)
+    assert len(branch.speed) == 5
+    assert f"ends at {branch.speed[-1] * 30.0 / np.pi:.5g} rpm after 5 points" in branch.ended
+    monkeypatch.setattr(gearbox_branches, "trace", trace)
+    assert not follow_branch(helical(), 520.0, 519.0).ended
 
 
 @pytest.mark.validation

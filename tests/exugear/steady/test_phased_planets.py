@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 
@@ -9,6 +12,7 @@ from exugear.dynamics.assemble import assemble
 from exugear.model.choice import Choice
 from exugear.rotating.rotating_frame import SteadyError
 from exugear.steady.gearbox_branches import follow_branch
+from exugear.steady.nonlinear import Balance, solve_balance
 from exugear.steady.point_solver import PointSolver, gearset_of
 from exugear.steady.response import dissipated_and_given, signals
 from exugear.steady.settings import SpeedRange, SteadySettings
@@ -91,3 +95,17 @@ def test_planets_out_of_phase_started_on_their_steady_state_stay_there(four, sti
     """As for planets in phase; combinations beyond the third leave 1e-3 of signals that phasing makes small."""
     solver = solver_of(assemble(four, Choice("bushing"), stiffness), RANGE, "nonlinear")
     assert apart(solver, speed, 3.0, 1.0 / 120e3, 2.0)[0] < 2e-3
+
+
+def test_the_memory_of_a_solved_speed_falls_free_at_once(four, stiffness):
+    """A balance holds samples of all laws: some tens of megabytes a speed, which no search for garbage has to find."""
+    gearset = gearset_of(assemble(four, Choice("bushing"), stiffness), np.array(RANGE), 4, 2)
+    balance = Balance(gearset, gearset.at(5.0), gearset.lattice, frozen=True)
+    gone = weakref.ref(balance)
+    gc.disable()
+    try:
+        solve_balance(balance, balance.static)
+        del balance
+        assert gone() is None
+    finally:
+        gc.enable()
