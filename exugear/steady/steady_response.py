@@ -465,7 +465,10 @@ def _contributions(gearset: Gearset, found: tuple[Crossing, ...]) -> tuple[tuple
 def _along_branch(
     solver: PointSolver, first: float, last: float, progress: Callable[[int, int], None]
 ) -> tuple[Solved, tuple[float, ...], str]:
-    """Points along a branch between two speeds (rad/s), its folds, and why it ended before the last; progress counts in hundredths of the range."""
+    """Points along a branch between two speeds (rad/s), its folds, and why it ended before the last.
+
+    Progress counts in hundredths of the range.
+    """
     fastest = max(abs(first), abs(last))
     first, last = (np.copysign(SLOWEST_BRANCH * fastest, first + last) if s == 0.0 else s for s in (first, last))
     branch = follow_branch(

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from exugear.dynamics.assemble import assemble
+from exugear.harmonics.branches import trace
 from exugear.harmonics.krylov import HarmonicBalanceError
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.rotating.mesh_ports import DEFLECTION
 from exugear.settling.settled import SettlingRun
-from exugear.harmonics.branches import trace
 from exugear.steady import gearbox_branches
 from exugear.steady.gearbox_branches import follow_branch
 from exugear.steady.point_solver import PointSolver, gearset_of
