@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from exugear.checks.readiness import check_parts
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.named_files import Permissions
+from exugear.model.reading import CaseError
 from exugear.results.folder import peak_memory
 from exugear.studies.design.paths import changed
 from exugear.studies.figures.figure import Values
@@ -28,6 +29,8 @@ from fe_ste.tools.workers import StoppedError, stop_if_asked
 LONG = 1.0
 """Seconds of a point after which it is brought to the disk by itself."""
 SHARED_FOLDER, WORK_FOLDER = "shared", "work"
+SHOWN_VALUES, LONGEST_VALUE = 5, 200
+"""Most parameters that the error of a point names, and most letters of each."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,8 @@ class Task:
     figures : mapping of name to KeptFigure
     folder : Path
         Of the study.
+    parameters : mapping of path to str
+        Names of the parameters that set paths of the case.
     """
 
     content: Mapping[str, Any]
@@ -54,6 +59,7 @@ class Task:
     settings: PointSettings
     figures: Mapping[str, KeptFigure]
     folder: Path
+    parameters: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -102,8 +108,7 @@ def compute_point(task: Task, work: Work) -> Record:
     error, doubts = "", []
     folder = task.folder / WORK_FOLDER / work.point[:32]
     try:
-        gearbox = Gearbox.from_dict(changed(task.content, work.changes), task.source, task.permissions)
-        check_parts(gearbox)
+        gearbox = _built(task, work)
         results = PointResults(gearbox, task.choice, task.settings, Shared(task.folder / SHARED_FOLDER), folder)
         values = {name: _finite(kept.of(results)) for name, kept in task.figures.items()}
         doubts = list(results.doubts)
@@ -113,6 +118,21 @@ def compute_point(task: Task, work: Work) -> Record:
     except Exception as reason:  # one point must not end the others, whatever it is
         values, error = {}, f"{type(reason).__name__}: {reason}"
     return Record(work.point, values, error, doubts, round(time.perf_counter() - start, 6), peak_memory())
+
+
+def _built(task: Task, work: Work) -> Gearbox:
+    """Gearbox of a point; of one that cannot be, the error begins with the parameters and their values."""
+    try:
+        gearbox = Gearbox.from_dict(changed(task.content, work.changes), task.source, task.permissions)
+        check_parts(gearbox)
+        return gearbox
+    except CaseError as error:
+        own = [
+            f"parameters.{task.parameters.get(path, '?')}: {path} = {value!r}"[:LONGEST_VALUE]
+            for path, value in work.changes.items()
+        ]
+        more = [f"and {len(own) - SHOWN_VALUES} more"] if len(own) > SHOWN_VALUES else []
+        raise CaseError(*("; ".join([*own[:SHOWN_VALUES], *more]) for _ in own[:1]), *error.faults) from None
 
 
 def _finite(values: Values) -> Any:

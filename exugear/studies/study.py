@@ -20,15 +20,13 @@ from exugear.rotating.rotating_frame import SteadyError
 from exugear.steady.settings import SpeedRange, SteadySettings, check_law
 from exugear.studies.design.paths import PathError, changed, check_path
 from exugear.studies.design.reading import StudyError, parse_study, read_study_file
-from exugear.studies.design.sampling import Design, Point, acting, design_of, listed_values
+from exugear.studies.design.sampling import Design, Point, design_of
 from exugear.studies.design.sections import StudyFile
 from exugear.studies.figures.figure import Figure, FigureError
 from exugear.studies.figures.point_results import PointSettings
 from exugear.studies.figures.registry import FIGURES, KeptFigure, kept_figures
+from exugear.studies.soundness import faults_of_names, faults_of_options, faults_of_paths, faults_of_values
 from fe_ste.tools.versions import TABLE
-
-TRIED_VALUES = 200
-"""Most values of a list that are tried before the work begins."""
 
 
 @dataclass(frozen=True)
@@ -126,9 +124,11 @@ class Study:
                 raise
             raise StudyError(fault_line(source, str(error))) from None
         choice = Choice(**file.choice.model_dump()).of(gearbox)
-        study = cls(file, source, gearbox, choice, settings, kept, design, case_digest(case))
-        study._try_values()
-        return study
+        faults = [*faults_of_names(file, kept), *faults_of_paths(file), *faults_of_values(design)]
+        faults += faults_of_options(kept, gearbox, choice)
+        if faults:
+            raise StudyError("\n".join(fault_line(source, fault) for fault in faults))
+        return cls(file, source, gearbox, choice, settings, kept, design, case_digest(case))
 
     def __repr__(self) -> str:
         """One line."""
@@ -164,28 +164,6 @@ class Study:
         named = sorted({text for text in _texts(content) if 0 < len(text) < 256 and "\0" not in text})
         files = [folder / name for name in named]
         return [hashlib.sha256(file.read_bytes()).hexdigest() for file in files if file.suffix and file.is_file()]
-
-    def _try_values(self) -> None:
-        """Build the gearbox at each listed value, so that one that cannot be is told before the work.
-
-        Raises
-        ------
-        CaseError
-        """
-        if not self.design.points:
-            return
-        first = self.design.points[0].changes
-        _varied(self.gearbox, first)
-        for parameter in self.file.parameters.values():
-            if parameter.settings is not None:
-                tried: list[Mapping[str, Any]] = list(parameter.settings.values())
-            elif parameter.kind in ("values", "range"):
-                paths, values = parameter.targets, listed_values(parameter)[:TRIED_VALUES]
-                tried = [{path: acting(parameter, self.gearbox, path, value) for path in paths} for value in values]
-            else:
-                continue
-            for changes in tried:
-                _varied(self.gearbox, {**first, **changes})
 
 
 def _varied(gearbox: Gearbox, changes: Mapping[str, Any]) -> Gearbox:

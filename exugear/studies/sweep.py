@@ -151,6 +151,6 @@ def sweep(
 def task_of(study: Study, folder: Path) -> Task:
     """Gather what all points have in common."""
     gearbox = study.gearbox
-    return Task(
-        gearbox.content, gearbox.source, gearbox.permissions, study.choice, study.settings, study.figures, folder
-    )
+    names = {path: name for name, parameter in study.file.parameters.items() for path in parameter.targets}
+    settings = (study.choice, study.settings, study.figures)
+    return Task(gearbox.content, gearbox.source, gearbox.permissions, *settings, folder, names)

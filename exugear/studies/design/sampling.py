@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -71,11 +71,14 @@ class Design:
     shape : mapping of dimension to size
     axes : mapping of name to Axis
     points : tuple of Point
+    levels : mapping of dimension to tuple
+        Values at paths of the case along each dimension; points are all their combinations.
     """
 
     shape: Mapping[str, int]
     axes: Mapping[str, Axis]
     points: tuple[Point, ...]
+    levels: Mapping[str, tuple[Mapping[str, Any], ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -119,7 +122,7 @@ def design_of(study: StudyFile, gearbox: Gearbox) -> Design:
         )
         for index in itertools.product(*(range(size) for size in shape.values()))
     )
-    return Design(shape, axes, points)
+    return Design(shape, axes, points, {name: level.changes for name, level in levels.items()})
 
 
 def _levels(name: str, parameter: ParameterSection, gearbox: Gearbox) -> _Levels:
@@ -270,4 +273,8 @@ def _derivatives(study: StudyFile, gearbox: Gearbox) -> Design:
         SIDE: Axis((SIDE,), np.array(SIDES, dtype=object)),
         "step": Axis((PARAMETER,), np.array(steps)),
     }
-    return Design({PARAMETER: len(study.parameters), SIDE: len(SIDES)}, axes, tuple(points))
+    levels = {
+        name: tuple(point.changes for point in points if point.index[0] == number)
+        for number, name in enumerate(study.parameters)
+    }
+    return Design({PARAMETER: len(study.parameters), SIDE: len(SIDES)}, axes, tuple(points), levels)

@@ -93,7 +93,8 @@ def test_what_is_missing_after_a_merge_ends_with_1(study):
     ("old", "new", "words"),
     [
         ("damping.mesh_time_s", "damping.mesh_tim_s", "did you mean damping.mesh_time_s"),
-        ("[1e-6, 2e-6, 4e-6]", "[1e-6, 2.0]", "damping.mesh_time_s = 2.0: must lie between"),
+        ("[1e-6, 2e-6, 4e-6]", "[1e-6, 1e-6]", "values 1 and 2 are one and the same point, damping.mesh_time_s"),
+        ("figures.frequency", "figures.memory", "this name is that of what is told of each point"),
         ('"iso6336"', '"iso"', "no such law; laws are"),
         ('"rigid"', '"rigid", load_case = "none"', "no load case 'none'; load cases are run_up"),
         ('"spur.toml"', '"spu.toml"', "spu.toml"),
@@ -105,6 +106,17 @@ def test_bad_input_is_told_and_nothing_written(study, old, new, words):
     outcome = sweep(study)
     assert outcome.exit_code == 2 and words in outcome.stderr
     assert not (study.parent / "out").exists()
+
+
+def test_a_listed_value_that_cannot_be_is_a_failed_point_with_parameter_and_value(study):
+    replaced(study, "[1e-6, 2e-6, 4e-6]", "[1e-6, 2.0]")
+    outcome = sweep(study, "--workers", "1")
+    assert outcome.exit_code == 1
+    assert "1 of 2 points failed" in outcome.stderr
+    assert "parameters.seat: damping.mesh_time_s = 2.0" in outcome.stderr
+    assert "damping.mesh_time_s = 2.0: must lie between" in outcome.stderr
+    data = load_study(study.parent / "out" / "study.nc")
+    assert [bool(one) for one in data["damping"].isnull()] == [False, True]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,143 @@
+"""What speaks against a study before any point is computed: names taken, equal points, options out of range."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from exugear.bearings.supports import elastic_names, mounts_at_work
+from exugear.model.choice import Choice
+from exugear.model.gearbox import Gearbox
+from exugear.studies.design.sampling import PARAMETER, SAMPLE, SIDE, Design
+from exugear.studies.design.sections import StudyFile
+from exugear.studies.figures.registry import FIGURES, KeptFigure
+from exugear.tooth_mesh.laws.registry import LAWS
+
+OF_POINTS = ("error", "doubts", "seconds", "memory")
+"""What a dataset tells of each point beside its figures."""
+OF_SEARCHES = ("evaluation", "on_front")
+SLOPE = "slope_"
+"""Before the name of a figure: its local derivative."""
+LIMITS: Mapping[str, tuple[float, float]] = {
+    "count": (1, 10_000),
+    "harmonic": (1, 1000),
+    "positions": (4, 2000),
+    "near_Hz": (0.0, 1e9),
+    "from_Hz": (0.0, 1e9),
+    "to_Hz": (0.0, 1e9),
+    "spacing": (1e-6, 1e6),
+    "centre": (0.0, 1e6),
+    "torque_factors": (1e-6, 1e3),
+    "misalignment_um": (-1e5, 1e5),
+    "speed_rpm": (-1e7, 1e7),
+}
+"""Least and most of the options of figures."""
+SHOWN = 3
+"""Most names of what is equal that a line has."""
+
+
+def faults_of_names(study: StudyFile, kept: Mapping[str, KeptFigure]) -> Iterator[str]:
+    """Tell parameters and figures whose names the dataset has for something else."""
+    taken = dict.fromkeys(OF_POINTS, "what is told of each point")
+    drawn = [name for name, parameter in study.parameters.items() if parameter.is_drawn]
+    stepped = any(parameter.kind == "step" for parameter in study.parameters.values())
+    if study.optimise is not None:
+        taken |= dict.fromkeys(OF_SEARCHES, "the points of a search")
+    elif drawn:
+        taken[SAMPLE] = "the draws"
+        taken |= {f"{name}_path": f"the paths of parameters.{name}" for name in drawn if study.parameters[name].paths}
+    if stepped:
+        taken |= dict.fromkeys((PARAMETER, SIDE, "step"), "local derivatives")
+        taken |= {f"{SLOPE}{name}": f"the local derivative of figures.{name}" for name in study.figures}
+    for name, figure in kept.items():
+        if figure.figure.dimension:
+            taken.setdefault(figure.figure.dimension, f"a dimension of figures.{name}")
+    for table, names in (("parameters", () if stepped else study.parameters), ("figures", study.figures)):
+        for name in names:
+            if name in taken:
+                yield f"{table}.{name}: this name is that of {taken[name]} in the dataset; choose another"
+    for name in study.parameters:
+        if name in study.figures:
+            yield f"figures.{name}: parameters.{name} has this name, too; rename one"
+
+
+def faults_of_paths(study: StudyFile) -> Iterator[str]:
+    """Tell paths that two parameters set, or one of them twice: only the last value would act."""
+    owners: list[tuple[str, str]] = []
+    for name, parameter in study.parameters.items():
+        paths = (parameter.path,) if parameter.path else tuple(parameter.paths or parameter.targets)
+        for path in paths:
+            for owner, other in owners:
+                if f"{path}.".startswith(f"{other}.") or f"{other}.".startswith(f"{path}."):
+                    if owner == name:
+                        yield f"parameters.{name}: sets {path} twice; name it once"
+                    else:
+                        yield f"parameters.{name}: sets {path}, and parameters.{owner} {other}; give it to one of them"
+                    break
+            owners.append((name, path))
+
+
+def faults_of_values(design: Design) -> Iterator[str]:
+    """Tell values that make one point of two: listed twice, or scaled from zero."""
+    for dimension, changes in design.levels.items():
+        seen: dict[str, int] = {}
+        for number, change in enumerate(changes):
+            first = seen.setdefault(json.dumps(change, sort_keys=True), number)
+            if first != number:
+                values = ", ".join(f"{path} = {value!r}" for path, value in list(change.items())[:SHOWN])
+                what = "draws" if dimension == SAMPLE else f"parameters.{dimension}: values"
+                yield f"{what} {first + 1} and {number + 1} are one and the same point, {values}; leave one out"
+                break
+
+
+def faults_of_options(kept: Mapping[str, KeptFigure], gearbox: Gearbox, choice: Choice) -> Iterator[str]:
+    """Tell options of the program's own figures that no gearbox bears, or that this one does not have."""
+    own = {id(figure) for figure in FIGURES.values()}
+    known = _names(gearbox, choice)
+    for name, figure in kept.items():
+        if id(figure.figure) not in own:
+            continue
+        for key, value in figure.options.items():
+            entries = value if isinstance(value, list) else [value]
+            low, high = LIMITS.get(key, (-math.inf, math.inf))
+            numbers = [entry for entry in entries if isinstance(entry, int | float) and not isinstance(entry, bool)]
+            if not all(low <= entry <= high and math.isfinite(entry) for entry in numbers):
+                yield f"figures.{name}.{key} = {value!r}: must be finite, and lie between {low:g} and {high:g}"
+            elif key in known and value and value not in known[key]:
+                yield f"figures.{name}.{key} = {str(value)[:200]!r}: no such {key}; there are {_listed(known[key])}"
+        yield from _faults_of_orders(name, figure.options, gearbox)
+
+
+def _faults_of_orders(name: str, options: Mapping[str, Any], gearbox: Gearbox) -> Iterator[str]:
+    """Tell options that contradict each other, or the table's positions."""
+    if options.get("from_Hz", 0.0) > options.get("to_Hz", math.inf):
+        yield f"figures.{name}.from_Hz = {options['from_Hz']:g}: lies above to_Hz = {options['to_Hz']:g}"
+    most = gearbox.ste.positions // 2
+    if options.get("harmonic", 1) > most:
+        yield (
+            f"figures.{name}.harmonic = {options['harmonic']}: a table of {gearbox.ste.positions} positions has "
+            f"{most} harmonics; give fewer, or more ste.positions"
+        )
+
+
+def _names(gearbox: Gearbox, choice: Choice) -> dict[str, list[str]]:
+    """Names that options may have."""
+    families = list(dict.fromkeys(mesh.family for mesh in gearbox.meshes))
+    law = LAWS.get(choice.mesh_law)
+    elements = [mesh.name for mesh in gearbox.meshes] if law is None or law.has_force else []
+    if choice.variant != "rigid":
+        elements += [bearing.name for bearing in gearbox.bearings]
+    if choice.variant == "flexible":
+        elements += [mount.name for mount in mounts_at_work(gearbox)]
+        elements += [f"{name}_body" for name in elastic_names(gearbox)]
+    elements += [coupling.name for coupling in gearbox.couplings]
+    return {"pair": list(gearbox.pairs), "mesh": families, "meshes": families, "element": elements}
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Names, as many as a line holds."""
+    shown = list(itertools.islice(names, 12))
+    return (", ".join(shown) or "none") + (f" and {len(names) - len(shown)} more" if len(names) > len(shown) else "")

@@ -1,0 +1,92 @@
+"""Studies that would lose a figure, never end or fail after the work are refused on reading, with the names."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import pytest
+
+from exugear.studies.design.reading import StudyError
+from exugear.studies.executors import processes
+from exugear.studies.sweep import sweep
+
+from ..study_case import small_study
+
+SEAT = {"path": "housing.factor", "values": [0.2, 0.4]}
+FREQUENCIES = {"figure": "frequencies", "count": 2}
+DRAWN = {"path": "housing.factor", "uniform": {"least": 0.2, "most": 0.4}}
+
+
+def nearest(**options):
+    return {"f": {"figure": "nearest_frequency", "near_Hz": 500.0, **options}}
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        *(
+            ({"figures": {name: FREQUENCIES}}, f"figures.{name}: this name is that of what is told of each point")
+            for name in ("error", "seconds", "memory", "doubts")
+        ),
+        ({"parameters": {"error": SEAT}}, "parameters.error: this name is that of what is told of each point"),
+        ({"parameters": {"mode": SEAT}}, "parameters.mode: this name is that of a dimension of figures.frequency"),
+        ({"parameters": {"forces": SEAT}}, "figures.forces: parameters.forces has this name, too"),
+        ({"parameters": {"sample": DRAWN}, "samples": 4}, "parameters.sample: this name is that of the draws"),
+        (
+            {"parameters": {"a": SEAT, "b": SEAT}},
+            "parameters.b: sets housing.factor, and parameters.a housing.factor; give it to one of them",
+        ),
+        (
+            {"parameters": {"a": {"paths": ["housing.factor", "housing.factor"], "values": [0.2, 0.4]}}},
+            "parameters.a: sets housing.factor twice; name it once",
+        ),
+        (
+            {"parameters": {"a": SEAT | {"values": [0.3, 0.5, 0.3]}}},
+            "parameters.a: values 1 and 3 are one and the same point, housing.factor = 0.3",
+        ),
+        (
+            {"parameters": {"a": {"path": "housing.factor", "range": {"first": 0.3, "last": 0.3, "count": 2}}}},
+            "parameters.a: values 1 and 2 are one and the same point",
+        ),
+        (
+            {"figures": {"f": FREQUENCIES | {"count": -1}}},
+            "figures.f.count = -1: must be finite, and lie between 1 and",
+        ),
+        ({"figures": nearest(near_Hz=math.nan)}, "figures.f.near_Hz = nan: must be finite"),
+        ({"figures": nearest(near_Hz=-1.0)}, "figures.f.near_Hz = -1.0: must be finite, and lie between 0"),
+        (
+            {"figures": nearest(element="nope")},
+            "figures.f.element = 'nope': no such element; there are spur, bearing_1",
+        ),
+        ({"figures": {"f": {"figure": "ste_harmonic", "pair": "nope"}}}, "figures.f.pair = 'nope': no such pair"),
+        ({"figures": {"f": {"figure": "load_sharing", "meshes": "nope"}}}, "figures.f.meshes = 'nope': no such meshes"),
+        (
+            {"figures": {"f": {"figure": "ste_harmonic", "pair": "spur", "harmonic": 5}}},
+            "figures.f.harmonic = 5: a table of 8 positions has 4 harmonics",
+        ),
+        (
+            {"figures": {"f": {"figure": "loudest_frequency", "from_Hz": 900.0, "to_Hz": 100.0}}},
+            "figures.f.from_Hz = 900: lies above to_Hz = 100",
+        ),
+    ],
+)
+def test_what_would_be_lost_or_fail_after_the_work_is_refused_with_names(changes, words, tmp_path):
+    with pytest.raises(StudyError, match=re.escape(words)):
+        small_study(tmp_path, **changes)
+
+
+def test_all_that_is_wrong_is_told_at_once(tmp_path):
+    with pytest.raises(StudyError) as caught:
+        small_study(tmp_path, parameters={"a": SEAT, "b": SEAT}, figures={"error": FREQUENCIES, **nearest(element="x")})
+    assert len(str(caught.value).splitlines()) == 3
+
+
+def test_elements_are_those_that_modes_have(tmp_path):
+    """Names that reading takes are those that the modes of the variant know."""
+    figures = {
+        name: {"figure": "nearest_strain", "near_Hz": 500.0, "element": name}
+        for name in ("spur", "bearing_1", "bearing_2")
+    }
+    study = small_study(tmp_path, figures=figures, parameters={"a": SEAT})
+    assert not sweep(study, tmp_path / "out", processes(1)).failed
