@@ -7,6 +7,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from exugear.model.gearbox import Gearbox
 from exugear.model.versions import STUDY
@@ -18,8 +19,10 @@ STUDIES, DATASET, PICTURES = "studies", "study.nc", "pictures"
 STUDY_LAYOUT = Layout(
     "study", STUDY, {}, ("title", "study", "case", "case_digest", "input_hash", "points", "failed", "missing")
 )
-UNREAD = ("labels", "loads", "operation", "rating", "report")
+WORDS = ("labels", "report")
 """Tables of a gearbox file that no figure of a study reads."""
+OF_LIFE = ("loads", "operation", "rating")
+"""Tables that figures of lives read, and no other."""
 
 
 @dataclass(frozen=True)
@@ -47,9 +50,15 @@ class StoredStudy:
     pictures: tuple[Path, ...]
 
 
-def case_digest(gearbox: Gearbox) -> str:
-    """Hash of all that the figures of studies depend on in a case."""
-    content = {key: value for key, value in gearbox.content.items() if key not in UNREAD}
+def read_content(gearbox: Gearbox, of_life: bool) -> dict[str, Any]:
+    """Tables of a gearbox file that figures of a study read, those of lives among them or not."""
+    unread = WORDS if of_life else (*WORDS, *OF_LIFE)
+    return {key: value for key, value in gearbox.content.items() if key not in unread}
+
+
+def case_digest(gearbox: Gearbox, of_life: bool = False) -> str:
+    """Hash of all that the figures of a study depend on in a case."""
+    content = read_content(gearbox, of_life)
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
@@ -76,6 +85,6 @@ def stored_studies(folder: Path, gearbox: Gearbox) -> Iterator[StoredStudy]:
             points=int(attributes["points"]),
             failed=int(attributes["failed"]),
             missing=int(attributes["missing"]),
-            fits=attributes["case_digest"] == case_digest(gearbox),
+            fits=attributes["case_digest"] in (case_digest(gearbox), case_digest(gearbox, of_life=True)),
             pictures=tuple(sorted((path.parent / PICTURES).glob("*.png"))),
         )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -23,7 +22,7 @@ from exugear.studies.figures.figure import Values
 from exugear.studies.figures.point_results import PointResults, PointSettings
 from exugear.studies.figures.registry import KeptFigure
 from exugear.studies.figures.shared import Shared
-from exugear.studies.journal import Journal, Record
+from exugear.studies.journal import Journal, Record, told_in_json
 from fe_ste.tools.workers import StoppedError, stop_if_asked
 
 LONG = 1.0
@@ -110,7 +109,7 @@ def compute_point(task: Task, work: Work) -> Record:
     try:
         gearbox = _built(task, work)
         results = PointResults(gearbox, task.choice, task.settings, Shared(task.folder / SHARED_FOLDER), folder)
-        values = {name: _finite(kept.of(results)) for name, kept in task.figures.items()}
+        values = {name: _told(kept.of(results)) for name, kept in task.figures.items()}
         doubts = list(results.doubts)
         results.clear()
     except StoppedError:
@@ -135,9 +134,8 @@ def _built(task: Task, work: Work) -> Gearbox:
         raise CaseError(*("; ".join([*own[:SHOWN_VALUES], *more]) for _ in own[:1]), *error.faults) from None
 
 
-def _finite(values: Values) -> Any:
-    """Values as JSON has them: what is not finite is None."""
+def _told(values: Values) -> Any:
+    """Values as a journal has them."""
     if isinstance(values, Mapping):
-        return {name: _finite(value) for name, value in values.items()}
-    number = float(values)
-    return number if math.isfinite(number) else None
+        return {name: told_in_json(float(value)) for name, value in values.items()}
+    return told_in_json(float(values))

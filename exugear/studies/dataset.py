@@ -14,7 +14,7 @@ import numpy as np
 from exugear.model.versions import MODES, REDUCTION, RUN, STEADY, STUDY
 from exugear.results.study_files import DATASET, STUDY_LAYOUT
 from exugear.studies.design.sampling import PARAMETER, SIDE
-from exugear.studies.journal import Record
+from exugear.studies.journal import Record, number_of
 from exugear.studies.study import Study
 from fe_ste.tools.sealed import load_dataset, write_dataset
 from fe_ste.tools.versions import TABLE
@@ -63,7 +63,7 @@ def dataset_of(study: Study, records: Mapping[str, Record]) -> xr.Dataset:
             values = _filled((*sizes, len(labels[own])), done, lambda record, n=name, d=own: _row(record, n, labels[d]))
             variables[name] = ((*dimensions, own), values, attributes)
         else:
-            values = _filled(sizes, done, lambda record, n=name: _number(record.values.get(n)))
+            values = _filled(sizes, done, lambda record, n=name: number_of(record.values.get(n)))
             variables[name] = (dimensions, values, attributes)
     variables |= _of_points(dimensions, sizes, at)
     coordinates: dict[str, Any] = {
@@ -82,13 +82,9 @@ def _filled(shape: tuple[int, ...], done: list[tuple[tuple[int, ...], Record]], 
     return values
 
 
-def _number(value: Any) -> float:
-    return math.nan if value is None else float(value)
-
-
 def _row(record: Record, name: str, labels: list[str]) -> list[float]:
     own = record.values.get(name) or {}
-    return [_number(own.get(label)) for label in labels]
+    return [number_of(own.get(label)) for label in labels]
 
 
 def _of_points(

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import platform
 import re
@@ -21,6 +22,8 @@ from typing import Any
 from fe_ste.tools.files import FileError, open_regular, write_all
 
 FOLDER = "points"
+INFINITE = "infinite"
+"""In place of a number that has no end, which JSON has not; with a sign where it is below all others."""
 _END = ".jsonl"
 _DIGITS = 16
 """Digits of a line's checksum."""
@@ -35,7 +38,7 @@ class Record:
     point : str
         Hash of its input.
     values : mapping
-        Figures by name: a number, or numbers by name; None for one that is not finite.
+        Figures by name: a number, or numbers by name; None for one that is none, `INFINITE` for one without end.
     error : str
         Why it failed; empty if it did not.
     doubts : list of str
@@ -75,6 +78,32 @@ def _record(line: str) -> Record | None:
         return Record(**json.loads(match[2]))
     except (ValueError, TypeError):
         return None
+
+
+def told_in_json(value: float) -> float | str | None:
+    """Write a number as a record has it.
+
+    Examples
+    --------
+    >>> [told_in_json(value) for value in (2.0, float("inf"), float("nan"))]
+    [2.0, 'infinite', None]
+    """
+    if math.isnan(value):
+        return None
+    return value if math.isfinite(value) else INFINITE if value > 0.0 else f"-{INFINITE}"
+
+
+def number_of(value: Any) -> float:
+    """Read a number that a record tells.
+
+    Examples
+    --------
+    >>> [number_of(value) for value in (2.0, "infinite", "-infinite", None)]
+    [2.0, inf, -inf, nan]
+    """
+    if isinstance(value, str):
+        return -math.inf if value.startswith("-") else math.inf
+    return math.nan if value is None else float(value)
 
 
 class Journal:

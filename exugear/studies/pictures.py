@@ -102,12 +102,25 @@ def _draw_over_parameters(figure: Figure, values: xr.DataArray) -> None:
     draw = _draw_spread if along == SAMPLE else _draw_curves if along in numeric else _draw_bars
     for axes, rows, label in zip(grid.flat, stacked, labels, strict=False):
         draw(axes, values, along, rows, _combinations(values, by))
+        _tell_of_infinite(axes, rows)
         axes.set_title(f"{', '.join(panels)} {label}" if panels else "")
     for axes in grid.flat[len(labels) :]:
         axes.set_visible(False)
     if by:
         handles, names = grid.flat[0].get_legend_handles_labels()
         figure.legend(handles, names, title=by[0], loc="outside right upper")
+
+
+def _tell_of_infinite(axes: Axes, rows: Floats) -> None:
+    """Say how many values have no end: no scale has a place for them."""
+    count = int(np.isinf(rows).sum())
+    if count:
+        axes.text(0.02, 0.98, f"{count} of {rows.size} infinite", va="top", transform=axes.transAxes, fontsize=7.5)
+
+
+def _finite(values: Floats) -> Floats:
+    """Values with those left out that have no place on a scale."""
+    return np.asarray(np.where(np.isfinite(values), values, np.nan))
 
 
 def _label(values: xr.DataArray) -> str:
@@ -120,7 +133,7 @@ def _is_number(values: xr.DataArray, dimension: str) -> bool:
 
 
 def _draw_curves(axes: Axes, values: xr.DataArray, along: str, rows: Floats, labels: list[str]) -> None:
-    x = values[along].to_numpy().astype(np.float64)
+    x, rows = values[along].to_numpy().astype(np.float64), _finite(rows)
     shown = np.unique(np.linspace(0, len(labels) - 1, min(MOST_CURVES, len(labels))).round().astype(int))
     for place, n in enumerate(shown):
         style = "-" if place < len(COLOURS) else "--"
@@ -155,7 +168,7 @@ def _combinations(values: xr.DataArray, dimensions: list[str]) -> list[str]:
 
 
 def _draw_bars(axes: Axes, values: xr.DataArray, along: str, rows: Floats, labels: list[str]) -> None:
-    words = _combinations(values, [along])
+    words, rows = _combinations(values, [along]), _finite(rows)
     width = 0.8 / min(len(labels), MOST_CURVES)
     for n, (row, label) in enumerate(zip(rows[:MOST_CURVES], labels, strict=False)):
         places = np.arange(len(words)) + (n - 0.5 * (min(len(labels), MOST_CURVES) - 1)) * width
@@ -171,13 +184,14 @@ def _draw_bars(axes: Axes, values: xr.DataArray, along: str, rows: Floats, label
 def _draw_spread(axes: Axes, values: xr.DataArray, along: str, rows: Floats, labels: list[str]) -> None:
     """Draw the share of draws below a value; quartiles and 95 % are marked."""
     for n, (row, label) in enumerate(zip(rows[:MOST_CURVES], labels, strict=False)):
-        known: Floats = np.sort(row[np.isfinite(row)])
-        if not known.size:
+        known: Floats = np.sort(row[~np.isnan(row)])
+        if not np.isfinite(known).any():
             continue
         share = (np.arange(known.size) + 0.5) / known.size
         colour = COLOURS[n % len(COLOURS)]
-        axes.plot(known, share, "-" if n < len(COLOURS) else "--", color=colour, label=label)
-        axes.plot(np.quantile(known, MARKED), MARKED, "o", color=colour, markersize=3.5)
+        axes.plot(_finite(known), share, "-" if n < len(COLOURS) else "--", color=colour, label=label)
+        marked = np.quantile(known, MARKED, method="linear" if np.isfinite(known).all() else "higher")
+        axes.plot(_finite(marked), MARKED, "o", color=colour, markersize=3.5)
     spread = values.to_numpy()[np.isfinite(values.to_numpy())]
     if spread.min() > 0.0 and spread.max() / spread.min() > WIDE:
         _logarithmic(axes, "x")
@@ -202,7 +216,7 @@ def _draw_ranking(figure: Figure, dataset: xr.Dataset) -> None:
 
 def _draw_front(axes: Axes, dataset: xr.Dataset, first: str, second: str) -> None:
     """Draw all points of a search over its two figures, those that no other beats, and the case as it is."""
-    x, y = dataset[first].to_numpy(), dataset[second].to_numpy()
+    x, y = (_finite(dataset[name].to_numpy()) for name in (first, second))
     front = dataset["on_front"].to_numpy() == 1
     order = np.argsort(x[front])
     axes.plot(x[~front], y[~front], ".", color="#BBBBBB", label="looked at")
@@ -220,7 +234,7 @@ def _draw_front(axes: Axes, dataset: xr.Dataset, first: str, second: str) -> Non
 
 def _draw_search(axes: Axes, dataset: xr.Dataset, name: str) -> None:
     """Draw a figure at the points that a search looked at, and the best so far."""
-    values = dataset[name].to_numpy()
+    values = _finite(dataset[name].to_numpy())
     axes.plot(values, ".", color="#BBBBBB")
     axes.plot(np.fmin.accumulate(values), color=COLOURS[0])
     axes.set_ylim(top=1.05 * float(np.nanquantile(values, 0.9)))

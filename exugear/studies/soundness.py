@@ -9,10 +9,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from exugear.bearings.supports import elastic_names, mounts_at_work
+from exugear.dynamics.signals import signals_of
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.studies.design.sampling import PARAMETER, SAMPLE, SIDE, Design
 from exugear.studies.design.sections import StudyFile
+from exugear.studies.figures.of_life import LEAST, LIVES, SAFETIES
+from exugear.studies.figures.of_runs import OVERALL
 from exugear.studies.figures.registry import FIGURES, KeptFigure
 from exugear.tooth_mesh.laws.registry import LAWS
 
@@ -123,7 +126,58 @@ def _faults_of_orders(name: str, options: Mapping[str, Any], gearbox: Gearbox) -
         )
 
 
-def _names(gearbox: Gearbox, choice: Choice) -> dict[str, list[str]]:
+def faults_of_needs(study: StudyFile, kept: Mapping[str, KeptFigure], gearbox: Gearbox) -> Iterator[str]:
+    """Tell figures that are read from what the study does not compute."""
+    for name, figure in kept.items():
+        needs = figure.figure.needs
+        if needs == "steady" and study.steady is None:
+            yield f"figures.{name}: is read from a steady response; give a section [steady] with speeds"
+        if needs == "bearings" and (study.choice.variant == "rigid" or not _rated_bearings(gearbox)):
+            yield (
+                f"figures.{name}: is one of bearings with a section catalogue, which the variant "
+                f"{study.choice.variant!r} of this gearbox has not"
+            )
+
+
+def faults_of_signals(kept: Mapping[str, KeptFigure], gearbox: Gearbox, choice: Choice) -> Iterator[str]:
+    """Tell signals and lines that neither runs nor steady responses of this gearbox have."""
+    tabled, jointed = choice.mesh_law == "table", choice.variant == "rigid"
+    of_runs = [one for one in signals_of(tabled, jointed) if one.stored and one.dimensions[0] == "time"]
+    families = [mesh.family for mesh in gearbox.meshes]
+    parts = {"mesh_dte": families, "mesh_force": families}
+    if not jointed:
+        supports = [word for one in gearbox.bearings for word in (one.name, one.family)]
+        parts |= {"support_force": supports, "seat_acceleration": supports}
+    for name, figure in kept.items():
+        signal = str(figure.options.get("signal", OVERALL))
+        if figure.figure.needs == "run":
+            single = figure.figure.dimension != ""
+            known = [one.name for one in of_runs if not single or len(one.dimensions) == 1]
+            if signal not in known:
+                yield f"figures.{name}.signal = {signal[:200]!r}: no such signal; there are {_listed(known)}"
+        elif figure.figure.needs == "steady":
+            quantity, _, rest = signal.partition(" ")
+            if signal != OVERALL and not any(rest.split(" ")[0] == part for part in parts.get(quantity, ())):
+                known = [OVERALL, *(f"{own} {part}" for own, of in parts.items() for part in dict.fromkeys(of))]
+                yield f"figures.{name}.signal = {signal[:200]!r}: no such signal; there are {_listed(known)}"
+            yield from _faults_of_line(name, figure, families)
+
+
+def _faults_of_line(name: str, figure: KeptFigure, families: Sequence[str]) -> Iterator[str]:
+    line = figure.options.get("line")
+    unknown = [word for word in str(line).split() if not word.isdecimal() and word not in ("x", "+", "-", *families)]
+    if line is not None and (unknown or not line):
+        yield (
+            f"figures.{name}.line = {str(line)[:200]!r}: no such line; lines are as {families[0]} and 2 x {families[0]}"
+            f", of {_listed(list(dict.fromkeys(families)))}"
+        )
+
+
+def _rated_bearings(gearbox: Gearbox) -> list[str]:
+    return [bearing.name for bearing in gearbox.bearings if bearing.catalogue is not None]
+
+
+def _names(gearbox: Gearbox, choice: Choice) -> dict[str, Sequence[str]]:
     """Names that options may have."""
     families = list(dict.fromkeys(mesh.family for mesh in gearbox.meshes))
     law = LAWS.get(choice.mesh_law)
@@ -134,7 +188,17 @@ def _names(gearbox: Gearbox, choice: Choice) -> dict[str, list[str]]:
         elements += [mount.name for mount in mounts_at_work(gearbox)]
         elements += [f"{name}_body" for name in elastic_names(gearbox)]
     elements += [coupling.name for coupling in gearbox.couplings]
-    return {"pair": list(gearbox.pairs), "mesh": families, "meshes": families, "element": elements}
+    rated = {} if gearbox.case.rating is None else {"gear": list(gearbox.case.rating.gears)}  # else told by itself
+    return {
+        **rated,
+        "pair": list(gearbox.pairs),
+        "mesh": families,
+        "meshes": families,
+        "element": elements,
+        "bearing": _rated_bearings(gearbox),
+        "of": list(SAFETIES),
+        "by": [LEAST, *LIVES],
+    }
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -5,17 +5,19 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from exugear.load_files.reading import file_digest
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.named_files import NOTHING_MORE, Permissions
 from exugear.model.reading import CaseError, fault_line
-from exugear.model.versions import MODES, REDUCTION, RUN, STEADY, STUDY
-from exugear.results.study_files import case_digest
+from exugear.model.versions import LIFE, MODES, REDUCTION, RUN, STEADY, STUDY
+from exugear.results.study_files import case_digest, read_content
 from exugear.rotating.rotating_frame import SteadyError
 from exugear.steady.settings import SpeedRange, SteadySettings, check_law
 from exugear.studies.design.paths import PathError, changed, check_path
@@ -23,9 +25,17 @@ from exugear.studies.design.reading import StudyError, parse_study, read_study_f
 from exugear.studies.design.sampling import Design, Point, design_of
 from exugear.studies.design.sections import StudyFile
 from exugear.studies.figures.figure import Figure, FigureError
+from exugear.studies.figures.point_lives import life_loads
 from exugear.studies.figures.point_results import PointSettings
 from exugear.studies.figures.registry import FIGURES, KeptFigure, kept_figures
-from exugear.studies.soundness import faults_of_names, faults_of_options, faults_of_paths, faults_of_values
+from exugear.studies.soundness import (
+    faults_of_names,
+    faults_of_needs,
+    faults_of_options,
+    faults_of_paths,
+    faults_of_signals,
+    faults_of_values,
+)
 from fe_ste.tools.versions import TABLE
 
 
@@ -125,10 +135,14 @@ class Study:
             raise StudyError(fault_line(source, str(error))) from None
         choice = Choice(**file.choice.model_dump()).of(gearbox)
         faults = [*faults_of_names(file, kept), *faults_of_paths(file), *faults_of_values(design)]
-        faults += faults_of_options(kept, gearbox, choice)
+        faults += [*faults_of_options(kept, gearbox, choice), *faults_of_needs(file, kept, gearbox)]
+        faults += faults_of_signals(kept, gearbox, choice)
         if faults:
             raise StudyError("\n".join(fault_line(source, fault) for fault in faults))
-        return cls(file, source, gearbox, choice, settings, kept, design, case_digest(case))
+        of_life = _of_life(kept)
+        if of_life:
+            life_loads(gearbox, choice)
+        return cls(file, source, gearbox, choice, settings, kept, design, case_digest(case, of_life))
 
     def __repr__(self) -> str:
         """One line."""
@@ -137,11 +151,14 @@ class Study:
     @cached_property
     def case_hash(self) -> str:
         """SHA-256 of all that every point depends on: the case with its files, choices, figures, versions."""
+        of_life, cases = _of_life(self.figures), self.gearbox.content.get("load_cases", {})
+        read = read_content(self.gearbox, of_life)
+        run = None if self.gearbox.case.rating is None else self.gearbox.case.rating.dynamic_factor_run
         content = {
-            "versions": [STUDY, TABLE, REDUCTION, MODES, RUN, STEADY],
-            "case": self.gearbox.computed_content,
-            "load": self.gearbox.content["load_cases"].get(self.choice.load_case),
-            "files": self._digests(self.gearbox.content),
+            "versions": [STUDY, TABLE, REDUCTION, MODES, RUN, STEADY, *([LIFE] if of_life else [])],
+            "case": {key: value for key, value in read.items() if key != "load_cases"},
+            "load": [cases.get(self.choice.load_case), cases.get(run) if of_life else None],
+            "files": self._digests(read),
             "choice": [self.choice.variant, self.choice.mesh_law, self.choice.inertias, self.choice.load_case],
             "settings": [repr(self.settings.steady), self.settings.duration, self.settings.solver],
             "figures": self.file.figures,
@@ -159,11 +176,14 @@ class Study:
             yield self.hash_of(point.changes), point
 
     def _digests(self, content: Any) -> list[str]:
-        """Checksums of the files that a content names."""
+        """Checksums of the files that a content names, one by one or by a pattern."""
         folder = Path(self.gearbox.source).parent
         named = sorted({text for text in _texts(content) if 0 < len(text) < 256 and "\0" not in text})
         files = [folder / name for name in named]
-        return [hashlib.sha256(file.read_bytes()).hexdigest() for file in files if file.suffix and file.is_file()]
+        for pattern in sorted(set(_patterns(content))):
+            with suppress(ValueError, NotImplementedError, OSError):  # what is no pattern is refused where it is read
+                files += sorted(folder.glob(pattern))
+        return [file_digest(file) for file in files if file.suffix and file.is_file()]
 
 
 def _varied(gearbox: Gearbox, changes: Mapping[str, Any]) -> Gearbox:
@@ -187,6 +207,20 @@ def _texts(content: Any) -> Iterator[str]:
     elif isinstance(content, list):
         for value in content:
             yield from _texts(value)
+
+
+def _patterns(content: Any) -> Iterator[str]:
+    """Names of many files in a content: what stands at keys `files`, also of paths that end in one."""
+    if isinstance(content, Mapping):
+        for key, value in content.items():
+            if isinstance(value, str) and str(key).rpartition(".")[2] == "files":
+                yield value
+            yield from _patterns(value)
+
+
+def _of_life(figures: Mapping[str, KeptFigure]) -> bool:
+    """Whether loads of a life are read."""
+    return any(kept.figure.needs in ("life", "bearings") for kept in figures.values())
 
 
 def _settings(file: StudyFile) -> PointSettings:

@@ -6,12 +6,15 @@ import difflib
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from exugear.studies.figures.point_results import PointResults
 
 Values = float | Mapping[str, float]
 """One number, or several by name along the figure's dimension."""
+Needs = Literal["", "run", "steady", "life", "bearings"]
+"""What a figure is read from, where it is more than modes, tables and the static state: a run, a steady response, a
+life, or bearings in that life."""
 
 
 class FigureError(ValueError):
@@ -30,11 +33,14 @@ class Figure:
     units : str
     dimension : str
         Name of the dimension of several numbers; empty for one.
+    needs : {"", "run", "steady", "life", "bearings"}
+        What it is read from, where that is more than modes, tables and the static state.
     """
 
     function: Callable[..., Values]
     units: str
     dimension: str = ""
+    needs: Needs = ""
 
     @property
     def description(self) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -153,13 +153,18 @@ class PointResults:
             The user stopped it.
         """
         from exugear.results.run_file import load_run
+
+        return load_run(self._simulated(self.choice))
+
+    def _simulated(self, choice: Choice) -> Path:
+        """File of a run; doubts about it are kept."""
         from exugear.runs.run_folder import refuse_to_resume, run_directory
         from exugear.runs.runup import simulate
 
-        resume = not refuse_to_resume(run_directory(self.folder, self.choice))
+        resume = not refuse_to_resume(run_directory(self.folder, choice))
         run = simulate(
             self.gearbox,
-            self.choice,
+            choice,
             self.stiffness,
             self.folder,
             bodies=self.bodies,
@@ -171,7 +176,32 @@ class PointResults:
         if not run.complete:
             raise KeyboardInterrupt
         self.doubts += run.reasons
-        return load_run(run.path)
+        return run.path
+
+    @cached_property
+    def life(self) -> xr.Dataset:
+        """Life of gears and bearings under the loads of the gearbox file, as `exugear life` has it.
+
+        K_v of a run or of a steady response is computed first: a point has no results folder that holds one.
+
+        Raises
+        ------
+        CaseError
+            No loads or strengths, or such as cannot be used.
+        BalanceError
+            A static state that is not held.
+        """
+        from exugear.life.life import rating_of
+        from exugear.studies.figures.point_lives import point_life, response_of_factors
+
+        rating = rating_of(self.gearbox)
+        if rating.dynamic_factor_run is not None:
+            self._simulated(replace(self.choice, load_case=rating.dynamic_factor_run))
+        elif rating.dynamic_factor_steady is not None:
+            response_of_factors(self.assembly, self.choice, self.settings.steady, self.folder, _between_steps)
+        data, doubts = point_life(self.assembly, self.choice, self.shared, self.folder, _between_steps)
+        self.doubts += doubts
+        return data
 
     def states(
         self, pair: str, positions: int, torque_factors: Sequence[float], misalignment_um: Sequence[float]

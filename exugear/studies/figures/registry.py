@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from exugear.dynamics.signals import SIGNALS
-from exugear.studies.figures import of_modes, of_runs, of_statics, of_steady, of_tables
+from exugear.studies.figures import of_life, of_modes, of_runs, of_statics, of_steady, of_tables
 from exugear.studies.figures.figure import Figure, FigureError, Values
 from exugear.studies.figures.of_runs import OVERALL
 from exugear.studies.figures.point_results import PointResults
@@ -32,16 +32,33 @@ FIGURES: dict[str, Figure] = {
     "nearest_amplification": Figure(of_modes.nearest_amplification, "m/m"),
     "nearest_strain": Figure(of_modes.nearest_strain, "1"),
     "loudest_frequency": Figure(of_modes.loudest_frequency, "Hz"),
-    "largest_line": Figure(of_steady.largest_line, AS_SIGNAL),
-    "loudest_peak": Figure(of_steady.loudest_peak, AS_SIGNAL),
-    "loudest_speed": Figure(of_steady.loudest_speed, "rad/s"),
-    "harmonics": Figure(of_steady.harmonics, AS_SIGNAL, "harmonic"),
-    "rms": Figure(of_runs.rms, AS_SIGNAL),
-    "peak_to_peak": Figure(of_runs.peak_to_peak, AS_SIGNAL),
-    "final_speed": Figure(of_runs.final_speed, "rad/s"),
-    "dynamic_load_sharing": Figure(of_runs.dynamic_load_sharing, "1"),
-    "run_harmonics": Figure(of_runs.run_harmonics, AS_SIGNAL, "harmonic"),
-    "order_amplitudes": Figure(of_runs.order_amplitudes, AS_SIGNAL, "sideband"),
+    "largest_line": Figure(of_steady.largest_line, AS_SIGNAL, needs="steady"),
+    "loudest_peak": Figure(of_steady.loudest_peak, AS_SIGNAL, needs="steady"),
+    "loudest_speed": Figure(of_steady.loudest_speed, "rad/s", needs="steady"),
+    "harmonics": Figure(of_steady.harmonics, AS_SIGNAL, "harmonic", "steady"),
+    "rms": Figure(of_runs.rms, AS_SIGNAL, needs="run"),
+    "peak_to_peak": Figure(of_runs.peak_to_peak, AS_SIGNAL, needs="run"),
+    "final_speed": Figure(of_runs.final_speed, "rad/s", needs="run"),
+    "dynamic_load_sharing": Figure(of_runs.dynamic_load_sharing, "1", needs="run"),
+    "run_harmonics": Figure(of_runs.run_harmonics, AS_SIGNAL, "harmonic", "run"),
+    "order_amplitudes": Figure(of_runs.order_amplitudes, AS_SIGNAL, "sideband", "run"),
+    "contact_safeties": Figure(of_life.contact_safeties, "1", "flank", "life"),
+    "root_safeties": Figure(of_life.root_safeties, "1", "flank", "life"),
+    "contact_damages": Figure(of_life.contact_damages, "1", "flank", "life"),
+    "root_damages": Figure(of_life.root_damages, "1", "flank", "life"),
+    "worst_planets": Figure(of_life.worst_planets, "1", "flank", "life"),
+    "contact_safety": Figure(of_life.contact_safety, "1", needs="life"),
+    "root_safety": Figure(of_life.root_safety, "1", needs="life"),
+    "contact_damage": Figure(of_life.contact_damage, "1", needs="life"),
+    "root_damage": Figure(of_life.root_damage, "1", needs="life"),
+    "bearing_lives": Figure(of_life.bearing_lives, "h", "bearing", "bearings"),
+    "bearing_damages": Figure(of_life.bearing_damages, "1", "bearing", "bearings"),
+    "static_safeties": Figure(of_life.static_safeties, "1", "bearing", "bearings"),
+    "bearing_life": Figure(of_life.bearing_life, "h", needs="bearings"),
+    "bearing_damage": Figure(of_life.bearing_damage, "1", needs="bearings"),
+    "static_safety": Figure(of_life.static_safety, "1", needs="bearings"),
+    "life_hours": Figure(of_life.life_hours, "h", needs="life"),
+    "shortfalls": Figure(of_life.shortfalls, "1", needs="life"),
 }
 """By the name in a study file."""
 

@@ -1,4 +1,4 @@
-"""Tables and reductions that points of a study share: computed once, whoever asks first, and locked meanwhile."""
+"""Tables, stresses and reductions that points of a study share: computed once, whoever asks first, locked meanwhile."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import filelock
@@ -14,8 +14,9 @@ import filelock
 from exugear.bodies.elastic_body import ElasticBody
 from exugear.model.gearbox import Gearbox
 from exugear.tooth_mesh.table_remarks import doubts_about_table
-from exugear.tooth_mesh.tables import requested_tables, wanted_table
-from fe_ste.transmission_error.table import MeshTable
+from exugear.tooth_mesh.tables import TableRequest, requested_tables, wanted_table
+from fe_ste.root_stress.mesh_cycle import MeshCycleStress
+from fe_ste.transmission_error.table import MeshTable, TableError, TableInput
 
 UNRELATED = (
     "name",
@@ -84,6 +85,27 @@ class Shared:
             raise SharedTableError("; ".join(doubts))
         return table
 
+    def stresses(self, request: TableRequest, progress: Callable[[int, int], None] | None = None) -> MeshCycleStress:
+        """Stresses of a pair from its table of loads and misalignments, which is computed first; likewise.
+
+        Raises
+        ------
+        SharedTableError
+            The table is not to be trusted.
+        """
+        from exugear.life.pair_stresses import pair_stresses  # root stress, which most figures need not
+
+        folder = self.folder / "stress" / request.wanted.hash[:32]
+        if request.stored is None:
+            path = folder / f"{request.name}.states.nc"
+            request = replace(request, path=path, stored=_stored(path, request.wanted))
+        with _waiting(folder / "lock"):
+            table = request.stored or _stored(request.path, request.wanted) or request.compute(progress)
+            doubts = list(doubts_about_table(request.name, table))
+            if doubts:
+                raise SharedTableError("; ".join(doubts))
+            return pair_stresses([replace(request, stored=table)], folder)[request.name]
+
     def bodies(self, gearbox: Gearbox, inertias: str) -> dict[str, ElasticBody]:
         """Reduced elastic bodies; likewise."""
         from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies  # loads finite elements
@@ -93,3 +115,10 @@ class Shared:
         folder = self.folder / "bodies"
         with _waiting(folder / f"{key[:32]}.lock"):
             return reduced_bodies(gearbox, inertias, folder)
+
+
+def _stored(path: Path, wanted: TableInput) -> MeshTable | None:
+    try:
+        return MeshTable.open(path, wanted)
+    except TableError:
+        return None
