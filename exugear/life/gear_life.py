@@ -76,11 +76,10 @@ class FlankLife:
     contact_static, root_static : float
         Safety under the largest load, extremes with their partial factors among them; NaN without strength.
     nominal_contact, nominal_root : float
-        sigma_H0 of ISO 6336-2 and sigma_F0 of ISO 6336-3 at the largest load, for comparison; NaN for roots of rings.
+        sigma_H0 of ISO 6336-2 and sigma_F0 of ISO 6336-3 at the largest load, for comparison.
     standard_contact_safety, standard_root_safety : float
         S_H and S_F over the life by the nominal stresses of ISO 6336-2 and -3 with K_gamma and K_v of each load,
-        K_Hbeta of the finite elements and K_Fbeta of it, K_Halpha = K_Falpha = 1; NaN without strength, and for roots
-        of rings.
+        K_Hbeta of the finite elements and K_Fbeta of it, K_Halpha = K_Falpha = 1; NaN without strength.
     outside : float
         Largest share of the load outside the path of contact: what tip relief would take away.
     face_load : float
@@ -292,14 +291,8 @@ class _Case:
         )
 
     def _nominal_root(self, force: float) -> float:
-        gear = (self.pair.pinion, self.pair.gear)[self.tooth.member]
-        if gear.internal:
-            return math.nan
-        return (
-            force
-            / (self.pair.face_width * gear.normal_module)
-            * root_stress_factors(self.pair, self.tooth.member).product
-        )
+        area = self.pair.face_width * self.pair.pinion.normal_module
+        return force / area * root_stress_factors(self.pair, self.tooth.member).product
 
     def _rated(
         self, hertz: Floats, root: Floats, cycles: Floats, speed: Floats, worst_hertz: float, worst_root: float
@@ -342,10 +335,7 @@ class _Case:
         allowed = self._contact_strength(strength, speed)[:, None, None]
         hertz = nominal_contact_stress(self.pair, 1.0) * np.sqrt(force * face)
         flank = safety_factor(contact, hertz / allowed, 1.0, cycles)
-        one = self._nominal_root(1.0)
-        if math.isnan(one):
-            return flank, math.nan
-        root = one * force * root_face_load_factor(face, self.pair)
+        root = self._nominal_root(1.0) * force * root_face_load_factor(face, self.pair)
         return flank, safety_factor(bending, root, root_strength(strength), cycles)
 
     def _contact_strength(self, strength: StrengthSection, speed: Floats) -> Floats:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Literal, get_args
 
-Deviation = Literal["profile_slope", "helix_slope", "single_pitch", "cumulative_pitch", "runout"]
+Deviation = Literal["profile_slope", "profile_form", "helix_slope", "single_pitch", "cumulative_pitch", "runout"]
 DEVIATIONS: tuple[Deviation, ...] = get_args(Deviation)
 CLASSES = range(1, 12)
 """Flank tolerance classes; 1 is the finest."""
@@ -16,6 +16,7 @@ _STEP = math.sqrt(2.0)
 # Class 5, micrometres, of reference diameter d, normal module m and face width b in mm.
 _CLASS_5: dict[Deviation, Callable[[float, float, float], float]] = {
     "profile_slope": lambda d, m, b: 0.4 * m + 0.001 * d + 4.0,
+    "profile_form": lambda d, m, b: 0.55 * m + 5.0,
     "helix_slope": lambda d, m, b: 0.05 * math.sqrt(d) + 0.35 * math.sqrt(b) + 4.0,
     "single_pitch": lambda d, m, b: 0.001 * d + 0.4 * m + 5.0,
     "cumulative_pitch": lambda d, m, b: 0.002 * d + 0.55 * math.sqrt(d) + 0.7 * m + 12.0,

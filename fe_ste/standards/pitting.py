@@ -47,6 +47,25 @@ def helix_factor(gear: Gear) -> float:
     return 1.0 / math.sqrt(math.cos(gear.helix_angle))
 
 
+def single_contact_factors(pair: GearPair) -> tuple[float, float]:
+    """Z_B and Z_D: from the pitch point to the inner points of single contact of gear 1 and gear 2."""
+    overlap, slope = pair.overlap_ratio, math.tan(pair.working_pressure_angle)
+    if overlap >= 1.0:
+        return 1.0, 1.0
+    one, two = (
+        math.sqrt((gear.tip_radius / gear.base_radius) ** 2 - 1.0) * gear.outward for gear in (pair.pinion, pair.gear)
+    )
+    steps = tuple(2.0 * math.pi / (gear.teeth * gear.outward) for gear in (pair.pinion, pair.gear))
+    shared = pair.transverse_contact_ratio - 1.0
+    at_one = (one - steps[0]) * (two - shared * steps[1])
+    at_two = (two - steps[1]) * (one - shared * steps[0])
+    found = []
+    for curvature in (at_one, at_two):
+        factor = slope / math.sqrt(abs(curvature))
+        found.append(max(factor - overlap * (factor - 1.0), 1.0))
+    return found[0], 1.0 if pair.gear.internal else found[1]
+
+
 def nominal_contact_stress(pair: GearPair, force: float) -> float:
     """sigma_H0 at the pitch point, Pa.
 

@@ -1,8 +1,8 @@
 """Nominal tooth root stress by ISO 6336-3:2006 method B, for comparison with the finite elements.
 
-External gears without protuberance and undercut, thinning of teeth left out; internal ones are left to the finite
-elements. Lengths in the formulas
-are in normal modules of the virtual spur gear in the normal section.
+Gears without protuberance and undercut, thinning of teeth left out; internal ones by Corrigendum 1 of 2007, with their
+pinion-type cutter. Lengths in the formulas are in normal modules of the virtual spur gear in the normal section; an
+internal gear has a negative number of teeth and negative diameters there.
 """
 
 from __future__ import annotations
@@ -16,8 +16,13 @@ from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.geometry.involute import involute
 from fe_ste.tools.arrays import Floats
 
-_ROOT_ANGLE = math.pi / 3.0
-"""60 deg: the tangents at the critical section lean by 30 deg from the middle of an external tooth."""
+_ROOT_ANGLE, _RING_ROOT_ANGLE = math.pi / 3.0, math.pi / 6.0
+"""60 and 30 deg: the tangents at the critical section lean by 30 deg from the middle of an external tooth, by 60 deg
+from that of an internal one."""
+_THICK_RIM, _THICK_RING = 1.2, 3.5
+"""Rim over tooth height, and ring's rim over normal module, from which rims do not weaken roots."""
+_FINE_CLASS, _DEEP_TEETH = 4, 2.05
+"""Coarsest flank tolerance class, and virtual contact ratio from which on, teeth count as deep."""
 _NEWTON_STEPS = 50
 _LARGEST_HELIX = math.radians(30.0)
 """Above it the helix factor stays."""
@@ -31,6 +36,10 @@ class RootStressFactors:
     ----------
     form, stress_correction, helix : float
         Y_F and Y_S with the load at the outer point of single contact, Y_beta.
+    rim, deep_tooth : float
+        Y_B of thin rims, Y_DT of deep teeth of high accuracy.
+    notch : float
+        q_s, the notch parameter.
     outside_validity : tuple of str
         Why the value is an extrapolation.
     """
@@ -38,37 +47,40 @@ class RootStressFactors:
     form: float
     stress_correction: float
     helix: float
+    rim: float
+    deep_tooth: float
+    notch: float
     outside_validity: tuple[str, ...]
 
     @property
     def product(self) -> float:
-        """Y_F Y_S Y_beta."""
-        return self.form * self.stress_correction * self.helix
+        """Y_F Y_S Y_beta Y_B Y_DT."""
+        return self.form * self.stress_correction * self.helix * self.rim * self.deep_tooth
 
 
-def root_stress_factors(pair: GearPair, member: int) -> RootStressFactors:
-    """Form, stress correction and helix factor of a gear in its pair, ISO 6336-3:2006, method B.
+def root_stress_factors(
+    pair: GearPair, member: int, tolerance_class: int | None = None, free_bore: bool = False
+) -> RootStressFactors:
+    """Factors of the root stress of a gear in its pair, ISO 6336-3:2006, method B.
 
     Parameters
     ----------
     pair : GearPair
     member : {0, 1}
-        Gear 1 or gear 2, an external one.
-
-    Raises
-    ------
-    ValueError
-        The gear is internal.
+        Gear 1 or gear 2.
+    tolerance_class : int, optional
+        Flank tolerance class: teeth of class 4 and finer share the load of deep teeth.
+    free_bore : bool
+        Whether the diameter at which an external gear is held is a bore that nothing fills, as in planets on rollers,
+        and not a seat on a shaft: its rim then counts, as that of a ring does.
     """
     gear = (pair.pinion, pair.gear)[member]
-    if gear.internal:
-        raise ValueError(f"gear {gear.name}: the root stress of internal gears is that of the finite elements alone")
     virtual = gear.teeth / (math.cos(gear.base_helix_angle) ** 2 * math.cos(gear.helix_angle))
     contact_ratio = pair.transverse_contact_ratio / math.cos(gear.base_helix_angle) ** 2
     tip = virtual + 2.0 * (gear.tip_radius - gear.reference_radius) / gear.normal_module
     base = virtual * math.cos(gear.normal_pressure_angle)
-    # Diameter at the outer point of single contact: from the tip back along the path by what is shared.
-    shared = math.pi * math.cos(gear.normal_pressure_angle) * (contact_ratio - 1.0)
+    # Diameter at the outer point of single contact: from the tip along the path, towards the root, by what is shared.
+    shared = math.pi * math.cos(gear.normal_pressure_angle) * (contact_ratio - 1.0) * gear.outward
     loaded = 2.0 * math.hypot(0.5 * math.sqrt(tip**2 - base**2) - shared, 0.5 * base)
     form, correction, notch = form_and_correction(gear, virtual, loaded)
     overlap = pair.overlap_ratio
@@ -76,8 +88,39 @@ def root_stress_factors(pair: GearPair, member: int) -> RootStressFactors:
     remarks = {
         f"notch parameter q_s = {notch:.2f} is outside 1 to 8": not 1.0 <= notch <= 8.0,
         f"virtual contact ratio {contact_ratio:.2f} is not below 2": contact_ratio >= 2.0,
+        "no cutter is given: its fillet is taken as that of its rack": gear.internal and gear.cutter is None,
     }
-    return RootStressFactors(form, correction, helix, tuple(text for text, applies in remarks.items() if applies))
+    return RootStressFactors(
+        form=form,
+        stress_correction=correction,
+        helix=helix,
+        rim=rim_factor(gear) if gear.internal or free_bore else 1.0,
+        deep_tooth=_deep_tooth_factor(contact_ratio, tolerance_class),
+        notch=notch,
+        outside_validity=tuple(text for text, applies in remarks.items() if applies),
+    )
+
+
+def rim_factor(gear: Gear) -> float:
+    """Y_B of the rim between the roots and where the gear is held, ISO 6336-3:2006, clause 9.
+
+    Examples
+    --------
+    >>> gear = {"name": "1", "teeth": 60, "normal_module": 5e-3, "face_width": 50e-3}
+    >>> [round(rim_factor(Gear(**gear, held_diameter=inside)), 3) for inside in (100e-3, 270e-3)]
+    [1.0, 1.694]
+    """
+    rim, height = abs(0.5 * gear.held_diameter - gear.root_radius), abs(gear.tip_radius - gear.root_radius)
+    if gear.internal:
+        return 1.0 if rim >= _THICK_RING * gear.normal_module else 1.15 * math.log(8.324 * gear.normal_module / rim)
+    return 1.0 if rim >= _THICK_RIM * height else 1.6 * math.log(2.242 * height / rim)
+
+
+def _deep_tooth_factor(contact_ratio: float, tolerance_class: int | None) -> float:
+    """Y_DT over the virtual contact ratio."""
+    if tolerance_class is None or tolerance_class > _FINE_CLASS or contact_ratio <= _DEEP_TEETH:
+        return 1.0
+    return max(2.366 - 0.666 * contact_ratio, 0.7)
 
 
 def root_face_load_factor(face_load: Floats, pair: GearPair) -> Floats:
@@ -107,7 +150,7 @@ def _face_exponent(slenderness: float) -> float:
 
 
 def form_and_correction(gear: Gear, virtual: float, loaded: float) -> tuple[float, float, float]:
-    """Y_F, Y_S and the notch parameter q_s of an external gear.
+    """Y_F, Y_S and the notch parameter q_s of a gear.
 
     Parameters
     ----------
@@ -117,28 +160,45 @@ def form_and_correction(gear: Gear, virtual: float, loaded: float) -> tuple[floa
     loaded : float
         Diameter at which the load acts on that gear, normal modules.
     """
-    angle, shift = gear.normal_pressure_angle, gear.profile_shift
-    tool_depth, radius = gear.dedendum_factor, gear.rack.tip_radius
+    teeth, diameter = virtual * gear.outward, loaded * gear.outward
+    angle, shift = gear.normal_pressure_angle, gear.profile_shift * gear.outward
+    tool_depth, radius = gear.dedendum_factor, _rack_radius(gear)
+    section, around = (_RING_ROOT_ANGLE, 1.0) if gear.internal else (_ROOT_ANGLE, math.sqrt(3.0))
     offset = radius - tool_depth + shift
     half = 0.25 * math.pi - tool_depth * math.tan(angle) - (1.0 - math.sin(angle)) * radius / math.cos(angle)
-    constant = 2.0 / virtual * (0.5 * math.pi - half) - _ROOT_ANGLE
-    theta = math.pi / 6.0
-    for _ in range(_NEWTON_STEPS):
-        error = theta - 2.0 * offset / virtual * math.tan(theta) + constant
-        theta -= error / (1.0 - 2.0 * offset / virtual / math.cos(theta) ** 2)
-    chord = virtual * math.sin(_ROOT_ANGLE - theta) + math.sqrt(3.0) * (offset / math.cos(theta) - radius)
-    cosine = math.cos(theta)
+    theta = _tangent_angle(2.0 * offset / teeth, 2.0 / teeth * (0.5 * math.pi - half) - section)
+    cosine, lean = math.cos(theta), section - theta
+    chord = teeth * math.sin(lean) + around * (offset / cosine - radius)
     fillet = radius + 2.0 * offset**2 / (cosine * (virtual * cosine**2 - 2.0 * offset))
-    at_load = math.acos(virtual * math.cos(angle) / loaded)
-    half_tooth = (0.5 * math.pi + 2.0 * shift * math.tan(angle)) / virtual + involute(angle) - involute(at_load)
+    at_load = math.acos(teeth * math.cos(angle) / diameter)
+    half_tooth = (0.5 * math.pi + 2.0 * shift * math.tan(angle)) / teeth + involute(angle) - involute(at_load)
     force_angle = at_load - half_tooth
     arm = 0.5 * (
-        (math.cos(half_tooth) - math.sin(half_tooth) * math.tan(force_angle)) * loaded
-        - virtual * math.cos(_ROOT_ANGLE - theta)
-        - offset / math.cos(theta)
-        + radius
+        (math.cos(half_tooth) - math.sin(half_tooth) * math.tan(force_angle)) * diameter
+        - teeth * math.cos(lean)
+        - math.sqrt(3.0) / around * (offset / cosine - radius)
     )
     form = 6.0 * arm * math.cos(force_angle) / (chord**2 * math.cos(angle))
     slender, notch = chord / arm, 0.5 * chord / fillet
     correction = (1.2 + 0.13 * slender) * notch ** (1.0 / (1.21 + 2.3 / slender))
     return form, correction, notch
+
+
+def _tangent_angle(slope: float, constant: float) -> float:
+    """Solve ``theta = slope tan(theta) - constant``, rad."""
+    theta = math.pi / 6.0
+    for _ in range(_NEWTON_STEPS):
+        error = theta - slope * math.tan(theta) + constant
+        theta -= error / (1.0 - slope / math.cos(theta) ** 2)
+    return theta
+
+
+def _rack_radius(gear: Gear) -> float:
+    """rho_fPv: tip radius of the rack, or of one that leaves about what the cutter of an internal gear leaves."""
+    if not gear.internal:
+        return gear.rack.tip_radius
+    if gear.cutter is None:
+        return gear.fillet_radius / gear.normal_module
+    radius, cutter = gear.cutter.tip_radius, gear.cutter
+    reach = max(cutter.profile_shift + gear.dedendum_factor - radius, 0.0)
+    return radius + float(reach**1.95) / (3.156 * 1.036**cutter.teeth)
