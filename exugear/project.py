@@ -26,6 +26,7 @@ from exugear.dynamics.statics import BalanceError, static_state
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.named_files import NOTHING_MORE, Permissions
+from exugear.model.reading import CaseError
 from exugear.results.bearings_file import write_duties
 from exugear.results.folder import bearings_path, bodies_folder, keep_case, kept_case, modes_path, time_noted
 from exugear.results.run_file import FINAL_NAME
@@ -44,9 +45,15 @@ from fe_ste.transmission_error.table import MeshTable
 if TYPE_CHECKING:
     import xarray as xr
 
+    from exugear.life.static_balance import StaticBalance
     from exugear.load_spectrum.counted import CountedLoads
+    from exugear.model.sections.loads import RatingSection
+    from exugear.rating.sheet import RatingSheet
     from exugear.report.writer import Report
     from exugear.steady.settings import SteadySettings
+
+Figures = dict[tuple[str, str, str], dict[str, float]]
+"""Figures of flanks by gear, family of meshes and flank, and then by symbol."""
 
 
 @dataclass(frozen=True)
@@ -381,6 +388,92 @@ class Project:
             data = write_life(self.life_path, life, self.gearbox.name)
             angles.discard()
             return data
+
+    def rating(
+        self,
+        begin: Callable[[str], None] | None = None,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> RatingSheet:
+        """Rate all gears by the standard under the loads of the file, or under the static load; write nothing.
+
+        Beside it stands what the finite elements say: of the life in the folder if it fits, or under the static load
+        from tables that are there. Nothing of that is computed but stresses from tables.
+
+        Parameters
+        ----------
+        begin : callable, optional
+            Called with the name of each pair before its root stress is computed.
+        progress : callable, optional
+            Called with the number of static states that are solved, and of all.
+
+        Raises
+        ------
+        CaseError
+            No section `[rating]`, loads that cannot be used, or strengths that do not fit the gears.
+        """
+        from exugear.life.acting_loads import acting_loads
+        from exugear.life.gear_life import check_strengths
+        from exugear.life.life import checked_loads, rating_of
+        from exugear.life.static_balance import static_balance
+        from exugear.rating.nominal import nominal_loads
+        from exugear.rating.sheet import rating_sheet
+
+        rating, spectrum = rating_of(self.gearbox), self.gearbox.case.loads is not None
+        counted = checked_loads(self.gearbox) if spectrum else nominal_loads(self.gearbox, rating)
+        if not spectrum:
+            check_strengths(self.gearbox, rating, counted.teeth, False)
+        at_rest = self.chosen(variant="bushing", mesh_law="iso6336")
+        acting, angles = acting_loads(counted), rating.carrier_angles
+        balance = static_balance(
+            at_rest.assembly(), counted.body, acting.torques, angles, progress, 0.5 * acting.hub_sizes
+        )
+        if spectrum:
+            found, remarks = self._rated_by_life(counted)
+        else:
+            found, remarks = self._rated_by_tables(rating, balance, begin)
+        return rating_sheet(self.gearbox, rating, counted, acting, balance, found, remarks)
+
+    def _rated_by_life(self, counted: CountedLoads) -> tuple[Figures, tuple[str, ...]]:
+        """Figures of the life in the folder; none, and why, where there is none that fits."""
+        from exugear.rating.beside import of_life
+
+        missing = "no finite elements beside it: `exugear life` computes them"
+        if not self.life_path.is_file() or any(request.stored is None for request in self.life_tables()):
+            return {}, (missing,)
+        try:
+            data = self.stored_life(counted)
+        except (BalanceError, MeshError, BearingError, VariantError, CaseError) as error:
+            return {}, (f"{missing}; {error}",)
+        if data is None:
+            return {}, (f"{missing}; {self.life_path} was computed from another input",)
+        return of_life(data), (f"by finite elements: {self.life_path}",)
+
+    def _rated_by_tables(
+        self, rating: RatingSection, balance: StaticBalance, begin: Callable[[str], None] | None
+    ) -> tuple[Figures, tuple[str, ...]]:
+        """Figures of the nominal load from tables that are there."""
+        from exugear.life.pair_stresses import pair_stresses
+        from exugear.rating.beside import of_nominal_load, remarks_on
+        from exugear.rating.nominal import nominal_loads
+
+        stresses = pair_stresses(self.requested_tables(), self.folder, begin, keep=False)
+        loads = nominal_loads(self.gearbox, rating, rating.application_factor)
+        found = of_nominal_load(self.gearbox, rating, loads, balance, stresses)
+        missing = [name for name in self.gearbox.gear_pairs if name not in stresses]
+        lines = [f"no finite elements beside {', '.join(missing)}: `exugear ste` computes tables"] if missing else []
+        return found, (*lines, *remarks_on(stresses))
+
+    def stored_life(self, counted: CountedLoads) -> xr.Dataset | None:
+        """Life in the folder that was computed from exactly this input; None without one."""
+        from exugear.dynamic_factors.response_factors import source_hash
+        from exugear.life.life import life_hash, rating_of
+        from exugear.life.life_file import stored_life
+
+        assembly, rating = self.assembly(), rating_of(self.gearbox)
+        tables = {request.name: request.wanted.hash for request in self.stress_tables(counted)}
+        return stored_life(
+            self.life_path, life_hash(assembly, counted, tables, source_hash(assembly, rating, self.folder))
+        )
 
     @property
     def life_path(self) -> Path:

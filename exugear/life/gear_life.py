@@ -22,6 +22,7 @@ from exugear.model.gearbox import Gearbox
 from exugear.model.sections.loads import RatingSection, StrengthSection
 from fe_ste.geometry.gears import GearPair
 from fe_ste.root_stress.mesh_cycle import MeshCycleStress
+from fe_ste.standards.load_factors import Hardening
 from fe_ste.standards.pitting import (
     lubricant_factor,
     nominal_contact_stress,
@@ -30,9 +31,12 @@ from fe_ste.standards.pitting import (
     tangential_force,
     velocity_factor,
 )
+from fe_ste.standards.root_strength import notch_factor, size_factor, surface_factor
 from fe_ste.standards.service_life import (
     CASE_HARDENED_BENDING,
     CASE_HARDENED_CONTACT,
+    THROUGH_HARDENED_BENDING,
+    THROUGH_HARDENED_CONTACT,
     LifeCurve,
     damages,
     safety_factor,
@@ -306,7 +310,7 @@ class _Case:
             return {**dict.fromkeys(keys, math.nan), "by_point": np.nan}
         contact, bending = life_curves(strength)
         allowed = self._contact_strength(strength, speed)[:, None, None]
-        endured = root_strength(strength)
+        endured = root_strength(strength, self.pair, self.tooth.member)
         static = 1e6 * strength.sigma_H_lim_MPa * contact.factors[0]
         by_contact = damages(contact, hertz / allowed, 1.0, cycles).sum(axis=(1, 2))
         by_root = damages(bending, root, endured, cycles).sum(axis=(1, 2))
@@ -336,7 +340,7 @@ class _Case:
         hertz = nominal_contact_stress(self.pair, 1.0) * np.sqrt(force * face)
         flank = safety_factor(contact, hertz / allowed, 1.0, cycles)
         root = self._nominal_root(1.0) * force * root_face_load_factor(face, self.pair)
-        return flank, safety_factor(bending, root, root_strength(strength), cycles)
+        return flank, safety_factor(bending, root, root_strength(strength, self.pair, self.tooth.member), cycles)
 
     def _contact_strength(self, strength: StrengthSection, speed: Floats) -> Floats:
         """Pa at a life factor of one, for each speed (rad/s) of the loaded body."""
@@ -360,15 +364,35 @@ def roughness_of(strength: StrengthSection) -> float:
     return 1e-6 * (strength.roughness_Rz_um or RZ_OF_RA * (strength.roughness_Ra_um or 0.0))
 
 
-def root_strength(strength: StrengthSection) -> float:
+def hardening_of(strength: StrengthSection) -> Hardening:
+    """Steel whose constants count: case-hardened ones, which run in least, where curves have no name."""
+    return strength.curve or "case_hardened"
+
+
+def root_factors(strength: StrengthSection, pair: GearPair, member: int) -> tuple[float, float, float]:
+    """Y_delta_rel_T, Y_R_rel_T and Y_X of a gear; the product that the file states in the place of the first."""
+    if strength.root_roughness_Rz_um is None:
+        return strength.root_factor or 1.0, 1.0, 1.0
+    hardening, notch = hardening_of(strength), root_stress_factors(pair, member).notch
+    return (
+        notch_factor(notch, hardening),
+        surface_factor(1e-6 * strength.root_roughness_Rz_um),
+        size_factor(pair.pinion.normal_module, hardening),
+    )
+
+
+def root_strength(strength: StrengthSection, pair: GearPair, member: int) -> float:
     """Root stress (Pa) that a gear withstands at a life factor of one."""
     both_ways = strength.mean_stress_factor or 1.0
-    return 1e6 * strength.sigma_F_lim_MPa * PLAIN_TEST_GEAR * strength.root_factor * both_ways
+    factors = math.prod(root_factors(strength, pair, member))
+    return 1e6 * strength.sigma_F_lim_MPa * PLAIN_TEST_GEAR * factors * both_ways
 
 
 def life_curves(strength: StrengthSection) -> tuple[LifeCurve, LifeCurve]:
     """S-N curves of contact and of bending of a gear."""
     if strength.contact_curve is None or strength.bending_curve is None:
+        if strength.curve == "through_hardened":
+            return THROUGH_HARDENED_CONTACT, THROUGH_HARDENED_BENDING
         return CASE_HARDENED_CONTACT, CASE_HARDENED_BENDING
     contact, bending = (
         LifeCurve(tuple(point[0] for point in curve), tuple(point[1] for point in curve))

@@ -36,6 +36,7 @@ def pair_stresses(
     requests: Iterable[TableRequest],
     folder: Path,
     begin: Callable[[str], None] | None = None,
+    keep: bool = True,
 ) -> dict[str, MeshCycleStress]:
     """Stresses of all pairs whose tables are there; those that are missing, or belong to another table, are computed.
 
@@ -46,6 +47,8 @@ def pair_stresses(
         Where they are kept: ``stress/<pair>.nc``.
     begin : callable, optional
         Called with the name of each pair before it is computed.
+    keep : bool
+        Whether what is computed is written.
     """
     known: dict[tuple[Gear, int], RootGauges] = {}
 
@@ -66,7 +69,8 @@ def pair_stresses(
                 begin(request.name)
             both = gauges(pair.pinion, 1), gauges(pair.gear, -1 if pair.gear.internal else 1)
             kept = mesh_cycle_stress(pair, request.stored.dataset, both)
-            _keep(path, kept, request.name, digest)
+            if keep:
+                _keep(path, kept, request.name, digest)
         found[request.name] = kept
     return found
 

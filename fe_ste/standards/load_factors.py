@@ -72,18 +72,18 @@ def helix_running_in(misalignment: float, hardening: Hardening, limit: float, ve
     return min(320e6 / limit * misalignment, 1e-6 * most * 1e6 / limit, misalignment)
 
 
-def reduced_mass(pair: GearPair, sun_meshes: int = 1) -> float:
+def reduced_mass(pair: GearPair, meshes: tuple[int, int] = (1, 1)) -> float:
     """m_red: mass of both gears that vibrates along the line of action, over the face width, kg/m.
 
     Parameters
     ----------
     pair : GearPair
         External gears; solid between the held diameter and the middle of the teeth.
-    sun_meshes : int
-        Planets at gear 1, 1 in a plain stage.
+    meshes : (int, int)
+        Teeth in mesh at once around gear 1 and gear 2: a sun has as many as planets.
     """
-    one, two = (_mass_on_base_circle(gear) for gear in (pair.pinion, pair.gear))
-    return 1.0 / (sun_meshes / one + 1.0 / two)
+    masses = (_mass_on_base_circle(gear) for gear in (pair.pinion, pair.gear))
+    return 1.0 / sum(count / mass for count, mass in zip(meshes, masses, strict=True))
 
 
 def _mass_on_base_circle(gear: Gear) -> float:
@@ -93,7 +93,7 @@ def _mass_on_base_circle(gear: Gear) -> float:
     return inertia / gear.base_radius**2
 
 
-def resonance_ratio(pair: GearPair, mesh_stiffness: float, speed: float, sun_meshes: int = 1) -> float:
+def resonance_ratio(pair: GearPair, mesh_stiffness: float, speed: float, meshes: tuple[int, int] = (1, 1)) -> float:
     """N: speed of gear 1 against its frame (rad/s) over that of the main resonance.
 
     Parameters
@@ -102,10 +102,10 @@ def resonance_ratio(pair: GearPair, mesh_stiffness: float, speed: float, sun_mes
     mesh_stiffness : float
         c_gamma_alpha, N/m per m.
     speed : float
-    sun_meshes : int
+    meshes : (int, int)
         As in `reduced_mass`.
     """
-    return abs(speed) * pair.pinion.teeth / math.sqrt(mesh_stiffness / reduced_mass(pair, sun_meshes))
+    return abs(speed) * pair.pinion.teeth / math.sqrt(mesh_stiffness / reduced_mass(pair, meshes))
 
 
 def dynamic_factor(

@@ -64,6 +64,11 @@ CASE_HARDENED_CONTACT = LifeCurve((1e5, 5e7, 1e10), (1.6, 1.0, 0.85))
 CASE_HARDENED_BENDING = LifeCurve((1e3, 3e6, 1e10), (2.5, 1.0, 0.85))
 """Y_NT of case-hardened steel: exponents 8.73724908 and 49.91250338 of the corrigendum's clause C.6."""
 
+THROUGH_HARDENED_CONTACT = CASE_HARDENED_CONTACT
+"""Z_NT of through-hardened steel without pitting: the same points (ISO 6336-2:2006, table 2)."""
+THROUGH_HARDENED_BENDING = LifeCurve((1e4, 3e6, 1e10), (2.5, 1.0, 0.85))
+"""Y_NT of through-hardened steel (ISO 6336-3:2006, table 1)."""
+
 
 def damages(curve: LifeCurve, stress: Floats, strength: Floats | float, cycles: Floats) -> Floats:
     """Cycles over endured cycles of each load; infinite where a stress exceeds the curve.

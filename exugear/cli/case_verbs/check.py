@@ -1,16 +1,19 @@
-"""The verb `check`: read and check a gearbox file, and sum up what follows from it at once."""
+"""The verb `check`: read and check a gearbox file, and sum up what follows from it at once, or rate its gears."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
 
 from exugear.cli.case import read_gearbox, steady_lack
-from exugear.cli.console import counted, note, print_json, print_table, say
-from exugear.cli.errors import BadInputError, FailedError, exit_codes, model_errors
-from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption
+from exugear.cli.console import counted, note, print_json, print_table, progress_bar, say
+from exugear.cli.dynamics import contacts_shown
+from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption, model_errors
+from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption, OutOption
 
 if TYPE_CHECKING:
     from exugear.model.gearbox import Gearbox
@@ -20,9 +23,28 @@ BEYOND = 1.05
 """Mesh frequencies above this part of the band are told: steps of a run are chosen for the band, and end softly."""
 
 
-def check(case: CaseArgument, files_below: FilesBelowOption = None, as_json: JsonOption = False) -> None:
+RatingOption = Annotated[
+    bool,
+    typer.Option(
+        "--rating",
+        help="Rate the gears by ISO 6336-2 and -3 instead, all factors by name, beside what the results folder has of "
+        "finite elements.",
+    ),
+]
+
+
+def check(
+    case: CaseArgument,
+    rating: RatingOption = False,
+    out: OutOption = None,
+    files_below: FilesBelowOption = None,
+    as_json: JsonOption = False,
+) -> None:
     """Read and check a gearbox file; sum up its gear pairs, bearings and load cases. Writes nothing."""
     with exit_codes():
+        if rating:
+            _rate(case, out, files_below, as_json)
+            return
         from exugear.checks.readiness import lacking, remarks
         from exugear.model.choice import USER_VARIANTS
 
@@ -66,6 +88,35 @@ def check(case: CaseArgument, files_below: FilesBelowOption = None, as_json: Jso
         for one in loads:
             for doubt in one["doubts"]:
                 note(f"load_cases.{one['load_case']}: {doubt}", style="yellow")
+
+
+def _rate(case: Path, out: Path | None, files_below: Path | None, as_json: bool) -> None:
+    """Print the rating of all gears; end with code 1 where one has less safety than is asked for."""
+    from exugear.cli.rating_tables import tell_rating
+    from exugear.model.choice import Choice
+    from exugear.project import Project, default_folder
+
+    gearbox = read_gearbox(case, files_below, tell=not as_json)
+    project = Project(gearbox, out or default_folder(case), Choice("bushing", "line_of_action"))
+    with progress_bar() as bar, model_errors():
+        task = bar.add_task("static balance", total=None)
+
+        def begin(pair: str) -> None:
+            interruption.check()
+            bar.update(task, description=f"{pair}: root stress by finite elements")
+
+        def show(done: int, total: int) -> None:
+            interruption.check()
+            bar.update(task, completed=done, total=total, description="static balance")
+
+        with contacts_shown(bar, task):
+            sheet = project.rating(begin, show)
+    if as_json:
+        print_json({"case": str(case), "name": gearbox.name, "rating": sheet.summary()})
+    else:
+        tell_rating(sheet)
+    if sheet.shortfalls:
+        raise FailedError("\n".join(["gears have less safety than is asked for:", *sheet.shortfalls]))
 
 
 def _read(case: Path, files_below: Path | None, as_json: bool) -> Gearbox:

@@ -126,8 +126,9 @@ class StrengthSection(Section):
     """Allowable stress number for contact."""
     sigma_F_lim_MPa: q.StressMPa
     """Nominal stress number for bending; the plain test gear withstands twice as much (Y_ST = 2)."""
-    curve: Literal["case_hardened"] | None = None
-    """S-N curves by name, those of ISO 6336-6; or the next two keys."""
+    curve: Literal["case_hardened", "through_hardened"] | None = None
+    """S-N curves by name, those of ISO 6336-6; or the next two keys. The name says whose running in, notch sensitivity
+    and size factor count by the standard; those of case-hardened steel with own curves."""
     contact_curve: Curve | None = None
     """Life factor Z_NT over load cycles."""
     bending_curve: Curve | None = None
@@ -136,8 +137,13 @@ class StrengthSection(Section):
     """Mean peak-to-valley roughness Rz of the flanks; or the next key."""
     roughness_Ra_um: q.MeanRoughnessUm | None = None
     """Arithmetic mean roughness Ra of the flanks; Rz is six times as much (ISO 6336-2)."""
-    root_factor: q.StrengthFactor
-    """Product of the relative notch sensitivity, surface and size factors of the root (Y_drelT Y_RrelT Y_X)."""
+    root_factor: q.StrengthFactor | None = None
+    """Product of the relative notch sensitivity, surface and size factors of the root (Y_drelT Y_RrelT Y_X); or the
+    next key."""
+    root_roughness_Rz_um: q.RoughnessUm | None = None
+    """Roughness Rz of the roots, from which these factors follow by ISO 6336-3."""
+    tolerance_class: q.ToleranceClass | None = None
+    """Flank tolerance class (ISO 1328-1:2013) of the gear; load factors by the standard need that of both gears."""
     mean_stress_factor: q.StrengthFactor | None = None
     """Y_M of gears whose teeth bend both ways, such as planets and idlers; they need it."""
 
@@ -154,6 +160,8 @@ class StrengthSection(Section):
     def _roughness(self) -> StrengthSection:
         if (self.roughness_Rz_um is None) == (self.roughness_Ra_um is None):
             raise ValueError("give one of roughness_Rz_um and roughness_Ra_um")
+        if (self.root_factor is None) == (self.root_roughness_Rz_um is None):
+            raise ValueError("give one of root_factor and root_roughness_Rz_um")
         return self
 
     @model_validator(mode="after")
@@ -182,6 +190,11 @@ class RatingSection(Section):
     """Level of the steady response that gives K_v over speed, by the same windows."""
     least_dynamic_factor: q.LoadFactorK | None = None
     """Least K_v beside a run or a response: without errors of the wheels these have too little."""
+    application_factor: q.LoadFactorK = 1.0
+    """K_A on the nominal load of `exugear check --rating`, where there is no section `[loads]`: counted loads have what
+    they have."""
+    nominal_hours: q.NominalHours | None = None
+    """Hours at that load and rated speed; without them the longest life of the S-N curves is asked for."""
     viscosity_40_mm2_per_s: q.Viscosity | None = None
     """Kinematic viscosity of the oil at 40 degrees Celsius, where there is no section `[lubricant]`."""
     carrier_angles: q.CarrierAngles = 12

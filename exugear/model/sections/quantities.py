@@ -160,6 +160,8 @@ StrengthFactor = Annotated[float, Range(0.1, 2.0, (0.5, 1.3))]
 LoadFactorK = Annotated[float, Range(1.0, 10.0, (1.0, 2.0))]
 Viscosity = Annotated[float, Range(1.0, 5000.0, (15.0, 1000.0))]
 CarrierAngles = Annotated[int, Range(1, 360, (4, 72))]
+ToleranceClass = Annotated[int, Range(1, 11)]
+NominalHours = Annotated[float, Range(0.01, 1e7, (100.0, 3e5))]
 SafetyFactor = Annotated[float, Range(0.5, 10.0, (1.0, 3.0))]
 
 # Numerics.

@@ -243,8 +243,8 @@ def ring_notch() -> float:
 
 PRINTED_2 = {
     "c' of sun and planet": (lambda: 1e-9 * mesh_stiffness(sun_planet(), blank_factor=0.862).single_stiffness, 12.240),
-    "m_red, kg/mm": (lambda: 1e-3 * reduced_mass(sun_planet(), 3), 0.1534),
-    "n_E1, rpm": (lambda: RPM**-1 / resonance_ratio(sun_planet(), 15.640e9, 1.0, 3), 5357.0),
+    "m_red, kg/mm": (lambda: 1e-3 * reduced_mass(sun_planet(), (3, 1)), 0.1534),
+    "n_E1, rpm": (lambda: RPM**-1 / resonance_ratio(sun_planet(), 15.640e9, 1.0, (3, 1)), 5357.0),
     "K_V of sun and planet": (dynamic_2, 1.02),
     "Z_B of the sun": (lambda: single_contact_factors(sun_planet())[0], 1.08),
     "Z_D of its planet": (lambda: single_contact_factors(sun_planet())[1], 1.00),

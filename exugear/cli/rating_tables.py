@@ -1,0 +1,67 @@
+"""A rating sheet on the console: factors by line, both gears of a mesh beside each other, finite elements below."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+
+from exugear.cli.console import note, print_table, say
+from exugear.rating.sheet import FINITE_ELEMENTS, UNITS, FlankSheet, RatingSheet
+
+_BLOCKS: Mapping[str, tuple[str, ...]] = {
+    "load": ("torque", "F_t", "v", "N_L", "K_A", "K_gamma", "K_v", "F_betax", "K_Hbeta", "K_Halpha"),
+    "stiffness": ("K_Fbeta", "K_Falpha", "c'", "c_gammaalpha"),
+    "flank": ("Z_H", "Z_E", "Z_eps", "Z_beta", "Z_BD", "sigma_H0", "sigma_H"),
+    "endured": ("sigma_Hlim", "Z_NT", "Z_L", "Z_v", "Z_R", "Z_W", "Z_X", "sigma_HG", "S_H"),
+    "root": ("Y_F", "Y_S", "Y_beta", "Y_B", "Y_DT", "sigma_F0", "sigma_F"),
+    "broken": ("sigma_Flim", "Y_NT", "Y_deltarelT", "Y_RrelT", "Y_X", "Y_rel", "Y_M", "sigma_FG", "S_F"),
+}
+_DIGITS = {"MPa": ".1f", "kN": ".4g", "kN m": ".5g", "m/s": ".3f", "um": ".1f", "N/(mm um)": ".3f", "N^0.5/mm": ".3f"}
+
+
+def tell_rating(sheet: RatingSheet) -> None:
+    """Print a sheet, what it rests on, and what it leaves out."""
+    say(f"Rating by {sheet.edition}, method B; {sheet.load}")
+    for title, flanks in _meshes(sheet):
+        print_table(title, [*_rows(flanks)], ("factor",))
+        for line in dict.fromkeys(line for one in flanks for line in _told(one)):
+            note(line, style="yellow")
+    for line in sheet.assumptions:
+        note(line)
+    for line in sheet.left_out:
+        note(line, style="yellow")
+
+
+def _meshes(sheet: RatingSheet) -> Iterator[tuple[str, list[FlankSheet]]]:
+    """Gears that mesh, under one sense of load, and a title for them."""
+    found: dict[tuple[str, int], list[FlankSheet]] = {}
+    for one in sheet.flanks:
+        sense = 1 if one.standard["torque"] > 0.0 else -1
+        found.setdefault((one.family, sense), []).append(one)
+    for (family, sense), flanks in found.items():
+        yield family if sense > 0 else f"{family}, reversed", flanks
+
+
+def _rows(flanks: list[FlankSheet]) -> Iterator[dict[str, str]]:
+    for name in (name for block in _BLOCKS.values() for name in block):
+        yield _row(name, name, flanks, lambda one: one.standard)
+    if any(one.finite_elements for one in flanks):
+        for name in FINITE_ELEMENTS:
+            yield _row(name, f"{name}, finite elements", flanks, lambda one: one.finite_elements)
+
+
+def _row(
+    name: str, words: str, flanks: list[FlankSheet], figures: Callable[[FlankSheet], Mapping[str, float]]
+) -> dict[str, str]:
+    scale, unit = UNITS.get(name, (1.0, ""))
+    values = {f"{one.gear} {one.flank}": scale * figures(one).get(name, math.nan) for one in flanks}
+    form = ".4g" if name == "N_L" else _DIGITS.get(unit, ".3f")
+    return {"factor": f"{words}, {unit}" if unit else words} | {
+        label: "-" if math.isnan(value) else "infinite" if math.isinf(value) else format(value, form)
+        for label, value in values.items()
+    }
+
+
+def _told(one: FlankSheet) -> Iterator[str]:
+    yield from (f"{one.family}: {name} {reason}" for name, reason in one.lacking.items())
+    yield from (f"{one.gear} in {one.family}: {remark}" for remark in one.remarks)

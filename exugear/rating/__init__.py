@@ -1,0 +1,1 @@
+"""Gears by the standard, all factors by name, beside what the finite elements say."""
