@@ -66,6 +66,8 @@ def _checksum(text: str) -> str:
     return hashlib.sha256(text.encode("utf-8")).hexdigest()[:_DIGITS]
 
 
+_POINT = re.compile(r'"record": \{"point": "([^"]*)"')
+"""Where a line says of which point it is: those that are not wanted are not read any further."""
 _LINE = re.compile(rf'\{{"checksum": "([0-9a-f]{{{_DIGITS}}})", "record": (.*)\}}')
 
 
@@ -157,10 +159,10 @@ def read_journals(folder: Path, wanted: Collection[str]) -> dict[str, Record]:
         except FileError:
             continue  # what is no journal holds no points
         for line in lines:
-            record = _record(line)
-            if record is None or record.point not in wanted:
+            match = _POINT.search(line)
+            if match is None or match[1] not in wanted:
                 continue
-            before = found.get(record.point)
-            if before is None or before.error:
+            before, record = found.get(match[1]), _record(line)
+            if record is not None and (before is None or before.error):
                 found[record.point] = record
     return found

@@ -1,48 +1,41 @@
-"""Search for parameters that make one figure small, or two that are weighed against each other.
+"""Search for parameters that make one figure small, or two weighed against each other, within limits of others.
 
 Each search is scipy's differential evolution: generations of points, computed as any points of a study, so that they
 are kept, shared by all searches, and found again after a kill. Two figures are brought into one by the larger of both,
-weighed and over their values of the case as it is (Chebyshev), which reaches bent-in fronts as well.
+weighed and over their values of the case as it is (Chebyshev), which reaches bent-in fronts as well. Limits are
+constraints of the evolution. With tolerances every point is as many as there are draws, the same at every point, and
+a percentile of each figure counts.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from exugear.studies.batches import Task, Work
-from exugear.studies.dataset import dataset_of, write_study
+from exugear.studies.dataset import write_study
 from exugear.studies.design.distributions import shares
-from exugear.studies.design.sampling import Axis, Design, Point, acting, units_of
+from exugear.studies.design.sampling import acting
 from exugear.studies.executors import Kept, Opens, processes
-from exugear.studies.journal import Record, read_journals
+from exugear.studies.journal import Record, number_of, read_journals
 from exugear.studies.schedule import compute_points
+from exugear.studies.searched import Criteria, Looked, searched_dataset
 from exugear.studies.study import Study
 from exugear.studies.sweep import Progress, Swept, task_of
-from fe_ste.tools.arrays import Booleans, Floats
+from fe_ste.tools.arrays import Floats
 
-if TYPE_CHECKING:
-    import xarray as xr
-
-EVALUATION = "evaluation"
-"""Dimension of the points that a search looked at, in its order; the first is the case as it is."""
 BLEND = 0.05
 """Share of the sum of both figures beside the larger one: of two points that are equal in one, the better wins."""
 
 
 class OptimisationError(RuntimeError):
     """A search that cannot begin."""
-
-
-def value_of(record: Record, figure: str) -> float:
-    """Figure of a point; infinite where it failed or is not finite."""
-    value = record.values.get(figure)
-    return math.inf if value is None else float(value)
 
 
 @dataclass
@@ -61,22 +54,21 @@ class _Evaluated:
     task: Task
     opens: Opens
     tell: Progress | None
-    points: dict[str, tuple[Floats, Mapping[str, Any]]] = field(default_factory=dict)
+    points: dict[str, Looked] = field(default_factory=dict)
     records: dict[str, Record] = field(default_factory=dict)
     computed: int = 0
 
-    @property
-    def figures(self) -> list[str]:
-        """Names of the figures that are made small."""
-        assert self.study.file.optimise is not None
-        return self.study.file.optimise.minimise
+    @cached_property
+    def criteria(self) -> Criteria:
+        """What points are judged by."""
+        return Criteria.of(self.study.file)
 
-    def look_at(self, values: Floats) -> Floats:
-        """Figures (points, figures) at parameters (points, parameters); infinite where a point failed."""
-        return self._figures([(row, self._changes(row)) for row in values])
+    def look_at(self, values: Floats) -> list[Looked]:
+        """Compute what is not known yet of parameters (points, parameters)."""
+        return self._seen([self._looked(row, self._changes(row)) for row in values])
 
     def of_case(self) -> Floats:
-        """Figures (figures,) of the case as it is.
+        """Figures (figures,) of the case as it is that are made small.
 
         Raises
         ------
@@ -84,11 +76,24 @@ class _Evaluated:
             It has none.
         """
         nothing = np.full(len(self.study.file.parameters), math.nan)
-        found = self._figures([(nothing, {})])[0]
+        (looked,) = self._seen([self._looked(nothing, {})])
+        found = self.minimised([looked])[0]
         if not np.isfinite(found).all():
-            (record,) = self.records.values()
-            raise OptimisationError(f"the case as it is gives no figures: {record.error or record.values}")
+            records = [self.records[name] for name, _ in looked.draws]
+            reason = next((record.error for record in records if record.error), records[0].values)
+            raise OptimisationError(f"the case as it is gives no figures: {reason}")
         return np.asarray(found)
+
+    def minimised(self, points: Sequence[Looked]) -> Floats:
+        """Figures (points, figures) that are made small; infinite where a point failed."""
+        return self.criteria.minimised(self._figure, points)
+
+    def violations(self, points: Sequence[Looked]) -> Floats:
+        """How far points are beyond limits (points, limits), over the limit; negative within."""
+        return self.criteria.violations(self._figure, points)
+
+    def _figure(self, looked: Looked, figure: str) -> Floats:
+        return np.array([number_of(self.records[name].values.get(figure)) for name, _ in looked.draws])
 
     def _changes(self, row: Floats) -> dict[str, Any]:
         parameters = self.study.file.parameters.values()
@@ -98,15 +103,22 @@ class _Evaluated:
             for path in parameter.targets
         }
 
-    def _figures(self, wanted: Sequence[tuple[Floats, Mapping[str, Any]]]) -> Floats:
-        names = [self.study.hash_of(changes) for _, changes in wanted]
-        self.points |= dict(zip(names, wanted, strict=True))
-        unknown = dict.fromkeys(name for name in names if name not in self.records)
-        self.records |= read_journals(self.task.folder, unknown)
-        missing = [Work(name, self.points[name][1]) for name in unknown if name not in self.records]
-        self.records |= compute_points(self.task, missing, self.opens, self._told)
+    def _looked(self, row: Floats, changes: dict[str, Any]) -> Looked:
+        tolerances = self.study.tolerances
+        all_changes = [changes] if tolerances is None else tolerances.produced(self.study.gearbox, changes)
+        return Looked(row, tuple((self.study.hash_of(own), own) for own in all_changes))
+
+    def _seen(self, wanted: list[Looked]) -> list[Looked]:
+        self.points |= {looked.key: looked for looked in wanted}
+        draws = {name: changes for looked in wanted for name, changes in looked.draws}
+        unknown = [name for name in draws if name not in self.records]
+        if unknown:
+            self.records |= read_journals(self.task.folder, set(unknown))
+        missing = [Work(name, draws[name]) for name in unknown if name not in self.records]
+        if missing:
+            self.records |= compute_points(self.task, missing, self.opens, self._told)
         self.computed += len(missing)
-        return np.array([[value_of(self.records[name], figure) for figure in self.figures] for name in names])
+        return wanted
 
     def _told(self, record: Record) -> None:
         if self.tell is not None:
@@ -119,7 +131,8 @@ class _Evaluated:
         wanted = self.study.file.optimise
         assert wanted is not None
         searches = wanted.weightings if len(wanted.minimise) == 2 else 1
-        return 1 + searches * wanted.population * (wanted.generations + 1)
+        points = 1 + searches * wanted.population * (wanted.generations + 1)
+        return points * (1 if self.study.tolerances is None else len(self.study.tolerances.draws))
 
 
 def optimise(
@@ -139,7 +152,8 @@ def optimise(
     Returns
     -------
     Swept
-        Its dataset holds all points that were looked at; `on_front` says which of them no other beats in all figures.
+        Its dataset holds all points that were looked at; `on_front` says which of them no other beats in all figures,
+        `meets_limits` which keep the limits.
 
     Raises
     ------
@@ -158,14 +172,15 @@ def optimise(
         weights = np.linspace(1.0, 0.0, wanted.weightings) if pair and wanted.weightings > 1 else np.array([0.5])
         for number, first in enumerate(weights):
             weighed = np.array([first, 1.0 - first]) if pair else np.ones(1)
-            _search(seen, weighed / reference, study.file.seed + number)
-    dataset = _dataset(study, seen)
+            scale = np.where(reference == 0.0, 1.0, np.abs(reference))
+            _search(seen, weighed / scale, study.file.seed + number)
+    dataset = searched_dataset(study, seen.criteria, list(seen.points.values()), seen.records)
     return Swept(seen.records, seen.computed, write_study(folder, dataset), dataset)
 
 
 def _search(seen: _Evaluated, weights: Floats, seed: int) -> None:
     """One search; it begins with points spread evenly and with the best that was seen before."""
-    from scipy.optimize import Bounds, differential_evolution
+    from scipy.optimize import Bounds, NonlinearConstraint, differential_evolution
 
     wanted = seen.study.file.optimise
     assert wanted is not None
@@ -177,7 +192,10 @@ def _search(seen: _Evaluated, weights: Floats, seed: int) -> None:
     begin[: len(known)] = known
 
     def objective(columns: Floats, /, *_: Any) -> Any:  # of all columns at once, which its type does not know
-        return mixed(seen.look_at(np.atleast_2d(columns.T)), weights)
+        return mixed(seen.minimised(seen.look_at(np.atleast_2d(columns.T))), weights)
+
+    def beyond(columns: Floats) -> Any:
+        return seen.violations(seen.look_at(np.atleast_2d(columns.T))).T
 
     differential_evolution(
         objective,
@@ -189,6 +207,7 @@ def _search(seen: _Evaluated, weights: Floats, seed: int) -> None:
         vectorized=True,
         updating="deferred",
         tol=1e-3,
+        constraints=NonlinearConstraint(beyond, -np.inf, 0.0) if seen.criteria.limits else (),
     )
 
 
@@ -205,40 +224,10 @@ def mixed(figures: Floats, weights: Floats) -> Floats:
 
 
 def _best(seen: _Evaluated, weights: Floats, count: int) -> Floats:
-    """Parameters (count, parameters) of the best points that were seen."""
-    names = [name for name, (row, _) in seen.points.items() if np.isfinite(row).all()]
-    if not names or not count:
+    """Parameters (count, parameters) of the best points that were seen, those within all limits first."""
+    points = [looked for looked in seen.points.values() if np.isfinite(looked.row).all()]
+    if not points or not count:
         return np.zeros((0, len(seen.study.file.parameters)))
-    found = np.array([[value_of(seen.records[name], figure) for figure in seen.figures] for name in names])
-    order = np.argsort(mixed(found, weights), kind="stable")[:count]
-    return np.array([seen.points[names[n]][0] for n in order])
-
-
-def on_front(figures: Floats) -> Booleans:
-    """Tell which points (points, figures) no other one beats: not larger in any figure and smaller in one.
-
-    Examples
-    --------
-    >>> on_front(np.array([[1.0, 4.0], [2.0, 2.0], [3.0, 3.0]])).tolist()
-    [True, True, False]
-    """
-    kept: Booleans = np.asarray(np.isfinite(figures).all(axis=1))
-    for n in np.flatnonzero(kept):
-        beaten = (figures <= figures[n]).all(axis=1) & (figures < figures[n]).any(axis=1)
-        kept[n] = not beaten.any()
-    return kept
-
-
-def _dataset(study: Study, seen: _Evaluated) -> xr.Dataset:
-    """All points that were looked at, in their order."""
-    rows = np.array([row for row, _ in seen.points.values()])
-    points = tuple(Point((n,), changes) for n, (_, changes) in enumerate(seen.points.values()))
-    axes = {EVALUATION: Axis((EVALUATION,), np.arange(len(points)))}
-    for n, (name, parameter) in enumerate(study.file.parameters.items()):
-        axes[name] = Axis((EVALUATION,), rows[:, n], units_of(parameter), ", ".join(parameter.targets))
-    looked_at = replace(study, design=Design({EVALUATION: len(points)}, axes, points))
-    dataset = dataset_of(looked_at, seen.records)
-    figures = np.array([dataset[name].to_numpy() for name in seen.figures]).T
-    front = on_front(np.where(np.isnan(figures), np.inf, figures))
-    words = {"long_name": "whether no other point is better in all figures that are made small"}
-    return dataset.assign(on_front=((EVALUATION,), front.astype(np.int8), words))
+    beyond = np.maximum(seen.violations(points), 0.0).sum(axis=1)
+    order = np.lexsort((mixed(seen.minimised(points), weights), beyond))[:count]
+    return np.array([points[n].row for n in order])

@@ -12,8 +12,8 @@ import numpy as np
 from exugear.results.study_files import PICTURES
 from exugear.studies.dataset import slopes
 from exugear.studies.design.sampling import PARAMETER, SAMPLE, SIDE
-from exugear.studies.optimisation import EVALUATION
-from fe_ste.tools.arrays import Floats
+from exugear.studies.searched import EVALUATION
+from fe_ste.tools.arrays import Booleans, Floats
 from fe_ste.tools.drawing import COLOURS, drawing_style, finish_figure, new_figure
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_OF_POINTS = ("error", "doubts", "seconds", "memory", "on_front", "step")
+_OF_POINTS = ("error", "doubts", "seconds", "memory", "on_front", "meets_limits", "step")
 MOST_CURVES = 12
 """Curves of one picture; of more values those spread over their range."""
 MOST_PANELS = 6
@@ -48,7 +48,7 @@ def draw_study(dataset: xr.Dataset, folder: Path, minimised: tuple[str, ...] = (
     folder : Path
         Of the study.
     minimised : tuple of str
-        Figures that a search made small.
+        Figures that a search made small, or their percentiles over tolerances.
 
     Returns
     -------
@@ -219,7 +219,10 @@ def _draw_front(axes: Axes, dataset: xr.Dataset, first: str, second: str) -> Non
     x, y = (_finite(dataset[name].to_numpy()) for name in (first, second))
     front = dataset["on_front"].to_numpy() == 1
     order = np.argsort(x[front])
-    axes.plot(x[~front], y[~front], ".", color="#BBBBBB", label="looked at")
+    kept = _within_limits(dataset)
+    axes.plot(x[~front & kept], y[~front & kept], ".", color="#BBBBBB", label="looked at")
+    if not kept.all():
+        axes.plot(x[~kept], y[~kept], "x", color="#DDBBBB", markersize=3.5, label="beyond limits")
     axes.plot(
         x[front][order], y[front][order], "o-", color=COLOURS[0], markersize=4, label="no other is better in both"
     )
@@ -235,8 +238,20 @@ def _draw_front(axes: Axes, dataset: xr.Dataset, first: str, second: str) -> Non
 def _draw_search(axes: Axes, dataset: xr.Dataset, name: str) -> None:
     """Draw a figure at the points that a search looked at, and the best so far."""
     values = _finite(dataset[name].to_numpy())
-    axes.plot(values, ".", color="#BBBBBB")
-    axes.plot(np.fmin.accumulate(values), color=COLOURS[0])
-    axes.set_ylim(top=1.05 * float(np.nanquantile(values, 0.9)))
+    kept = _within_limits(dataset)
+    axes.plot(np.where(kept, values, np.nan), ".", color="#BBBBBB")
+    if not kept.all():
+        axes.plot(np.where(kept, np.nan, values), "x", color="#DDBBBB", markersize=3.5, label="beyond limits")
+        axes.legend()
+    axes.plot(np.fmin.accumulate(np.where(kept, values, np.nan)), color=COLOURS[0])
+    low, high = float(np.nanmin(values)), float(np.nanquantile(values, 0.9))
+    axes.set_ylim(top=high + 0.05 * max(abs(high), high - low))
     axes.set_xlabel(EVALUATION)
     axes.set_ylabel(_label(dataset[name]))
+
+
+def _within_limits(dataset: xr.Dataset) -> Booleans:
+    """Tell which points of a search keep its limits; all where it has none."""
+    if "meets_limits" not in dataset:
+        return np.ones(dataset.sizes[EVALUATION], dtype=bool)
+    return np.asarray(dataset["meets_limits"].to_numpy() == 1)

@@ -21,7 +21,7 @@ from exugear.tooth_mesh.laws.registry import LAWS
 
 OF_POINTS = ("error", "doubts", "seconds", "memory")
 """What a dataset tells of each point beside its figures."""
-OF_SEARCHES = ("evaluation", "on_front")
+OF_SEARCHES = ("evaluation", "on_front", "meets_limits")
 SLOPE = "slope_"
 """Before the name of a figure: its local derivative."""
 LIMITS: Mapping[str, tuple[float, float]] = {
@@ -49,6 +49,7 @@ def faults_of_names(study: StudyFile, kept: Mapping[str, KeptFigure]) -> Iterato
     stepped = any(parameter.kind == "step" for parameter in study.parameters.values())
     if study.optimise is not None:
         taken |= dict.fromkeys(OF_SEARCHES, "the points of a search")
+        taken |= _taken_by_tolerances(study)
     elif drawn:
         taken[SAMPLE] = "the draws"
         taken |= {f"{name}_path": f"the paths of parameters.{name}" for name in drawn if study.parameters[name].paths}
@@ -58,29 +59,62 @@ def faults_of_names(study: StudyFile, kept: Mapping[str, KeptFigure]) -> Iterato
     for name, figure in kept.items():
         if figure.figure.dimension:
             taken.setdefault(figure.figure.dimension, f"a dimension of figures.{name}")
-    for table, names in (("parameters", () if stepped else study.parameters), ("figures", study.figures)):
+    named = {"parameters": () if stepped else study.parameters, "tolerances": study.tolerances}
+    for table, names in {**named, "figures": study.figures}.items():
         for name in names:
             if name in taken:
                 yield f"{table}.{name}: this name is that of {taken[name]} in the dataset; choose another"
-    for name in study.parameters:
-        if name in study.figures:
-            yield f"figures.{name}: parameters.{name} has this name, too; rename one"
+    for first, second in (("parameters", "figures"), ("parameters", "tolerances"), ("tolerances", "figures")):
+        for name in getattr(study, first):
+            if name in getattr(study, second):
+                yield f"{second}.{name}: {first}.{name} has this name, too; rename one"
+
+
+def _taken_by_tolerances(study: StudyFile) -> dict[str, str]:
+    """Names that the dataset of a search over tolerances has for itself."""
+    if not study.tolerances:
+        return {}
+    taken = {f"{name}_path": f"the paths of tolerances.{name}" for name, one in study.tolerances.items() if one.paths}
+    sides = {f"{name}_{side}": f"a percentile of figures.{name}" for name in study.figures for side in ("high", "low")}
+    return {SAMPLE: "the draws", **taken, **sides}
+
+
+def faults_of_search(study: StudyFile, kept: Mapping[str, KeptFigure]) -> Iterator[str]:
+    """Tell figures of many numbers where a search needs one."""
+    if study.optimise is None:
+        return
+    for key, names in (("minimise", study.optimise.minimise), ("limits", list(study.optimise.limits))):
+        for name in names:
+            along = kept[name].figure.dimension
+            if along:
+                yield f"optimise.{key}: figures.{name} has a number for each {along}; a search needs a single one"
 
 
 def faults_of_paths(study: StudyFile) -> Iterator[str]:
-    """Tell paths that two parameters set, or one of them twice: only the last value would act."""
-    owners: list[tuple[str, str]] = []
-    for name, parameter in study.parameters.items():
+    """Tell paths that two parameters set, or one of them twice: only the last value would act.
+
+    A tolerance may shift or scale what a parameter sets.
+    """
+    owners: list[tuple[str, str, str]] = []
+    for table, name, parameter in (
+        *(("parameters", name, own) for name, own in study.parameters.items()),
+        *(("tolerances", name, own) for name, own in study.tolerances.items()),
+    ):
         paths = (parameter.path,) if parameter.path else tuple(parameter.paths or parameter.targets)
         for path in paths:
-            for owner, other in owners:
-                if f"{path}.".startswith(f"{other}.") or f"{other}.".startswith(f"{path}."):
-                    if owner == name:
-                        yield f"parameters.{name}: sets {path} twice; name it once"
-                    else:
-                        yield f"parameters.{name}: sets {path}, and parameters.{owner} {other}; give it to one of them"
-                    break
-            owners.append((name, path))
+            for before, owner, other in owners:
+                if not (f"{path}.".startswith(f"{other}.") or f"{other}.".startswith(f"{path}.")):
+                    continue
+                if table != before and path == other and parameter.acts != "replaces":
+                    continue
+                if (before, owner) == (table, name):
+                    yield f"{table}.{name}: sets {path} twice; name it once"
+                elif table == before:
+                    yield f"{table}.{name}: sets {path}, and {before}.{owner} {other}; give it to one of them"
+                else:
+                    yield f'{table}.{name}: replaces {path}, which {before}.{owner} sets; give it acts = "shifts"'
+                break
+            owners.append((table, name, path))
 
 
 def faults_of_values(design: Design) -> Iterator[str]:

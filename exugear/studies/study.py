@@ -24,6 +24,7 @@ from exugear.studies.design.paths import PathError, changed, check_path
 from exugear.studies.design.reading import StudyError, parse_study, read_study_file
 from exugear.studies.design.sampling import Design, Point, design_of
 from exugear.studies.design.sections import StudyFile
+from exugear.studies.design.tolerances import Tolerances, tolerances_of
 from exugear.studies.figures.figure import Figure, FigureError
 from exugear.studies.figures.point_lives import life_loads
 from exugear.studies.figures.point_results import PointSettings
@@ -33,6 +34,7 @@ from exugear.studies.soundness import (
     faults_of_needs,
     faults_of_options,
     faults_of_paths,
+    faults_of_search,
     faults_of_signals,
     faults_of_values,
 )
@@ -55,7 +57,9 @@ class Study:
     settings : PointSettings
     figures : mapping of name to KeptFigure
     design : Design
-        All points.
+        All points; of a search none.
+    tolerances : Tolerances or None
+        Draws at each point of a search.
     case_digest : str
         Hash of the case without the changes.
 
@@ -82,6 +86,7 @@ class Study:
     figures: Mapping[str, KeptFigure]
     design: Design
     case_digest: str
+    tolerances: Tolerances | None = None
 
     @classmethod
     def from_toml(
@@ -123,10 +128,12 @@ class Study:
         case = Gearbox.from_toml(folder / file.case, permissions)
         try:
             gearbox = _varied(case, file.changes)
-            for name, parameter in file.parameters.items():
-                for path in parameter.targets:
-                    _guarded(f"parameters.{name}", check_path, gearbox.content, path)
+            for table in ("parameters", "tolerances"):
+                for name, parameter in getattr(file, table).items():
+                    for path in parameter.targets:
+                        _guarded(f"{table}.{name}", check_path, gearbox.content, path)
             design = design_of(file, gearbox) if file.optimise is None else Design({}, {}, ())
+            tolerances = tolerances_of(file, gearbox)
             kept = kept_figures(file.figures, figures)
             settings = _settings(file)
         except (PathError, FigureError, SteadyError, ValueError) as error:
@@ -136,13 +143,13 @@ class Study:
         choice = Choice(**file.choice.model_dump()).of(gearbox)
         faults = [*faults_of_names(file, kept), *faults_of_paths(file), *faults_of_values(design)]
         faults += [*faults_of_options(kept, gearbox, choice), *faults_of_needs(file, kept, gearbox)]
-        faults += faults_of_signals(kept, gearbox, choice)
+        faults += [*faults_of_signals(kept, gearbox, choice), *faults_of_search(file, kept)]
         if faults:
             raise StudyError("\n".join(fault_line(source, fault) for fault in faults))
         of_life = _of_life(kept)
         if of_life:
             life_loads(gearbox, choice)
-        return cls(file, source, gearbox, choice, settings, kept, design, case_digest(case, of_life))
+        return cls(file, source, gearbox, choice, settings, kept, design, case_digest(case, of_life), tolerances)
 
     def __repr__(self) -> str:
         """One line."""

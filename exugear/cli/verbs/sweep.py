@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,6 +18,7 @@ from exugear.cli.options import FilesBelowOption, JsonOption, OutOption, Scripts
 if TYPE_CHECKING:
     import xarray as xr
 
+    from exugear.studies.design.sections import LimitSection
     from exugear.studies.executors import Opens
     from exugear.studies.study import Study
     from exugear.studies.sweep import Shard, Swept
@@ -168,7 +170,8 @@ def _draw(study: Study, folder: Path, swept: Swept) -> list[Path]:
 
     if swept.dataset is None:
         return []
-    minimised = () if study.file.optimise is None else tuple(study.file.optimise.minimise)
+    search = study.file.optimise
+    minimised = () if search is None else tuple(_judged(study)[: len(search.minimise)])
     return draw_study(swept.dataset, folder, minimised)
 
 
@@ -194,6 +197,7 @@ def _tell(study: Study, path: Path, folder: Path, swept: Swept, pictures: list[P
         print_json(summary)
     else:
         _print(study, folder, swept, summary)
+    _fail_if_beyond(study, swept)
     if failed:
         lines = [f"{len(failed)} of {total} points failed; their errors are in {folder}, --retry-failed tries again:"]
         raise FailedError("\n".join([*lines, *(f"- {record.error}" for record in failed[:SHOWN_FAILURES])]))
@@ -219,19 +223,55 @@ def _print(study: Study, folder: Path, swept: Swept, summary: dict[str, Any]) ->
         if rows:
             print_table("What moves the figures most", rows, ("figure",))
     if study.file.optimise is not None:
-        _print_front(study.file.optimise.minimise, study, swept.dataset)
+        _print_front(study, swept.dataset)
     say(f"Results in {swept.path}, pictures beside it")
 
 
-def _print_front(figures: list[str], study: Study, dataset: xr.Dataset) -> None:
+def _judged(study: Study) -> list[str]:
+    """Variables that the points of a search are judged by: figures, or their percentiles over tolerances."""
+    from exugear.studies.searched import Criteria, judged_name
+
+    return [judged_name(study, name, side) for name, side in Criteria.of(study.file).sides]
+
+
+def _fail_if_beyond(study: Study, swept: Swept) -> None:
+    """End with code 1 where a search found no point within its limits."""
+    from exugear.studies.searched import EVALUATION
+
+    data = swept.dataset
+    if data is None or "meets_limits" not in data or data["meets_limits"].any():
+        return
+    assert study.file.optimise is not None
+    limits = (f"{name} {_in_words(limit)}" for name, limit in study.file.optimise.limits.items())
+    raise FailedError(
+        f"none of the {data.sizes[EVALUATION]} points that were looked at keeps the limits {', '.join(limits)}; widen "
+        f"limits or parameters, or give more generations. All points are in {swept.path}"
+    )
+
+
+def _in_words(limit: LimitSection) -> str:
+    bounds = (("from", limit.least), ("to", limit.most))
+    return " ".join(f"{word} {value:g}" for word, value in bounds if value is not None)
+
+
+def _print_front(study: Study, dataset: xr.Dataset) -> None:
     """Print where a search began, and some of what no other point beats, spread over the front."""
     import numpy as np
 
+    figures = _judged(study)
     front = dataset.isel(evaluation=dataset["on_front"].to_numpy() == 1).sortby(figures[0])
     shown = sorted({round(n) for n in np.linspace(0, front.sizes["evaluation"] - 1, SHOWN_OF_FRONT)})
-    points = {"begun at": dataset.isel(evaluation=0)} | {f"point {n + 1}": front.isel(evaluation=n) for n in shown}
+    points = {"begun at": dataset.isel(evaluation=0)}
+    points |= {f"point {n + 1}": front.isel(evaluation=n) for n in shown if front.sizes["evaluation"]}
     rows = [
-        {"": name} | {label: f"{float(point[name]):.4g}".replace("nan", "") for label, point in points.items()}
+        {"": name} | {label: _number(float(point[name])) for label, point in points.items()}
         for name in (*figures, *study.file.parameters)
     ]
     print_table(f"Front of {front.sizes['evaluation']} points that no other beats", rows)
+    if study.tolerances is not None:
+        for name in figures:
+            note(f"{name}: {dataset[name].attrs['long_name']}")
+
+
+def _number(value: float) -> str:
+    return "" if math.isnan(value) else "infinite" if math.isinf(value) else f"{value:.4g}"

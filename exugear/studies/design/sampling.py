@@ -160,9 +160,19 @@ def acting(parameter: ParameterSection, gearbox: Gearbox, path: str, value: Any)
     PathError
         The case has no number there.
     """
+    return acted(parameter, own_value(gearbox, path), path, value)
+
+
+def acted(parameter: ParameterSection, own: Any, path: str, value: Any) -> Any:
+    """Value at a path: as it is, or by one that stands there.
+
+    Raises
+    ------
+    PathError
+        No number stands there.
+    """
     if parameter.acts == "replaces":
         return value
-    own = _own(gearbox, path)
     if isinstance(own, bool) or not isinstance(own, int | float):
         raise PathError(
             f"{path}: the case has no number there that a value {parameter.acts.rstrip('s')}s; give acts = 'replaces'"
@@ -170,7 +180,7 @@ def acting(parameter: ParameterSection, gearbox: Gearbox, path: str, value: Any)
     return _rounded(own * value if parameter.acts == "scales" else own + value)
 
 
-def _own(gearbox: Gearbox, path: str) -> Any:
+def own_value(gearbox: Gearbox, path: str) -> Any:
     """Value that a case has at a path, also where the file leaves it to the default."""
     given = value_at(gearbox.content, path)
     if given is not None:
@@ -196,11 +206,28 @@ def units_of(parameter: ParameterSection) -> str:
 
 def _draws(study: StudyFile, drawn: Mapping[str, ParameterSection], gearbox: Gearbox) -> _Levels:
     """Values of all parameters with distributions, drawn together."""
+    axes, draws = drawn_values(study, drawn, gearbox)
+    axes = {SAMPLE: Axis((SAMPLE,), np.arange(1, len(draws) + 1)), **axes}
+    owners = {path: parameter for parameter in drawn.values() for path in parameter.targets}
+    changes = [{path: acting(owners[path], gearbox, path, value) for path, value in draw.items()} for draw in draws]
+    return _Levels(axes, tuple(changes))
+
+
+def drawn_values(
+    study: StudyFile, drawn: Mapping[str, ParameterSection], gearbox: Gearbox
+) -> tuple[dict[str, Axis], list[dict[str, float]]]:
+    """Coordinates of parameters with distributions over their draws, and values by path before they act.
+
+    Raises
+    ------
+    ValueError
+        See `distribution_of`.
+    """
     count = study.samples or 1
     members = {name: len(parameter.targets) if parameter.correlation < 1.0 else 1 for name, parameter in drawn.items()}
     cube = shares(study.sampling, count, sum(members.values()), study.seed)
-    axes: dict[str, Axis] = {SAMPLE: Axis((SAMPLE,), np.arange(1, count + 1))}
-    changes: list[dict[str, Any]] = [{} for _ in range(count)]
+    axes: dict[str, Axis] = {}
+    draws: list[dict[str, float]] = [{} for _ in range(count)]
     first = 0
     for name, parameter in drawn.items():
         own = cube[:, first : first + members[name]]
@@ -209,9 +236,8 @@ def _draws(study: StudyFile, drawn: Mapping[str, ParameterSection], gearbox: Gea
         axes |= _drawn_axes(name, parameter, values)
         for n, row in enumerate(values):
             for m, path in enumerate(parameter.targets):
-                value = _rounded(float(row[min(m, len(row) - 1)]))
-                changes[n][path] = acting(parameter, gearbox, path, value)
-    return _Levels(axes, tuple(changes))
+                draws[n][path] = _rounded(float(row[min(m, len(row) - 1)]))
+    return axes, draws
 
 
 def _drawn_axes(name: str, parameter: ParameterSection, values: Floats) -> dict[str, Axis]:

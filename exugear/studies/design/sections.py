@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AllowInfNan, BaseModel, ConfigDict, Field, model_validator
 
 from exugear.model.sections.entries import Name, Text
 
-Value = int | float | str | bool | list[Any]
+Value = int | Annotated[float, AllowInfNan(True)] | str | bool | list[Any]
+"""What may stand at a key of a case; what may not becomes a failed point with its name."""
 MOST_VALUES = 100_000
 Path = Annotated[str, Field(min_length=1, max_length=400)]
 
@@ -16,7 +17,7 @@ Path = Annotated[str, Field(min_length=1, max_length=400)]
 class StudyPart(BaseModel):
     """A table of the study file; no key or type is guessed."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 
 class RangeSection(StudyPart):
@@ -181,11 +182,32 @@ class RunSection(StudyPart):
     """The compiled one where it applies by default."""
 
 
+class LimitSection(StudyPart):
+    """Bounds that a figure is kept within by a search."""
+
+    least: float | None = None
+    """The figure is this or more."""
+    most: float | None = None
+    """The figure is this or less."""
+
+    @model_validator(mode="after")
+    def _order(self) -> LimitSection:
+        if self.least is None and self.most is None:
+            raise ValueError("give least, most or both")
+        if self.least is not None and self.most is not None and self.least > self.most:
+            raise ValueError("least must not be above most")
+        return self
+
+
 class OptimisationSection(StudyPart):
     """Search for parameters, each within its `uniform` limits, that make figures small."""
 
     minimise: Annotated[list[Name], Field(min_length=1, max_length=2)]
     """One figure, or two that are weighed against each other."""
+    limits: dict[Name, LimitSection] = {}
+    """Figures that are kept within bounds meanwhile."""
+    percentile: Annotated[float, Field(ge=50.0, le=100.0)] | None = None
+    """Of each figure over the tolerances, on its bad side; 95 by default. Of 100 it is the worst draw."""
     weightings: Annotated[int, Field(ge=1, le=50)] = 5
     """Of two figures: how many weightings, one search each, from the first alone to the second alone."""
     population: Annotated[int, Field(ge=4, le=1000)] = 16
@@ -214,7 +236,7 @@ class StudyFile(StudyPart):
     sampling: Literal["sobol", "latin_hypercube", "random"] = "latin_hypercube"
     """How distributions are drawn from."""
     samples: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
-    """Draws, where parameters have distributions."""
+    """Draws, where parameters have distributions; of a search with tolerances at each point."""
     seed: Annotated[int, Field(ge=0)] = 0
     """The same seed gives the same draws."""
     steady: SteadySection | None = None
@@ -223,6 +245,8 @@ class StudyFile(StudyPart):
     """Settings of runs."""
     optimise: OptimisationSection | None = None
     """A search instead of all combinations."""
+    tolerances: Annotated[dict[Name, ParameterSection], Field(max_length=200)] = {}
+    """What production does not hold, by name: drawn at every point of a search."""
 
     @model_validator(mode="after")
     def _fits(self) -> StudyFile:
@@ -231,17 +255,36 @@ class StudyFile(StudyPart):
             wrong = [name for name, parameter in self.parameters.items() if parameter.kind != "uniform"]
             if wrong:
                 raise ValueError(f"a search needs the limits of each parameter: give {wrong[0]} a key uniform")
-            lost = [name for name in self.optimise.minimise if name not in self.figures]
-            if lost:
-                raise ValueError(f"optimise.minimise: no figure {lost[0]!r}; figures are {', '.join(self.figures)}")
+            self._check_search(self.optimise)
             return self
+        if self.tolerances:
+            raise ValueError("tolerances: belong to a search; without [optimise] draws are parameters")
         if drawn and self.samples is None:
             raise ValueError(f"parameters.{drawn[0]} is drawn from a distribution: say how often, samples = 64")
         if self.samples is not None and not drawn:
             raise ValueError("samples: no parameter has a distribution; leave it out")
-        if drawn and self.sampling == "sobol" and self.samples and self.samples & (self.samples - 1):
-            raise ValueError(f"samples = {self.samples}: a Sobol sequence is even over a power of two of points")
+        self._check_sobol(bool(drawn))
         steps = [parameter.kind == "step" for parameter in self.parameters.values()]
         if any(steps) and not all(steps):
             raise ValueError("local derivatives: give each parameter a step, or none")
         return self
+
+    def _check_search(self, wanted: OptimisationSection) -> None:
+        for key, names in (("minimise", wanted.minimise), ("limits", list(wanted.limits))):
+            lost = [name for name in names if name not in self.figures]
+            if lost:
+                raise ValueError(f"optimise.{key}: no figure {lost[0]!r}; figures are {', '.join(self.figures)}")
+        if len(set(wanted.minimise)) < len(wanted.minimise):
+            raise ValueError(f"optimise.minimise: {wanted.minimise[0]} against itself; name two figures, or one")
+        listed = [name for name, tolerance in self.tolerances.items() if not tolerance.is_drawn]
+        if listed:
+            raise ValueError(f"tolerances.{listed[0]}: give it a distribution: normal, uniform or iso1328")
+        if self.tolerances and self.samples is None:
+            raise ValueError("tolerances: say how many draws each point has, samples = 32")
+        if not self.tolerances and wanted.percentile is not None:
+            raise ValueError("optimise.percentile: is taken over tolerances; give [tolerances.NAME], or leave it out")
+        self._check_sobol(bool(self.tolerances))
+
+    def _check_sobol(self, drawn: bool) -> None:
+        if drawn and self.sampling == "sobol" and self.samples and self.samples & (self.samples - 1):
+            raise ValueError(f"samples = {self.samples}: a Sobol sequence is even over a power of two of points")

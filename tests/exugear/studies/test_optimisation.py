@@ -8,7 +8,8 @@ import pytest
 from exugear.studies.executors import processes
 from exugear.studies.figures.figure import Figure
 from exugear.studies.figures.registry import FIGURES
-from exugear.studies.optimisation import EVALUATION, on_front, optimise
+from exugear.studies.optimisation import optimise
+from exugear.studies.searched import EVALUATION, on_front
 from exugear.studies.study import Study
 
 from ..study_case import study_content

@@ -54,6 +54,10 @@ def nearest(**options):
             "figures.f.count = -1: must be finite, and lie between 1 and",
         ),
         ({"figures": nearest(near_Hz=math.nan)}, "figures.f.near_Hz = nan: must be finite"),
+        (
+            {"parameters": {"a": {"path": "housing.factor", "range": {"first": math.nan, "last": 1.0, "count": 3}}}},
+            "parameters.a.range.first = nan: should be a finite number",
+        ),
         ({"figures": nearest(near_Hz=-1.0)}, "figures.f.near_Hz = -1.0: must be finite, and lie between 0"),
         (
             {"figures": nearest(element="nope")},
