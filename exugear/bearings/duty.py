@@ -17,6 +17,7 @@ from exugear.bearings.rolling.contact import (
     row_contacts,
     tangent_stiffness,
 )
+from exugear.bearings.rolling.known_ratings import known_rating, margins
 from exugear.bearings.rolling.life import basic_rating_life, minimum_load, reference_life
 from exugear.bearings.rolling.ratings import (
     basic_dynamic_rating,
@@ -29,6 +30,8 @@ from exugear.bearings.support_laws import LEAST_LOAD, holding_force, holds_one_w
 from exugear.model.sections.connections import CatalogueSection
 from fe_ste.tools.arrays import Floats
 
+INSIDE = ("element_diameter_mm", "element_count", "element_length_mm")
+"""Estimates that ratings rest on."""
 STATED_FACTOR = 3.0
 """Factor between a stated radial load and the reaction beyond which a remark says so: stiffness goes with the tenth to
 the third power of the load."""
@@ -36,11 +39,21 @@ the third power of the load."""
 
 @dataclass(frozen=True)
 class Ratings:
-    """Load ratings of a bearing, N; `estimated` where its internal geometry, not the file, gives them."""
+    """Load ratings of a bearing, N.
+
+    Attributes
+    ----------
+    dynamic, static : float
+    estimated : bool
+        Whether they follow from the inside of the bearing, by ISO 281 and ISO 76.
+    makers : tuple of str
+        Whose catalogues they are the least of; empty if they are not.
+    """
 
     dynamic: float
     static: float
     estimated: bool
+    makers: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -112,12 +125,25 @@ class BearingDuty:
 
 
 def ratings_of(section: CatalogueSection) -> Ratings:
-    """Load ratings of catalogue bearings: those that the file gives, else those of ISO 281 and ISO 76."""
+    """Load ratings of catalogue bearings: of the file, or the least that makers print for the designation, or by ISO.
+
+    Those of ISO 281 and ISO 76 rest on the inside of the bearing. Where that is estimated, they are divided by how far
+    estimates may lie above catalogues: a bearing is never rated better than it may be.
+    """
     rows = catalogue_rows(section)
     given = (section.dynamic_rating_kN, section.static_rating_kN)
-    dynamic = basic_dynamic_rating(rows, section.type) if given[0] is None else 1e3 * given[0]
-    static = basic_static_rating(rows, section.type) if given[1] is None else 1e3 * given[1]
-    return Ratings(dynamic, static, None in given)
+    computed = basic_dynamic_rating(rows, section.type), basic_static_rating(rows, section.type)
+    known = known_rating(section)
+    if known is not None:
+        both = 1.0 if section.arrangement == "single" else 2.0
+        computed = known.dynamic * both ** (7.0 / 9.0 if section.type.endswith("_roller") else 0.7), known.static * both
+    elif any(one.key in INSIDE for one in estimates(section)):
+        dynamic_margin, static_margin = margins(section)
+        computed = computed[0] / dynamic_margin, computed[1] / static_margin
+    dynamic, static = (own if stated is None else 1e3 * stated for own, stated in zip(computed, given, strict=True))
+    if None not in given:
+        return Ratings(dynamic, static, estimated=False)
+    return Ratings(dynamic, static, estimated=known is None, makers=known.makers if known else ())
 
 
 def duty_of(point: OperatingPoint, reaction: Floats | None = None) -> BearingDuty:

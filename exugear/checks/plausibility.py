@@ -31,6 +31,9 @@ MOST_BACKLASH = 3.0
 """Backlash over that of `usual_backlash`, above which a profile shift or centre distance looks wrong."""
 LEAST_BORE, MOST_RIM = 0.02, 2.0
 """Bore of a gear, and outside of a ring's rim, over the root diameter."""
+WHEEL, LEAST_SEAT, LEAST_OVER_SHAFT = 1.5, 0.98, 0.9
+"""Roots over the shaft beside them from which a gear is a wheel on a shaft, not one piece with it; and least bore of a
+wheel over the bores of the bearings on both sides of it, and over the shaft that the file draws under it."""
 OTHER_SIZE, MOST_WALL = 0.01, 4.0
 """Difference of a diameter from that of the designation, and outer diameter of a bearing over its bore."""
 TILTING = ("deep_groove_ball", "self_aligning_ball", "angular_contact_ball", "four_point_ball", "spherical_roller")
@@ -41,6 +44,7 @@ def doubts_about_parts(gearbox: Gearbox) -> Iterator[str]:
     """Say what looks like a mistake: key, value, and what it is compared with."""
     yield from _masses(gearbox)
     yield from _bores(gearbox)
+    yield from _seats(gearbox)
     yield from _bearings(gearbox)
     yield from _faces(gearbox)
     yield from _backlashes(gearbox)
@@ -106,6 +110,55 @@ def _bores(gearbox: Gearbox) -> Iterator[str]:
                 f"{key} = {1e3 * held:g}: hardly a bore under roots of {1e3 * root:.4g} mm diameter; it is the bore "
                 "or the shaft under the teeth"
             )
+
+
+def _seats(gearbox: Gearbox) -> Iterator[str]:
+    """Tell bores of wheels that are narrower than the shaft on either side of them, or than the shaft under them."""
+    told = set()
+    for body in gearbox.bodies():
+        for name, place in body.wheels.items():
+            gear = gearbox.gears[name]
+            if gear.internal or body.planet_of is not None or name in told:
+                continue
+            beside, under = _bores_beside(gearbox, body, place), _shaft_under(gearbox, body, gear, place)
+            root, key = 2.0 * gear.root_radius, f"gears.{name}.held_diameter_mm = {1e3 * gear.held_diameter:g}"
+            if under is not None and root >= WHEEL * under and gear.held_diameter < LEAST_OVER_SHAFT * under:
+                told.add(name)
+                yield (
+                    f"{key}: bodies.{body.family}.shape is {1e3 * under:g} mm thick there; it is the bore of a wheel "
+                    "on that shaft"
+                )
+            elif beside and root >= WHEEL * max(beside) and gear.held_diameter < LEAST_SEAT * min(beside):
+                told.add(name)
+                yield (
+                    f"{key}: the bearings on both sides of it have bores of {1e3 * beside[0]:g} and "
+                    f"{1e3 * beside[1]:g} mm; a wheel between them has a bore that goes over the thinner end"
+                )
+
+
+def _bores_beside(gearbox: Gearbox, body: Body, place: float) -> tuple[float, float] | None:
+    """Bores (m) of the nearest bearings of a body on both sides of a place on it; None without both."""
+    known = [
+        (bearing.position[2], 1e-3 * bearing.catalogue.bore_mm)
+        for bearing in gearbox.bearings
+        if bearing.catalogue is not None and bearing.body == body.name
+    ]
+    before, behind = [one for one in known if one[0] < place], [one for one in known if one[0] > place]
+    return (max(before)[1], min(behind)[1]) if before and behind else None
+
+
+def _shaft_under(gearbox: Gearbox, body: Body, gear: Gear, place: float) -> float | None:
+    """Least diameter (m) of the shape of a body under a gear; None without one."""
+    section = gearbox.case.bodies.get(body.family)
+    if section is None or section.shape is None:
+        return None
+    start, found = 1e-3 * section.shape.start_z_mm, []
+    for piece in section.shape.sections:
+        end = start + 1e-3 * piece.length_mm
+        if start < place + 0.5 * gear.face_width and end > place - 0.5 * gear.face_width:
+            found.append(1e-3 * min(piece.outer_diameter_mm, piece.outer_diameter_end_mm or piece.outer_diameter_mm))
+        start = end
+    return min(found, default=None)
 
 
 def _bearings(gearbox: Gearbox) -> Iterator[str]:

@@ -167,7 +167,9 @@ class _Case:
         if largest < least:
             remarks.append(f"carries {1e-3 * largest:.3g} kN at most, below the usual least load: elements may slide")
         if ratings.estimated:
-            remarks.append("ratings estimated from its dimensions")
+            remarks.append("ratings estimated from its dimensions, on the safe side")
+        elif ratings.makers:
+            remarks.append(f"ratings are the least that {', '.join(ratings.makers)} print for {section.designation}")
         exponent = 10.0 / 3.0 if section.type.endswith("_roller") else 3.0
         total, hours = float(revolutions.sum()), float(points.hours.sum())
         return BearingLife(

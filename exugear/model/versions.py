@@ -14,7 +14,7 @@ MODES = 3
 #: Runs in time (`exugear.runs`, both solvers, the laws, signals and filters).
 RUN = 7
 #: Life of gears and bearings (`exugear.life`, and the root stress of `fe_ste.root_stress`).
-LIFE = 6
+LIFE = 7
 #: Steady responses (`exugear.steady`, and all that modes rest on).
 STEADY = 7
 #: Points of studies (`exugear.studies`: their figures; what these rest on has its own version).

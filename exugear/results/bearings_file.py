@@ -33,6 +33,7 @@ def duty_summary(duty: BearingDuty) -> dict[str, Any]:
         "dynamic_rating_kN": 1e-3 * duty.ratings.dynamic,
         "static_rating_kN": 1e-3 * duty.ratings.static,
         "ratings_estimated": duty.ratings.estimated,
+        "ratings_of_makers": list(duty.ratings.makers),
         "L10_Mrev": _finite(duty.basic_life),
         "L10r_Mrev": _finite(duty.reference_life),
         "remarks": list(duty.remarks),

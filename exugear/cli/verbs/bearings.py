@@ -68,7 +68,9 @@ def bearings(
         print_table("Contact, ratings, basic rating life", [*map(_life_row, duties)])
         print_table("Meshes", [*map(_mesh_row, meshes)])
         if any(duty.ratings.estimated for duty in duties):
-            say("* rating estimated; dynamic_rating_kN and static_rating_kN of the file replace it")
+            say("* rating estimated on the safe side; dynamic_rating_kN and static_rating_kN of the file replace it")
+        if any(duty.ratings.makers for duty in duties):
+            say("+ least rating that makers print for the designation; the same keys replace it")
         say("Lives are basic: lubricant and cleanliness are left out, and so are ribs")
         say(f"Bearings in {path}")
         for duty in duties:
@@ -92,7 +94,7 @@ def _load_row(duty: BearingDuty) -> dict[str, str]:
 
 
 def _life_row(duty: BearingDuty) -> dict[str, str]:
-    sign = "*" if duty.ratings.estimated else ""
+    sign = "*" if duty.ratings.estimated else "+" if duty.ratings.makers else ""
     return {
         "bearing": duty.name,
         "most loaded\nelement kN": f"{1e-3 * duty.element_load:.3g}",

@@ -197,7 +197,8 @@ def _duties(material: Material, assembly: Assembly) -> str:
     words = (
         "Rows of rolling elements by ISO/TS 16281 between rigid rings, under the static load of the case. L10 by "
         "ISO 281 and L10r by ISO/TS 16281 in million revolutions, basic: lubricant and cleanliness are left out, and "
-        "so are ribs. A rating with a star is estimated from the rows. Linear bearings have the tangent at this load."
+        "so are ribs. A rating with a star is estimated on the safe side, one with + is the least that makers print. "
+        "Linear bearings have the tangent at this load."
     )
     content = pieces.paragraph(words, "note") + table + (pieces.bullets(remarks) if remarks else "")
     content += _meshes(material, assembly)
@@ -238,7 +239,7 @@ def _mesh_row(material: Material, duty: MeshDuty) -> dict[str, object]:
 
 
 def _duty_row(material: Material, duty: BearingDuty) -> dict[str, object]:
-    sign = "*" if duty.ratings.estimated else ""
+    sign = "*" if duty.ratings.estimated else "+" if duty.ratings.makers else ""
     tilt = 0.5e-6 * float(duty.stiffness[3, 3] + duty.stiffness[4, 4])
     return {
         "bearing": material.words.of(duty.name),

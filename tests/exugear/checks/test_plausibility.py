@@ -68,6 +68,14 @@ def a_bore_in_metres(content: dict[str, Any]) -> None:
     content["gears"]["planet"]["held_diameter_mm"] = 0.062
 
 
+def half_a_wheels_bore(content: dict[str, Any]) -> None:
+    content["gears"]["wheel"]["held_diameter_mm"] = 45.0
+
+
+def half_a_pinions_bore(content: dict[str, Any]) -> None:
+    content["gears"]["pinion_1"]["held_diameter_mm"] = 18.0
+
+
 def half_a_planets_bore(content: dict[str, Any]) -> None:
     content["gears"]["planet"]["held_diameter_mm"] = 31.0
 
@@ -99,6 +107,16 @@ MISTAKES: dict[str, tuple[str, Callable[[dict[str, Any]], None], str]] = {
         "bearings.input_left.catalogue.bore_mm = 17.5: no usual bearing of 72 mm outer diameter",
     ),
     "bore in m": ("planetary", a_bore_in_metres, "gears.planet.held_diameter_mm = 0.062: hardly a bore"),
+    "bore of a wheel": (
+        "pair",
+        half_a_wheels_bore,
+        "gears.wheel.held_diameter_mm = 45: the bearings on both sides of it have bores of 50 and 50 mm",
+    ),
+    "bore of a pinion": (
+        "parallel",
+        half_a_pinions_bore,
+        "gears.pinion_1.held_diameter_mm = 18: the bearings on both sides of it have bores of 30 and 30 mm",
+    ),
     "bore of a planet": ("planetary", half_a_planets_bore, "its face runs 20 mm into bearings.planet_left at"),
     "rim": ("wind", a_rim_of_metres, "gears.ring.held_diameter_mm = 29972: a rim 1.445e+04 mm thick"),
 }
@@ -141,3 +159,16 @@ def test_backlash_of_the_recommendation_is_that_of_its_formula() -> None:
     """ISO/TR 10064-2: 2/3 (0.06 + 0.0005 a + 0.03 m_n), in mm."""
     pair = Gearbox.from_dict(template("pair")).gear_pairs["helical"]
     assert usual_backlash(pair) == pytest.approx(2e-3 / 3.0 * (0.06 + 0.0005 * 128.0 + 0.03 * 3.0))
+
+
+def test_a_wheel_narrower_than_the_shaft_that_is_drawn_under_it_is_told():
+    """All wheels of the GRC with halved bores; its pinions are one piece with their shafts, at any held diameter."""
+    for name, words in (("hs_gear", "shape is 160 mm thick there"), ("im_gear", "shape is 280 mm thick there")):
+        content = tomllib.loads((ROOT / "cases/grc750/gearbox.toml").read_text("utf-8"))
+        content["gears"][name]["held_diameter_mm"] *= 0.5
+        found = [*doubts_about_parts(Gearbox.from_dict(content, str(ROOT / "cases/grc750/gearbox.toml")))]
+        assert any(name in line and words in line for line in found), found
+    for name in ("im_pinion", "hs_pinion"):
+        content = tomllib.loads((ROOT / "cases/grc750/gearbox.toml").read_text("utf-8"))
+        content["gears"][name]["held_diameter_mm"] *= 0.5
+        assert not [*doubts_about_parts(Gearbox.from_dict(content, str(ROOT / "cases/grc750/gearbox.toml")))]

@@ -16,9 +16,15 @@ from exugear.bearings.rolling.contact import (
     row_contacts,
     tangent_stiffness,
 )
+from exugear.bearings.rolling.known_ratings import MARGINS
 from exugear.bearings.rolling.life import basic_rating_life, reference_life
 from exugear.bearings.rolling.potential import rolling_arrays
-from exugear.bearings.rolling.ratings import equivalent_load, equivalent_static_load, thrust_contact_factor
+from exugear.bearings.rolling.ratings import (
+    basic_dynamic_rating,
+    equivalent_load,
+    equivalent_static_load,
+    thrust_contact_factor,
+)
 from exugear.bearings.rolling.rows import BearingError, BearingOfRows
 from exugear.kernels.rolling import ELASTIC_PART, rolling_forces, rolling_memory
 from exugear.model.sections.connections import CatalogueSection
@@ -79,11 +85,12 @@ def test_ratings_are_axial_forces():
     ratings = ratings_of(CatalogueSection(**SIZES))
     diameter, length, sine = 1e3 * row.element_diameter, 1e3 * row.effective_length, math.sin(row.contact_angle)
     static = 220.0 * (1.0 - row.diameter_ratio) * row.element_count * length * diameter * sine
-    assert ratings.static == pytest.approx(static, rel=1e-12)
+    dynamic_margin, static_margin = MARGINS[KIND]  # the inside is estimated
+    assert ratings.static * static_margin == pytest.approx(static, rel=1e-12)
     cosine = math.cos(row.contact_angle)
     size = (length * cosine) ** (7 / 9) * (sine / cosine) * row.element_count**0.75 * diameter ** (29 / 27)
     factor = thrust_contact_factor(row.diameter_ratio, row.contact_angle)
-    assert ratings.dynamic == pytest.approx(1.15 * factor * size, rel=1e-12)
+    assert ratings.dynamic * dynamic_margin == pytest.approx(1.15 * factor * size, rel=1e-12)
     tangent = math.tan(math.radians(48.0))
     assert equivalent_load([row], KIND, 10e3, 100e3, ratings.static) == pytest.approx(100e3 + 10e3 * tangent)
     assert equivalent_static_load([row], KIND, 10e3, 100e3) == pytest.approx(100e3 + 23e3 * tangent)
@@ -91,12 +98,12 @@ def test_ratings_are_axial_forces():
 
 def test_the_reference_life_is_the_basic_one_less_what_edges_take():
     found = rows()
-    ratings = ratings_of(CatalogueSection(**SIZES))
-    load = 0.1 * ratings.dynamic
+    rating = basic_dynamic_rating(found, KIND)
+    load = 0.1 * rating
     state = equilibrium(BearingOfRows(found), (0.0, 0.0, load), tilt=np.zeros(2))
     state = bearing_state(row_contacts(found), state.displacement)
     life = reference_life(found, loads_of_rows(state), KIND)
-    basic = basic_rating_life(ratings.dynamic, load, KIND)
+    basic = basic_rating_life(rating, load, KIND)
     assert 0.5 * basic < life < basic
 
 
