@@ -47,7 +47,6 @@ if TYPE_CHECKING:
 
     from exugear.life.static_balance import StaticBalance
     from exugear.load_spectrum.counted import CountedLoads
-    from exugear.model.sections.loads import RatingSection
     from exugear.rating.sheet import RatingSheet
     from exugear.report.writer import Report
     from exugear.steady.settings import SteadySettings
@@ -411,27 +410,16 @@ class Project:
         CaseError
             No section `[rating]`, loads that cannot be used, or strengths that do not fit the gears.
         """
-        from exugear.life.acting_loads import acting_loads
-        from exugear.life.gear_life import check_strengths
-        from exugear.life.life import checked_loads, rating_of
-        from exugear.life.static_balance import static_balance
-        from exugear.rating.nominal import nominal_loads
-        from exugear.rating.sheet import rating_sheet
+        from exugear.rating.rated import RATED_AS, balanced, rated, rated_loads
 
-        rating, spectrum = rating_of(self.gearbox), self.gearbox.case.loads is not None
-        counted = checked_loads(self.gearbox) if spectrum else nominal_loads(self.gearbox, rating)
-        if not spectrum:
-            check_strengths(self.gearbox, rating, counted.teeth, False)
-        at_rest = self.chosen(variant="bushing", mesh_law="iso6336")
-        acting, angles = acting_loads(counted), rating.carrier_angles
-        balance = static_balance(
-            at_rest.assembly(), counted.body, acting.torques, angles, progress, 0.5 * acting.hub_sizes
-        )
-        if spectrum:
+        counted = rated_loads(self.gearbox)
+        at_rest = self.chosen(variant=RATED_AS.variant, mesh_law=RATED_AS.mesh_law)
+        balance = balanced(at_rest.assembly(), counted, progress)
+        if self.gearbox.case.loads is not None:
             found, remarks = self._rated_by_life(counted)
         else:
-            found, remarks = self._rated_by_tables(rating, balance, begin)
-        return rating_sheet(self.gearbox, rating, counted, acting, balance, found, remarks)
+            found, remarks = self._rated_by_tables(balance, begin)
+        return rated(self.gearbox, counted, balance, found, remarks)
 
     def _rated_by_life(self, counted: CountedLoads) -> tuple[Figures, tuple[str, ...]]:
         """Figures of the life in the folder; none, and why, where there is none that fits."""
@@ -449,13 +437,15 @@ class Project:
         return of_life(data), (f"by finite elements: {self.life_path}",)
 
     def _rated_by_tables(
-        self, rating: RatingSection, balance: StaticBalance, begin: Callable[[str], None] | None
+        self, balance: StaticBalance, begin: Callable[[str], None] | None
     ) -> tuple[Figures, tuple[str, ...]]:
         """Figures of the nominal load from tables that are there."""
+        from exugear.life.life import rating_of
         from exugear.life.pair_stresses import pair_stresses
         from exugear.rating.beside import of_nominal_load, remarks_on
         from exugear.rating.nominal import nominal_loads
 
+        rating = rating_of(self.gearbox)
         stresses = pair_stresses(self.requested_tables(), self.folder, begin, keep=False)
         loads = nominal_loads(self.gearbox, rating, rating.application_factor)
         found = of_nominal_load(self.gearbox, rating, loads, balance, stresses)

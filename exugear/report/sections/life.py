@@ -6,15 +6,24 @@ import base64
 import io
 import json
 import math
+from collections.abc import Mapping
+from typing import Any
 
 import xarray as xr
 
+from exugear.bearings.rolling.rows import BearingError
+from exugear.dynamics.assembly import VariantError
+from exugear.dynamics.statics import BalanceError
 from exugear.findings.context import choice_of, words_of
 from exugear.findings.words import figure_text
 from exugear.life.life_diagrams import draw_life
 from exugear.life.life_file import limits
 from exugear.life.stored_lives import stored_lives
+from exugear.model.reading import CaseError
+from exugear.rating.beside import FlankKey, of_life
+from exugear.rating.rated import RATED_AS, balanced, rated, rated_loads
 from exugear.report.parts.material import Material, Part
+from exugear.tooth_mesh.placement import MeshError
 from exugear.web import pieces
 from exugear.web.pieces import Cell
 
@@ -35,10 +44,11 @@ WIDTH = 850
 
 
 def life_section(material: Material) -> Part:
-    """List what parts bear over the life, for each variant that was rated."""
+    """List what parts bear over the life, for each variant that was rated; with the rating sheet as data."""
     context = material.context
+    found: dict[FlankKey, dict[str, float]] = {}
     if context.gearbox.case.loads is None:
-        return Part("")
+        return Part("", _rating(material, found))
     tables = {name: table.input_hash for name, table in material.results.tables.items()}
     content = []
     for stored in stored_lives(context.gearbox, context.folder, context.assembled, tables):
@@ -46,6 +56,7 @@ def life_section(material: Material) -> Part:
             context.notes.left_out.append(f"{context.name_of(stored.path)}: {stored.reason}")
         else:
             content.append(_of_variant(material, stored.data))
+            found = found or of_life(stored.data)
             worst = limits(stored.data)
             if worst:
                 part, kind, damage = worst[0]
@@ -54,10 +65,25 @@ def life_section(material: Material) -> Part:
                     f"{words_of(choice_of(stored.data.attrs))}: in {float(stored.data.attrs['life_years']):g} years "
                     f"{material.words.told(part)} wears most, damage {size} ({kind})."
                 )
+    data = _rating(material, found)
     if not content:
-        return Part("")
+        return Part("", data)
     html = pieces.section("How long it lasts", *(pieces.paragraph(own, "note") for own in WORDS), *content, name="life")
-    return Part(html, {}, "How long it lasts", "life")
+    return Part(html, data, "How long it lasts", "life")
+
+
+def _rating(material: Material, beside: Mapping[FlankKey, Mapping[str, float]]) -> dict[str, Any]:
+    """Rating sheet by ISO 6336 under the key ``rating``, as `check --rating --json` has it, if it can be had."""
+    context = material.context
+    if context.gearbox.case.rating is None:
+        return {}
+    try:
+        counted = rated_loads(context.gearbox)
+        balance = balanced(context.assembled(RATED_AS.of(context.gearbox)), counted)
+    except (CaseError, BalanceError, VariantError, MeshError, BearingError) as error:
+        context.notes.left_out.append(f"rating by ISO 6336: {error}")
+        return {}
+    return {"rating": rated(context.gearbox, counted, balance, beside).summary()}
 
 
 def _of_variant(material: Material, data: xr.Dataset) -> str:

@@ -212,6 +212,28 @@ def test_finite_elements_stand_beside_the_nominal_load_where_a_table_is_there(tm
     assert not (project.folder / "stress").exists(), "a check writes nothing"
 
 
+def test_finite_elements_of_a_life_stand_beside_its_spectrum_and_only_of_that_life(tmp_path):
+    """As the life has them; a life of other loads is told as such, and the page's data has the same sheet."""
+    (tmp_path / "loads.csv").write_text("torque_N_m,speed_rpm,hours\n100,1500,500\n60,1500,500\n")
+    content = spur(tmp_path)
+    content["loads"] = {"body": "shaft_1", "life_years": 1.0, "sources": {"one": {"file": "loads.csv"}}}
+    project = Project(
+        Gearbox.from_dict(content, str(tmp_path / "gearbox.toml")), tmp_path / "results", Choice("bushing", "iso6336")
+    )
+    assert any("exugear life" in line for line in project.rating().assumptions)
+    data = project.life()
+    sheet = project.rating()
+    for place, one in enumerate(sheet.flanks):
+        assert one.finite_elements["S_F"] == pytest.approx(float(data["flank_root_safety"][place]))
+        assert one.finite_elements["sigma_H"] == pytest.approx(float(data["flank_contact_stress"][place]))
+    page = project.report().path.read_text("utf-8")
+    assert '"rating"' in page and '"sigma_FG_MPa"' in page
+    content["rating"]["dynamic_factor"] = 1.2
+    other = Project(Gearbox.from_dict(content, str(tmp_path / "gearbox.toml")), project.folder, project.choice).rating()
+    assert not other.flanks[0].finite_elements
+    assert any("another input" in line for line in other.assumptions)
+
+
 def test_a_ring_is_rated_by_its_root_and_says_what_is_left_out():
     content = tomllib.loads(GRC.read_text("utf-8"))
     del content["loads"]
