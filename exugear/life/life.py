@@ -16,7 +16,7 @@ from exugear.life.acting_loads import ActingLoads, acting_loads
 from exugear.life.bearing_life import BearingLife, bearing_lives
 from exugear.life.gear_life import FlankLife, beyond_tables, check_strengths, flank_lives
 from exugear.life.static_balance import AngleStore, StaticBalance, static_balance
-from exugear.life.verdict import failures, needs_of_relief, reaches, shortfalls
+from exugear.life.verdict import LEFT_OUT, failures, needs_of_relief, reaches, shortfalls
 from exugear.load_spectrum.counted import CountedLoads, count_loads
 from exugear.load_spectrum.sources import Progress
 from exugear.model.gearbox import Gearbox
@@ -236,7 +236,7 @@ def _unrated(assembly: Assembly, counted: CountedLoads, stresses: Mapping[str, M
         lines.append(f"{support}: given by its stiffness alone; a catalogue section would give it a life")
     if not assembly.supports:
         lines.append(f"bearings: the variant {assembly.variant} has none")
-    return lines
+    return [*lines, *LEFT_OUT]
 
 
 def _assumptions(

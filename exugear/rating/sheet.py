@@ -11,6 +11,7 @@ import numpy as np
 
 from exugear.life.acting_loads import ActingLoads
 from exugear.life.static_balance import StaticBalance
+from exugear.life.verdict import LEFT_OUT
 from exugear.load_spectrum.counted import CountedLoads
 from exugear.load_spectrum.exposure import FLANKS, ToothExposure, distinct
 from exugear.model.gearbox import Gearbox
@@ -20,11 +21,6 @@ from exugear.rating.standard import FlankRules, MeshLoads, rate
 from fe_ste.standards.pitting import tangential_force
 from fe_ste.standards.tooth_root import root_stress_factors
 
-LEFT_OUT = (
-    "scuffing (ISO/TS 6336-20, -21): left out, no source of its formulas that can be cited was found",
-    "micropitting (ISO/TS 6336-22): left out, likewise",
-    "tooth flank fracture (ISO/TS 6336-4): left out, likewise",
-)
 FINITE_ELEMENTS = ("sigma_H", "sigma_F", "K_Hbeta", "S_H", "S_F")
 """What stands beside the standard, from the contact of finite elements and gauges in the roots."""
 UNITS: Mapping[str, tuple[float, str]] = {

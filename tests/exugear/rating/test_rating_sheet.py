@@ -14,12 +14,12 @@ import pytest
 from typer.testing import CliRunner
 
 from exugear.cli.app import app
+from exugear.life.verdict import LEFT_OUT
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
 from exugear.model.sections.loads import StrengthSection
 from exugear.project import Project
-from exugear.rating.sheet import LEFT_OUT
 from exugear.rating.standard import FlankRules, MeshLoads, rate
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.standards.iso6336 import mesh_stiffness
@@ -222,6 +222,7 @@ def test_finite_elements_of_a_life_stand_beside_its_spectrum_and_only_of_that_li
     )
     assert any("exugear life" in line for line in project.rating().assumptions)
     data = project.life()
+    assert set(LEFT_OUT) <= set(json.loads(data.attrs["unrated"]))
     sheet = project.rating()
     for place, one in enumerate(sheet.flanks):
         assert one.finite_elements["S_F"] == pytest.approx(float(data["flank_root_safety"][place]))
