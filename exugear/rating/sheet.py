@@ -21,6 +21,8 @@ from exugear.rating.standard import FlankRules, MeshLoads, rate
 from fe_ste.standards.pitting import tangential_force
 from fe_ste.standards.tooth_root import root_stress_factors
 
+LEAST_FORCE = 1.0
+"""Tangential force, N, below which a mesh carries nothing: there is no line load to rate."""
 FINITE_ELEMENTS = ("sigma_H", "sigma_F", "K_Hbeta", "S_H", "S_F")
 """What stands beside the standard, from the contact of finite elements and gauges in the roots."""
 UNITS: Mapping[str, tuple[float, str]] = {
@@ -150,9 +152,8 @@ def rating_sheet(
         for sense in (1, -1):
             key = tooth.gear, tooth.family, FLANKS[sense * tooth.flank]
             if np.any(acting.points.torque * sense > 0.0):
-                flanks.append(
-                    _flank(gearbox, rating, counted, acting, balance, tooth, sense, finite_elements.get(key, {}))
-                )
+                one = _flank(gearbox, rating, counted, acting, balance, tooth, sense, finite_elements.get(key, {}))
+                flanks += [] if one is None else [one]
     return RatingSheet(
         edition=rating.edition,
         load=_load_in_words(gearbox, counted),
@@ -171,9 +172,13 @@ def _flank(
     tooth: ToothExposure,
     sense: int,
     beside: Mapping[str, float],
-) -> FlankSheet:
+) -> FlankSheet | None:
+    """Rate one flank; None if its meshes carry nothing."""
     rules = _rules(gearbox, rating, counted, tooth)
-    found = rate(rules, _mesh_loads(gearbox, acting, balance, tooth, rules, sense))
+    loads = _mesh_loads(gearbox, acting, balance, tooth, rules, sense)
+    if not len(loads.force):
+        return None
+    found = rate(rules, loads)
     lacking = dict(rules.lacking())
     if rules.strength is None:
         lacking["S_H, S_F"] = f"not rated: no [rating.gears.{tooth.gear}] says what it withstands"
@@ -235,13 +240,15 @@ def _mesh_loads(
     pair = rules.pair
     gear = (pair.pinion, pair.gear)[tooth.member]
     speed = points.speed[own] * tooth.cycles / len(tooth.meshes) * gear.teeth / pair.pinion.teeth
+    force = tangential_force(pair.pinion, 1.0) * plain
+    carries = force > LEAST_FORCE
     return MeshLoads(
-        torque=torque,
-        force=tangential_force(pair.pinion, 1.0) * plain,
-        sharing=forces.max(axis=(1, 2)) / np.where(plain > 0.0, plain, 1.0),
-        opening=tilts * pair.face_width,
-        speed=speed,
-        turns=points.revolutions[own] * tooth.cycles,
+        torque=torque[carries],
+        force=force[carries],
+        sharing=forces.max(axis=(1, 2))[carries] / plain[carries],
+        opening=tilts[carries] * pair.face_width,
+        speed=speed[carries],
+        turns=(points.revolutions[own] * tooth.cycles)[carries],
     )
 
 

@@ -199,6 +199,18 @@ def test_the_nominal_load_is_the_static_one_at_rated_speed_with_k_a(tmp_path):
     assert not (tmp_path / "results").exists()
 
 
+def test_loads_that_teeth_do_not_feel_are_left_out(tmp_path):
+    """A torque of a millionth of a newton metre has no line load to rate; alone it leaves no flank."""
+    content = spur(tmp_path)
+    content["loads"] = {"body": "shaft_1", "life_years": 1.0, "sources": {"one": {"file": "loads.csv"}}}
+    found = []
+    for rows in ("100,1500,50\n", "100,1500,50\n1e-6,1500,50\n", "1e-6,1500,50\n"):
+        (tmp_path / "loads.csv").write_text("torque_N_m,speed_rpm,hours\n" + rows)
+        found.append(project_of(content, tmp_path).rating().flanks)
+    assert [one.standard["S_H"] for one in found[1]] == pytest.approx([one.standard["S_H"] for one in found[0]])
+    assert found[2] == ()
+
+
 def test_finite_elements_stand_beside_the_nominal_load_where_a_table_is_there(tmp_path):
     """Root stress by gauges in the closed ring; see docs/loads_and_life.md for what lies between both."""
     content = spur(tmp_path, nominal_hours=5000.0)
