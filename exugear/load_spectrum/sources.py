@@ -22,6 +22,7 @@ from exugear.load_spectrum.series import LARGEST_SPEED, LARGEST_TORQUE, SeriesRe
 from exugear.load_spectrum.wind import bin_of_wind, hours_of_bins
 from exugear.model.gearbox import Gearbox
 from exugear.model.parts import RPM
+from exugear.model.reading import shortened
 from exugear.model.sections.loads import LoadsSection, SourceSection
 from exugear.rexs.faults import RexsError
 from fe_ste.tools.arrays import Floats
@@ -272,8 +273,8 @@ class _Draft:
             hours = _hours_in(row)
             if hours is None or row[0] in found:
                 raise self.gearbox.fault(
-                    f"{key}: {path}: line {number} has {','.join(row)[:80]}; needs a file, each once, and its hours a "
-                    f"year from 0 to {HOURS_PER_YEAR:g}"
+                    f"{key}: {path}: line {number} has {shortened(','.join(row), 80)}; needs a file, each once, and "
+                    f"its hours a year from 0 to {HOURS_PER_YEAR:g}"
                 )
             found[row[0]] = hours
         return found
@@ -290,8 +291,8 @@ class _Draft:
             return None
         if headings != SPECTRUM_HEADINGS:
             raise LoadFileError(
-                f"{path}: headings {','.join(headings)[:80]}; a series begins with time_s, a table of counted loads "
-                f"has {','.join(SPECTRUM_HEADINGS)}"
+                f"{path}: headings {shortened(','.join(headings), 80)}; a series begins with time_s, a table of "
+                f"counted loads has {','.join(SPECTRUM_HEADINGS)}"
             )
         values = table_rows(path, len(headings))
         bad = np.flatnonzero(~(np.isfinite(values).all(axis=1) & (values[:, 2] >= 0.0)))

@@ -175,7 +175,8 @@ def acted(parameter: ParameterSection, own: Any, path: str, value: Any) -> Any:
         return value
     if isinstance(own, bool) or not isinstance(own, int | float):
         raise PathError(
-            f"{path}: the case has no number there that a value {parameter.acts.rstrip('s')}s; give acts = 'replaces'"
+            f"{path}: the case has no number there that a value {parameter.acts.rstrip('s')}s; give one in "
+            "[changes], or acts = 'replaces'"
         )
     return _rounded(own * value if parameter.acts == "scales" else own + value)
 

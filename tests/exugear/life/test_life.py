@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import shutil
+import subprocess
+import sys
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -38,6 +41,7 @@ from fe_ste.root_stress.mesh_cycle import MeshCycleStress
 from fe_ste.standards.pitting import nominal_contact_stress
 from fe_ste.standards.tooth_root import root_stress_factors
 
+from ..case_mutations import toml_text
 from ..spur_case import SPUR_CASE
 from ..table_case import surfaces
 
@@ -135,6 +139,32 @@ def test_life_of_a_spur_pair_as_a_user_meets_it(first):
     assert again.identical(data) and first.life_path.stat().st_mtime_ns == before
     harder = spur_project(first.folder, TABLE, dynamic_factor=1.2).life()
     assert np.all(harder["flank_contact_stress"].to_numpy() > data["flank_contact_stress"].to_numpy())
+
+
+def killed_lives(first: Project, folder: Path, every: int) -> dict[str, Any]:
+    """What `tests.exugear.killed_lives` finds, with tables and stresses of a life that is there."""
+    (folder / "gearbox.toml").write_text(toml_text(content_of(TABLE, folder)))
+    for known in ("tables", "stress"):
+        shutil.copytree(first.folder / known, folder / "known" / known)
+    command = [sys.executable, "-m", "tests.exugear.killed_lives", "life", str(folder), str(every)]
+    ended = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parents[3], check=False)
+    assert ended.returncode == 0, ended.stderr
+    found: dict[str, Any] = json.loads(ended.stdout)
+    return found
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
+def test_a_life_killed_late_is_called_again_to_the_same_bits_and_leaves_no_partial_file(first, tmp_path):
+    found = killed_lives(first, tmp_path, 19)
+    assert found["kills"] >= 3
+    assert (found["undisturbed"], found["wrong"]) == (0, [])
+
+
+@pytest.mark.validation
+def test_a_life_killed_at_any_write_is_called_again_to_the_same_bits(first, tmp_path):
+    found = killed_lives(first, tmp_path, 1)
+    assert found["kills"] > 40
+    assert (found["undisturbed"], found["wrong"]) == (0, [])
 
 
 def test_nominal_stresses_are_those_of_the_standard_at_the_largest_torque(tmp_path, stresses):

@@ -122,7 +122,7 @@ HEADED = "time_s,carrier_N_m,carrier_rpm\n"
         (f"{HEADED}0,1,1\n1,1\n2,1,1\n", {"skip_s": 0.0}, "line 3 has 2 columns"),
         ("time_s,carrier_N_m\n0,1\n1,1\n2,1\n", {"skip_s": 0.0}, "no channel 'carrier_rpm'"),
         ("time_s,carrier_kN,carrier_rpm\n0,1,1\n1,1,1\n2,1,1\n", {"skip_s": 0.0, "torque": "carrier_kN"}, "unit 'kN'"),
-        ("torque_N_m,hours\n1,1\n2,2\n", {}, "headings torque_N_m,hours"),
+        ("torque_N_m,hours\n1,1\n2,2\n", {}, "headings 'torque_N_m,hours'"),
         ("torque_N_m,speed_rpm,hours\n1,1,1\n2,2,-2\n", {}, "line 3 has 2,2,-2; .*hours not negative"),
         ("torque_N_m,speed_rpm,hours\n1,nan,1\n", {}, "line 2 has 1,nan,1"),
         ("torque_N_m,speed_rpm,hours\n1,1,0\n", {}, "all hours are 0"),

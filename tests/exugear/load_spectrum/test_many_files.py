@@ -201,7 +201,7 @@ SOURCE = {"skip_s": 0.0, "hours_per_year": 10.0}
         ({"files": "dlc/../../*", "hours_per_year": 1.0}, "lies outside the gearbox file's folder"),
         ({"files": "dlc/*", "hours_per_year": 1.0}, "is none of .outb, .out, .csv"),
         ({"files": "dlc/*.outb", "hours_table": "short.csv"}, "has no line for wind_12.outb"),
-        ({"files": "dlc/*.outb", "hours_table": "bad.csv"}, "line 2 has wind_12.outb,many"),
+        ({"files": "dlc/*.outb", "hours_table": "bad.csv"}, "line 2 has 'wind_12.outb,many'"),
         ({"files": "dlc/*.outb", "hours_table": "other.csv"}, "begins with file,hours_per_year"),
         ({"files": "dlc/*.outb", "file": "dlc/wind_8.outb", "hours_per_year": 1.0}, "one of file and files"),
         ({"files": "dlc/*.outb", "wind": "WindVxi"}, "needs the section .loads.wind."),

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -227,6 +229,16 @@ def test_searches_that_cannot_be_are_refused_on_reading(tmp_path, changes, words
     with pytest.raises(StudyError) as told:
         Study.from_dict({key: value for key, value in study_content(tmp_path, **content).items() if value is not None})
     assert words in str(told.value) and len(str(told.value).splitlines()) == 1
+
+
+def test_the_example_of_the_guide_can_be_read():
+    page = Path("docs/howto/design_for_production.md").read_text(encoding="utf-8")
+    content = tomllib.loads(page[page.index("```toml") + 7 : page.index("```\n\n    exugear sweep")])
+    study = Study.from_dict({**content, "case": "cases/grc750/gearbox.toml"})
+    path = "gears.hs_pinion.modification.tip_relief_um"
+    made = study.tolerances.produced(study.gearbox, {path: 30.0})
+    assert len(made) == 32 and all(24.0 <= one[path] <= 36.0 for one in made)
+    assert len({one["gears.hs_pinion.modification.profile_slope_um"] for one in made}) == 32
 
 
 def verb(folder, content):
