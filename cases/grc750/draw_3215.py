@@ -78,14 +78,25 @@ def distance(one: Mapping[str, Any]) -> float:
 
 
 def chosen(found: Sequence[Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
-    """Of the sets that meet what is wanted, the nearest to the file and the loudest; nothing where none does."""
+    """Of the sets that meet what is wanted, the nearest to the file, on any and on a first order, and the loudest.
+
+    Nothing where none does.
+    """
     met = [one for one in found if one["met"]]
-    if not met:
-        return {}
+    first = [one for one in met if one["line"].startswith("1 x ")]
     return {
-        "nearest": min(met, key=lambda one: (distance(one), -one["m"])),
-        "loudest": max(met, key=lambda one: one["m"]),
+        which: min(own, key=rank)
+        for which, own, rank in (
+            ("nearest", met, _near),
+            ("first-order", first, lambda one: (distance(one), -one["rise_dB"])),
+            ("loudest", met, lambda one: -one["m"]),
+        )
+        if own
     }
+
+
+def _near(one: Mapping[str, Any]) -> tuple[float, float]:
+    return distance(one), -one["m"]
 
 
 def draw_waterfalls(project: Project, gearbox: Gearbox, inertias: str, path: Path) -> None:

@@ -35,6 +35,7 @@ from exugear import Choice, Project
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.fingerprint import input_hash
 from exugear.model.gearbox import Gearbox
+from exugear.rotating.mean_system import MeanSystem
 from exugear.steady.excitation import Gearset
 from exugear.steady.point_solver import gearset_of
 from exugear.steady.response import transmission_error_line
@@ -103,14 +104,18 @@ def sets() -> list[dict[str, float | str]]:
 
 
 def varied(gearbox: Gearbox, own: Mapping[str, Any], radial: float) -> Gearbox:
-    """Gearbox with a set of assumptions and a radial stiffness of its bearings, N/m."""
+    """Gearbox with a set of assumptions and a radial stiffness of its bearings, N/m.
+
+    The shaft's transverse inertia follows its mass; it is half of the axial one at least, as of a disc.
+    """
     path = f"bodies.hss.inertia.{own['inertias']}"
     inertia = gearbox.content["bodies"]["hss"]["inertia"][own["inertias"]]
+    axial = own["spin"] * inertia["axial_kg_m2"]
     changes: dict[str, Any] = {
         "housing.factor": own["housing_factor"],
-        f"{path}.axial_kg_m2": own["spin"] * inertia["axial_kg_m2"],
+        f"{path}.axial_kg_m2": axial,
         f"{path}.mass_kg": own["mass"] * inertia["mass_kg"],
-        f"{path}.transverse_kg_m2": own["mass"] * inertia["transverse_kg_m2"],
+        f"{path}.transverse_kg_m2": max(own["mass"] * inertia["transverse_kg_m2"], 0.5 * axial),
         "couplings.brake_coupling.stiffness_N_m_per_rad": own["coupling"],
     }
     for name in ("pl_a", "pl_b") if own["kind"] == "planet_bearings" else AXIAL:
@@ -127,17 +132,45 @@ def gearset_with(given: Given, own: Mapping[str, Any], radial: float, variant: s
     return gearset_of(assembly, np.array([0.0, FASTEST]), HARMONICS, 0)
 
 
-def tuned(given: Given, own: Mapping[str, Any]) -> list[float]:
+@dataclass(frozen=True)
+class Between:
+    """The variant `bushing` of a set at any radial stiffness within the range, from what it is at both ends.
+
+    Stiffness and damping are linear in it. What the meshes push along is that at the stiff end, where it hardly moves.
+    """
+
+    low: float
+    high: float
+    soft: MeanSystem
+    stiff: Gearset
+
+    @classmethod
+    def of(cls, given: Given, own: Mapping[str, Any]) -> Between:
+        """Assemble both ends of a set."""
+        low, high = RANGES[str(own["kind"])]
+        soft, stiff = (gearset_with(given, own, radial, "bushing") for radial in (low, high))
+        return cls(low, high, soft.system, stiff)
+
+    def at(self, radial: float) -> MeanSystem:
+        """Mean system at a radial stiffness, N/m."""
+        share = (radial - self.low) / (self.high - self.low)
+        changed = {
+            name: (1.0 - share) * getattr(self.soft, name) + share * getattr(self.stiff.system, name)
+            for name in ("stiffness", "damping")
+        }
+        return replace(self.stiff.system, **changed)
+
+
+def tuned(between: Between) -> list[float]:
     """Radial stiffnesses within the range (N/m) with which the frequency is a natural one of `bushing`.
 
     With the stiffness matrix K_0 + s E of the mean system they solve (K_0 - w^2 M) x = -s E x.
     """
-    low, high = RANGES[str(own["kind"])]
-    ends = [gearset_with(given, own, radial, "bushing").system for radial in (low, high)]
+    low, high = between.low, between.high
     at, speed = 2.0 * np.pi * TARGET_HZ, 0.5 * FASTEST
-    first, last = (system.stiffness_at(speed) for system in ends)
+    first, last = (system.stiffness_at(speed) for system in (between.soft, between.stiff.system))
     slope = (last - first) / (high - low)
-    found = scipy.linalg.eigvals(at**2 * ends[0].mass - first + low * slope, slope)
+    found = scipy.linalg.eigvals(at**2 * between.soft.mass - first + low * slope, slope)
     real = found.real[np.isfinite(found) & (np.abs(found.imag) < 1e-3 * np.abs(found.real))]
     kept: list[float] = []
     for value in sorted(float(f"{own:.3g}") for own in real[(real >= low) & (real <= high)]):
@@ -146,9 +179,9 @@ def tuned(given: Given, own: Mapping[str, Any]) -> list[float]:
     return kept
 
 
-def amplitudes(gearset: Gearset) -> dict[str, np.ndarray]:
+def amplitudes(gearset: Gearset, system: MeanSystem) -> dict[str, np.ndarray]:
     """Peak amplitude of the overall transmission error along `FREQUENCIES` by mesh order, m; NaN beyond the speeds."""
-    speed, system = 0.5 * FASTEST, gearset.system
+    speed = 0.5 * FASTEST
     ports = gearset.ports_at(speed)
     motion = system.responses(speed, 2.0 * np.pi * FREQUENCIES, gearset.loads(ports))
     seen = np.einsum("fsm,s->fm", motion, gearset.row_of_overall(speed))
@@ -175,17 +208,17 @@ def peak_of(amplitude: np.ndarray, within: float) -> dict[str, float] | None:
     return best
 
 
-def peaks_of(gearset: Gearset, within: float) -> dict[str, dict[str, float]]:
+def peaks_of(gearset: Gearset, system: MeanSystem, within: float) -> dict[str, dict[str, float]]:
     """Peaks by mesh order."""
-    found = {name: peak_of(values, within) for name, values in amplitudes(gearset).items()}
+    found = {name: peak_of(values, within) for name, values in amplitudes(gearset, system).items()}
     return {name: peak for name, peak in found.items() if peak is not None and peak["rise_dB"] >= TOLD_FROM}
 
 
-def around(given: Given, own: Mapping[str, Any], radial: float) -> list[dict[str, Any]]:
+def around(between: Between, radial: float) -> list[dict[str, Any]]:
     """Peaks at a radial stiffness (N/m); where one is seen, at stiffnesses beside it, too: it may rise more there."""
     found: list[dict[str, Any]] = []
     for factor in (1.0, *BESIDE):
-        peaks = peaks_of(gearset_with(given, own, factor * radial, "bushing"), NEAR)
+        peaks = peaks_of(between.stiff, between.at(factor * radial), NEAR)
         found.append({"radial_N_per_m": float(f"{factor * radial:.4g}"), "peaks": peaks})
         if not any(peak["rise_dB"] >= SEEN for peak in found[0]["peaks"].values()):
             break
@@ -195,7 +228,7 @@ def around(given: Given, own: Mapping[str, Any], radial: float) -> list[dict[str
 def search(project: Project) -> list[dict[str, Any]]:
     """Search all sets, and go on where a search was stopped."""
     path = project.folder / "search-3215.jsonl"
-    head = {"input": input_hash(project.assembly()), "script": 2}
+    head = {"input": input_hash(project.assembly()), "script": 3}
     given = given_by(project)
     wanted, done = sets(), kept_rows(path, head)
     first, begun = len(done), time.monotonic()
@@ -203,9 +236,9 @@ def search(project: Project) -> list[dict[str, Any]]:
     with path.open("w", encoding="utf-8") as file:
         file.writelines(json.dumps(row) + "\n" for row in (head, *done))
         for n, own in enumerate(wanted[first:], start=first + 1):
-            row: dict[str, Any] = {"set": own}
-            row["rigid"] = peaks_of(gearset_with(given, own, 1e9, "rigid"), AROUND)
-            row["bushing"] = [found for radial in tuned(given, own) for found in around(given, own, radial)]
+            rigid, between = gearset_with(given, own, 1e9, "rigid"), Between.of(given, own)
+            row: dict[str, Any] = {"set": own, "rigid": peaks_of(rigid, rigid.system, AROUND)}
+            row["bushing"] = [found for radial in tuned(between) for found in around(between, radial)]
             done.append(row)
             file.write(json.dumps(row) + "\n")
             file.flush()

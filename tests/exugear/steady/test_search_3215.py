@@ -35,7 +35,7 @@ def drawing(search):
 def test_each_stiffness_found_makes_the_frequency_a_natural_one(search, grc, stiffness, kind):
     """By its matrices within what rounding to three digits leaves; by modes, damped and gyroscopic, within 2 %."""
     own = {"kind": kind, **NEARLY_THE_FILE}
-    found = search.tuned(search.Given(grc, stiffness, {}), own)
+    found = search.tuned(search.Between.of(search.Given(grc, stiffness, {}), own))
     assert found
     for radial in found:
         system = search.gearset_with(search.Given(grc, stiffness, {}), own, radial, "bushing").system
@@ -56,10 +56,21 @@ def nearest(search, rates):
 
 def test_a_stiffness_between_those_found_does_not(search, grc, stiffness):
     own = {"kind": "planet_bearings", **NEARLY_THE_FILE}
-    first = search.tuned(search.Given(grc, stiffness, {}), own)[0]
+    first = search.tuned(search.Between.of(search.Given(grc, stiffness, {}), own))[0]
     assert first > 1.3 * search.RANGES["planet_bearings"][0]
     system = search.gearset_with(search.Given(grc, stiffness, {}), own, 0.8 * first, "bushing").system
     assert nearest(search, undamped(search, system)) > 3e-3
+
+
+@pytest.mark.parametrize(("kind", "radial"), [("planet_bearings", 1.6e10), ("all_bearings", 3e9)])
+def test_peaks_from_both_ends_of_the_range_are_those_of_the_gearbox_itself(search, grc, stiffness, kind, radial):
+    """Amplitudes of all orders where the gearbox is assembled with the stiffness, to 2e-3 of the largest."""
+    given, own = search.Given(grc, stiffness, {}), {"kind": kind, **NEARLY_THE_FILE}
+    between, itself = search.Between.of(given, own), search.gearset_with(given, own, radial, "bushing")
+    found = search.amplitudes(between.stiff, between.at(radial))
+    for name, amplitude in search.amplitudes(itself, itself.system).items():
+        exact, quick = np.nan_to_num(amplitude), np.nan_to_num(found[name])
+        assert np.abs(quick - exact).max() <= 2e-3 * exact.max(), name
 
 
 def test_a_set_changes_the_gearbox_as_it_says(search, grc, stiffness):
@@ -74,6 +85,15 @@ def test_a_set_changes_the_gearbox_as_it_says(search, grc, stiffness):
     systems = [search.gearset_with(given, own, radial, "bushing").system for radial in (1e10, 2e10, 3e10)]
     first, second, third = (system.stiffness_at(0.0) for system in systems)
     assert np.abs(third - second - (second - first)).max() < 1e-3 * np.abs(third - first).max()
+
+
+def test_every_shaft_that_is_searched_is_a_body(search, grc):
+    """Two and four times the spin of the set `gears` ask for a disc: no body has more than twice its transverse one."""
+    shafts = {(own["inertias"], own["spin"], own["mass"]): own for own in search.sets()}
+    assert len(shafts) == 27
+    for own in shafts.values():
+        inertia = search.varied(grc, own, 1e10).content["bodies"]["hss"]["inertia"][own["inertias"]]
+        assert inertia["axial_kg_m2"] <= (2.0 + 1e-12) * inertia["transverse_kg_m2"]
 
 
 def test_rise_of_a_peak_is_that_of_an_oscillator(search):
@@ -102,7 +122,7 @@ def few_sets(search, monkeypatch):
     """Three sets with ranges so narrow that little is found in them."""
     own = [{"kind": "planet_bearings", **NEARLY_THE_FILE, "coupling": coupling} for coupling in (1e5, 1e6, 1e8)]
     monkeypatch.setattr(search, "sets", lambda: own)
-    monkeypatch.setattr(search, "tuned", lambda given, own: [1e10])
+    monkeypatch.setattr(search, "tuned", lambda between: [1e10])
     return own
 
 
