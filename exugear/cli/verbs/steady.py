@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from exugear.project import Project
     from exugear.steady.peaks import Peak, Pull
     from exugear.steady.settings import SteadySettings
+    from exugear.tooth_mesh.wandering_load import WanderingLoad
 
 LEAST_AMPLITUDE = 1e-12
 """Amplitude of the overall transmission error below which a peak is round-off, m."""
@@ -46,6 +47,8 @@ NOTICED_CHANGE = 1e-2
 """Change of the loudest peaks by more harmonics that is to be minded."""
 NOTICED_VARIATION = 1e-3
 """Change of stiffness with the carrier's angle that is told."""
+NOTICED_WAY = 0.3
+"""Moment of the load's way along the face, over the transmission error's push, that is told."""
 
 
 class Level(StrEnum):
@@ -162,8 +165,10 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
     else:
         _tell_of_harmonics(data)
         _tell_of_range(ranking)
+    wandering = _tell_of_wandering_loads(project) if excited else ()
     if as_json:
-        print_json(_whole_summary(project, settings, data, ranking, pulling, excited))
+        summary = _whole_summary(project, settings, data, ranking, pulling, excited)
+        print_json({**summary, "left_out_moments": [_wandering_summary(own) for own in wandering]})
         _fail_if_doubtful(data, growth)
         return
     title = f"Loudest resonances, {_speeds_of(ranking)}, {project.choice.variant}, {settings.level}"
@@ -290,6 +295,29 @@ def _tell_of_stability(data: xr.Dataset, growth: float) -> None:
         speeds = data["speed"].values[data["growth"].values == growth]
         where = f" (at {float(speeds[0]) / RPM:.4g} rpm)" if speeds.size else ""
         note(f"Unstable: disturbances grow by up to {growth:.3g} 1/s{where}; no steady state lasts", style="yellow")
+
+
+def _tell_of_wandering_loads(project: Project) -> tuple[WanderingLoad, ...]:
+    """Say where the load moves along the face so far that its moment, which laws along a row leave out, counts."""
+    from exugear.tooth_mesh.laws.registry import LAWS
+    from exugear.tooth_mesh.wandering_load import wandering_loads
+
+    law = LAWS[project.choice.mesh_law]
+    if law.needs_axes or not law.needs_tables or project.choice.variant == "rigid":
+        return ()
+    found = wandering_loads(project.gearbox, project.folder)
+    if found and found[0].over_error > NOTICED_WAY:
+        note(
+            f"{found[0].in_words}; its moment, {found[0].over_error:.2g} times the push of the transmission error, is "
+            "left out: peaks of modes in which gears tilt may be many times higher; --mesh-law table --level "
+            "nonlinear has it",
+            style="yellow",
+        )
+    return found
+
+
+def _wandering_summary(own: WanderingLoad) -> dict[str, Any]:
+    return {"pair": own.pair, "load_centre_m": own.amplitude, "over_transmission_error": own.over_error}
 
 
 def _left_out(data: xr.Dataset) -> dict[str, float]:
