@@ -5,7 +5,7 @@
 The default: law `line_of_action`, linear bearings, the contact of the teeth as the commands find it. The best: law
 `table` on full grids, bearings by their rows (`law = "iso16281"`). Modes are matched by shape; misalignments and
 bearing loads are those of the static load; heights are those of the loudest lines of the overall transmission error,
-beside a dense sweep of the level `nonlinear`. Figures go to `defaults.json` beside this file; docs/validation.md shows
+beside a dense sweep of the level `nonlinear`. Figures go to `defaults.json` in the folder; docs/validation.md shows
 them.
 """
 
@@ -32,7 +32,6 @@ from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.templates.kinds import template
 
 CASE = Path(__file__).parent.parent / "cases" / "grc750" / "gearbox.toml"
-RESULTS = Path(__file__).parent / "defaults.json"
 DEFAULT, BEST = Choice("bushing"), Choice("bushing", "table")
 SAME_SHAPE = 0.8
 """Least share of kinetic energy that a mode must have along another to count as the same."""
@@ -41,6 +40,8 @@ HIGHEST_HZ = 5000.0
 BESIDE, DENSE = 0.02, 21
 """Share of a peak's speed on either side that the best model is swept over, and at how many speeds."""
 SIGNAL = "overall_dte"
+LEAST_TILT, LEAST_LOAD = 1e-9, 1.0
+"""Misalignment (rad) and load (N) of the best model below which there is nothing to compare: planets in balance."""
 
 Content = dict[str, Any]
 
@@ -151,13 +152,15 @@ def misalignments(default: Project, best: Project) -> list[Difference]:
     states = [static_state(project.assembly()) for project in (default, best)]
     names = states[0].assembly.mesh_names
     pairs = zip(names, *(state.misalignment for state in states), strict=True)
-    return [Difference(name, float(one), float(other)) for name, one, other in pairs]
+    found = [Difference(name, float(one), float(other)) for name, one, other in pairs]
+    return [own for own in found if abs(own.best) > LEAST_TILT]
 
 
 def bearing_loads(default: Project, best: Project) -> list[Difference]:
     """Radial load of each catalogue bearing at the static load, N."""
     pairs = zip(default.bearings(), best.bearings(), strict=True)
-    return [Difference(one.name, one.radial_load, other.radial_load) for one, other in pairs]
+    found = [Difference(one.name, one.radial_load, other.radial_load) for one, other in pairs]
+    return [own for own in found if abs(own.best) > LEAST_LOAD]
 
 
 def heights(default: Project, best: Project, count: int) -> list[Difference]:
@@ -202,12 +205,17 @@ def main() -> None:
     parser.add_argument("--folder", type=Path, default=Path(tempfile.gettempdir()) / "exugear-defaults")
     parser.add_argument("--heights", type=int, default=0, help="how many of the loudest lines are compared")
     arguments = parser.parse_args()
-    kept = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.exists() else {}
+    arguments.folder.mkdir(parents=True, exist_ok=True)
+    results = arguments.folder / "defaults.json"
+    kept = json.loads(results.read_text(encoding="utf-8")) if results.exists() else {}
     for name in arguments.names or CASES:
         found = compare(CASES[name](), arguments.folder / name, arguments.heights)
         kept[name] = {what: [[own.name, own.default, own.best] for own in own_list] for what, own_list in found.items()}
-        RESULTS.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+        results.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
         for what, differences in found.items():
+            if not differences:
+                print(f"{name}: {what}: nothing to compare")
+                continue
             worst = max(differences, key=lambda own: abs(own.share))
             print(f"{name}: {what}: {len(differences)} compared, worst {100.0 * worst.share:+.2f} %, {worst.name}")
 
