@@ -113,6 +113,26 @@ def test_points_share_tables_and_stresses(swept):
     assert len(list((folder / "out" / "shared").glob("stress/*/stress/spur.nc"))) == 1
 
 
+def test_a_dynamic_factor_of_a_run_is_that_of_each_point(swept):
+    """A point has no results folder with a run: K_v is computed there. More damping, less K_v, more safety."""
+    folder, data = swept
+    case = content_of(TABLE, folder)
+    del case["rating"]["dynamic_factor"]
+    case["rating"] |= {"dynamic_factor_run": "run_up", "least_dynamic_factor": 1.01}
+    (folder / "run.toml").write_text(toml_text(case), encoding="utf-8")
+    study = content(folder, case=str(folder / "run.toml"), figures={"S_H": {"figure": "contact_safety"}})
+    study |= {
+        "choice": {"variant": "bushing", "mesh_law": "line_of_action"},
+        "parameters": {"damping": {"path": "damping.mesh_time_s", "values": [1e-6, 5e-6]}},
+        "run": {"duration_s": 0.3},
+    }
+    found = sweep(Study.from_dict(study), folder / "out", processes(1))
+    assert not found.failed, [record.error for record in found.failed]
+    little, much = found.dataset["S_H"].to_numpy().tolist()
+    assert little < much < float(data["S_H"][0])  # that of K_v = 1
+    assert not list((folder / "out" / "work").glob("*"))
+
+
 def test_the_worst_planet_is_that_of_the_life(tmp_path):
     """A pin 60 um out of place: the same safeties and the same planet as the rating of flanks has them."""
     pins = {"pin": {"body": "planet_2", "tangential_um": 60.0}}
