@@ -32,8 +32,8 @@ LONGEST_LINE = 400
 """Letters of a line of a message; of a longer one the middle is left out, for file and remedy stand at its ends."""
 MOST_LINES = 25
 """Lines of a message."""
-_TURNS = frozenset("\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
-"""Characters that turn the direction of writing and so can show a text that is not there."""
+_TURNS = frozenset("\u00ad\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
+"""Characters that turn the direction of writing, or are not seen in a name, and so show a text that is not there."""
 results = Console()
 messages = Console(stderr=True)
 
@@ -45,6 +45,8 @@ def plain(text: object) -> str:
     --------
     >>> print(plain("red \x1b[31m, 5 µm"))
     red \x1b[31m, 5 µm
+    >>> print(plain("shaft\xad1"))
+    shaft\xad1
     """
     return "".join(
         letter.encode("unicode_escape").decode("ascii")
