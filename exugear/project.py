@@ -312,11 +312,9 @@ class Project:
 
         Without axes of the file they go over load and misalignment around where the gears stand.
         """
-        from exugear.life.stress_tables import stress_requests
+        from exugear.life.stress_tables import life_requests
 
-        if LAWS[self.choice.mesh_law].needs_axes:
-            return self.life_tables()
-        return stress_requests(self.assembly(), self.life_tables(), counted, self.folder)
+        return life_requests(self.assembly(), counted, self.folder)
 
     def checked_loads(self, progress: Callable[[int, int], None] | None = None) -> CountedLoads:
         """Read the loads of a life, and check all that is asked for before any work begins.

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from exugear.dynamic_factors.response_factors import source_hash
 from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.statics import BalanceError
 from exugear.life.life import checked_loads, life_hash, rating_of
 from exugear.life.life_file import read_life
+from exugear.life.stress_tables import life_requests
 from exugear.model.choice import Choice
 from exugear.model.gearbox import Gearbox
 from exugear.model.reading import CaseError
@@ -38,9 +40,7 @@ class StoredLife:
     reason: str = ""
 
 
-def stored_lives(
-    gearbox: Gearbox, folder: Path, assembled: Callable[[Choice], Assembly], tables: Mapping[str, str]
-) -> Iterator[StoredLife]:
+def stored_lives(gearbox: Gearbox, folder: Path, assembled: Callable[[Choice], Assembly]) -> Iterator[StoredLife]:
     """Read all lives of a folder.
 
     Parameters
@@ -50,16 +50,15 @@ def stored_lives(
     folder : Path
     assembled : callable
         Gives the equations of a choice.
-    tables : mapping of pair name to str
-        Hashes of the tables that fit the case.
     """
     for path in sorted(folder.glob("*/*/life.nc")):
         try:
             data = read_life(path)
             assembly = assembled(Choice(*(str(data.attrs[key]) for key in ("variant", "mesh_law", "inertias"))))
-            source = source_hash(assembly, rating_of(gearbox), folder)
-            digest = life_hash(assembly, checked_loads(gearbox), tables, source)
-        except (FileError, CaseError, KeyError) as error:
+            counted, source = checked_loads(gearbox), source_hash(assembly, rating_of(gearbox), folder)
+            tables = {request.name: request.wanted.hash for request in life_requests(assembly, counted, folder)}
+            digest = life_hash(assembly, counted, tables, source)
+        except (FileError, CaseError, BalanceError, KeyError) as error:
             yield StoredLife(path, None, str(error))
             continue
         fits = data.attrs["input_hash"] == digest

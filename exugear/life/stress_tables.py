@@ -15,7 +15,8 @@ from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.operating_points import contact_places
 from exugear.dynamics.statics import static_state
 from exugear.load_spectrum.counted import CountedLoads
-from exugear.tooth_mesh.tables import TableRequest
+from exugear.tooth_mesh.laws.registry import LAWS
+from exugear.tooth_mesh.tables import TableRequest, requested_tables
 from fe_ste.transmission_error.table import MeshTable, TableError, TableInput
 
 TORQUE_SHARES = (0.35, 0.7, 1.0)
@@ -28,6 +29,16 @@ LARGEST_STEP, ROUNDING = 15e-6, 2.5e-6
 """Largest step of misalignment as an opening over the face, and what its ends are rounded to, m."""
 STRAIGHT = 1e-6
 """Opening over the face up to which gears stand straight, m."""
+
+
+def life_requests(assembly: Assembly, counted: CountedLoads, folder: Path) -> list[TableRequest]:
+    """Tables that stresses of a life come from, and those of them that are in a results folder.
+
+    Of a law that reads grids these are its grids; else see `stress_requests`.
+    """
+    grid = LAWS[assembly.mesh_law].needs_axes
+    requests = requested_tables(assembly.gearbox, folder, grid=grid)
+    return requests if grid else stress_requests(assembly, requests, counted, folder)
 
 
 def stress_requests(

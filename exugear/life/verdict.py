@@ -21,9 +21,9 @@ UNTRUSTED_REACH = 3.0
 TOLD_REACH = 1.001
 """From here on that is told."""
 LEFT_OUT = (
-    "scuffing (ISO/TS 6336-20, -21): left out, no source of its formulas that can be cited was found",
-    "micropitting (ISO/TS 6336-22): left out, no source of its formulas that can be cited was found",
-    "tooth flank fracture (ISO/TS 6336-4): left out, no source of its formulas that can be cited was found",
+    "scuffing (ISO/TS 6336-20, -21): not rated: its formulas are not part of this program",
+    "micropitting (ISO/TS 6336-22): not rated: its formulas are not part of this program",
+    "tooth flank fracture (ISO/TS 6336-4): not rated: its formulas are not part of this program",
 )
 """Damages of gears that are not rated, and why."""
 

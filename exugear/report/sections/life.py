@@ -49,9 +49,8 @@ def life_section(material: Material) -> Part:
     found: dict[FlankKey, dict[str, float]] = {}
     if context.gearbox.case.loads is None:
         return Part("", _rating(material, found))
-    tables = {name: table.input_hash for name, table in material.results.tables.items()}
     content = []
-    for stored in stored_lives(context.gearbox, context.folder, context.assembled, tables):
+    for stored in stored_lives(context.gearbox, context.folder, context.assembled):
         if stored.data is None:
             context.notes.left_out.append(f"{context.name_of(stored.path)}: {stored.reason}")
         else:

@@ -33,6 +33,18 @@ def project(tmp_path, monkeypatch) -> Project:
     return Project(gearbox, tmp_path / "out", Choice("bushing", "line_of_action"))
 
 
+def test_a_report_knows_a_life_whose_stresses_come_from_tables_of_its_own(project):
+    """Gears that stand askew on their bearings."""
+    askew = project.gearbox.varied({"bearings.bearing_1.z_mm": 20.0})
+    skewed = Project(askew, project.folder, project.choice)
+    counted = skewed.checked_loads()
+    assert [len(request.wanted.misalignment) > 1 for request in skewed.stress_tables(counted)] == [True]
+    skewed.life(counted=counted)
+    report = write_report(skewed.folder)
+    assert not [line for line in report.left_out if "life.nc" in line]
+    assert '<section id="life"' in report.path.read_text(encoding="utf-8")
+
+
 def test_a_report_tells_what_limits_the_life_and_leaves_out_what_does_not_fit(project):
     project.life()
     report = write_report(project.folder)
