@@ -13,21 +13,26 @@ import numpy as np
 from dynamics import stiffness_of
 from timing import CASE, median, say, timed
 
+from exugear.bearings.kernels.rolling import (
+    RollingArrays,
+    rolling_force,
+    rolling_memory,
+    rolling_tangent,
+)
 from exugear.bearings.rolling.potential import rolling_arrays
 from exugear.bearings.rolling.rows import BallRow, RollerRow, RollingRow
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.loads import LoadTable
 from exugear.dynamics.statics import accelerating_start
-from exugear.kernels.rolling import RollingArrays, rolling_force, rolling_memory, rolling_tangent
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.solvers.compiled.arrays import Equations, Work
-from exugear.solvers.compiled.connectors import add_connectors
-from exugear.solvers.compiled.methods import adams
-from exugear.solvers.compiled.packing import equations_of, work_for
-from exugear.solvers.compiled.places import gather_places, place_bodies
-from exugear.solvers.compiled.solver import CompiledSystem
-from exugear.solvers.loads import LoadTable
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.transient.compiled.arrays import Equations, Work
+from exugear.transient.compiled.connectors import add_connectors
+from exugear.transient.compiled.methods import adams
+from exugear.transient.compiled.packing import equations_of, work_for
+from exugear.transient.compiled.places import gather_places, place_bodies
+from exugear.transient.compiled.solver import CompiledSystem
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import kernel
 

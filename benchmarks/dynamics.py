@@ -21,18 +21,18 @@ from timing import CASE, Cost, median, median_row, peak_memory, result, say, sta
 
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.loads import LoadTable
 from exugear.dynamics.statics import accelerating_start
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
 from exugear.project import Project
-from exugear.runs.extent import SAMPLE_RATE
-from exugear.runs.runup import BAND, simulate
-from exugear.solvers.compiled.methods import RUNGE_KUTTA as RK4
-from exugear.solvers.compiled.methods import Method, adams
-from exugear.solvers.compiled.observers import Observer
-from exugear.solvers.compiled.solver import CompiledSystem
-from exugear.solvers.compiled.step import choose_integration, methods_of
-from exugear.solvers.loads import LoadTable
+from exugear.transient.compiled.methods import RUNGE_KUTTA as RK4
+from exugear.transient.compiled.methods import Method, adams
+from exugear.transient.compiled.observers import Observer
+from exugear.transient.compiled.solver import CompiledSystem
+from exugear.transient.compiled.step import choose_integration, methods_of
+from exugear.transient.extent import SAMPLE_RATE
+from exugear.transient.runup import BAND, simulate
 
 LOAD = {"carrier": 240e3, "hss": -3000.0}
 RATED = {"carrier": 240e3, "hss": -2945.12}

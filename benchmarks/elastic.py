@@ -19,15 +19,15 @@ from timing import CASE, median, say, timed
 from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.loads import LoadTable
 from exugear.dynamics.signals import ENERGIES, POWERS, signal_layout
 from exugear.dynamics.statics import accelerating_start
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.runs.extent import SAMPLE_RATE
-from exugear.runs.runup import BAND
-from exugear.solvers.compiled.solver import CompiledSystem
-from exugear.solvers.compiled.step import Integration, choose_integration
-from exugear.solvers.loads import LoadTable
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.transient.compiled.solver import CompiledSystem
+from exugear.transient.compiled.step import Integration, choose_integration
+from exugear.transient.extent import SAMPLE_RATE
+from exugear.transient.runup import BAND
 
 SHAFTS = ("lss", "ims", "hss")
 CARRIER = (*SHAFTS, "carrier")

@@ -9,15 +9,15 @@ import numpy as np
 from timing import Cost, timed
 
 from exugear.dynamics.assembly import Assembly
-from exugear.kernels.meshes import stiffness_at
-from exugear.solvers.exudyn_model.library import exudyn, items
-from exugear.solvers.exudyn_model.system import ExudynSystem, MeshRoute
-from exugear.solvers.loads import Loading
+from exugear.dynamics.loads import Loading
 from exugear.tooth_mesh.element import MeshElement
+from exugear.tooth_mesh.kernels.meshes import stiffness_at
+from exugear.transient.exudyn_model.library import exudyn, items
+from exugear.transient.exudyn_model.system import ExudynSystem, MeshRoute
 
 
 class PythonMesh:
-    """One mesh as the textbook would write it: the law of `exugear.kernels.meshes` in plain Python."""
+    """One mesh as the textbook would write it: the law of `exugear.tooth_mesh.kernels.meshes` in plain Python."""
 
     def __init__(self, system: ExudynSystem, element: MeshElement) -> None:
         mesh = element.mesh

@@ -29,7 +29,7 @@ TORQUES = (1, 2, 4)
 def measure_pair(name: str, positions: int) -> dict[str, float | int | str]:
     """Compute one pair's table from nothing in this process, imports included."""
     started, processor = time.perf_counter(), time.process_time()
-    from exugear.model.gearbox import Gearbox
+    from exugear.gearbox.gearbox import Gearbox
     from fe_ste.transmission_error.compliance import pair_compliance
     from fe_ste.transmission_error.transmission_error import static_transmission_error
 
@@ -54,7 +54,7 @@ def measure_pair(name: str, positions: int) -> dict[str, float | int | str]:
 
 def measure_states(rounds: int) -> list[dict[str, float | int]]:
     """Cost of the states of a table, its gears prepared: over positions at one torque, over torques."""
-    from exugear.model.gearbox import Gearbox
+    from exugear.gearbox.gearbox import Gearbox
     from fe_ste.transmission_error.compliance import pair_compliance
     from fe_ste.transmission_error.transmission_error import static_transmission_error
 

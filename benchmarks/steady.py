@@ -16,11 +16,11 @@ from exugear.bodies.elastic_body import ElasticBody
 from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.runs.runup import simulate
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
 from exugear.steady.settings import LEVELS, SpeedRange, SteadySettings
 from exugear.steady.steady_response import response_of
+from exugear.transient.runup import simulate
 
 SPEEDS = "0:215:400"
 LINES = ((10, 3), (10, 5), (16, 4), (20, 3))

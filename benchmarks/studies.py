@@ -15,7 +15,7 @@ from typing import Any
 
 from timing import CASE, ROOT, say
 
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.gearbox import Gearbox
 from exugear.studies.design.paths import changed
 from exugear.studies.executors import Kept, Opens, processes
 from exugear.studies.figures.point_results import PointResults
@@ -23,7 +23,7 @@ from exugear.studies.figures.shared import Shared
 from exugear.studies.study import Study
 from exugear.studies.sweep import sweep, task_of
 
-SMALL = ROOT / "exugear" / "templates" / "pair.toml"
+SMALL = ROOT / "exugear" / "gearbox" / "templates" / "pair.toml"
 FREQUENCIES = {"frequency": {"figure": "frequencies", "count": 4}}
 
 

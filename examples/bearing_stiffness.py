@@ -17,7 +17,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from exugear import Choice, Gearbox, eigenmodes
-from exugear.templates.kinds import template
+from exugear.gearbox.templates.kinds import template
 from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 
 gearbox = Gearbox.from_dict(tomllib.loads(template("parallel")))

@@ -16,10 +16,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from exugear import Choice, Gearbox, Project
-from exugear.spectra.orders import order_lines
-from exugear.spectra.run_spectra import run_waterfall
-from exugear.spectra.waterfall import line_level
-from exugear.templates.kinds import template
+from exugear.gearbox.templates.kinds import template
+from exugear.results.spectra.orders import order_lines
+from exugear.results.spectra.run_spectra import run_waterfall
+from exugear.results.spectra.waterfall import line_level
 
 plain = Gearbox.from_dict(tomllib.loads(template("parallel")))
 relief = {"tip_relief_um": 8.0, "tip_relief_length_mm": 6.0}

@@ -18,7 +18,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from exugear import Choice, Project
-from exugear.templates.kinds import template
+from exugear.gearbox.templates.kinds import template
 
 case = Path("results/planetary/gearbox.toml")
 case.parent.mkdir(parents=True, exist_ok=True)

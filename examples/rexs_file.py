@@ -14,10 +14,10 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from exugear import Choice, Project
-from exugear.rexs.containers import read_rexs
-from exugear.rexs.to_case.conversion import to_case
+from exugear.exchange.rexs.containers import read_rexs
+from exugear.exchange.rexs.to_case.conversion import to_case
 
-source = Path("../tests/exugear/rexs/data/FVA-Industriegetriebe_2stufig_1-4.rexs")
+source = Path("../tests/exugear/exchange/rexs/data/FVA-Industriegetriebe_2stufig_1-4.rexs")
 imported = to_case(read_rexs(source), source.name)
 case = Path("results/rexs/gearbox.toml")
 case.parent.mkdir(parents=True, exist_ok=True)

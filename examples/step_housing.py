@@ -16,8 +16,8 @@ from pathlib import Path
 import gmsh
 
 from exugear import Choice, Gearbox, Project
-from exugear.pictures.solid_scene import draw_free_vibration
-from exugear.templates.kinds import template
+from exugear.gearbox.templates.kinds import template
+from exugear.report.pictures.solid_scene import draw_free_vibration
 
 folder = Path("results/housing")
 folder.mkdir(parents=True, exist_ok=True)

@@ -9,27 +9,27 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from exugear.dynamics.modes import Modes, eigenmodes
+    from exugear.dynamics.eigenmodes.modes import Modes, eigenmodes
     from exugear.dynamics.statics import static_state
-    from exugear.model.choice import Choice
-    from exugear.model.gearbox import Gearbox
-    from exugear.model.reading import CaseError
+    from exugear.gearbox.choice import Choice
+    from exugear.gearbox.gearbox import Gearbox
+    from exugear.gearbox.reading import CaseError
     from exugear.project import Project
     from exugear.report.writer import write_report
-    from exugear.runs.outcome import Run
-    from exugear.runs.runup import simulate
     from exugear.steady.steady_response import steady_response
+    from exugear.transient.outcome import Run
+    from exugear.transient.runup import simulate
 
 #: Public names and the modules they stand in.
 _HOMES = {
-    "CaseError": "exugear.model.reading",
-    "Choice": "exugear.model.choice",
-    "Gearbox": "exugear.model.gearbox",
-    "Modes": "exugear.dynamics.modes",
+    "CaseError": "exugear.gearbox.reading",
+    "Choice": "exugear.gearbox.choice",
+    "Gearbox": "exugear.gearbox.gearbox",
+    "Modes": "exugear.dynamics.eigenmodes.modes",
     "Project": "exugear.project",
-    "Run": "exugear.runs.outcome",
-    "eigenmodes": "exugear.dynamics.modes",
-    "simulate": "exugear.runs.runup",
+    "Run": "exugear.transient.outcome",
+    "eigenmodes": "exugear.dynamics.eigenmodes.modes",
+    "simulate": "exugear.transient.runup",
     "static_state": "exugear.dynamics.statics",
     "steady_response": "exugear.steady.steady_response",
     "write_report": "exugear.report.writer",

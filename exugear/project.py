@@ -20,19 +20,16 @@ from exugear.bodies.elastic_body import ElasticBody
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly, VariantError
 from exugear.dynamics.bearing_duties import bearing_duties, mesh_duties
+from exugear.dynamics.eigenmodes.modes import Modes, eigenmodes
 from exugear.dynamics.fingerprint import input_hash
-from exugear.dynamics.modes import Modes, eigenmodes
 from exugear.dynamics.statics import BalanceError, static_state
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.model.named_files import NOTHING_MORE, Permissions
-from exugear.model.reading import CaseError
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.named_files import NOTHING_MORE, Permissions
+from exugear.gearbox.reading import CaseError
 from exugear.results.bearings_file import write_duties
 from exugear.results.folder import bearings_path, bodies_folder, keep_case, kept_case, modes_path, time_noted
 from exugear.results.run_file import FINAL_NAME
-from exugear.runs.outcome import Run
-from exugear.runs.run_folder import run_directory
-from exugear.runs.runup import simulate
 from exugear.tooth_mesh.grid_axes import GridAxes, axes_reaching
 from exugear.tooth_mesh.law import MeshData
 from exugear.tooth_mesh.laws.registry import LAWS
@@ -40,14 +37,17 @@ from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.tooth_mesh.mesh_duty import MeshDuty
 from exugear.tooth_mesh.placement import MeshError
 from exugear.tooth_mesh.tables import TableRequest, missing_tables, requested_tables, tables_at_work
+from exugear.transient.outcome import Run
+from exugear.transient.run_folder import run_directory
+from exugear.transient.runup import simulate
 from fe_ste.transmission_error.table import MeshTable
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from exugear.life.load_spectrum.counted import CountedLoads
+    from exugear.life.rating.sheet import RatingSheet
     from exugear.life.static_balance import StaticBalance
-    from exugear.load_spectrum.counted import CountedLoads
-    from exugear.rating.sheet import RatingSheet
     from exugear.report.writer import Report
     from exugear.steady.settings import SteadySettings
 
@@ -356,7 +356,7 @@ class Project:
         counted : CountedLoads, optional
             What `checked_loads` gave; read anew without it.
         """
-        from exugear.dynamic_factors.response_factors import factors, source_hash
+        from exugear.life.dynamic_factors.response_factors import factors, source_hash
         from exugear.life.kept_angles import KeptAngles
         from exugear.life.life import compute_life, life_hash, rating_of  # root stress, which a run needs not
         from exugear.life.life_file import stored_life, write_life
@@ -408,7 +408,7 @@ class Project:
         CaseError
             No section `[rating]`, loads that cannot be used, or strengths that do not fit the gears.
         """
-        from exugear.rating.rated import RATED_AS, balanced, rated, rated_loads
+        from exugear.life.rating.rated import RATED_AS, balanced, rated, rated_loads
 
         counted = rated_loads(self.gearbox)
         at_rest = self.chosen(variant=RATED_AS.variant, mesh_law=RATED_AS.mesh_law)
@@ -421,7 +421,7 @@ class Project:
 
     def _rated_by_life(self, counted: CountedLoads) -> tuple[Figures, tuple[str, ...]]:
         """Figures of the life in the folder; none, and why, where there is none that fits."""
-        from exugear.rating.beside import of_life
+        from exugear.life.rating.beside import of_life
 
         missing = "no finite elements beside it: `exugear life` computes them"
         if not self.life_path.is_file() or any(request.stored is None for request in self.life_tables()):
@@ -440,8 +440,8 @@ class Project:
         """Figures of the nominal load from tables that are there."""
         from exugear.life.life import rating_of
         from exugear.life.pair_stresses import pair_stresses
-        from exugear.rating.beside import of_nominal_load, remarks_on
-        from exugear.rating.nominal import nominal_loads
+        from exugear.life.rating.beside import of_nominal_load, remarks_on
+        from exugear.life.rating.nominal import nominal_loads
 
         rating = rating_of(self.gearbox)
         stresses = pair_stresses(self.requested_tables(), self.folder, begin, keep=False)
@@ -453,7 +453,7 @@ class Project:
 
     def stored_life(self, counted: CountedLoads) -> xr.Dataset | None:
         """Life in the folder that was computed from exactly this input; None without one."""
-        from exugear.dynamic_factors.response_factors import source_hash
+        from exugear.life.dynamic_factors.response_factors import source_hash
         from exugear.life.life import life_hash, rating_of
         from exugear.life.life_file import stored_life
 
@@ -471,7 +471,7 @@ class Project:
         return life_path(self.folder, self.choice)
 
     def run(self, **options: Any) -> Run:
-        """Run the load case in time; options as those of `exugear.runs.runup.simulate`.
+        """Run the load case in time; options as those of `exugear.transient.runup.simulate`.
 
         Results are written to `run_directory` while it goes on.
         """

@@ -14,7 +14,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("fe_ste", "exugear")
-EXUDYN_ROOM = "exugear.solvers.exudyn_model"
+EXUDYN_ROOM = "exugear.transient.exudyn_model"
 MOST_MODULES = 12
 MOST_LINES = 600
 MEDIAN_LINES = 250

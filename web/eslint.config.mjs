@@ -5,7 +5,7 @@ export default [
   { ignores: ["web/node_modules/"] },
   js.configs.recommended,
   {
-    files: ["exugear/web/scripts/*.js"],
+    files: ["exugear/report/web/scripts/*.js"],
     languageOptions: {
       ecmaVersion: 2022,
       sourceType: "module",

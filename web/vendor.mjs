@@ -1,11 +1,11 @@
-// Renews exugear/web/vendor from the packages that package-lock.json pins: node vendor.mjs
+// Renews exugear/report/web/vendor from the packages that package-lock.json pins: node vendor.mjs
 import { createHash } from "node:crypto";
 import { copyFileSync, readFileSync, writeFileSync } from "node:fs";
 import { fileURLToPath } from "node:url";
 import { build } from "esbuild";
 
 const here = (path) => fileURLToPath(new URL(path, import.meta.url));
-const target = (name) => here(`../exugear/web/vendor/${name}`);
+const target = (name) => here(`../exugear/report/web/vendor/${name}`);
 const packaged = (name) => JSON.parse(readFileSync(here(`node_modules/${name}/package.json`), "utf8"));
 const digest = (name) => createHash("sha256").update(readFileSync(target(name))).digest("hex");
 

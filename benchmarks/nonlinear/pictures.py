@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.gearbox import Gearbox
 from exugear.tooth_mesh.tables import requested_tables
 from fe_ste.pictures.stress import draw_contact_stress
 from fe_ste.reference.position import nonlinear_position

@@ -19,12 +19,12 @@ import search_3215 as search
 from one_variant import grc_project
 
 from exugear import Choice, Project
-from exugear.dynamics.modes import eigenmodes
-from exugear.model.gearbox import Gearbox
-from exugear.model.parts import RPM
-from exugear.pictures.motions import mode_scene, motions_of
-from exugear.pictures.scene import draw_mode
-from exugear.pictures.shapes import bodies_of
+from exugear.dynamics.eigenmodes.modes import eigenmodes
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.parts import RPM
+from exugear.report.pictures.motions import mode_scene, motions_of
+from exugear.report.pictures.scene import draw_mode
+from exugear.report.pictures.shapes import bodies_of
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_response import steady_response
 from fe_ste.tools.drawing import WARNING_COLOUR, drawing_style, finish_figure, new_figure

@@ -19,13 +19,22 @@ import numpy as np
 from one_variant import grc_project, show
 
 from exugear import Choice, Modes, Project, static_state
-from exugear.dynamics.energy_shares import BODY_MOTIONS
-from exugear.dynamics.modes import counterparts, modes_of
-from exugear.pictures.elastic_scene import animate_elastic_bodies, draw_elastic_bodies, elastic_scene
-from exugear.pictures.run_diagrams import plot_waterfalls
-from exugear.spectra.orders import order_lines
-from exugear.spectra.resonances import Pick, group_by_frequency, match_eigenfrequencies, pick_resonances
-from exugear.spectra.run_spectra import run_waterfall
+from exugear.dynamics.eigenmodes.energy_shares import BODY_MOTIONS
+from exugear.dynamics.eigenmodes.modes import counterparts, modes_of
+from exugear.report.pictures.elastic_scene import (
+    animate_elastic_bodies,
+    draw_elastic_bodies,
+    elastic_scene,
+)
+from exugear.report.pictures.run_diagrams import plot_waterfalls
+from exugear.results.spectra.orders import order_lines
+from exugear.results.spectra.resonances import (
+    Pick,
+    group_by_frequency,
+    match_eigenfrequencies,
+    pick_resonances,
+)
+from exugear.results.spectra.run_spectra import run_waterfall
 
 VARIANTS = ("rigid", "bushing", "flexible")
 MAIN_SHAFT_MODES = 500.0

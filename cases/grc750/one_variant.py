@@ -6,12 +6,16 @@ import sys
 from pathlib import Path
 
 from exugear import Choice, Project
-from exugear.pictures.mode_diagrams import plot_campbell
-from exugear.pictures.run_diagrams import plot_waterfalls
-from exugear.runs.outcome import Progress
-from exugear.spectra.orders import order_lines
-from exugear.spectra.resonances import group_by_frequency, match_eigenfrequencies, pick_resonances
-from exugear.spectra.run_spectra import run_waterfall
+from exugear.report.pictures.mode_diagrams import plot_campbell
+from exugear.report.pictures.run_diagrams import plot_waterfalls
+from exugear.results.spectra.orders import order_lines
+from exugear.results.spectra.resonances import (
+    group_by_frequency,
+    match_eigenfrequencies,
+    pick_resonances,
+)
+from exugear.results.spectra.run_spectra import run_waterfall
+from exugear.transient.outcome import Progress
 
 CASE = Path(__file__).with_name("gearbox.toml")
 

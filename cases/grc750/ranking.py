@@ -13,11 +13,11 @@ import math
 from one_variant import grc_project, show
 
 from exugear import Choice
-from exugear.model.parts import RPM
+from exugear.gearbox.parts import RPM
 from exugear.results.run_file import load_run
-from exugear.spectra.order_cut import OrderCut
-from exugear.spectra.orders import OrderLine
-from exugear.spectra.sweeps import run_up_cut, sweep_rate
+from exugear.results.spectra.order_cut import OrderCut
+from exugear.results.spectra.orders import OrderLine
+from exugear.results.spectra.sweeps import run_up_cut, sweep_rate
 from exugear.steady.peaks import ComparedPeak, compared_peaks
 
 

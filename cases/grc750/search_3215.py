@@ -34,9 +34,9 @@ from one_variant import grc_project
 from exugear import Choice, Project
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.fingerprint import input_hash
-from exugear.model.gearbox import Gearbox
-from exugear.rotating.mean_system import MeanSystem
+from exugear.gearbox.gearbox import Gearbox
 from exugear.steady.excitation import Gearset
+from exugear.steady.mean_system.mean_system import MeanSystem
 from exugear.steady.point_solver import gearset_of
 from exugear.steady.response import transmission_error_line
 from exugear.tooth_mesh.contact_state import ContactState

@@ -16,8 +16,8 @@ from pathlib import Path
 from exugear.bodies.of_gearbox.solids import solid_body
 from exugear.bodies.reduced_body import ReducedBody
 from exugear.bodies.solids import SolidModel, load_or_reduce_solid
-from exugear.model.gearbox import Gearbox
-from exugear.pictures.solid_scene import draw_free_vibration
+from exugear.gearbox.gearbox import Gearbox
+from exugear.report.pictures.solid_scene import draw_free_vibration
 
 RIM = {
     "file": "ring_rim.step",

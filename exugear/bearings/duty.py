@@ -27,7 +27,7 @@ from exugear.bearings.rolling.ratings import (
 )
 from exugear.bearings.rolling.rows import BearingError, BearingOfRows, is_rib
 from exugear.bearings.support_laws import LEAST_LOAD, holding_force, holds_one_way, law_in_words
-from exugear.model.sections.connections import CatalogueSection
+from exugear.gearbox.sections.connections import CatalogueSection
 from fe_ste.tools.arrays import Floats
 
 INSIDE = ("element_diameter_mm", "element_count", "element_length_mm")

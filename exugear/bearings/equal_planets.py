@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from exugear.kernels.connectors import ConnectorArrays
-from exugear.model.parts import Bearing, Body
+from exugear.bearings.kernels.connectors import ConnectorArrays
+from exugear.gearbox.parts import Bearing, Body
 from fe_ste.tools.arrays import Floats, Integers
 
 FEWEST = 3

@@ -20,7 +20,7 @@ from exugear.bearings.rolling.contact import (
 from exugear.bearings.rolling.ratings import basic_dynamic_rating
 from exugear.bearings.rolling.rows import BearingOfRows, RollingRow
 from exugear.bearings.support_laws import LEAST_LOAD, holding_force
-from exugear.model.parts import Bearing
+from exugear.gearbox.parts import Bearing
 from fe_ste.tools.arrays import Floats
 
 CAGE_POSITIONS = 4

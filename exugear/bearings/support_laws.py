@@ -18,14 +18,14 @@ from functools import lru_cache
 import numpy as np
 
 from exugear.bearings import matrices
+from exugear.bearings.kernels.connectors import ConnectorArrays
 from exugear.bearings.rolling.catalogue import catalogue_rows
 from exugear.bearings.rolling.contact import pitch_averaged_tangent
 from exugear.bearings.rolling.potential import rolling_arrays
 from exugear.bearings.rolling.ratings import basic_dynamic_rating
 from exugear.bearings.rolling.rows import BearingError, BearingOfRows, RollingRow
-from exugear.kernels.connectors import ConnectorArrays
-from exugear.model.parts import Bearing, Body, stiffness_matrix
-from exugear.model.sections.connections import CatalogueSection
+from exugear.gearbox.parts import Bearing, Body, stiffness_matrix
+from exugear.gearbox.sections.connections import CatalogueSection
 from fe_ste.tools.arrays import Floats
 
 NOMINAL_LOAD = 0.1
@@ -85,7 +85,7 @@ def law_in_words(bearing: Bearing, stands_still: bool = True) -> str:
 
     Examples
     --------
-    >>> from exugear.model.gearbox import Gearbox
+    >>> from exugear.gearbox.gearbox import Gearbox
     >>> bearings = {bearing.family: bearing for bearing in Gearbox.from_toml("cases/grc750/gearbox.toml").bearings}
     >>> [law_in_words(bearings[name]) for name in ("plc_a", "pl_a")]
     ['linear, at a stated load, through the origin', 'linear, at the static load']
@@ -122,7 +122,7 @@ def misplaced_factor(bearing: Bearing) -> str:
 
     Examples
     --------
-    >>> from exugear.model.gearbox import Gearbox
+    >>> from exugear.gearbox.gearbox import Gearbox
     >>> bearing = next(b for b in Gearbox.from_toml("cases/grc750/gearbox.toml").bearings if b.name == "hss_a")
     >>> misplaced_factor(bearing)
     ''

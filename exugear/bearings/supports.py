@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from exugear.model.gearbox import Gearbox
-from exugear.model.parts import Bearing
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.parts import Bearing
 
 ON_BEARINGS = ("bushing", "flexible")
 """Variants whose bodies sit on bearings."""

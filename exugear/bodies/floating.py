@@ -7,7 +7,7 @@ int rho f_a g_b of its place and its modes f, g; rigid rings on seats (blanks) a
 For a body of revolution a turn by psi takes the modes into each other, exp(psi S), with eigenvalues of S at whole
 numbers: 0 for torsion and stretching, 1 for bending.
 
-Nothing here knows a solver; Exudyn's floating frame is in `exugear.solvers.exudyn_model.floating`.
+Nothing here knows a solver; Exudyn's floating frame is in `exugear.transient.exudyn_model.floating`.
 """
 
 from __future__ import annotations

@@ -42,8 +42,8 @@ from exugear.bodies.reduced_body import (
 )
 from exugear.bodies.reduction import ReducedComponent, reduce_component, rigid_gyroscopic_matrix, selective_mass_scaling
 from exugear.bodies.store import load_or_reduce
+from exugear.gearbox.versions import REDUCTION
 from exugear.kernels.coordinates import SPIN
-from exugear.model.versions import REDUCTION
 from fe_ste.geometry.gears import Material
 from fe_ste.tools.arrays import Floats
 

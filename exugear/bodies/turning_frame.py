@@ -1,4 +1,4 @@
-"""Elastic bodies in their own turning frame, one at a time; `exugear.kernels.turning` has the compiled laws."""
+"""Elastic bodies in their own turning frame, one at a time; `exugear.bodies.kernels.turning` has the compiled laws."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from functools import cached_property
 
 import numpy as np
 
+from exugear.bodies.kernels.turning import TurningArrays
 from exugear.bodies.reduced_body import TILT_X, TILT_Y, UX, UY, UZ, ReducedBody
 from exugear.kernels.coordinates import BODY_SIZE, SPIN
 from exugear.kernels.products import filled_up, laid_out, rectangular_tiles, symmetric_tiles
-from exugear.kernels.turning import TurningArrays
 from fe_ste.tools.arrays import Floats
 
 

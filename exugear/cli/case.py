@@ -11,17 +11,17 @@ from exugear.cli.errors import BadInputError, model_errors
 from exugear.cli.options import Variant
 
 if TYPE_CHECKING:
-    from exugear.model.choice import Choice
-    from exugear.model.gearbox import Gearbox
+    from exugear.gearbox.choice import Choice
+    from exugear.gearbox.gearbox import Gearbox
     from exugear.project import Project
 
 
 def read_gearbox(case: Path, files_below: Path | None = None, scripts: bool = False, *, tell: bool = True) -> Gearbox:
     """Read a gearbox file for a verb, with what the user permits it, and try all its parts; tell what is unusual."""
-    from exugear.checks.readiness import check_parts, faults_of_bearings, remarks
-    from exugear.model.gearbox import Gearbox
-    from exugear.model.named_files import Permissions
-    from exugear.model.reading import CaseError, read_toml
+    from exugear.dynamics.readiness.readiness import check_parts, faults_of_bearings, remarks
+    from exugear.gearbox.gearbox import Gearbox
+    from exugear.gearbox.named_files import Permissions
+    from exugear.gearbox.reading import CaseError, read_toml
 
     check_files_below(files_below)
     try:
@@ -102,8 +102,8 @@ def steady_lack(gearbox: Gearbox, variant: str) -> str:
     """
     from exugear.bearings.supports import elastic_names
     from exugear.dynamics.assemble import assemble
-    from exugear.model.choice import Choice
-    from exugear.rotating.mean_system import unsuitable
+    from exugear.gearbox.choice import Choice
+    from exugear.steady.mean_system.mean_system import unsuitable
     from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 
     law = "iso6336"
@@ -116,7 +116,7 @@ def steady_lack(gearbox: Gearbox, variant: str) -> str:
 def check_choice(gearbox: Gearbox, choice: Choice, folder: Path) -> None:
     """Refuse what the gearbox does not have, or may not do, before anything is written into the results folder."""
     from exugear.bodies.of_gearbox.solids import check_solids
-    from exugear.checks.readiness import lacking
+    from exugear.dynamics.readiness.readiness import lacking
     from exugear.results.folder import bodies_folder
     from exugear.tooth_mesh.laws.registry import LAWS
     from exugear.tooth_mesh.tables import without_table

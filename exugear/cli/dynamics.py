@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
     from exugear.bodies.elastic_body import ElasticBody
-    from exugear.dynamics.modes import Modes
+    from exugear.dynamics.eigenmodes.modes import Modes
     from exugear.project import Project
 
 
@@ -65,7 +65,7 @@ def contacts_shown(bar: Progress | None = None, task: TaskID | None = None) -> I
 
 def compute_modes(project: Project) -> Modes:
     """Compute the eigenmodes and store them; elastic bodies come first."""
-    from exugear.dynamics.modes import eigenmodes
+    from exugear.dynamics.eigenmodes.modes import eigenmodes
 
     bodies = reduce_elastic_bodies(project)
     with model_errors(), contacts_shown():

@@ -132,9 +132,9 @@ def model_errors() -> Iterator[None]:
     from exugear.bearings.rolling.rows import BearingError
     from exugear.dynamics.assembly import VariantError
     from exugear.dynamics.statics import BalanceError
-    from exugear.harmonics.krylov import HarmonicBalanceError
-    from exugear.model.reading import CaseError
-    from exugear.rotating.rotating_frame import SteadyError
+    from exugear.gearbox.reading import CaseError
+    from exugear.steady.harmonics.krylov import HarmonicBalanceError
+    from exugear.steady.mean_system.rotating_frame import SteadyError
     from exugear.tooth_mesh.placement import MeshError
 
     try:

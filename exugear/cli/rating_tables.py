@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 
 from exugear.cli.console import note, print_table, say
-from exugear.rating.sheet import FINITE_ELEMENTS, UNITS, FlankSheet, RatingSheet
+from exugear.life.rating.sheet import FINITE_ELEMENTS, UNITS, FlankSheet, RatingSheet
 
 _BLOCKS: Mapping[str, tuple[str, ...]] = {
     "load": ("torque", "F_t", "v", "N_L", "K_A", "K_gamma", "K_v", "F_betax", "K_Hbeta", "K_Halpha"),

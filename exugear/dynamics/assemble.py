@@ -10,21 +10,21 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
+from exugear.bearings.kernels.connectors import ConnectorArrays, no_connectors
+from exugear.bearings.kernels.rolling import no_rolling
 from exugear.bearings.support_laws import linear_law, with_laws
 from exugear.bearings.supports import ON_BEARINGS, elastic_names, mounts_at_work, unsupported
 from exugear.bodies.elastic_body import ElasticBody
+from exugear.bodies.kernels.elastic import ElasticArrays, no_elastic
+from exugear.bodies.kernels.travelling import TravellingArrays, no_travelling
 from exugear.dynamics.assembly import Assembly, VariantError
 from exugear.dynamics.operating_points import at_static_load
-from exugear.kernels.connectors import ConnectorArrays, no_connectors
-from exugear.kernels.elastic import ElasticArrays, no_elastic
+from exugear.gearbox.choice import VARIANTS, Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.parts import Bearing, Body
+from exugear.gearbox.seats import node_position, seat_key
 from exugear.kernels.inertia import InertiaArrays
-from exugear.kernels.rolling import no_rolling
 from exugear.kernels.springs import SpringArrays
-from exugear.kernels.travelling import TravellingArrays, no_travelling
-from exugear.model.choice import VARIANTS, Choice
-from exugear.model.gearbox import Gearbox
-from exugear.model.parts import Bearing, Body
-from exugear.model.seats import node_position, seat_key
 from exugear.tooth_mesh.contact_state import ContactState
 from exugear.tooth_mesh.element import mesh_elements
 from exugear.tooth_mesh.law import Angles, MeshData
@@ -194,10 +194,9 @@ def _travelling(
 def elastic_arrays(flexible: Mapping[str, ElasticBody], size: int, damping_time: float) -> ElasticArrays:
     """Arrays of elastic bodies whose coordinates are the last of `size`; damping is `damping_time` (s) times stiffness.
 
-    Those in turning frames are left out (`exugear.kernels.turning`). Each body falls into blocks that neither its
-    mass nor its
-    stiffness couples. Coordinates that turn with the body come first in their block; a body on the ground has no spin
-    speed, and no gyroscopic forces.
+    Those in turning frames are left out (`exugear.bodies.kernels.turning`). Each body falls into blocks that neither
+    its mass nor its stiffness couples. Coordinates that turn with the body come first in their block; a body on the
+    ground has no spin speed, and no gyroscopic forces.
     """
     blocks: list[NDArray[np.int64]] = []
     turning, partner = [], []

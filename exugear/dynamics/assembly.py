@@ -20,25 +20,25 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from exugear.bearings.operating_point import OperatingPoint
-from exugear.bearings.support_laws import law_in_words, load_stands_still
-from exugear.bodies.elastic_body import ElasticBody
-from exugear.bodies.floating_body import FloatingBody
-from exugear.bodies.turning_frame import TurningBody, turning_arrays
-from exugear.kernels.connectors import (
+from exugear.bearings.kernels.connectors import (
     ConnectorArrays,
     add_connector_forces,
     connector_loads,
     connector_strains,
     loads_at_rest,
 )
-from exugear.kernels.elastic import ElasticArrays, add_elastic_forces, scratch_for, set_elastic_accelerations
-from exugear.kernels.inertia import InertiaArrays, accelerations
-from exugear.kernels.meshes import STATE_SIZE, MeshArrays, gear_positions
-from exugear.kernels.rolling import no_rolling
-from exugear.kernels.springs import SpringArrays, add_spring_forces
-from exugear.kernels.table_law import NOMINAL_DEFLECTION
-from exugear.kernels.travelling import (
+from exugear.bearings.kernels.rolling import no_rolling
+from exugear.bearings.operating_point import OperatingPoint
+from exugear.bearings.support_laws import law_in_words, load_stands_still
+from exugear.bodies.elastic_body import ElasticBody
+from exugear.bodies.floating_body import FloatingBody
+from exugear.bodies.kernels.elastic import (
+    ElasticArrays,
+    add_elastic_forces,
+    scratch_for,
+    set_elastic_accelerations,
+)
+from exugear.bodies.kernels.travelling import (
     TravellingArrays,
     follow,
     place_travelling,
@@ -46,11 +46,16 @@ from exugear.kernels.travelling import (
     travelling_memory,
     travelling_tangent,
 )
-from exugear.kernels.turning import TurningArrays
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.model.parts import Bearing, Body
+from exugear.bodies.kernels.turning import TurningArrays
+from exugear.bodies.turning_frame import TurningBody, turning_arrays
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.parts import Bearing, Body
+from exugear.kernels.inertia import InertiaArrays, accelerations
+from exugear.kernels.springs import SpringArrays, add_spring_forces
 from exugear.tooth_mesh.element import MeshElement
+from exugear.tooth_mesh.kernels.meshes import STATE_SIZE, MeshArrays, gear_positions
+from exugear.tooth_mesh.kernels.table_law import NOMINAL_DEFLECTION
 from exugear.tooth_mesh.laws.forms import add_mesh_forces, add_mesh_jacobian, mesh_state
 from exugear.tooth_mesh.laws.packing import pack
 from exugear.tooth_mesh.static_contact import StaticContacts
@@ -70,7 +75,7 @@ class Assembly:
     gearbox, choice : what was assembled; the choice names its inertia set
     bodies : moving bodies in the order of their coordinates, elastic fixed ones among them
     coordinates : the six state indices of each body by name, -1 where there is none; of an elastic body those of
-        its main seat, and those of each seat under `exugear.model.seats.seat_key`
+        its main seat, and those of each seat under `exugear.gearbox.seats.seat_key`
     size : number of coordinates
     elements, meshes : mesh elements and their arrays
     travelling : seats of meshes on an elastic ring; their coordinates follow those of the system
@@ -446,7 +451,7 @@ class Assembly:
         return connector_strains(q, self.connectors)
 
     def mesh_states(self, q: Floats, v: Floats, meshes: MeshArrays | None = None) -> Floats:
-        """State of each mesh, (meshes, 10): columns as named in `exugear.kernels.meshes`."""
+        """State of each mesh, (meshes, 10): columns as named in `exugear.tooth_mesh.kernels.meshes`."""
         out = np.zeros((len(self.elements), STATE_SIZE))
         mesh_state(*self.with_travelling(q, v), self.meshes if meshes is None else meshes, out)
         return out

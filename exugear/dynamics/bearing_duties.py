@@ -15,7 +15,7 @@ from exugear.bearings.support_laws import catalogue_stiffness
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.operating_points import contact_places
 from exugear.dynamics.statics import static_state
-from exugear.model.parts import Bearing
+from exugear.gearbox.parts import Bearing
 from exugear.tooth_mesh.mesh_duty import MeshDuty, with_contact
 from fe_ste.tools.arrays import Floats
 

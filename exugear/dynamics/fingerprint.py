@@ -9,7 +9,7 @@ from dataclasses import astuple
 import numpy as np
 
 from exugear.dynamics.assembly import Assembly
-from exugear.model.versions import MODES, REDUCTION, RUN
+from exugear.gearbox.versions import MODES, REDUCTION, RUN
 from fe_ste.transmission_error.surface import SteSurface
 
 
@@ -27,8 +27,8 @@ def input_hash(assembly: Assembly, load_case: str | None = None) -> str:
     Examples
     --------
     >>> from exugear.dynamics.assemble import assemble
-    >>> from exugear.model.choice import Choice
-    >>> from exugear.model.gearbox import Gearbox
+    >>> from exugear.gearbox.choice import Choice
+    >>> from exugear.gearbox.gearbox import Gearbox
     >>> gearbox, choice = Gearbox.from_toml("cases/grc750/gearbox.toml"), Choice("bushing")
     >>> softer = gearbox.varied({"housing.factor": 0.2})
     >>> stiffness = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}

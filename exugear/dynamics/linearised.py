@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
+from exugear.bearings.kernels.connectors import add_connector_tangents
 from exugear.bodies.turning_frame import TurningBody
 from exugear.dynamics.assembly import Assembly
-from exugear.kernels.connectors import add_connector_tangents
-from exugear.kernels.meshes import MeshArrays
 from exugear.kernels.springs import SpringArrays, add_spring_forces
+from exugear.tooth_mesh.kernels.meshes import MeshArrays
 from fe_ste.tools.arrays import Floats
 
 DIFFERENCE_STEP = 1e-6

@@ -27,6 +27,7 @@ from exugear.bearings.equal_planets import (
     planet_supports,
     with_equal_planets,
 )
+from exugear.bearings.kernels.connectors import ConnectorArrays
 from exugear.bearings.operating_point import OperatingPoint, operating_point
 from exugear.bearings.rolling.contact import bearing_load, equilibrium, row_contacts
 from exugear.bearings.rolling.rows import BearingOfRows
@@ -44,10 +45,9 @@ from exugear.bearings.support_laws import (
 )
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.statics import BalanceError, locked_equilibrium, rolled_coordinates
-from exugear.kernels.connectors import ConnectorArrays
+from exugear.gearbox.parts import Bearing, Body
 from exugear.kernels.coordinates import BODY_SIZE, TILT
-from exugear.kernels.meshes import FORCE
-from exugear.model.parts import Bearing, Body
+from exugear.tooth_mesh.kernels.meshes import FORCE
 from exugear.tooth_mesh.static_contact import MeshPlace, static_contacts
 from fe_ste.tools.arrays import Floats
 

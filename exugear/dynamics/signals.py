@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from exugear.dynamics.assembly import Assembly
-from exugear.kernels.table_law import GUESSED, LEFT_TABLE
+from exugear.tooth_mesh.kernels.table_law import GUESSED, LEFT_TABLE
 from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Booleans, Floats
 
@@ -68,8 +68,8 @@ class Signal(Variable):
     Attributes
     ----------
     filled_by : tuple of str
-        Functions of `exugear.solvers.compiled.sampling` that fill its columns, or its part of the account; or
-        methods of `exugear.solvers.compiled.observers`. Empty where `formula` gives it, or where it is a time itself.
+        Functions of `exugear.transient.compiled.sampling` that fill its columns, or its part of the account; or
+        methods of `exugear.transient.compiled.observers`. Empty where `formula` gives it, or where it is a time itself.
     formula : callable, optional
         Makes it of the columns of samples: (layout, rows) to an array of rows and its further dimensions. Of a time
         that is added up: in which samples it passes.
@@ -307,7 +307,8 @@ SIGNALS = (
 
 The account of energy: the loads' work = change of kinetic and elastic energy + the other four. The last two of these
 are what the law `seed` does because its force has parts that its deflection does not see, and what the bearings do
-because their rate is not the derivative of their displacement (see `exugear.kernels.connectors.connector_motion`).
+because their rate is not the derivative of their displacement (see
+`exugear.bearings.kernels.connectors.connector_motion`).
 """
 MESH_TIMES = tuple(signal.name for signal in SIGNALS if signal.is_mesh_time)
 """Times (s) that a run adds up for each mesh."""

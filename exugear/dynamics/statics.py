@@ -19,8 +19,8 @@ import scipy.linalg
 
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.linearised import tangent_stiffness
-from exugear.kernels.meshes import FORCE, OUTSIDE, MeshArrays
-from exugear.kernels.table_law import GUESSED
+from exugear.tooth_mesh.kernels.meshes import FORCE, OUTSIDE, MeshArrays
+from exugear.tooth_mesh.kernels.table_law import GUESSED
 from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
 
@@ -282,8 +282,8 @@ def static_state(assembly: Assembly) -> StaticState:
     Examples
     --------
     >>> from exugear.dynamics.assemble import assemble
-    >>> from exugear.model.choice import Choice
-    >>> from exugear.model.gearbox import Gearbox
+    >>> from exugear.gearbox.choice import Choice
+    >>> from exugear.gearbox.gearbox import Gearbox
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
     >>> stiffness = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
     >>> state = static_state(assemble(gearbox, Choice("rigid"), stiffness))
@@ -394,7 +394,7 @@ def accelerating_start(
     torques : mapping of body name to torque about +z, N m
     speeds : float, or mapping of body name to float
         Speed of the overall input, rad/s, from which all others follow by rolling; or of several bodies, as
-        `exugear.train.train.Train.rolling` takes them.
+        `exugear.gearbox.train.train.Train.rolling` takes them.
     driven : (body, spin rate), optional
         A body whose spin rate (rad/s2) is prescribed; the torque that this takes is solved for.
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exugear.counting.duration import LoadPoints
-from exugear.load_spectrum.counted import CountedLoads
+from exugear.life.counting.duration import LoadPoints
+from exugear.life.load_spectrum.counted import CountedLoads
 from fe_ste.tools.arrays import Floats
 
 

@@ -27,10 +27,10 @@ from exugear.bearings.rolling.lubrication import (
 )
 from exugear.bearings.rolling.ratings import equivalent_load, equivalent_static_load
 from exugear.bearings.rolling.rows import BearingError, BearingOfRows, RollerRow, RollingRow, on_raceways
+from exugear.gearbox.parts import Bearing
+from exugear.gearbox.sections.lubricant import LubricantSection
 from exugear.life.acting_loads import ActingLoads
 from exugear.life.static_balance import StaticBalance
-from exugear.model.parts import Bearing
-from exugear.model.sections.lubricant import LubricantSection
 from fe_ste.tools.arrays import Floats
 
 LAMINAE = 40

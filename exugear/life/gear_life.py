@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from exugear.dynamic_factors.dynamic_factor import DynamicFactor
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.sections.loads import RatingSection, StrengthSection
 from exugear.life.acting_loads import ActingLoads
+from exugear.life.dynamic_factors.dynamic_factor import DynamicFactor
+from exugear.life.load_spectrum.exposure import FLANKS, ToothExposure
 from exugear.life.static_balance import StaticBalance
-from exugear.load_spectrum.exposure import FLANKS, ToothExposure
-from exugear.model.gearbox import Gearbox
-from exugear.model.sections.loads import RatingSection, StrengthSection
 from fe_ste.geometry.gears import GearPair
 from fe_ste.root_stress.mesh_cycle import MeshCycleStress
 from fe_ste.standards.load_factors import Hardening

@@ -9,21 +9,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exugear.dynamic_factors.dynamic_factor import WITHIN, DynamicFactor
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.fingerprint import input_hash
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.parts import RPM
+from exugear.gearbox.sections.loads import RatingSection
+from exugear.gearbox.sections.lubricant import LubricantSection
+from exugear.gearbox.versions import LIFE
 from exugear.life.acting_loads import ActingLoads, acting_loads
 from exugear.life.bearing_life import BearingLife, bearing_lives
+from exugear.life.dynamic_factors.dynamic_factor import WITHIN, DynamicFactor
 from exugear.life.gear_life import FlankLife, beyond_tables, check_strengths, flank_lives
+from exugear.life.load_spectrum.counted import CountedLoads, count_loads
+from exugear.life.load_spectrum.sources import Progress
 from exugear.life.static_balance import AngleStore, StaticBalance, static_balance
 from exugear.life.verdict import LEFT_OUT, failures, needs_of_relief, reaches, shortfalls
-from exugear.load_spectrum.counted import CountedLoads, count_loads
-from exugear.load_spectrum.sources import Progress
-from exugear.model.gearbox import Gearbox
-from exugear.model.parts import RPM
-from exugear.model.sections.loads import RatingSection
-from exugear.model.sections.lubricant import LubricantSection
-from exugear.model.versions import LIFE
 from fe_ste.root_stress.mesh_cycle import MeshCycleStress
 
 TOLD_SHARING = 1.0005

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.versions import LIFE
 from exugear.life.bearing_life import BearingLife
 from exugear.life.gear_life import FlankLife
 from exugear.life.life import Life
-from exugear.load_spectrum.spectra_files import write_table
-from exugear.model.choice import Choice
-from exugear.model.versions import LIFE
+from exugear.life.load_spectrum.spectra_files import write_table
 from exugear.results.folder import modes_path
 from fe_ste.tools.files import FileError
 from fe_ste.tools.sealed import Layout, load_dataset, write_dataset

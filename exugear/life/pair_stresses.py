@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from exugear.model.versions import LIFE
+from exugear.gearbox.versions import LIFE
 from exugear.tooth_mesh.tables import TableRequest
 from fe_ste.geometry.gears import Gear
 from fe_ste.root_stress.mesh_cycle import MeshCycleStress, mesh_cycle_stress

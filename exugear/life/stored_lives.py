@@ -7,15 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from exugear.dynamic_factors.response_factors import source_hash
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.statics import BalanceError
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.reading import CaseError
+from exugear.life.dynamic_factors.response_factors import source_hash
 from exugear.life.life import checked_loads, life_hash, rating_of
 from exugear.life.life_file import read_life
 from exugear.life.stress_tables import life_requests
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.model.reading import CaseError
 from fe_ste.tools.files import FileError
 
 if TYPE_CHECKING:

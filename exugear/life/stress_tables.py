@@ -14,7 +14,7 @@ from pathlib import Path
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.operating_points import contact_places
 from exugear.dynamics.statics import static_state
-from exugear.load_spectrum.counted import CountedLoads
+from exugear.life.load_spectrum.counted import CountedLoads
 from exugear.tooth_mesh.laws.registry import LAWS
 from exugear.tooth_mesh.tables import TableRequest, requested_tables
 from fe_ste.transmission_error.table import MeshTable, TableError, TableInput

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.sections.loads import RatingSection
 from exugear.life.bearing_life import BearingLife
 from exugear.life.gear_life import FlankLife
-from exugear.load_spectrum.counted import CountedLoads
-from exugear.model.gearbox import Gearbox
-from exugear.model.sections.loads import RatingSection
+from exugear.life.load_spectrum.counted import CountedLoads
 
 LEAST_OUTSIDE = 0.01
 """Share of the load outside the path of contact below which no relief is asked for."""

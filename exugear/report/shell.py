@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from exugear.report.parts.material import Material, Part
-from exugear.web import pieces
+from exugear.report.web import pieces
 
 
 def page_body(material: Material, parts: Sequence[Part]) -> str:

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from exugear.findings.context import Context
-from exugear.findings.groups import response_groups, run_groups
-from exugear.findings.stored import bytes_of_runs, stored_models, with_responses
-from exugear.findings.variations import begin_variations, model_variations
-from exugear.findings.words import Words
-from exugear.model.named_files import Permissions
+from exugear.gearbox.named_files import Permissions
+from exugear.report.findings.context import Context
+from exugear.report.findings.groups import response_groups, run_groups
+from exugear.report.findings.stored import bytes_of_runs, stored_models, with_responses
+from exugear.report.findings.variations import begin_variations, model_variations
+from exugear.report.findings.words import Words
 from exugear.report.parts.material import Material, Part, lines_of
 from exugear.report.parts.run_data import run_data
 from exugear.report.sections.bearings import bearings_section
@@ -32,9 +32,9 @@ from exugear.report.sections.steady import steady_section
 from exugear.report.sections.studies import studies_section
 from exugear.report.sections.trust import trust_section
 from exugear.report.shell import page_body
+from exugear.report.web.arrays import ArrayStore
+from exugear.report.web.document import whole_page
 from exugear.results.folder import REPORT_FILE, kept_case
-from exugear.web.arrays import ArrayStore
-from exugear.web.document import whole_page
 from fe_ste.tools.files import write_file
 
 SECTIONS: Final[tuple[Callable[[Material], Part], ...]] = (

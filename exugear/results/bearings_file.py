@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from exugear.bearings.duty import BearingDuty
-from exugear.model.versions import MODES
+from exugear.gearbox.versions import MODES
 from exugear.tooth_mesh.mesh_duty import MeshDuty
 from fe_ste.tools.files import FileError, read_text, write_file
 

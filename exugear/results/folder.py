@@ -14,10 +14,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.model.named_files import NOTHING_MORE, Permissions
-from exugear.model.reading import CaseError, parsed
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.named_files import NOTHING_MORE, Permissions
+from exugear.gearbox.reading import CaseError, parsed
 from fe_ste.tools.files import FileError, append_line, read_text, write_file
 
 CASE_FILE = "case.json"

@@ -58,7 +58,7 @@ class Checkpoint:
     mesh_times : (times, meshes) array
         s, as in `exugear.dynamics.signals.MESH_TIMES`.
     judgement : array
-        Running figures of an `exugear.runs.trust.Judge`.
+        Running figures of an `exugear.transient.trust.Judge`.
     """
 
     step: int

@@ -15,7 +15,7 @@ import h5netcdf
 import numpy as np
 from numpy.typing import NDArray
 
-from exugear.model.versions import RUN
+from exugear.gearbox.versions import RUN
 from exugear.results.pieces import Piece, RunPieces, discard_pieces, whole_pieces
 from exugear.results.variables import GROWING, VARIABLES
 from fe_ste.tools.files import FileError, replacement

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from exugear.model.gearbox import Gearbox
-from exugear.model.versions import STUDY
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.versions import STUDY
 from fe_ste.tools.files import FileError
 from fe_ste.tools.sealed import Layout, open_dataset
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.dynamics.linearised import linearise
-from exugear.rotating.mean_modes import mean_modes
 from exugear.steady.excitation import Gearset
+from exugear.steady.mean_system.mean_modes import mean_modes
 from exugear.steady.response import transmission_error_line
 from fe_ste.tools.arrays import Complexes, Floats
 

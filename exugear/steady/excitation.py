@@ -9,11 +9,17 @@ from functools import cached_property
 
 import numpy as np
 
-from exugear.harmonics.lattice import Lattice, lattice
-from exugear.harmonics.lines import LineSet, beside, count_of_lines, joined, line_set, modulated
-from exugear.harmonics.products import Product
-from exugear.kernels.meshes import SPIN_1
-from exugear.rotating.bearing_waves import (
+from exugear.steady.harmonics.lattice import Lattice, lattice
+from exugear.steady.harmonics.lines import (
+    LineSet,
+    beside,
+    count_of_lines,
+    joined,
+    line_set,
+    modulated,
+)
+from exugear.steady.harmonics.products import Product
+from exugear.steady.mean_system.bearing_waves import (
     TILTS,
     BearingMean,
     BearingWaves,
@@ -21,11 +27,25 @@ from exugear.rotating.bearing_waves import (
     places_with_bearings,
     ports_with_bearings,
 )
-from exugear.rotating.mean_system import MeanSystem
-from exugear.rotating.mesh_places import MeshPlaces, mesh_places
-from exugear.rotating.mesh_ports import BACK_TILT, DEFLECTION, POSITION, TILT, MeshPorts, mesh_ports
-from exugear.rotating.mesh_waves import MeshWaves, mesh_waves
-from exugear.rotating.signals import AXES, SignalName, SignalRows, mesh_signal_names, signal_rows
+from exugear.steady.mean_system.mean_system import MeanSystem
+from exugear.steady.mean_system.mesh_places import MeshPlaces, mesh_places
+from exugear.steady.mean_system.mesh_ports import (
+    BACK_TILT,
+    DEFLECTION,
+    POSITION,
+    TILT,
+    MeshPorts,
+    mesh_ports,
+)
+from exugear.steady.mean_system.mesh_waves import MeshWaves, mesh_waves
+from exugear.steady.mean_system.signals import (
+    AXES,
+    SignalName,
+    SignalRows,
+    mesh_signal_names,
+    signal_rows,
+)
+from exugear.tooth_mesh.kernels.meshes import SPIN_1
 from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
 

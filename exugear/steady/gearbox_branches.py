@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exugear.harmonics.branches import Branch, Scales, trace
-from exugear.model.parts import RPM
-from exugear.rotating.mesh_ports import DEFLECTION
-from exugear.rotating.rotating_frame import SteadyError
+from exugear.gearbox.parts import RPM
+from exugear.steady.harmonics.branches import Branch, Scales, trace
+from exugear.steady.mean_system.mesh_ports import DEFLECTION
+from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.nonlinear import Balance, Tangent
 from exugear.steady.point_solver import PointSolver
 from exugear.steady.stability import growth_of_state

@@ -11,14 +11,20 @@ from functools import cached_property
 
 import numpy as np
 
-from exugear.harmonics.krylov import HarmonicBalanceError, solve_lines
-from exugear.harmonics.lattice import Lattice
-from exugear.rotating.bearing_waves import COMPONENTS
-from exugear.rotating.mesh_places import MeshPlaces
-from exugear.rotating.mesh_ports import BACK, DEFLECTION, FRONT, POSITION
-from exugear.rotating.sampled_bearings import sample_rolling
-from exugear.rotating.sampled_laws import LawSamples, sample_curve, sample_line, sample_table, widened
 from exugear.steady.excitation import Gearset, Interface
+from exugear.steady.harmonics.krylov import HarmonicBalanceError, solve_lines
+from exugear.steady.harmonics.lattice import Lattice
+from exugear.steady.mean_system.bearing_waves import COMPONENTS
+from exugear.steady.mean_system.mesh_places import MeshPlaces
+from exugear.steady.mean_system.mesh_ports import BACK, DEFLECTION, FRONT, POSITION
+from exugear.steady.mean_system.sampled_bearings import sample_rolling
+from exugear.steady.mean_system.sampled_laws import (
+    LawSamples,
+    sample_curve,
+    sample_line,
+    sample_table,
+    widened,
+)
 from exugear.steady.response import Response, rates_of
 from fe_ste.tools.arrays import Complexes, Floats, Integers
 

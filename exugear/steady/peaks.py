@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from exugear.harmonics.curve_peaks import standing_peaks
-from exugear.rotating.rotating_frame import SteadyError
-from exugear.spectra.order_cut import OrderCut
-from exugear.spectra.orders import OrderLine
-from exugear.spectra.sweeps import sweep_severity
+from exugear.results.spectra.order_cut import OrderCut
+from exugear.results.spectra.orders import OrderLine
+from exugear.results.spectra.sweeps import sweep_severity
+from exugear.steady.harmonics.curve_peaks import standing_peaks
+from exugear.steady.mean_system.rotating_frame import SteadyError
 from fe_ste.tools.arrays import Floats, Integers
 
 if TYPE_CHECKING:
@@ -316,7 +316,7 @@ class ComparedPeak:
     run_amplitude : float
         Largest of the run-up near that speed, in the signal's unit.
     severity : float or None
-        Of the sweep, as `exugear.spectra.sweeps.sweep_severity` has it.
+        Of the sweep, as `exugear.results.spectra.sweeps.sweep_severity` has it.
     run_rank : int
         Place among the peaks by the run-up's amplitude, 1 for the loudest.
     """
@@ -329,7 +329,7 @@ class ComparedPeak:
 
 
 def steady_cut(data: xr.Dataset, line: OrderLine, signal: str = "overall_dte") -> OrderCut:
-    """Amplitude and phase along an order, as `exugear.spectra.order_cut` cuts them out of run-ups; times are NaN.
+    """Amplitude and phase along an order, as `exugear.results.spectra.order_cut` has them of run-ups; times are NaN.
 
     Parameters
     ----------
@@ -377,7 +377,7 @@ def compared_peaks(
     data : Dataset
         Steady response of the same variant.
     cut : callable
-        From an order to its cut out of the run-up, as `exugear.spectra.sweeps.run_up_cut` makes it.
+        From an order to its cut out of the run-up, as `exugear.results.spectra.sweeps.run_up_cut` makes it.
     rate : float
         At which order one sweeps, Hz/s.
     most : int

@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from exugear.campbell.mode_tracks import ModeTracks
-from exugear.harmonics.curve_peaks import NEIGHBOURS, predicted_top, standing_peaks
-from exugear.rotating.mean_system import MeanSystem
-from exugear.rotating.mesh_ports import DEFLECTION
-from exugear.rotating.quantities import Quantity
+from exugear.steady.campbell.mode_tracks import ModeTracks
 from exugear.steady.excitation import Gearset, Interface
+from exugear.steady.harmonics.curve_peaks import NEIGHBOURS, predicted_top, standing_peaks
+from exugear.steady.mean_system.mean_system import MeanSystem
+from exugear.steady.mean_system.mesh_ports import DEFLECTION
+from exugear.steady.mean_system.quantities import Quantity
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, SingleComplexes
 from fe_ste.tools.threads import side_by_side
 

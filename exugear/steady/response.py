@@ -18,11 +18,11 @@ from functools import cached_property
 
 import numpy as np
 
-from exugear.harmonics.krylov import solve_lines
-from exugear.harmonics.lines import SAME
-from exugear.rotating.mesh_places import mesh_places
-from exugear.rotating.mesh_ports import DEFLECTION, POSITION, MeshPorts
 from exugear.steady.excitation import Gearset, Interface
+from exugear.steady.harmonics.krylov import solve_lines
+from exugear.steady.harmonics.lines import SAME
+from exugear.steady.mean_system.mesh_places import mesh_places
+from exugear.steady.mean_system.mesh_ports import DEFLECTION, POSITION, MeshPorts
 from fe_ste.tools.arrays import Complexes, Floats
 
 TOLERANCE = 1e-9
@@ -33,7 +33,7 @@ TOLERANCE = 1e-9
 class Response:
     """Steady state at one speed; n lines, m mesh waves, f forces of each.
 
-    Arrays of lines hold coefficients; `exugear.harmonics.lines.LineSet` says how they make a signal.
+    Arrays of lines hold coefficients; `exugear.steady.harmonics.lines.LineSet` says how they make a signal.
 
     Attributes
     ----------

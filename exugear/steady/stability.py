@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.dynamics.linearised import RIGID_BODY_LIMIT
-from exugear.harmonics.floquet import exponents, kicks_needed
-from exugear.rotating.mean_modes import mean_modes
-from exugear.rotating.mesh_ports import DEFLECTION
 from exugear.steady.excitation import Gearset
+from exugear.steady.harmonics.floquet import exponents, kicks_needed
+from exugear.steady.mean_system.mean_modes import mean_modes
+from exugear.steady.mean_system.mesh_ports import DEFLECTION
 from exugear.steady.nonlinear import Balance
 from fe_ste.tools.arrays import Complexes
 

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from exugear.campbell.campbell import LAYOUT
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.statics import beside_unsolved_states
-from exugear.loads.operating_range import operating_range
-from exugear.model.choice import Choice
-from exugear.model.versions import STEADY
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.load_cases.operating_range import operating_range
+from exugear.gearbox.versions import STEADY
 from exugear.results.folder import modes_path
-from exugear.rotating.signals import carried_seats
+from exugear.steady.campbell.campbell import LAYOUT
+from exugear.steady.mean_system.signals import carried_seats
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_response import Solved, SteadyResponse, response_of
 from fe_ste.tools.files import FileError

@@ -10,23 +10,23 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from exugear.bodies.elastic_body import ElasticBody
-from exugear.campbell.campbell import Campbell, campbell_of, modes_over_speed
-from exugear.campbell.mode_tracks import ModeTracks
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
-from exugear.harmonics.curve_peaks import standing_peaks
-from exugear.harmonics.krylov import HarmonicBalanceError
-from exugear.harmonics.lines import LineSet
-from exugear.loads.operating_range import operating_range
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.model.parts import RPM
-from exugear.rotating.quantities import Quantity, quantities_of
-from exugear.rotating.rotating_frame import SteadyError
-from exugear.rotating.signals import SignalName
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.load_cases.operating_range import operating_range
+from exugear.gearbox.parts import RPM
+from exugear.steady.campbell.campbell import Campbell, campbell_of, modes_over_speed
+from exugear.steady.campbell.mode_tracks import ModeTracks
 from exugear.steady.contributions import Contributions, contributions, loudest_near
 from exugear.steady.excitation import Gearset
 from exugear.steady.gearbox_branches import follow_branch
+from exugear.steady.harmonics.curve_peaks import standing_peaks
+from exugear.steady.harmonics.krylov import HarmonicBalanceError
+from exugear.steady.harmonics.lines import LineSet
+from exugear.steady.mean_system.quantities import Quantity, quantities_of
+from exugear.steady.mean_system.rotating_frame import SteadyError
+from exugear.steady.mean_system.signals import SignalName
 from exugear.steady.point_solver import PointSolver, gearset_of
 from exugear.steady.resonances import HARMONICS, Crossing, crossings, missed_tops, with_crossings
 from exugear.steady.response import Response, dissipated_and_given, signals

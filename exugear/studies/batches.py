@@ -11,11 +11,11 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from exugear.checks.readiness import check_parts
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.model.named_files import Permissions
-from exugear.model.reading import CaseError
+from exugear.dynamics.readiness.readiness import check_parts
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.named_files import Permissions
+from exugear.gearbox.reading import CaseError
 from exugear.results.folder import peak_memory
 from exugear.studies.design.paths import changed
 from exugear.studies.figures.figure import Values

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from exugear.model.versions import MODES, REDUCTION, RUN, STEADY, STUDY
+from exugear.gearbox.versions import MODES, REDUCTION, RUN, STEADY, STUDY
 from exugear.results.study_files import DATASET, STUDY_LAYOUT
 from exugear.studies.design.sampling import PARAMETER, SIDE
 from exugear.studies.journal import Record, number_of

@@ -10,8 +10,8 @@ from typing import Any
 
 from exugear.bearings.supports import elastic_names, mounts_at_work
 from exugear.dynamics.signals import signals_of
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
 from exugear.studies.design.sampling import PARAMETER, SAMPLE, SIDE, Design
 from exugear.studies.design.sections import StudyFile
 from exugear.studies.figures.of_life import LEAST, LIVES, SAFETIES

@@ -11,14 +11,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from exugear.load_files.reading import file_digest
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.model.named_files import NOTHING_MORE, Permissions
-from exugear.model.reading import CaseError, fault_line
-from exugear.model.versions import LIFE, MODES, REDUCTION, RUN, STEADY, STUDY
+from exugear.exchange.load_files.reading import file_digest
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.named_files import NOTHING_MORE, Permissions
+from exugear.gearbox.reading import CaseError, fault_line
+from exugear.gearbox.versions import LIFE, MODES, REDUCTION, RUN, STEADY, STUDY
 from exugear.results.study_files import case_digest, read_content
-from exugear.rotating.rotating_frame import SteadyError
+from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.settings import SpeedRange, SteadySettings, check_law
 from exugear.studies.design.paths import PathError, changed, check_path
 from exugear.studies.design.reading import StudyError, parse_study, read_study_file

@@ -32,11 +32,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.parts import Body, Mesh
+from exugear.gearbox.seats import node_position, seat_key
+from exugear.gearbox.sections.entries import GROUND
 from exugear.kernels.coordinates import BODY_SIZE
-from exugear.model.gearbox import Gearbox
-from exugear.model.parts import Body, Mesh
-from exugear.model.seats import node_position, seat_key
-from exugear.model.sections.entries import GROUND
 from exugear.tooth_mesh.contact_state import ContactState, even_contact
 from exugear.tooth_mesh.law import Angles, Law, MeshCurve, MeshData, TableFlanks
 from exugear.tooth_mesh.placement import MeshError, loaded_flanks, position_rows, tooth_places

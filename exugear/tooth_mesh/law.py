@@ -9,9 +9,9 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from exugear.kernels.meshes import periodic_cubic
-from exugear.model.gearbox import Gearbox
-from exugear.model.parts import Mesh
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.parts import Mesh
+from exugear.tooth_mesh.kernels.meshes import periodic_cubic
 from exugear.tooth_mesh.placement import line_of_action_row
 from fe_ste.tools.arrays import Floats
 from fe_ste.transmission_error.surface import SteSurface

@@ -9,9 +9,9 @@ from typing import TypeVar
 
 import numpy as np
 
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.parts import Mesh
 from exugear.kernels.coordinates import BODY_SIZE, TILT
-from exugear.model.gearbox import Gearbox
-from exugear.model.parts import Mesh
 from fe_ste.tools.arrays import Floats
 
 Angle = TypeVar("Angle", float, Floats)

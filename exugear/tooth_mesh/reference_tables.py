@@ -9,7 +9,7 @@ from typing import Any
 
 import xarray as xr
 
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.gearbox import Gearbox
 from exugear.tooth_mesh.tables import TABLE_FOLDER, requested_tables
 from fe_ste.reference.contact_model import Iteration
 from fe_ste.reference.table import NonlinearInput, NonlinearTable

@@ -9,8 +9,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from exugear.model.gearbox import Gearbox
-from exugear.model.reading import CaseError
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.reading import CaseError
 from exugear.tooth_mesh.grid_axes import GridAxes, axes_reaching, reaches
 from fe_ste.transmission_error.hertz import pitch_point_pressure
 from fe_ste.transmission_error.states import CUT_OFF

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.gearbox import Gearbox
 from exugear.tooth_mesh.tables import fitting_table
 from fe_ste.tools.arrays import Floats
 from fe_ste.transmission_error.gaps import GapError, complete_cycle

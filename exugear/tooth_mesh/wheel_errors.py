@@ -13,8 +13,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from exugear.model.gearbox import Gearbox
-from exugear.model.parts import Mesh, WheelDeviation
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.parts import Mesh, WheelDeviation
 from exugear.tooth_mesh.placement import MeshGeometry, ToothContact
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats, Integers

@@ -10,11 +10,11 @@ from exugear.bodies.elastic_body import ElasticBody
 from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.modes import Modes, eigenmodes
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.runs.outcome import Run
-from exugear.runs.runup import simulate
+from exugear.dynamics.eigenmodes.modes import Modes, eigenmodes
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.transient.outcome import Run
+from exugear.transient.runup import simulate
 
 
 def bodies_of(gearbox: Gearbox, choice: Choice, folder: Path | None = None) -> dict[str, ElasticBody]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.gearbox import Gearbox
 
 from .spur_case import SPUR_CASE
 

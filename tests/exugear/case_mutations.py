@@ -16,8 +16,8 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
 
-from exugear.model.sections.case import CaseFile
-from exugear.model.sections.quantities import Range
+from exugear.gearbox.sections.case import CaseFile
+from exugear.gearbox.sections.quantities import Range
 
 from .spur_case import SPUR_CASE
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.gearbox import Gearbox
 from exugear.tooth_mesh.law import MeshCurve
 from exugear.tooth_mesh.tables import wanted_table
 from fe_ste.contact.cells import ContactSettings

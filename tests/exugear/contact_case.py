@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.gearbox import Gearbox
 from exugear.tooth_mesh.contact_state import ContactState
 from exugear.tooth_mesh.law import MeshCurve
 

@@ -16,10 +16,10 @@ import sys
 from functools import partial
 from pathlib import Path
 
-from exugear.load_spectrum.counted import count_loads
-from exugear.load_spectrum.spectra_files import write_spectra
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.life.load_spectrum.counted import count_loads
+from exugear.life.load_spectrum.spectra_files import write_spectra
 from exugear.project import Project
 
 from .killed_runs import in_fork, kill_at

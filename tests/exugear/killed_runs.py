@@ -20,13 +20,13 @@ import xarray as xr
 
 import fe_ste.tools.files
 import fe_ste.tools.sealed
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
 from exugear.results.run_file import load_run
-from exugear.runs import recorder, runup
-from exugear.runs.outcome import Run
-from exugear.runs.run_folder import refuse_to_resume, run_directory
 from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear.transient import recorder, runup
+from exugear.transient.outcome import Run
+from exugear.transient.run_folder import refuse_to_resume, run_directory
 
 CALLS = ("open", "fsync", "replace", "unlink", "rmdir", "mkdir")
 DURATION = 0.024

@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.gearbox import Gearbox
 
 
 def unchecked(gearbox: Gearbox, changes: Mapping[str, Any]) -> Gearbox:

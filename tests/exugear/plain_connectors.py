@@ -10,9 +10,8 @@ import math
 import numba
 import numpy as np
 
-from exugear.kernels.connectors import ConnectorArrays
-from exugear.kernels.coordinates import BODY_SIZE, SPIN, TILT
-from exugear.kernels.rolling import (
+from exugear.bearings.kernels.connectors import ConnectorArrays
+from exugear.bearings.kernels.rolling import (
     CAGE_TORQUE,
     CONTACT_SIZE,
     COUNT,
@@ -21,6 +20,7 @@ from exugear.kernels.rolling import (
     RollingArrays,
     rolling_force,
 )
+from exugear.kernels.coordinates import BODY_SIZE, SPIN, TILT
 
 Floats = np.ndarray
 ARM, POSITION, VELOCITY, ANGULAR_VELOCITY = range(4)
@@ -31,7 +31,7 @@ DISPLACEMENT, RATE, TRUE_RATE = range(3)
 
 @numba.njit
 def memory_for(rolling: RollingArrays) -> Floats:
-    """Memory for `exugear.kernels.rolling.rolling_forces`."""
+    """Memory for `exugear.bearings.kernels.rolling.rolling_forces`."""
     most = 0
     for r in range(rolling.layout.shape[0]):
         most = max(most, rolling.layout[r, COUNT])

@@ -11,13 +11,7 @@ import math
 import numba
 import numpy as np
 
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.modes import overall_row
-from exugear.dynamics.signals import signal_layout
-from exugear.kernels.elastic import elastic_energies, scratch_for
-from exugear.kernels.inertia import kinetic_energies
-from exugear.kernels.meshes import DEFLECTION, ENERGY, FORCE, OUTSIDE, ROW_SIZE, STATE_SIZE
-from exugear.kernels.rolling import (
+from exugear.bearings.kernels.rolling import (
     CAGE_DAMPING,
     CAGE_TORQUE,
     DAMPED_PART,
@@ -25,9 +19,22 @@ from exugear.kernels.rolling import (
     STORED,
     rolling_forces,
 )
-from exugear.kernels.table_law import scratch_memory
-from exugear.kernels.turning import set_turning_motion, turning_energies, turning_memory
-from exugear.model.sections.entries import GROUND
+from exugear.bodies.kernels.elastic import elastic_energies, scratch_for
+from exugear.bodies.kernels.turning import set_turning_motion, turning_energies, turning_memory
+from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.eigenmodes.modes import overall_row
+from exugear.dynamics.signals import signal_layout
+from exugear.gearbox.sections.entries import GROUND
+from exugear.kernels.inertia import kinetic_energies
+from exugear.tooth_mesh.kernels.meshes import (
+    DEFLECTION,
+    ENERGY,
+    FORCE,
+    OUTSIDE,
+    ROW_SIZE,
+    STATE_SIZE,
+)
+from exugear.tooth_mesh.kernels.table_law import scratch_memory
 from exugear.tooth_mesh.laws.forms import MEMORY, pass_meshes
 
 from .plain_connectors import connector_load, connector_motion, memory_for, turn_between

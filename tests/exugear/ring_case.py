@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import skfem
 
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.gearbox import Gearbox
 
 OUTER, INNER, FACE = 0.595, 0.5235, 0.23
 MIDDLE = -0.1045

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.gearbox import Gearbox
 from fe_ste.transmission_error.surface import SteSurface
 
 LOADS = np.array([0.05, 0.2, 0.5, 1.0, 1.5, 2.0])

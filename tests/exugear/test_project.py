@@ -13,7 +13,7 @@ from exugear import CaseError, Choice, Gearbox, Modes, Project, Run
 from exugear.cli.app import app
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import VariantError
-from exugear.dynamics.modes import load_modes
+from exugear.dynamics.eigenmodes.modes import load_modes
 from exugear.project import default_folder
 from exugear.results.run_file import load_run
 

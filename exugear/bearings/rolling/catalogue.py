@@ -13,7 +13,12 @@ from typing import Any
 
 from exugear.bearings.rolling import proportions
 from exugear.bearings.rolling.rows import BallRow, BearingError, RollerRow, RollingRow, moved, pair_rows, rib_row
-from exugear.model.sections.connections import CONTACT_ANGLES_DEG, ROUNDING_MM, TYPES_OF_KEYS, CatalogueSection
+from exugear.gearbox.sections.connections import (
+    CONTACT_ANGLES_DEG,
+    ROUNDING_MM,
+    TYPES_OF_KEYS,
+    CatalogueSection,
+)
 
 ALIGNING = ("spherical_roller", "self_aligning_ball")
 """Types whose outer raceway is a sphere about the middle of the bearing."""

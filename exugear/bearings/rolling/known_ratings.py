@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from exugear.model.sections.connections import BearingType, CatalogueSection
+from exugear.gearbox.sections.connections import BearingType, CatalogueSection
 
 WITHIN = 0.005
 """Part by which dimensions may differ from those of the designation."""

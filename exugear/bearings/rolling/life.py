@@ -23,7 +23,7 @@ from exugear.bearings.rolling.ratings import (
     row_count,
 )
 from exugear.bearings.rolling.rows import BallRow, BearingError, RollerRow, RollingRow, is_rib
-from exugear.model.sections.connections import BearingType
+from exugear.gearbox.sections.connections import BearingType
 from fe_ste.tools.arrays import Floats
 
 LINE_CONTACT_LIFE = 9.0 / 8.0

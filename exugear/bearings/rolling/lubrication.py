@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 
-from exugear.model.sections.connections import BearingType
-from exugear.model.sections.lubricant import Cleanliness
+from exugear.gearbox.sections.connections import BearingType
+from exugear.gearbox.sections.lubricant import Cleanliness
 
 CONTAMINATION: dict[Cleanliness, tuple[float, float]] = {
     "extreme": (1.0, 1.0),

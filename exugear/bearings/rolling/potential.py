@@ -1,4 +1,4 @@
-"""Potentials of rolling bearings for the compiled law: rows of a bearing to the arrays of `exugear.kernels.rolling`.
+"""Potentials of rolling bearings for the compiled law: rows to the arrays of `exugear.bearings.kernels.rolling`.
 
 A roller feels the approach of its middle and its tilt alone, so that one table over both holds what all its slices
 (ISO/TS 16281) give together. It is made once for each kind of roller from more slices than a lamina model affords in a
@@ -15,9 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from exugear.bearings.rolling.point_contact import ball_constant
-from exugear.bearings.rolling.rows import LEAST_ELEMENTS, STEEL_MODULUS, BallRow, BearingError, RollerRow, RollingRow
-from exugear.kernels.rolling import (
+from exugear.bearings.kernels.rolling import (
     ALIGNED_BALL,
     AXIAL,
     BALL,
@@ -49,6 +47,8 @@ from exugear.kernels.rolling import (
     TILTING,
     RollingArrays,
 )
+from exugear.bearings.rolling.point_contact import ball_constant
+from exugear.bearings.rolling.rows import LEAST_ELEMENTS, STEEL_MODULUS, BallRow, BearingError, RollerRow, RollingRow
 from fe_ste.tools.arrays import Floats
 
 SLICES = 240
@@ -188,7 +188,7 @@ def rolling_arrays(
     rows_per_connector : sequence of tuples of RollingRow
         Rows of each connector in the frame of its bearing; none where it has no rolling law.
     scale, time, cage_ratio, phase : sequences of float
-        One number a connector each: see `exugear.kernels.rolling.RollingArrays`.
+        One number a connector each: see `exugear.bearings.kernels.rolling.RollingArrays`.
 
     Returns
     -------

@@ -22,7 +22,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from exugear.bearings.rolling.rows import BallRow, BearingError, RollerRow, RollingRow, on_raceways
-from exugear.model.sections.connections import BearingType
+from exugear.gearbox.sections.connections import BearingType
 
 MATERIAL_FACTOR: dict[BearingType, float] = {
     "cylindrical_roller": 1.1,

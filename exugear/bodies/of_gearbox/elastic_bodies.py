@@ -24,8 +24,8 @@ from exugear.bodies.reduced_body import ReducedBody, ReductionError, RigidInerti
 from exugear.bodies.reduction import with_rigid_inertia
 from exugear.bodies.solids import SolidModel, load_or_reduce_solid, reduce_solid
 from exugear.bodies.turned_shaft import ShaftModel, load_or_reduce_shaft, reduce_shaft
-from exugear.model.gearbox import Gearbox
-from exugear.model.parts import Body
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.parts import Body
 
 
 def reduced_bodies(

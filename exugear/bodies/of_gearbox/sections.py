@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from exugear.bodies.reduced_body import Blank, Frame
-from exugear.model.gearbox import Gearbox
-from exugear.model.parts import Bearing, Body
-from exugear.model.sections.bodies import BlankSection
-from exugear.model.sections.gears import MaterialSection
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.parts import Bearing, Body
+from exugear.gearbox.sections.bodies import BlankSection
+from exugear.gearbox.sections.gears import MaterialSection
 from fe_ste.geometry.gears import Material
 
 

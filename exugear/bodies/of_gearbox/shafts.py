@@ -12,9 +12,9 @@ from exugear.bodies.finite_elements.turned_section import Shaft
 from exugear.bodies.of_gearbox.sections import blank_of, frame_of, material_of, seat_width
 from exugear.bodies.solids import SolidModel
 from exugear.bodies.turned_shaft import ShaftModel
-from exugear.model.gearbox import Gearbox
-from exugear.model.parts import Body
-from exugear.model.sections.bodies import ShaftSectionSection, ShapeSection
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.parts import Body
+from exugear.gearbox.sections.bodies import ShaftSectionSection, ShapeSection
 
 POINT = 0.01
 """Bore over that of the other end where a conical bore has its point: elements cannot begin in one."""

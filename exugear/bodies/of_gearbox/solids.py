@@ -13,10 +13,10 @@ from exugear.bodies.finite_elements.solid_seats import SolidSeat
 from exugear.bodies.of_gearbox.sections import blank_of, frame_of, material_of, seat_width
 from exugear.bodies.reduced_body import Blank
 from exugear.bodies.solids import SolidModel, reduction_file
-from exugear.model.gearbox import Gearbox
-from exugear.model.named_files import LARGEST_SOLID
-from exugear.model.parts import Body
-from exugear.model.sections.bodies import SolidSeatSection, SolidSection
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.named_files import LARGEST_SOLID
+from exugear.gearbox.parts import Body
+from exugear.gearbox.sections.bodies import SolidSeatSection, SolidSection
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from exugear.cli.errors import BadInputError, FailedError, exit_codes, interrupt
 from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption, OutOption
 
 if TYPE_CHECKING:
-    from exugear.model.gearbox import Gearbox
+    from exugear.gearbox.gearbox import Gearbox
 
 
 BEYOND = 1.05
@@ -45,8 +45,8 @@ def check(
         if rating:
             _rate(case, out, files_below, as_json)
             return
-        from exugear.checks.readiness import lacking, remarks
-        from exugear.model.choice import USER_VARIANTS
+        from exugear.dynamics.readiness.readiness import lacking, remarks
+        from exugear.gearbox.choice import USER_VARIANTS
 
         gearbox = _read(case, files_below, as_json)
         _tell_scripts(gearbox)
@@ -93,7 +93,7 @@ def check(
 def _rate(case: Path, out: Path | None, files_below: Path | None, as_json: bool) -> None:
     """Print the rating of all gears; end with code 1 where one has less safety than is asked for."""
     from exugear.cli.rating_tables import tell_rating
-    from exugear.model.choice import Choice
+    from exugear.gearbox.choice import Choice
     from exugear.project import Project, default_folder
 
     gearbox = read_gearbox(case, files_below, tell=not as_json)
@@ -121,7 +121,7 @@ def _rate(case: Path, out: Path | None, files_below: Path | None, as_json: bool)
 
 def _read(case: Path, files_below: Path | None, as_json: bool) -> Gearbox:
     """Read the file; of one with faults print these as an object, too, if that is asked for."""
-    from exugear.model.reading import CaseError
+    from exugear.gearbox.reading import CaseError
 
     try:
         return read_gearbox(case, files_below, tell=False)
@@ -157,7 +157,7 @@ def _tell_scripts(gearbox: Gearbox) -> None:
 
 
 def _pair_summary(gearbox: Gearbox, name: str) -> dict[str, Any]:
-    from exugear.checks.margins import backlash_range, pair_margins
+    from exugear.dynamics.readiness.margins import backlash_range, pair_margins
 
     spec = gearbox.pairs[name]
     pair, margins = spec.pair, pair_margins(spec)
@@ -206,7 +206,7 @@ def _play(ends: list[float]) -> str:
 
 def _thickness_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
     """Sum up the tooth thickness of gears that have allowances of it."""
-    from exugear.checks.margins import thickness_range
+    from exugear.dynamics.readiness.margins import thickness_range
 
     found = []
     for name, section in gearbox.case.gears.items():
@@ -241,7 +241,7 @@ def _bearing_summaries(gearbox: Gearbox) -> tuple[list[dict[str, Any]], list[str
     from exugear.bearings.duty import estimate_effects
     from exugear.dynamics.assemble import assemble
     from exugear.dynamics.bearing_duties import bearing_duties, bearing_points
-    from exugear.model.choice import Choice
+    from exugear.gearbox.choice import Choice
     from exugear.results.bearings_file import duty_summary
     from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 
@@ -295,10 +295,14 @@ def _bearing_row(summary: dict[str, Any]) -> dict[str, str]:
 
 def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
     """Sum up what each load case does to the rolling train; one that no run could take is bad input."""
-    from exugear.loads.summary import doubt_about_bearings, doubts_about, summarise_loads
-    from exugear.model.parts import RPM
-    from exugear.runs.extent import check_duration
-    from exugear.runs.runup import BAND
+    from exugear.gearbox.load_cases.summary import (
+        doubt_about_bearings,
+        doubts_about,
+        summarise_loads,
+    )
+    from exugear.gearbox.parts import RPM
+    from exugear.transient.extent import check_duration
+    from exugear.transient.runup import BAND
 
     found = []
     with model_errors():

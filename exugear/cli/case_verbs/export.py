@@ -47,10 +47,10 @@ def export(
     --shifts and --distances are to be those of the import.
     """
     with exit_codes():
+        from exugear.exchange.rexs.export.export import with_results
+        from exugear.exchange.rexs.faults import RexsError
+        from exugear.exchange.rexs.to_case.notes import Rules
         from exugear.project import default_folder
-        from exugear.rexs.export.export import with_results
-        from exugear.rexs.faults import RexsError
-        from exugear.rexs.to_case.notes import Rules
         from fe_ste.tools.files import write_file
 
         target = to or rexs.with_name(_new_name(rexs.name))

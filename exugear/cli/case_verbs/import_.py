@@ -12,8 +12,8 @@ from exugear.cli.errors import BadInputError, exit_codes
 from exugear.cli.options import DistanceRule, DistancesOption, JsonOption, ShiftRule, ShiftsOption
 
 if TYPE_CHECKING:
-    from exugear.rexs.to_case.conversion import Imported
-    from exugear.rexs.to_case.notes import Rules
+    from exugear.exchange.rexs.to_case.conversion import Imported
+    from exugear.exchange.rexs.to_case.notes import Rules
 
 NAME = "gearbox.toml"
 """Name of the file that is written."""
@@ -33,8 +33,8 @@ def import_(
 ) -> None:
     """Make a gearbox file of a REXS file (1.0 to 2.0): each value with its source, each assumption marked."""
     with exit_codes():
-        from exugear.rexs.to_case.loads import SPECTRUM
-        from exugear.rexs.to_case.notes import Rules
+        from exugear.exchange.rexs.to_case.loads import SPECTRUM
+        from exugear.exchange.rexs.to_case.notes import Rules
         from fe_ste.tools.files import write_file
 
         target = (out or Path(_stem(file))) / NAME
@@ -78,9 +78,9 @@ def _stem(file: Path) -> str:
 
 
 def _imported(file: Path, target: Path, rules: Rules) -> Imported:
-    from exugear.rexs.containers import read_rexs
-    from exugear.rexs.faults import RexsError
-    from exugear.rexs.to_case.conversion import to_case
+    from exugear.exchange.rexs.containers import read_rexs
+    from exugear.exchange.rexs.faults import RexsError
+    from exugear.exchange.rexs.to_case.conversion import to_case
 
     try:
         model = read_rexs(file)

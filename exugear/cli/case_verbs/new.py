@@ -11,7 +11,7 @@ import typer
 from exugear.cli.console import print_json, say
 from exugear.cli.errors import BadInputError, exit_codes
 from exugear.cli.options import JsonOption
-from exugear.templates.kinds import KINDS
+from exugear.gearbox.templates.kinds import KINDS
 
 
 class Kind(StrEnum):
@@ -33,8 +33,8 @@ def new(
 ) -> None:
     """Write a commented gearbox file that runs as it is, to make one's own of."""
     with exit_codes():
+        from exugear.gearbox.templates.kinds import template
         from exugear.project import default_folder
-        from exugear.templates.kinds import template
         from fe_ste.tools.files import write_file
 
         if case.suffix != ".toml":

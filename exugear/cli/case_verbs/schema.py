@@ -20,8 +20,8 @@ def schema(
 ) -> None:
     """Describe every key of the gearbox file as a JSON schema, which editors read."""
     with exit_codes():
-        from exugear.schema.json_schema import json_schema
-        from exugear.schema.page import page as described
+        from exugear.gearbox.sections.schema.json_schema import json_schema
+        from exugear.gearbox.sections.schema.page import page as described
         from fe_ste.tools.files import write_file
 
         text = described() if page else json.dumps(json_schema(), indent=1, ensure_ascii=False) + "\n"

@@ -45,7 +45,7 @@ def bearings(
     them bear evenly. Tables that are missing or do not fit the case are computed first.
     """
     with exit_codes():
-        from exugear.model.choice import Choice
+        from exugear.gearbox.choice import Choice
         from exugear.results.bearings_file import duties_summary
 
         if variant == Variant.rigid:

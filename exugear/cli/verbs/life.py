@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-    from exugear.load_spectrum.counted import CountedLoads
+    from exugear.life.load_spectrum.counted import CountedLoads
     from exugear.project import Project
 
 SHOWN_LIMITS = 8
@@ -53,9 +53,9 @@ def life(
     Tables that are missing or do not fit the case are computed first.
     """
     with exit_codes():
+        from exugear.gearbox.choice import Choice
         from exugear.life.life_diagrams import draw_life
         from exugear.life.life_file import summary
-        from exugear.model.choice import Choice
 
         project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
         with model_errors(), files_bar() as read:

@@ -13,7 +13,7 @@ from exugear.cli.load_files import files_bar
 from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption, OutOption, ScriptsOption
 
 if TYPE_CHECKING:
-    from exugear.load_spectrum.counted import CountedLoads
+    from exugear.life.load_spectrum.counted import CountedLoads
 
 
 def loads(
@@ -28,9 +28,9 @@ def loads(
     No tables are needed. Writes load duration distributions as CSV, and a picture of them.
     """
     with exit_codes():
-        from exugear.load_spectrum.counted import count_loads
-        from exugear.load_spectrum.diagrams import draw_duration
-        from exugear.load_spectrum.spectra_files import write_spectra
+        from exugear.life.load_spectrum.counted import count_loads
+        from exugear.life.load_spectrum.diagrams import draw_duration
+        from exugear.life.load_spectrum.spectra_files import write_spectra
         from exugear.project import default_folder
 
         gearbox = read_gearbox(case, files_below, scripts)

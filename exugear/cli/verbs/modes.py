@@ -23,7 +23,7 @@ from exugear.cli.options import (
 from exugear.cli.tables import compute_missing_tables, refuse_unsolved
 
 if TYPE_CHECKING:
-    from exugear.dynamics.modes import Modes
+    from exugear.dynamics.eigenmodes.modes import Modes
 
 
 def modes(
@@ -42,7 +42,7 @@ def modes(
     """
     with exit_codes():
         from exugear.dynamics.statics import beside_unsolved_states
-        from exugear.model.choice import Choice
+        from exugear.gearbox.choice import Choice
         from exugear.results.folder import time_noted
 
         project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
@@ -66,9 +66,9 @@ def modes(
 
 def _draw_campbell(found: Modes, path: Path) -> Path:
     """Draw the modes that the overall transmission error sees, over the speeds of the fastest load case."""
-    from exugear.pictures.mode_diagrams import plot_campbell
-    from exugear.spectra.mode_report import mobility_shares
-    from exugear.spectra.orders import order_lines
+    from exugear.report.pictures.mode_diagrams import plot_campbell
+    from exugear.results.spectra.mode_report import mobility_shares
+    from exugear.results.spectra.orders import order_lines
 
     gearbox, least = found.assembly.gearbox, 1e-3
     shares = mobility_shares(found.to_dataset())
@@ -89,7 +89,7 @@ def _draw_campbell(found: Modes, path: Path) -> Path:
 
 
 def _mode_summaries(found: Modes) -> list[dict[str, Any]]:
-    from exugear.spectra.mode_report import report_mode
+    from exugear.results.spectra.mode_report import report_mode
 
     data = found.to_dataset()
     reports = [report_mode(data, index) for index in range(len(found.names))]

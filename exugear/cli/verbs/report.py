@@ -30,7 +30,7 @@ def report(
     scripts never run: what they would make must be there.
     """
     with exit_codes():
-        from exugear.model.reading import CaseError
+        from exugear.gearbox.reading import CaseError
         from exugear.report.writer import ReportError, write_report
         from exugear.results.folder import time_noted
 

@@ -35,10 +35,10 @@ from exugear.cli.options import (
 from exugear.cli.tables import compute_missing_tables
 
 if TYPE_CHECKING:
-    from exugear.model.gearbox import Gearbox
-    from exugear.model.parts import LoadCase
+    from exugear.gearbox.gearbox import Gearbox
+    from exugear.gearbox.parts import LoadCase
     from exugear.project import Project
-    from exugear.runs.outcome import Progress, Run
+    from exugear.transient.outcome import Progress, Run
 
 
 class Solver(StrEnum):
@@ -96,7 +96,7 @@ def run(
     Ctrl-C keeps what was reached. Tables that are missing or do not fit the case are computed first.
     """
     with exit_codes():
-        from exugear.model.choice import Choice
+        from exugear.gearbox.choice import Choice
         from exugear.results.folder import time_noted
 
         choice = Choice(variant.value, mesh_law.value, inertias, load_case)
@@ -133,8 +133,8 @@ def _label_of(project: Project, solver: Solver, route: MeshRoute) -> str:
 
 def _check_extent(project: Project, duration: float | None, folder: Path) -> None:
     """Refuse a simulated time that is too short, or whose results do not fit on the disk."""
-    from exugear.runs.extent import check_disk, check_duration, sample_bytes
     from exugear.tooth_mesh.laws.registry import LAWS
+    from exugear.transient.extent import check_disk, check_duration, sample_bytes
 
     gearbox, load_case = project.gearbox, _load_case(project)
     jointed, tabled = project.choice.variant == Variant.rigid, LAWS[project.choice.mesh_law].signals_positions
@@ -174,7 +174,7 @@ def _check_mesh_route(route: MeshRoute, variant: Variant, solver: Solver) -> Non
 
 def _check_run_directory(directory: Path, resume: bool) -> None:
     """Refuse a run that another process is at work on, and one to go on with that cannot be gone on with."""
-    from exugear.runs.run_folder import refuse_if_busy, refuse_to_resume
+    from exugear.transient.run_folder import refuse_if_busy, refuse_to_resume
 
     refuse_if_busy(directory)
     if resume and (reason := refuse_to_resume(directory)):
@@ -183,7 +183,11 @@ def _check_run_directory(directory: Path, resume: bool) -> None:
 
 def _tell_doubts(project: Project, duration: float | None) -> None:
     """Say what looks like the wrong sign of a torque, or leads bearings far from the load that their law is of."""
-    from exugear.loads.summary import doubt_about_bearings, doubts_about, summarise_loads
+    from exugear.gearbox.load_cases.summary import (
+        doubt_about_bearings,
+        doubts_about,
+        summarise_loads,
+    )
 
     load_case = _load_case(project)
     with model_errors():
@@ -194,10 +198,10 @@ def _tell_doubts(project: Project, duration: float | None) -> None:
 
 
 def _simulate(project: Project, resume: bool, **options: Any) -> Run:
-    """Run the load case behind a progress bar; options as those of `exugear.runs.runup.simulate`."""
+    """Run the load case behind a progress bar; options as those of `exugear.transient.runup.simulate`."""
     from exugear.results.pieces import has_pieces
     from exugear.results.run_file import PARTIAL_NAME
-    from exugear.runs.outcome import LimitError, RunError
+    from exugear.transient.outcome import LimitError, RunError
 
     directory, variant = project.run_directory, project.choice.variant
     if not resume and has_pieces(directory / PARTIAL_NAME):
@@ -232,9 +236,9 @@ def _tell_run(case: Path, finished: Run, as_json: bool) -> None:
     import numpy as np
 
     from exugear.dynamics.signals import BALANCE_TERMS, MESH_TIMES, energy_residual
-    from exugear.model.parts import RPM
+    from exugear.gearbox.parts import RPM
     from exugear.results.run_file import read_run
-    from exugear.runs.plan import EXPECTATIONS
+    from exugear.transient.plan import EXPECTATIONS
 
     data, attributes = read_run(finished.path, ("input_speed", *MESH_TIMES, *BALANCE_TERMS))
     longest = {name: float(np.max(data[name], initial=0.0)) for name in MESH_TIMES}  # a rotor has no meshes

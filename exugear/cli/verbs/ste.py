@@ -21,7 +21,7 @@ from exugear.cli.tables import compute_tables, tell_of_tables
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
-    from exugear.model.gearbox import Gearbox
+    from exugear.gearbox.gearbox import Gearbox
     from exugear.tooth_mesh.reference_tables import ReferenceRequest
     from exugear.tooth_mesh.tables import TableRequest
     from fe_ste.reference.contact_model import Iteration
@@ -102,7 +102,7 @@ def _tell_misalignment(gearbox: Gearbox, folder: Path) -> None:
     from exugear.bearings.rolling.rows import BearingError
     from exugear.bearings.supports import unsupported
     from exugear.dynamics.statics import BalanceError, static_state
-    from exugear.model.choice import Choice
+    from exugear.gearbox.choice import Choice
     from exugear.project import Project
     from exugear.tooth_mesh.placement import MeshError
     from exugear.tooth_mesh.tables import missing_tables
@@ -125,7 +125,7 @@ def _tell_misalignment(gearbox: Gearbox, folder: Path) -> None:
 def _requested_tables(
     gearbox: Gearbox, case: Path, out: Path | None, names: list[str], positions: int | None, grid: bool
 ) -> tuple[list[TableRequest], Path]:
-    from exugear.model.reading import CaseError
+    from exugear.gearbox.reading import CaseError
     from exugear.project import Project, default_folder
     from exugear.results.folder import keep_case
     from exugear.tooth_mesh.tables import without_table
@@ -156,7 +156,7 @@ def _compute_references(
     gearbox: Gearbox, case: Path, out: Path | None, names: list[str], positions: int | None, as_json: bool
 ) -> None:
     """Run the reference analysis of the pairs and report; each position is kept as soon as it is solved."""
-    from exugear.model.reading import CaseError
+    from exugear.gearbox.reading import CaseError
     from exugear.project import default_folder
     from exugear.results.folder import keep_case, time_noted
     from exugear.tooth_mesh.reference_tables import requested_references, summarise_reference
@@ -207,7 +207,7 @@ def _curves_beside(
     tables: dict[str, MeshTable], folder: Path, requests: list[TableRequest]
 ) -> Iterator[Future[list[Path]]]:
     """Draw the curves of all tables, in another process where this one has some pictures of teeth to draw meanwhile."""
-    from exugear.pictures.tables import contact_picture, draw_curves
+    from exugear.report.pictures.tables import contact_picture, draw_curves
     from fe_ste.tools.threads import available_cores
     from fe_ste.tools.workers import Workers
 
@@ -223,7 +223,7 @@ def _curves_beside(
 
 def _draw_contacts(requests: list[TableRequest], tables: dict[str, MeshTable], folder: Path) -> list[Path]:
     """Draw the teeth in contact where the picture is missing or the table is new; return all such pictures."""
-    from exugear.pictures.tables import contact_picture, draw_contact
+    from exugear.report.pictures.tables import contact_picture, draw_contact
     from fe_ste.contact.kinematics import ContactError
     from fe_ste.tools.rendering import RenderingError
 

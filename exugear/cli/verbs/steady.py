@@ -30,8 +30,8 @@ from exugear.cli.tables import compute_missing_tables, refuse_unsolved
 if TYPE_CHECKING:
     import xarray as xr
 
-    from exugear.loudness.ranking import Ranking, Resonance
     from exugear.project import Project
+    from exugear.report.findings.loudness.ranking import Ranking, Resonance
     from exugear.steady.peaks import Peak, Pull
     from exugear.steady.settings import SteadySettings
     from exugear.tooth_mesh.wandering_load import WanderingLoad
@@ -102,7 +102,7 @@ def steady(
     Speeds are added where mesh orders meet modes. Tables that are missing or do not fit the case are computed first.
     """
     with exit_codes():
-        from exugear.model.choice import Choice
+        from exugear.gearbox.choice import Choice
 
         project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
         with model_errors():
@@ -147,8 +147,8 @@ def _respond(project: Project, settings: SteadySettings) -> xr.Dataset:
 
 
 def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json: bool) -> None:
-    from exugear.loudness.ranking import ranking_of
-    from exugear.model.parts import RPM
+    from exugear.gearbox.parts import RPM
+    from exugear.report.findings.loudness.ranking import ranking_of
 
     growth, ranking = float(data.attrs["growth_rate"]), ranking_of(data)
     _tell_of_stability(data, growth)
@@ -193,7 +193,7 @@ def _whole_summary(
     pulling: tuple[Pull, ...],
     excited: bool,
 ) -> dict[str, Any]:
-    from exugear.model.parts import RPM
+    from exugear.gearbox.parts import RPM
     from exugear.steady.peaks import peaks
 
     found = [peak for peak in peaks(data) if peak.amplitude > LEAST_AMPLITUDE]
@@ -229,7 +229,7 @@ def _whole_summary(
 
 
 def _speeds_of(ranking: Ranking) -> str:
-    from exugear.model.parts import RPM
+    from exugear.gearbox.parts import RPM
 
     low, high = (speed / RPM for speed in ranking.speeds)
     return f"{low:.4g} to {high:.4g} rpm"
@@ -260,7 +260,7 @@ def _fail_if_doubtful(data: xr.Dataset, growth: float) -> None:
 
 def _tell_of_pulls(data: xr.Dataset) -> tuple[Pull, ...]:
     """Say which meshes would have to pull, where the law does not let their teeth part."""
-    from exugear.model.parts import RPM
+    from exugear.gearbox.parts import RPM
     from exugear.steady.peaks import pulls
     from exugear.tooth_mesh.laws.registry import LAWS
 
@@ -277,14 +277,14 @@ def _tell_of_pulls(data: xr.Dataset) -> tuple[Pull, ...]:
 
 
 def _pull_summary(pull: Pull) -> dict[str, Any]:
-    from exugear.model.parts import RPM
+    from exugear.gearbox.parts import RPM
 
     return {"mesh": pull.mesh, "speeds": pull.count, "worst_speed_rpm": pull.speed / RPM, "share_of_time": pull.share}
 
 
 def _tell_of_stability(data: xr.Dataset, growth: float) -> None:
     """Say which speeds have no steady state, and where it does not last."""
-    from exugear.model.parts import RPM
+    from exugear.gearbox.parts import RPM
 
     for missing in json.loads(data.attrs["unsolved"]):
         note(f"{missing['speed'] / RPM:.4g} rpm: {missing['reason']}", style="yellow")
@@ -359,7 +359,7 @@ def _tell_of_bearings(data: xr.Dataset) -> None:
 
 
 def _summary(peak: Peak) -> dict[str, Any]:
-    from exugear.model.parts import RPM
+    from exugear.gearbox.parts import RPM
 
     return {
         "line": peak.line,
@@ -371,7 +371,7 @@ def _summary(peak: Peak) -> dict[str, Any]:
 
 
 def _resonance_summary(own: Resonance) -> dict[str, Any]:
-    from exugear.model.parts import RPM
+    from exugear.gearbox.parts import RPM
 
     found: dict[str, Any] = {
         "line": own.line,
@@ -389,7 +389,7 @@ def _resonance_summary(own: Resonance) -> dict[str, Any]:
 
 
 def _row(own: Resonance) -> dict[str, str]:
-    from exugear.model.parts import RPM
+    from exugear.gearbox.parts import RPM
 
     found = {"line": own.line, "rpm": f"{own.speed / RPM:.2f}", "Hz": f"{own.frequency:.1f}"}
     for quantity, loudness in own.loudness.items():

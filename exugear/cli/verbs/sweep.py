@@ -111,9 +111,9 @@ def _executor(executor: Executor, workers: int | None, scheduler: str | None) ->
 
 
 def _read(path: Path, files_below: Path | None, scripts: bool) -> Study:
-    from exugear.checks.readiness import check_parts
-    from exugear.model.named_files import Permissions
-    from exugear.model.reading import CaseError
+    from exugear.dynamics.readiness.readiness import check_parts
+    from exugear.gearbox.named_files import Permissions
+    from exugear.gearbox.reading import CaseError
     from exugear.studies.design.reading import StudyError
     from exugear.studies.study import Study
 

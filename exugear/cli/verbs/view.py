@@ -25,7 +25,7 @@ from exugear.cli.options import (
 from exugear.cli.tables import compute_missing_tables
 
 if TYPE_CHECKING:
-    from exugear.dynamics.modes import Modes
+    from exugear.dynamics.eigenmodes.modes import Modes
 
 
 def view(
@@ -47,7 +47,7 @@ def view(
 ) -> None:
     """Show the gearbox and its modes in three dimensions: a web page that stands alone, and pictures."""
     with exit_codes():
-        from exugear.model.choice import Choice
+        from exugear.gearbox.choice import Choice
 
         project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
         begin_results(project)
@@ -65,10 +65,10 @@ def view(
 
 def _draw_modes(found: Modes, folder: Path, first: int, animation: bool) -> list[Path]:
     """Write the page of all elastic modes, and pictures of the gearbox and one mode if this machine can render."""
-    from exugear.findings.words import Words
-    from exugear.pictures.motions import motions_of
-    from exugear.pictures.shapes import bodies_of
-    from exugear.web.mode_page import write_mode_page
+    from exugear.report.findings.words import Words
+    from exugear.report.pictures.motions import motions_of
+    from exugear.report.pictures.shapes import bodies_of
+    from exugear.report.web.mode_page import write_mode_page
 
     assembly = found.assembly
     drawn = {body.name for body in bodies_of(assembly.gearbox)}
@@ -95,10 +95,14 @@ def _draw_modes(found: Modes, folder: Path, first: int, animation: bool) -> list
 
 def _draw_pictures(found: Modes, folder: Path, place: int, animation: bool) -> list[Path]:
     """Draw the gearbox and one mode; nothing where this machine cannot render."""
-    from exugear.pictures.elastic_scene import animate_elastic_bodies, draw_elastic_bodies, elastic_scene
-    from exugear.pictures.motions import mode_scene, motions_of
-    from exugear.pictures.scene import animate_mode, draw_gearbox, draw_mode
-    from exugear.pictures.shapes import bodies_of
+    from exugear.report.pictures.elastic_scene import (
+        animate_elastic_bodies,
+        draw_elastic_bodies,
+        elastic_scene,
+    )
+    from exugear.report.pictures.motions import mode_scene, motions_of
+    from exugear.report.pictures.scene import animate_mode, draw_gearbox, draw_mode
+    from exugear.report.pictures.shapes import bodies_of
     from fe_ste.tools.rendering import RenderingError
 
     assembly = found.assembly

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from exugear.web import pieces
-from exugear.web.arrays import ArrayStore
+from exugear.report.web import pieces
+from exugear.report.web.arrays import ArrayStore
 
 
 @dataclass(frozen=True)

@@ -7,15 +7,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from exugear.findings.context import Context
-from exugear.findings.groups import RunGroup
-from exugear.findings.stored import StoredResults
-from exugear.findings.variations import ModelVariations
-from exugear.findings.words import Words
-from exugear.model.choice import Choice
-from exugear.spectra.orders import OrderLine, order_lines
-from exugear.web.arrays import ArrayStore
-from exugear.web.pieces import element
+from exugear.gearbox.choice import Choice
+from exugear.report.findings.context import Context
+from exugear.report.findings.groups import RunGroup
+from exugear.report.findings.stored import StoredResults
+from exugear.report.findings.variations import ModelVariations
+from exugear.report.findings.words import Words
+from exugear.report.web.arrays import ArrayStore
+from exugear.report.web.pieces import element
+from exugear.results.spectra.orders import OrderLine, order_lines
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from exugear.spectra.orders import OrderLine
-from exugear.spectra.waterfall import Waterfall
+from exugear.results.spectra.orders import OrderLine
+from exugear.results.spectra.waterfall import Waterfall
 from fe_ste.tools.arrays import Floats
 
 NO_LEVEL = -32768

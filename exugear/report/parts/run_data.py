@@ -8,18 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from exugear.findings.channels import Channel, channels_of, loudest_order
-from exugear.findings.constant_speed import TOP, ConstantSpeed, highest_drawn
-from exugear.findings.groups import RankedResonance, RunGroup
-from exugear.findings.response_channels import channels_of_response
-from exugear.findings.words import VARIANTS, figure_text, percentages
-from exugear.model.parts import RPM
+from exugear.gearbox.parts import RPM
+from exugear.report.findings.channels import Channel, channels_of, loudest_order
+from exugear.report.findings.constant_speed import TOP, ConstantSpeed, highest_drawn
+from exugear.report.findings.groups import RankedResonance, RunGroup
+from exugear.report.findings.response_channels import channels_of_response
+from exugear.report.findings.words import VARIANTS, figure_text, percentages
 from exugear.report.parts.material import Material, group_words, model_name
 from exugear.report.parts.pooling import cut_levels, level_bytes, pooled, tenths
-from exugear.spectra.orders import OrderLine
-from exugear.spectra.run_spectra import VariantRun
-from exugear.spectra.waterfall import Waterfall
-from exugear.web.arrays import rounded
+from exugear.report.web.arrays import rounded
+from exugear.results.spectra.orders import OrderLine
+from exugear.results.spectra.run_spectra import VariantRun
+from exugear.results.spectra.waterfall import Waterfall
 from fe_ste.tools.arrays import Floats
 
 SPEEDS, CHANNEL_SPEEDS = 438, 160

@@ -15,15 +15,15 @@ from exugear.bearings.supports import ON_BEARINGS
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.bearing_duties import bearing_duties, mesh_duties
 from exugear.dynamics.statics import BalanceError
-from exugear.findings.context import choice_of, words_of
-from exugear.findings.groups import RunGroup
-from exugear.findings.words import VARIANTS, figure_text
-from exugear.model.parts import RPM
+from exugear.gearbox.parts import RPM
+from exugear.report.findings.context import choice_of, words_of
+from exugear.report.findings.groups import RunGroup
+from exugear.report.findings.words import VARIANTS, figure_text
 from exugear.report.parts.material import Material, Part, only_for
+from exugear.report.web import pieces
+from exugear.report.web.pieces import Cell
 from exugear.steady.peaks import line_name
 from exugear.tooth_mesh.mesh_duty import MeshDuty
-from exugear.web import pieces
-from exugear.web.pieces import Cell
 
 LIFTS = 1.0
 """Swing over the mean force from which a linear bearing is said to have to lift off."""

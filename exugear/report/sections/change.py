@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from exugear.findings.facts import best_words, shift_text
-from exugear.findings.groups import RunGroup
-from exugear.findings.levers import levers_of
-from exugear.findings.variations import ModelVariations, best_change, guarded
-from exugear.findings.words import VARIANTS, figure_text
+from exugear.report.findings.facts import best_words, shift_text
+from exugear.report.findings.groups import RunGroup
+from exugear.report.findings.levers import levers_of
+from exugear.report.findings.variations import ModelVariations, best_change, guarded
+from exugear.report.findings.words import VARIANTS, figure_text
 from exugear.report.parts.charts import Axis, Curve, chart
 from exugear.report.parts.material import Material, Part, only_for
-from exugear.web import pieces
-from exugear.web.pieces import Cell
+from exugear.report.web import pieces
+from exugear.report.web.pieces import Cell
 
 LEVERS = 8
 """Levers of each kind in the table."""

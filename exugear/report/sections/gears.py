@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from exugear.findings.excitation import HARMONICS, PairExcitation, excitations
-from exugear.findings.words import figure_text
+from exugear.report.findings.excitation import HARMONICS, PairExcitation, excitations
+from exugear.report.findings.words import figure_text
 from exugear.report.parts.charts import Axis, Curve, chart
 from exugear.report.parts.material import Material, Part
-from exugear.web import pieces
-from exugear.web.pieces import Cell
+from exugear.report.web import pieces
+from exugear.report.web.pieces import Cell
 
 
 def gears_section(material: Material) -> Part:

@@ -14,18 +14,18 @@ import xarray as xr
 from exugear.bearings.rolling.rows import BearingError
 from exugear.dynamics.assembly import VariantError
 from exugear.dynamics.statics import BalanceError
-from exugear.findings.context import choice_of, words_of
-from exugear.findings.words import figure_text
+from exugear.gearbox.reading import CaseError
 from exugear.life.life_diagrams import draw_life
 from exugear.life.life_file import limits
+from exugear.life.rating.beside import FlankKey, of_life
+from exugear.life.rating.rated import RATED_AS, balanced, rated, rated_loads
 from exugear.life.stored_lives import stored_lives
-from exugear.model.reading import CaseError
-from exugear.rating.beside import FlankKey, of_life
-from exugear.rating.rated import RATED_AS, balanced, rated, rated_loads
+from exugear.report.findings.context import choice_of, words_of
+from exugear.report.findings.words import figure_text
 from exugear.report.parts.material import Material, Part
+from exugear.report.web import pieces
+from exugear.report.web.pieces import Cell
 from exugear.tooth_mesh.placement import MeshError
-from exugear.web import pieces
-from exugear.web.pieces import Cell
 
 WORDS = (
     "Loads of the gearbox file over its life, through the balance at rest of the variant and the contact of its teeth "

@@ -6,18 +6,18 @@ from typing import Any
 
 import xarray as xr
 
-from exugear.findings.context import VISIBLE_SHARE, words_of
-from exugear.findings.words import percentages
-from exugear.model.choice import Choice
-from exugear.model.parts import RPM
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.parts import RPM
+from exugear.report.findings.context import VISIBLE_SHARE, words_of
+from exugear.report.findings.words import percentages
 from exugear.report.parts.material import Material, Part, model_name
-from exugear.spectra.mode_report import report_mode
-from exugear.spectra.run_spectra import LEAST_SHARE
-from exugear.web import pieces
-from exugear.web.arrays import rounded
-from exugear.web.pieces import Cell
-from exugear.web.stage import stage_data
-from exugear.web.stage_figure import stage_figure
+from exugear.report.web import pieces
+from exugear.report.web.arrays import rounded
+from exugear.report.web.pieces import Cell
+from exugear.report.web.stage import stage_data
+from exugear.report.web.stage_figure import stage_figure
+from exugear.results.spectra.mode_report import report_mode
+from exugear.results.spectra.run_spectra import LEAST_SHARE
 
 DEFORMED = 32
 """Modes in which elastic bodies deform in the page: those of resonances, and those that are seen most."""

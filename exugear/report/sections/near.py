@@ -8,13 +8,17 @@ from dataclasses import dataclass, replace
 
 import xarray as xr
 
-from exugear.dynamics.modes import modes_of
-from exugear.dynamics.sensitivity import FrequencyMatch, assumed_parameters, frequency_matches
-from exugear.findings.context import REFERENCE_VARIANT, VISIBLE_SHARE, words_of
-from exugear.model.choice import Choice
+from exugear.dynamics.eigenmodes.modes import modes_of
+from exugear.dynamics.eigenmodes.sensitivity import (
+    FrequencyMatch,
+    assumed_parameters,
+    frequency_matches,
+)
+from exugear.gearbox.choice import Choice
+from exugear.report.findings.context import REFERENCE_VARIANT, VISIBLE_SHARE, words_of
 from exugear.report.parts.material import Material, Part
-from exugear.spectra.mode_report import NEAR, ModeReport, nearest_mode, report_mode
-from exugear.web import pieces
+from exugear.report.web import pieces
+from exugear.results.spectra.mode_report import NEAR, ModeReport, nearest_mode, report_mode
 
 
 @dataclass(frozen=True)

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 
-from exugear.findings.groups import RankedResonance, RunGroup
-from exugear.findings.words import VARIANTS, figure_text, percentages
-from exugear.loudness.ranking import Resonance
-from exugear.model.parts import RPM
+from exugear.gearbox.parts import RPM
+from exugear.report.findings.groups import RankedResonance, RunGroup
+from exugear.report.findings.loudness.ranking import Resonance
+from exugear.report.findings.words import VARIANTS, figure_text, percentages
 from exugear.report.parts.material import Material, Part, only_for, told_groups
-from exugear.spectra.comparison import AbsenceRule
-from exugear.spectra.run_spectra import VariantRun
-from exugear.spectra.windows import WINDOW_FACTORS
-from exugear.web import pieces
-from exugear.web.pieces import Cell
+from exugear.report.web import pieces
+from exugear.report.web.pieces import Cell
+from exugear.results.spectra.comparison import AbsenceRule
+from exugear.results.spectra.run_spectra import VariantRun
+from exugear.results.spectra.windows import WINDOW_FACTORS
 
 SHOWN_SPAN = 60.0
 """dB below the loudest at which the bar of a level ends."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from exugear.findings.groups import RunGroup
-from exugear.findings.words import VARIANTS, figure_text
-from exugear.model.parts import RPM
+from exugear.gearbox.parts import RPM
+from exugear.report.findings.groups import RunGroup
+from exugear.report.findings.words import VARIANTS, figure_text
 from exugear.report.parts.material import Material, Part
-from exugear.web import pieces
-from exugear.web.stage_figure import stage_figure
+from exugear.report.web import pieces
+from exugear.report.web.stage_figure import stage_figure
 
 NO_MODES = "No modes are here: `exugear modes` computes them, and the page shows them move."
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from exugear.findings.facts import Fact, facts_of, facts_of_response
-from exugear.findings.groups import RunGroup
-from exugear.findings.verdicts import Verdict, verdicts_of
+from exugear.report.findings.facts import Fact, facts_of, facts_of_response
+from exugear.report.findings.groups import RunGroup
+from exugear.report.findings.verdicts import Verdict, verdicts_of
 from exugear.report.parts.material import Material, Part, group_words, only_for, told_groups
-from exugear.web import pieces
+from exugear.report.web import pieces
 
 
 def short_section(material: Material) -> Part:

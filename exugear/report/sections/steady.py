@@ -9,22 +9,22 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from exugear.campbell.campbell import Campbell, campbell_from
-from exugear.findings.context import Context, choice_of, words_of
-from exugear.findings.words import figure_text
-from exugear.loads.summary import summarise_loads
-from exugear.model.parts import RPM
-from exugear.model.reading import CaseError
-from exugear.model.sections.entries import GROUND
+from exugear.gearbox.load_cases.summary import summarise_loads
+from exugear.gearbox.parts import RPM
+from exugear.gearbox.reading import CaseError
+from exugear.gearbox.sections.entries import GROUND
+from exugear.report.findings.context import Context, choice_of, words_of
+from exugear.report.findings.words import figure_text
 from exugear.report.parts.charts import Axis, Curve, chart
 from exugear.report.parts.material import Material, Part, model_name
+from exugear.report.web import pieces
 from exugear.results.run_file import read_run
-from exugear.spectra.orders import OrderLine, order_lines
-from exugear.spectra.run_spectra import VariantRun
-from exugear.spectra.sweeps import TOO_FAST, run_up_cut, sweep_rate, sweep_severity
+from exugear.results.spectra.orders import OrderLine, order_lines
+from exugear.results.spectra.run_spectra import VariantRun
+from exugear.results.spectra.sweeps import TOO_FAST, run_up_cut, sweep_rate, sweep_severity
+from exugear.steady.campbell.campbell import Campbell, campbell_from
 from exugear.steady.peaks import Peak, line_name, peaks, planet_sidebands, sidebands
 from exugear.steady.steady_file import settings_of
-from exugear.web import pieces
 from fe_ste.tools.arrays import Floats
 
 SHOWN = 20

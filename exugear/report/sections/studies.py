@@ -6,8 +6,8 @@ import base64
 from pathlib import Path
 
 from exugear.report.parts.material import Material, Part
+from exugear.report.web import pieces
 from exugear.results.study_files import StoredStudy, stored_studies
-from exugear.web import pieces
 
 LARGEST_PICTURE = 2_000_000
 """Bytes of a picture that a page takes in."""

@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from exugear.findings.context import choice_of, words_of
-from exugear.findings.verdicts import run_figures
-from exugear.model.parts import RPM
+from exugear.gearbox.parts import RPM
+from exugear.report.findings.context import choice_of, words_of
+from exugear.report.findings.verdicts import run_figures
 from exugear.report.parts.material import Material, Part
+from exugear.report.web import pieces
+from exugear.report.web.libraries import libraries, licences
 from exugear.results.folder import times_spent
-from exugear.runs.trust import verdict_of
-from exugear.spectra.run_spectra import VariantRun
-from exugear.web import pieces
-from exugear.web.libraries import libraries, licences
+from exugear.results.spectra.run_spectra import VariantRun
+from exugear.transient.trust import verdict_of
 
 PACKAGES = ("exugear", "exudyn", "numpy", "scipy", "numba", "scikit-fem", "xarray", "h5netcdf", "matplotlib", "pyvista")
 """Packages whose versions a report names."""

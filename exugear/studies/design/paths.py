@@ -6,7 +6,7 @@ import difflib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from exugear.schema.keys import tables
+from exugear.gearbox.sections.schema.keys import tables
 
 SHOWN_MATCHES = 3
 """Most near matches that a message names."""

@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from exugear.model.reading import fault_line, parsed, shortened
+from exugear.gearbox.reading import fault_line, parsed, shortened
 from exugear.studies.design.sections import StudyFile
 from fe_ste.tools.files import FileError, read_text
 

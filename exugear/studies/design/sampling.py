@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from exugear.model.gearbox import Gearbox
-from exugear.schema.keys import unit_of
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.sections.schema.keys import unit_of
 from exugear.studies.design.distributions import Distribution, Normal, Uniform, correlated, shares
 from exugear.studies.design.paths import PathError, value_at
 from exugear.studies.design.sections import ParameterSection, StudyFile

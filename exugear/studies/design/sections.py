@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AllowInfNan, BaseModel, ConfigDict, Field, model_validator
 
-from exugear.model.sections.entries import Name, Text
+from exugear.gearbox.sections.entries import Name, Text
 
 Value = int | Annotated[float, AllowInfNan(True)] | str | bool | list[Any]
 """What may stand at a key of a case; what may not becomes a failed point with its name."""

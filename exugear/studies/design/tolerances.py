@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.gearbox import Gearbox
 from exugear.studies.design.sampling import Axis, acted, drawn_values, own_value
 from exugear.studies.design.sections import ParameterSection, StudyFile
 from fe_ste.tools.arrays import Floats

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from exugear.dynamics.modes import FREE_ROTATION, Modes
+from exugear.dynamics.eigenmodes.modes import FREE_ROTATION, Modes
 from exugear.studies.figures.point_results import PointError, PointResults
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from exugear.model.parts import RPM
+from exugear.gearbox.parts import RPM
 from exugear.steady.peaks import line_name, peaks
 from exugear.studies.figures.point_results import PointError, PointResults
 from fe_ste.tools.arrays import Floats

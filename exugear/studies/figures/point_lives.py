@@ -6,16 +6,16 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from exugear.dynamic_factors.response_factors import factors, source_hash
 from exugear.dynamics.assembly import Assembly
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.life.dynamic_factors.response_factors import factors, source_hash
 from exugear.life.kept_angles import KeptAngles
 from exugear.life.life import checked_loads, compute_life, life_hash, rating_of
 from exugear.life.life_file import to_dataset
+from exugear.life.load_spectrum.counted import CountedLoads
 from exugear.life.stress_tables import stress_requests
 from exugear.life.verdict import UNTRUSTED_REACH, check_reach
-from exugear.load_spectrum.counted import CountedLoads
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
 from exugear.steady.settings import SteadySettings, usual_speeds
 from exugear.steady.steady_file import steady_path, stored_or_computed
 from exugear.studies.figures.shared import Shared

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 from exugear.bodies.elastic_body import ElasticBody
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.modes import Modes, modes_of
+from exugear.dynamics.eigenmodes.modes import Modes, modes_of
 from exugear.dynamics.statics import StaticState, static_state
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
 from exugear.studies.figures.shared import Shared
 from exugear.tooth_mesh.law import MeshData
 from exugear.tooth_mesh.laws.registry import LAWS, law_of
@@ -26,8 +26,8 @@ from fe_ste.transmission_error.table import MeshTable, prepared_compliance
 if TYPE_CHECKING:
     import xarray as xr
 
-    from exugear.runs.runup import Solver
     from exugear.steady.settings import SteadySettings
+    from exugear.transient.runup import Solver
 
 
 class PointError(RuntimeError):
@@ -158,8 +158,8 @@ class PointResults:
 
     def _simulated(self, choice: Choice) -> Path:
         """File of a run; doubts about it are kept."""
-        from exugear.runs.run_folder import refuse_to_resume, run_directory
-        from exugear.runs.runup import simulate
+        from exugear.transient.run_folder import refuse_to_resume, run_directory
+        from exugear.transient.runup import simulate
 
         resume = not refuse_to_resume(run_directory(self.folder, choice))
         run = simulate(

@@ -12,7 +12,7 @@ from pathlib import Path
 import filelock
 
 from exugear.bodies.elastic_body import ElasticBody
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.gearbox import Gearbox
 from exugear.tooth_mesh.table_remarks import doubts_about_table
 from exugear.tooth_mesh.tables import TableRequest, requested_tables, wanted_table
 from fe_ste.root_stress.mesh_cycle import MeshCycleStress

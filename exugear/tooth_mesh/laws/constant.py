@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from exugear.model.parts import Mesh
+from exugear.gearbox.parts import Mesh
 from exugear.tooth_mesh.law import Angles
 from exugear.tooth_mesh.laws.line_of_action import LineOfAction
 from fe_ste.tools.arrays import Floats

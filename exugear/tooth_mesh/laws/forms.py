@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from exugear.kernels.meshes import (
+from exugear.tooth_mesh.kernels.meshes import (
     CYCLE_POWER,
     DAMPED_POWER,
     DEFLECTION,
@@ -40,7 +40,13 @@ from exugear.kernels.meshes import (
     row_dot,
     turn_rows,
 )
-from exugear.kernels.table_law import NOMINAL_DEFLECTION, NOMINAL_MISALIGNMENT, Scratch, TableArrays, scratch_memory
+from exugear.tooth_mesh.kernels.table_law import (
+    NOMINAL_DEFLECTION,
+    NOMINAL_MISALIGNMENT,
+    Scratch,
+    TableArrays,
+    scratch_memory,
+)
 from exugear.tooth_mesh.laws.line_of_action import CURVE_FORM, curve_law, stiffness_law
 from exugear.tooth_mesh.laws.table import TABLE_FORM, TABLE_MEMORY, add_table_tangent, table_force
 from fe_ste.tools.arrays import Floats, Integers
@@ -252,5 +258,5 @@ def add_mesh_jacobian(q: Floats, v: Floats, meshes: MeshArrays, jq: Floats, jv: 
 
 
 def mesh_state(q: Floats, v: Floats, meshes: MeshArrays, out: Floats) -> None:
-    """Fill (m, 10): what each mesh does; columns as named in `exugear.kernels.meshes`."""
+    """Fill (m, 10): what each mesh does; columns as named in `exugear.tooth_mesh.kernels.meshes`."""
     _pass(q, v, meshes, out, _NOTHING, _NO_ROWS, _NO_ROWS)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from exugear.model.gearbox import Gearbox
-from exugear.model.parts import PairSpec
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.parts import PairSpec
 from exugear.tooth_mesh.laws.constant import Constant
 from fe_ste.standards.iso6336 import mesh_stiffness as iso_stiffness
 from fe_ste.tools.arrays import Floats

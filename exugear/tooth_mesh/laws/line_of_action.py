@@ -18,10 +18,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from exugear.kernels.meshes import periodic_cubic, stiffness_at
-from exugear.kernels.table_law import piece_at
-from exugear.model.gearbox import Gearbox
-from exugear.model.parts import Mesh
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.parts import Mesh
+from exugear.tooth_mesh.kernels.meshes import periodic_cubic, stiffness_at
+from exugear.tooth_mesh.kernels.table_law import piece_at
 from exugear.tooth_mesh.law import Law, MeshCurve, MeshData
 from exugear.tooth_mesh.placement import MeshError
 from exugear.tooth_mesh.tables import fitting_table, table_path, wanted_table

@@ -6,11 +6,17 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from exugear.gearbox.seats import seat_key
 from exugear.kernels.coordinates import BODY_SIZE, SPIN, TILT
-from exugear.kernels.meshes import FRAME, ROW_SIZE, TILT_COLUMNS, MeshArrays, periodic_cubic
-from exugear.kernels.table_law import NOMINAL_DEFLECTION
-from exugear.model.seats import seat_key
 from exugear.tooth_mesh.element import MeshElement
+from exugear.tooth_mesh.kernels.meshes import (
+    FRAME,
+    ROW_SIZE,
+    TILT_COLUMNS,
+    MeshArrays,
+    periodic_cubic,
+)
+from exugear.tooth_mesh.kernels.table_law import NOMINAL_DEFLECTION
 from exugear.tooth_mesh.laws.line_of_action import CURVE_FORM, STIFFNESS_FORM, curve_coefficients
 from exugear.tooth_mesh.laws.table import pack_tables
 from fe_ste.tools.arrays import Floats, Integers

@@ -11,7 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from exugear.model.parts import Mesh
+from exugear.gearbox.parts import Mesh
 from exugear.tooth_mesh.law import Angles
 from exugear.tooth_mesh.laws.line_of_action import LineOfAction
 from exugear.tooth_mesh.placement import MeshGeometry, pitch_point_of, wrench_row

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.gearbox import Gearbox
 from exugear.tooth_mesh.law import MeshCurve
 from exugear.tooth_mesh.laws.registry import LAWS, law_of
 from exugear.tooth_mesh.placement import MeshError

@@ -1,12 +1,12 @@
 """Mesh law `table`: the potential of a pair's table over deflection, centre distance and misalignment.
 
-The potential (`exugear.kernels.table_law`) depends on the deflection delta, on the centre distance a and on the
-misalignment gamma, each a row of the same coordinates. The generalized force is
+The potential (`exugear.tooth_mesh.kernels.table_law`) depends on the deflection delta, on the centre distance a and
+on the misalignment gamma, each a row of the same coordinates. The generalized force is
 
     f = -(F d delta/dq + U_a da/dq + U_gamma d gamma/dq).
 
 Damping is a time times the tangent of the potential at a frozen position, along the same rows: where the tangent has a
-negative part, that does not damp (`exugear.kernels.table_law.surface_damping`). It fades as the teeth part.
+negative part, that does not damp (`exugear.tooth_mesh.kernels.table_law.surface_damping`). It fades as the teeth part.
 Teeth are apart in the backlash; beyond it the other flank touches. A table is that of the flank s = +1; the flank
 s = -1 is it turned by pi about the line of centres: the same table with misalignment reversed. Two forms of the force
 stand here, `table_force` with its tangent, and `fast_table_force` for the compiled solver, which tests hold together.
@@ -19,7 +19,10 @@ from pathlib import Path
 
 import numpy as np
 
-from exugear.kernels.fast_meshes import (
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.parts import Mesh
+from exugear.tooth_mesh.element import MeshElement
+from exugear.tooth_mesh.kernels.fast_meshes import (
     ALONG_DEFLECTION,
     ALONG_FORCE,
     LAST_CENTRE,
@@ -38,7 +41,7 @@ from exugear.kernels.fast_meshes import (
     mesh_row,
     subtract_wheel_errors,
 )
-from exugear.kernels.meshes import (
+from exugear.tooth_mesh.kernels.meshes import (
     CYCLE_POWER,
     DAMPED_POWER,
     DEFLECTION,
@@ -61,7 +64,7 @@ from exugear.kernels.meshes import (
     row_dot,
     turn_rows,
 )
-from exugear.kernels.table_law import (
+from exugear.tooth_mesh.kernels.table_law import (
     BY_DISTANCE,
     BY_MISALIGNMENT,
     CUBIC_SIZE,
@@ -88,9 +91,6 @@ from exugear.kernels.table_law import (
     surface_law,
     surface_tangent,
 )
-from exugear.model.gearbox import Gearbox
-from exugear.model.parts import Mesh
-from exugear.tooth_mesh.element import MeshElement
 from exugear.tooth_mesh.law import Law, MeshData, TableFlanks
 from exugear.tooth_mesh.placement import MeshError, ToothContact, line_of_action_row, position_rows
 from exugear.tooth_mesh.tables import fitting_table, table_path, without_table

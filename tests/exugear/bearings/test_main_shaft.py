@@ -17,15 +17,15 @@ from exugear.bodies.of_gearbox.shafts import shaft_model
 from exugear.bodies.reduced_body import ReducedBody
 from exugear.bodies.turned_shaft import ShaftModel, reduce_shaft
 from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.energy_shares import BODY_MOTIONS
+from exugear.dynamics.eigenmodes.energy_shares import BODY_MOTIONS
+from exugear.dynamics.eigenmodes.modes import modes_of
 from exugear.dynamics.linearised import linearise
-from exugear.dynamics.modes import modes_of
+from exugear.dynamics.loads import Loading, LoadTable
 from exugear.dynamics.statics import accelerating_start
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.solvers.compiled.solver import CompiledSystem
-from exugear.solvers.exudyn_model.system import ExudynSystem
-from exugear.solvers.loads import Loading, LoadTable
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.transient.compiled.solver import CompiledSystem
+from exugear.transient.exudyn_model.system import ExudynSystem
 
 from ..assembled import assembled, modes_with_bodies
 

@@ -11,8 +11,8 @@ from exugear.bearings.matrices import axially_symmetric
 from exugear.bearings.rolling.contact import pitch_averaged_tangent
 from exugear.bearings.rolling.rollers import BearingPair, CylindricalRollerBearing
 from exugear.bearings.support_laws import cage_ratio, catalogue_stiffness, linear_law, rolling_law
-from exugear.model.gearbox import Gearbox
-from exugear.model.sections.connections import CatalogueSection
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.sections.connections import CatalogueSection
 
 from ..bearing_case import bearing_gearbox
 

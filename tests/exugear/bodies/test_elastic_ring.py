@@ -11,14 +11,14 @@ import pytest
 import xarray as xr
 
 from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.loads import Loading, LoadTable
 from exugear.dynamics.signals import energy_residual
 from exugear.dynamics.statics import accelerating_start, locked_equilibrium
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.solvers.compiled.observers import Observer
-from exugear.solvers.compiled.solver import CompiledSystem
-from exugear.solvers.exudyn_model.system import ExudynSystem
-from exugear.solvers.loads import Loading, LoadTable
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.transient.compiled.observers import Observer
+from exugear.transient.compiled.solver import CompiledSystem
+from exugear.transient.exudyn_model.system import ExudynSystem
 
 from ..assembled import assembled, simulated
 from ..plain_signals import energies_of, sampled

@@ -19,17 +19,17 @@ from exugear.bodies.of_gearbox.shafts import shaft_model, solid_of_shaft
 from exugear.bodies.reduced_body import Blank, ReductionError
 from exugear.bodies.solids import SolidModel, reduce_matrices, reduce_solid
 from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.loads import Drive, Loading
 from exugear.dynamics.signals import energy_residual
 from exugear.dynamics.statics import accelerating_start
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.model.reading import CaseError
-from exugear.runs.outcome import RunError
-from exugear.solvers.compiled.solver import unsupported_reason
-from exugear.solvers.exudyn_model.floating_object import frame_integrals
-from exugear.solvers.exudyn_model.library import elements, exudyn
-from exugear.solvers.exudyn_model.system import ExudynSystem
-from exugear.solvers.loads import Drive, Loading
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.reading import CaseError
+from exugear.transient.compiled.solver import unsupported_reason
+from exugear.transient.exudyn_model.floating_object import frame_integrals
+from exugear.transient.exudyn_model.library import elements, exudyn
+from exugear.transient.exudyn_model.system import ExudynSystem
+from exugear.transient.outcome import RunError
 from fe_ste.geometry.gears import Material
 
 from ..assembled import assembled, simulated

@@ -12,18 +12,22 @@ from exugear.bodies.of_gearbox.shafts import shaft_model
 from exugear.bodies.of_gearbox.solids import solid_body
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly, VariantError
+from exugear.dynamics.eigenmodes.modes import counterparts, eigenmodes, modes_of
 from exugear.dynamics.linearised import linearise
-from exugear.dynamics.modes import counterparts, eigenmodes, modes_of
+from exugear.dynamics.loads import Loading, LoadTable
 from exugear.dynamics.signals import signal_layout
 from exugear.dynamics.statics import accelerating_start, locked_equilibrium
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.model.reading import CaseError
-from exugear.pictures.elastic_scene import animate_elastic_bodies, draw_elastic_bodies, elastic_scene
-from exugear.solvers.compiled.observers import Observer
-from exugear.solvers.compiled.solver import CompiledSystem
-from exugear.solvers.exudyn_model.system import ExudynSystem
-from exugear.solvers.loads import Loading, LoadTable
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.reading import CaseError
+from exugear.report.pictures.elastic_scene import (
+    animate_elastic_bodies,
+    draw_elastic_bodies,
+    elastic_scene,
+)
+from exugear.transient.compiled.observers import Observer
+from exugear.transient.compiled.solver import CompiledSystem
+from exugear.transient.exudyn_model.system import ExudynSystem
 
 from ..assembled import assembled, modes_with_bodies
 from ..limit_case import unchecked

@@ -17,20 +17,20 @@ from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies
 from exugear.bodies.of_gearbox.solids import solid_body
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly, VariantError
-from exugear.dynamics.energy_shares import BODY_MOTIONS
+from exugear.dynamics.eigenmodes.energy_shares import BODY_MOTIONS
+from exugear.dynamics.eigenmodes.modes import counterparts, eigenmodes, modes_of
 from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.linearised import linearise
-from exugear.dynamics.modes import counterparts, eigenmodes, modes_of
+from exugear.dynamics.loads import Loading, LoadTable
 from exugear.dynamics.signals import energy_residual
 from exugear.dynamics.statics import accelerating_start, locked_equilibrium
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.model.named_files import Permissions
-from exugear.model.reading import CaseError
-from exugear.pictures.elastic_scene import elastic_scene
-from exugear.solvers.compiled.solver import CompiledSystem
-from exugear.solvers.exudyn_model.system import ExudynSystem
-from exugear.solvers.loads import Loading, LoadTable
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.named_files import Permissions
+from exugear.gearbox.reading import CaseError
+from exugear.report.pictures.elastic_scene import elastic_scene
+from exugear.transient.compiled.solver import CompiledSystem
+from exugear.transient.exudyn_model.system import ExudynSystem
 from fe_ste.elimination.sparse import factorise
 
 from ..assembled import assembled, bodies_of, modes_with_bodies, simulated

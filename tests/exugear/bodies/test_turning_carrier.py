@@ -12,17 +12,17 @@ import pytest
 import skfem
 
 from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.eigenmodes.modes import modes_of
 from exugear.dynamics.linearised import linearise
-from exugear.dynamics.modes import modes_of
+from exugear.dynamics.loads import Loading, LoadTable
 from exugear.dynamics.signals import signal_layout
 from exugear.dynamics.statics import accelerating_start, locked_equilibrium
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.model.named_files import Permissions
-from exugear.solvers.compiled.observers import Observer
-from exugear.solvers.compiled.solver import CompiledSystem
-from exugear.solvers.exudyn_model.system import ExudynSystem
-from exugear.solvers.loads import Loading, LoadTable
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.named_files import Permissions
+from exugear.transient.compiled.observers import Observer
+from exugear.transient.compiled.solver import CompiledSystem
+from exugear.transient.exudyn_model.system import ExudynSystem
 
 from ..assembled import assembled
 from ..limit_case import unchecked

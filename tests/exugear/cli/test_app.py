@@ -22,7 +22,7 @@ from typer.testing import CliRunner
 from exugear.cli import case_verbs, verbs
 from exugear.cli.app import OBJECTS_OF_A_START, VERBS, app, garbage_seldom_looked_for
 from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.gearbox import Gearbox
 from exugear.tooth_mesh.tables import requested_tables
 from fe_ste.contact.cells import ContactSettings
 from fe_ste.elasticity.hexmesh import MeshSettings

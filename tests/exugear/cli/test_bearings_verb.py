@@ -11,7 +11,7 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from exugear.cli.app import app
-from exugear.dynamics.modes import load_modes
+from exugear.dynamics.eigenmodes.modes import load_modes
 from exugear.dynamics.signals import energy_residual
 from exugear.dynamics.statics import BalanceError
 from exugear.results.run_file import load_run
@@ -130,7 +130,9 @@ def test_non_linear_bearings_go_through_modes_run_and_file(case: Path) -> None:
     assert np.all(force[len(force) // 2 :].mean(axis=0) > 100.0)
 
 
-@pytest.mark.parametrize("place", ["exugear.findings.variations.vary_parameter", "exugear.findings.context.assemble"])
+@pytest.mark.parametrize(
+    "place", ["exugear.report.findings.variations.vary_parameter", "exugear.report.findings.context.assemble"]
+)
 def test_a_report_leaves_out_what_no_longer_balances(case: Path, monkeypatch: pytest.MonkeyPatch, place: str) -> None:
     """An assumption that is varied too far, and a model that has no static state: a line each, no more."""
     out = case.parent / "out"

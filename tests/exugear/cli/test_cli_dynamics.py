@@ -15,15 +15,15 @@ from typer.testing import CliRunner
 from exugear.cli.app import app
 from exugear.cli.options import MeshLaw, Variant
 from exugear.cli.verbs.run import Solver
-from exugear.model.choice import USER_VARIANTS
-from exugear.model.gearbox import Gearbox
-from exugear.runs.outcome import RunError
-from exugear.runs.runup import SOLVERS
-from exugear.runs.runup import simulate as real_simulate
+from exugear.gearbox.choice import USER_VARIANTS
+from exugear.gearbox.gearbox import Gearbox
 from exugear.tooth_mesh.laws.registry import MESH_LAWS
 from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.tooth_mesh.placement import MeshError
 from exugear.tooth_mesh.tables import missing_tables, requested_tables
+from exugear.transient.outcome import RunError
+from exugear.transient.runup import SOLVERS
+from exugear.transient.runup import simulate as real_simulate
 from fe_ste.tools.rendering import RenderingError
 
 from ..floating_case import FLOATING_CASE
@@ -209,7 +209,7 @@ def test_view_writes_a_page_where_nothing_can_be_rendered(case, monkeypatch):
     def unable(*arguments, **options):
         raise RenderingError("3-D pictures need pyvista: pip install")
 
-    monkeypatch.setattr("exugear.pictures.scene.draw_gearbox", unable)
+    monkeypatch.setattr("exugear.report.pictures.scene.draw_gearbox", unable)
     outcome = iso("view", case, "--variant", "rigid", "--json")
     assert outcome.exit_code == 0, outcome.stderr
     (page,) = json.loads(outcome.stdout)["files"]

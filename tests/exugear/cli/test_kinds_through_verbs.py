@@ -11,8 +11,8 @@ import pytest
 from typer.testing import CliRunner
 
 from exugear.cli.app import app
-from exugear.model.choice import USER_VARIANTS
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.choice import USER_VARIANTS
+from exugear.gearbox.gearbox import Gearbox
 from exugear.project import Project
 from exugear.tooth_mesh import tables
 

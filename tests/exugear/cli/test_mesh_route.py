@@ -15,11 +15,11 @@ from typer.testing import CliRunner
 
 from exugear.cli.app import app
 from exugear.cli.verbs.run import MeshRoute
-from exugear.model.choice import Choice
+from exugear.gearbox.choice import Choice
 from exugear.project import Project
 from exugear.results.run_file import load_run
-from exugear.runs.runup import simulate
-from exugear.solvers.exudyn_model import system
+from exugear.transient.exudyn_model import system
+from exugear.transient.runup import simulate
 
 from ..spur_case import SPUR_CASE
 from ..table_case import surfaces

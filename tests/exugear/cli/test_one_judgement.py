@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from exugear.checks.readiness import check_parts, remarks
 from exugear.cli.app import app
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.model.reading import CaseError
+from exugear.dynamics.readiness.readiness import check_parts, remarks
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.reading import CaseError
 from exugear.project import Project
 from exugear.studies.executors import processes
 from exugear.studies.study import Study

@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 
 from exugear.dynamics.assemble import assemble
+from exugear.dynamics.eigenmodes.modes import modes_of
 from exugear.dynamics.fingerprint import input_hash
-from exugear.dynamics.modes import modes_of
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
 from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 
 from ..gear_trains import pair, planetary

@@ -12,13 +12,13 @@ import scipy.linalg
 import xarray as xr
 
 from exugear.dynamics.assemble import assemble
+from exugear.dynamics.eigenmodes.modes import FREE_ROTATION, eigenmodes, modes_of
 from exugear.dynamics.linearised import linearise
-from exugear.dynamics.modes import FREE_ROTATION, eigenmodes, modes_of
+from exugear.dynamics.loads import Loading
 from exugear.dynamics.statics import locked_equilibrium
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.solvers.exudyn_model.system import ExudynSystem
-from exugear.solvers.loads import Loading
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.transient.exudyn_model.system import ExudynSystem
 
 from ..assembled import modes_with_bodies
 

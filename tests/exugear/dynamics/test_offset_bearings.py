@@ -14,15 +14,15 @@ from exugear.bearings.equal_planets import planet_families, planet_supports
 from exugear.bearings.support_laws import SupportLaw, law_in_words, load_stands_still, through_point
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.modes import modes_of
-from exugear.dynamics.sensitivity import planet_bearings, scaled_bearings
+from exugear.dynamics.eigenmodes.modes import modes_of
+from exugear.dynamics.eigenmodes.sensitivity import planet_bearings, scaled_bearings
+from exugear.dynamics.loads import Loading, LoadTable
 from exugear.dynamics.statics import accelerating_start, locked_equilibrium, static_state
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
 from exugear.life.static_balance import is_linear
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.solvers.compiled.solver import CompiledSystem
-from exugear.solvers.exudyn_model.system import ExudynSystem
-from exugear.solvers.loads import Loading, LoadTable
+from exugear.transient.compiled.solver import CompiledSystem
+from exugear.transient.exudyn_model.system import ExudynSystem
 
 from ..bearing_case import NON_LINEAR, STIFFNESS, bearing_gearbox
 

@@ -12,15 +12,15 @@ from exugear.bearings.operating_point import OperatingPoint
 from exugear.bearings.rolling.contact import bearing_load, equilibrium, pitch_averaged_tangent, row_contacts
 from exugear.bearings.rolling.rows import BearingError, BearingOfRows
 from exugear.bearings.support_laws import LEAST_LOAD, catalogue_stiffness
-from exugear.checks.readiness import lacking
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.modes import modes_of
+from exugear.dynamics.eigenmodes.modes import modes_of
+from exugear.dynamics.loads import LoadTable
+from exugear.dynamics.readiness.readiness import lacking
 from exugear.dynamics.statics import BalanceError, static_state
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.solvers.compiled.solver import CompiledSystem
-from exugear.solvers.loads import LoadTable
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.transient.compiled.solver import CompiledSystem
 
 from ..bearing_case import NON_LINEAR, STIFFNESS, bearing_gearbox
 

@@ -14,17 +14,23 @@ import numpy as np
 import pytest
 
 from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.loads import LoadTable
 from exugear.dynamics.signals import signal_layout
 from exugear.dynamics.statics import accelerating_start
-from exugear.kernels.meshes import CYCLE_POWER, DAMPED_POWER, ENERGY, ROW_SIZE, STATE_SIZE
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
 from exugear.kernels.springs import add_spring_forces
-from exugear.kernels.table_law import scratch_memory
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.solvers.compiled.solver import CompiledSystem
-from exugear.solvers.compiled.step import choose_integration
-from exugear.solvers.loads import LoadTable
+from exugear.tooth_mesh.kernels.meshes import (
+    CYCLE_POWER,
+    DAMPED_POWER,
+    ENERGY,
+    ROW_SIZE,
+    STATE_SIZE,
+)
+from exugear.tooth_mesh.kernels.table_law import scratch_memory
 from exugear.tooth_mesh.laws.forms import MEMORY, pass_meshes
+from exugear.transient.compiled.solver import CompiledSystem
+from exugear.transient.compiled.step import choose_integration
 
 from ..assembled import assembled
 from ..plain_connectors import add_forces

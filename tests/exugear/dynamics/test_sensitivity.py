@@ -7,8 +7,8 @@ import tomllib
 import numpy as np
 import pytest
 
-from exugear.dynamics.modes import modes_of
-from exugear.dynamics.sensitivity import (
+from exugear.dynamics.eigenmodes.modes import modes_of
+from exugear.dynamics.eigenmodes.sensitivity import (
     FrequencyMatch,
     Parameter,
     ParameterVariation,
@@ -18,8 +18,8 @@ from exugear.dynamics.sensitivity import (
     scaled_bearings,
     vary_parameter,
 )
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
 from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 
 from ..spur_case import SPUR_CASE

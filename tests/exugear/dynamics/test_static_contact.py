@@ -15,9 +15,9 @@ import exugear.dynamics.operating_points
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.statics import StaticState, static_state
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.templates.kinds import template
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.templates.kinds import template
 from exugear.tooth_mesh.law import MeshCurve
 from exugear.tooth_mesh.static_contact import StaticContacts, static_contacts
 from fe_ste.contact.kinematics import ContactError

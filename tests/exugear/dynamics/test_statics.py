@@ -7,14 +7,14 @@ import math
 import numpy as np
 import pytest
 
+from exugear.bearings.kernels.connectors import add_connector_forces
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.linearised import linearise, tangent_stiffness
 from exugear.dynamics.statics import BalanceError, accelerating_start, locked_equilibrium
-from exugear.kernels.connectors import add_connector_forces
-from exugear.kernels.meshes import TILT_STIFFNESS
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.tooth_mesh.kernels.meshes import TILT_STIFFNESS
 
 from ..assembled import assembled
 

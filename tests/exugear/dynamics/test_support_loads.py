@@ -9,14 +9,14 @@ import pytest
 
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.loads import LoadTable
 from exugear.dynamics.signals import SIGNALS
 from exugear.dynamics.statics import accelerating_start, locked_equilibrium, rolled_coordinates
 from exugear.dynamics.support_loads import LoadsUnknownError, support_loads
-from exugear.kernels.meshes import TILT_STIFFNESS
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.solvers.compiled.observers import Observer
-from exugear.solvers.loads import LoadTable
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.tooth_mesh.kernels.meshes import TILT_STIFFNESS
+from exugear.transient.compiled.observers import Observer
 
 from ..table_case import surfaces
 

@@ -10,15 +10,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from exugear.bearings.rolling.potential import rolling_arrays
-from exugear.kernels.connectors import (
+from exugear.bearings.kernels.connectors import (
     ConnectorArrays,
     add_connector_forces,
     add_connector_tangents,
     connector_loads,
     connector_strains,
 )
-from exugear.kernels.rolling import no_rolling
+from exugear.bearings.kernels.rolling import no_rolling
+from exugear.bearings.rolling.potential import rolling_arrays
 
 from ..plain_connectors import DISPLACEMENT, add_forces, connector_load, connector_motion
 from ..rolling_case import BALLS, CYLINDRICAL

@@ -8,11 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from exugear.bearings.rolling.contact import bearing_load, equilibrium, row_contacts, tangent_stiffness
-from exugear.bearings.rolling.potential import rolling_arrays
-from exugear.bearings.rolling.rollers import BearingPair, TaperedRollerBearing
-from exugear.bearings.rolling.rows import BearingError, RollerRow, RollingRow
-from exugear.kernels.rolling import (
+from exugear.bearings.kernels.rolling import (
     CAGE_DAMPING,
     CAGE_TORQUE,
     DAMPED_PART,
@@ -27,6 +23,10 @@ from exugear.kernels.rolling import (
     rolling_tangent,
     selected_rolling,
 )
+from exugear.bearings.rolling.contact import bearing_load, equilibrium, row_contacts, tangent_stiffness
+from exugear.bearings.rolling.potential import rolling_arrays
+from exugear.bearings.rolling.rollers import BearingPair, TaperedRollerBearing
+from exugear.bearings.rolling.rows import BearingError, RollerRow, RollingRow
 
 from ..rolling_case import BALLS, CYLINDRICAL, TAPERED, plain_energy_and_load
 

@@ -10,11 +10,11 @@ import pytest
 import scipy.linalg
 import scipy.optimize
 
+from exugear.bearings.kernels.connectors import ConnectorArrays, add_connector_forces
+from exugear.bearings.kernels.rolling import STORED, rolling_forces, rolling_memory, rolling_tangent
 from exugear.bearings.rolling.potential import rolling_arrays
 from exugear.bearings.rolling.rows import RollingRow
-from exugear.kernels.connectors import ConnectorArrays, add_connector_forces
 from exugear.kernels.inertia import InertiaArrays, accelerations, kinetic_energies
-from exugear.kernels.rolling import STORED, rolling_forces, rolling_memory, rolling_tangent
 
 from ..plain_connectors import add_forces
 from ..rolling_case import BALLS, CYLINDRICAL

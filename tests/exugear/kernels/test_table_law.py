@@ -15,16 +15,16 @@ import xarray as xr
 
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.loads import LoadTable
 from exugear.dynamics.statics import locked_equilibrium
-from exugear.kernels.meshes import DAMPED_POWER
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.runs.runup import simulate
-from exugear.solvers.compiled.observers import Observer
-from exugear.solvers.compiled.solver import CompiledSystem
-from exugear.solvers.loads import LoadTable
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.tooth_mesh.kernels.meshes import DAMPED_POWER
 from exugear.tooth_mesh.laws.forms import add_mesh_forces
 from exugear.tooth_mesh.laws.packing import pack
+from exugear.transient.compiled.observers import Observer
+from exugear.transient.compiled.solver import CompiledSystem
+from exugear.transient.runup import simulate
 from fe_ste.transmission_error.surface import SteSurface
 
 from ..assembled import assembled, modes_with_bodies, simulated

@@ -13,7 +13,7 @@ from exugear.bodies.finite_elements.solid_matrices import assemble
 from exugear.bodies.finite_elements.solid_seats import SolidSeat, seat_rows
 from exugear.bodies.finite_elements.turned_hexahedra import turned_hexahedra
 from exugear.bodies.finite_elements.turned_section import Shaft
-from exugear.kernels.travelling import (
+from exugear.bodies.kernels.travelling import (
     TravellingArrays,
     follow,
     place_travelling,

@@ -14,16 +14,16 @@ from exugear.bodies.finite_elements.shaft_sections import MeshSize, SeatBand, Sh
 from exugear.bodies.finite_elements.solid_seats import SolidSeat
 from exugear.bodies.finite_elements.turned_hexahedra import turned_hexahedra
 from exugear.bodies.finite_elements.turned_section import Shaft
-from exugear.bodies.reduced_body import ReducedBody, RigidInertia
-from exugear.bodies.reduction import with_rigid_inertia
-from exugear.bodies.solids import SolidModel, gyroscopic_matrix, reduce_matrices, reduce_solid
-from exugear.bodies.turning_frame import TurningBody, turning_arrays
-from exugear.kernels.turning import (
+from exugear.bodies.kernels.turning import (
     set_turning_motion,
     turning_energies,
     turning_memory,
     turning_weight_power,
 )
+from exugear.bodies.reduced_body import ReducedBody, RigidInertia
+from exugear.bodies.reduction import with_rigid_inertia
+from exugear.bodies.solids import SolidModel, gyroscopic_matrix, reduce_matrices, reduce_solid
+from exugear.bodies.turning_frame import TurningBody, turning_arrays
 from fe_ste.geometry.gears import Material
 
 STEEL = Material(210e9, 0.3, 7850.0)

@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from exugear.dynamic_factors.dynamic_factor import DynamicFactor, window_factors
-from exugear.dynamic_factors.response_factors import factors, family_factors, response_path
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.parts import RPM
+from exugear.gearbox.reading import CaseError
+from exugear.life.dynamic_factors.dynamic_factor import DynamicFactor, window_factors
+from exugear.life.dynamic_factors.response_factors import factors, family_factors, response_path
 from exugear.life.life import rating_of
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.model.parts import RPM
-from exugear.model.reading import CaseError
 from exugear.project import Project
-from exugear.rotating.rotating_frame import PlanetSet
-from exugear.runs.runup import simulate
+from exugear.steady.mean_system.rotating_frame import PlanetSet
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import stored_or_computed
+from exugear.transient.runup import simulate
 
 from .test_life import TABLE, content_of
 

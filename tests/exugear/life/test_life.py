@@ -19,24 +19,24 @@ from typer.testing import CliRunner
 
 from exugear.bearings.rolling.life import basic_rating_life
 from exugear.cli import app as cli
-from exugear.dynamic_factors.dynamic_factor import stated_factors
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly, VariantError
 from exugear.dynamics.statics import locked_equilibrium, rolled_coordinates
-from exugear.kernels.meshes import FORCE
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.reading import CaseError
+from exugear.gearbox.sections.loads import RatingSection
 from exugear.life.acting_loads import acting_loads
+from exugear.life.dynamic_factors.dynamic_factor import stated_factors
 from exugear.life.gear_life import beyond_tables, flank_lives
 from exugear.life.life import checked_loads, compute_life, rating_of, shortfalls
 from exugear.life.life_diagrams import damage_matrix
 from exugear.life.life_file import limits, read_life
+from exugear.life.load_spectrum.counted import count_loads
 from exugear.life.pair_stresses import pair_stresses
 from exugear.life.static_balance import static_balance
-from exugear.load_spectrum.counted import count_loads
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.model.reading import CaseError
-from exugear.model.sections.loads import RatingSection
 from exugear.project import Project
+from exugear.tooth_mesh.kernels.meshes import FORCE
 from fe_ste.root_stress.mesh_cycle import MeshCycleStress
 from fe_ste.standards.pitting import nominal_contact_stress
 from fe_ste.standards.tooth_root import root_stress_factors

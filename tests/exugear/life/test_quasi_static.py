@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from exugear.exchange.load_files.reading import read_channels
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
 from exugear.life.static_balance import static_balance
-from exugear.load_files.reading import read_channels
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
 from exugear.project import Project
 from exugear.results.run_file import load_run
 

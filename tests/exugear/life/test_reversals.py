@@ -9,10 +9,10 @@ import pytest
 
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.statics import accelerating_start
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.templates.kinds import template
 from exugear.life.static_balance import static_balance
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.templates.kinds import template
 
 from .. import table_case
 from ..spur_case import SPUR_CASE

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from exugear.dynamics.assemble import assemble
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
 from exugear.life.kept_angles import KeptAngles
 from exugear.life.static_balance import static_balance
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
 
 from ..table_case import surfaces
 

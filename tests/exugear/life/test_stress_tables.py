@@ -14,9 +14,9 @@ import pytest
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.bearing_duties import mesh_duties
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
 from exugear.life.stress_tables import LARGEST_STEP, stress_requests
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
 from exugear.tooth_mesh.tables import TableRequest
 from fe_ste.transmission_error.face_load import face_load_factor
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
 from exugear.report.writer import write_report
 from exugear.results.folder import keep_case, modes_path
 from exugear.tooth_mesh.laws.stiffness import mesh_stiffness

@@ -23,10 +23,10 @@ from typer.testing import CliRunner
 
 from exugear.cli import console
 from exugear.cli.app import app
-from exugear.pictures.mode_diagrams import plot_campbell
-from exugear.pictures.scene import mode_figure
-from exugear.spectra.orders import OrderLine
-from exugear.web import pieces as page
+from exugear.report.pictures.mode_diagrams import plot_campbell
+from exugear.report.pictures.scene import mode_figure
+from exugear.report.web import pieces as page
+from exugear.results.spectra.orders import OrderLine
 from fe_ste.tools.rendering import RenderingError
 
 from ..spur_case import SPUR_CASE
@@ -97,7 +97,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Any]]:
         def unable(*arguments: Any, **options: Any) -> None:
             raise RenderingError(f"no picture {MARKUP}")
 
-        patch.setattr("exugear.pictures.scene.draw_gearbox", unable)
+        patch.setattr("exugear.report.pictures.scene.draw_gearbox", unable)
         ended = [
             exugear("check", case),
             exugear("check", case, "--json"),

@@ -6,8 +6,8 @@ import tomllib
 
 import pytest
 
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
 from exugear.project import Project
 from exugear.report.writer import write_report
 

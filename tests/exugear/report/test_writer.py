@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from exugear.dynamics.eigenmodes.modes import eigenmodes
 from exugear.dynamics.fingerprint import input_hash
-from exugear.dynamics.modes import eigenmodes
 from exugear.dynamics.signals import energy_residual
-from exugear.findings.variations import begin_variations
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.model.reading import CaseError
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.reading import CaseError
+from exugear.report.findings.variations import begin_variations
 from exugear.report.writer import ReportError, write_report
 from exugear.results.folder import bodies_folder, keep_case, kept_case, modes_path, note_time, times_spent
 from exugear.tooth_mesh.laws.stiffness import mesh_stiffness

@@ -11,20 +11,20 @@ import pytest
 from typer.testing import CliRunner
 
 from exugear.cli import app as cli
+from exugear.dynamics.eigenmodes.modes import load_modes
 from exugear.dynamics.fingerprint import input_hash
-from exugear.dynamics.modes import load_modes
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.model.reading import CaseError
-from exugear.model.versions import MODES as METHOD
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.reading import CaseError
+from exugear.gearbox.versions import MODES as METHOD
 from exugear.results.folder import kept_case, times_spent
 from exugear.results.run_file import load_run, read_run
 from fe_ste.tools.files import FileError
 from fe_ste.tools.sealed import write_dataset
 
 from ...fe_ste.damage import damages
-from ..runs.test_kills import stopped_run
 from ..spur_case import SPUR_CASE
+from ..transient.test_kills import stopped_run
 
 MODES = Path("rigid") / "iso6336-disc" / "modes.nc"
 RUN = Path("rigid") / "run_up-iso6336-disc" / "run.nc"

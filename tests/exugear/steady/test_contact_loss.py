@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 
 from exugear.dynamics.assemble import assemble
-from exugear.harmonics.branches import trace
-from exugear.harmonics.krylov import HarmonicBalanceError
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.rotating.mesh_ports import DEFLECTION
-from exugear.settling.settled import SettlingRun
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
 from exugear.steady import gearbox_branches
 from exugear.steady.gearbox_branches import follow_branch
+from exugear.steady.harmonics.branches import trace
+from exugear.steady.harmonics.krylov import HarmonicBalanceError
+from exugear.steady.mean_system.mesh_ports import DEFLECTION
 from exugear.steady.point_solver import PointSolver, gearset_of
 from exugear.steady.response import signals
 from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear.steady.settling.settled import SettlingRun
 from exugear.steady.steady_response import response_of
 
 from .. import gear_trains, table_case

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from exugear import Project
-from exugear.model.parts import RPM
-from exugear.rotating.mesh_ports import TILT, mesh_ports
+from exugear.gearbox.parts import RPM
+from exugear.steady.mean_system.mesh_ports import TILT, mesh_ports
 from exugear.steady.point_solver import gearset_of
 from exugear.steady.response import transmission_error_line
 from exugear.steady.settings import SpeedRange, SteadySettings

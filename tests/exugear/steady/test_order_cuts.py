@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from exugear.dynamics.assemble import assemble
-from exugear.model.choice import Choice
-from exugear.rotating.rotating_frame import SteadyError
-from exugear.spectra.orders import OrderLine
-from exugear.spectra.sweeps import sweep_severity
+from exugear.gearbox.choice import Choice
+from exugear.results.spectra.orders import OrderLine
+from exugear.results.spectra.sweeps import sweep_severity
+from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.peaks import compared_peaks, damping_at, peaks, steady_cut
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import to_dataset

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from exugear.dynamics.assemble import assemble
-from exugear.model.choice import Choice
-from exugear.rotating.rotating_frame import SteadyError
+from exugear.gearbox.choice import Choice
 from exugear.steady.gearbox_branches import follow_branch
+from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.nonlinear import Balance, solve_balance
 from exugear.steady.point_solver import PointSolver, gearset_of
 from exugear.steady.response import dissipated_and_given, signals

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from exugear.dynamics.assemble import assemble
-from exugear.model.choice import Choice
+from exugear.gearbox.choice import Choice
 from exugear.project import Project
 from exugear.steady.response import signals
 

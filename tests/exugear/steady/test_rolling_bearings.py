@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from exugear.dynamics.assemble import assemble
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.rotating.rotating_frame import SteadyError
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
 from exugear.steady.gearbox_branches import follow_branch
+from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.nonlinear import Balance
 from exugear.steady.response import dissipated_and_given, signals
 from exugear.steady.settings import SpeedRange, SteadySettings

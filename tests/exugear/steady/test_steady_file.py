@@ -7,10 +7,10 @@ import json
 import numpy as np
 import pytest
 
-from exugear.campbell.campbell import campbell_from
 from exugear.dynamics.assemble import assemble
-from exugear.model.choice import Choice
-from exugear.rotating.rotating_frame import SteadyError
+from exugear.gearbox.choice import Choice
+from exugear.steady.campbell.campbell import campbell_from
+from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.peaks import line_name, peaks, planet_sidebands, sidebands
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import keep_points, kept_points, load_response, partial_path, stored_or_computed

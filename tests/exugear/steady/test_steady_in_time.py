@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from exugear.dynamics.assemble import assemble
-from exugear.dynamics.modes import overall_row
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.rotating.mean_system import torque_of_vibration
-from exugear.solvers.compiled.solver import CompiledSystem
-from exugear.solvers.loads import LoadTable
+from exugear.dynamics.eigenmodes.modes import overall_row
+from exugear.dynamics.loads import LoadTable
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.steady.mean_system.mean_system import torque_of_vibration
 from exugear.steady.nonlinear import Balance
 from exugear.steady.point_solver import PointSolver, gearset_of
 from exugear.steady.response import dissipated_and_given, signals
 from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear.transient.compiled.solver import CompiledSystem
 
 from .. import gear_trains, table_case
 from ..assembled import assembled

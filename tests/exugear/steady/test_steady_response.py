@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from exugear.campbell.campbell import modes_over_speed
 from exugear.dynamics.assemble import assemble
-from exugear.model.choice import Choice
+from exugear.gearbox.choice import Choice
+from exugear.steady.campbell.campbell import modes_over_speed
 from exugear.steady.point_solver import gearset_of
 from exugear.steady.resonances import crossings, with_crossings
 from exugear.steady.response import (

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.gearbox import Gearbox
 from exugear.studies.design.distributions import Normal, correlated, shares
 from exugear.studies.design.reading import StudyError, parse_study
 from exugear.studies.design.sampling import design_of

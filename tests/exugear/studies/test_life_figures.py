@@ -12,10 +12,10 @@ import pytest
 from typer.testing import CliRunner
 
 from exugear.cli.app import app
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.reading import CaseError
 from exugear.life.life_file import summary
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.model.reading import CaseError
 from exugear.project import Project
 from exugear.studies.dataset import load_study
 from exugear.studies.design.reading import StudyError

@@ -44,7 +44,7 @@ def journal_lines(folder):
 
 
 def test_points_are_those_of_gearboxes_varied_one_by_one(here, tmp_path):
-    from exugear.dynamics.modes import eigenmodes
+    from exugear.dynamics.eigenmodes.modes import eigenmodes
     from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 
     study = small_study(tmp_path)
@@ -243,7 +243,7 @@ def test_memory_of_a_worker_does_not_grow_with_its_points(tmp_path):
 
 
 def test_a_run_that_was_stopped_is_gone_on_with(tmp_path, monkeypatch):
-    from exugear.runs import recorder
+    from exugear.transient import recorder
 
     monkeypatch.setattr(recorder, "FLUSH_INTERVAL", 1e-3)
     settings = {

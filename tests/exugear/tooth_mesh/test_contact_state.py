@@ -10,8 +10,11 @@ import scipy.optimize
 
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
 from exugear.kernels.coordinates import TILT
-from exugear.kernels.meshes import (
+from exugear.tooth_mesh.contact_state import ContactState
+from exugear.tooth_mesh.kernels.meshes import (
     CYCLE_POWER,
     DAMPED_POWER,
     ENERGY,
@@ -21,7 +24,7 @@ from exugear.kernels.meshes import (
     TILT_REST,
     TILT_STIFFNESS,
 )
-from exugear.kernels.table_law import (
+from exugear.tooth_mesh.kernels.table_law import (
     ENERGY_DERIVATIVES,
     LAW_BY_MISALIGNMENT,
     LAW_FORCE,
@@ -31,9 +34,6 @@ from exugear.kernels.table_law import (
     scratch_memory,
     surface_law,
 )
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.tooth_mesh.contact_state import ContactState
 from exugear.tooth_mesh.law import MeshCurve
 from exugear.tooth_mesh.laws.packing import pack
 from exugear.tooth_mesh.laws.registry import LAWS, law_of

@@ -9,10 +9,10 @@ import pytest
 
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
-from exugear.kernels.meshes import ENERGY, STATE_SIZE, periodic_cubic, stiffness_at
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
 from exugear.tooth_mesh.element import mesh_elements
+from exugear.tooth_mesh.kernels.meshes import ENERGY, STATE_SIZE, periodic_cubic, stiffness_at
 from exugear.tooth_mesh.laws.forms import add_mesh_forces, mesh_state
 from exugear.tooth_mesh.laws.registry import LAWS as ALL_LAWS
 from exugear.tooth_mesh.laws.registry import law_of

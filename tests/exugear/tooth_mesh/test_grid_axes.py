@@ -11,8 +11,8 @@ import pytest
 import exugear.tooth_mesh.tables
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.statics import static_state
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
 from exugear.project import Project
 from exugear.tooth_mesh.grid_axes import LEAST, REACH, axes_reaching, rounded_up
 from exugear.tooth_mesh.laws.stiffness import mesh_stiffness

@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 
 import exugear.tooth_mesh.tables
 from exugear.cli.app import app
-from exugear.model.gearbox import Gearbox
-from exugear.templates.kinds import template
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.templates.kinds import template
 from exugear.tooth_mesh.tables import fitting_table
 from fe_ste.transmission_error.states import CUT_OFF
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from exugear.dynamics.assemble import assemble
-from exugear.kernels.meshes import periodic_cubic
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.tooth_mesh.kernels.meshes import periodic_cubic
 from exugear.tooth_mesh.law import MeshCurve
 from exugear.tooth_mesh.laws.forms import row_law
 from exugear.tooth_mesh.laws.line_of_action import CURVE_FORM, STIFFNESS_FORM, curve_coefficients

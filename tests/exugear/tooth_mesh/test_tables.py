@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 
 import exugear.tooth_mesh.tables
 from exugear.cli.app import app
-from exugear.model.gearbox import Gearbox
-from exugear.model.reading import CaseError
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.reading import CaseError
 from exugear.report.writer import write_report
 from exugear.tooth_mesh.law import MeshCurve
 from exugear.tooth_mesh.laws.stiffness import mesh_stiffness

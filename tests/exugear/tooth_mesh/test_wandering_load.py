@@ -10,8 +10,8 @@ import pytest
 from typer.testing import CliRunner
 
 from exugear.cli.app import app
-from exugear.model.gearbox import Gearbox
-from exugear.templates.kinds import template
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.templates.kinds import template
 from exugear.tooth_mesh.tables import fitting_table, requested_tables
 from exugear.tooth_mesh.wandering_load import wandering_loads
 

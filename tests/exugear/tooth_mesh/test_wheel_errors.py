@@ -11,16 +11,16 @@ import xarray as xr
 
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.loads import LoadTable
 from exugear.dynamics.statics import accelerating_start, locked_equilibrium
-from exugear.model.choice import Choice
-from exugear.model.gearbox import Gearbox
-from exugear.model.reading import CaseError
-from exugear.runs.runup import simulate
-from exugear.solvers.compiled.solver import CompiledSystem
-from exugear.solvers.loads import LoadTable
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.reading import CaseError
 from exugear.tooth_mesh.laws.packing import pack
 from exugear.tooth_mesh.placement import MeshGeometry, loaded_flanks, tooth_places
 from exugear.tooth_mesh.wheel_errors import contact_line_shares
+from exugear.transient.compiled.solver import CompiledSystem
+from exugear.transient.runup import simulate
 
 from ..assembled import assembled
 from ..table_case import surfaces

@@ -190,7 +190,7 @@ def test_compiled_functions_read_only_what_the_digest_covers() -> None:
         for file in (ROOT / package).rglob("*.py")
     }
     with_kernels = {name: text for name, text in sources.items() if "fe_ste.tools.compilation import" in text}
-    assert {"fe_ste.contact.near_field", "exugear.solvers.compiled.equations"} <= set(with_kernels)
+    assert {"fe_ste.contact.near_field", "exugear.transient.compiled.equations"} <= set(with_kernels)
     assert not [name for name, text in sources.items() if "njit" in text and name != "fe_ste.tools.compilation"]
     others = {name for name, text in sources.items() if "fe_ste.tools.compilation" not in text}
     frozen = {name: list(foreign_names(text, others)) for name, text in with_kernels.items()}

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from exugear.model.gearbox import Gearbox
+from exugear.gearbox.gearbox import Gearbox
 from exugear.tooth_mesh.grid_axes import axes_reaching
 from fe_ste.contact.cells import ContactSettings
 from fe_ste.elasticity.flank import flank_compliance

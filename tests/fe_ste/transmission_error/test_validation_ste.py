@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from exugear.model.gearbox import Gearbox
-from exugear.model.parts import PairSpec
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.parts import PairSpec
 from fe_ste.contact.cells import ContactSettings
 from fe_ste.elasticity.flank import FlankCompliance, flank_compliance
 from fe_ste.elasticity.hexmesh import MeshSettings

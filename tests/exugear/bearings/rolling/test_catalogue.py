@@ -10,7 +10,7 @@ from exugear.bearings.rolling.catalogue import catalogue_rows, estimates, with_e
 from exugear.bearings.rolling.contact import element_loads, equilibrium, pitch_averaged_tangent, row_contacts
 from exugear.bearings.rolling.point_contact import ball_pressure, elliptic_contact
 from exugear.bearings.rolling.rows import BallRow, BearingError, BearingOfRows, RollerRow
-from exugear.model.sections.connections import BearingType, CatalogueSection
+from exugear.gearbox.sections.connections import BearingType, CatalogueSection
 
 TYPES = get_args(BearingType)
 SIZES = [(10.0, 26.0, 8.0), (25.0, 52.0, 15.0), (160.0, 290.0, 80.0), (400.0, 500.0, 46.0), (1000.0, 1220.0, 128.0)]

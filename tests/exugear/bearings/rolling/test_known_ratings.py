@@ -12,7 +12,7 @@ import pytest
 from exugear.bearings.duty import ratings_of
 from exugear.bearings.rolling import known_ratings
 from exugear.bearings.rolling.known_ratings import known_rating
-from exugear.model.sections.connections import CatalogueSection
+from exugear.gearbox.sections.connections import CatalogueSection
 
 from .test_catalogue import PRINTED as STATIC_RATINGS
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from exugear.bearings.duty import ratings_of
+from exugear.bearings.kernels.rolling import ELASTIC_PART, rolling_forces, rolling_memory
 from exugear.bearings.rolling.catalogue import catalogue_rows, estimates
 from exugear.bearings.rolling.contact import (
     bearing_load,
@@ -17,8 +18,7 @@ from exugear.bearings.rolling.contact import (
 from exugear.bearings.rolling.life import reference_life
 from exugear.bearings.rolling.potential import rolling_arrays
 from exugear.bearings.rolling.rows import RIB_APPROACH, BearingError, BearingOfRows, on_raceways
-from exugear.kernels.rolling import ELASTIC_PART, rolling_forces, rolling_memory
-from exugear.model.sections.connections import CatalogueSection
+from exugear.gearbox.sections.connections import CatalogueSection
 
 PLAIN = {"type": "cylindrical_roller", "bore_mm": 60.0, "outer_diameter_mm": 130.0, "width_mm": 31.0}
 

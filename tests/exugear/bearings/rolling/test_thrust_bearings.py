@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from exugear.bearings.duty import loads_of_rows, ratings_of
+from exugear.bearings.kernels.rolling import ELASTIC_PART, rolling_forces, rolling_memory
 from exugear.bearings.rolling.catalogue import catalogue_rows
 from exugear.bearings.rolling.contact import (
     bearing_load,
@@ -26,8 +27,7 @@ from exugear.bearings.rolling.ratings import (
     thrust_contact_factor,
 )
 from exugear.bearings.rolling.rows import BearingError, BearingOfRows
-from exugear.kernels.rolling import ELASTIC_PART, rolling_forces, rolling_memory
-from exugear.model.sections.connections import CatalogueSection
+from exugear.gearbox.sections.connections import CatalogueSection
 
 KIND = "thrust_spherical_roller"
 SIZES = {"type": KIND, "bore_mm": 200.0, "outer_diameter_mm": 340.0, "width_mm": 85.0}

@@ -1,0 +1,1 @@
+"""Compiled laws of bearings on arrays of coordinates."""

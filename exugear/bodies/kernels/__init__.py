@@ -1,0 +1,1 @@
+"""Compiled laws of elastic bodies on arrays of coordinates."""

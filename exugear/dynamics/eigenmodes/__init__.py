@@ -1,0 +1,1 @@
+"""Eigenmodes at the static load: shapes, energies, what moves them."""

@@ -1,0 +1,1 @@
+"""Files of other programs: gearboxes and loads, in and out."""

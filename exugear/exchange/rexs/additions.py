@@ -1,0 +1,110 @@
+"""Attributes that are put into a REXS file as it stands: all other bytes stay as they are."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from exugear.exchange.rexs.faults import RexsError
+from exugear.exchange.rexs.synonyms import degree_sign
+
+OWN = "custom_exugear_"
+"""Beginning of the attributes that REXS has no name for; other programs pass them over."""
+JSON_KINDS: Mapping[type, str] = {str: "string", float: "floating_point", tuple: "floating_point_array"}
+"""Key of a value in JSON."""
+
+AdditionValue = str | float | tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Addition:
+    """An attribute for a component.
+
+    Attributes
+    ----------
+    component : int
+    name : str
+        In the version of the file.
+    unit : str
+    value : str, float or tuple of float
+    load_case : int, optional
+        The load case that the value belongs to; None for the component itself.
+    """
+
+    component: int
+    name: str
+    unit: str
+    value: AdditionValue
+    load_case: int | None = None
+
+
+Edit = tuple[int, int, str]
+"""What stands between two places of a text, and what is put there instead."""
+
+
+def edited(text: str, edits: Iterable[Edit]) -> str:
+    """Text after some edits, none of which overlap; those at one place follow each other as given.
+
+    Examples
+    --------
+    >>> edited("abcd", [(3, 3, "-"), (0, 1, "A"), (3, 3, "+")])
+    'Abc-+d'
+    """
+    pieces, place = [], 0
+    for start, end, new in sorted(edits, key=lambda edit: edit[:2]):
+        pieces += [text[place:start], new]
+        place = end
+    return "".join([*pieces, text[place:]])
+
+
+def by_place(additions: Iterable[Addition]) -> dict[tuple[int | None, int], dict[str, Addition]]:
+    """Additions by load case and component, then by name.
+
+    Raises
+    ------
+    RexsError
+        Two of one name at one place.
+    """
+    gathered: dict[tuple[int | None, int], dict[str, Addition]] = {}
+    for one in additions:
+        names = gathered.setdefault((one.load_case, one.component), {})
+        if one.name in names:
+            raise RexsError(f"component {one.component}: two results would be called {one.name}")
+        names[one.name] = one
+    return gathered
+
+
+def number(value: float) -> str:
+    """Write a number as files have it: ten digits, always with a point or an exponent.
+
+    Examples
+    --------
+    >>> number(2.0), number(-0.0), number(1e20), number(1.0 / 3.0)
+    ('2.0', '0.0', '1e+20', '0.3333333333')
+    """
+    return repr(float(f"{value:.10g}") + 0.0)
+
+
+def unit_in(unit: str, version: tuple[int, int]) -> str:
+    """Return a unit as a version writes it.
+
+    Examples
+    --------
+    >>> unit_in("deg", (1, 1)), unit_in("deg", (1, 4)), unit_in("MPa", (1, 7))
+    ('°', 'deg', 'N / mm^2')
+    """
+    if unit == "deg":
+        return degree_sign(version)
+    return "N / mm^2" if unit == "MPa" and version < (2, 0) else unit
+
+
+def json_entry(addition: Addition) -> str:
+    """Attribute as JSON has it."""
+    value = addition.value
+    kind = JSON_KINDS[type(value)]
+    if isinstance(value, tuple):
+        shown = f"[{', '.join(map(number, value))}]"
+    else:
+        shown = json.dumps(value) if isinstance(value, str) else number(value)
+    return f'{{"id": {json.dumps(addition.name)}, "unit": {json.dumps(addition.unit)}, "{kind}": {shown}}}'

@@ -1,0 +1,178 @@
+"""A REXS file as it lies on the disk: XML, JSON, or a zip archive with one of them."""
+
+from __future__ import annotations
+
+import copy
+import io
+import lzma
+import struct
+import zipfile
+import zlib
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+from exugear.exchange.rexs import json_additions, xml_additions
+from exugear.exchange.rexs.additions import Addition, by_place
+from exugear.exchange.rexs.faults import RexsError, plain
+from exugear.exchange.rexs.parsing import is_json, parse_model
+from exugear.exchange.rexs.tree import Model
+from fe_ste.tools.files import FileError, open_regular
+
+LARGEST = 64_000_000
+"""Most bytes of a model, unpacked; the largest found is a tenth of it."""
+MOST_MEMBERS = 1000
+"""Most members of an archive."""
+_DAMAGES = (
+    zipfile.BadZipFile,
+    NotImplementedError,
+    RuntimeError,
+    EOFError,
+    OSError,
+    ValueError,
+    struct.error,
+    zlib.error,
+    lzma.LZMAError,
+)
+_ENDINGS = (".rexs", ".rexsj", ".xml", ".json")
+
+
+def read_rexs(path: str | Path) -> Model:
+    """Read a REXS file of version 1.0 to 2.0; what it holds tells its kind, not its name.
+
+    Nothing outside the file is read, and of an archive nothing but its one model, in memory.
+
+    Raises
+    ------
+    RexsError
+        The file cannot be read, is no REXS file or asks for more than one may.
+
+    Examples
+    --------
+    >>> read_rexs("tests/exugear/exchange/rexs/data/SEW_3-stage_cylindrical_gearbox_1.0.rexs")
+    <Model REXS 1.0: 86 components, 82 relations>
+    """
+    return parsed(_bytes_of(path), path)
+
+
+def parsed(content: bytes, path: str | Path) -> Model:
+    """Read the bytes of a REXS file; `path` is for messages.
+
+    Raises
+    ------
+    RexsError
+        As in `read_rexs`.
+    """
+    try:
+        return parse_model(_member(content)[1] if _is_archive(content) else content)
+    except RexsError as error:
+        raise RexsError(*(f"{path}: {fault}" for fault in error.faults)) from None
+
+
+def with_additions(path: str | Path, additions: Iterable[Addition]) -> bytes:
+    """Bytes of a REXS file with attributes added: the same kind, version and encoding, and all else as it is.
+
+    An attribute that its component has already is replaced. Of an archive the other members stay.
+
+    Parameters
+    ----------
+    path : path-like
+    additions : iterable of Addition
+
+    Raises
+    ------
+    RexsError
+        The file cannot be read, or an addition names a component that it does not have.
+    """
+    content = _bytes_of(path)
+    model = parsed(content, path)
+    placed = by_place(additions)
+    cases = {case.number for case in model.load_cases}
+    for case, component in placed:
+        if component not in model.components or not (case is None or case in cases):
+            raise RexsError(
+                f"{path}: there is no component {component}" + ("" if case is None else f", load case {case}")
+            )
+    if not _is_archive(content):
+        return _put_in(content, placed)
+    member, unpacked = _member(content)
+    return _repacked(content, member, _put_in(unpacked, placed))
+
+
+def _repacked(content: bytes, member: str, new: bytes) -> bytes:
+    """Archive with a new member in the place of an old one; the bytes of all others stay, packed as they are."""
+    packed = io.BytesIO()
+    with _damage_told(), zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(packed, "w") as target:
+        target.comment = old.comment
+        members = sorted(old.infolist(), key=lambda one: one.header_offset)
+        stops = [*(one.header_offset for one in members[1:]), old.start_dir]
+        for one, stop in zip(members, stops, strict=True):
+            if one.filename == member:
+                target.writestr(one, new)
+                continue
+            start, moved = one.header_offset, copy.copy(one)
+            moved.header_offset = packed.tell()
+            packed.write(content[start:stop])
+            target.filelist.append(moved)
+            target.start_dir = packed.tell()
+    return packed.getvalue()
+
+
+def _put_in(content: bytes, placed: Mapping[tuple[int | None, int], Mapping[str, Addition]]) -> bytes:
+    if is_json(content):
+        return json_additions.with_additions(content, placed)
+    return xml_additions.with_additions(content, placed)
+
+
+def _bytes_of(path: str | Path) -> bytes:
+    try:
+        with open_regular(Path(path)) as file:
+            content = file.read(LARGEST + 1)
+    except FileError as error:
+        raise RexsError(str(error)) from None
+    try:
+        _check_size(len(content))
+    except RexsError as error:
+        raise RexsError(f"{path}: {error}") from None
+    return content
+
+
+def _is_archive(content: bytes) -> bool:
+    return content[:2] == b"PK"
+
+
+def _check_size(size: int) -> None:
+    if size > LARGEST:
+        raise RexsError(f"is larger than {LARGEST / 1e6:g} MB")
+
+
+def _member(content: bytes) -> tuple[str, bytes]:
+    """Name and bytes of the one model in an archive."""
+    with _damage_told(), zipfile.ZipFile(io.BytesIO(content)) as archive:
+        members = archive.infolist()
+        if len(members) > MOST_MEMBERS:
+            raise RexsError(f"the archive has {len(members)} members; {MOST_MEMBERS} are the most")
+        if len({one.header_offset for one in members}) < len(members):
+            raise RexsError("the archive is damaged: two of its members lie at one place")
+        models = [one for one in members if one.filename.lower().endswith(_ENDINGS) and not one.is_dir()]
+        if len(models) != 1:
+            names = ", ".join(plain(one.filename) for one in models[:5]) or "none"
+            raise RexsError(f"the archive must hold one model ({', '.join(_ENDINGS)}); it holds {names}")
+        if models[0].flag_bits & 1:
+            raise RexsError("the archive is encrypted; only open ones can be read")
+        _check_size(models[0].file_size)
+        with archive.open(models[0]) as file:
+            unpacked = file.read(LARGEST + 1)
+    _check_size(len(unpacked))
+    return models[0].filename, unpacked
+
+
+@contextmanager
+def _damage_told() -> Iterator[None]:
+    """Tell in words what an archive is damaged by; the modules that unpack raise what they meet."""
+    try:
+        yield
+    except RexsError:
+        raise
+    except _DAMAGES as error:
+        raise RexsError(f"the archive is damaged: {plain(error)}") from None

@@ -1,0 +1,315 @@
+"""XML and JSON of REXS into the tree of a model, with limits on what a stranger's file may ask for."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+from xml.parsers import expat
+
+import numpy as np
+
+from exugear.exchange.rexs import synonyms
+from exugear.exchange.rexs.encodings import decoded
+from exugear.exchange.rexs.faults import RexsError, plain
+from exugear.exchange.rexs.tree import Attribute, Component, LoadCase, Model, Relation, Value
+
+DEEPEST = 24
+"""Most levels of nesting; a REXS file has nine."""
+MOST_ELEMENTS = 500_000
+"""Most elements of an XML file; the largest found has 20,000."""
+LONGEST_WHOLE = 30
+"""Digits from which on a whole number of JSON is read as a float."""
+CODES = {"int32": "<i4", "float32": "<f4", "float64": "<f8"}
+"""Numbers packed as base64 (since 1.4): little-endian, matrices row by row."""
+_FORBIDDEN = ("data_source", "referenced_component_id")
+
+
+def parse_model(content: bytes) -> Model:
+    """Read the model in the bytes of an XML or JSON file, whichever they are.
+
+    Raises
+    ------
+    RexsError
+        What is wrong with the file.
+    """
+    if is_json(content):
+        return _model(_header_of_json(content))
+    if _start(content) == b"<":
+        return _model(_header_of_xml(content))
+    raise RexsError("the file is neither XML nor JSON nor a zip archive of one of them: it is no REXS file")
+
+
+def is_json(content: bytes) -> bool:
+    """Tell whether the bytes of a file begin as JSON does."""
+    return _start(content) in (b"{", b"[")
+
+
+def _start(content: bytes) -> bytes:
+    return content[:200].lstrip(b"\xef\xbb\xbf\xff\xfe \t\r\n\x00")[:1]
+
+
+@dataclass
+class _Raw:
+    """A model as both formats give it: plain values, names as in the file."""
+
+    version: str
+    program: str
+    relations: list[tuple[dict[str, Any], list[dict[str, Any]]]]
+    components: list[tuple[dict[str, Any], list[tuple[str, Attribute]]]]
+    load_cases: list[tuple[dict[str, Any], list[tuple[dict[str, Any], list[tuple[str, Attribute]]]]]]
+
+
+# -- the tree ------------------------------------------------------------------------------------------------
+
+
+def _model(raw: _Raw) -> Model:
+    _check_version(raw.version)
+    faults: list[str] = []
+    components: dict[int, Component] = {}
+    for head, attributes in raw.components:
+        number = _identifier(head.get("id"), "a component")
+        if number in components:
+            faults.append(f"two components have the id {number}")
+        kind = str(head.get("type", ""))
+        named = _present_names(attributes)
+        components[number] = Component(number, synonyms.TYPES.get(kind, kind), str(head.get("name") or ""), named)
+        outside = [key for key in _FORBIDDEN if key in named]
+        if outside:
+            faults.append(f"{components[number]}: {outside[0]} points outside the file, whose data alone are read")
+    relations = [_relation(head, references, components, faults) for head, references in raw.relations]
+    if faults:
+        raise RexsError(*faults)
+    cases = tuple(
+        LoadCase(
+            _identifier(head.get("id"), "a load case"),
+            {_identifier(one.get("id"), "a component"): _present_names(attributes) for one, attributes in parts},
+        )
+        for head, parts in raw.load_cases
+    )
+    return Model(raw.version, raw.program, components, tuple(relations), cases)
+
+
+def _check_version(version: str) -> None:
+    match = re.fullmatch(r"(\d{1,3})\.(\d{1,3})(\.\d{1,3})?", version)
+    number = (int(match[1]), int(match[2])) if match else (0, 0)
+    if not synonyms.LEAST_VERSION <= number <= synonyms.LAST_VERSION:
+        least, last = (".".join(map(str, one)) for one in (synonyms.LEAST_VERSION, synonyms.LAST_VERSION))
+        raise RexsError(f"the file is of REXS version '{plain(version)}'; versions {least} to {last} can be read")
+
+
+def _relation(
+    head: Mapping[str, Any],
+    references: Sequence[Mapping[str, Any]],
+    components: Mapping[int, Component],
+    faults: list[str],
+) -> Relation:
+    kind = str(head.get("type", ""))
+    roles = {}
+    for reference in references:
+        role, number = str(reference.get("role", "")), _identifier(reference.get("id"), "a reference")
+        roles[synonyms.ROLES.get(role, role)] = number
+        if number not in components:
+            faults.append(f"relation {plain(head.get('id'))} ({plain(kind)}): there is no component {number}")
+    order = head.get("order")
+    return Relation(synonyms.RELATIONS.get(kind, kind), 0 if order is None else _identifier(order, "an order"), roles)
+
+
+def _present_names(attributes: Sequence[tuple[str, Attribute]]) -> dict[str, Attribute]:
+    """Attributes by their present names; where old and new stand side by side the new one counts."""
+    named = {synonyms.ATTRIBUTES.get(key, key): attribute for key, attribute in attributes}
+    return named | {key: attribute for key, attribute in attributes if key in named}
+
+
+def _identifier(value: Any, what: str) -> int:
+    try:
+        number = float(value)
+        if number == int(number) and abs(number) < 1e15:
+            return int(number)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise RexsError(f"{what} has the id '{plain(value)}'; expected a whole number")
+
+
+def _unpacked(code: str, text: str, rows: int | None) -> tuple[Value, ...]:
+    """Numbers of a base64 text; those of a matrix as its rows.
+
+    A text that is cut short is refused, as REXS pads none.
+    """
+    if code not in CODES:
+        raise RexsError(f"an array is packed as '{plain(code)}'; expected one of {', '.join(CODES)}")
+    try:
+        content = base64.b64decode("".join(text.split()), validate=True)
+        values = np.frombuffer(content, CODES[code]).astype(float)
+    except (binascii.Error, ValueError) as error:
+        raise RexsError(f"an array packed as base64 is damaged: {error}") from None
+    if rows is None:
+        return tuple(float(value) for value in values)
+    if rows < 1 or len(values) % rows:
+        raise RexsError(f"a packed matrix of {len(values)} numbers cannot have {rows} rows")
+    return tuple(tuple(float(value) for value in row) for row in values.reshape(rows, -1))
+
+
+# -- JSON ----------------------------------------------------------------------------------------------------
+
+
+def _header_of_json(content: bytes) -> _Raw:
+    try:
+        tree = json.loads(content.decode("utf-8-sig"), parse_constant=_no_number, parse_int=_whole_number)
+    except UnicodeDecodeError:
+        raise RexsError("the file is not UTF-8, as JSON must be") from None
+    except json.JSONDecodeError as error:
+        raise RexsError(f"the file is no JSON: {error.msg} in line {error.lineno}") from None
+    except RecursionError:
+        raise RexsError("the file is nested far deeper than any REXS file") from None
+    model = _table(_table(tree, "the file").get("model"), "model")
+    spectra = model.get("load_spectrum") or []
+    spectra = spectra if isinstance(spectra, list) else [spectra]
+    cases = [case for spectrum in spectra for case in _tables(spectrum, "load_cases")]
+    return _Raw(
+        str(model.get("version", "")),
+        f"{model.get('applicationId', '')} {model.get('applicationVersion', '')}".strip(),
+        [(one, list(_tables(one, "refs"))) for one in _tables(model, "relations")],
+        [(one, list(_json_attributes(one))) for one in _tables(model, "components")],
+        [(case, [(one, list(_json_attributes(one))) for one in _tables(case, "components")]) for case in cases],
+    )
+
+
+def _whole_number(digits: str) -> int | float:
+    """Whole number; one of more digits than any id has is a float, and infinite beyond that: it costs no time."""
+    return int(digits) if len(digits) < LONGEST_WHOLE else float(digits)
+
+
+def _no_number(text: str) -> float:
+    raise RexsError(f"the file holds '{text}', which is no finite number")
+
+
+def _table(value: Any, what: str) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise RexsError(f"{what} is no JSON object: this is no REXS file")
+    return value
+
+
+def _tables(parent: Mapping[str, Any], key: str) -> Iterator[dict[str, Any]]:
+    """Objects of a list, which may be missing."""
+    values = _table(parent, key).get(key) or []
+    if not isinstance(values, list):
+        raise RexsError(f"{key} is no list: this is no REXS file")
+    return (_table(value, f"an entry of {key}") for value in values)
+
+
+def _json_attributes(component: Mapping[str, Any]) -> Iterator[tuple[str, Attribute]]:
+    for attribute in _tables(component, "attributes"):
+        values = [value for key, value in attribute.items() if key not in ("id", "unit")]
+        if values and values[0] is not None:
+            yield str(attribute.get("id", "")), Attribute(_json_value(values[0]), str(attribute.get("unit") or ""))
+
+
+def _json_value(value: Any, depth: int = 0) -> Value:
+    if isinstance(value, list):
+        if depth > 2:
+            raise RexsError("an array is nested deeper than a matrix")
+        return tuple(_json_value(entry, depth + 1) for entry in value)
+    if isinstance(value, dict):
+        rows = value.get("rows")
+        return _unpacked(
+            str(value.get("code", "")), str(value.get("value", "")), None if rows is None else _identifier(rows, "rows")
+        )
+    if isinstance(value, int) and not isinstance(value, bool):
+        return float(value)
+    return value if isinstance(value, str | bool | float) else ""
+
+
+# -- XML -----------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class _Element:
+    tag: str
+    attributes: dict[str, str]
+    children: list[_Element] = field(default_factory=list)
+    texts: list[str] = field(default_factory=list)
+
+    @property
+    def text(self) -> str:
+        return "".join(self.texts).strip()
+
+    def all(self, tag: str) -> Iterator[_Element]:
+        return (child for child in self.children if child.tag == tag)
+
+
+def _header_of_xml(content: bytes) -> _Raw:
+    model = _elements(content)
+    if model.tag != "model":
+        raise RexsError(f"the outermost element is '{plain(model.tag)}', not 'model': this is no REXS file")
+    get = model.attributes.get
+    relations = [one for group in model.all("relations") for one in group.all("relation")]
+    components = [one for group in model.all("components") for one in group.all("component")]
+    cases = [one for spectrum in model.all("load_spectrum") for one in spectrum.all("load_case")]
+    return _Raw(
+        get("version", ""),
+        f"{get('applicationId', '')} {get('applicationVersion', '')}".strip(),
+        [(one.attributes, [dict(reference.attributes) for reference in one.all("ref")]) for one in relations],
+        [(one.attributes, list(_xml_attributes(one))) for one in components],
+        [
+            (case.attributes, [(one.attributes, list(_xml_attributes(one))) for one in case.all("component")])
+            for case in cases
+        ],
+    )
+
+
+def _xml_attributes(component: _Element) -> Iterator[tuple[str, Attribute]]:
+    for one in component.all("attribute"):
+        value = _xml_value(one.children[0]) if one.children else one.text
+        yield one.attributes.get("id", ""), Attribute(value, one.attributes.get("unit", ""))
+
+
+def _xml_value(element: _Element) -> Value:
+    """Value of an array, a matrix or an array of arrays."""
+    if "code" in element.attributes:
+        rows = _identifier(element.attributes.get("rows"), "rows") if element.tag == "matrix" else None
+        return _unpacked(element.attributes["code"], element.text, rows)
+    return tuple(_xml_value(child) if child.tag in ("r", "array") else child.text for child in element.children)
+
+
+def _elements(content: bytes) -> _Element:
+    """Tree of an XML file; a file that declares anything of its own is refused."""
+    top = _Element("", {})
+    open_elements, count = [top], 0
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal count
+        count += 1
+        if count > MOST_ELEMENTS or len(open_elements) > DEEPEST:
+            raise RexsError("the file has more elements, or deeper ones, than any REXS file")
+        element = _Element(tag.rpartition(":")[2], attributes)
+        open_elements[-1].children.append(element)
+        open_elements.append(element)
+
+    def refuse(*_: object) -> None:
+        raise RexsError("the file has a DOCTYPE or an entity of its own, which no REXS file has and none may")
+
+    parser = expat.ParserCreate("utf-8")
+    parser.buffer_text = True
+    parser.StartElementHandler = start
+    parser.EndElementHandler = _closing(open_elements)
+    parser.CharacterDataHandler = lambda text: open_elements[-1].texts.append(text)
+    parser.StartDoctypeDeclHandler = refuse
+    parser.EntityDeclHandler = refuse
+    try:
+        parser.Parse(decoded(content).text, True)
+    except expat.ExpatError as error:
+        reason = expat.errors.messages.get(error.code, "cannot be parsed")
+        raise RexsError(f"the file is no XML: {reason} in line {error.lineno}") from None
+    return top.children[0]
+
+
+def _closing(open_elements: list[_Element]) -> Callable[[str], None]:
+    def end(_: str) -> None:
+        open_elements.pop()
+
+    return end

@@ -1,0 +1,391 @@
+"""Which components turn as one body, which of these are planets of a set, and what each is called."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from exugear.exchange.rexs.faults import RexsError
+from exugear.exchange.rexs.to_case.notes import Notes
+from exugear.exchange.rexs.to_case.places import Places
+from exugear.exchange.rexs.tree import Component, Model
+
+GEARS = ("cylindrical_gear", "ring_gear")
+JOINING = (
+    "coupling",
+    "switchable_coupling",
+    "cylindrical_interference_fit",
+    "tapered_interference_fit",
+    "feather_key_connection",
+    "involute_spline_connection",
+)
+"""Types that can join their inner and outer part."""
+RIGID_TORSION = 1e12
+"""Torsional stiffness (N m/rad) from which on a connection is one piece; the files mean rigid by 1e17."""
+RIGID_ABOVE = {"radial_stiffness": 1e14, "axial_stiffness": 1e14, "bending_stiffness": 1e11}
+"""Stiffness (N/m, N m/rad) from which on a file means rigid; no bearing has as much."""
+STIFFNESSES = {
+    "radial_stiffness": ("radial_N_per_m", "N / m", 1.0),
+    "axial_stiffness": ("axial_N_per_m", "N / m", 1.0),
+    "bending_stiffness": ("tilt_N_m_per_rad", "N mm / rad", 1e-3),
+}
+"""Attributes of bearings and couplings: key of the gearbox file, unit, and factor from it to SI."""
+COAXIAL = 2e-3
+"""Largest distance of axes that count as one, mm."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """Components that move as one.
+
+    Attributes
+    ----------
+    name : str
+        In the gearbox file.
+    parts : tuple of Component
+        Shafts, plates and gears.
+    axis : (float, float)
+        mm.
+    fixed : bool
+    others : tuple of tuple of Component
+        Parts of the other planets of a set, in the order of their angles.
+    angles : tuple of float
+        Angles of the planets on the carrier, deg; empty for what is no planet.
+    orbit : float
+        Their distance from the carrier's axis, mm.
+    carrier : str
+        Empty for what is no planet.
+    """
+
+    name: str
+    parts: tuple[Component, ...]
+    axis: tuple[float, float]
+    fixed: bool = False
+    others: tuple[tuple[Component, ...], ...] = ()
+    angles: tuple[float, ...] = ()
+    orbit: float = 0.0
+    carrier: str = ""
+
+    def of_type(self, *types: str) -> tuple[Component, ...]:
+        """Parts of some types."""
+        return tuple(part for part in self.parts if part.type in types)
+
+    @property
+    def gears(self) -> tuple[Component, ...]:
+        """Gears of the body, of planets those of the first."""
+        return self.of_type(*GEARS)
+
+
+class Bodies:
+    """All bodies of a gearbox, by name and by component."""
+
+    def __init__(self, members: Sequence[Body]) -> None:
+        self.members = tuple(members)
+        self._of_part = {part.number: body for body in members for part in body.parts}
+        self._of_other = {part.number: body for body in members for each in body.others for part in each}
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<Bodies: {', '.join(body.name for body in self.members)}>"
+
+    def of(self, part: Component) -> Body | None:
+        """Body of a component; None for what is idle, or a planet that is not the first of its set."""
+        return self._of_part.get(part.number)
+
+    def of_any(self, part: Component) -> Body | None:
+        """Body of a component, whichever planet of a set it belongs to."""
+        return self._of_part.get(part.number) or self._of_other.get(part.number)
+
+
+class _Union:
+    """Disjoint sets of components."""
+
+    def __init__(self, numbers: Iterable[int]) -> None:
+        self._parent = {number: number for number in numbers}
+
+    def __contains__(self, number: int) -> bool:
+        return number in self._parent
+
+    def root(self, number: int) -> int:
+        while self._parent[number] != number:
+            self._parent[number] = number = self._parent[self._parent[number]]
+        return number
+
+    def join(self, first: int, second: int) -> None:
+        self._parent[self.root(second)] = self.root(first)
+
+
+def torsional_stiffness(connection: Component) -> float | None:
+    """Torsional stiffness of a coupling or fit, N m/rad; None where the file gives none."""
+    value = connection.quantity("rotational_stiffness", "N mm / rad")
+    return None if value is None else 1e-3 * value
+
+
+def is_rigid_in_torsion(connection: Component) -> bool:
+    """Tell whether both sides turn as one."""
+    torsion = torsional_stiffness(connection)
+    return torsion is None or torsion >= RIGID_TORSION
+
+
+def is_one_piece(connection: Component) -> bool:
+    """Tell whether a coupling or fit makes one body of both sides: rigid in all that it says something of.
+
+    A shaft behind a coupling that is stiff in torsion and soft across the axis, such as a floating sun, moves for
+    itself.
+    """
+    if not is_rigid_in_torsion(connection) or connection.flag("radial_force_absorption") is False:
+        return False
+    for key, (_, unit, factor) in STIFFNESSES.items():
+        value = connection.quantity(key, unit)
+        if value is not None and factor * value < RIGID_ABOVE[key]:
+            return False
+    return True
+
+
+def is_engaged(model: Model, connection: Component) -> bool:
+    """Tell whether a switchable coupling is closed in the gear that the file stands in."""
+    unit = model.of_type("gear_unit")
+    shift = (unit[0].whole("gear_shift_index") if unit else None) or 1
+    return connection.type != "switchable_coupling" or connection.flag("is_engaged", shift - 1) is not False
+
+
+def ends(model: Model, connection: Component) -> tuple[Component, Component] | None:
+    """Inner and outer part of a bearing, coupling or fit; None if the file does not say both."""
+    inner = model.related("side", "assembly", connection.number, "inner_part")
+    outer = model.related("side", "assembly", connection.number, "outer_part")
+    return (inner[0], outer[0]) if inner and outer else None
+
+
+def find_bodies(model: Model, places: Places, notes: Notes) -> Bodies:
+    """Gather components into bodies.
+
+    Raises
+    ------
+    RexsError
+        Planets that are not equal, or whose carrier cannot be told.
+    """
+    union = _joined(model, notes)
+    groups: dict[int, list[Component]] = {}
+    for part in model.of_type("shaft", "side_plate", "gear_casing", *GEARS):
+        groups.setdefault(union.root(part.number), []).append(part)
+    working = _working(model, union)
+    sets = _planet_sets(model, places, union, groups)
+    planets = {root for members in sets for root, _ in members}
+    pins = {one.roles["shaft"] for one in model.relations_of("planet_pin") if "shaft" in one.roles}
+    names = _names(
+        {root: parts for root, parts in groups.items() if root in working - planets}, _carriers(model, union)
+    )
+    found: list[Body] = []
+    for root, parts in groups.items():
+        if root in names:
+            found.append(Body(names[root], tuple(_axial(parts)), _axis(places, parts, pins), _is_fixed(parts)))
+        elif root not in planets and not _is_fixed(parts):
+            notes.ignored.append(f"{', '.join(str(part) for part in parts)}: in no mesh, turns idly")
+    by_root = {union.root(part.number): body for body in found for part in body.parts}
+    carried = [
+        one for members in sets for one in _on_one_orbit(places, members, _carrier(model, union, by_root, members))
+    ]
+    planet_bodies: list[Body] = []
+    for number, (carrier, placed) in enumerate(carried):
+        name = _lettered("planet", number, len(carried))
+        placed = _beside_mates(model, groups, placed, planet_bodies)
+        planet_bodies.append(_planet_body(places, carrier, placed, name, groups))
+    return Bodies([*found, *planet_bodies])
+
+
+def _joined(model: Model, notes: Notes) -> _Union:
+    parts = model.of_type("shaft", "side_plate", "gear_casing", *GEARS)
+    union = _Union(part.number for part in parts)
+    casings = [part.number for part in parts if part.type == "gear_casing"]
+    for casing in casings[1:]:
+        union.join(casings[0], casing)
+    carriers: dict[int, int] = {}
+    for relation in model.relations_of("assembly", "ordered_assembly"):
+        owner, part = relation.roles.get("assembly", -1), relation.roles.get("part", -1)
+        if owner in union and part in union and model.components[owner].type == "shaft":
+            union.join(owner, part)
+        elif part in union and owner in model.components and model.components[owner].type == "planet_carrier":
+            union.join(carriers.setdefault(owner, part), part)
+    stiff = [
+        (connection, both)
+        for connection in model.of_type(*JOINING)
+        if is_rigid_in_torsion(connection)
+        and is_engaged(model, connection)
+        and (both := ends(model, connection)) is not None
+        and all(end.number in union for end in both)
+    ]
+    for connection, (inner, outer) in stiff:
+        if is_one_piece(connection):
+            union.join(inner.number, outer.number)
+    for connection, (inner, outer) in stiff:
+        held = {union.root(end.number) for end in (inner, outer)}
+        if casings and union.root(casings[0]) in held and len(held) > 1:
+            notes.changed.append(
+                f"{connection}: holds {inner} against turning and yields otherwise; taken as rigid, since a body that "
+                "does not turn stands still here: loads of its gears that even out in the gearbox do so less"
+            )
+            union.join(inner.number, outer.number)
+    return union
+
+
+def _working(model: Model, union: _Union) -> set[int]:
+    """Roots of what meshes or carries planets, and of what connections with some stiffness tie to it."""
+    numbers = {one for relation in model.relations_of("stage") for one in relation.roles.values()}
+    working = {union.root(number) for number in numbers if number in union} | _carriers(model, union)
+    ties = []
+    for connection in model.of_type(*JOINING):
+        both = ends(model, connection)
+        if both and torsional_stiffness(connection) != 0.0 and is_engaged(model, connection):
+            ties.append({union.root(end.number) for end in both if end.number in union and end.type != "gear_casing"})
+    for _ in ties:
+        working |= {root for tie in ties if tie & working for root in tie}
+    return working
+
+
+def _is_fixed(parts: Iterable[Component]) -> bool:
+    return any(part.type == "gear_casing" for part in parts)
+
+
+def _carriers(model: Model, union: _Union) -> set[int]:
+    relations = model.relations_of("planet_carrier_shaft", "planet_pin")
+    return {union.root(one.roles["shaft"]) for one in relations if one.roles.get("shaft", -1) in union}
+
+
+def _axial(parts: Iterable[Component]) -> list[Component]:
+    return [part for part in parts if part.type != "gear_casing"]
+
+
+def _axis(places: Places, parts: Sequence[Component], pins: set[int]) -> tuple[float, float]:
+    """Axis of a body, mm: that of its gears, else of its shafts and plates, pins of planets left out."""
+    rank = {"cylindrical_gear": 0, "ring_gear": 0, "shaft": 1, "side_plate": 2}
+    own = sorted((p for p in parts if p.type in rank and p.number not in pins), key=lambda part: rank[part.type])
+    own = [part for part in own if part.given("support_vector")]
+    if not own:
+        raise RexsError(f"{parts[0]}: nothing tells where its axis lies")
+    x, y, _ = places.position(own[0])
+    for part in own[1:]:
+        if math.dist((x, y), places.position(part)[:2]) > COAXIAL:
+            raise RexsError(f"{part}: is joined rigidly to {own[0]} and does not share its axis")
+    return x, y
+
+
+def _planet_sets(
+    model: Model, places: Places, union: _Union, groups: Mapping[int, list[Component]]
+) -> list[list[tuple[int, Component]]]:
+    """Gather sets of equal planets: (root, shaft) of each."""
+    sets: dict[tuple[object, ...], list[tuple[int, Component]]] = {}
+    for relation in model.relations_of("planet_shaft"):
+        if not {"shaft", "planetary_stage"} <= relation.roles.keys() or relation.roles["shaft"] not in union:
+            raise RexsError("a relation 'planet_shaft' does not say which shaft and which planetary_stage it joins")
+        shaft = model.components[relation.roles["shaft"]]
+        root = union.root(shaft.number)
+        gears = sorted(
+            (part.whole("number_of_teeth") or 0, part.quantity("normal_module", "mm") or 0.0)
+            for part in groups[root]
+            if part.type in GEARS
+        )
+        if not gears:
+            continue
+        key = (relation.roles.get("planetary_stage"), *gears, places.position(shaft)[2])
+        sets.setdefault(key, []).append((root, shaft))
+    return list(sets.values())
+
+
+@dataclass(frozen=True)
+class _Planet:
+    """A planet on its carrier: angle in degrees, distance from the axis in mm, root of its parts, its shaft."""
+
+    angle: float
+    radius: float
+    root: int
+    shaft: Component
+
+
+def _carrier(
+    model: Model, union: _Union, by_root: Mapping[int, Body], members: Sequence[tuple[int, Component]]
+) -> Body:
+    """Carrier of a set of planets."""
+    shaft = members[0][1]
+    stage = next(
+        one.roles["planetary_stage"] for one in model.relations_of("planet_shaft") if one.roles["shaft"] == shaft.number
+    )
+    held = [
+        one
+        for kind in ("planet_carrier_shaft", "planet_pin")
+        for one in model.related(kind, "planetary_stage", stage, "shaft")
+    ]
+    roots = dict.fromkeys(union.root(one.number) for one in held if one.number in union)
+    carriers = [by_root[root] for root in roots if root in by_root]
+    if not carriers:
+        raise RexsError(
+            f"{model.components[stage]}: no planet_carrier_shaft or planet_pin tells which carrier {shaft} turns on"
+        )
+    return carriers[0]
+
+
+def _on_one_orbit(
+    places: Places, members: Sequence[tuple[int, Component]], carrier: Body
+) -> Iterator[tuple[Body, list[_Planet]]]:
+    """Split planets into sets equally far from the carrier's axis, in the order of angles: a Ravigneaux set has two."""
+    orbits: list[list[_Planet]] = []
+    for root, shaft in members:
+        x, y, _ = places.position(shaft)
+        dx, dy = x - carrier.axis[0], y - carrier.axis[1]
+        angle = round(math.degrees(math.atan2(dy, dx)) % 360.0, 9) % 360.0
+        planet = _Planet(angle, math.hypot(dx, dy), root, shaft)
+        orbit = next((one for one in orbits if abs(one[0].radius - planet.radius) <= COAXIAL), None)
+        if orbit is None:
+            orbits.append([planet])
+        else:
+            orbit.append(planet)
+    for orbit in sorted(orbits, key=lambda one: one[0].radius):
+        yield carrier, sorted(orbit, key=lambda planet: planet.angle)
+
+
+def _beside_mates(
+    model: Model, groups: Mapping[int, list[Component]], placed: list[_Planet], earlier: Sequence[Body]
+) -> list[_Planet]:
+    """Turn the order of planets so that each has the number of the one of another set that it meshes with."""
+    mates: dict[int, set[int]] = {}
+    for relation in model.relations_of("stage"):
+        one, other = (relation.roles.get(role, -1) for role in ("gear_1", "gear_2"))
+        mates.setdefault(one, set()).add(other)
+        mates.setdefault(other, set()).add(one)
+    first = {mate for part in groups[placed[0].root] for mate in mates.get(part.number, ())}
+    for body in earlier:
+        for number, parts in enumerate((body.parts, *body.others)):
+            if first & {part.number for part in parts} and len(body.angles) == len(placed):
+                return placed[-number:] + placed[:-number] if number else placed
+    return placed
+
+
+def _planet_body(
+    places: Places, carrier: Body, placed: Sequence[_Planet], name: str, groups: Mapping[int, list[Component]]
+) -> Body:
+    parts = [tuple(_axial(groups[planet.root])) for planet in placed]
+    x, y, _ = places.position(placed[0].shaft)
+    return Body(
+        name,
+        parts[0],
+        (x, y),
+        others=tuple(parts[1:]),
+        angles=tuple(planet.angle for planet in placed),
+        orbit=round(placed[0].radius, 6),
+        carrier=carrier.name,
+    )
+
+
+def _names(groups: Mapping[int, list[Component]], carriers: set[int]) -> dict[int, str]:
+    """Names of the bodies that are no planets, by role, numbered in the order of the file."""
+    roles: dict[str, list[int]] = {}
+    for root, parts in groups.items():
+        role = "housing" if _is_fixed(parts) else "carrier" if root in carriers else "shaft"
+        roles.setdefault(role, []).append(root)
+    names = {root: _lettered("carrier", n, len(roles["carrier"])) for n, root in enumerate(roles.get("carrier", []))}
+    names |= {root: "housing" for root in roles.get("housing", [])}
+    return names | {root: f"shaft_{number}" for number, root in enumerate(roles.get("shaft", []), 1)}
+
+
+def _lettered(name: str, number: int, count: int) -> str:
+    return name if count == 1 else f"{name}_{chr(ord('a') + number % 26)}"

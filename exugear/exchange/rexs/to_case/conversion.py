@@ -1,0 +1,415 @@
+"""A REXS file as a gearbox file: what cannot be imported is said all at once, what is assumed is marked."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from exugear.dynamics.readiness.readiness import check_parts
+from exugear.exchange.rexs.additions import OWN
+from exugear.exchange.rexs.faults import RexsError, plain
+from exugear.exchange.rexs.to_case.bodies import GEARS, JOINING, Bodies, find_bodies
+from exugear.exchange.rexs.to_case.body_blocks import (
+    INERTIAS,
+    body_blocks,
+    gear_places,
+    levelled_under_seats,
+    meshes_of_bodies,
+    sections_of_bodies,
+)
+from exugear.exchange.rexs.to_case.gear_blocks import (
+    Teeth,
+    axes_to_move,
+    gear_blocks,
+    mesh_blocks,
+    pair_blocks,
+    teeth_of,
+)
+from exugear.exchange.rexs.to_case.loads import (
+    Ends,
+    Loads,
+    ends_of,
+    life_blocks,
+    load_case_blocks,
+    loads_of,
+    static_load,
+)
+from exugear.exchange.rexs.to_case.modifications import MODIFICATIONS
+from exugear.exchange.rexs.to_case.notes import (
+    Block,
+    Entry,
+    Notes,
+    Rules,
+    assumed,
+    derived,
+    read,
+    tidy,
+    toml_text,
+)
+from exugear.exchange.rexs.to_case.places import Places
+from exugear.exchange.rexs.to_case.supports import (
+    BEARINGS,
+    PLAIN_BEARINGS,
+    bearing_blocks,
+    coupling_blocks,
+    joint_blocks,
+)
+from exugear.exchange.rexs.tree import Component, Model
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.reading import CaseError
+
+OTHER_GEARS = {"bevel": "bevel gears", "worm": "worm gears", "hypoid": "hypoid gears"}
+"""Beginnings of the types of gears that are not cylindrical."""
+SPEED_TOLERANCE = 1e-3
+"""Largest difference of a speed in the file from the one at which the train rolls, relative."""
+_SHAPE_FAULT = re.compile(r"bodies\.(\w+)\.shape: (.*)")
+TYPES_OF_ROLES = {
+    ("stage", "gear_1"): GEARS,
+    ("stage", "gear_2"): GEARS,
+    ("stage", "stage"): ("cylindrical_stage",),
+    ("planet_shaft", "shaft"): ("shaft",),
+    ("planet_shaft", "planetary_stage"): ("planetary_stage",),
+    ("planet_pin", "shaft"): ("shaft",),
+    ("planet_pin", "planetary_stage"): ("planetary_stage",),
+    ("planet_carrier_shaft", "shaft"): ("shaft",),
+    ("planet_carrier_shaft", "planetary_stage"): ("planetary_stage",),
+    ("side", "assembly"): (*BEARINGS, *PLAIN_BEARINGS, *JOINING),
+}
+"""What a component must be that has a role in a relation; a wrong id makes another component of it."""
+READ_TYPES = frozenset(
+    (
+        *GEARS,
+        *BEARINGS,
+        *PLAIN_BEARINGS,
+        *JOINING,
+        "gear_unit",
+        "gear_casing",
+        "shaft",
+        "shaft_section",
+        "side_plate",
+        "planet_carrier",
+        "planetary_stage",
+        "cylindrical_stage",
+        "cylindrical_gear_flank",
+        "rack_shaped_tool",
+        "cutter_wheel_tool",
+        *MODIFICATIONS,
+        "material",
+        "rolling_bearing_row",
+        "rolling_element",
+        "external_load",
+        "lubricant",
+    )
+)
+"""Types of components of which something is read."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """What an import found in a REXS file, with the names of the gearbox file.
+
+    Attributes
+    ----------
+    model : Model
+    places : Places
+    bodies : Bodies
+    teeth : Teeth
+    bearings : mapping of str to Block
+    """
+
+    model: Model
+    places: Places
+    bodies: Bodies
+    teeth: Teeth
+    bearings: Mapping[str, Block]
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<Found in {self.model!r}: {self.bodies!r}>"
+
+
+@dataclass(frozen=True)
+class Imported:
+    """Outcome of an import.
+
+    Attributes
+    ----------
+    text : str
+        The gearbox file with its comments.
+    gearbox : Gearbox
+        What it gives.
+    changed : tuple of str
+        What was replaced or assumed and matters.
+    ignored : tuple of str
+        What was left out.
+    checked : tuple of str
+        What the file says twice, compared.
+    found : Found
+        What parts of the gearbox file stand for which components.
+    spectrum : str
+        Table of the loads over the life, which belongs beside the gearbox file under the name
+        `exugear.exchange.rexs.to_case.loads.SPECTRUM`; empty where the file tells too little.
+    """
+
+    text: str
+    gearbox: Gearbox
+    changed: tuple[str, ...]
+    ignored: tuple[str, ...]
+    checked: tuple[str, ...]
+    found: Found
+    spectrum: str
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<Imported {self.gearbox!r}: {len(self.changed)} assumptions, {len(self.ignored)} left out>"
+
+
+def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules: Rules | None = None) -> Imported:
+    """Make a gearbox file of a REXS model, and check it as one.
+
+    Parameters
+    ----------
+    model : Model
+    source : str
+        Name of the REXS file, for the comments.
+    path : path-like
+        Where the gearbox file is going to be, for messages.
+    rules : Rules, optional
+        What counts where the file contradicts itself.
+
+    Raises
+    ------
+    RexsError
+        Why the model cannot be imported, a sentence each.
+    """
+    notes = Notes(rules or Rules())
+    _refuse_types(model, notes)
+    _refuse_misplaced(model, notes)
+    notes.faults.tell()
+    places = Places(model)
+    draft = _Draft(model, places, notes)
+    notes.faults.tell()
+    static = draft.static.value[draft.ends.input]
+    draft.leave_stiff(source, path)
+    gearbox = draft.checked(draft.text(source, {}), path)
+    ratio = gearbox.train.ratio
+    cases = load_case_blocks(draft.loads, draft.ends, static, ratio)
+    life = life_blocks(model, draft.loads, draft.ends, ratio, draft.rated_gears())
+    draft.settings |= life.blocks
+    _compare_speeds(gearbox, draft.loads, draft.ends, notes)
+    notes.faults.tell()
+    _note_ignored(model, notes)
+    text = draft.text(source, cases)
+    gearbox = draft.checked(text, path)
+    changed, ignored, checked = (tuple(lines) for lines in (notes.changed, notes.ignored, notes.checked))
+    return Imported(text, gearbox, changed, ignored, checked, draft.found, life.spectrum)
+
+
+def _refuse_types(model: Model, notes: Notes) -> None:
+    """Refuse what is not a gearbox of cylindrical gears."""
+    for begin, words in OTHER_GEARS.items():
+        parts = [part for part in model.components.values() if part.type.startswith(f"{begin}_")]
+        parts = [part for part in parts if part.type.endswith(("_gear", "_wheel", "_stage"))]
+        if parts:
+            names = ", ".join(str(part) for part in parts)
+            notes.faults.add(f"{names}: {words} cannot be imported, only cylindrical gears on parallel axes")
+    notes.faults.tell()
+    if not any(True for _ in model.relations_of("stage")) or not model.of_type(*GEARS):
+        notes.faults.add("the file holds no stage of two cylindrical gears: there is no gearbox to import")
+
+
+def _refuse_misplaced(model: Model, notes: Notes) -> None:
+    """Refuse relations with a component of the wrong type in a role, as wrong ids make them."""
+    for relation in model.relations:
+        for role, number in relation.roles.items():
+            wanted = TYPES_OF_ROLES.get((relation.type, role))
+            if wanted is not None and model.components[number].type not in wanted:
+                notes.faults.add(
+                    f"a relation '{relation.type}' has {model.components[number]} as {role}; expected a component of "
+                    f"type {' or '.join(wanted[:3])}: correct the id"
+                )
+
+
+class _Draft:
+    """All tables of the gearbox file but the load cases."""
+
+    def __init__(self, model: Model, places: Places, notes: Notes) -> None:
+        self.model, self.notes = model, notes
+        bodies, self.teeth = _placed(model, places, notes)
+        bearings = bearing_blocks(model, places, bodies, notes)
+        self.found = Found(model, places, bodies, self.teeth, bearings)
+        sections = sections_of_bodies(model, places, bodies, notes)
+        sections = levelled_under_seats(sections, self.teeth, bearings, notes)
+        self.loads = loads_of(model, places, bodies, notes)
+        self.ends = ends_of(model, bodies, self.loads, meshes_of_bodies(self.teeth))
+        self.static = static_load(self.loads, self.ends)
+        self.groups = [
+            ("gears", _named("gears", gear_blocks(model, self.teeth, sections, notes))),
+            ("pairs", _named("pairs", pair_blocks(self.teeth))),
+            ("bodies", _named("bodies", body_blocks(model, places, bodies, self.teeth, sections, notes))),
+            ("meshes", _named("meshes", mesh_blocks(self.teeth))),
+            ("couplings", _named("couplings", coupling_blocks(model, bodies, bearings))),
+            (
+                "variant `rigid`: ideal joints",
+                _named("joints", joint_blocks(bodies, bearings, gear_places(self.teeth, bodies))),
+            ),
+            ("variants `bushing` and `flexible`: bearings", _named("bearings", bearings)),
+        ]
+        self.settings = _settings(model, places, self.ends, self.static, self._output_gear())
+
+    def checked(self, text: str, path: str | Path) -> Gearbox:
+        """Read the gearbox file and try its parts; a fault names the components that it is about.
+
+        Raises
+        ------
+        RexsError
+            The gearbox cannot be as the file has it.
+        """
+        content: dict[str, Any] = tomllib.loads(text)
+        try:
+            gearbox = Gearbox.from_dict(content, str(path))
+            check_parts(gearbox)
+        except CaseError as error:
+            raise RexsError(
+                *(self._with_components(fault.removeprefix(f"{path}: ")) for fault in error.faults)
+            ) from None
+        return gearbox
+
+    def _with_components(self, fault: str) -> str:
+        """Return a fault of the gearbox file with the components that its parts stand for."""
+        words = set(re.split(r"[^\w.]", fault)) | set(re.split(r"\W", fault))
+        blocks = {name: block.comment for _, group in self.groups for name, block in group.items() if block.comment}
+        told = [
+            f"{name} is {comment}" for name, comment in blocks.items() if name in words or name.split(".")[1] in words
+        ]
+        return f"{fault} ({'; '.join(told)})" if told else fault
+
+    def leave_stiff(self, source: str, path: str | Path) -> None:
+        """Take bodies as rigid in all variants whose shape has no place for its seats, and say why."""
+        try:
+            self.checked(self.text(source, {}), path)
+        except RexsError as error:
+            found = (_SHAPE_FAULT.search(fault) for fault in error.faults)
+            reasons = {match[1]: match[2] for match in found if match}
+        else:
+            return
+        blocks = dict(self.groups)["bodies"]
+        for body, reason in reasons.items():
+            self.notes.changed.append(f"bodies.{body}: rigid in the variant flexible, too: {reason}")
+            blocks[f"bodies.{body}"].entries["flexibility"] = assumed("none", "its sections give no seats, see above")
+
+    def rated_gears(self) -> dict[str, tuple[Component, bool]]:
+        """Gears by name, and whether their teeth bend both ways: those with several mates do."""
+        met = [number for stage in self.teeth.stages.values() for number in (stage.pinion, stage.gear)]
+        return {name: (self.model.components[n], met.count(n) > 1) for n, name in self.teeth.names.items()}
+
+    def _output_gear(self) -> str:
+        for number, body in self.teeth.bodies.items():
+            if body.name == self.ends.output:
+                return self.teeth.names[number]
+        return next(iter(self.teeth.names.values()))
+
+    def text(self, source: str, cases: Mapping[str, Block]) -> str:
+        if not cases:
+            torque = {self.ends.input: self.static.value[self.ends.input]}
+            cases = {"draft": Block("", {"torques_N_m": Entry(torque)})}
+        units = self.model.of_type("gear_unit")
+        name = plain(units[0].name) if units and units[0].name else ""
+        title = f"{Path(source).stem}" + (f": {name}" if name else "")
+        top = {"name": Entry(plain(title, 200)), "default_inertias": Entry(INERTIAS)}
+        groups = [("", self.settings), *self.groups, ("load cases", _named("load_cases", cases))]
+        return toml_text(_head(self.model, source, self.notes), top, groups)
+
+
+def _placed(model: Model, places: Places, notes: Notes) -> tuple[Bodies, Teeth]:
+    """Bodies and gears where the centre distances that count want them."""
+    first = Notes(notes.rules)
+    bodies = find_bodies(model, places, first)
+    teeth = teeth_of(model, places, bodies, first)
+    moves = axes_to_move(teeth, bodies, places)
+    if moves:
+        notes.changed += [line for line in first.changed if "axes are moved" in line]
+        for parts, by in moves:
+            places.move(parts, by)
+    bodies = find_bodies(model, places, notes)
+    return bodies, teeth_of(model, places, bodies, notes)
+
+
+def _named(table: str, blocks: Mapping[str, Block]) -> dict[str, Block]:
+    return {f"{table}.{name}": block for name, block in blocks.items()}
+
+
+def _settings(model: Model, places: Places, ends: Ends, static: Entry, gear: str) -> dict[str, Block]:
+    blocks = {
+        "overall": Block(
+            "", {"input": derived(ends.input, ends.reason), "output": Entry(ends.output), "output_gear": Entry(gear)}
+        ),
+        "static_load": Block(
+            "the state that tables are computed for",
+            {"torques_N_m": static, "locked": derived([ends.output], "the output holds what the input gives")},
+        ),
+    }
+    for unit in model.of_type("gear_unit")[:1]:
+        keys = [f"direction_vector_gravity_{axis}" for axis in "uvw"]
+        direction = np.array([unit.quantity(key) or 0.0 for key in keys])
+        if unit.flag("account_for_gravity") and np.linalg.norm(direction) > 0.0:
+            size = unit.quantity("gravitational_acceleration", "m / s^2") or 9.81
+            vector = places.turned(direction / np.linalg.norm(direction)) * size
+            entry = read([tidy(round(value, 9)) for value in vector.tolist()], "direction_vector_gravity")
+            blocks["gravity"] = Block("", {"acceleration_m_per_s2": entry})
+    return blocks
+
+
+def _head(model: Model, source: str, notes: Notes) -> list[str]:
+    """Comment at the beginning: origin, what marks mean, and all that a reader must know."""
+    lines = [
+        f"Imported from {plain(Path(source).name)}: REXS {model.version}, written by {plain(model.program)}.",
+        "After each value stands the attribute that gives it, after each table the component.",
+        "D is computed here from what the file gives, A is assumed: the file does not give it. Check all A.",
+        "Axes: z along the shafts, x and y are v and w of the gear unit; mm.",
+    ]
+    for title, found in (
+        ("Replaced or assumed", notes.changed),
+        ("Said twice, compared", notes.checked),
+        ("Left out", notes.ignored),
+    ):
+        if found:
+            lines += ["", f"{title}:", *(f"- {plain(line, 2000)}" for line in dict.fromkeys(found))]
+    return lines
+
+
+def _note_ignored(model: Model, notes: Notes) -> None:
+    """List the types of components of which nothing was read, and the attributes of others that nothing asked for."""
+    for kind in sorted({part.type for part in model.components.values()}):
+        parts = model.of_type(kind)
+        keys = {key for part in parts for key in part.attributes if not key.startswith(OWN)}
+        unread = keys - {key for part in parts for key in part.asked}
+        if kind not in READ_TYPES:
+            notes.ignored.append(f"{plain(kind)}, {len(parts)} of them")
+        elif unread:
+            notes.ignored.append(f"{kind}: {', '.join(plain(key) for key in sorted(unread))}")
+
+
+def _compare_speeds(gearbox: Gearbox, loads: Sequence[Loads], ends: Ends, notes: Notes) -> None:
+    """Compare speeds that the file gives for several bodies with those at which the train rolls."""
+    if gearbox.train.degrees_of_freedom != 1:
+        return
+    mode = dict(zip(gearbox.spinning, gearbox.train.kinematic_modes[:, 0].tolist(), strict=True))
+    for one in loads:
+        base = one.speeds.get(ends.input)
+        for body, speed in one.speeds.items():
+            if not base or body == ends.input or body not in mode:
+                continue
+            rolls = base * mode[body] / mode[ends.input]
+            notes.checked.append(f"{one.name}: {body} turns at {speed:.6g} rpm, the train rolls at {rolls:.6g} rpm")
+            if abs(rolls - speed) > SPEED_TOLERANCE * max(abs(rolls), abs(speed)):
+                notes.faults.add(
+                    f"{one.name}: the file turns {body} at {speed:g} rpm, but with {ends.input} at {base:g} rpm the "
+                    f"train rolls at {rolls:g} rpm"
+                )

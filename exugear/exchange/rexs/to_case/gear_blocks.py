@@ -1,0 +1,408 @@
+"""Stages, gears and pairs of a REXS file as tables of the gearbox file, planets of a set taken once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from exugear.exchange.rexs.faults import RexsError
+from exugear.exchange.rexs.to_case.bodies import Bodies, Body
+from exugear.exchange.rexs.to_case.meshing import (
+    PLACE_TOLERANCE,
+    Stage,
+    centre_distance,
+    told_if_impossible,
+    unchecked,
+    with_clear_tips,
+    with_equal_racks,
+    with_fitting_tool,
+    with_form_circles,
+    with_possible_cutter,
+    with_shifts,
+)
+from exugear.exchange.rexs.to_case.modifications import modification_of
+from exugear.exchange.rexs.to_case.notes import Block, Entry, Notes, assumed, derived, read, tidy
+from exugear.exchange.rexs.to_case.places import Places
+from exugear.exchange.rexs.to_case.shafts import Cylinder, seat_diameter
+from exugear.exchange.rexs.to_case.toothing import (
+    Toothing,
+    is_rigid,
+    material_of,
+    material_table,
+    toothing_of,
+)
+from exugear.exchange.rexs.tree import Component, Model
+
+FACE_TOLERANCE = 1e-3
+"""Largest difference of face widths that needs no word, mm."""
+LEAST_RIM = 1.0
+"""Least height of a rim between root circle and seat, in normal modules; with less the gear is one with its shaft."""
+ANGLE_TOLERANCE = 0.01
+"""Largest difference of two statements on a direction that needs no word, deg."""
+HELD_SHARE = 0.6
+"""Held diameter assumed for a gear that is one with its shaft, over its root diameter."""
+
+
+@dataclass(frozen=True)
+class Teeth:
+    """All gears that mesh, with their names, stages and bodies; of equal planets the first.
+
+    Attributes
+    ----------
+    gears : mapping of int to Toothing
+        By the number of their component.
+    names : mapping of int to str
+    stages : mapping of str to Stage
+        By the name of their pair.
+    bodies : mapping of int to Body
+    z : mapping of int to float
+        Middle of the gear, mm.
+    """
+
+    gears: Mapping[int, Toothing]
+    names: Mapping[int, str]
+    stages: Mapping[str, Stage]
+    bodies: Mapping[int, Body]
+    z: Mapping[int, float]
+
+
+def teeth_of(model: Model, places: Places, bodies: Bodies, notes: Notes) -> Teeth:
+    """Gather gears and stages.
+
+    Raises
+    ------
+    RexsError
+        All that keeps stages from being gear pairs.
+    """
+    first = first_of_planets(model, places, bodies)
+    met: dict[frozenset[int], tuple[Component, list[Component]]] = {}
+    for relation in model.relations_of("stage"):
+        with notes.faults.gathered():
+            part, both = _stage(model, relation.roles)
+            pair = frozenset(first.get(gear.number, gear.number) for gear in both)
+            if len(pair) == 1:
+                raise RexsError(f"{part}: planets of one set mesh with each other, which cannot be")
+            met.setdefault(pair, (part, [model.components[number] for number in sorted(pair)]))
+            _check_direction(places, part, both, notes)
+    notes.faults.tell()
+    mates: dict[int, list[Component]] = {}
+    for _, (one, other) in met.values():
+        mates.setdefault(one.number, []).append(other)
+        mates.setdefault(other.number, []).append(one)
+    gears: dict[int, Toothing] = {}
+    for number, partners in mates.items():
+        with notes.faults.gathered():
+            gears[number] = toothing_of(model, model.components[number], partners, notes)
+    notes.faults.tell()
+    stages = _ordered(model, places, met.values(), gears, notes)
+    notes.faults.tell()
+    _check_equal_planets(model, bodies, first, gears, notes)
+    gears = with_equal_racks(gears, stages, notes)
+    gears = with_shifts(gears, stages, notes)
+    for number, gear in gears.items():
+        with told_if_impossible(gear):
+            gears[number] = with_form_circles(with_fitting_tool(with_possible_cutter(gear, notes), notes), notes)
+    gears = with_clear_tips(gears, stages, notes)
+    owners = {number: body for number in gears if (body := bodies.of(model.components[number])) is not None}
+    lost = [str(gears[number].part) for number in gears if number not in owners]
+    if lost:
+        raise RexsError(f"{', '.join(lost)}: no relation tells on which shaft it sits")
+    return Teeth(
+        gears,
+        _gear_names(gears, stages, owners),
+        dict(zip(_pair_names(gears, stages, owners), stages, strict=True)),
+        owners,
+        {number: places.position(gear.part)[2] for number, gear in gears.items()},
+    )
+
+
+def first_of_planets(model: Model, places: Places, bodies: Bodies) -> dict[int, int]:
+    """Map each planet's gear to that of the first planet which is like it, by their numbers."""
+
+    def ordered(parts: Iterable[Component]) -> list[int]:
+        gears = [part for part in parts if part.type == "cylindrical_gear"]
+        gears.sort(key=lambda gear: (gear.whole("number_of_teeth") or 0, places.position(gear)[2]))
+        return [gear.number for gear in gears]
+
+    return {
+        number: own
+        for body in bodies.members
+        for each in body.others
+        for own, number in zip(ordered(body.parts), ordered(each), strict=True)
+    }
+
+
+def _stage(model: Model, roles: Mapping[str, int]) -> tuple[Component, list[Component]]:
+    missing = [role for role in ("stage", "gear_1", "gear_2") if role not in roles]
+    if missing:
+        raise RexsError(f"a relation 'stage' has no {' and no '.join(missing)}")
+    return model.components[roles["stage"]], [model.components[roles[role]] for role in ("gear_1", "gear_2")]
+
+
+def _check_direction(places: Places, stage: Component, gears: Sequence[Component], notes: Notes) -> None:
+    """Compare the direction of the line of centres with positions."""
+    one, other = (places.position(gear) for gear in gears)
+    stated = stage.quantity("rotating_angle_around_neg_u_axis", "deg")
+    # From v over w, with u: the angle of the second gear's centre as seen from the first, zero along w.
+    angle = math.degrees(math.atan2(other[0] - one[0], other[1] - one[1]))
+    if stated is not None and abs(math.remainder(stated - angle, 360.0)) > ANGLE_TOLERANCE:
+        notes.checked.append(f"{stage}: turned by {stated:g} deg as it says, by {angle:.4f} deg as its gears stand")
+
+
+def _ordered(
+    model: Model,
+    places: Places,
+    met: Iterable[tuple[Component, list[Component]]],
+    gears: Mapping[int, Toothing],
+    notes: Notes,
+) -> list[Stage]:
+    stages = []
+    for part, (one, other) in met:
+        with notes.faults.gathered():
+            if gears[one.number].internal and gears[other.number].internal:
+                raise RexsError(f"{part}: two ring gears cannot mesh")
+            pinion, gear = sorted((one, other), key=lambda each: _size(gears[each.number]))
+            apart = math.dist(places.position(one)[:2], places.position(other)[:2])
+            both = gears[pinion.number], gears[gear.number]
+            if both[1].internal and both[1].teeth <= both[0].teeth:
+                raise RexsError(f"{part}: a ring of {both[1].teeth} teeth has no room for {both[0].teeth}")
+            distance = centre_distance(part, apart, both, notes)
+            common = _common_face(places, part, *both)
+            stages.append(Stage(part, pinion.number, gear.number, distance, apart, common))
+    return stages
+
+
+def _common_face(places: Places, stage: Component, pinion: Toothing, gear: Toothing) -> Entry | None:
+    """Face width that the gears share, where that is less than the narrower face."""
+    least = min(pinion.face_width.value, gear.face_width.value)
+    low, high = -math.inf, math.inf
+    for one in (pinion, gear):
+        z = places.position(one.part)[2]
+        low, high = max(low, z - 0.5 * one.face_width.value), min(high, z + 0.5 * one.face_width.value)
+    stated = stage.quantity("common_face_width", "mm")
+    overlap = tidy(round(high - low, 6))
+    if stated is not None and stated < min(least, overlap) - FACE_TOLERANCE:
+        return read(tidy(stated), "common_face_width")
+    return derived(overlap, "overlap of the faces as they stand") if 0.0 < overlap < least - FACE_TOLERANCE else None
+
+
+def _size(gear: Toothing) -> tuple[bool, int]:
+    return gear.internal, gear.teeth
+
+
+def _check_equal_planets(
+    model: Model, bodies: Bodies, first: Mapping[int, int], gears: Mapping[int, Toothing], notes: Notes
+) -> None:
+    for number, own in first.items():
+        if own not in gears:
+            continue
+        other, mate = toothing_of(model, model.components[number], [], Notes()), gears[own]
+        for key in ("module", "face_width", "helix_angle", "pressure_angle"):
+            if abs(getattr(other, key).value - getattr(mate, key).value) > 1e-9:
+                notes.faults.add(f"{other.part}: differs from {mate.part} in {key}; planets of a set must be equal")
+    notes.faults.tell()
+
+
+def axes_to_move(
+    teeth: Teeth, bodies: Bodies, places: Places
+) -> list[tuple[tuple[Component, ...], tuple[float, float]]]:
+    """Parts and how far (mm) they have to move for the centre distances that count; none where all stand so.
+
+    The first body of a train stays. Bodies on one axis move together, planets along their own radii.
+
+    Raises
+    ------
+    RexsError
+        Moving one gear for its stage would take it out of another.
+    """
+    if all(abs(stage.distance.value - stage.apart) <= PLACE_TOLERANCE for stage in teeth.stages.values()):
+        return []
+    axes = {body.name: body.axis for body in bodies.members}
+    first = next(iter(teeth.stages.values()))
+    settled = set(_coaxial(bodies, teeth.bodies[first.pinion]))
+    open_stages = list(teeth.stages.values())
+    while open_stages:
+        stage = next((s for s in open_stages if settled & _names_of(teeth, s)), open_stages[0])
+        open_stages.remove(stage)
+        one, other = teeth.bodies[stage.pinion], teeth.bodies[stage.gear]
+        base, moving = (one, other) if one.name in settled else (other, one)
+        stands = axes[base.name], axes[moving.name]
+        apart = math.dist(*stands)
+        if moving.name in settled:
+            if abs(apart - stage.distance.value) > PLACE_TOLERANCE:
+                raise RexsError(
+                    f"{stage.part}: its centre distance of {stage.distance.value:g} mm and those of the other stages "
+                    "cannot all be; import with --distances positions, or correct them"
+                )
+            continue
+        share = stage.distance.value / apart - 1.0
+        by = share * (stands[1][0] - stands[0][0]), share * (stands[1][1] - stands[0][1])
+        for name in _coaxial(bodies, moving):
+            axes[name] = axes[name][0] + by[0], axes[name][1] + by[1]
+            settled.add(name)
+    return [move for body in bodies.members for move in _moves(places, bodies, body, axes)]
+
+
+def _names_of(teeth: Teeth, stage: Stage) -> set[str]:
+    return {teeth.bodies[stage.pinion].name, teeth.bodies[stage.gear].name}
+
+
+def _coaxial(bodies: Bodies, body: Body) -> list[str]:
+    """Names of the bodies that stand on one axis; planets stand for themselves."""
+    if body.carrier:
+        return [body.name]
+    return [one.name for one in bodies.members if not one.carrier and math.dist(one.axis, body.axis) <= PLACE_TOLERANCE]
+
+
+def _moves(
+    places: Places, bodies: Bodies, body: Body, axes: Mapping[str, tuple[float, float]]
+) -> Iterator[tuple[tuple[Component, ...], tuple[float, float]]]:
+    """How far the parts of a body move, each planet of a set along its own radius."""
+    new = axes[body.name]
+    if not body.carrier:
+        yield body.parts, (new[0] - body.axis[0], new[1] - body.axis[1])
+        return
+    carrier = next(one for one in bodies.members if one.name == body.carrier)
+    centre, orbit = axes[carrier.name], math.dist(new, axes[carrier.name])
+    for parts, degrees in zip((body.parts, *body.others), body.angles, strict=True):
+        angle = math.radians(degrees)
+        target = centre[0] + orbit * math.cos(angle), centre[1] + orbit * math.sin(angle)
+        x, y, _ = places.position(next(part for part in parts if part.given("support_vector")))
+        yield parts, (target[0] - x, target[1] - y)
+
+
+def _gear_names(gears: Mapping[int, Toothing], stages: Sequence[Stage], owners: Mapping[int, Body]) -> dict[int, str]:
+    """Role of each gear; several of one role are numbered in the order of the stages."""
+    central = {
+        number
+        for stage in stages
+        for number, mate in ((stage.pinion, stage.gear), (stage.gear, stage.pinion))
+        if owners[mate].carrier and not owners[number].carrier
+    }
+    roles: dict[str, list[int]] = {}
+    for number in dict.fromkeys(number for stage in stages for number in (stage.pinion, stage.gear)):
+        if gears[number].internal:
+            role = "ring"
+        elif owners[number].carrier:
+            role = "planet_gear"
+        else:
+            role = "sun" if number in central else "gear"
+        roles.setdefault(role, []).append(number)
+    return {
+        number: role if len(numbers) == 1 and role != "gear" else f"{role}_{place}"
+        for role, numbers in roles.items()
+        for place, number in enumerate(numbers, 1)
+    }
+
+
+def _pair_names(gears: Mapping[int, Toothing], stages: Sequence[Stage], owners: Mapping[int, Body]) -> list[str]:
+    names: list[str] = []
+    for number, stage in enumerate(stages, 1):
+        planet = next((owners[one].name for one in (stage.pinion, stage.gear) if owners[one].carrier), "")
+        both = owners[stage.pinion].carrier and owners[stage.gear].carrier
+        name = f"{'ring' if gears[stage.gear].internal else 'sun'}_{planet}" if planet and not both else ""
+        names.append(name if name and name not in names else f"stage_{number}")
+    return names
+
+
+def gear_blocks(
+    model: Model, teeth: Teeth, sections: Mapping[str, Sequence[Cylinder]], notes: Notes
+) -> dict[str, Block]:
+    """Tables of the gears; `sections` are those of the shafts of each body."""
+    return {
+        teeth.names[number]: Block(
+            str(gear.part),
+            _entries(model, gear, teeth.z[number], sections[teeth.bodies[number].name], notes),
+            _modification(model, gear, notes),
+        )
+        for number, gear in teeth.gears.items()
+    }
+
+
+def _modification(model: Model, gear: Toothing, notes: Notes) -> dict[str, Block]:
+    with notes.faults.gathered():
+        entries = modification_of(model, gear, notes)
+        return {"modification": Block("", entries)} if entries else {}
+    return {}
+
+
+def _entries(model: Model, gear: Toothing, z: float, sections: Sequence[Cylinder], notes: Notes) -> dict[str, Entry]:
+    entries = {"teeth": read(gear.teeth, "number_of_teeth")}
+    if gear.internal:
+        entries["internal"] = read(True, "ring_gear")
+    entries |= {
+        "normal_module_mm": gear.module,
+        "normal_pressure_angle_deg": gear.pressure_angle,
+        "helix_angle_deg": gear.helix_angle,
+        "profile_shift": gear.shift or assumed(0.0, ""),
+        "face_width_mm": gear.face_width,
+        "held_diameter_mm": _held(gear, z, sections),
+        **({"tooth_thickness": gear.allowances} if gear.allowances else {"tooth_thinning_mm": gear.thinning}),
+    }
+    if gear.tip is not None:
+        entries["tip_diameter_mm"] = gear.tip
+    if gear.root is not None:
+        entries["root_diameter_mm"] = gear.root
+    if gear.chamfer:
+        entries["tip_chamfer_mm"] = read(gear.chamfer, "tooth_tip_chamfer, or tip_form_diameter")
+    if gear.root_form is not None:
+        entries["root_form_diameter_mm"] = gear.root_form
+    rack = {"addendum": 1.0, "dedendum": gear.dedendum.value, "tip_radius": gear.tip_radius.value}
+    tip = "addendum: tip_diameter_mm counts" if gear.tip is not None else "addendum: A"
+    parts = (tip, f"dedendum: {gear.dedendum.comment}", f"tip radius: {gear.tip_radius.comment}")
+    entries["rack"] = Entry(rack, "; ".join(" ".join(part.split()) for part in parts))
+    if gear.cutter is not None:
+        entries["cutter"] = gear.cutter
+    material = material_of(model, gear.part)
+    table = material_table(material)
+    if table is not None:
+        entries["material"] = table
+    elif is_rigid(material):
+        notes.changed.append(f"{gear.part}: its material stands for 'rigid', taken as steel")
+    return entries
+
+
+def _held(gear: Toothing, z: float, sections: Sequence[Cylinder]) -> Entry:
+    """Diameter at which the tooth model is held: the seat, if enough rim is left."""
+    root = 2e3 * unchecked("", gear).root_radius
+    seat = seat_diameter(sections, z, gear.face_width.value, gear.internal)
+    rim = 0.0 if seat is None else 0.5 * abs(root - seat)
+    fits = seat is not None and ((seat > root) if gear.internal else (0.0 < seat < root))
+    if fits and seat is not None and rim >= LEAST_RIM * gear.module.value:
+        return derived(tidy(seat), "seat on its shaft" if not gear.internal else "bore that holds the ring")
+    if gear.internal:
+        return assumed(tidy(round(root + 6.0 * gear.module.value, 4)), "root diameter and a rim of 3 normal modules")
+    why = f"{HELD_SHARE:g} root diameters: one with its shaft, or no seat given"
+    return assumed(tidy(round(HELD_SHARE * root, 4)), why)
+
+
+def pair_blocks(teeth: Teeth) -> dict[str, Block]:
+    """Tables of the gear pairs."""
+    return {
+        name: Block(
+            str(stage.part),
+            {
+                "pinion": Entry(teeth.names[stage.pinion]),
+                "gear": Entry(teeth.names[stage.gear]),
+                "centre_distance_mm": stage.distance,
+            }
+            | ({"common_face_width_mm": stage.common_face} if stage.common_face else {}),
+        )
+        for name, stage in teeth.stages.items()
+    }
+
+
+def mesh_blocks(teeth: Teeth) -> dict[str, Block]:
+    """Tables of the meshes: of each pair one, for a set of planets all."""
+    return {
+        name: Block(
+            "",
+            {
+                "pair": Entry(name),
+                "pinion_body": Entry(teeth.bodies[stage.pinion].name),
+                "gear_body": Entry(teeth.bodies[stage.gear].name),
+            },
+        )
+        for name, stage in teeth.stages.items()
+    }

@@ -1,0 +1,380 @@
+"""Torques and speeds of a REXS file, at rest, by load case and over the life, and what withstands them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from exugear.exchange.rexs.faults import RexsError
+from exugear.exchange.rexs.to_case.bodies import Bodies, Body
+from exugear.exchange.rexs.to_case.notes import Block, Entry, Notes, assumed, derived, read, tidy
+from exugear.exchange.rexs.to_case.places import Places
+from exugear.exchange.rexs.to_case.toothing import material_of
+from exugear.exchange.rexs.tree import Attribute, Component, LoadCase, Model
+
+FORCES = ("force_u_direction", "force_v_direction", "force_w_direction")
+UNKNOWN_TORQUE = 100.0
+"""Torque where the file gives none, N m."""
+SPECTRUM = "load_spectrum.csv"
+"""Name of the table of loads beside the gearbox file."""
+HOURS_PER_YEAR = 8766.0
+USUAL_YEARS, USUAL_VISCOSITY, USUAL_DYNAMIC_FACTOR, USUAL_ROUGHNESS, USUAL_ROOT_FACTOR, BOTH_WAYS = (
+    20.0,
+    220.0,
+    1.2,
+    4.8,
+    0.95,
+    0.7,
+)
+"""What is assumed for a life: years, viscosity at 40 degrees (mm2/s), K_v, Rz (um), Y_drelT Y_RrelT Y_X, Y_M."""
+HARD_FLANK = 1100.0
+"""Endurance limit of flanks (MPa) from which on they are case hardened, if nothing else is said (ISO 6336-5)."""
+_NITRIDED = (((1e5, 1.3), (2e6, 1.0), (1e10, 0.85)), ((1e3, 1.6), (3e6, 1.0), (1e10, 0.85)))
+CURVES = {
+    "nitrided": _NITRIDED,
+    "grey_cast": _NITRIDED,
+    "through_hardened": (((1e5, 1.6), (5e7, 1.0), (1e10, 0.85)), ((1e4, 2.5), (3e6, 1.0), (1e10, 0.85))),
+}
+"""Life factors for contact and bending over load cycles, by words in the heat treatment; case hardened else."""
+LEAST_SHARE = 0.1
+"""Speed at the start of a run-up over that at its end."""
+
+
+@dataclass(frozen=True)
+class Loads:
+    """Torques (N m) and speeds (rpm) on bodies, positive about +z.
+
+    Attributes
+    ----------
+    name : str
+        Of the load case.
+    description : str
+    torques, speeds : mapping of body name to float
+    share : float, optional
+        Of the operating time, %; None where the file gives none.
+    """
+
+    name: str
+    description: str
+    torques: Mapping[str, float]
+    speeds: Mapping[str, float]
+    share: float | None = None
+
+
+@dataclass(frozen=True)
+class Ends:
+    """Bodies at which the gearbox is driven and loaded, and why these."""
+
+    input: str
+    output: str
+    reason: str
+
+
+def loads_of(model: Model, places: Places, bodies: Bodies, notes: Notes) -> list[Loads]:
+    """Gather the loads of each load case, or of the file itself if it has none."""
+    forced = [part for part in model.of_type("external_load") if _has_forces(part)]
+    forced += [
+        model.components[number]
+        for case in model.load_cases
+        for number, changes in case.changes.items()
+        if number in model.components and _has_forces(Component(number, "", "", changes))
+    ]
+    for part in dict.fromkeys(forced):
+        notes.ignored.append(f"{part}: point forces, which a gearbox file cannot hold")
+    return [_loads(model, places, bodies, case) for case in model.load_cases or (None,)]
+
+
+def _has_forces(part: Component) -> bool:
+    return any(part.quantity(key, "N") for key in FORCES)
+
+
+def _loads(model: Model, places: Places, bodies: Bodies, case: LoadCase | None) -> Loads:
+    changes = case.changes if case else {}
+    speeds: dict[str, float] = {}
+    for shaft in _changed(model.of_type("shaft"), changes):
+        body, speed = bodies.of_any(shaft), shaft.quantity("rotational_speed", "1 / min")
+        if body is not None and speed is not None and not body.fixed:
+            speeds.setdefault(body.name, tidy(places.sense(shaft) * speed))
+    torques: dict[str, float] = {}
+    for load in _changed(model.of_type("external_load"), changes):
+        body, torque = _owner(model, bodies, load), _torque(model, places, load, speeds, bodies)
+        if body is not None and torque and load.flag("transmits_torque") is not False:
+            torques[body.name] = torques.get(body.name, 0.0) + torque
+    share = None
+    for unit in _changed(model.of_type("gear_unit"), changes):
+        share = unit.quantity("operating_time_fraction", "%")
+    name = f"load_case_{case.number}" if case else "nominal"
+    return Loads(name, "" if share is None else f"{share:g} % of the operating time", torques, speeds, share)
+
+
+def _changed(parts: Sequence[Component], changes: Mapping[int, Mapping[str, Attribute]]) -> list[Component]:
+    return [part.with_attributes(changes[part.number]) if part.number in changes else part for part in parts]
+
+
+def _shaft(model: Model, load: Component) -> Component | None:
+    owners = [
+        one for kind in ("assembly", "ordered_assembly") for one in model.related(kind, "part", load.number, "assembly")
+    ]
+    return next((one for one in owners if one.type in ("shaft", "side_plate", "planet_carrier")), None)
+
+
+def _owner(model: Model, bodies: Bodies, load: Component) -> Body | None:
+    shaft = _shaft(model, load)
+    body = bodies.of_any(shaft) if shaft else None
+    return None if body is None or body.fixed or body.carrier else body
+
+
+def _torque(model: Model, places: Places, load: Component, speeds: Mapping[str, float], bodies: Bodies) -> float | None:
+    """Torque of a load about +z, N m; from its power and the speed of its body where the file gives no torque."""
+    shaft, body = _shaft(model, load), _owner(model, bodies, load)
+    if shaft is None or body is None:
+        return None
+    torque = load.quantity("torque_around_u_axis", "N m")
+    if torque is not None:
+        return tidy(places.sense(shaft) * torque)
+    power, speed = load.quantity("power", "kW"), speeds.get(body.name)
+    if power and speed:
+        return tidy(1e3 * power / (speed * math.pi / 30.0))
+    return None
+
+
+def ends_of(model: Model, bodies: Bodies, loads: Sequence[Loads], links: Mapping[str, int]) -> Ends:
+    """Tell input and output of the gearbox.
+
+    Parameters
+    ----------
+    links : mapping of body name to int
+        Number of meshes of each body that turns.
+
+    Raises
+    ------
+    RexsError
+        The file does not tell them.
+    """
+    turning = [body for body in bodies.members if not body.fixed and not body.carrier]
+    links = {body.name: links[body.name] for body in turning if body.name in links}
+    if len(links) < 2:
+        raise RexsError(
+            f"only {', '.join(links) or 'nothing'} can turn in mesh, all else is joined with the casing: "
+            "a gearbox has an input and an output; open one of the connections with the casing"
+        )
+    defined = {b.name for b in turning for part in b.parts if part.flag("defines_speed") is True}
+    loaded = [
+        body.name
+        for part in model.of_type("external_load")
+        if part.flag("transmits_torque") is not False and (body := _owner(model, bodies, part)) is not None
+    ]
+    given = [name for one in loads for name in one.torques]
+    candidates = [name for name in given if name in defined] or given or [n for n in loaded if n in defined] or loaded
+    candidates = candidates or [name for name in links if name in defined] or list(links)
+    first = candidates[0]
+    others = [name for name in dict.fromkeys(loaded) if name != first]
+    why = "bodies with an external_load; the input has the torque or defines the speed"
+    if not others:
+        others = [name for name, count in links.items() if count == 1 and name != first]
+        why = "the file loads one body only; the output is the other end of the train"
+    if not others:
+        raise RexsError("no external_load tells which shafts are driven and loaded: add one on each of them")
+    return Ends(first, others[-1], why)
+
+
+def static_load(loads: Sequence[Loads], ends: Ends) -> Entry:
+    """Torque of the static state: the largest of all load cases at the input."""
+    torques = [one.torques[ends.input] for one in loads if one.torques.get(ends.input)]
+    if not torques:
+        return assumed({ends.input: UNKNOWN_TORQUE}, "the file gives no torque: SET IT")
+    source = "torque_around_u_axis, or power over speed" + ("; the largest of the load cases" if len(loads) > 1 else "")
+    return read({ends.input: max(torques, key=abs)}, source)
+
+
+def load_case_blocks(loads: Sequence[Loads], ends: Ends, static: float, ratio: float) -> dict[str, Block]:
+    """Tables of the load cases: each at its speed with balanced torques, and a run-up to the fastest.
+
+    Parameters
+    ----------
+    static : float
+        Torque of the static state at the input, N m.
+    ratio : float
+        Speed of the output over that of the input.
+    """
+    blocks = {}
+    fastest = 0.0
+    for one in loads:
+        torque = one.torques.get(ends.input) or static
+        speed = _input_speed(one, ends, ratio)
+        fastest = max(fastest, speed, key=abs)
+        entries = {"description": Entry(one.description)} if one.description else {}
+        entries["torques_N_m"] = _balanced(ends, torque, ratio)
+        if speed:
+            entries["start_speed_rpm"] = read(tidy(speed), f"rotational_speed, at {ends.input}")
+        entries["duration_s"] = assumed(1.0, "")
+        blocks[one.name] = Block("", entries)
+    if fastest:
+        blocks["run_up"] = _run_up(ends, static, ratio, fastest)
+    return blocks
+
+
+def _balanced(ends: Ends, torque: float, ratio: float) -> Entry:
+    return derived({ends.input: torque, ends.output: _rounded(-torque / ratio)}, "the output holds the balance")
+
+
+def _run_up(ends: Ends, torque: float, ratio: float, speed: float) -> Block:
+    return Block(
+        "",
+        {
+            "description": Entry("the input is driven up to its speed, the output loaded"),
+            "torques_N_m": derived({ends.output: _rounded(-torque / ratio)}, "as in the static state"),
+            "driven_body": Entry(ends.input),
+            "start_speed_rpm": assumed(tidy(LEAST_SHARE * speed), ""),
+            "end_speed_rpm": derived(tidy(speed), "the fastest of the file"),
+            "drive_stiffness_N_m_per_rad": assumed(
+                tidy(max(100.0 * abs(torque), 10.0)), "the torque of the static state twists it by 0.01 rad"
+            ),
+            "duration_s": assumed(5.0, ""),
+        },
+    )
+
+
+def _input_speed(loads: Loads, ends: Ends, ratio: float) -> float:
+    if ends.input in loads.speeds:
+        return loads.speeds[ends.input]
+    return loads.speeds.get(ends.output, 0.0) / ratio
+
+
+def _rounded(torque: float) -> float:
+    return float(f"{torque:.8g}") + 0.0
+
+
+# -- loads over the life, and what withstands them -----------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class LifeLoads:
+    """Loads of a life as a table, and the sections of the gearbox file on them.
+
+    Attributes
+    ----------
+    spectrum : str
+        Text of the table `SPECTRUM`, which lies beside the gearbox file; empty where the file tells too little.
+    blocks : mapping of str to Block
+        Sections by name.
+    """
+
+    spectrum: str
+    blocks: Mapping[str, Block]
+
+
+def life_blocks(
+    model: Model, loads: Sequence[Loads], ends: Ends, ratio: float, gears: Mapping[str, tuple[Component, bool]]
+) -> LifeLoads:
+    """Sections on service, loads and rating, as far as the file has what `life` needs.
+
+    Parameters
+    ----------
+    model : Model
+    loads : sequence of Loads
+    ends : Ends
+    ratio : float
+        Speed of the output over that of the input.
+    gears : mapping of str to (Component, bool)
+        Gears by name, and whether their teeth bend both ways.
+    """
+    rated = max(loads, key=lambda one: abs(one.torques.get(ends.input, 0.0)))
+    speed = abs(_input_speed(rated, ends, ratio))
+    blocks = {}
+    if speed:
+        source = "rotational_speed at the torque of the static state"
+        blocks["operation"] = Block("", {"rated_speed_rpm": read(tidy(speed), source)})
+    rows = _spectrum(model, loads, ends, ratio)
+    if rows is None:
+        return LifeLoads("", blocks)
+    body, life, lines = rows
+    of_life = {"body": Entry(body), "life_years": life}
+    file = read(SPECTRUM, "load_case: torque, speed and operating_time_fraction of each")
+    source_block = Block("", {"file": file, "hours_per_year": assumed(HOURS_PER_YEAR, "always at work")})
+    blocks["loads"] = Block("", of_life, {"sources.load_spectrum": source_block})
+    blocks["rating"] = _rating(model, gears)
+    return LifeLoads("torque_N_m,speed_rpm,hours\n" + "".join(lines), blocks)
+
+
+def _spectrum(model: Model, loads: Sequence[Loads], ends: Ends, ratio: float) -> tuple[str, Entry, list[str]] | None:
+    """Body that is loaded, years, and lines of torque, speed and hours; None where the file does not tell them."""
+    body = next((end for end in (ends.input, ends.output) if all(one.torques.get(end) for one in loads)), None)
+    shares = [100.0] if len(loads) == 1 else [one.share or 0.0 for one in loads]
+    speeds = [_input_speed(one, ends, ratio) * (ratio if body == ends.output else 1.0) for one in loads]
+    if body is None or not sum(shares) or not all(speeds):
+        return None
+    hours = next((h for unit in model.of_type("gear_unit") if (h := unit.quantity("operating_time", "h"))), None)
+    life = assumed(USUAL_YEARS, "the file gives no operating_time")
+    if hours:
+        life = derived(_rounded(hours / HOURS_PER_YEAR), f"operating_time of {hours:g} h")
+    each = [(hours or life.value * HOURS_PER_YEAR) * share / sum(shares) for share in shares]
+    lines = [
+        f"{one.torques[body]!r},{tidy(speed)!r},{_rounded(duration)!r}\n"
+        for one, speed, duration in zip(loads, speeds, each, strict=True)
+    ]
+    return body, life, lines
+
+
+def _rating(model: Model, gears: Mapping[str, tuple[Component, bool]]) -> Block:
+    """Tell what gears withstand by their materials, and the oil; gears without both endurance limits are not rated."""
+    viscosities = [
+        one for oil in model.of_type("lubricant") if (one := oil.quantity("viscosity_at_40_degree_celsius", "mm^2 / s"))
+    ]
+    viscosity = (
+        read(tidy(min(viscosities)), "viscosity_at_40_degree_celsius of the lubricant")
+        if viscosities
+        else assumed(USUAL_VISCOSITY, "the file gives no lubricant")
+    )
+    keys = ("dynamic_factor_iso_6336_2006", "dynamic_factor_din_3990_1987")
+    factors = [one for stage in model.of_type("cylindrical_stage") for key in keys if (one := stage.quantity(key))]
+    dynamic = (
+        read(tidy(max(1.0, *factors)), "the largest dynamic_factor of the stages")
+        if factors
+        else assumed(USUAL_DYNAMIC_FACTOR, "the file gives none; a run or `steady` gives it, see dynamic_factor_run")
+    )
+    block = Block("", {"dynamic_factor": dynamic, "viscosity_40_mm2_per_s": viscosity})
+    for name, (gear, both_ways) in gears.items():
+        strength = _strength(material_of(model, gear), gear, both_ways)
+        if strength is not None:
+            block.blocks[f"gears.{name}"] = strength
+    return block
+
+
+def _strength(material: Component | None, gear: Component, both_ways: bool) -> Block | None:
+    """Tell what a gear withstands; None without both of its endurance limits."""
+    limits = {
+        ours: material.quantity(key, "MPa") if material else None
+        for ours, key in (("sigma_H_lim_MPa", "endurance_limit_flank"), ("sigma_F_lim_MPa", "endurance_limit_root"))
+    }
+    if material is None or not all(limits.values()):
+        return None
+    entries = {
+        ours: read(tidy(value or 0.0), f"endurance_limit_{'flank' if 'H' in ours else 'root'} of {material}")
+        for ours, value in limits.items()
+    }
+    entries |= _curves(material.text("heat_treated_material_type_iso_6336_2006"), limits["sigma_H_lim_MPa"] or 0.0)
+    roughness = gear.quantity("arithmetic_average_roughness_flank", "mum")
+    if roughness:
+        entries["roughness_Ra_um"] = read(tidy(roughness), "arithmetic_average_roughness_flank")
+    else:
+        entries["roughness_Rz_um"] = assumed(USUAL_ROUGHNESS, "the file gives none")
+    entries["root_factor"] = assumed(USUAL_ROOT_FACTOR, "Y_drelT Y_RrelT Y_X, near 1 by ISO 6336-3")
+    if both_ways:
+        entries["mean_stress_factor"] = assumed(BOTH_WAYS, "Y_M of ISO 6336-3, annex B, for teeth that bend both ways")
+    return Block(str(material), entries)
+
+
+def _curves(kind: str, flank_limit: float) -> dict[str, Entry]:
+    """S-N curves of a heat treatment: ISO 6336-2:2006, table 2, and ISO 6336-3:2006, table 1."""
+    source = f"heat_treated_material_type_iso_6336_2006 {kind}"
+    if kind.lower() in ("", "false", "none"):
+        hard = flank_limit >= HARD_FLANK
+        kind = "case_hardened" if hard else "through_hardened"
+        source = f"no heat treatment given; {flank_limit:g} MPa are those of {'' if hard else 'un'}hardened flanks"
+    found = next((curves for word, curves in CURVES.items() if word in kind), None)
+    if found is None:
+        return {"curve": assumed("case_hardened", source)}
+    contact, bending = ([list(point) for point in curve] for curve in found)
+    return {"contact_curve": derived(contact, source), "bending_curve": derived(bending, source)}

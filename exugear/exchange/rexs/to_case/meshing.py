@@ -1,0 +1,454 @@
+"""Stages of a REXS file as gear pairs: profile shifts that follow from centre distances, and what must fit."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from exugear.exchange.rexs.faults import RexsError
+from exugear.exchange.rexs.to_case.notes import Entry, Notes, assumed, derived, tidy
+from exugear.exchange.rexs.to_case.toothing import Toothing
+from exugear.exchange.rexs.tree import Component
+from fe_ste.geometry import fitting
+from fe_ste.geometry.checks import GeometryError, check_gear
+from fe_ste.geometry.cutter import PinionCutter
+from fe_ste.geometry.gear_relations import BasicRack, UncheckedGear
+from fe_ste.geometry.involute import involute
+from fe_ste.geometry.pair_relations import UncheckedPair
+
+SHIFT_TOLERANCE = 1e-3
+"""Largest difference of the sum of profile shifts from what the centre distance asks for: digits of a file."""
+RACK_TOLERANCE = 1e-6
+"""Largest relative difference of modules and pressure angles of one rack."""
+PITCH_TOLERANCE = 2e-4
+"""Largest relative difference of base pitches that are one, in files that give four digits."""
+PLACE_TOLERANCE = 0.02
+"""Largest difference of a centre distance and the positions of the gears, mm."""
+MARGIN = 1e-4
+"""Rounding allowed for where a tool or a tip is replaced, in normal modules."""
+FORM_TOLERANCE = 1e-3
+"""Difference of form diameters that says nothing, in normal modules."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Two gears in mesh: the pinion is the smaller, against a ring the external one.
+
+    Attributes
+    ----------
+    part : Component
+        The first of the stages that are alike, one for each planet.
+    pinion, gear : int
+        Numbers of the gears' components.
+    distance : Entry
+        Centre distance, mm; that of the positions where these do not count.
+    apart : float
+        Distance of the axes as they stand, mm.
+    common_face : Entry, optional
+        Face width that the gears share, where that is less than the narrower face, mm.
+    """
+
+    part: Component
+    pinion: int
+    gear: int
+    distance: Entry
+    apart: float
+    common_face: Entry | None = None
+
+
+def centre_distance(stage: Component, apart: float, pair: tuple[Toothing, Toothing], notes: Notes) -> Entry:
+    """Centre distance of a stage whose gears stand so far apart (mm), by the rules of the import.
+
+    Raises
+    ------
+    RexsError
+        The file says two different distances, and neither profile shifts nor rules tell which one counts.
+    """
+    stated = stage.quantity("center_distance", "mm")
+    if apart <= PLACE_TOLERANCE:
+        raise RexsError(f"{stage}: both of its gears stand on one axis; correct support_vector of one of them")
+    if stated is None:
+        return derived(tidy(round(apart, 9)), "distance of the gears' positions")
+    stated = abs(stated)
+    notes.checked.append(f"{stage}: centre distance {stated:.6g} mm, positions {apart:.6f} mm")
+    if abs(stated - apart) <= PLACE_TOLERANCE:
+        return Entry(tidy(stated), "center_distance")
+    rule, why = notes.rules.distances, "as asked for"
+    if rule == "agreeing" and stated > PLACE_TOLERANCE:
+        rule, why = _confirmed(pair, stated, apart), "with which the profile shifts agree"
+    both = f"center_distance = {stated:g} mm, but its gears stand {apart:.4f} mm apart"
+    if rule == "agreeing":
+        raise RexsError(
+            f"{stage}: {both}; correct one of them, or import with --distances positions or --distances file"
+        )
+    notes.changed.append(
+        f"{stage}: {both}; {'the positions count' if rule == 'positions' else 'axes are moved to the first'}, {why}"
+    )
+    if rule == "positions":
+        return derived(tidy(round(apart, 9)), f"distance of the gears' positions, {why}; center_distance {stated:g}")
+    return Entry(tidy(stated), f"center_distance, {why}; the gears stand {apart:.4f} apart")
+
+
+def _confirmed(
+    pair: tuple[Toothing, Toothing], stated: float, apart: float
+) -> Literal["agreeing", "positions", "file"]:
+    """Tell which of two distances the profile shifts of both gears agree with: one alone, or none."""
+    pinion, gear = pair
+    if pinion.shift is None or gear.shift is None:
+        return "agreeing"
+    total = pinion.shift.value + (-gear.shift.value if gear.internal else gear.shift.value)
+    asked = [fitting.shift_sum(unchecked("", pinion), unchecked("", gear), 1e-3 * one) for one in (apart, stated)]
+    fits = [one is not None and abs(one - total) <= SHIFT_TOLERANCE for one in asked]
+    if fits[0] == fits[1]:
+        return "agreeing"
+    return "positions" if fits[0] else "file"
+
+
+def shift_sum(pinion: Toothing, gear: Toothing, distance: float) -> float:
+    """Profile shifts that leave no backlash at a centre distance (mm), see `fe_ste.geometry.fitting.shift_sum`.
+
+    Raises
+    ------
+    RexsError
+        No working pressure angle belongs to the distance.
+    """
+    total = fitting.shift_sum(unchecked("", pinion), unchecked("", gear), 1e-3 * distance)
+    if total is None:
+        raise RexsError(
+            f"{pinion.part}, {gear.part}: no line of action touches both base circles at a distance of {distance:g} mm"
+        )
+    return total
+
+
+def with_shifts(gears: Mapping[int, Toothing], stages: Sequence[Stage], notes: Notes) -> dict[int, Toothing]:
+    """Complete the profile shifts: a file may give one of a pair, or none, and leave the rest to the centre distance.
+
+    Raises
+    ------
+    RexsError
+        Shifts and centre distance contradict each other.
+    """
+    solved = _solved(gears, stages)
+    wrong = [stage for stage in stages if _beyond(solved, stage)]
+    replaced = _replaceable(gears, stages, wrong, notes)
+    if replaced:
+        open_shifts = {number: dataclasses.replace(gears[number], shift=None) for number in replaced}
+        again = _solved({**gears, **open_shifts}, stages)
+        if not any(_beyond(again, stage) for stage in stages):
+            solved = again
+            notes.changed += [_replacement(gears[number], again[number]) for number in replaced]
+    for stage in stages:
+        with notes.faults.gathered():
+            _check_shifts(solved, stage, notes)
+    notes.faults.tell()
+    return solved
+
+
+def _solved(gears: Mapping[int, Toothing], stages: Sequence[Stage]) -> dict[int, Toothing]:
+    """Give every gear a profile shift."""
+    solved, open_stages = dict(gears), list(stages)
+    while open_stages:
+        ready = [one for one in open_stages if _given(solved, one)] or open_stages[:1]
+        for stage in ready:
+            open_stages.remove(stage)
+            _complete(solved, stage)
+    return solved
+
+
+def _beyond(gears: Mapping[int, Toothing], stage: Stage) -> bool:
+    """Tell whether the shifts of a stage contradict its centre distance."""
+    stated, total = _shift_sums(gears, stage)
+    return abs(stated - total) > SHIFT_TOLERANCE
+
+
+def _shift_sums(gears: Mapping[int, Toothing], stage: Stage) -> tuple[float, float]:
+    """Sum of the shifts as they are, and that which the centre distance asks for."""
+    pinion, gear = gears[stage.pinion], gears[stage.gear]
+    assert pinion.shift is not None and gear.shift is not None
+    stated = pinion.shift.value + (-gear.shift.value if gear.internal else gear.shift.value)
+    return stated, shift_sum(pinion, gear, stage.distance.value)
+
+
+def _replaceable(
+    gears: Mapping[int, Toothing], stages: Sequence[Stage], wrong: Sequence[Stage], notes: Notes
+) -> list[int]:
+    """Gears whose shift may be none at all: zeros that fit to none of their stages, one in each of these.
+
+    Programs write 0 for a shift that they derive. Where both gears of a stage have one, or neither, the rules decide.
+    """
+    found: list[int] = []
+    for stage in wrong:
+        both = (stage.pinion, stage.gear)
+        free = [number for number in both if all(one in wrong for one in stages if number in (one.pinion, one.gear))]
+        zeros = [number for number in free if (shift := gears[number].shift) is not None and shift.value == 0.0]
+        if len(zeros) == 1:
+            found += zeros
+        elif notes.rules.shifts == "centre-distance":
+            found += zeros or free[:1]
+    return list(dict.fromkeys(found))
+
+
+def _replacement(before: Toothing, after: Toothing) -> str:
+    assert before.shift is not None and after.shift is not None
+    return (
+        f"{before.part}: addendum_modification_coefficient = {before.shift.value:g} contradicts the centre distances, "
+        f"taken as one that the program left out: {after.shift.value:.6f} without backlash"
+    )
+
+
+def _given(gears: Mapping[int, Toothing], stage: Stage) -> bool:
+    return gears[stage.pinion].shift is not None or gears[stage.gear].shift is not None
+
+
+def _complete(gears: dict[int, Toothing], stage: Stage) -> None:
+    """Give both gears of a stage a shift; where neither has one the gear gets none and the pinion all."""
+    pinion, gear = gears[stage.pinion], gears[stage.gear]
+    sign = -1.0 if gear.internal else 1.0
+    total = shift_sum(pinion, gear, stage.distance.value)
+    if pinion.shift is None and gear.shift is None:
+        gear = dataclasses.replace(gear, shift=assumed(0.0, "the file gives none for either gear of the stage"))
+        gears[stage.gear] = gear
+    if pinion.shift is None and gear.shift is not None:
+        shift = derived(tidy(round(total - sign * gear.shift.value, 9)), "from the centre distance, without backlash")
+        gears[stage.pinion] = dataclasses.replace(pinion, shift=shift)
+    elif gear.shift is None and pinion.shift is not None:
+        missing = tidy(round(sign * (total - pinion.shift.value), 9))
+        shift = derived(missing, "from the centre distance, without backlash")
+        gears[stage.gear] = dataclasses.replace(gear, shift=shift)
+
+
+def _check_shifts(gears: Mapping[int, Toothing], stage: Stage, notes: Notes) -> None:
+    stated, total = _shift_sums(gears, stage)
+    notes.checked.append(f"{stage.part}: sum of profile shifts {stated:.6f}, centre distance asks for {total:.6f}")
+    if abs(stated - total) > SHIFT_TOLERANCE:
+        pinion = gears[stage.pinion]
+        assert pinion.shift is not None
+        raise RexsError(
+            f"{stage.part}: the profile shifts sum to {stated:.5f}, but its centre distance of "
+            f"{stage.distance.value:g} mm asks for {total:.5f}; correct addendum_modification_coefficient "
+            f"or center_distance, or import with --shifts centre-distance, which gives {pinion.part} "
+            f"{pinion.shift.value + total - stated:.5f} where the other gear keeps its own"
+        )
+
+
+def with_equal_racks(gears: Mapping[int, Toothing], stages: Sequence[Stage], notes: Notes) -> dict[int, Toothing]:
+    """Describe gears by the rack of their mates, where theirs is another one with the same base pitch.
+
+    Involutes mesh if their base pitches are equal, whatever racks they were cut with. Base circle, base helix and tooth
+    thickness stay, and so do diameters; the fillet is that of the other rack, which differs a little.
+    """
+    same, open_stages = dict(gears), list(stages)
+    settled: set[int] = set()
+    while open_stages:
+        stage = next((one for one in open_stages if {one.pinion, one.gear} & settled), open_stages[0])
+        open_stages.remove(stage)
+        keep, other = (stage.gear, stage.pinion) if stage.gear in settled else (stage.pinion, stage.gear)
+        settled |= {keep, other}
+        if _have_one_rack(same[keep], same[other]) or not _have_one_base_pitch(same[keep], same[other]):
+            continue
+        mate = same[keep]
+        notes.changed.append(
+            f"{same[other].part}: m_n = {same[other].module.value:g} mm at {same[other].pressure_angle.value:g} deg "
+            f"has the base pitch of {mate.part}; described by its rack of {mate.module.value:g} mm at "
+            f"{mate.pressure_angle.value:g} deg, base circle, tooth thickness and diameters kept"
+        )
+        same[other] = _in_rack_of(mate, same[other])
+    return same
+
+
+def _have_one_rack(one: Toothing, other: Toothing) -> bool:
+    pairs = ((one.module, other.module), (one.pressure_angle, other.pressure_angle))
+    return all(abs(a.value - b.value) <= RACK_TOLERANCE * abs(b.value) for a, b in pairs)
+
+
+def _have_one_base_pitch(one: Toothing, other: Toothing) -> bool:
+    cosines = [math.cos(math.radians(gear.pressure_angle.value)) for gear in (one, other)]
+    pitches = [gear.module.value * cosine for gear, cosine in zip((one, other), cosines, strict=True)]
+    sines = [
+        abs(math.sin(math.radians(gear.helix_angle.value))) * cosine
+        for gear, cosine in zip((one, other), cosines, strict=True)
+    ]
+    return abs(pitches[0] - pitches[1]) <= PITCH_TOLERANCE * pitches[1] and abs(sines[0] - sines[1]) <= PITCH_TOLERANCE
+
+
+def _in_rack_of(mate: Toothing, gear: Toothing) -> Toothing:
+    """Describe a gear by the rack of its mate."""
+    before = unchecked("", gear)
+    angle = math.radians(mate.pressure_angle.value)
+    sine = math.sin(before.helix_angle) * math.cos(before.normal_pressure_angle) / math.cos(angle)
+    source = f"of another rack with the same base pitch: {gear.module.value:g} mm, {gear.pressure_angle.value:g} deg"
+    changes: dict[str, Any] = {
+        "module": derived(mate.module.value, source),
+        "pressure_angle": derived(mate.pressure_angle.value, source),
+        "helix_angle": derived(tidy(math.degrees(math.asin(sine))), "the same base helix angle"),
+    }
+    bare = unchecked("", dataclasses.replace(gear, **changes, tip=None, root=None, cutter=None, root_form=None))
+    scale = bare.reference_radius / before.reference_radius
+    changes["thinning"] = dataclasses.replace(gear.thinning, value=tidy(gear.thinning.value * scale))
+    if gear.allowances:
+        allowances = {key: tidy(value * scale) for key, value in gear.allowances.value.items()}
+        changes["allowances"] = dataclasses.replace(gear.allowances, value=allowances)
+    if gear.shift is None:
+        return dataclasses.replace(gear, **changes)
+    turned = involute(before.transverse_pressure_angle) - involute(bare.transverse_pressure_angle)
+    thickness = gear.shift.value * math.tan(before.normal_pressure_angle) + 0.5 * gear.teeth * turned
+    shift = thickness / math.tan(angle)
+    root = 2e3 * before.root_radius
+    depth = bare.outward * (1e3 * bare.reference_radius - 0.5 * root) / mate.module.value
+    changes |= {
+        "shift": derived(tidy(round(shift, 9)), "the same tooth thickness at the base circle"),
+        "tip": gear.tip or derived(tidy(round(2e3 * before.tip_radius, 6)), "that of its own rack"),
+        "root": gear.root or derived(tidy(round(root, 6)), "that of its own rack"),
+        "dedendum": derived(tidy(round(depth + bare.outward * shift, 9)), "the same root diameter"),
+        "tip_radius": derived(
+            tidy(round(gear.tip_radius.value * gear.module.value / mate.module.value, 9)), "the same length"
+        ),
+        "cutter": None,
+    }
+    return dataclasses.replace(gear, **changes)
+
+
+def unchecked(name: str, gear: Toothing) -> UncheckedGear:
+    """Build the gear with the relations of its geometry."""
+    plain = UncheckedGear(
+        name=name,
+        teeth=gear.teeth,
+        normal_module=1e-3 * gear.module.value,
+        normal_pressure_angle=math.radians(gear.pressure_angle.value),
+        helix_angle=math.radians(gear.helix_angle.value),
+        profile_shift=gear.shift.value if gear.shift else 0.0,
+        face_width=1e-3 * gear.face_width.value,
+        held_diameter=1e-3,
+        internal=gear.internal,
+        rack=BasicRack(1.0, gear.dedendum.value, gear.tip_radius.value),
+        tip_diameter=1e-3 * gear.tip.value if gear.tip else None,
+        root_diameter=1e-3 * gear.root.value if gear.root else None,
+        tooth_thinning=1e-3 * gear.thinning.value,
+        root_form_diameter=1e-3 * gear.root_form.value if gear.root_form else None,
+        cutter=_cutter(gear),
+    )
+    if not gear.chamfer:
+        return plain
+    return dataclasses.replace(plain, tip_form_diameter=2.0 * (plain.tip_radius - 1e-3 * plain.outward * gear.chamfer))
+
+
+def _cutter(gear: Toothing) -> PinionCutter | None:
+    """Build the cutter of a ring."""
+    if gear.cutter is None:
+        return None
+    given, tip = gear.cutter.value, gear.cutter.value.get("tip_diameter_mm")
+    if "addendum" in given:
+        reference = given["teeth"] / math.cos(math.radians(gear.helix_angle.value))
+        tip = gear.module.value * (reference + 2.0 * (given["profile_shift"] + given["addendum"]))
+    return PinionCutter(
+        given["teeth"], given["tip_radius"], given["profile_shift"], None if tip is None else 1e-3 * tip
+    )
+
+
+@contextmanager
+def told_if_impossible(*gears: Toothing) -> Iterator[None]:
+    """Tell numbers of gears that no geometry follows from: their relations have no solution there."""
+    try:
+        yield
+    except RexsError:
+        raise
+    except (ArithmeticError, ValueError) as error:
+        parts = " and ".join(str(gear.part) for gear in gears)
+        raise RexsError(
+            f"{parts}: tooth numbers, diameters, shift and tool make no gear together ({error}); correct them"
+        ) from None
+
+
+def with_possible_cutter(gear: Toothing, notes: Notes) -> Toothing:
+    """Leave out a cutter that cannot make the ring as the file describes it, and say why."""
+    if gear.cutter is None:
+        return gear
+    made = unchecked("", gear)
+    try:
+        check_gear(dataclasses.replace(made, held_diameter=10.0 * made.reference_radius))
+    except GeometryError as error:
+        why = str(error).removeprefix("gear '': ")
+        notes.changed.append(f"{gear.part}: its cutter is left out, the fillet is an arc instead; {why}")
+        return dataclasses.replace(gear, cutter=None)
+    return gear
+
+
+def with_fitting_tool(gear: Toothing, notes: Notes) -> Toothing:
+    """Let the corner of the tool be as round as fits on it: at large pressure angles that is less than usual."""
+    made = unchecked("", gear)
+    if gear.internal or made.rack_tip_half_land >= 0.0:
+        return gear
+    # As in `fe_ste.geometry.checks`: a smaller radius leaves more of the tool's tip flat.
+    growth = 1.0 / math.cos(made.normal_pressure_angle) - math.tan(made.normal_pressure_angle)
+    most = gear.tip_radius.value + made.rack_tip_half_land / made.normal_module / growth
+    if most <= 0.0:
+        return gear
+    radius = math.floor(1e4 * most) / 1e4
+    if not gear.tip_radius.kind:
+        notes.changed.append(
+            f"{gear.part}: a tool with a corner of {gear.tip_radius.value:g} has no tip; {radius:g} taken"
+        )
+    said = f"{gear.tip_radius.value:g} does not fit on a tool of {gear.pressure_angle.value:g} deg"
+    return dataclasses.replace(gear, tip_radius=assumed(radius, said))
+
+
+def with_form_circles(gear: Toothing, notes: Notes) -> Toothing:
+    """Keep a root form diameter where it ends the flank before the fillet does; undercut ends it by itself."""
+    bare = unchecked("", dataclasses.replace(gear, root_form=None))
+    if bare.is_undercut:
+        notes.checked.append(
+            f"{gear.part}: undercut by its tool; its flank begins at a diameter of {2e3 * bare.form_radius:.4f} mm"
+        )
+    if gear.root_form is None:
+        return gear
+    beyond = (1e-3 * gear.root_form.value - 2.0 * bare.form_radius) * bare.outward
+    notes.checked.append(
+        f"{gear.part}: root form diameter {gear.root_form.value:.6g} mm, its tool's rounding gives "
+        f"{2e3 * bare.form_radius:.6g} mm"
+    )
+    return gear if beyond > FORM_TOLERANCE * bare.normal_module else dataclasses.replace(gear, root_form=None)
+
+
+def with_clear_tips(gears: dict[int, Toothing], stages: Sequence[Stage], notes: Notes) -> dict[int, Toothing]:
+    """Move back tips that would touch their mate below its form circle, where it has no involute.
+
+    A tip that the file gives is left alone as long as it does not; one that it does not give keeps a clearance.
+    """
+    cleared = dict(gears)
+    for stage in stages:
+        for tip, mate in ((stage.gear, stage.pinion), (stage.pinion, stage.gear)):
+            with told_if_impossible(cleared[tip], cleared[mate]):
+                bound = _tip_bound(cleared, stage, tip)
+            if bound is None:
+                continue
+            own = 2e3 * unchecked("", cleared[tip]).tip_radius
+            notes.changed.append(
+                f"{cleared[tip].part}: tip diameter {bound:g} mm instead of {own:.4f} mm, which reaches the form "
+                f"circle of {cleared[mate].part} or comes too near to it"
+            )
+            entry = assumed(bound, f"{own:.4f} would come too near to the form circle of {cleared[mate].part}")
+            cleared[tip] = dataclasses.replace(cleared[tip], tip=entry)
+    return cleared
+
+
+def _tip_bound(gears: Mapping[int, Toothing], stage: Stage, which: int) -> float | None:
+    """Tip diameter (mm) at which a gear keeps clear of its mate's form circle; None if it does so already."""
+    pinion, gear = unchecked("pinion", gears[stage.pinion]), unchecked("gear", gears[stage.gear])
+    pair = UncheckedPair(name="", pinion=pinion, gear=gear, centre_distance=1e-3 * stage.distance.value)
+    for one, of in ((pinion, stage.pinion), (gear, stage.gear)):
+        if one.tip_radius <= one.base_radius:
+            raise RexsError(
+                f"{gears[of].part}: its tip circle of {2e3 * one.tip_radius:.6g} mm lies inside of its base circle of "
+                f"{2e3 * one.base_radius:.6g} mm: no flank is left; correct tip_diameter or its tooth data"
+            )
+    tip = gear if which == stage.gear else pinion
+    margin = (MARGIN if gears[which].tip else fitting.ROOT_MARGIN) * tip.normal_module
+    diameter = 1e3 * fitting.clear_tip_diameter(pair, tip, margin)
+    if fitting.root_margin(pair, tip) >= margin:
+        return None
+    # Rounded to the side that clears.
+    return round((math.floor if tip.outward > 0 else math.ceil)(1e4 * diameter) / 1e4, 4)

@@ -1,0 +1,420 @@
+"""Bearings and couplings of a REXS file as those of the gearbox file, and the ideal joints of the variant `rigid`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from exugear.bearings.rolling.designations import boundary_of
+from exugear.exchange.rexs.faults import RexsError, plain
+from exugear.exchange.rexs.to_case.bodies import (
+    JOINING,
+    RIGID_ABOVE,
+    STIFFNESSES,
+    Bodies,
+    Body,
+    ends,
+    is_engaged,
+    is_one_piece,
+    is_rigid_in_torsion,
+    torsional_stiffness,
+)
+from exugear.exchange.rexs.to_case.notes import Block, Entry, Notes, assumed, derived, read, tidy
+from exugear.exchange.rexs.to_case.places import Places
+from exugear.exchange.rexs.tree import Component, Model
+from exugear.gearbox.sections.connections import CONTACT_ANGLES_DEG, TYPES_OF_KEYS
+
+BEARINGS = ("concept_bearing", "rolling_bearing_with_catalog_geometry", "rolling_bearing_with_detailed_geometry")
+PLAIN_BEARINGS = ("hydrodynamic_radial_plain_bearing", "slide_bearing")
+ROLLING_TYPES = {
+    "angular_contact_ball_bearing": "angular_contact_ball",
+    "axial_self_aligning_roller_bearing": "thrust_spherical_roller",
+    "four_point_contact_ball_bearing": "four_point_ball",
+    "radial_grooved_ball_bearing": "deep_groove_ball",
+    "radial_needle_roller_bearing": "needle_roller",
+    "radial_roller_bearing": "cylindrical_roller",
+    "radial_self-aligning_ball_bearing": "self_aligning_ball",
+    "radial_self_aligning_ball_bearing": "self_aligning_ball",
+    "radial_self_aligning_roller_bearing": "spherical_roller",
+    "radial_spherical_roller_bearing": "spherical_roller",
+    "radial_tapered_roller_bearing": "tapered_roller",
+}
+"""Types of rolling bearings, REXS to ours."""
+CYLINDERS = TYPES_OF_KEYS["ribs"][0]
+"""Types whose rollers hold a shaft along the axis by ribs alone."""
+ARRANGED = TYPES_OF_KEYS["axial_preload_um"][0]
+"""Types of which two rows stand in X, O or tandem."""
+GROOVE_RATIOS, OSCULATIONS = (0.501, 0.6), (0.5, 0.9999)
+"""Ratios of radii that rolling bearings can have."""
+LEAST_RADIUS = 0.03
+"""Radius (m) that stands for that of gears where two coupled bodies have none."""
+PLACE_TOLERANCE = 0.02
+"""Largest difference of two statements on a place that needs no word, mm."""
+RIGID = {"radial_stiffness": 1e10, "axial_stiffness": 1e10, "bending_stiffness": 1e7}
+"""What stands for rigid: stiffer than teeth and bearings, and no more, for the step's sake."""
+
+
+def bearing_blocks(model: Model, places: Places, bodies: Bodies, notes: Notes) -> dict[str, Block]:
+    """Tables of all bearings by name, and of connections that hold without joining."""
+    blocks: dict[str, Block] = {}
+    for part in model.of_type(*BEARINGS, *PLAIN_BEARINGS):
+        with notes.faults.gathered():
+            block = _bearing(model, places, bodies, part, notes)
+            if block is not None:
+                blocks[f"bearing_{len(blocks) + 1}"] = block
+    for part, body, on in _flexible_connections(model, bodies):
+        entries = _stiffness(part, notes)
+        if not entries:
+            continue
+        with notes.faults.gathered():
+            blocks[f"bearing_{len(blocks) + 1}"] = _placed(places, part, body, on, {"stiffness": Block("", entries)})
+    return blocks
+
+
+def coupling_blocks(model: Model, bodies: Bodies, bearings: Mapping[str, Block]) -> dict[str, Block]:
+    """Tables of the connections that turn two bodies together, by name; `bearings` hold them in other directions."""
+    blocks: dict[str, Block] = {}
+    seats = {block.number: name for name, block in bearings.items()}
+    for part, body, on in _flexible_connections(model, bodies):
+        torsion = torsional_stiffness(part)
+        if torsion == 0.0 or on.fixed:
+            continue
+        entries = {"bodies": read([body.name, on.name], "inner_part and outer_part")}
+        if part.number in seats:
+            entries["seat"] = Entry(seats[part.number])
+        if torsion is None or is_rigid_in_torsion(part):
+            said = "none given" if torsion is None else f"rotational_stiffness of {torsion:g} N m/rad means rigid"
+            said += f": as much as {RIGID['radial_stiffness']:g} N/m at the teeth"
+            stiff = assumed(_stiff_torsion(body, on), said)
+        else:
+            stiff = read(tidy(torsion), "rotational_stiffness")
+        blocks[f"coupling_{len(blocks) + 1}"] = Block(str(part), entries | {"stiffness_N_m_per_rad": stiff})
+    return blocks
+
+
+def _stiff_torsion(*bodies: Body) -> float:
+    """Find what stands for rigid in torsion, N m/rad: at the largest reference circle as in other directions."""
+    diameters = [
+        (gear.whole("number_of_teeth") or 0) * (gear.quantity("normal_module", "mm") or 0.0)
+        for body in bodies
+        for gear in body.gears
+    ]
+    radius = max([0.5e-3 * abs(one) for one in diameters], default=0.0) or LEAST_RADIUS
+    return float(f"{RIGID['radial_stiffness'] * radius**2:.2g}")
+
+
+def joint_blocks(bodies: Bodies, bearings: dict[str, Block], gear_places: dict[str, float]) -> dict[str, Block]:
+    """Joints of the variant `rigid`: one for each body, in the middle of its bearings, or at its gear."""
+    blocks = {}
+    for body in bodies.members:
+        if body.fixed:
+            continue
+        held = [one.entries["z_mm"].value for one in bearings.values() if one.entries["body"].value == body.name]
+        place = sum(held) / len(held) if held else gear_places.get(body.name, 0.0)
+        entries = {"body": Entry(body.name)}
+        if body.carrier:
+            entries["on"] = Entry(body.carrier)
+        entries["z_mm"] = derived(tidy(round(place, 6)), "middle of its bearings" if held else "middle of its gear")
+        blocks[body.name] = Block("", entries)
+    return blocks
+
+
+def _flexible_connections(model: Model, bodies: Bodies) -> Iterator[tuple[Component, Body, Body]]:
+    """Couplings and fits between two bodies that are not one piece, one of equal planets."""
+    for part in model.of_type(*JOINING):
+        both = ends(model, part)
+        if both is None or is_one_piece(part) or not is_engaged(model, part):
+            continue
+        inner, outer = bodies.of(both[0]), bodies.of(both[1])
+        if inner is not None and outer is not None and inner is not outer:
+            yield part, inner, outer
+
+
+def _bearing(model: Model, places: Places, bodies: Bodies, part: Component, notes: Notes) -> Block | None:
+    both = ends(model, part)
+    if both is None:
+        raise RexsError(f"{part}: no relation 'side' tells what it holds and on what")
+    inner, outer = (None if end.type == "gear_casing" else bodies.of_any(end) for end in both)
+    if any(body is not None and bodies.of(end) is None for end, body in zip(both, (inner, outer), strict=True)):
+        return None  # of a planet that is like the first
+    inner, outer = (None if body is not None and body.fixed else body for body in (inner, outer))
+    if inner is outer:
+        notes.ignored.append(f"{part}: holds nothing that turns, or both of its rings are on one body")
+        return None
+    if inner is None or (outer is not None and outer.carrier == inner.name):
+        inner, outer = outer, inner
+    if inner is None:
+        return None
+    _check_place(places, part, both, notes)
+    inside = _support(model, part, places.sense(both[0]), notes)
+    block = _placed(places, part, inner, outer, inside)
+    if "designation" in inside:
+        block.entries["designation"] = inside["designation"].entries["designation"]
+        block.blocks.clear()
+    if outer is None and bodies.of(both[0]) is None:
+        block.entries["outer_ring"] = read("body", "outer_part turns")
+    return block
+
+
+def _check_place(places: Places, part: Component, both: tuple[Component, Component], notes: Notes) -> None:
+    """Compare the place of a bearing with its coordinate on the shafts that it joins."""
+    for side, shaft in zip(("inner", "outer"), both, strict=True):
+        along = part.quantity(f"u_coordinate_on_shaft_{side}_side", "mm")
+        if along is None or shaft.type != "shaft" or not shaft.given("support_vector"):
+            continue
+        expected = places.position(shaft)[2] + places.sense(shaft) * along
+        if abs(expected - places.position(part)[2]) > PLACE_TOLERANCE:
+            notes.checked.append(
+                f"{part}: stands at z = {places.position(part)[2]:g} mm by support_vector, which is taken, and at "
+                f"{expected:g} mm by u_coordinate_on_shaft_{side}_side"
+            )
+
+
+def _placed(places: Places, part: Component, body: Body, on: Body | None, inside: dict[str, Block]) -> Block:
+    entries = {"body": Entry(body.name)}
+    if on is not None and not on.fixed:
+        entries["on"] = Entry(on.name)
+    entries["z_mm"] = read(places.position(part)[2], "support_vector")
+    return Block(str(part), entries, inside, part.number)
+
+
+def _support(model: Model, part: Component, sense: int, notes: Notes) -> dict[str, Block]:
+    """Return the stiffness or catalogue of a bearing, or its designation alone."""
+    if part.type == "concept_bearing":
+        entries = _stiffness(part, notes)
+        if not entries:
+            raise RexsError(f"{part}: holds nothing, neither radially nor axially nor against tilting")
+        return {"stiffness": Block("", entries)}
+    kind = ROLLING_TYPES.get(part.text("bearing_type"))
+    sizes = _sizes(part, kind, notes)
+    rows = part.whole("number_of_bearing_rows") or len(_parts_of(model, part, "rolling_bearing_row")) or 1
+    paired = rows > 1 and kind in CONTACT_ANGLES_DEG and kind not in ("spherical_roller", "self_aligning_ball")
+    arrangement = _arrangement(model, part, sense) if paired and rows == 2 and kind in ARRANGED else {}
+    if kind and sizes and (arrangement or not paired):
+        catalogue = _catalogue(model, part, kind, rows, sense, sizes, notes, arrangement)
+        return {"catalogue": Block("", catalogue), **_rib_stiffness(part, catalogue)}
+    if not sizes and part.quantity("radial_stiffness", "N / m"):
+        return {"stiffness": Block("", _stiffness(part, notes))}
+    if not kind:
+        why = f"a {part.text('bearing_type') or part.type} has no law here: give its stiffness"
+    elif paired:
+        why = (
+            f"a bearing of {rows} rows with contact angles, of which axial_force_absorption_of_row does not tell how "
+            "they stand: give its catalogue with arrangement X, O or tandem"
+        )
+    else:
+        why = "the file gives no dimensions, and no table here has them: give its catalogue, or its stiffness"
+    notes.changed.append(f"{part}: BLANK, {why}; until then only the variant rigid runs")
+    return {"designation": Block("", {"designation": Entry(_designation(part), f"BLANK: {why}")})}
+
+
+def _arrangement(model: Model, part: Component, sense: int) -> dict[str, Entry]:
+    """Tell how two rows stand to each other, by the way that each holds the inner ring; empty where a row is silent.
+
+    Rows follow each other along the u axis of the shaft. A first row that holds a ring pushed against u, with a second
+    one that holds it along u, is an X: the pressure lines meet towards the middle. A shaft that points the other way
+    turns the order and both senses, so that X stays X.
+    """
+    rows = _parts_of(model, part, "rolling_bearing_row")
+    held = [row.text("axial_force_absorption_of_row") for row in rows]
+    source = "axial_force_absorption_of_row, in the order of the rows"
+    if held in (["negative", "positive"], ["positive", "negative"]):
+        found = {"arrangement": read("X" if held[0] == "negative" else "O", source)}
+    elif held in (["positive", "positive"], ["negative", "negative"]):
+        towards = "+z" if (held[0] == "positive") == (sense > 0) else "-z"
+        found = {"arrangement": read("tandem", source), "holds_towards": read(towards, source)}
+    else:
+        return {}
+    distance = part.quantity("distance_between_bearing_rows", "mm")
+    if distance:
+        found["row_distance_mm"] = read(tidy(distance), "distance_between_bearing_rows")
+    preload, play = part.quantity("preload_distance", "mm"), part.quantity("operating_axial_bearing_clearance", "mm")
+    if found["arrangement"].value != "tandem" and (preload or play):
+        key = "preload_distance" if preload else "operating_axial_bearing_clearance"
+        found["axial_preload_um"] = read(tidy(1e3 * (preload or -(play or 0.0))), key)
+    return found
+
+
+def _rib_stiffness(part: Component, catalogue: Mapping[str, Entry]) -> dict[str, Block]:
+    """Stiffness that the file gives to ribs of cylindrical rollers, beside the catalogue, which leaves that free."""
+    value = part.quantity("axial_stiffness", "N / m")
+    if not value or catalogue["type"].value not in CYLINDERS or "ribs" in catalogue:
+        return {}
+    return {"stiffness": Block("", {"axial_N_per_m": _axial_stiffness(value)})}
+
+
+def _axial_stiffness(value: float) -> Entry:
+    if value >= RIGID_ABOVE["axial_stiffness"]:
+        return assumed(RIGID["axial_stiffness"], f"axial_stiffness of {value:g} means rigid")
+    return read(tidy(value), "axial_stiffness")
+
+
+def _sizes(part: Component, kind: str | None, notes: Notes) -> dict[str, Entry]:
+    """Boundary dimensions: those of the file, or those that its designation stands for; empty if neither tells."""
+    keys = {"inner_diameter": "bore_mm", "outer_diameter": "outer_diameter_mm", "width": "width_mm"}
+    given = {ours: part.quantity(key, "mm") for key, ours in keys.items()}
+    if all(given.values()):
+        return {ours: read(given[ours], key) for key, ours in keys.items()}
+    found = boundary_of(_designation(part))
+    if found is None or found.type != kind:
+        return {}
+    source = f"{found.source} by the designation {_designation(part)}: the file gives no dimensions"
+    notes.changed.append(f"{part}: {found.bore:g} x {found.outer:g} x {found.width:g} mm by {source}")
+    sizes = {"bore_mm": found.bore, "outer_diameter_mm": found.outer, "width_mm": found.width}
+    return {key: assumed(value, source) for key, value in sizes.items()}
+
+
+def _designation(part: Component) -> str:
+    return plain(part.text("catalogue_designation") or part.text("name") or part.name or part.type, 60)
+
+
+def _catalogue(
+    model: Model,
+    part: Component,
+    kind: str,
+    rows: int,
+    sense: int,
+    sizes: Mapping[str, Entry],
+    notes: Notes,
+    arrangement: Mapping[str, Entry],
+) -> dict[str, Entry]:
+    if arrangement:  # the catalogue section has the width of one of two bearings
+        sizes = {**sizes, "width_mm": derived(tidy(0.5 * sizes["width_mm"].value), "width, for each of two rows")}
+    entries = {
+        "type": read(kind, f"bearing_type {part.text('bearing_type')}"),
+        "designation": Entry(_designation(part)),
+        **sizes,
+    }
+    row = next(iter(_parts_of(model, part, "rolling_bearing_row")), None)
+    angle = abs((row or part).quantity("pressure_angle", "deg") or 0.0)
+    if kind in CONTACT_ANGLES_DEG and CONTACT_ANGLES_DEG[kind][0] <= angle <= CONTACT_ANGLES_DEG[kind][1]:
+        entries["contact_angle_deg"] = read(tidy(angle), "pressure_angle of its row")
+    if not arrangement and (rows > 1 or part.text("bearing_type") == "radial_spherical_roller_bearing"):
+        entries["row_count"] = read(rows, "number_of_bearing_rows")
+    if row is not None:
+        entries |= _elements(model, row, kind)
+        entries |= _grooves(model, row, kind, notes)
+    entries |= arrangement
+    clearance = part.quantity("operating_radial_bearing_clearance", "mm")
+    if clearance:
+        entries["radial_clearance_mm"] = read(tidy(clearance), "operating_radial_bearing_clearance")
+    sense_of_rating = "axial" if kind == "thrust_spherical_roller" else "radial"
+    for key, ours in (
+        (f"{sense_of_rating}_dynamic_load_rating", "dynamic_rating_kN"),
+        (f"{sense_of_rating}_static_load_rating", "static_rating_kN"),
+    ):
+        rating = part.quantity(key, "kN")
+        if rating:
+            entries[ours] = read(tidy(rating), key)
+    if not arrangement:
+        _tell_axial(part, kind, sense, entries, notes)
+    return entries
+
+
+def _tell_axial(part: Component, kind: str, sense: int, entries: dict[str, Entry], notes: Notes) -> None:
+    """Say which way a bearing holds the shaft, where the law of its type does not already."""
+    absorbed = part.text("axial_force_absorption")
+    if kind in TYPES_OF_KEYS["holds_towards"][0] and absorbed in ("positive", "negative"):
+        towards = "+z" if (absorbed == "positive") == (sense > 0) else "-z"
+        entries["holds_towards"] = read(towards, f"axial_force_absorption {absorbed}")
+    elif kind in CYLINDERS:
+        if absorbed == "both_directions" and not part.quantity("axial_stiffness", "N / m"):
+            entries["ribs"] = read("both", "axial_force_absorption both_directions")
+        elif absorbed in ("positive", "negative"):
+            towards = "+z" if (absorbed == "positive") == (sense > 0) else "-z"
+            entries["ribs"] = read(towards, f"axial_force_absorption {absorbed}")
+    elif absorbed in ("positive", "negative", "no_direction"):
+        notes.changed.append(f"{part}: axial_force_absorption {absorbed}, but the law of a {kind} holds both ways")
+
+
+def _elements(model: Model, row: Component, kind: str) -> dict[str, Entry]:
+    """Count and sizes of the rolling elements, as far as the file gives them."""
+    entries = {}
+    count = row.whole("number_of_rolling_elements")
+    if count:
+        entries["element_count"] = read(count, "number_of_rolling_elements")
+    element = next(iter(_parts_of(model, row, "rolling_element")), None)
+    wanted = [(element, "diameter_of_rolling_element", "element_diameter_mm")]
+    if kind in TYPES_OF_KEYS["element_length_mm"][0]:
+        wanted.append((element, "length_of_rolling_element", "element_length_mm"))
+    wanted.append((row, "reference_diameter_rolling_bearing", "pitch_diameter_mm"))
+    for part, key, ours in wanted:
+        value = part.quantity(key, "mm") if part else None
+        if value:
+            entries[ours] = read(tidy(value), key)
+    return entries
+
+
+def _grooves(model: Model, row: Component, kind: str, notes: Notes) -> dict[str, Entry]:
+    """Radii of grooves over the diameter of the balls, of barrels that of their outline over that of the raceway."""
+    element = next(iter(_parts_of(model, row, "rolling_element")), None)
+    radii = {ring: row.quantity(f"raceway_radius_of_{ring}_ring", "mm") for ring in ("inner", "outer")}
+    entries: dict[str, Entry] = {}
+    if element is None:
+        return entries
+    diameter = element.quantity("diameter_of_rolling_element", "mm")
+    for ring, radius in radii.items():
+        key = f"{ring}_groove_ratio"
+        if kind in TYPES_OF_KEYS[key][0] and diameter and radius:
+            source = f"raceway_radius_of_{ring}_ring over diameter_of_rolling_element"
+            _put_within(entries, key, radius / diameter, GROOVE_RATIOS, source, row, notes)
+    outline = element.quantity("roller_crowning_radius", "mm")
+    if kind in TYPES_OF_KEYS["osculation"][0] and outline and radii["outer"]:
+        source = "roller_crowning_radius over raceway_radius_of_outer_ring"
+        _put_within(entries, "osculation", outline / radii["outer"], OSCULATIONS, source, row, notes)
+    return entries
+
+
+def _put_within(
+    entries: dict[str, Entry],
+    key: str,
+    ratio: float,
+    limits: tuple[float, float],
+    source: str,
+    row: Component,
+    notes: Notes,
+) -> None:
+    if limits[0] <= ratio <= limits[1]:
+        entries[key] = derived(tidy(round(ratio, 6)), source)
+    else:
+        notes.changed.append(f"{row}: {source} is {ratio:.4g}, which cannot be; the usual {key} is taken")
+
+
+def _parts_of(model: Model, owner: Component, kind: str) -> Sequence[Component]:
+    found = [
+        one
+        for relation in ("assembly", "ordered_assembly")
+        for one in model.related(relation, "assembly", owner.number, "part")
+    ]
+    return [one for one in found if one.type == kind]
+
+
+def _was_rigid(part: Component) -> bool:
+    """Tell whether a connection is rigid in torsion: what it says nothing of is then rigid, too."""
+    return part.type in JOINING and is_rigid_in_torsion(part)
+
+
+def _stiffness(part: Component, notes: Notes) -> dict[str, Entry]:
+    """Isotropic stiffness of a concept bearing or coupling; what is meant as rigid gets a bound."""
+    entries = {}
+    for key, (ours, unit, factor) in STIFFNESSES.items():
+        value = part.quantity(key, unit)
+        value = None if value is None else factor * value
+        if key == "radial_stiffness" and part.flag("radial_force_absorption") is False:
+            continue
+        absorbed = part.text("axial_force_absorption")
+        if key == "axial_stiffness" and absorbed == "no_direction":
+            continue
+        if value is None and (key == "bending_stiffness" or part.type in JOINING) and not _was_rigid(part):
+            continue
+        one_way = absorbed in ("positive", "negative")
+        holds = one_way or absorbed == "both_directions" or _was_rigid(part)
+        if value is None and key == "axial_stiffness" and not holds:
+            continue
+        if key == "axial_stiffness" and one_way:
+            notes.changed.append(f"{part}: holds the axis {absorbed} along u only, here both ways")
+        if value is None or value >= RIGID_ABOVE[key]:
+            said = "the file gives none" if value is None else f"{key} of {value:g} means rigid"
+            entries[ours] = assumed(RIGID[key], said)
+        elif value > 0.0:
+            entries[ours] = read(tidy(value), key)
+    return entries

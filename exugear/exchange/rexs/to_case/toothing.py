@@ -1,0 +1,288 @@
+"""Gears as a REXS file gives them: one set of numbers for each gear, flanks and tool included."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from exugear.exchange.rexs.faults import RexsError
+from exugear.exchange.rexs.to_case.notes import Entry, Notes, assumed, needed, read, tidy, within
+from exugear.exchange.rexs.tree import Component, Model
+
+PLAUSIBLE_TIP = (0.5, 2.0)
+"""Tip diameters over the reference diameter beyond which a tip diameter is taken as a placeholder."""
+THINNING = 0.02
+"""Tooth thinning assumed where the file gives none, in normal modules: half of a usual backlash."""
+LENGTHS, PRESSURE_ANGLES, HELIX_ANGLES = (1e-3, 1e5), (1.0, 45.0), (-60.0, 60.0)
+"""Modules and face widths (mm), pressure and helix angles (deg) that a cylindrical gear can have."""
+EQUAL = 1e-6
+"""Largest difference of numbers on equal flanks or planets."""
+LEAST_RADIUS = 0.2
+"""Least radius of a tool's corner that the tooth model can have in all cases, in normal modules."""
+RIGID_MODULUS = 1e6
+"""Young's modulus (MPa) above which a material stands for 'rigid'; the stiffest there are have less."""
+
+
+@dataclass(frozen=True)
+class Toothing:
+    """A gear in the units and signs of the gearbox file: mm, deg, the shift of a ring positive for a larger ring.
+
+    Attributes
+    ----------
+    part : Component
+    teeth : int
+    module, pressure_angle, helix_angle, face_width : Entry
+    shift : Entry, optional
+        None where the file gives none: it follows from the centre distance.
+    tip, root : Entry, optional
+        Diameters as far as they are given.
+    dedendum, tip_radius, thinning : Entry
+    allowances : Entry, optional
+        Table of the tooth thickness's allowances, where the file gives them; `thinning` is then their mean.
+    cutter : Entry, optional
+        Table of the cutter of a ring, as far as the file gives one.
+    chamfer : float
+        Radial, mm.
+    root_form : Entry, optional
+        Diameter at which the flank ends towards the root, as far as it is given.
+    internal : bool
+    """
+
+    part: Component
+    teeth: int
+    module: Entry
+    pressure_angle: Entry
+    helix_angle: Entry
+    face_width: Entry
+    shift: Entry | None
+    tip: Entry | None
+    root: Entry | None
+    dedendum: Entry
+    tip_radius: Entry
+    thinning: Entry
+    allowances: Entry | None
+    cutter: Entry | None
+    chamfer: float
+    root_form: Entry | None
+    internal: bool
+
+
+def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes: Notes) -> Toothing:
+    """Gather the numbers of a gear; `mates` are the gears that it meshes with.
+
+    Raises
+    ------
+    RexsError
+        A number is missing, or left and right flanks differ.
+    """
+    internal = gear.type == "ring_gear"
+    module = _length(gear, "normal_module")
+    flank = _flank(model, gear)
+    tool = _tool(model, gear)
+    chamfer = (flank.quantity("tooth_tip_chamfer", "mm") if flank else None) or 0.0
+    angle, helix = _pressure_angle(gear, flank), _helix_angle(gear, mates)
+    allowances = _allowances(gear, math.radians(angle.value), math.radians(helix.value), internal)
+    teeth = abs(gear.whole("number_of_teeth") or 0)
+    if not teeth:
+        raise RexsError(f"{gear}: number_of_teeth is missing")
+    return Toothing(
+        part=gear,
+        teeth=teeth,
+        module=read(tidy(module), "normal_module"),
+        pressure_angle=angle,
+        helix_angle=helix,
+        face_width=read(_length(gear, "face_width"), "face_width"),
+        shift=_shift(flank, internal),
+        tip=_tip(gear, teeth * module, notes),
+        root=_diameter(gear, "root_diameter"),
+        dedendum=_of_tool(tool, internal, "addendum_coefficient_reference_profile", 1.25),
+        tip_radius=_rounded(_of_tool(tool, internal, "tip_corner_radius_factor_reference_profile", 0.38)),
+        thinning=_thinning(gear, module, allowances, math.radians(helix.value)),
+        allowances=allowances,
+        cutter=_cutter(gear, tool, module) if internal else None,
+        chamfer=_chamfer(gear, chamfer),
+        root_form=_diameter(gear, "root_form_diameter"),
+        internal=internal,
+    )
+
+
+def _length(gear: Component, key: str) -> float:
+    """Length that a gear must have, mm."""
+    return within(needed(gear.quantity(key, "mm"), gear, key), gear, key, *LENGTHS)
+
+
+def _chamfer(gear: Component, stated: float) -> float:
+    """Height of the tip's chamfer, mm: as stated, or from the tip form diameter."""
+    tip, form = gear.quantity("tip_diameter", "mm"), gear.quantity("tip_form_diameter", "mm")
+    if stated or not tip or not form:
+        return tidy(stated)
+    return tidy(max(0.0, round(0.5 * (abs(tip) - abs(form)) * (-1.0 if gear.type == "ring_gear" else 1.0), 9)))
+
+
+def _flank(model: Model, gear: Component) -> Component | None:
+    """Left flank of a gear, equal to the right one."""
+    left, right = (model.related("flank", "gear", gear.number, side) for side in ("left", "right"))
+    if not left or not right:
+        return (left or right or (None,))[0]
+    for key, unit in (
+        ("addendum_modification_coefficient", "none"),
+        ("normal_pressure_angle", "deg"),
+        ("tooth_tip_chamfer", "mm"),
+    ):
+        one, other = left[0].quantity(key, unit), right[0].quantity(key, unit)
+        if one != other and (one is None or other is None or abs(one - other) > EQUAL):
+            raise RexsError(
+                f"{gear}: left and right flank differ in {key} ({one} and {other}); only equal flanks can be imported"
+            )
+    return left[0]
+
+
+def _tool(model: Model, gear: Component) -> Component | None:
+    """Last tool of a gear: by a manufacturing step of the gear or its flank (1.3 on), or by a reference."""
+    workpieces = [gear, *model.related("flank", "gear", gear.number, "left")]
+    for part in workpieces:
+        tools = model.related("manufacturing_step", "workpiece", part.number, "tool")
+        tools = tools or model.related("ordered_reference", "origin", part.number, "referenced")
+        tools = tools or model.related("reference", "origin", part.number, "referenced")
+        tools = tuple(one for one in tools if one.type in ("rack_shaped_tool", "cutter_wheel_tool"))
+        if tools:
+            return tools[-1]
+    return None
+
+
+def _pressure_angle(gear: Component, flank: Component | None) -> Entry:
+    key = "normal_pressure_angle"
+    for part in (flank, gear):
+        value = part.quantity(key, "deg") if part else None
+        if part is not None and value is not None:
+            return read(tidy(within(value, part, key, *PRESSURE_ANGLES)), f"{key} of the flank")
+    return assumed(20.0, "the file gives none")
+
+
+def _helix_angle(gear: Component, mates: Sequence[Component]) -> Entry:
+    """Helix angle, right hand positive; of a ring that of its mates, as programs differ in its sign."""
+    key = "helix_angle_reference_diameter"
+    if gear.type == "ring_gear" and mates:
+        angle = _helix(mates[0], key)
+        return read(tidy(angle), f"{key}, with the hand of {mates[0]}, as internal pairs have")
+    return read(tidy(_helix(gear, key)), key)
+
+
+def _helix(gear: Component, key: str) -> float:
+    return within(needed(gear.quantity(key, "deg"), gear, key), gear, key, *HELIX_ANGLES)
+
+
+def _shift(flank: Component | None, internal: bool) -> Entry | None:
+    value = flank.quantity("addendum_modification_coefficient") if flank else None
+    if value is None:
+        return None
+    source = "addendum_modification_coefficient of the flanks"
+    return read(tidy(-value if internal else value), source + (", positive for a larger ring" if internal else ""))
+
+
+def _diameter(gear: Component, key: str) -> Entry | None:
+    value = gear.quantity(key, "mm")
+    return read(tidy(abs(value)), key) if value else None
+
+
+def _tip(gear: Component, reference: float, notes: Notes) -> Entry | None:
+    """Tip diameter, unless it is a placeholder; `reference` is teeth times normal module, mm."""
+    tip = _diameter(gear, "tip_diameter")
+    if tip is None or PLAUSIBLE_TIP[0] <= tip.value / reference <= PLAUSIBLE_TIP[1]:
+        return tip
+    notes.changed.append(f"{gear}: tip_diameter of {tip.value:g} mm cannot be meant, replaced by that of the rack")
+    return None
+
+
+def _cutter(gear: Component, tool: Component | None, module: float) -> Entry | None:
+    """Cutter of a ring; its tip counts where the file gives the ring no root diameter."""
+    teeth = tool.whole("number_of_teeth") if tool else None
+    if tool is None or tool.type != "cutter_wheel_tool" or not teeth:
+        return None
+    radius = tool.quantity("tip_corner_radius_cutter", "mm")
+    factor = tool.quantity("tip_corner_radius_factor_reference_profile") if radius is None else radius / module
+    rounded = _rounded(assumed(LEAST_RADIUS, "none given") if factor is None else read(tidy(factor), ""))
+    shift = tool.quantity("addendum_modification_coefficient")
+    cutter = {"teeth": abs(teeth), "tip_radius": rounded.value, "profile_shift": tidy(shift or 0.0)}
+    tip, addendum = tool.quantity("tip_diameter", "mm"), tool.quantity("addendum_coefficient_reference_profile")
+    if not gear.quantity("root_diameter", "mm"):
+        if tip:
+            cutter["tip_diameter_mm"] = tidy(abs(tip))
+        elif addendum:
+            cutter["addendum"] = tidy(addendum)
+    said = [f"tip radius: {' '.join(rounded.comment.split())}"] if rounded.kind else []
+    said += ["profile shift: A none given"] if shift is None else []
+    return read(cutter, "; ".join([f"number_of_teeth, tip and its radius of {tool}", *said]))
+
+
+def _of_tool(tool: Component | None, internal: bool, key: str, usual: float) -> Entry:
+    """Factor of the tool that makes the root: of a rack, which an internal gear has none of."""
+    value = tool.quantity(key) if tool else None
+    if tool is None or value is None or value < 0.0:
+        return assumed(usual, "the file gives no tool")
+    if internal:
+        return assumed(tidy(value), f"{key} of {tool}, for an arc as fillet where no cutter is given")
+    return read(tidy(value), f"{key} of {tool}")
+
+
+def _rounded(radius: Entry) -> Entry:
+    """Return the radius of the tool's corner; a sharp one gets a radius, as the tooth model wants a fillet."""
+    if radius.value >= LEAST_RADIUS:
+        return radius
+    return assumed(LEAST_RADIUS, f"the file says {radius.value:g}, a corner too sharp for the tooth model")
+
+
+def _allowances(gear: Component, angle: float, helix: float, internal: bool) -> Entry | None:
+    """Give the tooth thickness's allowances in the normal section, um: of a thickness or of the base tangent length.
+
+    DIN 3967: A_sn = A_st cos(beta), and A_W = A_sn cos(alpha_n) for external gears; chords and arcs differ by less than
+    a part in a thousand. `angle` and `helix` in rad. None if they are not given, or would thicken the teeth.
+    """
+    sources = {
+        "chordal_tooth_thickness_{}_deviation": 1.0,
+        "chordal_transverse_tooth_thickness_{}_deviation": math.cos(helix),
+        "{}_backlash_allowance_referenced_to_span": 1.0 / math.cos(angle),
+    }
+    for key, factor in list(sources.items())[: 2 if internal else 3]:
+        upper, lower = (gear.quantity(key.format(end), "mm") for end in ("upper", "lower"))
+        if upper is not None and lower is not None and lower <= upper <= 0.0:
+            ends = {"upper": upper, "lower": lower}
+            table = {f"{end}_allowance_um": tidy(round(1e3 * factor * one, 6)) for end, one in ends.items()}
+            return read(table, key.format("upper and lower"))
+    return None
+
+
+def _thinning(gear: Component, module: float, allowances: Entry | None, helix: float) -> Entry:
+    """Thinning in the transverse section, mm."""
+    if allowances is not None:
+        mean = 0.5e-3 * sum(allowances.value.values())
+        return read(tidy(-mean / math.cos(helix)), "mean of the tooth thickness allowances")
+    series = gear.text("tooth_thickness_deviation_tolerance_series_din_3967_1978")
+    why = f"the file gives only the tolerance {series}" if series not in ("", "False") else "the file gives none"
+    return assumed(tidy(round(THINNING * module, 6)), f"{THINNING:g} normal modules; {why}")
+
+
+def material_of(model: Model, part: Component) -> Component | None:
+    """Material that a component refers to."""
+    found = model.related("reference", "origin", part.number, "referenced")
+    return next((one for one in found if one.type == "material"), None)
+
+
+def is_rigid(material: Component | None) -> bool:
+    """Tell whether a material stands for 'rigid'."""
+    modulus = material.quantity("elastic_modulus", "MPa") if material else None
+    return modulus is not None and modulus > RIGID_MODULUS
+
+
+def material_table(material: Component | None) -> Entry | None:
+    """Inline table of a material, as far as it says anything and is none that stands for 'rigid'."""
+    if material is None or is_rigid(material):
+        return None
+    values = {
+        "youngs_modulus_GPa": (material.quantity("elastic_modulus", "MPa"), 1e-3),
+        "poissons_ratio": (material.quantity("poisson_ratio"), 1.0),
+        "density_kg_per_m3": (material.quantity("density", "kg / m^3"), 1.0),
+    }
+    given = {key: tidy(value * factor) for key, (value, factor) in values.items() if value is not None}
+    return read(given, str(material)) if given else None

@@ -1,0 +1,215 @@
+"""Bodies from their sections, position errors of planets' pins, and load cases."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+from exugear.gearbox.named_files import LARGEST_TABLE
+from exugear.gearbox.origin import Origin, part_of_each
+from exugear.gearbox.parts import RPM, Body, LoadCase
+from exugear.gearbox.sections.bodies import BodySection, InertiaSection, ShaftSectionSection
+from exugear.gearbox.sections.case import LoadCaseSection
+from exugear.gearbox.sections.gears import GearSection, PinSection
+from fe_ste.geometry.cylinders import MassProperties, Tube, mass_properties, together
+
+
+def inertia_sets(origin: Origin) -> tuple[str, ...]:
+    """Names of the inertia sets; every moving body has each of them, or none where its inertia follows from its shape.
+
+    Where that of all bodies does, the default set is the only one.
+    """
+    moving = [section for section in origin.enabled.values() if not section.fixed]
+    named = next((section.inertia for section in moving if section.inertia), None)
+    return tuple(named or (origin.case.default_inertias,)) if moving else ()
+
+
+def bodies(origin: Origin, inertias: str) -> tuple[Body, ...]:
+    """All enabled bodies, planets one by one.
+
+    Parameters
+    ----------
+    origin : Origin
+    inertias : str
+        Inertia set.
+
+    Raises
+    ------
+    CaseError
+        A body lacks the inertia set, or has no place.
+    """
+    return tuple(
+        body for family, section in origin.enabled.items() for body in _family(origin, family, section, inertias)
+    )
+
+
+def _family(origin: Origin, family: str, section: BodySection, inertias: str) -> Iterator[Body]:
+    """One body, or the planets of a set."""
+    inertia = section.inertia.get(inertias)
+    if not section.inertia and not section.fixed:
+        inertia = _computed_inertia(origin, section)
+    elif inertia is None and not section.fixed:
+        raise origin.fault(
+            f"bodies.{family}.inertia: no set {inertias!r}; every moving body "
+            f"needs the sets {', '.join(inertia_sets(origin))}"
+        )
+    angles = [math.radians(angle) for angle in section.planet_angles_deg] or [0.0]
+    held = section.carrier is not None and origin.case.bodies[section.carrier].fixed
+    for suffix, angle in zip(origin.suffixes(family), angles, strict=True):
+        yield _body(family, suffix, section, inertia, angle, _axis(origin, family, angle), held)
+
+
+def _body(
+    family: str,
+    suffix: str,
+    section: BodySection,
+    inertia: InertiaSection | None,
+    angle: float,
+    axis: tuple[float, float],
+    held: bool,
+) -> Body:
+    return Body(
+        name=family + suffix,
+        family=family,
+        axis=axis,
+        centre_of_mass_z=1e-3 * ((inertia and inertia.centre_of_mass_z_mm) or 0.0),
+        mass=(inertia and inertia.mass_kg) or 0.0,
+        axial=inertia.axial_kg_m2 if inertia else 0.0,
+        transverse=(inertia and inertia.transverse_kg_m2) or 0.0,
+        carrier=None if section.carrier is None or held else section.carrier,
+        orbit_angle=angle if section.carrier else 0.0,
+        spin_only=section.spin_only,
+        fixed=section.fixed,
+        wheels={gear: z * 1e-3 for gear, z in section.wheels_z_mm.items()},
+        planet_of=section.carrier,
+    )
+
+
+def _computed_inertia(origin: Origin, section: BodySection) -> InertiaSection:
+    """Inertia of the pieces of a body's shape, and of its gears: their blanks, or tubes up to their reference circles.
+
+    A tube begins at the diameter at which the gear is held, or at the shaft where that is thicker.
+    """
+    tubes: list[Tube] = []
+    rings: list[MassProperties] = []
+    shape = section.shape
+    if shape is not None:
+        start = 1e-3 * shape.start_z_mm
+        for piece in shape.sections:
+            tubes.append(_tube(piece, start, shape.material.density_kg_per_m3))
+            start += tubes[-1].length
+    for name, z in section.wheels_z_mm.items():
+        blank = shape.blanks.get(name) if shape is not None else None
+        if blank is not None:
+            rings.append(MassProperties(blank.mass_kg, blank.axial_kg_m2, blank.transverse_kg_m2, 1e-3 * z))
+        elif name in origin.case.gears:
+            tubes.append(gear_tube(origin.case.gears[name], 1e-3 * z, tubes))
+    total = together([mass_properties(tubes), *rings])
+    return InertiaSection.model_construct(
+        mass_kg=total.mass,
+        axial_kg_m2=total.axial,
+        # Of a thin disc it is half the axial one: rounding must not make it less.
+        transverse_kg_m2=max(total.transverse, 0.5 * total.axial),
+        centre_of_mass_z_mm=1e3 * total.centre,
+    )
+
+
+def _tube(piece: ShaftSectionSection, start: float, density: float) -> Tube:
+    ends = (piece.outer_diameter_end_mm, piece.inner_diameter_end_mm)
+    outer_end, inner_end = (None if end is None else 1e-3 * end for end in ends)
+    return Tube(
+        start=start,
+        length=1e-3 * piece.length_mm,
+        outer=1e-3 * piece.outer_diameter_mm,
+        inner=1e-3 * piece.inner_diameter_mm,
+        density=density,
+        outer_end=outer_end,
+        inner_end=inner_end,
+    )
+
+
+def gear_tube(gear: GearSection, z: float, shaft: Sequence[Tube]) -> Tube:
+    """Body of a gear in the middle of its face at z (m) on a shaft: a tube up to its reference circle."""
+    reference = 1e-3 * gear.teeth * gear.normal_module_mm / math.cos(math.radians(gear.helix_angle_deg))
+    width, held = 1e-3 * gear.face_width_mm, 1e-3 * gear.held_diameter_mm
+    under = [one.outer for one in shaft if one.start < z + 0.5 * width and one.start + one.length > z - 0.5 * width]
+    inner, outer = (reference, held) if gear.internal else (min(max([held, *under]), reference), reference)
+    density = gear.material.density_kg_per_m3
+    return Tube(start=z - 0.5 * width, length=width, outer=outer, inner=inner, density=density)
+
+
+def _axis(origin: Origin, family: str, angle: float) -> tuple[float, float]:
+    """Position (x, y) of a body's axis, m; of a planet at its angle on the carrier, rad."""
+    section = origin.case.bodies[family]
+    if section.axis_position_mm is not None:
+        x, y = section.axis_position_mm
+        return x * 1e-3, y * 1e-3
+    carrier, radius = section.carrier, section.orbit_radius_mm
+    if carrier is None or radius is None:
+        raise origin.fault(f"bodies.{family}: give axis_position_mm or the keys of a planet")
+    if not origin.are_enabled(f"bodies.{family}.carrier", carrier):
+        raise origin.fault(f"bodies.{family}.carrier = {carrier!r}: that body is not enabled")
+    if origin.case.bodies[carrier].axis_position_mm is None:
+        raise origin.fault(f"bodies.{family}.carrier = {carrier!r}: a carrier cannot be a planet")
+    x, y = _axis(origin, carrier, 0.0)
+    return x + radius * 1e-3 * math.cos(angle), y + radius * 1e-3 * math.sin(angle)
+
+
+def pin_offsets(origin: Origin, bodies: Mapping[str, Body]) -> dict[str, tuple[float, float]]:
+    """Position error of planets in their carrier at zero angles, x and y, m.
+
+    Raises
+    ------
+    CaseError
+        Errors of what is no planet.
+    """
+
+    def offset(name: str, section: PinSection) -> tuple[str, tuple[float, float]]:
+        body = bodies.get(section.body)
+        if body is None or body.planet_of is None:
+            planets = ", ".join(planet.name for planet in bodies.values() if planet.planet_of) or "none"
+            raise origin.fault(f"pins.{name}.body = {section.body!r}: no planet; planets are {planets}")
+        error = 1e-6 * complex(section.radial_um, section.tangential_um)
+        error *= complex(math.cos(body.orbit_angle), math.sin(body.orbit_angle))
+        return section.body, (error.real, error.imag)
+
+    return dict(part_of_each(offset, origin.case.pins).values())
+
+
+def load_cases(origin: Origin, spinning: Sequence[str]) -> dict[str, LoadCase]:
+    """Load cases by name; `spinning` are the bodies that can turn.
+
+    Raises
+    ------
+    CaseError
+        Loads on a body that does not turn, a torque series that is not there or may not be read.
+    """
+
+    def load_case(name: str, section: LoadCaseSection) -> LoadCase:
+        key = f"load_cases.{name}"
+        driven = (section.driven_body,) if section.driven_body else ()
+        for body in (*section.torques_N_m, *section.start_speeds_rpm, *driven):
+            if body not in spinning:
+                raise origin.fault(f"{key}: no turning body {body!r}; bodies are {', '.join(spinning)}")
+        if origin.case.overall.input in section.start_speeds_rpm:
+            raise origin.fault(
+                f"{key}.start_speeds_rpm: {origin.case.overall.input} is the overall input, whose speed is "
+                "start_speed_rpm; leave it out here"
+            )
+        series = None
+        if section.torque_series is not None:
+            series = origin.file(f"{key}.torque_series", section.torque_series, LARGEST_TABLE)
+        return LoadCase(
+            name=name,
+            torques=dict(section.torques_N_m),
+            torque_series=series,
+            duration=section.duration_s,
+            start_speed=section.start_speed_rpm * RPM,
+            start_speeds={body: speed * RPM for body, speed in section.start_speeds_rpm.items()},
+            driven_body=section.driven_body,
+            end_speed=None if section.end_speed_rpm is None else section.end_speed_rpm * RPM,
+            drive_stiffness=section.drive_stiffness_N_m_per_rad,
+            description=section.description,
+        )
+
+    return part_of_each(load_case, origin.case.load_cases)

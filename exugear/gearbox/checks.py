@@ -1,0 +1,431 @@
+"""The parts of a gearbox checked against each other: masses, places, assembly of planets, what holds what.
+
+Each function takes the parts that it compares and yields faults as texts: key, value and what would be right.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from exugear.gearbox.parts import Bearing, Body, Coupling, Joint, Mesh, stiffness_matrix
+from exugear.gearbox.reading import CaseError, shortened
+from exugear.gearbox.sections.case import CaseFile, OverallSection
+from exugear.gearbox.sections.connections import BearingSection, StiffnessSection
+from exugear.gearbox.sections.entries import GROUND
+from fe_ste.geometry.gears import Gear
+
+CENTRE_DISTANCE_TOLERANCE = 2e-5
+"""Allowed difference between a pair's centre distance and the positions of its bodies, m."""
+AXIS_TOLERANCE = 1e-6
+"""Allowed distance of a central wheel from the axis of the carrier whose planets it meets, m."""
+ASSEMBLY_TOLERANCE = 2e-3
+"""Allowed departure from the assembly condition, in teeth: angles in a file are rounded."""
+MATRIX_TOLERANCE = 1e-4
+"""Rounding allowed in a stiffness matrix, against its diagonal: as printed with five digits."""
+LARGEST_MATRICES = 2e9
+"""Largest memory of all matrices of the elements together, bytes: each is over the coordinates of all bodies."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """One check of a gearbox.
+
+    Attributes
+    ----------
+    name : str
+    run : callable
+        Raises `CaseError` where something is wrong.
+    needs : tuple of str
+        Checks without which this one makes no sense.
+    """
+
+    name: str
+    run: Callable[[], object]
+    needs: tuple[str, ...] = ()
+
+
+def check(checks: Iterable[Check]) -> None:
+    """Run all checks as `faults_of` does.
+
+    Raises
+    ------
+    CaseError
+        All faults that are found.
+
+    Examples
+    --------
+    >>> check([Check("gears", lambda: None), Check("pairs", lambda: None, ("gears",))])
+    """
+    faults = faults_of(checks)
+    if faults:
+        raise CaseError(*faults)
+
+
+def faults_of(checks: Iterable[Check]) -> list[str]:
+    """Faults of all checks in their order, but those that need one which failed, or which could not be run."""
+    faults: list[str] = []
+    failed: set[str] = set()
+    for one in checks:
+        if failed & set(one.needs):
+            failed.add(one.name)
+            continue
+        try:
+            one.run()
+        except CaseError as error:
+            faults += error.faults
+            failed.add(one.name)
+    return faults
+
+
+def faults_of_bodies(case: CaseFile) -> Iterator[str]:
+    """Tell names that are taken, carriers that cannot be, wheels that are no gears."""
+    if GROUND in case.bodies:
+        yield f"bodies.{GROUND}: {GROUND} is the name of what stands still; choose another"
+    families: dict[str, str] = {}
+    for family, section in case.bodies.items():
+        count = len(section.planet_angles_deg)
+        for name in [f"{family}_{number}" for number in range(1, count + 1)] or [family]:
+            if name in families:
+                yield f"bodies.{family}: planets are numbered, and bodies.{families[name]} is {name}, too; rename one"
+            families[name] = family
+        for gear in section.wheels_z_mm:
+            if gear not in case.gears:
+                yield f"bodies.{family}.wheels_z_mm.{gear}: no such gear; gears are {', '.join(case.gears)}"
+        if section.enabled and section.carrier is not None:
+            yield from _faults_of_carrier(case, f"bodies.{family}.carrier = {section.carrier!r}", section.carrier)
+
+
+def _faults_of_carrier(case: CaseFile, key: str, name: str) -> Iterator[str]:
+    carrier = case.bodies.get(name)
+    if carrier is None:
+        yield f"{key}: no such body; bodies are {', '.join(case.bodies)}"
+    elif not carrier.enabled:
+        yield f"{key}: that body is not enabled"
+    elif carrier.carrier is not None:
+        yield f"{key}: a carrier cannot be a planet"
+    elif carrier.spin_only:
+        yield f"{key}: a spin-only body has no place, and so carries no planets"
+
+
+def faults_of_inertia_sets(default: str, inertia_sets: Sequence[str]) -> Iterator[str]:
+    """Tell that no body moves, or that the default set is none of those that bodies have."""
+    if not inertia_sets:
+        yield "bodies: none turns; a gearbox has at least one body without fixed = true"
+    elif default not in inertia_sets:
+        yield f"default_inertias = {default!r}: no such set; sets are {', '.join(inertia_sets)}"
+
+
+def faults_of_size(bodies: int, elements: int) -> Iterator[str]:
+    """Tell what no memory holds: each element has a stiffness and a damping over all coordinates.
+
+    Parameters
+    ----------
+    bodies, elements : int
+        Numbers of bodies, and of meshes, bearings, mounts and couplings together.
+    """
+    coordinates = 6 * bodies
+    if 16.0 * elements * coordinates**2 > LARGEST_MATRICES:
+        yield (
+            f"bodies: {bodies} with {elements} meshes, bearings and couplings are too many: their "
+            f"matrices take more than {1e-9 * LARGEST_MATRICES:g} GB"
+        )
+
+
+def faults_of_overall(overall: OverallSection, spinning: Sequence[str], gears: Collection[str]) -> Iterator[str]:
+    """Tell an overall input or output that does not turn, or that both are one where there are gears."""
+    for key in ("input", "output"):
+        if getattr(overall, key) not in spinning:
+            yield (f"overall.{key} = {getattr(overall, key)!r}: no such turning body; bodies are {', '.join(spinning)}")
+            return
+    if overall.input == overall.output and gears:
+        yield f"overall.output = {overall.output!r}: is the input, too; name the body at the other end"
+
+
+def faults_of_output_gear(
+    overall: OverallSection, gears: Collection[str], bodies: Iterable[Body], couplings: Sequence[Coupling]
+) -> Iterator[str]:
+    """Tell an output gear that does not turn with the output.
+
+    The overall transmission error is a length on it. A carrier has no gear, and so any serves; a rotor without gears
+    needs none.
+    """
+    if overall.output_gear is None:
+        if gears:
+            yield "overall.output_gear: this key is missing; name a gear on whose base circle the angle is a length"
+        return
+    if overall.output_gear not in gears:
+        yield f"overall.output_gear = {overall.output_gear!r}: no such gear; gears are {', '.join(gears)}"
+        return
+    turning = _coupled(couplings, overall.output)
+    known = [gear for body in bodies if body.name in turning for gear in body.wheels]
+    if known and overall.output_gear not in known:
+        yield (
+            f"overall.output_gear = {overall.output_gear!r}: does not turn with {overall.output}; "
+            f"gears that do are {', '.join(known)}"
+        )
+
+
+def _coupled(couplings: Sequence[Coupling], body: str) -> set[str]:
+    """Bodies that couplings tie to one, and itself: all turn at one speed."""
+    reached = {body}
+    for _ in couplings:
+        reached |= {name for c in couplings if {c.first, c.second} & reached for name in (c.first, c.second)}
+    return reached
+
+
+def faults_of_repetition(
+    case: CaseFile, deviations: Collection[tuple[str, str]], pin_offsets: Collection[str]
+) -> Iterator[str]:
+    """Tell errors of a wheel or a pin that are given twice: a second section would replace the first."""
+    if len(deviations) < len(case.deviations):
+        yield "deviations: two of them are of one wheel; give its errors together"
+    elif len(pin_offsets) < len(case.pins):
+        yield "pins: two of them are of one planet; give its errors together"
+
+
+def faults_of_mass_properties(case: CaseFile) -> Iterator[str]:
+    """Tell mass properties that are missing."""
+    for family, section in case.bodies.items():
+        for inertias, values in section.inertia.items():
+            if section.spin_only:
+                continue
+            for key in ("mass_kg", "transverse_kg_m2", "centre_of_mass_z_mm"):
+                if getattr(values, key) is None:
+                    yield (
+                        f"bodies.{family}.inertia.{inertias}.{key}: this key is "
+                        "missing; only a spin_only body needs nothing but axial_kg_m2"
+                    )
+
+
+def faults_of_centre_distances(meshes: Iterable[Mesh], bodies: Mapping[str, Body]) -> Iterator[str]:
+    """Tell bodies whose positions contradict the centre distance of their pair, or the axis of their carrier."""
+    for mesh in meshes:
+        difference = mesh.centre_distance - mesh.pair.centre_distance
+        if abs(difference) > CENTRE_DISTANCE_TOLERANCE:
+            yield (
+                f"pairs.{mesh.pair.name}.centre_distance_mm = {mesh.pair.centre_distance * 1e3:g}: "
+                f"the bodies {mesh.pinion} and {mesh.gear} stand {mesh.centre_distance * 1e3:.4f} mm apart; "
+                f"they may differ by {CENTRE_DISTANCE_TOLERANCE * 1e3:g} mm"
+            )
+        for body in (mesh.pinion, mesh.gear):
+            if mesh.frame != GROUND and bodies[body].carrier is None:
+                apart = math.dist(bodies[body].axis, bodies[mesh.frame].axis)
+                if apart > AXIS_TOLERANCE:
+                    yield (
+                        f"meshes.{mesh.family}: {body} stands {apart * 1e3:.4f} mm off the axis of {mesh.frame}, whose "
+                        "spin carries the line of centres; only planets of it may"
+                    )
+
+
+def faults_of_planets(
+    case: CaseFile, bodies: Iterable[Body], gears: Mapping[str, Gear], meshes: Sequence[Mesh]
+) -> Iterator[str]:
+    """Tell planets that run into each other, of one set or of several on a carrier, and such as cannot be assembled."""
+    planets = [body for body in bodies if body.planet_of is not None]
+    told = set()
+    for planet, other in itertools.combinations(planets, 2):
+        if (planet.family, other.family) in told or planet.planet_of != other.planet_of:
+            continue
+        if any({mesh.pinion, mesh.gear} == {planet.name, other.name} for mesh in meshes):
+            continue
+        collision = next(_collisions(case, planet, other, gears), None)
+        if collision is not None:
+            told.add((planet.family, other.family))
+            yield collision
+    for family in case.bodies:
+        others = {body.name for body in planets if body.family != family}
+        yield from _faults_of_assembly(family, [body for body in planets if body.family == family], others, meshes)
+
+
+def _collisions(case: CaseFile, planet: Body, other: Body, gears: Mapping[str, Gear]) -> Iterator[str]:
+    """Tell wheels of two planets that share a place along the axis and overlap."""
+    gap = math.dist(planet.axis, other.axis)
+    for wheel, other_wheel in itertools.product(planet.wheels, other.wheels):
+        reach = 0.5 * (gears[wheel].face_width + gears[other_wheel].face_width)
+        needed = gears[wheel].tip_radius + gears[other_wheel].tip_radius
+        if abs(planet.wheels[wheel] - other.wheels[other_wheel]) < reach and gap <= needed:
+            angles = [round(angle, 4) for angle in case.bodies[planet.family].planet_angles_deg]
+            yield (
+                f"bodies.{planet.family}.planet_angles_deg = {shortened(angles)}: {planet.name} and {other.name} "
+                f"collide, their axes are {gap * 1e3:.2f} mm apart, their tips need more than {needed * 1e3:.2f} mm"
+            )
+
+
+def _faults_of_assembly(
+    family: str, planets: Sequence[Body], others: Collection[str], meshes: Sequence[Mesh]
+) -> Iterator[str]:
+    """Compare every planet with the first: going round two meshes with central wheels must close on whole teeth.
+
+    Planets that mesh with planets of another set close chains that only the places of all teeth tell.
+
+    With tooth numbers zp of the planet wheel and zc of the central wheel (negative for an external one),
+    (zc_b zp_a - zc_a zp_b) angle / 2 pi must be a multiple of gcd(zp_a, zp_b); for one planet wheel
+    between sun and ring this is the familiar (z_sun + z_ring) angle / 2 pi = integer.
+    """
+    for planet in planets[1:]:
+        teeth = [
+            _teeth_on_planet(mesh, planet.name)
+            for mesh in meshes
+            if planet.name in (mesh.pinion, mesh.gear) and not {mesh.pinion, mesh.gear} & set(others)
+        ]
+        angle = planet.orbit_angle - planets[0].orbit_angle
+        for planet_teeth, central_teeth in teeth[1:]:
+            whole = math.gcd(planet_teeth, teeth[0][0])
+            turns = (central_teeth * teeth[0][0] - teeth[0][1] * planet_teeth) / whole
+            off = math.remainder(turns * angle / (2.0 * math.pi), 1.0)
+            if abs(off) > ASSEMBLY_TOLERANCE:
+                yield (
+                    f"bodies.{family}.planet_angles_deg: {planet.name} cannot be assembled at "
+                    f"{math.degrees(angle):.4f} deg from the first planet; angles must be multiples of "
+                    f"360/{abs(turns):g} = {360.0 / abs(turns):.4f} deg"
+                )
+
+
+def _teeth_on_planet(mesh: Mesh, planet: str) -> tuple[int, int]:
+    """(teeth of the planet's wheel, teeth of its mate, the latter negative unless internal)."""
+    pinion, gear = mesh.pair.pinion, mesh.pair.gear
+    if mesh.pinion == planet:
+        return pinion.teeth, gear.teeth if gear.internal else -gear.teeth
+    return gear.teeth, -pinion.teeth
+
+
+def faults_of_connection(
+    case: CaseFile, bodies: Iterable[Body], meshes: Iterable[Mesh], couplings: Iterable[Coupling]
+) -> Iterator[str]:
+    """Tell bodies that no mesh, coupling or carrier joins to the overall input."""
+    bodies = tuple(bodies)
+    links = [(mesh.pinion, mesh.gear) for mesh in meshes]
+    links += [(coupling.first, coupling.second) for coupling in couplings]
+    links += [(body.name, body.carrier) for body in bodies if body.carrier]
+    reached = {case.overall.input}
+    while True:
+        more = {b for pair in links for a, b in (pair, pair[::-1]) if a in reached} - reached
+        if not more:
+            break
+        reached |= more
+    lost = [body.name for body in bodies if not body.fixed and body.name not in reached]
+    if lost:
+        aside = [
+            f"; couplings.{name} stands aside while bodies.{section.instead_of} is enabled"
+            for name, section in case.couplings.items()
+            if section.instead_of is not None and set(section.bodies) & set(lost)
+        ]
+        yield (
+            f"bodies {', '.join(lost)} are joined to {case.overall.input} by no "
+            f"mesh, coupling or carrier{''.join(aside)}; the gear train must be one connected whole"
+        )
+
+
+def faults_of_torsion(
+    spinning: Sequence[str], couplings: Iterable[Coupling], bearings: Iterable[Bearing]
+) -> Iterator[str]:
+    """Tell torsion that takes two paths: couplings in a loop, and bearings between bodies that both turn."""
+    paths: dict[str, dict[str, list[str]]] = {name: {name: []} for name in spinning}
+    for coupling in couplings:
+        from_first, from_second = paths[coupling.first], paths[coupling.second]
+        if coupling.second in from_first:
+            yield (
+                f"couplings {', '.join([*from_first[coupling.second], coupling.name])} form a loop: {coupling.first} "
+                f"and {coupling.second} are joined twice; leave one of them out"
+            )
+            return
+        for start, to_start in list(from_first.items()):
+            for end, to_end in list(from_second.items()):
+                paths[start][end] = [*to_start[::-1], coupling.name, *to_end]
+                paths[end][start] = paths[start][end][::-1]
+    for bearing in bearings:
+        torsion = stiffness_matrix(bearing.stiffness)[5, 5]
+        if torsion and bearing.on in spinning:
+            yield (
+                f"bearings.{bearing.family}.stiffness: torsion {torsion:g} N m/rad between {bearing.on} and "
+                f"{bearing.body}, which both turn; give it in a [couplings] table, which knows that they turn together"
+            )
+            return
+
+
+def faults_of_supports(case: CaseFile) -> Iterator[str]:
+    """Tell stiffness and damping that no support has: unsymmetric, indefinite, or none at all."""
+    for table, sections in (("bearings", case.bearings), ("mounts", case.mounts)):
+        for name, section in sections.items():
+            key = f"{table}.{name}"
+            stiffness, damping = section.stiffness, section.damping
+            catalogue = isinstance(section, BearingSection) and section.catalogue is not None
+            if stiffness is not None:
+                yield from _faults_of_matrix(f"{key}.stiffness", stiffness)
+                if not catalogue and not np.any(stiffness_matrix(stiffness)):
+                    yield f"{key}.stiffness: is zero in all directions; give at least one above zero"
+            if damping is not None:
+                yield from _faults_of_matrix(f"{key}.damping", damping)
+    yield from _bearings_at_one_place(case.bearings)
+
+
+def _bearings_at_one_place(bearings: Mapping[str, BearingSection]) -> Iterator[str]:
+    """Tell rolling bearings of the same bodies that stand in each other by half of their width or more."""
+    names = [name for name, bearing in bearings.items() if bearing.catalogue is not None]
+    for place, first in enumerate(names):
+        for second in names[place + 1 :]:
+            one, other = bearings[first], bearings[second]
+            distance = abs(one.z_mm - other.z_mm)
+            half = 0.5 * sum(bearing.catalogue.width_mm for bearing in (one, other) if bearing.catalogue)
+            if (one.body, one.on) == (other.body, other.on) and distance < 0.5 * half:
+                yield (
+                    f"bearings.{second}.z_mm = {other.z_mm:g}: is where bearings.{first} is, {distance:g} mm away, and "
+                    f"both are bearings of {one.body} on {one.on}; give two places, or one bearing with an arrangement"
+                )
+
+
+def _faults_of_matrix(key: str, section: StiffnessSection) -> Iterator[str]:
+    """Compare each entry with the diagonal entries of its row and column: units differ by row."""
+    if section.matrix is None:
+        return
+    matrix = stiffness_matrix(section)
+    scale = np.sqrt(np.abs(np.diag(matrix)))
+    scaled = matrix / np.outer(*[np.where(scale > 0.0, scale, 1.0)] * 2)
+    skew = np.abs(scaled - scaled.T)
+    row, column = (int(index) for index in np.unravel_index(np.argmax(skew), skew.shape))
+    if skew[row, column] > MATRIX_TOLERANCE:
+        yield (
+            f"{key}.matrix: is not symmetric: {matrix[row, column]:g} in row {row + 1}, column {column + 1}, but "
+            f"{matrix[column, row]:g} in row {column + 1}, column {row + 1}"
+        )
+    elif np.linalg.eigvalsh(0.5 * (scaled + scaled.T))[0] < -MATRIX_TOLERANCE:
+        yield f"{key}.matrix: is indefinite, some displacement would release energy; no eigenvalue may be below zero"
+
+
+def faults_of_names(parts: Mapping[str, Sequence[Mesh | Bearing | Coupling]]) -> Iterator[str]:
+    """Tell a name that stands twice among meshes, supports and couplings: they share one list in the results.
+
+    `parts` are by their table in the file.
+    """
+    tables: dict[str, str] = {}
+    for table, members in parts.items():
+        for part in members:
+            if part.name in tables:
+                yield f"{table}.{part.name}: one of [{tables[part.name]}] has this name, too; rename one"
+                return
+            tables[part.name] = table
+
+
+def faults_of_joints(joints: Iterable[Joint], bodies: Mapping[str, Body]) -> Iterator[str]:
+    """Tell the first joint that its body cannot have: fixed, joined twice, or a planet's away from its carrier."""
+    joined: dict[str, str] = {}
+    for joint in joints:
+        body = bodies[joint.body]
+        if body.fixed or body.spin_only:
+            yield f"joints.{joint.name}.body = {joint.body!r}: a fixed or spin-only body takes no joint"
+            return
+        if joint.body in joined:
+            yield (
+                f"joints.{joint.name}.body = {joint.body!r}: the body already turns "
+                f"on {joined[joint.body]}; a second ideal joint on the same axis is redundant"
+            )
+            return
+        if body.carrier is not None and joint.on != body.carrier:
+            yield f"joints.{joint.name}.on = {joint.on!r}: a planet turns on its carrier {body.carrier!r}"
+            return
+        joined[joint.body] = joint.name

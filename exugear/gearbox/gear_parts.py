@@ -1,0 +1,486 @@
+"""Gears, their modifications and errors, pairs and meshes, from their sections."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import fields, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from exugear.gearbox.named_files import LARGEST_TABLE
+from exugear.gearbox.origin import Origin, part_of_each, parts_of_each
+from exugear.gearbox.parts import Body, Mesh, PairSpec, WheelDeviation
+from exugear.gearbox.sections.connections import MeshSection
+from exugear.gearbox.sections.entries import GROUND
+from exugear.gearbox.sections.gears import (
+    DeviationSection,
+    GearSection,
+    MeshStiffnessSection,
+    ModificationSection,
+    PairSection,
+)
+from fe_ste.flanks.modifications import (
+    FlankModification,
+    Relief,
+    ReliefShape,
+    radius_at_roll_length_from_root,
+    radius_at_roll_length_from_tip,
+)
+from fe_ste.flanks.topography import FlankTopography
+from fe_ste.geometry.cutter import PinionCutter
+from fe_ste.geometry.fitting import (
+    LEAST_ROOT_MARGIN,
+    ROOT_MARGIN,
+    clear_tip_diameter,
+    fitted_tip_diameter,
+    root_margin,
+    shift_beside,
+)
+from fe_ste.geometry.gear_relations import UncheckedGear
+from fe_ste.geometry.gears import BasicRack, Gear, GearPair, Material
+from fe_ste.geometry.pair_relations import UncheckedPair
+from fe_ste.tools.arrays import Floats
+
+DEEPEST_REMOVAL = 0.5
+"""Most that a modification or an error may take off a flank, in normal modules: a tooth is 1.6 thick."""
+SAMPLES_PER_WAVE = 64
+"""Values in each wave of a stated stiffness: cubics between them are off by 1e-5 of its amplitude."""
+ANGLE_TOLERANCE = 1e-4
+"""Allowed difference between a stated angle of the line of centres and the positions of the bodies, rad."""
+
+
+def gears(origin: Origin) -> dict[str, Gear]:
+    """All gears by name.
+
+    Raises
+    ------
+    CaseError
+        A gear that cannot be made, with its key.
+    """
+    plain = {name: _unchecked(name, section) for name, section in origin.case.gears.items()}
+    shifted = {**plain, **part_of_each(partial(_with_shift, origin, plain), _flagged(origin, "shift"))}
+    fitted = {**shifted, **part_of_each(partial(_with_fitted_tip, origin, shifted), _flagged(origin, "tip"))}
+
+    def of_section(name: str, section: GearSection) -> Gear:
+        gear = fitted[name]
+        if section.tip_chamfer_mm:
+            height = gear.outward * section.tip_chamfer_mm * 1e-3
+            gear = replace(gear, tip_form_diameter=2.0 * (gear.tip_radius - height))
+        return origin.guarded(
+            f"gears.{name}", Gear, **{field.name: getattr(gear, field.name) for field in fields(gear)}
+        )
+
+    return part_of_each(of_section, origin.case.gears)
+
+
+def _flagged(origin: Origin, what: Literal["shift", "tip"]) -> dict[str, GearSection]:
+    """Sections of gears whose shift or tip follows from their mates."""
+    key = {"shift": "profile_shift_from_centre_distance", "tip": "fitted_tip"}[what]
+    return {name: section for name, section in origin.case.gears.items() if getattr(section, key)}
+
+
+def _pairs_of(origin: Origin, gears: Mapping[str, UncheckedGear], name: str) -> Iterator[tuple[str, UncheckedPair]]:
+    """Pairs of a gear by name, gear 1 being the external or smaller one."""
+    for pair, section in origin.case.pairs.items():
+        both = [gears[one] for one in (section.pinion, section.gear) if one in gears]
+        if name in (section.pinion, section.gear) and len(both) == 2:
+            first, second = sorted(both, key=lambda gear: (gear.internal, gear.teeth))
+            distance = 1e-3 * section.centre_distance_mm
+            yield pair, UncheckedPair(name=pair, pinion=first, gear=second, centre_distance=distance)
+
+
+def _with_shift(origin: Origin, gears: Mapping[str, UncheckedGear], name: str, section: GearSection) -> UncheckedGear:
+    """Gear with the profile shift that leaves no backlash at the centre distance of its first pair."""
+    key = f"gears.{name}.profile_shift_from_centre_distance"
+    for pair_name, pair in _pairs_of(origin, gears, name):
+        mate = pair.gear if pair.pinion.name == name else pair.pinion
+        if origin.case.gears[mate.name].profile_shift_from_centre_distance:
+            raise origin.fault(f"{key}: {mate.name} of pairs.{pair_name} has no profile_shift either; give one of them")
+        shift = shift_beside(mate, gears[name], pair.centre_distance)
+        if shift is None:
+            raise origin.fault(
+                f"{key}: at pairs.{pair_name}.centre_distance_mm = {1e3 * pair.centre_distance:g} no line of action "
+                "touches both base circles; correct it"
+            )
+        return replace(gears[name], profile_shift=shift)
+    raise origin.fault(f"{key}: the gear is in no pair, whose centre distance would give it; give profile_shift")
+
+
+def _with_fitted_tip(
+    origin: Origin, gears: Mapping[str, UncheckedGear], name: str, section: GearSection
+) -> UncheckedGear:
+    """Gear with its tip shortened as far as all of its mates ask for."""
+    gear = gears[name]
+    try:
+        tips = [
+            fitted_tip_diameter(pair, pair.gear if pair.gear.name == name else pair.pinion)
+            for _, pair in _pairs_of(origin, gears, name)
+        ]
+    except ValueError:
+        return gear  # what makes the pair impossible is told when it is built
+    if not tips:
+        raise origin.fault(f"gears.{name}.fitted_tip: the gear is in no pair that its tip could be fitted to")
+    return replace(gear, tip_diameter=max(tips) if gear.internal else min(tips))
+
+
+def _unchecked(name: str, section: GearSection) -> UncheckedGear:
+    """Gear from its section: millimetres to metres, degrees to radians."""
+    return UncheckedGear(
+        name=name,
+        teeth=section.teeth,
+        normal_module=section.normal_module_mm * 1e-3,
+        normal_pressure_angle=math.radians(section.normal_pressure_angle_deg),
+        helix_angle=math.radians(section.helix_angle_deg),
+        profile_shift=section.profile_shift,
+        face_width=section.face_width_mm * 1e-3,
+        held_diameter=section.held_diameter_mm * 1e-3,
+        internal=section.internal,
+        rack=BasicRack(section.rack.addendum, section.rack.dedendum, section.rack.tip_radius),
+        tip_diameter=None if section.tip_diameter_mm is None else section.tip_diameter_mm * 1e-3,
+        root_diameter=None if section.root_diameter_mm is None else section.root_diameter_mm * 1e-3,
+        tooth_thinning=sum(thinning_range(section)) / 2.0,
+        material=Material(
+            youngs_modulus=section.material.youngs_modulus_GPa * 1e9,
+            poissons_ratio=section.material.poissons_ratio,
+            density=section.material.density_kg_per_m3,
+        ),
+        tip_form_diameter=None if section.tip_form_diameter_mm is None else section.tip_form_diameter_mm * 1e-3,
+        root_form_diameter=None if section.root_form_diameter_mm is None else section.root_form_diameter_mm * 1e-3,
+        cutter=_cutter(section),
+    )
+
+
+def _cutter(section: GearSection) -> PinionCutter | None:
+    """Cutter of a ring; from an addendum d_a0 = m_n (z_0 / cos(beta) + 2 (x_0 + h_a0*))."""
+    cutter = section.cutter
+    if cutter is None:
+        return None
+    tip_mm = cutter.tip_diameter_mm
+    if cutter.addendum is not None:
+        reference = cutter.teeth / math.cos(math.radians(section.helix_angle_deg))
+        tip_mm = section.normal_module_mm * (reference + 2.0 * (cutter.profile_shift + cutter.addendum))
+    return PinionCutter(
+        cutter.teeth, cutter.tip_radius, cutter.profile_shift, None if tip_mm is None else 1e-3 * tip_mm
+    )
+
+
+def thinning_range(section: GearSection) -> tuple[float, float]:
+    """Least and greatest thinning of a gear's teeth, transverse section, m; both are the same without allowances."""
+    allowances = section.tooth_thickness
+    if allowances is None:
+        return section.tooth_thinning_mm * 1e-3, section.tooth_thinning_mm * 1e-3
+    upper, lower = allowances.upper_allowance_um, allowances.lower_allowance_um
+    if lower is None:
+        lower = upper - (allowances.tolerance_um or 0.0)
+    transverse = -1e-6 / math.cos(math.radians(section.helix_angle_deg))
+    return transverse * upper, transverse * lower
+
+
+def margins_of_roots(pairs: Iterable[GearPair]) -> Iterator[str]:
+    """Tell tips that come so near to their mate's fillet that contact under load reaches it, and what would not."""
+    for pair in pairs:
+        for tip, mate in ((pair.pinion, pair.gear), (pair.gear, pair.pinion)):
+            margin = root_margin(pair, tip)
+            if margin < LEAST_ROOT_MARGIN * tip.normal_module:
+                clear = 1e3 * clear_tip_diameter(pair, tip, ROOT_MARGIN * tip.normal_module)
+                yield (
+                    f"gears.{tip.name}: its tip touches {mate.name} {1e3 * margin:.3f} mm of roll length above the "
+                    "fillet, which contact under load may reach, and then finds no solution there: "
+                    f"tip_diameter_mm = {clear:.3f} keeps clear, or fitted_tip = true"
+                )
+
+
+def modifications(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, FlankModification]:
+    """Flank modifications of all gears by name.
+
+    Raises
+    ------
+    CaseError
+        A modification that does not fit its gear, or a topography that cannot be read.
+    """
+
+    def of_section(name: str, section: GearSection) -> FlankModification:
+        key = f"gears.{name}.modification"
+        amounts = {} if section.modification is None else dict(section.modification)
+        _check_depth(origin, key, amounts, section.normal_module_mm)
+        find = partial(origin.file, f"{key}.topography", largest=LARGEST_TABLE)
+        modification = origin.guarded(key, _modification, gears[name], section, find)
+        if modification.topography is not None:
+            removed = 1e6 * max(abs(value) for row in modification.topography.removed for value in row)
+            _check_depth(origin, key, {"topography, removed_um": removed}, section.normal_module_mm)
+        return modification
+
+    return part_of_each(of_section, origin.case.gears)
+
+
+def _modification(gear: Gear, section: GearSection, find: Callable[[str], Path]) -> FlankModification:
+    """Modification of a gear from its section, tried on the gear; `find` gives the path of the topography it names."""
+    given = section.modification
+    if given is None:
+        return FlankModification()
+    modification = FlankModification(
+        tip_relief=_relief(gear, given, "tip", radius_at_roll_length_from_tip),
+        root_relief=_relief(gear, given, "root", radius_at_roll_length_from_root),
+        profile_crowning=1e-6 * given.profile_crowning_um,
+        lead_crowning=1e-6 * given.lead_crowning_um,
+        profile_slope=1e-6 * given.profile_slope_um,
+        helix_slope=1e-6 * given.helix_slope_um,
+        twist=1e-6 * given.twist_um,
+        topography=None if given.topography is None else FlankTopography.from_csv(find(given.topography)),
+    )
+    modification.gap(gear, np.array(gear.tip_radius), np.array(0.0))  # refuses a relief that starts off the involute
+    return modification
+
+
+def _relief(
+    gear: Gear, given: ModificationSection, kind: str, from_end: Callable[[Gear, float], float]
+) -> Relief | None:
+    length_mm = getattr(given, f"{kind}_relief_length_mm")
+    start_roll_deg = getattr(given, f"{kind}_relief_start_roll_deg")
+    if length_mm is not None:
+        radius = from_end(gear, 1e-3 * length_mm)
+    elif start_roll_deg is not None:
+        radius = gear.base_radius * math.hypot(1.0, math.radians(start_roll_deg))
+    else:
+        return None
+    shape = ReliefShape(getattr(given, f"{kind}_relief_shape"))
+    return Relief(1e-6 * getattr(given, f"{kind}_relief_um"), radius, shape)
+
+
+def _check_depth(origin: Origin, key: str, amounts: Mapping[str, Any], module_mm: float) -> None:
+    """Refuse removal that leaves nothing of the teeth."""
+    deepest = 1e3 * DEEPEST_REMOVAL * module_mm
+    for name, amount in amounts.items():
+        if name.endswith("_um") and abs(amount) > deepest:
+            raise origin.fault(f"{key}.{name} = {amount:g}: must be at most {deepest:g}, half a normal module")
+
+
+def gear_pairs(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, GearPair]:
+    """All gear pairs by name.
+
+    Raises
+    ------
+    CaseError
+        A pair of unknown gears, or of such as cannot run together.
+    """
+
+    def of_section(name: str, section: PairSection) -> GearPair:
+        for key in ("pinion", "gear"):
+            if getattr(section, key) not in gears:
+                raise origin.fault(
+                    f"pairs.{name}.{key} = {getattr(section, key)!r}: no such gear; gears are {', '.join(gears)}"
+                )
+        first, second = gears[section.pinion], gears[section.gear]
+        if _is_turned_over(first, second):
+            first, second = second, first
+        return origin.guarded(
+            f"pairs.{name}",
+            GearPair,
+            name=name,
+            pinion=first,
+            gear=second,
+            centre_distance=section.centre_distance_mm * 1e-3,
+            common_face_width=(None if section.common_face_width_mm is None else section.common_face_width_mm * 1e-3),
+        )
+
+    return part_of_each(of_section, origin.case.pairs)
+
+
+def _is_turned_over(pinion: Gear, gear: Gear) -> bool:
+    """Tell whether a file calls the larger gear or the ring the pinion: gear 1 is the other one all the same."""
+    return pinion.internal > gear.internal or (pinion.internal == gear.internal and pinion.teeth > gear.teeth)
+
+
+def pair_specs(
+    sections: Mapping[str, PairSection],
+    pairs: Mapping[str, GearPair],
+    modifications: Mapping[str, FlankModification],
+    mesh_forces: Mapping[str, list[float]],
+    stated: Mapping[str, tuple[float, ...]],
+) -> dict[str, PairSpec]:
+    """Gather what the tables of pairs need.
+
+    Parameters
+    ----------
+    sections, pairs : mappings of pair name
+    modifications : mapping of gear name to FlankModification
+    mesh_forces : mapping of pair name to list of float
+        Static force F_bt of each of the pair's meshes at work, N; the pair's own is the mean of their amounts.
+    stated : mapping of pair name to tuple of float
+        Mesh stiffness of pairs that need no table.
+    """
+    specs = {}
+    for name, pair in pairs.items():
+        section, forces = sections[name], mesh_forces.get(name, [])
+        force = sum(abs(force) for force in forces) / len(forces) if forces else 0.0
+        specs[name] = PairSpec(
+            name=name,
+            pair=pair,
+            static_torque=force * pair.pinion.base_radius,
+            table=section.table and name not in stated and force > 0.0,
+            flank=-1 if sum(forces) < 0.0 else 1,
+            modifications=(modifications[pair.pinion.name], modifications[pair.gear.name]),
+            stiffness=stated.get(name, ()),
+        )
+    return specs
+
+
+def stated_stiffness(origin: Origin) -> dict[str, tuple[float, ...]]:
+    """Mesh stiffness of the pairs of which the file states it, N/m at equal distances over the mesh cycle, by name.
+
+    Raises
+    ------
+    CaseError
+        A stiffness that is not above zero somewhere in the cycle.
+    """
+
+    def of_section(name: str, section: PairSection) -> tuple[float, ...]:
+        assert section.stiffness is not None
+        values = _over_cycle(section.stiffness)
+        if values.min() <= 0.0:
+            raise origin.fault(
+                f"pairs.{name}.stiffness: falls to {values.min():g} N/m in the mesh cycle; lessen its waves, "
+                "it must stay above zero"
+            )
+        return tuple(values.tolist())
+
+    return part_of_each(of_section, {name: one for name, one in origin.case.pairs.items() if one.stiffness is not None})
+
+
+def _over_cycle(section: MeshStiffnessSection) -> Floats:
+    """Values over the mesh cycle, N/m: those of the file, or the sum of its waves, dense enough for cubics between."""
+    if section.over_cycle_N_per_m is not None:
+        return np.array(section.over_cycle_N_per_m)
+    highest = max(len(section.cosine_N_per_m), len(section.sine_N_per_m))
+    angle = 2.0 * np.pi * np.arange(max(1, SAMPLES_PER_WAVE * highest)) / max(1, SAMPLES_PER_WAVE * highest)
+    values = np.full(angle.shape, section.mean_N_per_m, dtype=np.float64)
+    for waves, function in ((section.cosine_N_per_m, np.cos), (section.sine_N_per_m, np.sin)):
+        for order, amplitude in enumerate(waves, start=1):
+            values += amplitude * function(order * angle)
+    return values
+
+
+def meshes(origin: Origin, pairs: Mapping[str, GearPair], bodies: Mapping[str, Body]) -> tuple[Mesh, ...]:
+    """All meshes at work, one per planet.
+
+    Raises
+    ------
+    CaseError
+        Unknown pairs or bodies, a body without the gear, faces that do not overlap, angles that contradict positions.
+    """
+
+    def of_section(name: str, section: MeshSection) -> tuple[Mesh, ...]:
+        key = f"meshes.{name}"
+        for end in ("pinion_body", "gear_body"):
+            if getattr(section, end) == GROUND:
+                raise origin.fault(f"{key}.{end} = {GROUND!r}: name a body; one with fixed = true does not turn")
+        if not origin.are_enabled(key, section.pinion_body, section.gear_body):
+            return ()
+        if section.pair not in pairs:
+            raise origin.fault(f"{key}.pair = {section.pair!r}: no such pair; pairs are {', '.join(pairs)}")
+        return tuple(_meshes_of_section(origin, name, section, pairs[section.pair], bodies))
+
+    return parts_of_each(of_section, origin.case.meshes)
+
+
+def _meshes_of_section(
+    origin: Origin, family: str, section: MeshSection, pair: GearPair, bodies: Mapping[str, Body]
+) -> Iterator[Mesh]:
+    key = f"meshes.{family}"
+    ends, stated_deg = (section.pinion_body, section.gear_body), section.position_angle_deg
+    if pair.pinion.name != origin.case.pairs[section.pair].pinion:
+        ends, stated_deg = ends[::-1], None if stated_deg is None else stated_deg + 180.0
+    instances = origin.instances(key, *ends)
+    phases = section.phase if isinstance(section.phase, tuple) else (section.phase,) * len(instances)
+    if len(phases) != len(instances):
+        raise origin.fault(f"{key}.phase = {list(phases)}: {len(instances)} meshes need {len(instances)} phases")
+    for (suffix, pinion_name, gear_name), phase in zip(instances, phases, strict=True):
+        pinion_body, gear_body = bodies[pinion_name], bodies[gear_name]
+        frame = section.frame or pinion_body.carrier or gear_body.carrier or GROUND
+        if frame != GROUND and frame not in bodies:
+            raise origin.fault(f"{key}.frame = {frame!r}: no such body; use a carrier's name or ground")
+        dx, dy = gear_body.axis[0] - pinion_body.axis[0], gear_body.axis[1] - pinion_body.axis[1]
+        angle = math.atan2(dy, dx)
+        _check_angle(origin, key, stated_deg, angle)
+        z = _middle_of_faces(origin, key, pair, pinion_body, gear_body)
+        yield Mesh(
+            name=family + suffix,
+            family=family,
+            pair=pair,
+            pinion=pinion_name,
+            gear=gear_name,
+            frame=frame,
+            z=z,
+            offsets=(z - pinion_body.wheels[pair.pinion.name], z - gear_body.wheels[pair.gear.name]),
+            position_angle=angle,
+            centre_distance=math.hypot(dx, dy),
+            phase=phase,
+        )
+
+
+def _check_angle(origin: Origin, key: str, stated_deg: float | None, angle: float) -> None:
+    """Refuse a stated angle of the line of centres that is not the one of the bodies' positions, rad."""
+    if stated_deg is not None and abs(math.remainder(angle - math.radians(stated_deg), 2 * math.pi)) > ANGLE_TOLERANCE:
+        raise origin.fault(
+            f"{key}.position_angle_deg = {stated_deg}: the bodies' positions give "
+            f"{math.degrees(angle):.4f} deg; leave the key out or correct the positions"
+        )
+
+
+def _middle_of_faces(origin: Origin, key: str, pair: GearPair, pinion_body: Body, gear_body: Body) -> float:
+    """Middle of the overlap of the two faces, m."""
+    low, high = -math.inf, math.inf
+    for body, gear in ((pinion_body, pair.pinion), (gear_body, pair.gear)):
+        if gear.name not in body.wheels:
+            raise origin.fault(
+                f"{key}: body {body.family!r} carries no gear {gear.name!r}; give its z in "
+                f"bodies.{body.family}.wheels_z_mm"
+            )
+        low = max(low, body.wheels[gear.name] - gear.face_width / 2)
+        high = min(high, body.wheels[gear.name] + gear.face_width / 2)
+    if high <= low:
+        raise origin.fault(f"{key}: the faces of {pair.pinion.name} and {pair.gear.name} do not overlap in z")
+    return (low + high) / 2
+
+
+def deviations(
+    origin: Origin, gears: Mapping[str, Gear], bodies: Mapping[str, Body]
+) -> dict[tuple[str, str], WheelDeviation]:
+    """Errors of wheels by body and gear; a pitch deviation is cumulative, positive into the tooth (ISO 1328-1).
+
+    Raises
+    ------
+    CaseError
+        Errors of an unknown body or gear, not one for each tooth, or deeper than teeth are.
+    """
+
+    def of_section(name: str, section: DeviationSection) -> tuple[tuple[str, str], WheelDeviation]:
+        key = f"deviations.{name}"
+        if section.body not in bodies:
+            raise origin.fault(f"{key}.body = {section.body!r}: no such body; bodies are {', '.join(bodies)}")
+        wheels = bodies[section.body].wheels
+        gear = section.gear or next(iter(wheels), "")
+        if gear not in wheels or (section.gear is None and len(wheels) > 1):
+            raise origin.fault(f"{key}.gear = {section.gear!r}: name one of {', '.join(wheels) or 'no gears'}")
+        return (section.body, gear), _deviation(origin, key, gears[gear], section)
+
+    return dict(part_of_each(of_section, origin.case.deviations).values())
+
+
+def _deviation(origin: Origin, key: str, gear: Gear, section: DeviationSection) -> WheelDeviation:
+    pitch = np.array(section.cumulative_pitch_um) * 1e-6
+    if len(pitch) not in (0, gear.teeth):
+        raise origin.fault(f"{key}.cumulative_pitch_um: {len(pitch)} values; {gear.name} has {gear.teeth} teeth")
+    amounts = {"cumulative_pitch_um": max(map(abs, section.cumulative_pitch_um), default=0.0)}
+    amounts["runout_um"] = section.runout_um
+    _check_depth(origin, key, amounts, 1e3 * gear.normal_module)
+    return WheelDeviation(
+        teeth=gear.teeth,
+        pitch=pitch * gear.base_radius / gear.reference_radius,
+        eccentricity=0.5e-6 * section.runout_um,
+        eccentricity_angle=math.radians(section.runout_angle_deg),
+    )

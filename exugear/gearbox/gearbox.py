@@ -1,0 +1,565 @@
+"""The gearbox as data: bodies, supports, meshes and load cases in SI, read from TOML and checked.
+
+Axes: +z along the shafts towards the output, lengths in m, angles in rad, rotation positive about +z.
+Planet sets are written once in the file and appear here as one body, support and mesh per planet,
+numbered from 1 (`planet_1`, `sun_planet_1`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Any
+
+from exugear.gearbox import body_parts, checks, gear_parts, support_parts
+from exugear.gearbox.named_files import NOTHING_MORE, Permissions
+from exugear.gearbox.origin import Origin
+from exugear.gearbox.parts import (
+    Bearing,
+    Body,
+    Coupling,
+    Joint,
+    LoadCase,
+    Mesh,
+    PairSpec,
+    WheelDeviation,
+    stiffness_matrix,
+)
+from exugear.gearbox.reading import CaseError, parse_case, read_toml, readable, shortened
+from exugear.gearbox.sections.case import CaseFile, SteSection, labels_in_use
+from exugear.gearbox.sections.quantities import unusual_values
+from exugear.gearbox.train.kinematics import Tie
+from exugear.gearbox.train.train import Train
+from fe_ste.flanks.modifications import FlankModification
+from fe_ste.geometry.gears import Gear, GearPair
+from fe_ste.standards import iso6336
+from fe_ste.tools.notebook import html_table
+
+BESIDE_EQUATIONS = ("labels", "load_cases", "loads", "lubricant", "operation", "rating", "report", "ste")
+"""Tables of the file that change nothing in the equations: words and speeds for pages, what acts over a life, how parts
+are rated, settings of reports and of tables, whose content goes into hashes by itself, and load cases: a run adds its
+own."""
+
+
+@dataclass(frozen=True)
+class Gearbox:
+    """A checked gearbox. Build one with :meth:`from_toml` or :meth:`from_dict`.
+
+    Attributes
+    ----------
+    case : CaseFile
+        The file as it is written.
+    source : str
+        Its path or name.
+    content : mapping
+        What was read from it, before it was checked.
+    permissions : Permissions
+        What the file may do.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> round(gearbox.train.ratio, 6)
+    81.490683
+    >>> sorted(gearbox.pairs)
+    ['high_speed', 'intermediate', 'ring_planet', 'sun_planet']
+    """
+
+    case: CaseFile
+    source: str
+    content: Mapping[str, Any]
+    permissions: Permissions = NOTHING_MORE
+
+    @classmethod
+    def from_toml(cls, path: str | Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:
+        """Read and check a gearbox file.
+
+        Parameters
+        ----------
+        path : path-like
+        permissions : Permissions
+            Whether scripts that it names may run, and where else files that it names may lie.
+
+        Raises
+        ------
+        CaseError
+            Anything wrong with the file: one message with file, key, value and what would be right.
+        """
+        return cls.from_dict(read_toml(path), str(path), permissions)
+
+    @classmethod
+    def from_dict(
+        cls, content: Mapping[str, Any], source: str = "gearbox", permissions: Permissions = NOTHING_MORE
+    ) -> Gearbox:
+        """Check content already in memory, such as a varied case; files that it names lie beside `source`.
+
+        Raises
+        ------
+        CaseError
+            Anything wrong with the content, as in :meth:`from_toml`.
+        """
+        try:
+            case = parse_case(dict(content), source)
+        except CaseError as error:
+            rest = cls(readable(content), source, content, permissions)
+            raise CaseError(*error.faults, *checks.faults_of(_checks_of_entries(rest))) from None
+        gearbox = cls(case, source, content, permissions)
+        checks.check(_checks_of(gearbox))
+        return gearbox
+
+    def varied(self, changes: Mapping[str, Any]) -> Gearbox:
+        """Build a new, checked gearbox with some keys replaced; keys are dotted paths of the file.
+
+        Labels of entries that are gone go with them.
+
+        Raises
+        ------
+        CaseError
+            A path through what is no section, or anything wrong with the new gearbox.
+
+        Examples
+        --------
+        >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+        >>> gearbox.varied({"housing.factor": 0.5}).case.housing.factor
+        0.5
+        """
+        content = _copied(self.content)
+        for dotted, value in changes.items():
+            section = content
+            *parents, key = dotted.split(".")
+            for parent in parents:
+                section = section.setdefault(parent, {})
+                if not isinstance(section, dict):
+                    raise self.fault(f"{dotted}: {parent!r} is not a section")
+            section[key] = value
+        content["labels"] = labels_in_use(content)
+        return Gearbox.from_dict(content, self.source, self.permissions)
+
+    def fault(self, text: str) -> CaseError:
+        """Error that names the file before `text` (key, value and what would be right)."""
+        return self._origin.fault(text)
+
+    def file(self, key: str, name: str, largest: int) -> Path:
+        """Path of a file of at most `largest` bytes that the gearbox file names under a key.
+
+        Raises
+        ------
+        CaseError
+            The file is not there or may not be read, as `exugear.gearbox.named_files.named_file` says.
+        """
+        return self._origin.file(key, name, largest)
+
+    @cached_property
+    def _origin(self) -> Origin:
+        return Origin(self.case, self.source, self.permissions)
+
+    @property
+    def name(self) -> str:
+        """Title of the gearbox."""
+        return self.case.name
+
+    @property
+    def viscosity_40(self) -> float:
+        """Kinematic viscosity of the oil at 40 degrees Celsius, mm2/s.
+
+        Raises
+        ------
+        CaseError
+            None is given, or two.
+        """
+        sections = (self.case.lubricant, self.case.rating)
+        found = [one.viscosity_40_mm2_per_s for one in sections if one is not None]
+        given = [value for value in found if value is not None]
+        if len(given) != 1:
+            what = "is given twice; leave that of [rating] out" if given else "this key is missing"
+            raise self.fault(f"lubricant.viscosity_40_mm2_per_s: {what}")
+        return given[0]
+
+    @property
+    def ste(self) -> SteSection:
+        """Settings of the STE tables."""
+        return self.case.ste
+
+    @property
+    def computed_content(self) -> dict[str, Any]:
+        """What was read from the file less `BESIDE_EQUATIONS`: what the equations depend on."""
+        return {key: value for key, value in self.content.items() if key not in BESIDE_EQUATIONS}
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is possible and unusual about the file, a line each."""
+        lines = [f"{key} = {value:g}: {warning}" for key, value, warning in unusual_values(self.case)]
+        for bearing in self.bearings:
+            torsion = stiffness_matrix(bearing.stiffness)[5, 5]
+            ends = (self.case.overall.input, self.case.overall.output)
+            if torsion and bearing.body in ends and bearing.on not in self.spinning:
+                key = f"bearings.{bearing.family}.stiffness"
+                lines.append(f"{key}: torsion {torsion:g} N m/rad holds {bearing.body} back, which turns")
+        lines += gear_parts.margins_of_roots(self.gear_pairs.values())
+        for name, gear in self.gears.items():
+            if gear.is_undercut:
+                start = 2e3 * gear.form_radius
+                lines.append(f"gears.{name}: undercut by its rack; its flank begins at a diameter of {start:.3f} mm")
+        return tuple(dict.fromkeys(lines))
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return (
+            f"<Gearbox {shortened(self.name)}: ratio {self.train.ratio:.6g}, {len(self.named_bodies)} bodies, "
+            f"{len(self.meshes)} meshes>"
+        )
+
+    def _repr_html_(self) -> str:
+        return html_table(
+            self.name,
+            {
+                "file": self.source,
+                "ratio": f"{self.train.ratio:.6g}",
+                "bodies": ", ".join(self.named_bodies),
+                "meshes": ", ".join(mesh.name for mesh in self.meshes),
+                "bearings": str(len(self.bearings)),
+                "inertia sets": ", ".join(self.inertia_sets),
+                "load cases": ", ".join(self.load_cases),
+                "warnings": str(len(self.warnings)),
+            },
+        )
+
+    # -- bodies ------------------------------------------------------------------------------------------
+
+    @property
+    def inertia_sets(self) -> tuple[str, ...]:
+        """Names of the inertia sets; every moving body has each of them."""
+        return body_parts.inertia_sets(self._origin)
+
+    def bodies(self, inertias: str | None = None) -> tuple[Body, ...]:
+        """All enabled bodies, planets one by one, with the mass properties of an inertia set.
+
+        Raises
+        ------
+        CaseError
+            No such inertia set.
+        """
+        inertias = inertias or self.case.default_inertias
+        if inertias not in self.inertia_sets:
+            raise self.fault(f"inertia set {inertias!r} is unknown; sets are {', '.join(self.inertia_sets)}")
+        return body_parts.bodies(self._origin, inertias)
+
+    def body(self, name: str, inertias: str | None = None) -> Body:
+        """One body by name.
+
+        Raises
+        ------
+        CaseError
+            No such body or inertia set.
+        """
+        bodies = {body.name: body for body in self.bodies(inertias)}
+        if name not in bodies:
+            raise self.fault(f"no body {name!r}; bodies are {', '.join(bodies)}")
+        return bodies[name]
+
+    @cached_property
+    def named_bodies(self) -> dict[str, Body]:
+        """All enabled bodies by name, with the default inertia set."""
+        return {body.name: body for body in self.bodies()}
+
+    @cached_property
+    def spinning(self) -> tuple[str, ...]:
+        """Names of the bodies that can turn, in the order of the spin vector."""
+        return tuple(body.name for body in self.named_bodies.values() if not body.fixed)
+
+    @cached_property
+    def pin_offsets(self) -> dict[str, tuple[float, float]]:
+        """Position error of planets in their carrier at zero angles, x and y, m."""
+        return body_parts.pin_offsets(self._origin, self.named_bodies)
+
+    @cached_property
+    def load_cases(self) -> dict[str, LoadCase]:
+        """Load cases by name."""
+        return body_parts.load_cases(self._origin, self.spinning)
+
+    # -- supports ----------------------------------------------------------------------------------------
+
+    @cached_property
+    def joints(self) -> tuple[Joint, ...]:
+        """Ideal joints of the variant `rigid`."""
+        return support_parts.joints(self._origin, self.named_bodies)
+
+    @cached_property
+    def bearings(self) -> tuple[Bearing, ...]:
+        """Compliant supports of the variants `bushing` and `flexible`."""
+        return support_parts.bearings(self._origin, self.named_bodies)
+
+    @cached_property
+    def unknown_bearings(self) -> dict[str, str]:
+        """Designations of bearings of which nothing else is known, by name; variants on bearings wait for the rest."""
+        return support_parts.unknown_bearings(self._origin)
+
+    @cached_property
+    def mounts(self) -> tuple[Bearing, ...]:
+        """Supports of the gearbox on the ground, at work where a fixed body is elastic."""
+        return support_parts.mounts(self._origin)
+
+    @cached_property
+    def couplings(self) -> tuple[Coupling, ...]:
+        """Torsional springs between spins."""
+        return support_parts.couplings(self._origin, self.spinning, [bearing.name for bearing in self.bearings])
+
+    # -- gears -------------------------------------------------------------------------------------------
+
+    @cached_property
+    def gears(self) -> dict[str, Gear]:
+        """All gears by name."""
+        return gear_parts.gears(self._origin)
+
+    @cached_property
+    def modifications(self) -> dict[str, FlankModification]:
+        """Flank modifications of all gears by name."""
+        return gear_parts.modifications(self._origin, self.gears)
+
+    @cached_property
+    def deviations(self) -> dict[tuple[str, str], WheelDeviation]:
+        """Errors of wheels by body and gear; a pitch deviation is cumulative, positive into the tooth (ISO 1328-1)."""
+        return gear_parts.deviations(self._origin, self.gears, self.named_bodies)
+
+    @cached_property
+    def gear_pairs(self) -> dict[str, GearPair]:
+        """All gear pairs by name."""
+        return gear_parts.gear_pairs(self._origin, self.gears)
+
+    @cached_property
+    def meshes(self) -> tuple[Mesh, ...]:
+        """All meshes at work, one per planet."""
+        return gear_parts.meshes(self._origin, self.gear_pairs, self.named_bodies)
+
+    @cached_property
+    def train(self) -> Train:
+        """The gear train: how it rolls, and what its meshes carry in the static state.
+
+        Examples
+        --------
+        >>> train = Gearbox.from_toml("cases/grc750/gearbox.toml").train
+        >>> round(train.ratio, 6)
+        81.490683
+        """
+        return Train(
+            spins=self.spinning,
+            meshes=self.meshes,
+            couplings=(*self.couplings, *self.held_by_torsion.values()),
+            input=self.case.overall.input,
+            output=self.case.overall.output,
+            torques=self.case.static_load.torques_N_m,
+            locked=self.locked,
+            fault=self.fault,
+        )
+
+    @cached_property
+    def held_by_torsion(self) -> dict[str, Tie]:
+        """What holds bodies that can turn by torsion on what stands, such as a ring on a torque arm, by their names.
+
+        The train rolls without them. One that holds the input or the output of the train is no part of how it rolls.
+        """
+        ends = (self.case.overall.input, self.case.overall.output)
+        return {
+            own.body: Tie(own.on, own.body)
+            for own in self.bearings
+            if stiffness_matrix(own.stiffness)[5, 5]
+            and own.body in self.spinning
+            and own.body not in ends
+            and own.on not in self.spinning
+        }
+
+    @property
+    def locked(self) -> tuple[str, ...]:
+        """Bodies that hold the static load, less those that torsion holds."""
+        return tuple(name for name in self.case.static_load.locked if name not in self.held_by_torsion)
+
+    @property
+    def output_radius(self) -> float:
+        """Base radius of the overall output gear, m; 1 m for a rotor without gears."""
+        name = self.case.overall.output_gear
+        return 1.0 if name is None else self.gears[name].base_radius
+
+    def start_speeds(self, case: LoadCase) -> dict[str, float]:
+        """Spins of all bodies at the start of a load case, rad/s.
+
+        Raises
+        ------
+        CaseError
+            Its speeds contradict each other.
+        """
+        return self.train.rolling({self.case.overall.input: case.start_speed, **case.start_speeds})
+
+    @cached_property
+    def pairs(self) -> dict[str, PairSpec]:
+        """Gear pairs with the static torque on gear 1 that the train's statics give."""
+        static_forces = self.train.static_mesh_forces()
+        forces: dict[str, list[float]] = {}
+        for mesh in self.meshes:
+            forces.setdefault(mesh.pair.name, []).append(static_forces[mesh.name])
+        return gear_parts.pair_specs(
+            self.case.pairs, self.gear_pairs, self.modifications, forces, self.stated_stiffness
+        )
+
+    @cached_property
+    def idle_pairs(self) -> tuple[str, ...]:
+        """Pairs at work that carry no torque in the static state, and whose stiffness the file does not state."""
+        forces = self.train.static_mesh_forces()
+        loaded = {mesh.pair.name for mesh in self.meshes if forces[mesh.name] != 0.0}
+        at_work = dict.fromkeys(mesh.pair.name for mesh in self.meshes)
+        return tuple(name for name in at_work if name not in loaded and self.case.pairs[name].stiffness is None)
+
+    @cached_property
+    def stated_stiffness(self) -> dict[str, tuple[float, ...]]:
+        """Mesh stiffness of the pairs that need no table, N/m at equal distances over the mesh cycle.
+
+        It is what the file states. A pair that carries no torque has no table, since it has no loaded flank: its teeth
+        are as stiff as ISO 6336-1 says of loaded ones, and excite nothing.
+        """
+        stated = gear_parts.stated_stiffness(self._origin)
+        return stated | {name: (iso6336.mesh_stiffness(self.gear_pairs[name]).stiffness,) for name in self.idle_pairs}
+
+    def table_distances(self, pair: str) -> tuple[float, ...]:
+        """Centre distances (m) that the file asks for in a pair's table with axes; none if they follow from the state.
+
+        Raises
+        ------
+        CaseError
+            The gears cannot run at one of them.
+        """
+        static, offsets = self.gear_pairs[pair], self.ste.centre_distance_offsets_um or ()
+        distances = tuple(static.centre_distance + 1e-6 * offset for offset in offsets)
+        for offset, distance in zip(offsets, distances, strict=True):
+            key = f"ste.centre_distance_offsets_um: {offset:g}"
+            self._origin.guarded(key, static.with_centre_distance, distance)
+        return distances
+
+
+ALONE = ("bodies", "masses", "gears", "stiffness", "supports", "modifications", "pairs")
+"""Checks of entries that make sense where others of the file cannot be read."""
+
+
+def _checks_of_entries(gearbox: Gearbox) -> tuple[checks.Check, ...]:
+    """List the checks of what could be read of a file with faults of writing."""
+    return tuple(one for one in _checks_of_parts(gearbox) if one.name in ALONE)
+
+
+def _checks_of(gearbox: Gearbox) -> tuple[checks.Check, ...]:
+    """List all checks, each after those it needs; building parts checks their sections."""
+    return (*_checks_of_parts(gearbox), *_checks_of_the_whole(gearbox))
+
+
+def _checks_of_parts(gearbox: Gearbox) -> Iterator[checks.Check]:
+    case, refuse = gearbox.case, partial(_refuse, gearbox)
+    yield checks.Check("bodies", lambda: refuse(checks.faults_of_bodies(case)))
+    yield checks.Check("masses", lambda: refuse(checks.faults_of_mass_properties(case)))
+    yield checks.Check("gears", lambda: gearbox.gears)
+    yield checks.Check("stiffness", lambda: gear_parts.stated_stiffness(gearbox._origin))
+    yield checks.Check("supports", lambda: refuse(checks.faults_of_supports(case)))
+    yield checks.Check("places", lambda: _check_inertia_sets(gearbox), ("bodies", "masses"))
+    yield checks.Check("modifications", lambda: gearbox.modifications, ("gears",))
+    yield checks.Check("pairs", lambda: gearbox.gear_pairs, ("gears",))
+    yield checks.Check(
+        "ends", lambda: refuse(checks.faults_of_overall(case.overall, gearbox.spinning, case.gears)), ("places",)
+    )
+    for name, part in (
+        ("bearings", lambda: gearbox.bearings),
+        ("joints", lambda: gearbox.joints),
+        ("mounts", lambda: gearbox.mounts),
+        ("load cases", lambda: gearbox.load_cases),
+        ("pins", lambda: gearbox.pin_offsets),
+    ):
+        yield checks.Check(name, part, ("places",))
+    yield checks.Check("meshes", lambda: gearbox.meshes, ("places", "pairs"))
+    yield checks.Check("couplings", lambda: gearbox.couplings, ("bearings",))
+    yield checks.Check("deviations", lambda: gearbox.deviations, ("places", "gears"))
+
+
+def _checks_of_the_whole(gearbox: Gearbox) -> Iterator[checks.Check]:
+    case = gearbox.case
+    elements = ("meshes", "bearings", "mounts", "couplings")
+    for name, faults, needs in (
+        ("distances", lambda: checks.faults_of_centre_distances(gearbox.meshes, gearbox.named_bodies), ("meshes",)),
+        (
+            "planets",
+            lambda: checks.faults_of_planets(case, gearbox.bodies(), gearbox.gears, gearbox.meshes),
+            ("meshes",),
+        ),
+        (
+            "size",
+            lambda: checks.faults_of_size(len(gearbox.bodies()), sum(map(len, _elements(gearbox).values()))),
+            elements,
+        ),
+        (
+            "connection",
+            lambda: checks.faults_of_connection(case, gearbox.bodies(), gearbox.meshes, gearbox.couplings),
+            ("ends", "meshes", "couplings"),
+        ),
+        (
+            "torsion",
+            lambda: checks.faults_of_torsion(gearbox.spinning, gearbox.couplings, gearbox.bearings),
+            ("couplings", "supports"),
+        ),
+        ("names", lambda: checks.faults_of_names(_elements(gearbox)), elements),
+        ("axes", lambda: checks.faults_of_joints(gearbox.joints, gearbox.named_bodies), ("joints",)),
+        (
+            "repetition",
+            lambda: checks.faults_of_repetition(case, gearbox.deviations, gearbox.pin_offsets),
+            ("deviations", "pins"),
+        ),
+        (
+            "output",
+            lambda: checks.faults_of_output_gear(case.overall, gearbox.gears, gearbox.bodies(), gearbox.couplings),
+            ("ends", "gears", "couplings"),
+        ),
+    ):
+        yield checks.Check(name, partial(_refuse_found, gearbox, faults), needs)
+    yield checks.Check("train", lambda: _check_train(gearbox), ("connection", "size", "load cases"))
+
+
+def _refuse_found(gearbox: Gearbox, find: Callable[[], Iterable[str]]) -> None:
+    _refuse(gearbox, find())
+
+
+def _refuse(gearbox: Gearbox, faults: Iterable[str]) -> None:
+    """Raise all faults together, a line each."""
+    lines = [line for text in faults for line in gearbox.fault(text).faults]
+    if lines:
+        raise CaseError(*lines)
+
+
+def _check_inertia_sets(gearbox: Gearbox) -> None:
+    _refuse(gearbox, checks.faults_of_inertia_sets(gearbox.case.default_inertias, gearbox.inertia_sets))
+    for inertias in gearbox.inertia_sets:
+        gearbox.bodies(inertias)
+
+
+def _check_train(gearbox: Gearbox) -> None:
+    """Let the static load be held, and the train roll from input to output."""
+    gearbox.train.static_mesh_forces()
+    if gearbox.gears and not gearbox.meshes:
+        raise gearbox.fault("meshes: none is at work; gears need at least one")
+    _ = gearbox.train.ratio
+    for case in gearbox.load_cases.values():
+        try:
+            gearbox.start_speeds(case)
+        except CaseError as error:
+            key = f"load_cases.{case.name}.start_speeds_rpm"
+            raise CaseError(*(f"{fault}; see {key}" for fault in error.faults)) from None
+
+
+def _elements(gearbox: Gearbox) -> dict[str, Sequence[Mesh | Bearing | Coupling]]:
+    """Parts that exert forces, by their table in the file."""
+    return {
+        "meshes": gearbox.meshes,
+        "bearings": gearbox.bearings,
+        "mounts": gearbox.mounts,
+        "couplings": gearbox.couplings,
+    }
+
+
+def _copied(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _copied(entry) for key, entry in value.items()}
+    return list(value) if isinstance(value, list) else value

@@ -1,0 +1,419 @@
+"""The parts of a gearbox as data in SI: bodies, supports, meshes, load cases."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from exugear.gearbox.sections.connections import CatalogueSection, StiffnessSection
+from fe_ste.flanks.modifications import FlankModification
+from fe_ste.geometry.gears import GearPair
+from fe_ste.tools.arrays import Floats
+from fe_ste.tools.notebook import html_table, value_range
+
+RPM = math.pi / 30.0
+"""One revolution a minute, rad/s."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body, its place at zero angles and its mass properties (about the centre of mass).
+
+    Attributes
+    ----------
+    name, family : str
+        Its name, and that of its section, which planets share.
+    axis : (2,) tuple of float
+        Position x, y of its axis at zero angles, m.
+    centre_of_mass_z : float
+        m.
+    mass, axial, transverse : float
+        Mass, and inertia about its axis and across it, kg, kg m2, kg m2; a spin-only body has inertia about its axis
+        alone.
+    carrier : str, optional
+        Carrier that a planet rides on; none while it is held: then its planets turn on axes that stand still.
+    orbit_angle : float
+        Its angle there, rad.
+    spin_only, fixed : bool
+        Whether it has no place in space, or does not turn.
+    wheels : mapping of gear name to float
+        Middle of the gear's face width, z, m.
+    planet_of : str, optional
+        Carrier of the set that a planet belongs to, held or not.
+    """
+
+    name: str
+    family: str
+    axis: tuple[float, float]
+    centre_of_mass_z: float
+    mass: float
+    axial: float
+    transverse: float
+    carrier: str | None
+    orbit_angle: float
+    spin_only: bool
+    fixed: bool
+    wheels: Mapping[str, float]
+    planet_of: str | None = None
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<Body {self.name!r}: {self._kind}, {self.mass:g} kg, {self.axial:g} kg m2 about its axis>"
+
+    def _repr_html_(self) -> str:
+        return html_table(
+            f"body {self.name}",
+            {
+                "kind": self._kind,
+                "axis": _point(self.axis),
+                "centre of mass": value_range(self.centre_of_mass_z, "mm", 1e3),
+                "mass": value_range(self.mass, "kg"),
+                "axial inertia": value_range(self.axial, "kg m2"),
+                "transverse inertia": value_range(self.transverse, "kg m2"),
+                "gears": ", ".join(f"{gear} at {1e3 * z:g} mm" for gear, z in self.wheels.items()) or "none",
+            },
+        )
+
+    @property
+    def _kind(self) -> str:
+        if self.fixed:
+            return "fixed"
+        if self.carrier is not None:
+            return f"planet on {self.carrier}"
+        if self.planet_of is not None:
+            return f"planet on {self.planet_of}, which is held"
+        return "spin only" if self.spin_only else "turning"
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Ideal joint between `on` and `body` that leaves only the spin about z.
+
+    Attributes
+    ----------
+    name : str
+    body, on : str
+        Bodies that it joins.
+    position : (3,) tuple of float
+        At zero angles, m.
+    """
+
+    name: str
+    body: str
+    on: str
+    position: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Bearing:
+    """Compliant support: a 6x6 stiffness in the axes of `on`, order x y z rx ry rz.
+
+    Attributes
+    ----------
+    name, family : str
+        Its name, and that of its section, which planets share.
+    body, on : str
+        Body that is held, and what it sits on.
+    position : (3,) tuple of float
+        At zero angles, m.
+    stiffness : StiffnessSection, optional
+        As the file gives it; beside a catalogue the least stiffness of each direction.
+    catalogue : CatalogueSection, optional
+        Dimensions and loads from which its stiffness follows.
+    damping : StiffnessSection, optional
+        As the file gives it; in proportion to the stiffness otherwise.
+    factor : float
+        Factor of the housing on its stiffness, not yet multiplied in.
+    carries_outer_ring : bool
+        Whether the outer ring sits in the body, as in planets; else the inner ring does.
+    law : {"stiffness", "iso16281"}
+        Linear, or the law of the rolling elements themselves.
+    cage : {"averaged", "turning"}
+        Of a non-linear bearing: whether rolling elements move on as its rings turn.
+    """
+
+    name: str
+    family: str
+    body: str
+    on: str
+    position: tuple[float, float, float]
+    stiffness: StiffnessSection | None
+    catalogue: CatalogueSection | None
+    damping: StiffnessSection | None
+    factor: float
+    carries_outer_ring: bool = False
+    law: Literal["stiffness", "iso16281"] = "stiffness"
+    cage: Literal["averaged", "turning"] = "averaged"
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<Bearing {self.name!r}: {self.body} on {self.on} at {_point(self.position)}, {self._source}>"
+
+    def _repr_html_(self) -> str:
+        return html_table(
+            f"bearing {self.name}",
+            {
+                "holds": self.body,
+                "on": self.on,
+                "position": _point(self.position),
+                "stiffness": self._source,
+                "damping": "in proportion to the stiffness" if self.damping is None else "given",
+                "factor of the housing": f"{self.factor:g}",
+            },
+        )
+
+    @property
+    def _source(self) -> str:
+        """Where its stiffness comes from."""
+        if self.catalogue is None:
+            return "stiffness given"
+        return "from catalogue" if self.stiffness is None else "from catalogue and stiffness given"
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """Torsional spring and damper between two spins.
+
+    Attributes
+    ----------
+    name : str
+    first, second : str
+        Bodies that it joins.
+    seat : str, optional
+        Bearing at whose seat it acts on elastic bodies.
+    stiffness, damping : float
+        N m/rad, N m s/rad.
+    """
+
+    name: str
+    first: str
+    second: str
+    seat: str | None
+    stiffness: float
+    damping: float
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A gear pair at work.
+
+    Attributes
+    ----------
+    name, family : str
+        Its name, and that of its section, which meshes of planets share.
+    pair : GearPair
+    pinion, gear : str
+        Bodies that carry gear 1 and gear 2.
+    frame : str
+        Body whose spin carries the line of centres, or "ground".
+    z : float
+        Middle of the common face width, m.
+    offsets : (2,) tuple of float
+        z of that middle from the middle of gear 1 and of gear 2, m.
+    position_angle : float
+        Polar angle of the line from gear 1's axis to gear 2's axis at zero angles, rad.
+    centre_distance : float
+        From the bodies' positions, m; the pair's own value agrees within 20 um.
+    phase : float, optional
+        Position in the mesh cycle at zero angles, where the file overrides what geometry gives.
+    """
+
+    name: str
+    family: str
+    pair: GearPair
+    pinion: str
+    gear: str
+    frame: str
+    z: float
+    offsets: tuple[float, float]
+    position_angle: float
+    centre_distance: float
+    phase: float | None
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        pinion, gear = self.pair.pinion, self.pair.gear
+        return (
+            f"<Mesh {self.name!r}: {pinion.name} ({pinion.teeth} teeth) on {self.pinion} with "
+            f"{gear.name} ({gear.teeth} teeth) on {self.gear}>"
+        )
+
+    def _repr_html_(self) -> str:
+        return html_table(
+            f"mesh {self.name}",
+            {
+                "pair": self.pair.name,
+                "gear 1": f"{self.pair.pinion.name} on {self.pinion}",
+                "gear 2": f"{self.pair.gear.name} on {self.gear}",
+                "line of centres turns with": self.frame,
+                "middle of the faces": value_range(self.z, "mm", 1e3),
+                "centre distance": value_range(self.centre_distance, "mm", 1e3),
+                "position angle": value_range(math.degrees(self.position_angle), "deg"),
+            },
+        )
+
+
+@dataclass(frozen=True)
+class WheelDeviation:
+    """Errors of one wheel that return with each of its revolutions.
+
+    Attributes
+    ----------
+    teeth : int
+    pitch : array (teeth,)
+        By which each loaded flank stands back on the transverse line of action, m. Tooth 0 is the first at a positive
+        polar angle at zero body angle, the others follow in the positive sense.
+    eccentricity : float
+        Distance of the teeth's axis from the body's, m.
+    eccentricity_angle : float
+        Its polar angle at zero body angle, rad.
+    """
+
+    teeth: int
+    pitch: Floats
+    eccentricity: float
+    eccentricity_angle: float
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        runout = value_range(2.0 * self.eccentricity, "um", 1e6)
+        return f"<WheelDeviation: {self.teeth} teeth, runout {runout}, pitch {value_range(self.pitch, 'um', 1e6)}>"
+
+    def _repr_html_(self) -> str:
+        return html_table(
+            "errors of a wheel",
+            {
+                "teeth": str(self.teeth),
+                "cumulative pitch on the line of action": value_range(self.pitch, "um", 1e6),
+                "runout": value_range(2.0 * self.eccentricity, "um", 1e6),
+                "angle of the eccentricity": value_range(math.degrees(self.eccentricity_angle), "deg"),
+            },
+        )
+
+
+@dataclass(frozen=True)
+class LoadCase:
+    """Loads of a run.
+
+    Attributes
+    ----------
+    name : str
+    torques : mapping of body name to float
+        N m.
+    torque_series : Path, optional
+        File of torques over time.
+    duration : float
+        s.
+    start_speed : float
+        Of the overall input, rad/s.
+    start_speeds : mapping of body name to float
+        Of further bodies, in a train of several degrees of freedom, rad/s.
+    driven_body : str, optional
+        Body whose speed a machine prescribes.
+    end_speed : float, optional
+        Its speed at the end, rad/s.
+    drive_stiffness : float, optional
+        Of the spring between it and the machine, N m/rad.
+    description : str
+    """
+
+    name: str
+    torques: Mapping[str, float]
+    torque_series: Path | None
+    duration: float
+    start_speed: float
+    start_speeds: Mapping[str, float]
+    driven_body: str | None
+    end_speed: float | None
+    drive_stiffness: float | None
+    description: str
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<LoadCase {self.name!r}: {self.duration:g} s, {self._drive}, torques on {len(self.torques)} bodies>"
+
+    def _repr_html_(self) -> str:
+        rows = {
+            "duration": value_range(self.duration, "s"),
+            "start speed": value_range(self.start_speed / RPM, "rpm"),
+            "drive": self._drive,
+            "torque series": "none" if self.torque_series is None else str(self.torque_series),
+        }
+        torques = {f"torque on {body}": value_range(torque, "N m") for body, torque in self.torques.items()}
+        return html_table(f"load case {self.name}", rows | torques | {"description": self.description})
+
+    @property
+    def _drive(self) -> str:
+        if self.driven_body is None or self.end_speed is None:
+            return "no drive"
+        return f"{self.driven_body} driven to {self.end_speed / RPM:g} rpm"
+
+
+@dataclass(frozen=True)
+class PairSpec:
+    """What the STE table of a pair needs.
+
+    Attributes
+    ----------
+    name : str
+    pair : GearPair
+    static_torque : float
+        On gear 1, N m, positive.
+    table : bool
+        Whether the file wants a table of it.
+    flank : int
+        Loaded flank of gear 1 in the static state: +1 if it faces the sense of +z rotation, else -1. A table is that
+        of flank +1; turned about the line of centres it is that of flank -1, with the ends of the face exchanged.
+    modifications : tuple of FlankModification
+        Gear 1, gear 2, in the axes of the gearbox.
+    stiffness : tuple of float
+        Mesh stiffness of a pair that needs no table, at equal distances over the mesh cycle, N/m; empty of others.
+    """
+
+    name: str
+    pair: GearPair
+    static_torque: float
+    table: bool
+    flank: int
+    modifications: tuple[FlankModification, FlankModification]
+    stiffness: tuple[float, ...] = ()
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        pinion, gear = self.pair.pinion, self.pair.gear
+        return (
+            f"<PairSpec {self.name!r}: {pinion.teeth} and {gear.teeth} teeth, "
+            f"{self.static_torque:g} N m on gear 1, flank {self.flank:+d}>"
+        )
+
+    def _repr_html_(self) -> str:
+        return html_table(
+            f"gear pair {self.name} in the gearbox",
+            {
+                "gear 1": f"{self.pair.pinion.name}, {self.pair.pinion.teeth} teeth",
+                "gear 2": f"{self.pair.gear.name}, {self.pair.gear.teeth} teeth",
+                "static torque on gear 1": value_range(self.static_torque, "N m"),
+                "loaded flank": f"{self.flank:+d}",
+                "table": "wanted" if self.table else "not wanted",
+                "stated stiffness": value_range(np.array(self.stiffness), "N/m") if self.stiffness else "none",
+            },
+        )
+
+
+def _point(coordinates: tuple[float, ...]) -> str:
+    return f"({', '.join(f'{1e3 * value:.6g}' for value in coordinates)}) mm"
+
+
+def stiffness_matrix(section: StiffnessSection | None) -> Floats:
+    """Stiffness or damping (6, 6) as a section gives it; zeros for none."""
+    if section is None:
+        return np.zeros((6, 6))
+    if section.matrix is not None:
+        return np.array(section.matrix, dtype=np.float64)
+    radial, tilt = section.radial_N_per_m, section.tilt_N_m_per_rad
+    return np.diag([radial, radial, section.axial_N_per_m, tilt, tilt, section.torsion_N_m_per_rad])

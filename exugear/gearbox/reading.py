@@ -1,0 +1,291 @@
+"""Reading the gearbox file: TOML to checked sections, and faults as lines that name file, key and remedy."""
+
+from __future__ import annotations
+
+import difflib
+import re
+import tomllib
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from exugear.gearbox.named_files import LARGEST_CASE, NamedFileError, check_regular
+from exugear.gearbox.sections.case import CaseFile
+
+SHOWN_FAULTS = 24
+"""Most faults that one message shows; the error has all."""
+LONGEST_FAULT = 280
+"""Characters of a fault after the name of the file."""
+
+
+class CaseError(ValueError):
+    """A gearbox file that cannot be used: a line for each fault says file, key, value and what would be right.
+
+    Attributes
+    ----------
+    faults : tuple of str
+        All of them; the message shows the first `SHOWN_FAULTS`.
+    """
+
+    def __init__(self, *faults: str) -> None:
+        self.faults = tuple(dict.fromkeys(faults))
+        more = len(self.faults) - SHOWN_FAULTS
+        rest = [f"and {more} more fault{'s' if more > 1 else ''}"] if more > 0 else []
+        super().__init__("\n".join([*self.faults[:SHOWN_FAULTS], *rest]))
+
+
+def fault_line(source: str, text: str) -> str:
+    """One line that names the file before a fault; of a long one the middle is left out, not key and remedy."""
+    text = " ".join(text.split())
+    half = (LONGEST_FAULT - 1) // 2
+    return f"{' '.join(source.splitlines())}: {text if len(text) <= LONGEST_FAULT else f'{text[:half]}…{text[-half:]}'}"
+
+
+def read_toml(path: str | Path) -> dict[str, Any]:
+    """Raw content of a TOML file.
+
+    Raises
+    ------
+    CaseError
+        No regular file, nothing in it, far too much in it, or not TOML (with line and column).
+    """
+    path = Path(path)
+    try:
+        check_regular(path, LARGEST_CASE)
+    except NamedFileError as error:
+        raise CaseError(f"{path}: {error}; expected a gearbox file such as cases/grc750/gearbox.toml") from None
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise CaseError(f"{path}: not UTF-8 text at byte {error.start}; expected TOML") from None
+    except OSError as error:
+        raise CaseError(f"{path}: cannot be read ({error.strerror}); expected a gearbox file") from None
+    if not text.strip():
+        raise CaseError(f"{path}: the file is empty; expected sections such as [gears.sun]")
+    return parsed(lambda: tomllib.loads(text), str(path), "TOML")
+
+
+def parsed(parse: Callable[[], dict[str, Any]], source: str, form: str) -> dict[str, Any]:
+    """Run a parser of TOML or JSON; whatever it refuses is one fault.
+
+    Python's parsers raise ValueError for numbers of thousands of digits, and run out of stack in deep nesting.
+
+    Parameters
+    ----------
+    parse : callable
+        Gives the content.
+    source, form : str
+        Name of the file and "TOML" or "JSON", for the message.
+
+    Raises
+    ------
+    CaseError
+        The text is not of this form.
+    """
+    try:
+        return parse()
+    except RecursionError:
+        raise CaseError(fault_line(source, f"not valid {form}: nested too deep; a gearbox needs 6 levels")) from None
+    except ValueError as error:
+        why = "a whole number of thousands of digits" if "set_int_max_str_digits" in str(error) else error
+        raise CaseError(fault_line(source, f"not valid {form}: {why}")) from None
+
+
+def parse_case(content: dict[str, Any], source: str) -> CaseFile:
+    """Validate raw content; each fault becomes a line of the message.
+
+    Examples
+    --------
+    >>> parse_case({"name": 3}, "x.toml")
+    Traceback (most recent call last):
+    ...
+    exugear.gearbox.reading.CaseError: x.toml: name = 3: must be text in quotes
+    x.toml: default_inertias: this key is missing
+    ...
+    """
+    try:
+        return CaseFile.model_validate(content)
+    except ValidationError as error:
+        faults = error.errors(include_url=False)
+    raise CaseError(*(fault_line(source, text) for text in _described(faults, content)))
+
+
+def readable(content: Mapping[str, Any]) -> CaseFile:
+    """Entries of faulty content that can be judged all the same: valid by themselves, and so is what they rest on.
+
+    A gear whose shift or tip follows from its pairs rests on these; a pair on its gears, a body on its gears and its
+    carrier. What an entry names and nobody wrote is a fault of it where all of that table can be read.
+
+    Returns
+    -------
+    CaseFile
+        With the tables of gears, pairs, bodies, bearings and mounts alone; other keys that are needed are not there.
+
+    Examples
+    --------
+    >>> gear = {"teeth": 20, "normal_module_mm": 2.0, "face_width_mm": 9.0, "held_diameter_mm": 20.0}
+    >>> list(readable({"name": 3, "gears": {"one": gear, "two": {**gear, "teeth": "20"}}}).gears)
+    ['one']
+    """
+    found = {table: _valid_entries(content, table) for table in _JUDGED}
+    written = {table: content[table] if isinstance(content.get(table), Mapping) else {} for table in _JUDGED}
+    before = -1
+    while before != (count := sum(map(len, found.values()))):
+        before = count
+        lost = {table: set(written[table]) - set(entries) for table, entries in found.items()}
+        for table in set(_JUDGED) & set(content):
+            if not isinstance(content[table], Mapping):
+                lost[table].add("")  # whatever was meant there
+        pairs = found["pairs"].items()
+        known, carriers = set(found["gears"]), set(found["bodies"])
+        found["pairs"] = {name: one for name, one in pairs if not lost["gears"] or {one.pinion, one.gear} <= known}
+        broken = [one for name, one in written["pairs"].items() if name in lost["pairs"] and isinstance(one, Mapping)]
+        mates = {str(one.get(end)) for one in broken for end in ("pinion", "gear")}
+        found["gears"] = {
+            name: one
+            for name, one in found["gears"].items()
+            if name not in mates or not (one.profile_shift_from_centre_distance or one.fitted_tip)
+        }
+        found["bodies"] = {
+            name: one
+            for name, one in found["bodies"].items()
+            if (not lost["gears"] or set(one.wheels_z_mm) <= known)
+            and (not lost["bodies"] or one.carrier is None or one.carrier in carriers)
+        }
+    return CaseFile.model_construct(None, **found)
+
+
+_JUDGED = ("gears", "pairs", "bodies", "bearings", "mounts")
+"""Tables whose entries are judged one by one."""
+
+
+def _valid_entries(content: Mapping[str, Any], table: str) -> dict[str, Any]:
+    """Entries of a table that are valid by themselves."""
+    model = _inner(_inner(CaseFile, table), "")
+    entries, found = content.get(table, {}), {}
+    for name, entry in entries.items() if isinstance(entries, Mapping) else ():
+        with suppress(ValidationError):
+            found[name] = model.model_validate(entry)
+    return found
+
+
+def _described(faults: list[Any], content: dict[str, Any]) -> Iterator[str]:
+    """Key, value and what would be right of each fault; a misspelt key is not told as missing besides."""
+    meant = set()
+    locations = {fault["loc"] for fault in faults}
+    for fault in faults:
+        if fault["type"] == "extra_forbidden":
+            meant.add((*fault["loc"][:-1], _nearest(fault["loc"])))
+    for fault in faults:
+        path = _path(fault["loc"], content)
+        key = ".".join(_key(part) for part in path)
+        if fault["type"] == "too_short" and any(loc[:-1][: len(fault["loc"])] == fault["loc"] for loc in locations):
+            continue  # only because entries of it are wrong
+        if fault["type"] == "missing":
+            if path not in meant:
+                yield f"{key}: this key is missing"
+            continue
+        shown = "" if isinstance(fault["input"], Mapping) else f" = {shortened(fault['input'])}"
+        if fault["loc"][-1:] == ("[key]",):
+            yield f"{key}: {_A_NAME}"
+        else:
+            yield f"{key}{shown}: {_remedy(fault)}"
+
+
+_NO_CONTROL = "must hold words and no control characters"
+_A_NAME = "a name has letters, digits and underscores, begins with a letter, and is 80 long at most"
+_TYPES = {
+    "float_type": "must be a number",
+    "int_type": "must be a whole number, without quotes and decimal point",
+    "int_from_float": "must be a whole number, without decimal point",
+    "bool_type": "must be true or false",
+    "string_type": "must be text in quotes",
+    "dict_type": "must be a table",
+    "model_type": "must be a table",
+    "tuple_type": "must be an array in brackets",
+}
+"""What would be right where a value has the wrong type; numbers and words of a file are not converted."""
+
+
+def _remedy(fault: Any) -> str:
+    """Say what would be right."""
+    if fault["type"] == "extra_forbidden":
+        near = _nearest(fault["loc"])
+        known = ", ".join(_known_keys(fault["loc"]))
+        return f"unknown key; did you mean {near!r}?" if near else f"unknown key; known keys are {known}"
+    if fault["type"] in _TYPES:
+        return _TYPES[fault["type"]]
+    if fault["type"] in ("too_long", "too_short"):
+        limit = fault["ctx"].get("max_length", fault["ctx"].get("min_length"))
+        return f"must have {'at most' if fault['type'] == 'too_long' else 'at least'} {limit} entries"
+    if fault["type"] == "string_pattern_mismatch":
+        return _NO_CONTROL if "x7f" in fault["ctx"]["pattern"] else _A_NAME
+    text = str(fault["msg"]).removeprefix("Value error, ")
+    return text[:1].lower() + text[1:]
+
+
+def _path(location: tuple[int | str, ...], content: Any) -> tuple[int | str, ...]:
+    """Path of a fault in the content: without the words that pydantic adds for the branches of a type."""
+    path: list[int | str] = []
+    for number, part in enumerate(location):
+        inside = (isinstance(content, Mapping) and part in content) or (
+            isinstance(content, list | tuple) and isinstance(part, int) and part < len(content)
+        )
+        if inside:
+            content = content[part]
+        if inside or (number == len(location) - 1 and isinstance(content, Mapping) and part != "[key]"):
+            path.append(part)
+    return tuple(path)
+
+
+def _key(part: int | str) -> str:
+    """Part of a dotted key, in quotes where TOML wants them."""
+    return str(part) if re.fullmatch(r"[A-Za-z0-9_-]{1,60}", str(part)) else shortened(part)
+
+
+def shortened(value: Any, longest: int = 60) -> str:
+    """Show a value as a message does: on one line and not longer than anybody reads.
+
+    Examples
+    --------
+    >>> shortened([1.5, "a"]), shortened(10**30), shortened("x" * 200, 20)
+    ("[1.5, 'a']", 'an integer of 100 bits', "'xxxxxxxxxxxxxxxxxx…")
+    """
+    if isinstance(value, int) and value.bit_length() > 64:  # Python refuses to print thousands of digits
+        return f"an integer of {value.bit_length()} bits"
+    if isinstance(value, list | tuple):
+        text = "[" + ", ".join(shortened(entry, 20) for entry in value[:longest]) + "]"
+    elif isinstance(value, Mapping):
+        text = "a table"
+    else:
+        text = repr(value[: longest + 1] if isinstance(value, str) else value)
+    return text if len(text) <= longest else text[: longest - 1] + "…"
+
+
+def _nearest(location: tuple[int | str, ...]) -> str:
+    """Known key that an unknown one resembles; empty for none."""
+    near = difflib.get_close_matches(str(location[-1])[:100], _known_keys(location), n=1)
+    return near[0] if near else ""
+
+
+def _known_keys(location: tuple[int | str, ...]) -> list[str]:
+    """Keys of the section that holds an unknown one."""
+    section: Any = CaseFile
+    for part in location[:-1]:
+        section = _inner(section, part)
+    return list(section.model_fields) if isinstance(section, type) and issubclass(section, BaseModel) else []
+
+
+def _inner(section: Any, part: int | str) -> Any:
+    """Model of the sub-section `part`: a field of a model, or the value type of a table of named entries."""
+    if isinstance(section, type) and issubclass(section, BaseModel):
+        field = section.model_fields.get(str(part))
+        section = field.annotation if field else None
+        candidates = [section, *getattr(section, "__args__", ())]
+        models = [c for c in candidates if isinstance(c, type) and issubclass(c, BaseModel)]
+        return models[0] if models and getattr(section, "__origin__", None) not in (dict, tuple) else section
+    arguments = getattr(section, "__args__", ())
+    return next((kind for kind in reversed(arguments) if kind is not Ellipsis), None)

@@ -1,0 +1,376 @@
+"""Sections on what joins bodies: joints, bearings, mounts, couplings, meshes."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Annotated, Literal
+
+from pydantic import Discriminator, Field, Tag, model_validator
+
+from exugear.gearbox.sections import quantities as q
+from exugear.gearbox.sections.entries import (
+    GROUND,
+    MOST_PLANETS,
+    Name,
+    Point,
+    Section,
+    Text,
+    check_wall,
+)
+
+
+class JointSection(Section):
+    """Ideal joint that leaves the spin about z free (used by the variant `rigid`)."""
+
+    body: Name
+    """Body that turns."""
+    on: Name = GROUND
+    """What it turns on: `ground`, a fixed body, a planet's carrier."""
+    z_mm: q.PlaceMm
+    """Place along the axis."""
+
+
+_MatrixRow = Annotated[tuple[q.StiffnessEntry, ...], Field(strict=False, max_length=6)]
+
+
+class StiffnessSection(Section):
+    """6x6 stiffness (or damping) of a bearing, about its place: isotropic entries or the full matrix."""
+
+    radial_N_per_m: q.Stiffness = 0.0
+    """Against displacement across the axis."""
+    axial_N_per_m: q.Stiffness = 0.0
+    """Against displacement along the axis."""
+    tilt_N_m_per_rad: q.Stiffness = 0.0
+    """Against tilting."""
+    torsion_N_m_per_rad: q.Stiffness = 0.0
+    """Against rotation about the axis."""
+    matrix: Annotated[tuple[_MatrixRow, ...], Field(strict=False, max_length=6)] | None = None
+    """Full 6x6 matrix instead, rows x y z rx ry rz, N/m, N and N m/rad."""
+
+    @model_validator(mode="after")
+    def _shape(self) -> StiffnessSection:
+        if self.matrix is not None and [len(row) for row in self.matrix] != [6] * 6:
+            raise ValueError("matrix needs 6 rows of 6 numbers (N/m, N, N m/rad; order x y z rx ry rz)")
+        others = self.model_fields_set - {"matrix"}
+        if self.matrix is not None and others:
+            raise ValueError(f"matrix stands alone: leave {', '.join(sorted(others))} out, or give no matrix")
+        return self
+
+
+Profile = Annotated[
+    Annotated[Literal["standard", "none"], Tag("name")]
+    | Annotated[
+        tuple[Annotated[tuple[q.ProfileShare, q.RemovedUm], Field(strict=False)], ...],
+        Field(strict=False, min_length=2, max_length=200),
+        Tag("table"),
+    ],
+    Discriminator(lambda value: "name" if isinstance(value, str) else "table"),
+]
+"""Roller profile by name, or drops (micrometres) over shares of half the length."""
+BearingType = Literal[
+    "cylindrical_roller",
+    "needle_roller",
+    "tapered_roller",
+    "spherical_roller",
+    "deep_groove_ball",
+    "angular_contact_ball",
+    "self_aligning_ball",
+    "four_point_ball",
+    "thrust_spherical_roller",
+]
+"""Types of rolling bearings that a catalogue section can describe."""
+_BARRELS = frozenset({"spherical_roller", "thrust_spherical_roller"})
+_ROLLERS = _BARRELS | {"cylindrical_roller", "needle_roller", "tapered_roller"}
+_BALLS = frozenset({"deep_groove_ball", "angular_contact_ball", "self_aligning_ball", "four_point_ball"})
+_ANGULAR = frozenset({"tapered_roller", "angular_contact_ball"})
+_SELF_ALIGNING = frozenset({"spherical_roller", "self_aligning_ball"})
+_PROFILED = frozenset({"cylindrical_roller", "needle_roller", "tapered_roller"})
+_PAIRED = frozenset({"cylindrical_roller", "needle_roller", "tapered_roller", "angular_contact_ball"})
+_CYLINDERS = frozenset({"cylindrical_roller", "needle_roller"})
+_RADIAL = frozenset({"cylindrical_roller", "needle_roller", "deep_groove_ball"})
+TYPES_OF_KEYS: dict[str, tuple[frozenset[str], str]] = {
+    "element_length_mm": (_ROLLERS, "balls have none"),
+    "inner_groove_ratio": (_BALLS, "rollers run in no groove"),
+    "outer_groove_ratio": (_BALLS - _SELF_ALIGNING, "only balls run in grooves, self-aligning ones in a sphere"),
+    "osculation": (_BARRELS, "only barrel rollers have one"),
+    "profile": (_PROFILED, "balls have none, that of barrel rollers is their osculation"),
+    "row_count": (_RADIAL | _SELF_ALIGNING, "two rows with a contact angle are an arrangement, X or O"),
+    "ribs": (_CYLINDERS, "only cylindrical rollers run against ribs that hold the shaft"),
+    "rib_contact_mm": (_CYLINDERS, "only cylindrical rollers run against ribs that hold the shaft"),
+    "holds_towards": (_ANGULAR | {"thrust_spherical_roller"}, "it holds both directions or none"),
+    "axial_preload_um": (_ANGULAR, "only a pair with contact angles can be set along the axis"),
+}
+"""Keys of a catalogue section that only some types have, and why."""
+CONTACT_ANGLES_DEG: dict[str, tuple[float, float]] = {
+    "tapered_roller": (5.0, 45.0),
+    "spherical_roller": (2.0, 25.0),
+    "angular_contact_ball": (5.0, 45.0),
+    "self_aligning_ball": (2.0, 25.0),
+    "four_point_ball": (10.0, 45.0),
+    "thrust_spherical_roller": (40.0, 58.0),
+}
+"""Contact angles that can be, by type; other types have none. Beyond 45 degrees it is a thrust bearing, of which
+one type is known."""
+
+
+ROUNDING_MM = 1e-6
+"""What sums of lengths in millimetres may differ by."""
+
+
+class CatalogueSection(Section):
+    """Boundary dimensions of a rolling bearing, and what is known of its inside; the rest is estimated from them.
+
+    With `radial_load_kN` the stiffness is that under this load; without, that under the load of the statics.
+    """
+
+    type: BearingType
+    """Type of the bearing."""
+    designation: Text = ""
+    """Words for people; `check` compares bore and outer diameter with those of ISO 15 and 355."""
+    bore_mm: q.LengthMm
+    """Bore."""
+    outer_diameter_mm: q.LengthMm
+    """Outer diameter."""
+    width_mm: q.LengthMm
+    """Width of one bearing."""
+    contact_angle_deg: q.ContactAngleDeg | None = None
+    """Contact angle; that of the type by default."""
+    arrangement: Literal["single", "X", "O", "tandem"] = "single"
+    """How two bearings of a pair stand to each other."""
+    holds_towards: Literal["+z", "-z"] = "+z"
+    """Which way of the inner ring a single bearing, or a tandem, holds."""
+    ribs: Literal["none", "+z", "-z", "both"] = "none"
+    """Which way of the inner ring the ribs of cylindrical rollers hold: "+z" a ring that is pushed towards +z."""
+    rib_contact_mm: q.LengthMm | None = None
+    """Length of the contact of a roller's end with a rib."""
+    row_count: q.RollingRows | None = None
+    """Rows of one bearing."""
+    row_distance_mm: q.BoreMm | None = None
+    """Distance of the middles of two rows; by type and arrangement by default."""
+    full_complement: bool = False
+    """Whether it has no cage."""
+    element_count: q.RollingElements | None = None
+    """Balls or rollers of one row; as many as usual by default."""
+    element_diameter_mm: q.LengthMm | None = None
+    """Diameter of balls or rollers, of cones and barrels in their middle."""
+    element_length_mm: q.LengthMm | None = None
+    """Effective length of rollers."""
+    pitch_diameter_mm: q.LengthMm | None = None
+    """Diameter of the circle of their centres."""
+    inner_groove_ratio: q.GrooveRatio | None = None
+    """Radius of the inner groove over the ball's diameter."""
+    outer_groove_ratio: q.GrooveRatio | None = None
+    """Radius of the outer groove over the ball's diameter."""
+    osculation: q.Osculation | None = None
+    """Radius of a barrel's outline over that of the raceway."""
+    profile: Profile = "standard"
+    """Profile of rollers: that of ISO/TS 16281, straight, or a table of drops."""
+    radial_clearance_mm: q.ClearanceMm = 0.0
+    """Clearance on the diameter, as mounted and warm; negative for preload."""
+    axial_preload_um: q.AxialPreloadUm = 0.0
+    """Approach of both rows against line-to-line contact; negative for play."""
+    dynamic_rating_kN: q.RatingKN | None = None
+    """Dynamic load rating as the catalogue prints it, of a pair that of both; by ISO 281 by default."""
+    static_rating_kN: q.RatingKN | None = None
+    """Static load rating as the catalogue prints it, of a pair that of both; by ISO 76 by default."""
+    radial_load_kN: q.RadialLoadKN | None = None
+    """Load that the stiffness belongs to; that of the statics by default."""
+    axial_load_kN: q.AxialLoadKN | None = None
+    """Axial load beside it."""
+
+    @model_validator(mode="after")
+    def _keys_of_the_type(self) -> CatalogueSection:
+        for key, (types, why) in TYPES_OF_KEYS.items():
+            if key in self.model_fields_set and getattr(self, key) is not None and self.type not in types:
+                raise ValueError(f"{key} makes no sense for type = {self.type!r}: {why}; leave it out")
+        if self.arrangement != "single" and self.type not in _PAIRED:
+            raise ValueError(
+                f"arrangement = {self.arrangement!r} makes no sense for type = {self.type!r}: use 'single'"
+            )
+        if self.type in _ANGULAR and self.arrangement in ("X", "O") and "holds_towards" in self.model_fields_set:
+            raise ValueError(f"holds_towards makes no sense for arrangement = {self.arrangement!r}: it holds both")
+        if self.rib_contact_mm is not None and self.ribs == "none":
+            raise ValueError("rib_contact_mm needs ribs = '+z', '-z' or 'both'")
+        if self.axial_preload_um != 0.0 and self.arrangement not in ("X", "O"):
+            raise ValueError("axial_preload_um needs arrangement = 'X' or 'O': one bearing alone has none")
+        if self.axial_load_kN is not None and self.radial_load_kN is None:
+            raise ValueError(
+                "axial_load_kN stands beside radial_load_kN: give both, or none to take the load of the statics"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _rows(self) -> CatalogueSection:
+        rows = self.row_count or (2 if self.type in _SELF_ALIGNING else 1)
+        if self.type in _SELF_ALIGNING and (rows > 2 or self.row_distance_mm is not None):
+            raise ValueError(f"type = {self.type!r} has one or two rows, contact_angle_deg says how far apart")
+        if self.type in _SELF_ALIGNING and rows == 1 and self.contact_angle_deg is not None:
+            raise ValueError("contact_angle_deg makes no sense for row_count = 1: the row stands in the middle")
+        if rows > 1 and self.arrangement != "single":
+            raise ValueError(f"row_count = {rows} stands beside arrangement = 'single' only: count the rows of both")
+        if self.row_distance_mm is not None and rows == 1 and self.arrangement == "single":
+            raise ValueError("row_distance_mm needs a second row: row_count = 2, or arrangement 'X', 'O' or 'tandem'")
+        return self
+
+    @model_validator(mode="after")
+    def _dimensions(self) -> CatalogueSection:
+        check_wall(self.bore_mm, self.outer_diameter_mm, "bore_mm")
+        height = 0.5 * (self.outer_diameter_mm - self.bore_mm)
+        # Needle cages without rings: bore to outer diameter is two needles.
+        most = height + ROUNDING_MM if self.type == "needle_roller" else height - ROUNDING_MM
+        if self.element_diameter_mm is not None and self.element_diameter_mm > most:
+            raise ValueError(
+                f"element_diameter_mm = {self.element_diameter_mm:g} must be below the {height:g} mm "
+                "between bore_mm and outer_diameter_mm"
+            )
+        if self.element_length_mm is not None and self.element_length_mm > self.width_mm:
+            raise ValueError(
+                f"element_length_mm = {self.element_length_mm:g} must not be above width_mm = {self.width_mm:g}"
+            )
+        if self.pitch_diameter_mm is not None and not self.bore_mm < self.pitch_diameter_mm < self.outer_diameter_mm:
+            raise ValueError(
+                f"pitch_diameter_mm = {self.pitch_diameter_mm:g} must lie between bore_mm = {self.bore_mm:g} "
+                f"and outer_diameter_mm = {self.outer_diameter_mm:g}"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _contact_angle(self) -> CatalogueSection:
+        angle = self.contact_angle_deg
+        if angle is None:
+            return self
+        if self.type not in CONTACT_ANGLES_DEG:
+            if angle != 0.0:
+                raise ValueError(
+                    f"contact_angle_deg = {angle:g} makes no sense for type = {self.type!r}: it has none; leave it out"
+                )
+            return self
+        least, most = CONTACT_ANGLES_DEG[self.type]
+        if not least <= angle <= most:
+            raise ValueError(
+                f"contact_angle_deg = {angle:g} must lie between {least:g} and {most:g} for type = {self.type!r}"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _profile_table(self) -> CatalogueSection:
+        if isinstance(self.profile, str):
+            return self
+        shares = [share for share, _ in self.profile]
+        if shares[0] != 0.0 or any(later <= earlier for earlier, later in itertools.pairwise(shares)):
+            raise ValueError(f"profile: shares of half the length = {shares} must begin at 0 and ascend, up to 1")
+        return self
+
+
+class BearingSection(Section):
+    """Compliant support (variants `bushing` and `flexible`): given 6x6 or from catalogue dimensions.
+
+    Beside a `catalogue`, `stiffness` is a floor: it holds the directions that the rollers leave free. One of which
+    only the `designation` is known waits for either of them; until then the variant `rigid` alone runs.
+    """
+
+    body: Name
+    """Body on its inner ring, or outer (`outer_ring`)."""
+    on: Name = GROUND
+    """The other body; `ground`, a fixed body, a carrier, another shaft."""
+    z_mm: q.PlaceMm
+    """Place of the middle along the axis."""
+    housing_factor_applies: bool = True
+    """Whether its seat yields by `housing.factor`."""
+    law: Literal["stiffness", "iso16281"] = "stiffness"
+    """Whether it is linear at its load, or follows its rows."""
+    cage: Literal["averaged", "turning"] = "averaged"
+    """Whether the elements of a non-linear bearing stand at the mean stiffness, or pass as the rings turn."""
+    outer_ring: Literal["body", "on"] | None = None
+    """Which of the two carries the outer ring; planets do by default, other bodies do not."""
+    designation: Text = ""
+    """Words for people; a bearing with nothing else holds only in the variant `rigid`, until it gets its data."""
+    stiffness: StiffnessSection | None = None
+    """Stiffness given, or floor beside a catalogue."""
+    catalogue: CatalogueSection | None = None
+    """Catalogue data."""
+    damping: StiffnessSection | None = None
+    """Damping; in proportion to the stiffness by default."""
+
+    @model_validator(mode="after")
+    def _source(self) -> BearingSection:
+        if not self.is_known and not self.designation:
+            raise ValueError("give a [.stiffness] table or a [.catalogue] table")
+        return self
+
+    @property
+    def is_known(self) -> bool:
+        """Whether more than its designation is known."""
+        return self.stiffness is not None or self.catalogue is not None
+
+    @model_validator(mode="after")
+    def _law(self) -> BearingSection:
+        if self.law == "iso16281" and self.catalogue is None:
+            raise ValueError("law = 'iso16281' needs a [.catalogue] table, whose rolling elements it follows")
+        if self.law == "iso16281" and self.catalogue is not None and self.catalogue.radial_load_kN is not None:
+            raise ValueError("law = 'iso16281' follows the load: leave catalogue.radial_load_kN and .axial_load_kN out")
+        if self.law != "iso16281" and "cage" in self.model_fields_set:
+            raise ValueError(f"cage = {self.cage!r} stands beside law = 'iso16281' only")
+        return self
+
+
+class MountSection(Section):
+    """Elastic support of the gearbox on the ground; there where a fixed body is elastic, which else is the ground.
+
+    One that stands for a body (`instead_of`) steps aside when that body is enabled.
+    """
+
+    body: Name
+    """Body that is held."""
+    instead_of: Name | None = None
+    """Body for which it stands while that is not enabled."""
+    position_mm: Point
+    """Place."""
+    stiffness: StiffnessSection
+    """Stiffness."""
+    damping: StiffnessSection | None = None
+    """Damping; in proportion to the stiffness by default."""
+
+
+class CouplingSection(Section):
+    """Torsional spring between the spins of two bodies on one axis.
+
+    It acts at the `seat` of elastic bodies, a bearing's name, and where torques act on those without such a seat. One
+    that stands for a body (`instead_of`) steps aside when that body is enabled.
+    """
+
+    bodies: Annotated[tuple[Name, Name], Field(strict=False)]
+    """The two bodies."""
+    seat: Name | None = None
+    """Bearing on whose seat of elastic bodies it acts."""
+    instead_of: Name | None = None
+    """Body for which it stands while that is not enabled."""
+    stiffness_N_m_per_rad: q.CouplingStiffness
+    """Torsional stiffness."""
+    damping_N_m_s_per_rad: q.CouplingDamping | None = None
+    """Torsional damping; in proportion to the stiffness by default."""
+
+
+Phases = Annotated[
+    Annotated[q.Phase, Tag("one")]
+    | Annotated[tuple[q.Phase, ...], Field(strict=False, max_length=MOST_PLANETS), Tag("each")],
+    Discriminator(lambda value: "each" if isinstance(value, list | tuple) else "one"),
+]
+"""One phase for all meshes of a set, or one for each."""
+
+
+class MeshSection(Section):
+    """A gear pair at work between two bodies; a planet set gives one mesh per planet."""
+
+    pair: Name
+    """Pair of gears."""
+    pinion_body: Name
+    """Body of the pinion."""
+    gear_body: Name
+    """Body of the gear."""
+    frame: Name | None = None
+    """Body in whose axes the line of centres stands still; follows from the bodies by default."""
+    position_angle_deg: q.AngleDeg | None = None
+    """Direction from pinion to gear in that frame; follows from the bodies by default."""
+    phase: Phases | None = None
+    """Position in the mesh cycle at zero angles; follows from teeth and places by default."""

@@ -1,0 +1,210 @@
+"""Every key of the gearbox file, read from the models themselves: unit, type, range, default, meaning.
+
+What a key means stands as a text below it in :mod:`exugear.gearbox.sections`. It is read from the source when it is
+asked for, so that it costs nothing at the start of a program.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from exugear.gearbox.sections.case import CaseFile
+from exugear.gearbox.sections.quantities import Range
+
+UNITS = {
+    "mm": "mm",
+    "um": "µm",
+    "deg": "deg",
+    "GPa": "GPa",
+    "kg": "kg",
+    "kg_m2": "kg m²",
+    "kg_per_m3": "kg/m³",
+    "kN": "kN",
+    "N_m": "N m",
+    "N_per_m": "N/m",
+    "N_m_per_rad": "N m/rad",
+    "N_m_s_per_rad": "N m s/rad",
+    "m_per_s2": "m/s²",
+    "s": "s",
+    "rpm": "rpm",
+    "Hz": "Hz",
+}
+"""Units by the end of a key."""
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key of the gearbox file.
+
+    Attributes
+    ----------
+    table : str
+        Table that it stands in, such as ``gears.NAME``; empty at the top.
+    name : str
+    unit : str
+        Empty for numbers without one and for what is no number.
+    kind : str
+        What it holds, in words.
+    range : str
+        What can be; empty for all.
+    default : str
+        What is taken without it; "needed" if nothing is.
+    meaning : str
+    example : object
+        A value that can be, as TOML has it.
+    """
+
+    table: str
+    name: str
+    unit: str
+    kind: str
+    range: str
+    default: str
+    meaning: str
+    example: object
+
+
+def unit_of(name: str) -> str:
+    """Return the unit that the end of a key names.
+
+    Examples
+    --------
+    >>> unit_of("axial_kg_m2"), unit_of("stiffness_N_m_per_rad"), unit_of("teeth")
+    ('kg m²', 'N m/rad', '')
+    """
+    parts = name.split("_")
+    ends = ("_".join(parts[start:]) for start in range(1, len(parts)))
+    return next((UNITS[end] for end in ends if end in UNITS), "")
+
+
+def tables() -> dict[str, type[BaseModel]]:
+    """Tables of the file by their place, such as ``bearings.NAME.catalogue``, in the order of the file."""
+    return dict(_tables(CaseFile, ""))
+
+
+def keys() -> Iterator[Key]:
+    """All keys, table by table; a key that holds a table is told by that table alone."""
+    examples = tomllib.loads(files(__package__).joinpath("examples.toml").read_text(encoding="utf-8"))
+    for table, model in tables().items():
+        texts, given = meanings(model), _at(examples, table)
+        for name, field in model.model_fields.items():
+            if not _model_within(field.annotation):
+                yield _key(table, name, field, texts[name], given[name])
+
+
+@cache
+def meanings(model: type[BaseModel]) -> Mapping[str, str]:
+    """Texts below the keys of a table, by key."""
+    body = ast.parse(inspect.getsource(model)).body[0]
+    assert isinstance(body, ast.ClassDef)
+    texts = {}
+    for statement, text in zip(body.body, body.body[1:], strict=False):
+        if not (isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant)):
+            continue
+        if isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
+            texts[statement.target.id] = str(text.value.value)
+    return texts
+
+
+def _tables(model: type[BaseModel], place: str) -> Iterator[tuple[str, type[BaseModel]]]:
+    yield place, model
+    for name, field in model.model_fields.items():
+        within = _model_within(field.annotation)
+        if within is not None:
+            named = get_origin(_bare(field.annotation)) is dict
+            yield from _tables(within, f"{place}.{name}".lstrip(".") + (".NAME" if named else ""))
+
+
+def _model_within(kind: Any) -> type[BaseModel] | None:
+    """Table that a key holds one or several of; a list of tables is a table, too."""
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        return kind
+    return next((found for part in get_args(kind) if (found := _model_within(part)) is not None), None)
+
+
+def _bare(kind: Any) -> Any:
+    """Type without annotations and without None."""
+    if get_origin(kind) is Annotated:
+        return _bare(get_args(kind)[0])
+    if get_origin(kind) in (Union, UnionType):
+        others = [part for part in get_args(kind) if part is not NoneType]
+        return _bare(others[0]) if len(others) == 1 else kind
+    return kind
+
+
+def _at(examples: dict[str, Any], table: str) -> dict[str, Any]:
+    """Return the example of a table; of a list of tables the first."""
+    found: Any = examples
+    for part in filter(None, table.split(".")):
+        found = found[part]
+        found = found[0] if isinstance(found, list) else found
+    return dict(found)
+
+
+def _key(table: str, name: str, field: FieldInfo, meaning: str, example: object) -> Key:
+    found = _range(field.annotation) or next((entry for entry in field.metadata if isinstance(entry, Range)), None)
+    told = "" if found is None else f"{found.least:g} to {found.most:g}"
+    return Key(table, name, unit_of(name), _kind(field.annotation), told, _default(field), meaning, example)
+
+
+def _range(kind: Any) -> Range | None:
+    """Range of the numbers in a type."""
+    own = next((entry for entry in getattr(kind, "__metadata__", ()) if isinstance(entry, Range)), None)
+    return own or next((found for part in get_args(kind) if (found := _range(part)) is not None), None)
+
+
+def _kind(kind: Any) -> str:
+    """Say in words what a type holds."""
+    bare = _bare(kind)
+    simple = {bool: "true or false", int: "whole number", float: "number", str: "text"}
+    if bare in simple:
+        return simple[bare]
+    origin, parts = get_origin(bare), get_args(bare)
+    if origin is Literal:
+        return ", ".join(f'"{choice}"' for choice in parts)
+    if origin is dict:
+        return f"{_kind(parts[1])} by name"
+    if origin is tuple:
+        count = "" if parts[-1] is Ellipsis else f"{len(parts)} of "
+        return f"list: {count}{_kind(parts[0])}"
+    return " or ".join(_kind(part) for part in parts)
+
+
+def _default(field: FieldInfo) -> str:
+    if field.default is PydanticUndefined:
+        return "needed"
+    if field.default is None or field.default in ((), {}, ""):
+        return "none"
+    return written(field.default)
+
+
+def written(value: object) -> str:
+    """Write a value as a gearbox file has it.
+
+    Examples
+    --------
+    >>> written(True), written((1.0, 2e6)), written({"hss": 3.5})
+    ('true', '[1.0, 2e+06]', '{ hss = 3.5 }')
+    """
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float):
+        short = f"{value:g}"
+        return short if set(short) & set(".e") else f"{short}.0"
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(f'{key} = {written(entry)}' for key, entry in value.items())} }}"
+    if isinstance(value, tuple | list):
+        return f"[{', '.join(map(written, value))}]"
+    return f'"{value}"' if isinstance(value, str) else str(value)

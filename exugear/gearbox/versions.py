@@ -1,0 +1,21 @@
+"""Versions of the methods that give stored numbers; part of the hash of every input.
+
+Raise a number when a change of the method, or of what it rests on, changes what is stored: results of the old
+version are then computed again or refused. A change that leaves all numbers as they are leaves the version, too.
+Tables have theirs in `fe_ste.tools.versions`.
+"""
+
+from __future__ import annotations
+
+#: Reduced elastic bodies (`exugear.bodies`). Runs and modes rest on it.
+REDUCTION = 1
+#: Eigenmodes (`exugear.dynamics.eigenmodes.modes`, and the laws and matrices of `exugear.dynamics.assembly`).
+MODES = 3
+#: Runs in time (`exugear.transient`, both solvers, the laws, signals and filters).
+RUN = 7
+#: Life of gears and bearings (`exugear.life`, and the root stress of `fe_ste.root_stress`).
+LIFE = 7
+#: Steady responses (`exugear.steady`, and all that modes rest on).
+STEADY = 7
+#: Points of studies (`exugear.studies`: their figures; what these rest on has its own version).
+STUDY = 1

@@ -1,0 +1,178 @@
+"""The dynamic factor K_v as a gearbox file wants it: stated, of a run, or of a steady response.
+
+Of a response forces are put together again from its lines, over windows of as many mesh cycles as those of a run, so
+that both say the same of one speed. A steady response has settled at every speed; a run-up passes its resonances.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.fingerprint import input_hash
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.parts import RPM
+from exugear.gearbox.sections.loads import RatingSection
+from exugear.life.dynamic_factors.dynamic_factor import (
+    CYCLES,
+    DynamicFactor,
+    factors_of_run,
+    merged,
+    stated_factors,
+)
+from exugear.results.folder import modes_path
+from exugear.results.run_file import FINAL_NAME
+from exugear.steady.mean_system.mesh_waves import wave_name
+from exugear.steady.mean_system.rotating_frame import PlanetSet, planet_sets
+from exugear.steady.steady_file import load_response, settings_of
+from exugear.transient.run_folder import run_directory
+from fe_ste.tools.arrays import Complexes, Floats
+from fe_ste.tools.files import FileError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+WINDOWS = 4
+"""Windows at each speed: slow beats of several meshes show themselves in some of them."""
+SAMPLES = 6
+"""Samples of the shortest period: the largest lies within a seventh of a line's amplitude."""
+SMALLEST = 1e-4
+"""Share of the mean force below which a line is left out."""
+
+
+def factors(assembly: Assembly, rating: RatingSection, folder: Path, body: str) -> Mapping[str, DynamicFactor]:
+    """Factors of mesh families, from what a results folder holds where the gearbox file wants them of that.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    rating : RatingSection
+    folder : Path
+        Results folder.
+    body : str
+        Loaded body.
+
+    Raises
+    ------
+    CaseError
+        See `factors_of_response` and `exugear.life.dynamic_factors.dynamic_factor.factors_of_run`.
+    """
+    if rating.dynamic_factor is not None:
+        return stated_factors(assembly.gearbox, rating.dynamic_factor)
+    if rating.dynamic_factor_run is not None:
+        choice = _choice(assembly, rating.dynamic_factor_run)
+        return factors_of_run(assembly, rating, run_directory(folder, choice) / FINAL_NAME, body)
+    return factors_of_response(assembly, rating, response_path(folder, assembly, rating), body)
+
+
+def source_hash(assembly: Assembly, rating: RatingSection, folder: Path) -> str:
+    """Hash of the input of what gives K_v; empty where it is stated, or where there is no such response."""
+    if rating.dynamic_factor_run is not None:
+        return input_hash(assembly, rating.dynamic_factor_run)
+    if rating.dynamic_factor_steady is not None:
+        with suppress(FileError):
+            return str(load_response(response_path(folder, assembly, rating)).attrs["input_hash"])
+    return ""
+
+
+def response_path(folder: Path, assembly: Assembly, rating: RatingSection) -> Path:
+    """Place of the steady response that gives K_v."""
+    name = f"steady-{rating.dynamic_factor_steady}.nc"
+    return modes_path(folder, _choice(assembly)).with_name(name)
+
+
+def _choice(assembly: Assembly, load_case: str | None = None) -> Choice:
+    return Choice(assembly.variant, assembly.mesh_law, assembly.inertias, load_case)
+
+
+def factors_of_response(assembly: Assembly, rating: RatingSection, path: Path, body: str) -> dict[str, DynamicFactor]:
+    """Factors of mesh families over the speed of a body, from a steady response of the same variant.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    rating : RatingSection
+        With the level that the response is of, and the least factor.
+    path : Path
+        File of the response.
+    body : str
+        Loaded body, whose speed counts.
+
+    Raises
+    ------
+    CaseError
+        No response there, or one of another input.
+    """
+    gearbox, level = assembly.gearbox, rating.dynamic_factor_steady
+    key = f"rating.dynamic_factor_steady = {level!r}"
+    try:
+        data = load_response(path)
+        fits = settings_of(data.attrs).hash_with(assembly) == data.attrs["input_hash"]
+    except (FileError, ValueError) as error:
+        command = f"exugear steady CASE.toml --variant {assembly.variant} --level {level}"
+        raise gearbox.fault(f"{key}: {error}; `{command}` makes it") from error
+    if not fits:
+        raise gearbox.fault(f"{key}: {path} belongs to another input; compute it again")
+    frequencies, sets = gearbox.train.mesh_frequencies(2.0 * np.pi), planet_sets(assembly)
+    ratio = abs(gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)[body])
+    speed = ratio * np.abs(data["speed"].to_numpy())
+    found: dict[str, list[tuple[Floats, Floats]]] = {}
+    for mesh in gearbox.meshes:
+        if mesh.family not in found:
+            ends = {mesh.pinion, mesh.gear}
+            planets = next((one for one in sets if ends & set(one.names)), None)
+            values = family_factors(data, mesh.family, mesh.name, planets, frequencies[mesh.name])
+            found[mesh.family] = [(speed, values)]
+    source = (
+        f"the steady response ({level}) at {len(speed)} speeds of {body} "
+        f"from {speed.min() / RPM:.4g} to {speed.max() / RPM:.4g} rpm"
+    )
+    least = rating.least_dynamic_factor or 1.0
+    return {family: merged(parts, least, source) for family, parts in found.items()}
+
+
+def family_factors(data: xr.Dataset, family: str, mesh: str, planets: PlanetSet | None, order: float) -> Floats:
+    """Largest over mean force in a window, at each speed, the largest of all windows and planets."""
+    signals = [str(name) for name in data["signal"].to_numpy()]
+    labels = [mesh] if planets is None else _labels(family, planets)
+    places = [signals.index(f"mesh_force {label}") for label in labels if f"mesh_force {label}" in signals]
+    size, phase = (data[key].to_numpy()[:, :, places].astype(np.float64) for key in ("amplitude", "phase"))
+    lines = size * np.exp(1j * phase)
+    orders = data["order"].to_numpy()
+    found = np.empty(len(lines))
+    for n, one in enumerate(lines):
+        loud = np.abs(one).max(axis=1) > SMALLEST * np.abs(one[0]).max()
+        loud[0] = True
+        waves, angles = _sampled(one[loud], orders[loud], order)
+        shapes = np.ones((1, 1, 1)) if planets is None else planets.values(planets.ratio * angles)[..., : len(places)]
+        force = np.abs(np.einsum("snw,sw->ns", np.broadcast_to(shapes, (len(angles), *shapes.shape[1:])), waves))
+        windows = force.reshape(len(force), WINDOWS, -1)
+        mean = windows.mean(axis=2)
+        found[n] = np.max(windows.max(axis=2) / np.where(mean > 0.0, mean, np.inf), initial=1.0)
+    return found
+
+
+def _labels(family: str, planets: PlanetSet) -> list[str]:
+    names = (wave_name(n, planets.waves) for n in range(1, planets.waves))
+    return [family, *(f"{family} {name}" for name in names)]
+
+
+def _sampled(lines: Complexes, orders: Floats, order: float) -> tuple[Floats, Floats]:
+    """Sum lines (lines, waves) over `WINDOWS` windows: (samples, waves), and angles of the input (samples,), rad.
+
+    Samples are even, so that each is a product of a coarse and a fine turn: few exponentials make all.
+    """
+    each = CYCLES / order * 2.0 * np.pi
+    fine = int(np.ceil(SAMPLES * CYCLES * max(1.0, float(orders.max()) / order)))
+    blocks = int(np.ceil(np.sqrt(fine)))
+    fine = blocks * int(np.ceil(fine / blocks))
+    step = each / fine
+    coarse = np.exp(1j * np.outer(np.arange(WINDOWS * blocks) * (step * fine / blocks), orders))
+    turns = np.exp(1j * np.outer(orders, np.arange(fine // blocks) * step))
+    values = np.stack([((coarse * wave) @ turns).real.ravel() for wave in lines.T], axis=-1)
+    return np.asarray(values), np.asarray(np.arange(len(values)) * step)

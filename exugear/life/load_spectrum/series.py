@@ -1,0 +1,226 @@
+"""Series of a source taken into pools, block by block: what is skipped, scaled, and refused with its row."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from exugear.exchange.load_files.channels import LONG_SERIES, Channels, LoadFileError
+from exugear.exchange.load_files.reading import read_channels
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.parts import RPM
+from exugear.gearbox.sections.loads import SourceSection
+from exugear.life.counting.rainflow import Rainflow
+from exugear.life.load_spectrum.pools import COMPONENTS, HUB_LOADS, Pool, Samples
+from fe_ste.tools.arrays import Floats
+
+LARGEST_TORQUE = 1e9
+"""N m: no gearbox sees more, and damages beyond are no numbers."""
+LARGEST_FORCE = 1e9
+"""N."""
+LARGEST_SPEED = 1e5
+"""1/min."""
+LEAST_BEFORE_DROPOUT = 0.1
+"""Share of the largest speed so far from which a shaft cannot stop within one step."""
+
+
+@dataclass(frozen=True)
+class Taken:
+    """What was taken of a file.
+
+    Attributes
+    ----------
+    skipped, duration : float
+        s.
+    wind : float
+        Mean wind speed, m/s; NaN where none is asked for.
+    counts : mapping of component to Rainflow
+    """
+
+    skipped: float
+    duration: float
+    wind: float
+    counts: Mapping[str, Rainflow]
+
+
+@dataclass(frozen=True)
+class SeriesReader:
+    """Reads the series of one source.
+
+    Attributes
+    ----------
+    gearbox : Gearbox
+    key : str
+        Key of the source, for messages.
+    source : SourceSection
+    body : str
+    """
+
+    gearbox: Gearbox
+    key: str
+    source: SourceSection
+    body: str
+
+    @property
+    def has_hub(self) -> bool:
+        """Whether channels of a hub are named."""
+        return self.source.hub_forces is not None or self.source.hub_moments is not None
+
+    def take(self, path: Path, pool: Pool) -> Taken:
+        """Read a file into a pool.
+
+        Raises
+        ------
+        LoadFileError
+            A file that cannot be used.
+        CaseError
+            Keys that do not fit the file.
+        """
+        series = read_channels(path)
+        wanted = self._wanted(series)
+        counts = {name: Rainflow() for name, asked in zip(COMPONENTS, self._components(), strict=True) if asked}
+        first = last = begin = None
+        wind = lasting_wind = 0.0
+        for time, lasting, values, start in _lasting(self._kept(series, wanted)):
+            begin = start if begin is None else begin
+            first = float(time[0]) if first is None else first
+            last = float(time[-1])
+            samples = self._samples(path, time, lasting, values)
+            pool.add(samples)
+            if self.source.wind is not None:
+                wind += float(lasting @ values[:, -1])
+                lasting_wind += float(lasting.sum())
+            if self.source.kind == "fatigue":
+                for name, column in zip(COMPONENTS, (samples.torque, *samples.hub.T), strict=False):
+                    if name in counts:
+                        counts[name].add(column)
+        if first is None or last is None or begin is None or last == first:
+            length = series.time[-1] - series.time[0]
+            raise self.gearbox.fault(
+                f"{self.key}.skip_s = {self.source.skip_s:g}: leaves nothing of a series of {length:g} s ({path.name})"
+            )
+        found = wind / lasting_wind if lasting_wind else math.nan
+        return Taken(first - begin, last - first, found, counts)
+
+    def _components(self) -> list[bool]:
+        forces = self.source.hub_forces or (None,) * 3
+        moments = self.source.hub_moments or (None,) * 2
+        return [True, *(name is not None for name in (*forces, *moments))]
+
+    def _wanted(self, series: Channels) -> list[tuple[str, str]]:
+        """Names and quantities of the channels: torque, speed, five of the hub if any, wind if asked for."""
+        if self.source.skip_s is None:
+            raise self.gearbox.fault(
+                f"{self.key}.skip_s: this key is missing; say how much of the beginning is left out, 0 for nothing"
+            )
+        own = {}
+        if series.path.suffix.lower() == ".csv":
+            own = {"torque": f"{self.body}_N_m", "speed": f"{self.body}_rpm"}
+        found = []
+        for quantity, given in (("torque", self.source.torque), ("speed", self.source.speed)):
+            name = given or own.get(quantity)
+            if name is None:
+                shown = ", ".join(series.names[:8])
+                raise self.gearbox.fault(
+                    f"{self.key}.{quantity}: this key is missing; name a channel of the file, such as {shown}"
+                )
+            found.append((name, quantity))
+        found += [(name.removeprefix("-"), quantity) for name, quantity in self._hub()]
+        if self.source.wind is not None:
+            found.append((self.source.wind, "velocity"))
+        return found
+
+    def _hub(self) -> list[tuple[str, str]]:
+        forces = [(name, "force") for name in self.source.hub_forces or ()]
+        return forces + [(name, "torque") for name in self.source.hub_moments or ()]
+
+    def _kept(self, series: Channels, wanted: list[tuple[str, str]]) -> Iterator[tuple[Floats, Floats, float]]:
+        """Blocks behind the time that is skipped, and the time at which the series begins."""
+        start, before = None, 0
+        top = 0.0
+        for time, values in series.blocks(wanted):
+            start = float(time[0]) if start is None else start
+            top = self._check_speed(series.path, values[:, 1], time, before, top)
+            before += len(time)
+            kept = time >= start + (self.source.skip_s or 0.0)
+            if kept.any():
+                yield time[kept], values[kept], start
+
+    def _check_speed(self, path: Path, speed: Floats, time: Floats, before: int, top: float) -> float:
+        """Refuse speeds that no shaft has; return the largest so far."""
+        size = np.abs(speed) * abs(self.source.speed_factor)
+        bad = np.flatnonzero(size > LARGEST_SPEED * RPM)
+        if bad.size:
+            row = int(bad[0])
+            raise LoadFileError(
+                f"{path}: the speed at {time[row]:g} s (step {before + row + 1}) is {size[row] / RPM:.3g} rpm; up to "
+                f"{LARGEST_SPEED:g} rpm can be meant"
+            )
+        so_far = np.maximum.accumulate(np.append(top, size))
+        if before + len(speed) >= LONG_SERIES:
+            stopped = np.flatnonzero((size[1:] == 0.0) & (size[:-1] > LEAST_BEFORE_DROPOUT * so_far[1:-1]))
+            if stopped.size:
+                row = int(stopped[0]) + 1
+                raise LoadFileError(
+                    f"{path}: the speed falls from {size[row - 1] / RPM:.4g} rpm to 0 within the step to {time[row]:g} "
+                    f"s (step {before + row + 1}): a dropout; no shaft stops so"
+                )
+        return float(so_far[-1])
+
+    def _samples(self, path: Path, time: Floats, lasting: Floats, values: Floats) -> Samples:
+        """Give the loads of a block in the gearbox's senses and sizes."""
+        partial = self.source.partial_factor or 1.0
+        torque = values[:, 0] * self.source.torque_factor * partial
+        hub = np.zeros((len(torque), HUB_LOADS if self.has_hub else 0))
+        if self.has_hub:
+            places = [place for place, asked in enumerate(self._components()[1:]) if asked]
+            signs = np.array([-1.0 if name.startswith("-") else 1.0 for name, _ in self._hub()])
+            hub[:, places] = values[:, 2 : 2 + len(places)] * (signs * self.source.hub_factor * partial)
+        for name, loads, largest, unit in (
+            ("torque", torque[:, None], LARGEST_TORQUE, "N m"),
+            ("load of the hub", hub, LARGEST_FORCE, "N or N m"),
+        ):
+            bad = np.argwhere(np.abs(loads) > largest)
+            if bad.size:
+                row = int(bad[0][0])
+                raise LoadFileError(
+                    f"{path}: the {name} at {time[row]:g} s is {abs(loads[tuple(bad[0])]):.3g} {unit}; up to "
+                    f"{largest:g} can be meant; look at its unit and factor"
+                )
+        return Samples(torque, values[:, 1] * self.source.speed_factor, lasting, hub)
+
+
+def _lasting(
+    blocks: Iterator[tuple[Floats, Floats, float]],
+) -> Iterator[tuple[Floats, Floats, Floats, float]]:
+    """Say of each sample how long it lasts: half of the steps on its two sides, at the ends of a series one of them.
+
+    Gives time, lasting, values and the beginning of the series, by blocks.
+    """
+    before: float | None = None
+    held: tuple[Floats, Floats, float] | None = None
+    for block in blocks:
+        if held is not None:
+            time, values, start = held
+            yield time, _halves(before, time, float(block[0][0])), values, start
+            before = float(time[-1])
+        held = block
+    if held is not None:
+        time, values, start = held
+        yield time, _halves(before, time, None), values, start
+
+
+def _halves(before: float | None, time: Floats, behind: float | None) -> Floats:
+    if before is None and behind is None and len(time) == 1:
+        return np.zeros(1)
+    around = time
+    if before is not None:
+        around = np.append(before, around)
+    if behind is not None:
+        around = np.append(around, behind)
+    found = np.gradient(around)
+    return np.asarray(found[int(before is not None) : len(found) - int(behind is not None)])

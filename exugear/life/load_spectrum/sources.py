@@ -1,0 +1,445 @@
+"""Sources of loads of a gearbox file: files found, read, weighed by hours of the life, and the hash of each."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from exugear.exchange.load_files.channels import LoadFileError
+from exugear.exchange.load_files.lines import first_lines
+from exugear.exchange.load_files.reading import LARGEST_SERIES, SERIES_ENDINGS, file_digest
+from exugear.exchange.load_files.tables import headings_of, is_series, table_rows
+from exugear.exchange.rexs.faults import RexsError
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.parts import RPM
+from exugear.gearbox.reading import shortened
+from exugear.gearbox.sections.loads import LoadsSection, SourceSection
+from exugear.life.counting.duration import (
+    DurationDistribution,
+    LoadPoints,
+    load_duration,
+    load_points,
+)
+from exugear.life.load_spectrum.pools import HUB_LOADS, Pool, Samples, together
+from exugear.life.load_spectrum.rexs_load_cases import rexs_load_cases
+from exugear.life.load_spectrum.series import LARGEST_SPEED, LARGEST_TORQUE, SeriesReader
+from exugear.life.load_spectrum.wind import bin_of_wind, hours_of_bins
+from fe_ste.tools.arrays import Floats
+
+HOURS_PER_YEAR = 8766.0
+HUB_CELLS = 8
+"""Cells of each load of a hub into which the bins of torque are split."""
+SPECTRUM_HEADINGS = ("torque_N_m", "speed_rpm", "hours")
+"""Headings of a table of loads that were counted elsewhere."""
+HOURS_HEADINGS = ("file", "hours_per_year")
+"""Headings of a table of hours of files."""
+MOST_FILES = 20_000
+"""Files of one source."""
+REXS_ENDINGS = (".rexs", ".rexsj", ".rexsz")
+Progress = Callable[[int, int], None]
+"""Told the number of files that are read, and of all."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoadSource:
+    """Samples of one source over the life of the gearbox.
+
+    Attributes
+    ----------
+    name, kind, case : str
+        Its key, ``fatigue`` or ``extreme``, and its label.
+    file : str
+        Name of its file, or what its files are called.
+    files, count : int
+        Number of its files, and of samples in them.
+    digest : str
+        SHA-256 of the file, or of the names and hashes of all.
+    torque, speed : array (samples,)
+        On the loaded body about +z, N m and rad/s; an extreme torque with its partial factor. Many samples are put
+        together: see `exugear.life.load_spectrum.pools`.
+    hours : array (samples,)
+        Of each sample in the whole of the life; zero for extreme sources.
+    hub : array (samples, 5) or (samples, 0)
+        Force along x, y, z and moment about x, y on the loaded body, N and N m; nothing where the source has none.
+    series : bool
+        Whether the samples follow each other in time.
+    skipped, duration : float
+        Time of each series that was left out, the longest, and that was taken, of all, s; zero for tables.
+    factors : (float, float)
+        On torque and speed.
+    least, largest : float
+        Torque, N m.
+    slowest, fastest : float
+        Speed under a torque without sign, rad/s.
+    equivalent_ranges : mapping of (component, slope) to float
+        Range of one cycle a second that does the same damage, N m or N; none of tables.
+    remarks : tuple of str
+    """
+
+    name: str
+    kind: str
+    case: str
+    file: str
+    files: int
+    count: int
+    digest: str
+    torque: Floats
+    speed: Floats
+    hours: Floats
+    hub: Floats
+    series: bool
+    skipped: float
+    duration: float
+    factors: tuple[float, float]
+    least: float
+    largest: float
+    slowest: float
+    fastest: float
+    equivalent_ranges: Mapping[tuple[str, float], float]
+    remarks: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<LoadSource {self.name!r}: {self.kind}, {self.count} samples, {self.hours.sum():.6g} h>"
+
+    @property
+    def hub_loads(self) -> Floats:
+        """Loads of a hub (samples, 5), zeros where there are none."""
+        return self.hub if self.hub.shape[1] else np.zeros((len(self.torque), HUB_LOADS))
+
+
+def load_sources(gearbox: Gearbox, progress: Progress | None = None) -> tuple[LoadSource, ...]:
+    """Read all sources of a gearbox file.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    progress : callable, optional
+        Called with the number of files that are read, and of all.
+
+    Raises
+    ------
+    CaseError
+        No section [loads], a body that does not turn, more hours than a year has, or a file that cannot be used.
+    """
+    loads = section_of(gearbox)
+    if loads.body not in gearbox.spinning:
+        raise gearbox.fault(f"loads.body = {loads.body!r} does not turn; bodies are {', '.join(gearbox.spinning)}")
+    paths = {name: _paths(gearbox, f"loads.sources.{name}", source) for name, source in loads.sources.items()}
+    total, done = sum(map(len, paths.values())), 0
+    drafts = []
+    for name, source in loads.sources.items():
+        draft = _Draft(gearbox, loads, name, source)
+        for path in paths[name]:
+            if progress is not None:
+                progress(done, total)
+            draft.take(path)
+            done += 1
+        drafts.append(draft)
+    by_wind = _wind_seconds(drafts)
+    sources = tuple(draft.source(by_wind) for draft in drafts)
+    yearly = sum(float(source.hours.sum()) for source in sources) / loads.life_years
+    if yearly > HOURS_PER_YEAR * (1.0 + 1e-9):
+        raise gearbox.fault(f"loads.sources: {yearly:.6g} hours a year in all; a year has {HOURS_PER_YEAR:g}")
+    return sources
+
+
+def section_of(gearbox: Gearbox) -> LoadsSection:
+    """Section [loads] of a gearbox file.
+
+    Raises
+    ------
+    CaseError
+        There is none.
+    """
+    if gearbox.case.loads is None:
+        raise gearbox.fault("loads: this section is missing; [loads] names the body and the files of its loads")
+    return gearbox.case.loads
+
+
+def distribution(gearbox: Gearbox, sources: tuple[LoadSource, ...]) -> DurationDistribution:
+    """Load duration distribution of all sources of fatigue together."""
+    worn = [source for source in sources if source.kind == "fatigue"]
+    if not worn:
+        raise gearbox.fault("loads.sources: none is of kind 'fatigue'; without one no part wears")
+    torque, speed, hours = (np.concatenate([getattr(one, key) for one in worn]) for key in ("torque", "speed", "hours"))
+    if not np.any(torque * speed * hours):
+        raise gearbox.fault("loads.sources: no source of fatigue has torque, speed and hours at once: no part wears")
+    largest = max(max(one.largest, -one.least) for one in worn)
+    return load_duration(torque, speed, hours, section_of(gearbox).bins, largest)
+
+
+def points_of(gearbox: Gearbox, sources: tuple[LoadSource, ...], found: DurationDistribution) -> LoadPoints:
+    """Split the bins of the distribution where loads of a hub differ."""
+    worn = [source for source in sources if source.kind == "fatigue"]
+    torque, speed, hours, hub = (
+        np.concatenate([getattr(one, key) for one in worn]) for key in ("torque", "speed", "hours", "hub_loads")
+    )
+    return load_points(found, section_of(gearbox).bin_value, torque, speed, hours, hub, HUB_CELLS)
+
+
+def _paths(gearbox: Gearbox, key: str, source: SourceSection) -> list[Path]:
+    """Files of a source, all below the folder of the gearbox file."""
+    if source.file is not None:
+        path = gearbox.file(f"{key}.file", source.file, LARGEST_SERIES)
+        if path.suffix.lower() not in (*SERIES_ENDINGS, *REXS_ENDINGS):
+            known = ", ".join((*SERIES_ENDINGS, *REXS_ENDINGS))
+            raise gearbox.fault(f"{key}.file = {source.file!r}: files of loads end in {known}")
+        return [path]
+    folder, pattern = Path(gearbox.source).parent, str(source.files)
+    try:
+        names = sorted(path.relative_to(folder).as_posix() for path in folder.glob(pattern) if path.is_file())
+    except (ValueError, NotImplementedError, OSError) as error:
+        raise gearbox.fault(f"{key}.files = {pattern!r}: {error}") from None
+    if not names:
+        raise gearbox.fault(f"{key}.files = {pattern!r}: no file has such a name in {folder}")
+    if len(names) > MOST_FILES:
+        raise gearbox.fault(f"{key}.files = {pattern!r}: {len(names)} files; at most {MOST_FILES} are read")
+    paths = [gearbox.file(f"{key}.files", name, LARGEST_SERIES) for name in names]
+    other = next((name for name in names if Path(name).suffix.lower() not in SERIES_ENDINGS), None)
+    if other is not None:
+        raise gearbox.fault(
+            f"{key}.files = {pattern!r}: {other} is none of {', '.join(SERIES_ENDINGS)}; say which, as in *.outb"
+        )
+    return paths
+
+
+class _Draft:
+    """A source while its files are read: samples in pools that weigh alike."""
+
+    def __init__(self, gearbox: Gearbox, loads: LoadsSection, name: str, source: SourceSection) -> None:
+        self.gearbox, self.loads, self.name, self.section = gearbox, loads, name, source
+        self.key = f"loads.sources.{name}"
+        self.pools: dict[float, Pool] = {}
+        self._reader = SeriesReader(gearbox, self.key, source, loads.body)
+        self._digests: list[tuple[str, str]] = []
+        self._table: Samples | None = None
+        self._remarks: tuple[str, ...] = ()
+        self._skipped = 0.0
+        self._hours = self._stated_hours()
+
+    def take(self, path: Path) -> None:
+        """Read a file."""
+        try:
+            self._digests.append((path.name, file_digest(path)))
+            self._table = self._counted(path)
+            if self._table is None:
+                self._take_series(path)
+        except (LoadFileError, RexsError) as error:
+            raise self.gearbox.fault(f"{self.key}.{'file' if self.section.file else 'files'}: {error}") from error
+        if self._table is not None:
+            self._check_table(path)
+
+    def _take_series(self, path: Path) -> None:
+        if self.section.kind == "fatigue" and not self._weighed:
+            raise self.gearbox.fault(f"{self.key}.hours_per_year: this key is missing; a series needs it")
+        pool = Pool(self.section.kind == "extreme")
+        taken = self._reader.take(path, pool)
+        self._skipped = max(self._skipped, taken.skipped)
+        group = 0.0
+        if self._hours is not None:
+            if path.name not in self._hours:
+                raise self.gearbox.fault(f"{self.key}.hours_table: has no line for {path.name}")
+            group = self._hours[path.name]
+        elif self.section.wind is not None and self.loads.wind is not None:
+            group = bin_of_wind(self.loads.wind, taken.wind)
+        pool.close(taken.counts, taken.duration)
+        if group in self.pools:
+            self.pools[group].merge(pool)
+        else:
+            self.pools[group] = pool
+
+    @property
+    def _weighed(self) -> bool:
+        one = self.section
+        return any(way is not None for way in (one.hours_per_year, one.events_per_year, one.hours_table, one.wind))
+
+    def _stated_hours(self) -> dict[str, float] | None:
+        """Hours a year of each file by its name, from a table."""
+        if self.section.hours_table is None:
+            return None
+        key = f"{self.key}.hours_table"
+        path = self.gearbox.file(key, self.section.hours_table, LARGEST_SERIES)
+        try:
+            lines = [line for line in first_lines(path, MOST_FILES + 1) if line.strip()]
+        except LoadFileError as error:
+            raise self.gearbox.fault(f"{key}: {error}") from None
+        rows = [tuple(cell.strip() for cell in row) for row in csv.reader(lines)]
+        if not rows or rows[0] != HOURS_HEADINGS:
+            raise self.gearbox.fault(f"{key}: {path}: a table of hours begins with {','.join(HOURS_HEADINGS)}")
+        found: dict[str, float] = {}
+        for number, row in enumerate(rows[1:], start=2):
+            hours = _hours_in(row)
+            if hours is None or row[0] in found:
+                raise self.gearbox.fault(
+                    f"{key}: {path}: line {number} has {shortened(','.join(row), 80)}; needs a file, each once, and "
+                    f"its hours a year from 0 to {HOURS_PER_YEAR:g}"
+                )
+            found[row[0]] = hours
+        return found
+
+    def _counted(self, path: Path) -> Samples | None:
+        """Read a table of counted loads; None for a series."""
+        if path.suffix.lower() in REXS_ENDINGS:
+            torque, speed, shares = rexs_load_cases(self.gearbox, path, self.loads.body)
+            return self._scaled(path, torque, speed, shares)
+        if path.suffix.lower() != ".csv":
+            return None
+        headings = headings_of(path)
+        if is_series(headings):
+            return None
+        if headings != SPECTRUM_HEADINGS:
+            raise LoadFileError(
+                f"{path}: headings {shortened(','.join(headings), 80)}; a series begins with time_s, a table of "
+                f"counted loads has {','.join(SPECTRUM_HEADINGS)}"
+            )
+        values = table_rows(path, len(headings))
+        bad = np.flatnonzero(~(np.isfinite(values).all(axis=1) & (values[:, 2] >= 0.0)))
+        if bad.size:
+            told = ",".join(f"{value:g}" for value in values[bad[0]])
+            raise LoadFileError(f"{path}: line {bad[0] + 2} has {told}; needs three finite numbers, hours not negative")
+        if not values[:, 2].sum() > 0.0:
+            raise LoadFileError(f"{path}: all hours are 0")
+        return self._scaled(path, values[:, 0], values[:, 1] * RPM, values[:, 2])
+
+    def _scaled(self, path: Path, torque: Floats, speed: Floats, hours: Floats) -> Samples:
+        section = self.section
+        found = torque * section.torque_factor * (section.partial_factor or 1.0)
+        turning = speed * section.speed_factor
+        for values, largest, unit in ((found, LARGEST_TORQUE, "N m"), (turning / RPM, LARGEST_SPEED, "rpm")):
+            bad = np.flatnonzero(np.abs(values) > largest)
+            if bad.size:
+                raise LoadFileError(
+                    f"{path}: row {bad[0] + 1} has {values[bad[0]]:.3g} {unit}; up to {largest:g} {unit} can be meant; "
+                    "look at its unit and at torque_factor and speed_factor"
+                )
+        return Samples(found, turning, hours, np.zeros((len(found), 0)))
+
+    def _check_table(self, path: Path) -> None:
+        for superfluous in ("skip_s", "torque", "speed", "events_per_year", "wind", "hub_forces", "hub_moments"):
+            if getattr(self.section, superfluous) is not None:
+                raise self.gearbox.fault(f"{self.key}.{superfluous}: makes no sense for a table of loads; leave it out")
+        if self.section.files is not None:
+            raise self.gearbox.fault(f"{self.key}.files: {path.name} is a table of counted loads; give it by `file`")
+
+    def source(self, by_wind: Mapping[float, float]) -> LoadSource:
+        """All that was read, in hours of the life."""
+        samples = self._table_in_hours() if self._table is not None else self._series_in_hours(by_wind)
+        pools, section = [*self.pools.values()], self.section
+        loaded = np.abs(samples.speed[samples.torque != 0.0])
+        return LoadSource(
+            name=self.name,
+            kind=section.kind,
+            case=section.case,
+            file=str(section.files or self._digests[0][0]),
+            files=len(self._digests),
+            count=sum(pool.count for pool in pools) or len(samples),
+            digest=self._digest(),
+            torque=samples.torque,
+            speed=samples.speed,
+            hours=samples.lasting,
+            hub=samples.hub,
+            series=self._table is None,
+            skipped=self._skipped,
+            duration=sum(pool.seconds for pool in pools),
+            factors=(section.torque_factor, section.speed_factor),
+            least=min((pool.least for pool in pools), default=float(samples.torque.min())),
+            largest=max((pool.largest for pool in pools), default=float(samples.torque.max())),
+            slowest=min((pool.slowest for pool in pools), default=float(loaded.min(initial=math.inf))),
+            fastest=max((pool.fastest for pool in pools), default=float(loaded.max(initial=0.0))),
+            equivalent_ranges=self._ranges(by_wind),
+            remarks=self._remarks,
+        )
+
+    def _digest(self) -> str:
+        if self.section.files is None and self.section.hours_table is None:
+            return self._digests[0][1]
+        content = repr((sorted(self._digests), sorted((self._hours or {}).items())))
+        return hashlib.sha256(content.encode()).hexdigest()
+
+    def _table_in_hours(self) -> Samples:
+        """Give a table's hours: those of the life, or shares of what the source states."""
+        table = self._table
+        assert table is not None
+        hours = table.lasting
+        if self.section.hours_per_year is not None:
+            found = self.section.hours_per_year * self.loads.life_years
+            total = float(hours.sum())
+            if abs(total - found) > 1e-3 * found:
+                self._remarks = (
+                    f"{self.name}: hours of {self._digests[0][0]}, {total:.6g} in all, are shares of the {found:.6g} h "
+                    "that hours_per_year gives in the life",
+                )
+            hours = hours / total * found
+        elif self.section.kind == "extreme":
+            hours = np.zeros(len(hours))
+        return Samples(table.torque, table.speed, hours, table.hub)
+
+    def _series_in_hours(self, by_wind: Mapping[float, float]) -> Samples:
+        parts = []
+        for group, pool in self.pools.items():
+            samples = pool.samples()
+            total = float(samples.lasting.sum())
+            hours = self._hours_of(group, pool, by_wind) * self.loads.life_years
+            lasting = samples.lasting * (hours / total) if total else np.zeros(len(samples))
+            parts.append(Samples(samples.torque, samples.speed, lasting, samples.hub))
+        return together(parts)
+
+    def _hours_of(self, group: float, pool: Pool, by_wind: Mapping[float, float]) -> float:
+        """Hours of a pool in a year."""
+        section = self.section
+        if section.kind == "extreme":
+            return 0.0
+        if section.wind is not None and self.loads.wind is not None:
+            return hours_of_bins(self.loads.wind, [group])[0] * pool.seconds / by_wind[group]
+        if self._hours is not None:
+            return group * pool.files
+        if section.events_per_year is not None:
+            return section.events_per_year * pool.seconds / 3600.0
+        return (section.hours_per_year or 0.0) * pool.seconds / sum(one.seconds for one in self.pools.values())
+
+    def _ranges(self, by_wind: Mapping[float, float]) -> dict[tuple[str, float], float]:
+        """Equivalent ranges of all pools, by their hours."""
+        weights = {group: self._hours_of(group, pool, by_wind) for group, pool in self.pools.items()}
+        total = sum(weights.values())
+        found: dict[tuple[str, float], float] = {}
+        for group, pool in self.pools.items() if total else ():
+            for key, value in pool.equivalent_ranges().items():
+                found[key] = found.get(key, 0.0) + weights[group] / total * value ** key[1]
+        return {key: value ** (1.0 / key[1]) for key, value in found.items()}
+
+
+def _hours_in(row: Sequence[str]) -> float | None:
+    """Hours of a line of a table of hours; None where it is none."""
+    try:
+        hours = float(row[1]) if len(row) == len(HOURS_HEADINGS) else math.nan
+    except ValueError:
+        return None
+    return hours if 0.0 <= hours <= HOURS_PER_YEAR else None
+
+
+def _wind_seconds(drafts: Sequence[_Draft]) -> dict[float, float]:
+    """Length of all files of each bin of wind speed, s, whatever source they are of."""
+    found: dict[float, float] = {}
+    for draft in drafts:
+        for group, pool in draft.pools.items() if draft.section.wind is not None else ():
+            found[group] = found.get(group, 0.0) + pool.seconds
+    return found
+
+
+def told(sources: tuple[LoadSource, ...]) -> Iterator[str]:
+    """Say in words what was left out and scaled."""
+    for source in sources:
+        if source.skipped:
+            each = " each" if source.files > 1 else ""
+            yield f"{source.name}: the first {source.skipped:.4g} s of {source.file} are skipped{each}"
+        torque, speed = source.factors
+        if (torque, speed) != (1.0, 1.0):
+            yield f"{source.name}: torque times {torque:g}, speed times {speed:g}, not as in {source.file}"
+        yield from source.remarks

@@ -1,0 +1,285 @@
+"""The rating sheet of a gearbox: each gear and flank by ISO 6336, beside the finite elements, and what is left out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.parts import RPM, Mesh
+from exugear.gearbox.sections.loads import RatingSection
+from exugear.life.acting_loads import ActingLoads
+from exugear.life.load_spectrum.counted import CountedLoads
+from exugear.life.load_spectrum.exposure import FLANKS, ToothExposure, distinct
+from exugear.life.rating.standard import FlankRules, MeshLoads, rate
+from exugear.life.static_balance import StaticBalance
+from exugear.life.verdict import LEFT_OUT
+from fe_ste.standards.pitting import tangential_force
+from fe_ste.standards.tooth_root import root_stress_factors
+
+LEAST_FORCE = 1.0
+"""Tangential force, N, below which a mesh carries nothing: there is no line load to rate."""
+FINITE_ELEMENTS = ("sigma_H", "sigma_F", "K_Hbeta", "S_H", "S_F")
+"""What stands beside the standard, from the contact of finite elements and gauges in the roots."""
+UNITS: Mapping[str, tuple[float, str]] = {
+    **dict.fromkeys(("sigma_H0", "sigma_H", "sigma_HG", "sigma_F0", "sigma_F", "sigma_FG"), (1e-6, "MPa")),
+    **dict.fromkeys(("sigma_Hlim", "sigma_Flim"), (1e-6, "MPa")),
+    **dict.fromkeys(("c'", "c_gammaalpha"), (1e-9, "N/(mm um)")),
+    "F_t": (1e-3, "kN"),
+    "torque": (1e-3, "kN m"),
+    "v": (1.0, "m/s"),
+    "F_betax": (1e6, "um"),
+    "Z_E": (1e-3, "N^0.5/mm"),
+}
+"""Factor from SI to the unit that a sheet has, and that unit; others are plain numbers."""
+_KEY_UNITS = {"N/(mm um)": "N_per_mm_um", "kN m": "kN_m", "m/s": "m_per_s", "N^0.5/mm": "root_MPa"}
+
+
+@dataclass(frozen=True, eq=False)
+class FlankSheet:
+    """One flank of a gear in one family of meshes.
+
+    Attributes
+    ----------
+    gear, family, flank : str
+    member : {0, 1}
+    standard : mapping of str to float
+        By the field's symbols, SI; see `exugear.life.rating.standard.rate`.
+    finite_elements : mapping of str to float
+        `FINITE_ELEMENTS`, SI; nothing where none are known.
+    lacking : mapping of str to str
+        Why factors are not rated.
+    remarks : tuple of str
+        What lies outside the range of the standard.
+    """
+
+    gear: str
+    family: str
+    flank: str
+    member: int
+    standard: Mapping[str, float]
+    finite_elements: Mapping[str, float]
+    lacking: Mapping[str, str]
+    remarks: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class RatingSheet:
+    """All flanks that are loaded, under what, and what is left out.
+
+    Attributes
+    ----------
+    edition, load : str
+    flanks : tuple of FlankSheet
+    shortfalls, assumptions, left_out : tuple of str
+    """
+
+    edition: str
+    load: str
+    flanks: tuple[FlankSheet, ...]
+    shortfalls: tuple[str, ...]
+    assumptions: tuple[str, ...]
+    left_out: tuple[str, ...] = LEFT_OUT
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<RatingSheet by {self.edition}: {len(self.flanks)} flanks>"
+
+    def summary(self) -> dict[str, Any]:
+        """Figures for programs: units in the keys; numbers that are none are left out, infinite ones are words."""
+        return {
+            "edition": self.edition,
+            "load": self.load,
+            "flanks": [
+                {
+                    "gear": one.gear,
+                    "mesh": one.family,
+                    "flank": one.flank,
+                    "standard": _for_programs(one.standard),
+                    "finite_elements": _for_programs(one.finite_elements),
+                    "not_rated": dict(one.lacking),
+                    "remarks": list(one.remarks),
+                }
+                for one in self.flanks
+            ],
+            "shortfalls": list(self.shortfalls),
+            "assumptions": list(self.assumptions),
+            "left_out": list(self.left_out),
+        }
+
+
+def _for_programs(figures: Mapping[str, float]) -> dict[str, float | str]:
+    found: dict[str, float | str] = {}
+    for name, value in figures.items():
+        scale, unit = UNITS.get(name, (1.0, ""))
+        key = f"{name.replace(chr(39), '_single')}" + (f"_{_KEY_UNITS.get(unit, unit)}" if unit else "")
+        if not math.isnan(value):
+            found[key] = "infinite" if math.isinf(value) else scale * value
+    return found
+
+
+def rating_sheet(
+    gearbox: Gearbox,
+    rating: RatingSection,
+    counted: CountedLoads,
+    acting: ActingLoads,
+    balance: StaticBalance,
+    finite_elements: Mapping[tuple[str, str, str], Mapping[str, float]],
+    assumptions: tuple[str, ...],
+) -> RatingSheet:
+    """Rate all flanks that loads press.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    rating : RatingSection
+    counted : CountedLoads
+        Of the file, or `exugear.life.rating.nominal.nominal_loads`.
+    acting : ActingLoads
+        Of these.
+    balance : StaticBalance
+        Over their torques.
+    finite_elements : mapping of (gear, family, flank) to mapping
+        What is known beside the standard.
+    assumptions : tuple of str
+    """
+    flanks = []
+    for tooth in distinct(counted.teeth):
+        for sense in (1, -1):
+            key = tooth.gear, tooth.family, FLANKS[sense * tooth.flank]
+            if np.any(acting.points.torque * sense > 0.0):
+                one = _flank(gearbox, rating, counted, acting, balance, tooth, sense, finite_elements.get(key, {}))
+                flanks += [] if one is None else [one]
+    return RatingSheet(
+        edition=rating.edition,
+        load=_load_in_words(gearbox, counted),
+        flanks=tuple(flanks),
+        shortfalls=tuple(_shortfalls(rating, flanks)),
+        assumptions=(*assumptions, *_assumptions(gearbox, rating)),
+    )
+
+
+def _flank(
+    gearbox: Gearbox,
+    rating: RatingSection,
+    counted: CountedLoads,
+    acting: ActingLoads,
+    balance: StaticBalance,
+    tooth: ToothExposure,
+    sense: int,
+    beside: Mapping[str, float],
+) -> FlankSheet | None:
+    """Rate one flank; None if its meshes carry nothing."""
+    rules = _rules(gearbox, rating, counted, tooth)
+    loads = _mesh_loads(gearbox, acting, balance, tooth, rules, sense)
+    if not len(loads.force):
+        return None
+    found = rate(rules, loads)
+    lacking = dict(rules.lacking())
+    if rules.strength is None:
+        lacking["S_H, S_F"] = f"not rated: no [rating.gears.{tooth.gear}] says what it withstands"
+    return FlankSheet(
+        gear=tooth.gear,
+        family=tooth.family,
+        flank=FLANKS[sense * tooth.flank],
+        member=tooth.member,
+        standard=found,
+        finite_elements=beside,
+        lacking=lacking,
+        remarks=root_stress_factors(rules.pair, tooth.member).outside_validity,
+    )
+
+
+def _rules(gearbox: Gearbox, rating: RatingSection, counted: CountedLoads, tooth: ToothExposure) -> FlankRules:
+    family = _family(gearbox, tooth.family)
+    pair = family[0].pair
+    bodies = gearbox.named_bodies
+    around = [
+        max(
+            sum(other.family == one.family and _holder(other, side) == _holder(one, side) for other in gearbox.meshes)
+            for one in family
+        )
+        for side in (0, 1)
+    ]
+    strengths = rating.gears.get(pair.pinion.name), rating.gears.get(pair.gear.name)
+    return FlankRules(
+        pair=pair,
+        member=tooth.member,
+        strengths=strengths,
+        application_factor=rating.application_factor if gearbox.case.loads is None else 1.0,
+        stated_dynamic_factor=rating.dynamic_factor or rating.least_dynamic_factor or 1.0,
+        viscosity=gearbox.viscosity_40,
+        meshes=(around[0], around[1]),
+        free_bore=bodies[tooth.holder].planet_of is not None,
+    )
+
+
+def _family(gearbox: Gearbox, name: str) -> list[Mesh]:
+    return [mesh for mesh in gearbox.meshes if mesh.family == name]
+
+
+def _holder(mesh: Mesh, side: int) -> str:
+    return (mesh.pinion, mesh.gear)[side]
+
+
+def _mesh_loads(
+    gearbox: Gearbox, acting: ActingLoads, balance: StaticBalance, tooth: ToothExposure, rules: FlankRules, sense: int
+) -> MeshLoads:
+    """Find what the meshes of a family carry, from the static balance."""
+    points = acting.points
+    own = np.sign(points.torque) == sense
+    torque, hub = points.torque[own], points.other[own]
+    numbers = [number for number, mesh in enumerate(gearbox.meshes) if mesh.family == tooth.family]
+    forces = np.abs(balance.at(balance.mesh_force, torque, hub)[..., numbers])
+    plain = np.abs(balance.at(balance.mesh_force, torque)[..., numbers]).mean(axis=(1, 2))
+    tilts = np.abs(balance.at(balance.misalignment, torque, hub)[..., numbers]).max(axis=(1, 2))
+    pair = rules.pair
+    gear = (pair.pinion, pair.gear)[tooth.member]
+    speed = points.speed[own] * tooth.cycles / len(tooth.meshes) * gear.teeth / pair.pinion.teeth
+    force = tangential_force(pair.pinion, 1.0) * plain
+    carries = force > LEAST_FORCE
+    return MeshLoads(
+        torque=torque[carries],
+        force=force[carries],
+        sharing=forces.max(axis=(1, 2))[carries] / plain[carries],
+        opening=tilts[carries] * pair.face_width,
+        speed=speed[carries],
+        turns=(points.revolutions[own] * tooth.cycles)[carries],
+    )
+
+
+def _load_in_words(gearbox: Gearbox, counted: CountedLoads) -> str:
+    hours = float(counted.distribution.hours.sum())
+    if gearbox.case.loads is not None:
+        count = len(counted.points.torque)
+        return f"spectrum on {counted.body}: {count} loads, {hours:,.0f} h; factors are those of the load that decides"
+    one = counted.sources[0]
+    return (
+        f"nominal load: {1e-3 * one.largest:.6g} kN m on {counted.body} at {one.fastest / RPM:.4g} rpm, {hours:,.0f} h"
+    )
+
+
+def _shortfalls(rating: RatingSection, flanks: list[FlankSheet]) -> Iterator[str]:
+    for one in flanks:
+        for name, asked in (("S_H", rating.least_S_H), ("S_F", rating.least_S_F)):
+            found = one.standard[name]
+            if found < asked:
+                part = f"{one.gear} {one.flank} {one.family}"
+                yield f"{part}: {name} = {found:.3g} by the standard, {asked:g} is asked for"
+
+
+def _assumptions(gearbox: Gearbox, rating: RatingSection) -> Iterator[str]:
+    yield "K_gamma and misalignment are those of the static balance on bearings, with the mesh stiffness of ISO 6336-1"
+    yield "C_R = 1: gears are solid discs; helix and profile modifications are not in K_v, K_Hbeta and K_Halpha"
+    yield "Y_B is that of rims of rings and planets; other gears are held on shafts. Z_W = Z_X = 1"
+    if gearbox.case.loads is None:
+        if rating.nominal_hours is None:
+            yield "nominal_hours of [rating] is missing: teeth are rated for at least 1e10 load cycles"
+    elif rating.application_factor != 1.0:
+        yield "application_factor is for nominal loads: K_A = 1 under [loads]"
+    if rating.dynamic_factor is None:
+        yield "K_v that is not the standard's is least_dynamic_factor: no run or response is looked at here"

@@ -1,0 +1,310 @@
+"""One flank of a gear by ISO 6336:2006, method B: all factors, stresses, what they may be, and both safeties.
+
+Load sharing and misalignment are those of the static balance of the shafts; what running in leaves of misalignment and
+deviations loads the face and the teeth beside each other. Under a spectrum all factors follow each load, safeties are
+those of Miner's rule, and what is told is the load that does most damage to the flank.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from exugear.gearbox.sections.loads import StrengthSection
+from exugear.life.gear_life import hardening_of, life_curves, root_factors, root_strength, roughness_of
+from fe_ste.geometry.gears import GearPair
+from fe_ste.standards.iso1328 import tolerance
+from fe_ste.standards.iso6336 import MethodBStiffness, mesh_stiffness
+from fe_ste.standards.load_factors import (
+    FlankDeviations,
+    Hardening,
+    dynamic_factor,
+    face_load_factor,
+    helix_running_in,
+    pitch_running_in,
+    resonance_ratio,
+    transverse_load_factors,
+)
+from fe_ste.standards.pitting import (
+    contact_ratio_factor,
+    elasticity_factor,
+    helix_factor,
+    lubricant_factor,
+    nominal_contact_stress,
+    reduced_radius,
+    roughness_factor,
+    single_contact_factors,
+    velocity_factor,
+    zone_factor,
+)
+from fe_ste.standards.service_life import damages, safety_factor
+from fe_ste.standards.tooth_root import root_face_load_factor, root_stress_factors
+from fe_ste.tools.arrays import Floats
+
+FINE_CLASS = 5
+"""Coarsest flank tolerance class whose tip relief counts in K_v."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeshLoads:
+    """What a family of meshes carries in each load of a spectrum.
+
+    Attributes
+    ----------
+    torque : array (n,)
+        Of the loaded body, N m: what the loads are told by.
+    force : array (n,)
+        F_t at the reference circle, mean of the meshes over the angles of the carrier, N.
+    sharing : array (n,)
+        K_gamma: the largest over that.
+    opening : array (n,)
+        Largest misalignment of the meshes as an opening over the face, m.
+    speed : array (n,)
+        Of gear 1 against the frame in which its mates stand, rad/s.
+    turns : array (n,)
+        Load cycles of the flank.
+    """
+
+    torque: Floats
+    force: Floats
+    sharing: Floats
+    opening: Floats
+    speed: Floats
+    turns: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class FlankRules:
+    """What one gear of a pair is rated by.
+
+    Attributes
+    ----------
+    pair : GearPair
+    member : {0, 1}
+    strengths : tuple of StrengthSection or None
+        Of gear 1 and gear 2.
+    application_factor, stated_dynamic_factor : float
+        K_A; K_v where the standard's is not to be had.
+    viscosity : float
+        At 40 degrees Celsius, mm2/s.
+    meshes : (int, int)
+        Teeth in mesh at once around gear 1 and gear 2, for the mass that vibrates.
+    free_bore : bool
+        Whether the gear's bore is free: that of a planet.
+    """
+
+    pair: GearPair
+    member: int
+    strengths: tuple[StrengthSection | None, StrengthSection | None]
+    application_factor: float
+    stated_dynamic_factor: float
+    viscosity: float
+    meshes: tuple[int, int]
+    free_bore: bool
+
+    @property
+    def strength(self) -> StrengthSection | None:
+        """Of the gear itself."""
+        return self.strengths[self.member]
+
+    @property
+    def classes(self) -> tuple[int, int] | None:
+        """Tolerance classes of both gears; None without that of one."""
+        found = [one.tolerance_class for one in self.strengths if one is not None]
+        return None if len(found) < 2 or None in found else (found[0] or 0, found[1] or 0)
+
+    def deviations(self) -> FlankDeviations | None:
+        """Tolerances of the classes, the larger of both gears, f_ma of both; None without classes."""
+        classes = self.classes
+        if classes is None:
+            return None
+        found: dict[str, list[float]] = {}
+        for gear, one in zip((self.pair.pinion, self.pair.gear), classes, strict=True):
+            size = {
+                "reference_diameter": 2.0 * gear.reference_radius,
+                "normal_module": gear.normal_module,
+                "face_width": gear.face_width,
+            }
+            pitch = tolerance("single_pitch", one, **size) * math.cos(gear.transverse_pressure_angle)
+            found.setdefault("pitch", []).append(pitch)
+            found.setdefault("form", []).append(tolerance("profile_form", one, **size))
+            found.setdefault("helix", []).append(tolerance("helix_slope", one, **size))
+        return FlankDeviations(max(found["pitch"]), max(found["form"]), math.hypot(*found["helix"]))
+
+    def lacking(self) -> dict[str, str]:
+        """Why factors are not rated, by their name."""
+        lines = {}
+        if self.pair.gear.internal:
+            lines["K_v"] = "not rated: c' and the mass of rings are left out; K_v of [rating] is taken"
+        elif self.classes is None:
+            lines["K_v"] = "not rated: tolerance_class of both gears is missing; K_v of [rating] is taken"
+        if self.classes is None:
+            lines["K_Halpha"] = "not rated: tolerance_class of both gears is missing; 1 is taken"
+            lines["K_Hbeta"] = "of deflections alone: tolerance_class of both gears is missing"
+        return lines
+
+
+def rate(rules: FlankRules, loads: MeshLoads) -> dict[str, float]:
+    """Factors, stresses and safeties of a flank and the root below it, by the field's symbols.
+
+    Parameters
+    ----------
+    rules : FlankRules
+    loads : MeshLoads
+
+    Returns
+    -------
+    dict of str to float
+        Stresses in Pa, F_t in N, v in m/s; what is not rated is NaN.
+    """
+    factors = [_load_factors(rules, loads, place) for place in range(len(loads.force))]
+    stresses = [_stresses(rules, one) for one in factors]
+    contact = np.array([one["sigma_H"] for one in stresses])
+    root = np.array([one["sigma_F"] for one in stresses])
+    allowed = np.array([_contact_influences(rules, one["v"]) for one in factors])
+    found = {"S_H": math.nan, "S_F": math.nan, "sigma_HG": math.nan, "sigma_FG": math.nan}
+    decides = int((contact * loads.turns**0.05).argmax())
+    strength = rules.strength
+    if strength is not None:
+        curve, bending = life_curves(strength)
+        endured = 1e6 * strength.sigma_H_lim_MPa * allowed.prod(axis=1)
+        broken = root_strength(strength, rules.pair, rules.member)
+        by_load = damages(curve, contact / endured, 1.0, loads.turns)
+        if 0.0 < by_load.sum() < math.inf:
+            decides = int(by_load.argmax())
+        found["S_H"] = safety_factor(curve, contact / endured, 1.0, loads.turns)
+        found["S_F"] = safety_factor(bending, root, broken, loads.turns)
+        found["sigma_HG"], found["sigma_FG"] = found["S_H"] * contact[decides], found["S_F"] * root[decides]
+        found["Z_NT"], found["Y_NT"] = found["sigma_HG"] / endured[decides], found["sigma_FG"] / broken
+        relative = root_factors(strength, rules.pair, rules.member)
+        found["Y_rel"] = math.prod(relative)
+        if strength.root_factor is None:
+            found |= dict(zip(ROOT_STRENGTH, relative, strict=True))
+        found["Y_M"] = strength.mean_stress_factor or 1.0
+        found |= {"sigma_Hlim": 1e6 * strength.sigma_H_lim_MPa, "sigma_Flim": 1e6 * strength.sigma_F_lim_MPa}
+    found |= dict(zip(("Z_L", "Z_v", "Z_R"), allowed[decides].tolist(), strict=True))
+    place = {"torque": float(loads.torque[decides]), "N_L": float(loads.turns.sum())}
+    return {**place, **factors[decides], **stresses[decides], **found}
+
+
+ROOT_STRENGTH = ("Y_deltarelT", "Y_RrelT", "Y_X")
+"""Relative factors of the root's strength, none where the file states their product; that is ``Y_rel``."""
+
+
+def _load_factors(rules: FlankRules, loads: MeshLoads, place: int) -> dict[str, float]:
+    """F_t, v and the K factors of one load."""
+    pair, force, sharing = rules.pair, float(loads.force[place]), float(loads.sharing[place])
+    velocity = float(loads.speed[place]) * pair.pinion.reference_radius
+    width, deviations = pair.face_width, rules.deviations()
+    stiffness = mesh_stiffness(pair, tangential_force=force, application_factor=rules.application_factor * sharing)
+    line_load = force * rules.application_factor * sharing / width
+    left = _run_in(rules, deviations, velocity)
+    dynamic = rules.stated_dynamic_factor
+    if left is not None and not pair.gear.internal:
+        dynamic = _dynamic(rules, stiffness, line_load, float(loads.speed[place]), left)
+    opening = float(loads.opening[place]) + (deviations.helix if deviations else 0.0)
+    taken = _mean(rules, lambda kind, limit: helix_running_in(opening, kind, limit, velocity))
+    face = face_load_factor(
+        line_load * dynamic, stiffness.mesh_stiffness_for_load_distribution, max(opening - taken, 0.0)
+    )
+    across = math.nan, math.nan
+    if deviations is not None and left is not None:
+        pitch = max(deviations.base_pitch, deviations.profile_form)
+        remaining = pitch - (deviations.base_pitch - left.base_pitch)
+        across = transverse_load_factors(
+            pair, line_load * dynamic * face, stiffness.mesh_stiffness, remaining, contact_ratio_factor(pair)
+        )
+    return {
+        "F_t": force,
+        "v": velocity,
+        "K_A": rules.application_factor,
+        "K_gamma": sharing,
+        "K_v": dynamic,
+        "F_betax": opening,
+        "K_Hbeta": face,
+        "K_Halpha": across[0],
+        "K_Fbeta": float(root_face_load_factor(np.array(face), pair)),
+        "K_Falpha": across[1],
+        "c'": stiffness.single_stiffness,
+        "c_gammaalpha": stiffness.mesh_stiffness,
+    }
+
+
+def _dynamic(
+    rules: FlankRules, stiffness: MethodBStiffness, line_load: float, speed: float, left: FlankDeviations
+) -> float:
+    pair = rules.pair
+    relief = _running_in_relief(rules) if max(rules.classes or (FINE_CLASS + 1,)) <= FINE_CLASS else None
+    ratio = resonance_ratio(pair, stiffness.mesh_stiffness, speed, rules.meshes)
+    return dynamic_factor(ratio, pair.total_contact_ratio, stiffness.single_stiffness, line_load, left, relief)
+
+
+def _running_in_relief(rules: FlankRules) -> float:
+    """C_ay that running in gives tips, m; designed relief is not looked at (ISO 6336-1:2006, 6.5.4)."""
+    limits = [one.sigma_H_lim_MPa for one in rules.strengths if one is not None]
+    return 1e-6 * sum(((limit / 97.0 - 18.45) ** 2 / 18.0 + 1.5) / len(limits) for limit in limits)
+
+
+def _run_in(rules: FlankRules, deviations: FlankDeviations | None, velocity: float) -> FlankDeviations | None:
+    """Tell what running in leaves of deviations."""
+    if deviations is None:
+        return None
+
+    def left(deviation: float) -> float:
+        return deviation - _mean(rules, lambda kind, limit: pitch_running_in(deviation, kind, limit, velocity))
+
+    return FlankDeviations(left(deviations.base_pitch), left(deviations.profile_form))
+
+
+def _mean(rules: FlankRules, taken: Callable[[Hardening, float], float]) -> float:
+    """Mean of both gears of what running in takes; nothing without their strength."""
+    known = [one for one in rules.strengths if one is not None]
+    values = [taken(hardening_of(one), 1e6 * one.sigma_H_lim_MPa) for one in known]
+    return sum(values) / len(values) if values else 0.0
+
+
+def _stresses(rules: FlankRules, of: dict[str, float]) -> dict[str, float]:
+    """Nominal and acting stresses of one load with its Z and Y factors; K_Halpha and K_Falpha that are none count 1."""
+    pair, member = rules.pair, rules.member
+    strength = rules.strength
+    root = root_stress_factors(pair, member, strength.tolerance_class if strength else None, rules.free_bore)
+    single = single_contact_factors(pair)[member]
+    common = of["K_A"] * of["K_gamma"] * of["K_v"]
+    nominal = nominal_contact_stress(pair, of["F_t"])
+    nominal_root = of["F_t"] / (pair.face_width * pair.pinion.normal_module) * root.product
+    across, across_root = (1.0 if math.isnan(of[name]) else of[name] for name in ("K_Halpha", "K_Falpha"))
+    return {
+        "Z_H": zone_factor(pair),
+        "Z_E": elasticity_factor(pair),
+        "Z_eps": contact_ratio_factor(pair),
+        "Z_beta": helix_factor(pair.pinion),
+        "Z_BD": single,
+        "Z_W": 1.0,
+        "Z_X": 1.0,
+        "Y_F": root.form,
+        "Y_S": root.stress_correction,
+        "Y_beta": root.helix,
+        "Y_B": root.rim,
+        "Y_DT": root.deep_tooth,
+        "sigma_H0": nominal,
+        "sigma_H": single * nominal * math.sqrt(common * of["K_Hbeta"] * across),
+        "sigma_F0": nominal_root,
+        "sigma_F": nominal_root * common * of["K_Fbeta"] * across_root,
+    }
+
+
+def _contact_influences(rules: FlankRules, velocity: float) -> tuple[float, float, float]:
+    """Z_L, Z_v and Z_R of the softer gear at a pitch line velocity; NaN without strengths."""
+    known = [one for one in rules.strengths if one is not None]
+    if not known:
+        return math.nan, math.nan, math.nan
+    softer = 1e6 * min(one.sigma_H_lim_MPa for one in known)
+    roughness = sum(roughness_of(one) for one in known) / len(known)
+    return (
+        lubricant_factor(softer, rules.viscosity),
+        velocity_factor(softer, velocity),
+        roughness_factor(softer, roughness, reduced_radius(rules.pair)),
+    )

@@ -1,0 +1,149 @@
+"""Channels of a run-up beside the overall transmission error: forces of bearings and joints, forces of meshes.
+
+Of the copies of a planet set one stands for all: the one whose force swings most.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exugear.report.findings.words import Words
+from exugear.results.run_file import read_run
+from exugear.results.spectra.orders import OrderLine
+from exugear.results.spectra.run_spectra import VariantRun
+from exugear.results.spectra.waterfall import Waterfall, waterfall
+from fe_ste.tools.arrays import Floats
+
+OVERLAP = 0.5
+"""Share of a window that the next one repeats: enough for what is drawn coarser than the transmission error."""
+SAMPLED = 8
+"""Every which sample tells how much a force swings."""
+MEAN_PART = slice(1, 2)
+"""Third of the run whose mean force is told: neither the start nor the fastest."""
+
+_Signals = Mapping[str, NDArray[Any]]
+"""Variables of a run by their names."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A signal of a run-up with its waterfall.
+
+    Attributes
+    ----------
+    name : str
+        Of the bearing, joint or mesh.
+    kind : {"support", "mesh"}
+    words : str
+        What it is.
+    copies : int
+        How many equal parts it stands for.
+    mean : float
+        Mean force over the middle third of the run, N; of bearings that go round with a carrier, of its magnitude.
+    axial : float
+        Mean axial force of a bearing there, N; NaN for a mesh.
+    spectra : Waterfall
+        Of a support the root of the summed squares of both transverse forces.
+    """
+
+    name: str
+    kind: str
+    words: str
+    copies: int
+    mean: float
+    axial: float
+    spectra: Waterfall
+
+
+@dataclass(frozen=True)
+class LoudestOrder:
+    """Where a channel is loudest along the orders.
+
+    Attributes
+    ----------
+    line : OrderLine
+    amplitude : float
+        In the unit of the channel.
+    speed, frequency : float
+        rad/s, Hz.
+    """
+
+    line: OrderLine
+    amplitude: float
+    speed: float
+    frequency: float
+
+
+def channels_of(run: VariantRun, words: Words) -> Iterator[Channel]:
+    """Compute the channels of a run-up, bearings and joints first."""
+    data, _ = read_run(run.path, ("time", "input_speed", "support", "mesh", "mesh_force", "support_force"))
+    yield from _supports(data, run, words)
+    yield from _meshes(data, run, words)
+
+
+def _supports(data: _Signals, run: VariantRun, words: Words) -> Iterator[Channel]:
+    force, names = data["support_force"], [str(name) for name in data["support"]]
+    sample = force[::SAMPLED]
+    swings = np.hypot(sample[..., 0], sample[..., 1]).std(axis=0)
+    for place, copies in _standing_for(names, swings, words):
+        own = np.ascontiguousarray(force[:, place].T)
+        parts = [_waterfall(own[axis], data, run) for axis in (0, 1)]
+        whole = replace(parts[0], amplitude=np.hypot(parts[0].amplitude, parts[1].amplitude))
+        middle = _middle(own.T.astype(np.float64))
+        # The force of a bearing that goes round has no mean in axes that stand still.
+        mean = max(math.hypot(*middle[:, :2].mean(axis=0)), 0.0)
+        if copies > 1:
+            mean = float(np.hypot(middle[:, 0], middle[:, 1]).mean())
+        told = words.of(words.family(names[place])) if copies > 1 else words.of(names[place])
+        yield Channel(names[place], "support", told, copies, mean, float(middle[:, 2].mean()), whole)
+
+
+def _meshes(data: _Signals, run: VariantRun, words: Words) -> Iterator[Channel]:
+    force, names = data["mesh_force"], [str(name) for name in data["mesh"]]
+    for place, copies in _standing_for(names, force[::SAMPLED].std(axis=0), words):
+        own = np.ascontiguousarray(force[:, place])
+        told = words.of(words.family(names[place])) if copies > 1 else words.of(names[place])
+        mean = float(_middle(own).mean(dtype=np.float64))
+        yield Channel(names[place], "mesh", f"mesh {told}", copies, mean, math.nan, _waterfall(own, data, run))
+
+
+def _standing_for(names: Sequence[str], swings: Floats, words: Words) -> list[tuple[int, int]]:
+    """Place of the channel that stands for each family, and how many there are."""
+    families: dict[str, list[int]] = {}
+    for place, name in enumerate(names):
+        families.setdefault(words.family(name), []).append(place)
+    return [(max(places, key=lambda place: float(swings[place])), len(places)) for places in families.values()]
+
+
+def _middle(values: Floats) -> Floats:
+    third = len(values) // 3
+    return values[MEAN_PART.start * third : MEAN_PART.stop * third] if third else values
+
+
+def _waterfall(values: Floats, data: _Signals, run: VariantRun) -> Waterfall:
+    time, speed = data["time"], data["input_speed"]
+    rate = (time.size - 1) / float(np.ptp(time))
+    return waterfall(
+        values, speed, rate, window_length=run.spectra.window_length, overlap=OVERLAP, reference=1.0, unit="N"
+    )
+
+
+def loudest_order(spectra: Waterfall, lines: Sequence[OrderLine]) -> LoudestOrder | None:
+    """Find where a waterfall is loudest along its orders; None where no order lies in its band."""
+    levels = np.array([spectra.along(line) for line in lines]).reshape(len(lines), spectra.time.size)
+    if not np.isfinite(levels).any():
+        return None
+    line, frame = divmod(int(np.nanargmax(levels)), levels.shape[1])
+    speed = float(spectra.speed[frame])
+    return LoudestOrder(
+        lines[line],
+        spectra.reference * 10.0 ** (float(levels[line, frame]) / 20.0),
+        speed,
+        float(lines[line].frequency(speed)),
+    )

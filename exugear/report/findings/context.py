@@ -1,0 +1,112 @@
+"""What all that is told of results stands on: the case of the folder, its models, and notes for the top of a page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from exugear.bodies.elastic_body import ElasticBody
+from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies
+from exugear.dynamics.assemble import assemble
+from exugear.dynamics.assembly import Assembly
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.results.folder import bodies_folder
+from exugear.tooth_mesh.law import MeshCurve
+from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+from fe_ste.tools.arrays import Floats
+from fe_ste.transmission_error.surface import SteSurface
+
+REFERENCE_VARIANT = "rigid"
+"""Variant that others are compared with."""
+VISIBLE_SHARE = 0.01
+"""Least share of the overall transmission error's mobility for a mode to be called seen by it."""
+
+
+def choice_of(attributes: Mapping[str, Any]) -> Choice:
+    """Choice that a run or modes were computed of, from the attributes of the file; its load case is left out."""
+    return Choice(*(str(attributes[key]) for key in ("variant", "mesh_law", "inertias")))
+
+
+def words_of(choice: Choice) -> str:
+    """Return a choice for headings."""
+    return f"{choice.variant}, law {choice.mesh_law}, inertias {choice.inertias}"
+
+
+def file_part(choice: Choice) -> str:
+    """Return a choice for names of files."""
+    return f"{choice.variant}-{choice.mesh_law}-{choice.inertias}"
+
+
+@dataclass(frozen=True)
+class Notes:
+    """What is told at the top of the page; each list in the order in which it was noted.
+
+    Attributes
+    ----------
+    statements : list of str
+        What the page says in short.
+    distrusted : list of str
+        Runs that are not to be trusted, with the reason.
+    left_out : list of str
+        Files that do not belong to the case, and what could not be computed, with the reason.
+    """
+
+    statements: list[str] = field(default_factory=list)
+    distrusted: list[str] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Context:
+    """What the sections of one report share.
+
+    Attributes
+    ----------
+    folder : Path
+        The results folder.
+    gearbox : Gearbox
+        The case that is kept in it.
+    target : float or None
+        Frequency (Hz) that modes are looked for at.
+    tell : callable
+        Called with what is being done.
+    notes : Notes
+    assemblies : dict of Choice to Assembly
+        Choices assembled so far.
+    stiffnesses : dict of law to mesh stiffness
+        Mesh stiffness read so far.
+    """
+
+    folder: Path
+    gearbox: Gearbox
+    target: float | None
+    tell: Callable[[str], None]
+    notes: Notes = field(default_factory=Notes)
+    assemblies: dict[Choice, Assembly] = field(default_factory=dict)
+    stiffnesses: dict[str, dict[str, Floats | MeshCurve | SteSurface]] = field(default_factory=dict)
+
+    def stiffness(self, law: str) -> dict[str, Floats | MeshCurve | SteSurface]:
+        """Mesh stiffness of a law from the tables of the folder, read once."""
+        if law not in self.stiffnesses:
+            self.stiffnesses[law] = mesh_stiffness(self.gearbox, law, self.folder)
+        return self.stiffnesses[law]
+
+    def assembled(self, choice: Choice) -> Assembly:
+        """Equations of a choice, with the tables of the folder, assembled once."""
+        if choice not in self.assemblies:
+            bodies = self.bodies_of(choice)(self.gearbox)
+            self.assemblies[choice] = assemble(self.gearbox, choice, self.stiffness(choice.mesh_law), bodies)
+        return self.assemblies[choice]
+
+    def bodies_of(self, choice: Choice) -> Callable[[Gearbox], dict[str, ElasticBody]]:
+        """Reduced elastic bodies of a gearbox, varied or not, as a choice has them."""
+        if choice.variant != "flexible":
+            return lambda gearbox: {}
+        return lambda gearbox: reduced_bodies(gearbox, choice.inertia_set(gearbox), bodies_folder(self.folder))
+
+    def name_of(self, path: Path) -> Path:
+        """Path of a file as seen from the results folder."""
+        return path.relative_to(self.folder)

@@ -1,0 +1,298 @@
+"""Three facts in plain words: where it rings loudest, what compliance does, and what would move it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import xarray as xr
+
+from exugear.gearbox.parts import RPM
+from exugear.report.findings.context import REFERENCE_VARIANT, Context, choice_of
+from exugear.report.findings.groups import RankedResonance, RunGroup
+from exugear.report.findings.levers import Lever, levers_of
+from exugear.report.findings.loudness.ranking import Loudness, Ranking
+from exugear.report.findings.variations import GAIN, BestChange, ModelVariations, best_change
+from exugear.report.findings.words import VARIANTS, Words, figure_text
+from exugear.results.spectra.orders import order_lines
+from exugear.steady.peaks import peaks
+
+DAMPING = "mesh damping"
+"""Begin of the label of the parameter that damps."""
+SAME_MODE = 0.01
+"""Share of the frequency within which resonances belong to one mode."""
+NO_GAIN = 0.1
+"""Gain (dB) below which a change makes no difference."""
+AROUND_RATED = 1.25
+"""Speed up to which a resonance counts as one of the rated speed, over that speed."""
+
+LOUDER = 1.0
+"""dB by which a resonance that the run-up does not show is louder than those that it shows, to be told first."""
+
+
+@dataclass(frozen=True)
+class Fact:
+    """A fact for a card of the page and a line of the command line.
+
+    Attributes
+    ----------
+    kind : str
+        What it is about.
+    figure, beside : str
+        The figure in large letters, and what stands beside it.
+    sentence : str
+        The rest.
+    link : str
+        Section of the page that has more.
+    """
+
+    kind: str
+    figure: str
+    beside: str
+    sentence: str
+    link: str
+
+    @property
+    def line(self) -> str:
+        """The whole fact as one line."""
+        return f"{self.kind}: {self.figure} {self.beside}. {self.sentence}"
+
+
+def amplitude_text(level: float) -> str:
+    """Amplitude of the overall transmission error at a level (dB re 1 µm), with its sign and unit.
+
+    Examples
+    --------
+    >>> amplitude_text(35.9)
+    '±62 µm'
+    """
+    return f"±{figure_text(10.0 ** (level / 20.0), 2)} µm"
+
+
+def speed_text(peak_speed: float) -> str:
+    """Speed of the overall input (rad/s) in rpm."""
+    return f"{figure_text(abs(peak_speed) / RPM, 4)} rpm"
+
+
+def frequency_text(frequency: float) -> str:
+    """Frequency in Hz."""
+    return f"{frequency:.0f} Hz"
+
+
+def facts_of(
+    context: Context, words: Words, group: RunGroup, variations: Sequence[ModelVariations]
+) -> tuple[Fact, ...]:
+    """Tell the facts of a group of run-ups; those that it has nothing for are left out."""
+    facts = [_loudest(context, words, group), _compliance(group), _lever(words, group, variations)]
+    return tuple(fact for fact in facts if fact is not None)
+
+
+def facts_of_response(words: Words, response: xr.Dataset) -> tuple[Fact, ...]:
+    """Tell the fact of a steady response that no run-up of its choice stands beside.
+
+    Parameters
+    ----------
+    words : Words
+    response : Dataset
+        As `exugear.steady.steady_file.load_response` reads it.
+    """
+    top = next(iter(peaks(response)), None)
+    if top is None:
+        return ()
+    level = 20.0 * math.log10(top.amplitude / 1e-6)
+    said = (
+        f"Excited by {words.told(top.line)}. The overall transmission error swings by {amplitude_text(level)} "
+        f"({figure_text(level)} dB) at constant speed."
+    )
+    beside = f"at {speed_text(top.speed)}, {VARIANTS[choice_of(response.attrs).variant]}"
+    return (Fact("Loudest resonance", frequency_text(top.frequency), beside, said, "steady"),)
+
+
+def _loudest(context: Context, words: Words, group: RunGroup) -> Fact | None:
+    if group.in_operation is not None:
+        return _in_operation(words, group, group.in_operation)
+    top = group.loudest
+    if top is None:
+        highest = max(float(run.spectra.speed.max()) for run in group.runs.values())
+        with_all = "" if group.responses else " with every window"
+        said = f"No resonance stands out up to {speed_text(highest)}{with_all}."
+        return Fact("Loudest resonance", "none", "that stands out", said, "ranking")
+    unseen = _unseen(context, words, group, top)
+    if unseen is not None:
+        return unseen
+    said = (
+        f"Excited by {words.line_sentence(top.peak.line)}. The overall transmission error swings by "
+        f"{amplitude_text(top.loudness)} ({figure_text(top.loudness)} dB){_how(group, top)}{_moves(words, group, top)}."
+        f"{_against_rated(context, group)}"
+    )
+    beside = f"at {speed_text(top.speed)}, {VARIANTS[group.main]}"
+    return Fact("Loudest resonance", frequency_text(top.frequency), beside, said, "rings")
+
+
+def _moves(words: Words, group: RunGroup, own: RankedResonance) -> str:
+    """Tell what moves in the mode of a resonance, after a colon; nothing where none is known."""
+    modes = group.runs[group.main].modes
+    if own.finding.mode is not None and modes is not None:
+        return f": {words.moves(modes, own.finding.mode)}"
+    return f": {words.told(own.finding.mode_name)}" if own.finding.mode_name else ""
+
+
+def _in_operation(words: Words, group: RunGroup, ranking: Ranking) -> Fact:
+    """Tell the resonance that comes first by any of three quantities at constant speed, where the gearbox works."""
+    low, high = (speed_text(speed) for speed in ranking.speeds)
+    where = f"from {low} to {high}" + ("" if ranking.whole else ", the speeds of operation")
+    if not ranking.resonances:
+        return Fact("Loudest resonance", "none", "that stands out", f"No peak stands out {where}.", "ranking")
+    top = ranking.resonances[0]
+    parts = [quantity_text(words, name, own, ranking) for name, own in top.loudness.items()]
+    near = (own for own in group.ranked[group.main] if abs(own.frequency / top.frequency - 1.0) < SAME_MODE)
+    moves = next((told for told in (_moves(words, group, own) for own in near) if told), "")
+    mode = f" What moves{moves}." if moves else ""
+    said = f"Excited by {words.told(top.line)}. At constant speed, {where}: {'; '.join(parts)}.{mode}"
+    beside = f"at {speed_text(top.speed)}, {VARIANTS[group.main]}"
+    return Fact("Loudest resonance", frequency_text(top.frequency), beside, said, "ranking")
+
+
+def quantity_text(words: Words, name: str, own: Loudness, ranking: Ranking) -> str:
+    """Amplitude of a resonance in one of the three quantities, with its place and where it is largest."""
+    count = sum(other.loudness[name].place is not None for other in ranking.resonances)
+    place = "no peak of its own" if own.place is None else f"place {own.place} of {count}"
+    if name == "error":
+        return f"the overall transmission error swings by ±{figure_text(1e6 * own.amplitude)} µm ({place})"
+    at = words.of(own.at)
+    if name == "force":
+        return f"the largest bearing force by ±{figure_text(1e-3 * own.amplitude)} kN, {at} ({place})"
+    return f"the {ranking.accelerates} accelerate at bearings by ±{figure_text(own.amplitude)} m/s², {at} ({place})"
+
+
+def _unseen(context: Context, words: Words, group: RunGroup, top: RankedResonance) -> Fact | None:
+    """Tell of a resonance that is louder at constant speed than all that the run-up tells apart, if there is one."""
+    levels = group.constant.get(group.main)
+    found = None if levels is None else levels.highest(order_lines(context.gearbox))
+    if found is None or found[1].level < top.loudness + LOUDER:
+        return None
+    line, at = found
+    said = (
+        f"Excited by {words.line_sentence(line)}. The overall transmission error swings by {amplitude_text(at.level)} "
+        f"({figure_text(at.level)} dB) at constant speed. The run-up is too fast to tell it from what is near: the "
+        f"loudest there is {frequency_text(top.finding.resonance.frequency)} with {amplitude_text(top.peak.level)}."
+    )
+    beside = f"at {speed_text(at.speed)}, {VARIANTS[group.main]}"
+    return Fact("Loudest resonance", frequency_text(at.frequency), beside, said, "steady")
+
+
+def _how(group: RunGroup, own: RankedResonance) -> str:
+    """Tell what a level was read from, unless it is a run-up alone."""
+    if group.responses:
+        return " at constant speed"
+    if own.constant is None:
+        return ""
+    return f" at constant speed, {amplitude_text(own.peak.level)} in the run-up"
+
+
+def _against_rated(context: Context, group: RunGroup) -> str:
+    rated = context.gearbox.case.operation.rated_speed_rpm
+    if rated is None or group.loudest is None:
+        return ""
+    times = abs(group.loudest.speed) / RPM / rated
+    if times <= AROUND_RATED:
+        return f" That is {figure_text(times, 2)} times the rated speed."
+    near = next((own for own in group.ranked[group.main] if own.steady and _is_near_rated(own, rated)), None)
+    said = "nothing stands out"
+    if near is not None:
+        frequency = frequency_text(near.frequency)
+        level = amplitude_text(near.loudness)
+        said = f"the loudest is {frequency} at {speed_text(near.speed)} with {level}"
+    return (
+        f" That is {figure_text(times, 2)} times the rated speed; up to {100.0 * (AROUND_RATED - 1.0):.0f} % over "
+        f"rated {said}."
+    )
+
+
+def _is_near_rated(own: RankedResonance, rated: float) -> bool:
+    return own.speed / RPM <= AROUND_RATED * rated
+
+
+def _compliance(group: RunGroup) -> Fact | None:
+    """Tell what compliance does, against the stiff reference."""
+    reference, top = group.ranked.get(REFERENCE_VARIANT), group.loudest
+    if reference is None or group.main == REFERENCE_VARIANT:
+        return None
+    stiff = next((own for own in reference if own.steady), None)
+    if stiff is None or top is None:
+        return None
+    change = top.peak.level - stiff.peak.level
+    fresh = sum(own.steady and REFERENCE_VARIANT in own.lacking for own in group.ranked[group.main])
+    gone = sum(own.steady and group.main in own.lacking for own in reference)
+    counted = "" if group.responses else " Counted are those that windows of five lengths show."
+    said = (
+        f"On ideal joints the loudest is {frequency_text(stiff.finding.resonance.frequency)} at "
+        f"{speed_text(stiff.peak.speed)} with {amplitude_text(stiff.peak.level)}. {VARIANTS[group.main].capitalize()} "
+        f"{_resonances(fresh)} that the rigid model lacks, and {gone} of its own disappear.{counted}"
+    )
+    sign = "−" if change < 0.0 else "+"
+    kind = "What elastic bodies do" if group.main == "flexible" else "What the bearings do"
+    return Fact(kind, f"{sign}{figure_text(abs(change), 2)} dB", "at the loudest peak", said, "ranking")
+
+
+def _resonances(count: int) -> str:
+    return f"{count} resonance appears" if count == 1 else f"{count} resonances appear"
+
+
+def _lever(words: Words, group: RunGroup, variations: Sequence[ModelVariations]) -> Fact | None:
+    """Tell what moves the loudest resonance, and whether any change makes it quieter."""
+    top, modes = group.loudest, group.runs[group.main].modes
+    if top is None or modes is None or top.finding.mode is None:
+        return None
+    levers = levers_of(words, modes, top.finding.mode)
+    stiffest = next((lever for lever in levers if lever.kind == "stiffness"), None)
+    heaviest = next((lever for lever in levers if lever.kind == "inertia"), None)
+    if stiffest is None:
+        return None
+    said = f"It holds {100.0 * stiffest.share:.0f} % of the strain energy of the loudest mode."
+    if heaviest is not None:
+        said += f" 10 % more inertia of {heaviest.what}: {shift_text(heaviest)}."
+    said += _quieter(words, group, modes, top.finding.mode, variations)
+    return Fact("What moves it", shift_text(stiffest), f"for 10 % more stiffness of {stiffest.what}", said, "change")
+
+
+def shift_text(lever: Lever) -> str:
+    """Shift of a lever with its sign and unit.
+
+    Examples
+    --------
+    >>> shift_text(Lever("carrier", "inertia", 0.4, -13.8))
+    '−14 Hz'
+    """
+    sign = "−" if lever.shift < 0.0 else "+"
+    return f"{sign}{figure_text(abs(lever.shift), 2)} Hz"
+
+
+def _quieter(words: Words, group: RunGroup, modes: xr.Dataset, mode: int, variations: Sequence[ModelVariations]) -> str:
+    own = next((one.variations for one in variations if one.choice == group.choice(group.main)), ())
+    if not own:
+        return ""
+    frequency = float(modes["frequency"][mode])
+    changes = [best_change(variation, frequency) for variation in own]
+    # More damping always helps; whether anything else does is the question.
+    others = [change for change in changes if not change.label.startswith(DAMPING)]
+    said = f" {best_words(words, max(others, key=lambda change: change.gain))}" if others else ""
+    damping = [change for change in changes if change.label.startswith(DAMPING) and change.gain > 0.0]
+    return said + "".join(
+        f" With {words.change(change.label, change.value, change.default)}: −{figure_text(change.gain, 2)} dB."
+        for change in damping
+    )
+
+
+def best_words(words: Words, best: BestChange) -> str:
+    """Say whether the best change of a parameter is worth it."""
+    change = words.change(best.label, best.value, best.default)
+    if best.gain < NO_GAIN:
+        return "Makes no difference to what lies within an octave of it."
+    if best.gain < GAIN:
+        return (
+            f"Nothing that was varied makes what lies within an octave of it {GAIN:g} dB quieter: where the mode "
+            f"fades, another takes over. The most, {figure_text(best.gain, 2)} dB, comes by {change}."
+        )
+    return f"What lies within an octave of it becomes {figure_text(best.gain, 2)} dB quieter by {change}."

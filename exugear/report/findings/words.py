@@ -1,0 +1,218 @@
+"""Words for the names of a case: labels of its file, orders, what moves in a mode and what gives."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from functools import cached_property
+
+import numpy as np
+import xarray as xr
+
+from exugear.gearbox.gearbox import Gearbox
+from exugear.results.spectra.mode_report import element_words
+from exugear.results.spectra.orders import OrderLine
+
+MOTIONS = {
+    "spin": ("rotates", "rotate"),
+    "radial": ("moves sideways", "move sideways"),
+    "axial": ("moves axially", "move axially"),
+    "tilt": ("tilts", "tilt"),
+    "bending": ("bends", "bend"),
+    "twist": ("twists", "twist"),
+    "stretch": ("stretches", "stretch"),
+    "deformation": ("deforms", "deform"),
+}
+"""Motions of bodies as verbs, of one body and of several."""
+VARIANTS = {"rigid": "on ideal joints", "bushing": "on bearings", "flexible": "with elastic bodies"}
+"""Variants in words."""
+TOLD, LEAST_TOLD = 0.8, 0.1
+"""Share of the kinetic energy that is told of a mode, and the least share of what is told."""
+GIVES = 2
+"""Elements that are told to give way."""
+_COPY = re.compile(r"^(.*)_(\d+)$")
+_OF = re.compile(r"(?<= of )\w+")
+_NAME = re.compile(r"\w+(?:-\w+)*")
+
+
+class Words:
+    """Words for the names of one gearbox.
+
+    Examples
+    --------
+    >>> words = Words(Gearbox.from_toml("cases/grc750/gearbox.toml"))
+    >>> words.of("hss_bc"), words.of("pl_b_2"), words.of("planet_1"), words.of("im_gear")
+    ('high-speed bearing B/C', 'planet bearing B 2', 'planet 1', 'im gear')
+    """
+
+    def __init__(self, gearbox: Gearbox) -> None:
+        self._gearbox = gearbox
+        self._labels = gearbox.case.labels
+
+    def of(self, name: str) -> str:
+        """Words for a name: its label, or the name with spaces; copies of a planet set are numbered."""
+        if name in self._labels:
+            return self._labels[name]
+        copy = _COPY.match(name)
+        if copy and copy[1] in self._labels:
+            return f"{self._labels[copy[1]]} {copy[2]}"
+        return name.replace("_", " ")
+
+    def told(self, text: str) -> str:
+        """Text with words for all names of the case that stand in it, such as of a line or of what moves.
+
+        Examples
+        --------
+        >>> words = Words(Gearbox.from_toml("cases/grc750/gearbox.toml"))
+        >>> words.told("2 x high_speed"), words.told("lss axial 94 %; strained: lss_bc 99 %")
+        ('2 × high-speed', 'low-speed shaft axial 94 %; strained: low-speed bearing B/C 99 %')
+        """
+        named = _NAME.sub(lambda found: self.of(found[0]) if self.family(found[0]) in self._named else found[0], text)
+        return named.replace(" x ", " × ")
+
+    def parameter(self, label: str) -> str:
+        """Label of a parameter with words for the body that it is of."""
+        return _OF.sub(lambda found: self.told(found[0]), label)
+
+    def change(self, label: str, value: float, default: float) -> str:
+        """Say what a parameter is changed to, such as "mesh damping time 16 instead of 4 µs".
+
+        Examples
+        --------
+        >>> words = Words(Gearbox.from_toml("cases/grc750/gearbox.toml"))
+        >>> words.change("stiffness of planet bearings / default", 2.8, 1.0)
+        '2.8 times the stiffness of planet bearings'
+        >>> words.change("axial inertia of hss / kg m²", 0.05, 0.1)
+        'axial inertia of high-speed shaft 0.05 instead of 0.1 kg m²'
+        """
+        name, _, unit = self.parameter(label).partition(" / ")
+        if unit == "default":
+            return f"{figure_text(value)} times the {name}"
+        return f"{name} {figure_text(value)} instead of {figure_text(default)} {unit}".rstrip()
+
+    def family(self, name: str) -> str:
+        """Name that the copies of a planet set share."""
+        copy = _COPY.match(name)
+        return copy[1] if copy and copy[1] in self._copied else name
+
+    @cached_property
+    def _copied(self) -> set[str]:
+        case = self._gearbox.case
+        single = {mesh.name for mesh in self._gearbox.meshes} | set(self._gearbox.named_bodies)
+        tables = (case.bodies, case.bearings, case.joints, case.meshes, case.couplings)
+        return {name for table in tables for name in table if f"{name}_1" not in table and name not in single}
+
+    @cached_property
+    def _named(self) -> set[str]:
+        case = self._gearbox.case
+        return {*self.labels, *case.labels, *case.couplings, *case.joints}
+
+    @cached_property
+    def _meshes(self) -> set[str]:
+        return {mesh.name for mesh in self._gearbox.meshes}
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """Words by name of all that pages draw or list."""
+        case = self._gearbox.case
+        tables = (self._gearbox.named_bodies, case.gears, case.pairs, case.bodies, case.bearings, case.meshes)
+        return {name: self.of(name) for table in tables for name in table}
+
+    @cached_property
+    def _families(self) -> dict[float, list[str]]:
+        """Families of meshes by their order."""
+        orders = self._gearbox.train.mesh_frequencies(2.0 * np.pi)
+        families: dict[float, list[str]] = {}
+        for mesh in self._gearbox.meshes:
+            key = next((o for o in families if abs(o - orders[mesh.name]) < 1e-6 * o), orders[mesh.name])
+            if mesh.family not in families.setdefault(key, []):
+                families[key].append(mesh.family)
+        return families
+
+    def line(self, line: OrderLine) -> str:
+        """Order in short: its harmonic and the mesh."""
+        harmonic, mesh = self._split(line)
+        return mesh if harmonic == 1 else f"{harmonic} × {mesh}"
+
+    def line_sentence(self, line: OrderLine) -> str:
+        """Order in a sentence, such as "the 2nd harmonic of the mesh high-speed"."""
+        harmonic, mesh = self._split(line)
+        ordinal = {1: "mesh frequency", 2: "2nd harmonic", 3: "3rd harmonic"}.get(harmonic, f"{harmonic}th harmonic")
+        return f"the {ordinal} of the mesh {mesh}"
+
+    def _split(self, line: OrderLine) -> tuple[int, str]:
+        number, _, family = line.name.rpartition(" × ")
+        harmonic = int(number) if number else 1
+        order = line.order / harmonic
+        meshes = next((f for o, f in self._families.items() if abs(o - order) < 1e-6 * order), [family])
+        return harmonic, " and ".join(self.of(one) for one in meshes)
+
+    def moves(self, modes: xr.Dataset, index: int) -> str:
+        """Say what moves in a mode, until most of its kinetic energy is told."""
+        kinetic = modes["kinetic_energy_share"].isel(mode=index).to_numpy()
+        carried = {body.name for body in self._gearbox.bodies() if body.carrier}
+        shares: dict[tuple[str, str], float] = {}
+        for body, of_body in zip(modes["body"].to_numpy(), kinetic, strict=True):
+            name = "planets" if str(body) in carried else self.of(str(body))
+            for motion, share in zip(modes["motion"].to_numpy(), of_body, strict=True):
+                shares[name, str(motion)] = shares.get((name, str(motion)), 0.0) + float(share)
+        told = 0.0
+        verbs: dict[str, list[str]] = {}
+        for (name, motion), share in sorted(shares.items(), key=lambda item: -item[1]):
+            if verbs and (told >= TOLD or share < LEAST_TOLD):
+                break
+            verbs.setdefault(name, []).append(MOTIONS[motion][name == "planets"])
+            told += share
+        return joined(f"{name} {joined(own)}" for name, own in verbs.items())
+
+    def gives(self, modes: xr.Dataset, index: int) -> dict[str, float]:
+        """Shares of strain energy by what gives way, copies of a planet set together, the largest first."""
+        shares = modes["strain_energy_share"].isel(mode=index).to_numpy()
+        return self.gathered(dict(zip(element_words(modes), map(float, shares), strict=True)))
+
+    def gathered(self, shares: Mapping[str, float]) -> dict[str, float]:
+        """Shares by words, copies of a planet set together, the largest first."""
+        gathered: dict[str, float] = {}
+        for name, share in shares.items():
+            itself = name.removesuffix(" itself")
+            mesh = "mesh " if itself in self._meshes else ""
+            words = mesh + self.of(self.family(itself)) + (" itself" if itself != name else "")
+            gathered[words] = gathered.get(words, 0.0) + share
+        return dict(sorted(gathered.items(), key=lambda item: -item[1]))
+
+
+def percentages(shares: Mapping[str, float], most: int = GIVES, least: float = 0.01) -> str:
+    """Largest shares in words.
+
+    Examples
+    --------
+    >>> percentages({"mesh": 0.704, "bearing A": 0.2, "bearing B": 0.096})
+    'mesh 70 %, bearing A 20 %'
+    """
+    shown = sorted(shares.items(), key=lambda item: -item[1])[:most]
+    return ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in shown if share >= least)
+
+
+def joined(parts: Iterable[str]) -> str:
+    """Join parts of a sentence.
+
+    Examples
+    --------
+    >>> joined(["a", "b", "c"])
+    'a, b and c'
+    """
+    *first, last = parts
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def figure_text(value: float, digits: int = 3) -> str:
+    """Write a number to significant digits, without exponents where people need none.
+
+    Examples
+    --------
+    >>> figure_text(205.87, 4), figure_text(62.3, 2), figure_text(1234.0), figure_text(-0.0004)
+    ('205.9', '62', '1234', '-0.0004')
+    """
+    if value and abs(value) >= 10.0 ** (digits - 1):
+        return f"{value:.0f}" if abs(value) < 1e7 else f"{value:.{digits - 1}e}"
+    return f"{value:.{digits}g}"

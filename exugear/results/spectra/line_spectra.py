@@ -1,0 +1,173 @@
+"""Line spectra over speed: what a steady response is made of, drawn and read as the waterfall of a run-up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.signal
+from numpy.typing import NDArray
+
+from exugear.results.spectra.orders import OrderLine
+from exugear.results.spectra.resonances import Pick
+from exugear.results.spectra.waterfall import Waterfall
+from fe_ste.tools.arrays import Floats
+
+SAME_ORDER = 1e-6
+"""Share by which orders of one line may differ."""
+FRAMES, ROWS = 880, 1536
+"""Least number of speeds, and number of frequencies, of the picture."""
+THICK = 2
+"""Rows to both sides of its own that a line is drawn over: fewer are lost on a small screen."""
+HALF_POWER = 3.0
+"""dB below a peak at which its width is told."""
+
+
+@dataclass(frozen=True)
+class LineSpectra(Waterfall):
+    """Lines at steady speeds, as a waterfall: `amplitude` is the picture, `line_level` the lines themselves.
+
+    Attributes
+    ----------
+    orders : (lines,) array
+        Periods per turn of the reference shaft.
+    line_level : (n, lines) array
+        Level at each speed, dB; NaN where no steady state is known.
+    """
+
+    orders: Floats
+    line_level: Floats
+
+    def along(self, line: OrderLine) -> Floats:
+        """Level (dB) of an order at each speed, shape (n,); NaN throughout if it is none of the lines."""
+        place = int(np.argmin(np.abs(self.orders - line.order)))
+        if abs(self.orders[place] - line.order) > SAME_ORDER * line.order:
+            return np.full(self.speed.size, np.nan)
+        return self.line_level[:, place]
+
+    def resolution(self, line: OrderLine) -> Floats:
+        """Distance of the speeds along an order, Hz, shape (n,)."""
+        return np.asarray(np.abs(np.gradient(line.frequency(self.speed))), dtype=np.float64)
+
+    @property
+    def description(self) -> str:
+        """Source and reference in words, for captions."""
+        return f"Lines at constant speeds, 0 dB = {self.reference_text}"
+
+
+def line_spectra(
+    speed: Floats,
+    orders: Floats,
+    amplitude: Floats,
+    highest: float,
+    *,
+    unknown: Iterable[float] = (),
+    reference: float = 1e-6,
+    unit: str = "m",
+) -> LineSpectra:
+    """Spectra over speed made of lines.
+
+    Parameters
+    ----------
+    speed : (n,) array
+        Of the reference shaft, rad/s, ascending, three or more.
+    orders : (lines,) array
+        Periods per turn of the reference shaft.
+    amplitude : (n, lines) array
+        Peak amplitudes in `unit`.
+    highest : float
+        Highest frequency of the picture, Hz.
+    unknown : iterable of float
+        Speeds at which no state is known: nothing is drawn from the speed before to the speed behind.
+    reference : float
+        Amplitude of 0 dB, in `unit`.
+    unit : str
+
+    Returns
+    -------
+    LineSpectra
+        At the given speeds and, between them, at so many more that lines are drawn without steps; there levels are
+        straight between their neighbours, so that no peak is made.
+
+    Examples
+    --------
+    >>> spectra = line_spectra(np.linspace(1, 10, 10), np.array([20.0]), np.full((10, 1), 2e-6), 40.0)
+    >>> level = spectra.along(OrderLine("mesh", 20.0))
+    >>> round(float(level.min()), 3), round(float(level.max()), 3)
+    (6.021, 6.021)
+    """
+    fine = np.union1d(speed, np.linspace(float(speed[0]), float(speed[-1]), FRAMES))
+    known = 20.0 * np.log10(np.maximum(amplitude / reference, 1e-10))
+    level = np.array([np.interp(fine, speed, own) for own in known.T]).reshape(-1, fine.size).T
+    for place in unknown:
+        after = int(np.searchsorted(speed, abs(place)))
+        low, high = (speed[after - 1] if after else -np.inf), (speed[after] if after < speed.size else np.inf)
+        level[(fine > low) & (fine < high)] = np.nan
+    frequency = np.linspace(0.0, highest, ROWS)
+    picture = _picture(fine, orders, reference * 10.0 ** (level / 20.0), frequency)
+    time = np.full(fine.size, np.nan)
+    return LineSpectra(time, fine, frequency, picture, "none", 0.0, 0.0, reference, unit, orders, level)
+
+
+def _picture(speed: Floats, orders: Floats, amplitude: Floats, frequency: Floats) -> NDArray[Any]:
+    """Amplitudes over speeds and frequencies: each line over all rows that it passes on its way between speeds."""
+    middle = 0.5 * (speed[1:] + speed[:-1])
+    low, high = np.append(speed[0], middle), np.append(middle, speed[-1])
+    rows_per_hertz = (frequency.size - 1) / frequency[-1]
+    picture: NDArray[Any] = np.zeros((speed.size, frequency.size), dtype=np.float32)
+    drawn = np.nan_to_num(amplitude)
+    for line, order in enumerate(orders):
+        first = np.rint(order * low / (2.0 * np.pi) * rows_per_hertz).astype(np.int64) - THICK
+        last = np.rint(order * high / (2.0 * np.pi) * rows_per_hertz).astype(np.int64) + THICK
+        for step in range(int((last - first).max()) + 1):
+            row = first + step
+            at = np.flatnonzero((row <= last) & (row >= 0) & (row < frequency.size))
+            picture[at, row[at]] = np.maximum(picture[at, row[at]], drawn[at, line])
+    return picture
+
+
+def pick_line_peaks(
+    spectra: LineSpectra, lines: Sequence[OrderLine], *, prominence: float = 6.0, depth: float = 60.0
+) -> tuple[Pick, ...]:
+    """Find the peaks along order lines, as `exugear.results.spectra.resonances.pick_resonances` does in run-ups.
+
+    Parameters
+    ----------
+    spectra : LineSpectra
+    lines : sequence of OrderLine
+        Where to look.
+    prominence : float
+        Least height of a peak over the higher of the two valleys beside it, dB.
+    depth : float
+        Peaks so far below the highest level on any of the lines, dB, are left out.
+
+    Returns
+    -------
+    tuple of Pick
+        Each with half of its width at half power as its resolution: what lies nearer to it cannot be told apart.
+    """
+    picks = [pick for line in lines for pick in _line_peaks(spectra, line, prominence)]
+    known = [float(np.nanmax(level)) for level in map(spectra.along, lines) if np.isfinite(level).any()]
+    highest = max(known, default=0.0)
+    return tuple(pick for pick in picks if pick.level > highest - depth)
+
+
+def _line_peaks(spectra: LineSpectra, line: OrderLine, prominence: float) -> list[Pick]:
+    usable = np.flatnonzero(np.isfinite(spectra.along(line)))
+    if usable.size < 3:
+        return []
+    level, speed = spectra.along(line)[usable], spectra.speed[usable]
+    frequency = line.frequency(speed)
+    found, properties = scipy.signal.find_peaks(level, prominence=prominence)
+    picks = []
+    for peak, height in zip(found, properties["prominences"], strict=True):
+        quiet = np.flatnonzero(level < level[peak] - HALF_POWER)
+        # A prominent peak has quiet places on both sides.
+        left, right = quiet[quiet < peak][-1], quiet[quiet > peak][0]
+        width = 0.5 * float(frequency[right] - frequency[left])
+        picks.append(
+            Pick(line, np.nan, float(speed[peak]), float(frequency[peak]), float(level[peak]), float(height), width)
+        )
+    return picks

@@ -1,1 +1,0 @@
-"""Two solvers for one assembly: the compiled one, and Exudyn."""

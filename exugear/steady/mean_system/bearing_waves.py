@@ -1,0 +1,326 @@
+"""Bearings with rows of rolling elements in the rotating frame: what their law reads, and what it pushes along.
+
+A bearing's law reads five numbers, the displacement and tilts of the second body's seat against that of the first in
+the first one's axes, ahead by the time of the damping; five forces go with them. Bearings of equal planets are waves
+around the carrier, as their meshes are, each along the radius and the tangent of its planet: in these the law is the
+same for all of them, wherever the carrier stands.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from exugear.bearings.kernels.connectors import rolling_pushes, rolling_strains
+from exugear.bearings.kernels.rolling import RollingArrays, selected_rolling
+from exugear.bearings.support_laws import bearing_rows
+from exugear.dynamics.assembly import Assembly
+from exugear.steady.mean_system.mean_system import PLACE_STEP, PLACES, RATE_STEP, MeanSystem
+from exugear.steady.mean_system.mesh_places import MeshPlaces, wave_shapes
+from exugear.steady.mean_system.mesh_ports import POSITION, MeshPorts
+from exugear.steady.mean_system.mesh_waves import WAVES, MeshWaves, wave_name
+from exugear.steady.mean_system.rotating_frame import PlanetSet, SteadyError
+from exugear.steady.mean_system.sampled_bearings import sample_rolling
+from fe_ste.tools.arrays import Floats, Integers
+
+COMPONENTS = 5
+"""Readings and forces of a bearing: along x, y, z, and tilts about x and y; of planets' along radius and tangent."""
+TILTS = slice(3, 5)
+"""Tilts among them."""
+
+
+@dataclass(frozen=True, eq=False)
+class BearingWave:
+    """One wave of the bearings of a family, or a single bearing.
+
+    Attributes
+    ----------
+    name : str
+        Bearing or family, with the wave where there are several.
+    connectors : tuple of int
+        Supports of the family, in the order of their planets.
+    law : int
+        Place of its law in `BearingWaves.laws`.
+    wave : int
+        0 mean, 1 cosine, 2 sine, and on where planets mesh out of phase.
+    weight : float
+        What a unit of its force counts in generalized forces.
+    planets : PlanetSet or None
+    """
+
+    name: str
+    connectors: tuple[int, ...]
+    law: int
+    wave: int
+    weight: float
+    planets: PlanetSet | None
+
+
+class BearingMean(NamedTuple):
+    """Bearings in the mean system at one speed; b waves.
+
+    Attributes
+    ----------
+    readings, rates : (b, 5, size) arrays
+        Rows of what the laws read, by the frame's coordinates and by their rates.
+    static : (b, 5) array
+        Readings in the static state, m and rad.
+    pushes : (b, 5, size) array
+        Rows along which forces act: a unit is a generalized force of minus the row.
+    load : (b, 5) array
+        Forces in the static state, N and N m.
+    slope : (b, 5, b, 5) array
+        Derivatives of the forces by the readings there.
+    """
+
+    readings: Floats
+    rates: Floats
+    static: Floats
+    pushes: Floats
+    load: Floats
+    slope: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class BearingWaves:
+    """All waves of the non-linear bearings of a mean system.
+
+    Attributes
+    ----------
+    system : MeanSystem
+    waves : tuple of BearingWave
+        Those of a family one after the other.
+    carriers : tuple of str
+        Carriers whose angle is a base: their planets are looked at one by one.
+    """
+
+    system: MeanSystem
+    waves: tuple[BearingWave, ...]
+    carriers: tuple[str, ...]
+
+    @property
+    def assembly(self) -> Assembly:
+        """What was linearised."""
+        return self.system.frame.assembly
+
+    @cached_property
+    def weights(self) -> Floats:
+        """(b,) array."""
+        return np.array([wave.weight for wave in self.waves])
+
+    @cached_property
+    def firsts(self) -> tuple[int, ...]:
+        """Place of the mean wave of each law."""
+        return tuple(n for n, wave in enumerate(self.waves) if wave.wave == 0)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Name of each law: bearing, of planets' bearings the family."""
+        return tuple(self.waves[n].name for n in self.firsts)
+
+    @cached_property
+    def laws(self) -> RollingArrays:
+        """Law of each family, of planets along radius and tangent."""
+        own = [self.waves[n] for n in self.firsts]
+        laws = selected_rolling(self.assembly.connectors.rolling, np.array([wave.connectors[0] for wave in own]))
+        turned = np.array([0.0 if wave.planets is None else wave.planets.angles[0] for wave in own])
+        return laws._replace(phase=laws.phase - turned)
+
+    @cached_property
+    def radii(self) -> Floats:
+        """Half of the pitch diameter of each wave's bearing, (b,), m: what makes lengths of tilts."""
+        supports = self.assembly.supports
+        return np.array([0.5 * bearing_rows(supports[wave.connectors[0]])[0].pitch_diameter for wave in self.waves])
+
+    def at(self, speed: float) -> BearingMean:
+        """Find how the bearings stand in the mean system at a speed of the input, rad/s."""
+        frame, numbers = self.system.frame, self._numbers
+        q, v, _ = frame.state(0.0, speed, self.system.static_at(speed))
+        t, t1, _ = frame.matrices(0.0)
+        chosen = self.assembly.connectors.chosen(numbers)
+        ways, turn = np.eye(q.size), self._along_radii()
+
+        def slopes(step: float, by_place: float) -> Floats:
+            moved = [
+                rolling_strains(q + by_place * own, v + (1.0 - by_place) * own, chosen)
+                for own in (step * ways, -step * ways)
+            ]
+            return np.asarray(turn @ np.moveaxis((moved[0] - moved[1]) / (2.0 * step), 0, -1))
+
+        by_q, by_v = slopes(PLACE_STEP, 1.0), slopes(RATE_STEP, 0.0)
+        static = (turn @ rolling_strains(q, v, chosen)[..., None])[..., 0]
+        return BearingMean(
+            readings=self._waves_of(by_q @ t + speed * by_v @ t1),
+            rates=self._waves_of(by_v @ t),
+            static=self._waves_of(static),
+            pushes=self._waves_of(-(turn @ rolling_pushes(q, chosen)) @ t),
+            load=self._waves_of(self._static_loads(static)),
+            slope=self._mean_slope(self._waves_of(static)),
+        )
+
+    @cached_property
+    def _numbers(self) -> Integers:
+        """All bearings (c,), law by law."""
+        return np.concatenate([self.waves[n].connectors for n in self.firsts]).astype(np.int64)
+
+    def _along_radii(self) -> Floats:
+        """Matrices (c, 5, 5) from components along a bearing's axes to those along radius and tangent of its planet."""
+        sets = [self.waves[n].planets for n in self.firsts]
+        angles = [np.zeros(1) if planets is None else planets.angles for planets in sets]
+        turn = np.tile(np.eye(COMPONENTS), (len(self._numbers), 1, 1))
+        for own, angle in zip(turn, np.concatenate(angles), strict=True):
+            c, s = math.cos(angle), math.sin(angle)
+            own[:2, :2] = own[3:, 3:] = [[c, s], [-s, c]]
+        return turn
+
+    def _waves_of(self, values: Floats) -> Floats:
+        """Waves (b, ...) of values (c, ...) at zero angle of the input."""
+        out = np.empty((len(self.waves), *values.shape[1:]))
+        at = 0
+        for n in self.firsts:
+            count = len(self.waves[n].connectors)
+            shapes = self._shapes(n, np.zeros(1))[0]
+            back = (shapes / (shapes**2).sum(axis=0)).T
+            out[n : n + len(back)] = np.tensordot(back, values[at : at + count], axes=1)
+            at += count
+        return out
+
+    def _shapes(self, first: int, turned: Floats) -> Floats:
+        """Waves of the law whose mean is wave `first`, where its carrier has turned (s, bearings, waves)."""
+        planets, law = self.waves[first].planets, self.waves[first].law
+        if planets is None:
+            return np.ones((len(turned), 1, 1))
+        return planets.values(turned)[..., : sum(wave.law == law for wave in self.waves)]
+
+    def _static_loads(self, static: Floats) -> Floats:
+        """Find the forces (c, 5) at readings (c, 5) of the bearings."""
+        laws = [self.waves[n].law for n in self.firsts for _ in self.waves[n].connectors]
+        found = [sample_rolling(self.laws, law, own[None])[0] for law, own in zip(laws, static, strict=True)]
+        return np.concatenate(found)
+
+    def _mean_slope(self, static: Floats) -> Floats:
+        """Find the derivatives (b, 5, b, 5) of the forces of waves by readings, at those of the static state (b, 5).
+
+        As the mean system has them: the mean over the same places of the carrier.
+        """
+        out = np.zeros((len(self.waves), COMPONENTS) * 2)
+        for n in self.firsts:
+            planets, law = self.waves[n].planets, self.waves[n].law
+            turned = np.zeros(1) if planets is None else 2.0 * np.pi / planets.waves * np.arange(PLACES) / PLACES
+            shapes = self._shapes(n, turned)
+            own = slice(n, n + shapes.shape[-1])
+            back = shapes / (shapes**2).sum(axis=1, keepdims=True)
+            _, slope = sample_rolling(self.laws, law, (shapes @ static[own]).reshape(-1, COMPONENTS))
+            slope = slope.reshape(*shapes.shape[:2], COMPONENTS, COMPONENTS)
+            out[own, :, own] = np.einsum("snw,snfr,snv->wfvr", back, slope, shapes) / len(turned)
+        return out
+
+
+def bearing_waves(meshes: MeshWaves) -> BearingWaves | None:
+    """Waves of the bearings with rows of rolling elements, None where all bearings are linear.
+
+    Parameters
+    ----------
+    meshes : MeshWaves
+        Of the same gearbox: bearings of planets that mesh out of phase have all waves.
+
+    Raises
+    ------
+    SteadyError
+        Planets have different numbers of non-linear bearings.
+    """
+    assembly = meshes.assembly
+    rows = np.flatnonzero(np.diff(assembly.connectors.rolling.first))
+    if not rows.size:
+        return None
+    carriers = tuple(name for name, _ in meshes.carriers)
+    families: dict[str, list[int]] = {}
+    for n in rows:
+        support = assembly.supports[n]
+        carried = any(support.body in planets.names for planets in meshes.system.frame.sets)
+        families.setdefault(support.family if carried else support.name, []).append(int(n))
+    waves: list[BearingWave] = []
+    for law, (family, numbers) in enumerate(families.items()):
+        bodies = [assembly.supports[n].body for n in numbers]
+        planets = next((own for own in meshes.system.frame.sets if bodies[0] in own.names), None)
+        if planets is None:
+            waves.append(BearingWave(family, tuple(numbers), law, 0, 1.0, None))
+            continue
+        if sorted(bodies) != sorted(planets.names):
+            raise SteadyError(f"bearings.{family}: non-linear on some of the planets only, which makes them unequal")
+        ordered = tuple(numbers[bodies.index(name)] for name in planets.names)
+        norms = (planets.shapes(0.0)[0] ** 2).sum(axis=0)
+        for number in range(planets.waves if planets.carrier in carriers else len(WAVES)):
+            name = f"{family} {wave_name(number, planets.waves)}" if number else family
+            waves.append(BearingWave(name, ordered, law, number, float(norms[number]), planets))
+    return BearingWaves(meshes.system, tuple(waves), carriers)
+
+
+def ports_with_bearings(ports: MeshPorts, bearings: BearingMean) -> MeshPorts:
+    """Ports of meshes and behind them those of bearings.
+
+    Laws with fewer readings or forces have rows of zeros; the first reading of a mesh is the first here, the last the
+    last.
+    """
+    count, size = ports.readings.shape[0], ports.readings.shape[2]
+    forces, readings = max(ports.forces.shape[1], COMPONENTS), max(ports.readings.shape[1], COMPONENTS + 1)
+    total = count + len(bearings.static)
+    read, rates, pushed = (np.zeros((total, own, size)) for own in (readings, readings, forces))
+    static, own = np.zeros((total, readings)), ports.readings.shape[1] - 1
+    read[:count, :own], read[:count, POSITION] = ports.readings[:, :own], ports.readings[:, POSITION]
+    static[:count, :own], static[:count, POSITION] = ports.static[:, :own], ports.static[:, POSITION]
+    pushed[:count, : ports.forces.shape[1]] = ports.forces
+    read[count:, :COMPONENTS], rates[count:, :COMPONENTS] = bearings.readings, bearings.rates
+    static[count:, :COMPONENTS], pushed[count:, :COMPONENTS] = bearings.static, bearings.pushes
+    return MeshPorts(read, static, pushed, ports.positions, ports.levers, rates)
+
+
+def places_with_bearings(
+    places: MeshPlaces, bearings: BearingWaves, meshes: int, speed: float, angles: Floats
+) -> MeshPlaces:
+    """Places of meshes and behind them those of bearings, whose waves follow those of the meshes.
+
+    Parameters
+    ----------
+    places : MeshPlaces
+    bearings : BearingWaves
+    meshes : int
+        Number of bases of meshes, behind which those of carriers follow.
+    speed : float
+        Of the input, rad/s.
+    angles : (s, bases) array
+        Of the bases, rad.
+    """
+    count, means = places.there.shape[-1], list(places.means)
+    there, back = [places.there], [places.back]
+    total = count + len(bearings.waves)
+    for n in bearings.firsts:
+        planets = bearings.waves[n].planets
+        turning = planets is not None and planets.carrier in bearings.carriers
+        column = meshes + bearings.carriers.index(planets.carrier) if planets and turning else None
+        shapes = wave_shapes(planets, speed, None if column is None else angles[:, column])
+        own = slice(count + n, count + n + shapes.shape[-1])
+        rows, columns = np.zeros((*shapes.shape[:-1], total)), np.zeros((*shapes.shape[:-2], total, shapes.shape[-2]))
+        rows[..., own] = shapes
+        columns[..., own, :] = np.swapaxes(shapes / (shapes**2).sum(axis=-2, keepdims=True), -1, -2)
+        samples = places.there.shape[:-2]
+        there.append(np.broadcast_to(rows, (*samples, *rows.shape[-2:])))
+        back.append(np.broadcast_to(columns, (*samples, *columns.shape[-2:])))
+        means += [count + n] * shapes.shape[-2]
+    return MeshPlaces(
+        tuple(means),
+        np.concatenate([_wider(there[0], total, -1), *there[1:]], axis=-2),
+        np.concatenate([_wider(back[0], total, -2), *back[1:]], axis=-1),
+        places.positions,
+    )
+
+
+def _wider(values: Floats, size: int, axis: int) -> Floats:
+    """Values with zeros behind them along an axis."""
+    lacking = [(0, 0)] * values.ndim
+    lacking[axis] = (0, size - values.shape[axis])
+    return np.pad(values, lacking)

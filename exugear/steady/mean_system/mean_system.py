@@ -1,0 +1,484 @@
+"""The mean system: equations of motion in the rotating frame, linearised about the static state at speed.
+
+    M u'' + C(W) u' + K(W) u = forces,   C and K quadratic in the speed W of the overall input
+
+averaged over the carrier's places: static tilts that differ from planet to planet leave 5e-5 of variation in the GRC.
+Gyroscopic, Coriolis and centrifugal terms are in C and K. They come from the assembly's own forces by central
+differences, since these know every element; the parabolas through three speeds are exact.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import scipy.linalg
+
+from exugear.bearings.equal_planets import planet_supports, with_equal_planets
+from exugear.bearings.support_laws import load_stands_still
+from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.statics import BalanceError, static_state
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.parts import Mesh
+from exugear.steady.harmonics.side_by_side import Elimination, elimination, solve_side_by_side
+from exugear.steady.mean_system.rotating_frame import (
+    PlanetSet,
+    RotatingFrame,
+    SteadyError,
+    planet_sets,
+)
+from fe_ste.tools.arrays import Complexes, Floats
+
+PLACE_STEP, RATE_STEP = 1e-6, 1e-3
+"""Steps of central differences by u and u'; forces are all but linear in the latter."""
+ROWS_STEP = 1e-8
+"""Step by u where rolling elements bend the forces: those that hardly touch stiffen within a tenth of a micrometre.
+
+A step ten times as long takes 3e-5 of a frequency in the GRC, which is 2e-3 of the response beside a light mode."""
+MOST_STEPS = 20
+"""Steps of Newton's method to the static state."""
+BALANCED = 1e-8
+"""Residual over the largest load that counts as balanced; the search goes on as far as it falls."""
+VARIATION = 2e-4
+"""Largest change of stiffness over the carrier's angle that counts as none, over the stiffness.
+
+Static tilts that are not the same for all planets bend the geometry by 5e-5 in the GRC; unequal planets bring 1e-3."""
+ROWS_VARIATION = 2e-2
+"""The same on non-linear bearings and curved teeth: planets share the load unequally, the more loaded is the stiffer.
+
+Shares go around with the carrier's angle. In the GRC, whose sun is pushed aside, it is 8e-3, at three times the
+carrier's frequency: lines stay as they are to 1e-3, and what stands beside them is left out."""
+PLACES = 4
+"""Places of the carrier between one planet's and the next, over which matrices are averaged.
+
+A thousandth of a light resonance's amplitude hangs on it: 5e-6 of a frequency."""
+
+ELASTIC_RING = (
+    "the ring gear is elastic, and meshes travel around its seats: stiffness changes with the carrier's angle, "
+    "which the steady response cannot treat; make the ring's body rigid (flexibility = 'none')"
+)
+LEAST_ENERGY = 1e-6
+"""Share of the kinetic energy from which what a line does in the mean is looked at."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeanSystem:
+    """Mean system of an assembly over speed.
+
+    Attributes
+    ----------
+    frame : RotatingFrame
+    speeds : (3,) array
+        Speeds of the input at which it was linearised, rad/s.
+    mass : (size, size) array
+    damping, stiffness : (3, size, size) arrays
+        C and K there.
+    static : (3, size) array
+        Static coordinates u there.
+    torque : (3,) array
+        Torque of the drive that keeps the speed, N m.
+    drive : (size,) array
+        Generalized force of a unit of that torque.
+    pinned : int
+        Coordinate whose mean is zero: the spin of the overall input.
+    planet_spread : float
+        Largest change of planet bearings' stiffness that makes them equal, over that stiffness.
+    variation : float
+        Largest change of stiffness over the carrier's places, over the stiffness: its mean is taken.
+    """
+
+    frame: RotatingFrame
+    speeds: Floats
+    mass: Floats
+    damping: Floats
+    stiffness: Floats
+    static: Floats
+    torque: Floats
+    drive: Floats
+    pinned: int
+    planet_spread: float
+    variation: float
+
+    def __repr__(self) -> str:
+        """Size and speeds in one line."""
+        return f"<MeanSystem: {self.size} coordinates, {self.speeds.min():.4g} to {self.speeds.max():.4g} rad/s>"
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates."""
+        return len(self.mass)
+
+    @cached_property
+    def _parabola(self) -> Floats:
+        """From values at the three speeds to coefficients of 1, W, W^2."""
+        return np.asarray(np.linalg.inv(np.vander(self.speeds, 3, increasing=True)))
+
+    def at(self, values: Floats, speed: float) -> Floats:
+        """Value (...) at a speed (rad/s) of what is known at the three, (3, ...): exact for parabolas."""
+        weights = np.array([1.0, speed, speed**2]) @ self._parabola
+        return np.asarray(np.tensordot(weights, values, axes=1))
+
+    def stiffness_at(self, speed: float) -> Floats:
+        """K (size, size) at a speed of the input, rad/s."""
+        return self.at(self.stiffness, speed)
+
+    def damping_at(self, speed: float) -> Floats:
+        """C (size, size) at a speed of the input, rad/s."""
+        return self.at(self.damping, speed)
+
+    def static_at(self, speed: float) -> Floats:
+        """Coordinates u (size,) of the static state at a speed of the input, rad/s."""
+        return self.at(self.static, speed)
+
+    def torque_at(self, speed: float) -> float:
+        """Torque of the drive at a speed of the input (rad/s), N m."""
+        return float(self.at(self.torque, speed))
+
+    @cached_property
+    def _plan(self) -> Elimination:
+        """How dynamic stiffnesses are eliminated: bodies touch each other at few coordinates."""
+        return elimination((self.mass != 0.0) | (self.damping != 0.0).any(axis=0) | (self.stiffness != 0.0).any(axis=0))
+
+    def responses(self, speed: float, frequencies: Floats, loads: Floats) -> Complexes:
+        """Amplitudes (lines, size, n) at a speed of the input (rad/s), as `fill_responses` has them."""
+        found = np.empty((len(frequencies), *loads.shape), dtype=np.complex128)
+        self.fill_responses((self.stiffness_at(speed), self.damping_at(speed)), frequencies, loads, found)
+        return found
+
+    def fill_responses(self, pencil: tuple[Floats, Floats], frequencies: Floats, loads: Floats, out: Complexes) -> None:
+        """Fill amplitudes (lines, size, n) under unit loads (size, n) at angular frequencies (lines,), not zero.
+
+        The pencil is stiffness and damping at a speed.
+        """
+        solve_side_by_side(self._plan, *pencil, self.mass, frequencies, loads, out)
+
+    def dynamic(self, speed: float, frequency: float) -> Complexes:
+        """Dynamic stiffness (size, size) at a speed of the input and an angular frequency, rad/s."""
+        stiffness = self.stiffness_at(speed) - frequency**2 * self.mass
+        return np.asarray(stiffness + 1j * frequency * self.damping_at(speed))
+
+    def still(self, stiffness: Floats, loads: Floats) -> Floats:
+        """Find static deflections under loads (size, n), and in the last row the torque of the drive that they need.
+
+        The train is free to roll: the mean angle of the input stays, and the drive takes what a load would turn.
+        """
+        n = self.size
+        bordered = np.zeros((n + 1, n + 1))
+        bordered[:n, :n], bordered[:n, n], bordered[n, self.pinned] = stiffness, -self.drive, 1.0
+        # Rows of torque and stiffness differ by ten orders of magnitude.
+        size = np.sqrt(np.abs(np.diag(stiffness)).clip(min=1.0))
+        scale = np.append(1.0 / size, 1.0)
+        reach = float(np.abs(scale[:n] * self.drive).max())
+        columns = np.append(scale[:n], 1.0 / reach)
+        solved = np.linalg.solve(
+            scale[:, None] * bordered * columns, scale[:, None] * np.vstack([loads, np.zeros((1, loads.shape[1]))])
+        )
+        return np.asarray(columns[:, None] * solved)
+
+    def eigenvalues(self, speed: float) -> Complexes:
+        """Eigenvalues of the mean system at a speed of the input, 1/s; free rolling among them."""
+        n = self.size
+        lower = np.linalg.solve(self.mass, np.hstack([-self.stiffness_at(speed), -self.damping_at(speed)]))
+        return np.asarray(scipy.linalg.eigvals(np.vstack([np.eye(n, 2 * n, n), lower])))
+
+
+def mean_system(assembly: Assembly, speeds: Floats) -> MeanSystem:
+    """Linearise an assembly about its static states at speeds of the overall input.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    speeds : array_like
+        rad/s; the system holds between the lowest and the highest.
+
+    Raises
+    ------
+    SteadyError
+        Its matrices are not constant in the rotating frame, and why.
+    BalanceError
+        The static load has no equilibrium.
+    """
+    _check(assembly)
+    sets = planet_sets(assembly)
+    assembly, spread = _with_equal_planets(assembly, sets)
+    frame = RotatingFrame(assembly, sets)
+    drive, load = _drive_and_load(assembly)
+    low, high = float(np.min(speeds)), float(np.max(speeds))
+    low, high = (low, high) if high > low else (low - 0.5 * abs(low), high + 0.5 * abs(high))
+    at = np.array([low, 0.5 * (low + high), high])
+    u, torque = _first_guess(assembly, frame, drive), 0.0
+    rows = []
+    matrix = None
+    for speed in at:
+        u, torque = _static(frame, float(speed), drive, load, u, torque, matrix)
+        damping, matrix = tangents(frame, 0.0, float(speed), u)
+        rows.append((u, torque, damping, matrix))
+    static, torques, dampings, stiffnesses = (np.array(values) for values in zip(*rows, strict=True))
+    mass, variation = _mass(frame, 0.0, static[1]), 0.0
+    if sets:
+        more, variation = _mean_over_places(frame, float(at[1]), static[1], (mass, dampings[1], stiffnesses[1]))
+        mass, dampings, stiffnesses = mass + more[0], dampings + more[1], stiffnesses + more[2]
+    pinned = assembly.spin[assembly.gearbox.case.overall.input]
+    return MeanSystem(frame, at, mass, dampings, stiffnesses, static, torques, drive, pinned, spread, variation)
+
+
+def _with_equal_planets(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> tuple[Assembly, float]:
+    """Assembly whose planets stand on equal bearings, and the largest change of stiffness that this took, over it.
+
+    Those from a catalogue are equal already: what is left are matrices of the file that are not the same all around.
+    """
+    supports = [own for planets in sets for own in planet_supports(assembly.supports, planets.names, planets.angles)]
+    connectors, spread = with_equal_planets(assembly.connectors, supports)
+    return replace(assembly, connectors=connectors), max(spread, assembly.planet_spread)
+
+
+def torque_of_vibration(system: MeanSystem, speed: float, frequencies: Floats, motion: Complexes) -> float:
+    """Torque of the drive, N m, that a vibration takes in the mean beside that of the mean system.
+
+    It is of second order in the vibration: bearing moments on bodies that tilt push along the rolling. A run in time
+    without it gains or loses speed, 4e-5 a second at a light resonance of the GRC, which turns phases there by 1e-2.
+
+    Parameters
+    ----------
+    system : MeanSystem
+    speed : float
+        Of the input, rad/s.
+    frequencies : (lines,) array
+        Angular frequencies, rad/s.
+    motion : (lines, size) complex array
+        Coefficients about the static state, the mean first.
+
+    Notes
+    -----
+    The power that all forces together have along the rolling has to vanish in the mean. Meshes have none: rolling does
+    not deflect them. What two lines do together has no mean, so that each line is looked at alone, as far as it counts.
+    """
+    frame, assembly = system.frame, system.frame.assembly
+    load = assembly.torque_vector(assembly.gearbox.case.static_load.torques_N_m)
+    here = system.static_at(speed) + motion[0].real
+
+    def power(change: Complexes, frequency: float) -> float:
+        parts = change, 1j * frequency * change, -(frequency**2) * change
+        place, rate, bend = (np.asarray(part.real) for part in parts)
+        q, v, a = frame.state(0.0, speed, here + place, rate, bend)
+        missing = assembly.inertia_forces(q, v, a) - assembly.forces(q, v, frame.mean_meshes) - load
+        return float(assembly.rolling_velocity(q, frame.speeds) @ missing)
+
+    energies = frequencies**2 * (np.abs(motion) ** 2 @ np.abs(np.diag(system.mass)))
+    energies[0] = 0.0
+    still, total = power(np.zeros(system.size, dtype=complex), 0.0), 0.0
+    for line in np.flatnonzero(energies > LEAST_ENERGY * energies.sum()):
+        for part in math.sqrt(2.0) * motion[line] * np.array([[1.0], [-1.0], [1j], [-1j]]):
+            total += 0.5 * (power(part, float(frequencies[line])) - still)
+    rolling = assembly.rolling_velocity(np.zeros(assembly.size), frame.speeds)
+    return total / float(rolling @ system.drive)
+
+
+def unsuitable(assembly: Assembly, elastic: Collection[str] = ()) -> str:
+    """Say why an assembly has no steady response that this room can compute; empty if nothing speaks against it.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    elastic : collection of str
+        Bodies that another variant takes as elastic, which this one does not.
+    """
+    try:
+        _check(assembly)
+        planet_sets(assembly)
+    except SteadyError as error:
+        return str(error)
+    if any(_has_sectors(assembly.gearbox, mesh) for mesh in assembly.gearbox.meshes if mesh.gear in elastic):
+        return ELASTIC_RING
+    turning = {name for body in assembly.bodies if body.carrier is not None for name in (body.name, body.carrier)}
+    return ", ".join(f"bodies.{name}: elastic and turning with planets" for name in elastic if name in turning)
+
+
+def _has_sectors(gearbox: Gearbox, mesh: Mesh) -> bool:
+    """Whether a mesh travels around the sectors of its elastic gear."""
+    solid = gearbox.case.bodies[gearbox.body(mesh.gear).family].solid
+    seat = None if solid is None else solid.seats.get(mesh.pair.gear.name)
+    return seat is not None and seat.sectors is not None
+
+
+def _check(assembly: Assembly) -> None:
+    """Refuse what has no constant matrices, or no single speed."""
+    gearbox = assembly.gearbox
+    if gearbox.train.degrees_of_freedom != 1:
+        raise SteadyError(
+            f"the gear train has {gearbox.train.degrees_of_freedom} degrees of freedom; the steady response over one "
+            "speed needs one: fix a body or couple two"
+        )
+    if not gearbox.meshes:
+        raise SteadyError("the train has no meshes, and so nothing that excites it; run a load case in time instead")
+    if assembly.travelling.first.size:
+        raise SteadyError(ELASTIC_RING)
+    if gearbox.deviations:
+        raise SteadyError(
+            "deviations: errors of pitch and run-out return with the wheels' turns, which the steady response does not "
+            "take as causes; leave them out, or run the load case in time"
+        )
+    if gearbox.pin_offsets:
+        raise SteadyError(
+            "pins: planets with position errors share the load unequally and their matrices turn with the carrier, "
+            "which the steady response cannot treat; leave the errors out, or run the load case in time"
+        )
+    _check_rows(assembly)
+
+
+def _check_rows(assembly: Assembly) -> None:
+    """Refuse rows of rolling elements that pass, or that turn against the load that they carry."""
+    rolling, bodies = assembly.connectors.rolling, {body.name: body for body in assembly.gearbox.bodies()}
+    for n in np.flatnonzero(np.diff(rolling.first)):
+        support = assembly.supports[n]
+        if rolling.cage_ratio[n]:
+            raise SteadyError(
+                f"bearings.{support.family}.cage = 'turning': elements that pass are a cause of their own beside the "
+                "meshes, which the steady response cannot treat; take cage = 'averaged', or run the load case in time"
+            )
+        if not load_stands_still(support, bodies):
+            raise SteadyError(
+                f"bearings.{support.family}.law = 'iso16281': its elements turn with {support.on} against the load, "
+                "which the steady response cannot treat; take law = 'stiffness', or run the load case in time"
+            )
+
+
+def _drive_and_load(assembly: Assembly) -> tuple[Floats, Floats]:
+    """Generalized force of a unit of the drive's torque, and those of the static load.
+
+    What the file locks is what keeps the speed: its torque is whatever balances the others.
+    """
+    load, overall = assembly.gearbox.case.static_load, assembly.gearbox.case.overall
+    locked = assembly.gearbox.locked
+    keeper = locked[0] if locked else overall.input
+    return assembly.torque_vector({keeper: 1.0}), assembly.torque_vector(load.torques_N_m)
+
+
+def _first_guess(assembly: Assembly, frame: RotatingFrame, drive: Floats) -> Floats:
+    """Find the static state at rest, rolled back until the input stands at zero, in the coordinates of the frame."""
+    q = static_state(assembly).q
+    rolling = assembly.rolling_velocity(np.zeros(assembly.size), frame.speeds)
+    pinned = assembly.spin[assembly.gearbox.case.overall.input]
+    return np.asarray(np.linalg.solve(frame.matrices(0.0)[0], q - q[pinned] * rolling))
+
+
+def _residual(
+    frame: RotatingFrame, psi: float, speed: float, u: Floats, du: Floats | None = None, ddu: Floats | None = None
+) -> Floats:
+    """Generalized forces (size,) in the frame that inertia needs, less those that elements give."""
+    assembly = frame.assembly
+    q, v, a = frame.state(psi, speed, u, du, ddu)
+    missing = assembly.inertia_forces(q, v, a) - assembly.forces(q, v, frame.mean_meshes)
+    return np.asarray(frame.matrices(psi)[0].T @ missing)
+
+
+def tangents(frame: RotatingFrame, psi: float, speed: float, u: Floats) -> tuple[Floats, Floats]:
+    """Damping and stiffness (size, size) in the frame, about the coordinates u at the input's angle psi.
+
+    The input turns at `speed` (rad/s).
+    """
+    here = np.tile(u, (len(u), 1))
+    damping = _slopes(lambda steps: _residuals(frame, psi, speed, here, steps), len(u), RATE_STEP)
+    return damping, _stiffness(frame, psi, speed, u)
+
+
+def _stiffness(frame: RotatingFrame, psi: float, speed: float, u: Floats) -> Floats:
+    step = place_step(frame.assembly)
+    return _slopes(lambda steps: _residuals(frame, psi, speed, u + steps, None), len(u), step)
+
+
+def place_step(assembly: Assembly) -> float:
+    """Step of central differences of forces by places, m and rad."""
+    return ROWS_STEP if assembly.has_rows else PLACE_STEP
+
+
+def _mass(frame: RotatingFrame, psi: float, u: Floats) -> Floats:
+    """Mass (size, size) in the frame: what accelerations need, which is linear in them."""
+    assembly, t = frame.assembly, frame.matrices(psi)[0]
+    q, v, a = frame.state(psi, 0.0, u)
+    still = assembly.inertia_forces(q, v, a)
+    columns = [assembly.inertia_forces(q, v, a + own) - still for own in t.T]
+    return np.asarray(t.T @ np.array(columns).T)
+
+
+def _residuals(frame: RotatingFrame, psi: float, speed: float, u: Floats, du: Floats | None) -> Floats:
+    """Return `_residual` at several coordinates and velocities (n, size) at once: bearings have much in common."""
+    assembly, t = frame.assembly, frame.matrices(psi)[0]
+    states = [frame.state(psi, speed, own, None if du is None else du[n]) for n, own in enumerate(u)]
+    q, v, _ = (np.array(values) for values in zip(*states, strict=True))
+    needed = np.array([assembly.inertia_forces(*state) for state in states])
+    return np.asarray((needed - assembly.forces(q, v, frame.mean_meshes)) @ t)
+
+
+def _slopes(function: Callable[[Floats], Floats], size: int, step: float) -> Floats:
+    """Take derivatives (size, size) by central differences of a function of several steps (n, size) at once."""
+    steps = step * np.eye(size)
+    return np.asarray((function(steps) - function(-steps)).T / (2.0 * step))
+
+
+def _static(
+    frame: RotatingFrame, speed: float, drive: Floats, load: Floats, u: Floats, torque: float, matrix: Floats | None
+) -> tuple[Floats, float]:
+    """Find the static state at a speed, and the torque that keeps it; `matrix` is the stiffness at another speed."""
+    n, assembly = len(u), frame.assembly
+    pinned = assembly.spin[assembly.gearbox.case.overall.input]
+    t0 = frame.matrices(0.0)[0]
+    drive, load = t0.T @ drive, t0.T @ load
+    largest = max(1.0, float(np.abs(load).max()))
+    best = before = np.inf
+    bordered = np.zeros((n + 1, n + 1))
+    for _ in range(MOST_STEPS):
+        missing = _residual(frame, 0.0, speed, u) - load - torque * drive
+        error = float(np.abs(np.append(missing, largest * u[pinned])).max()) / largest
+        if not error < np.inf or (best < BALANCED and error > 0.5 * best):
+            break
+        best = min(best, error)
+        # The elements are all but linear: one matrix serves for several steps.
+        if matrix is None or error > 0.1 * before:
+            matrix = _stiffness(frame, 0.0, speed, u)
+        before = error
+        bordered[:n, :n], bordered[:n, n], bordered[n, pinned] = matrix, -drive * largest, largest
+        step = np.linalg.solve(bordered, -np.append(missing, largest * u[pinned]))
+        u, torque = u + step[:n], torque + largest * float(step[n])
+    if not best < BALANCED:
+        raise BalanceError(f"static state at {speed:.4g} rad/s: the residual stays at {best:.1e} of the load")
+    return u, torque
+
+
+def _mean_over_places(
+    frame: RotatingFrame, speed: float, u: Floats, here: tuple[Floats, Floats, Floats]
+) -> tuple[tuple[Floats, ...], float]:
+    """Means of M, C and K (size, size) over the carrier's places less those at the angle zero, which are given.
+
+    The last result is the largest change of K over the places, over K.
+
+    Raises
+    ------
+    SteadyError
+        The stiffness changes as the carrier turns.
+    """
+    period = max(2.0 * math.pi / abs(planets.waves * planets.ratio) for planets in frame.sets)
+    more, largest = tuple(np.zeros_like(own) for own in here), 0.0
+    curved = any(element.is_curved for element in frame.assembly.elements)
+    most = ROWS_VARIATION if frame.assembly.has_rows or curved else VARIATION
+    for psi in period * np.arange(1, PLACES) / PLACES:
+        there = (_mass(frame, float(psi), u), *tangents(frame, float(psi), speed, u))
+        largest = max(largest, _checked_change(here[2], there[2], most))
+        for mean, one, other in zip(more, here, there, strict=True):
+            mean += (other - one) / PLACES
+    return more, largest
+
+
+def _checked_change(here: Floats, there: Floats, most: float) -> float:
+    """Find the change of stiffness with the carrier's angle, over it, and refuse more of it than a share."""
+    size = np.sqrt(np.abs(np.diag(here)).clip(min=1e-3 * np.abs(np.diag(here)).max()))
+    change = float(np.abs((there - here) / np.outer(size, size)).max())
+    if change > most:
+        raise SteadyError(
+            f"the stiffness changes by {100.0 * change:.2g} % as the carrier turns (unequal planets, or a support "
+            "that turns with them), which the steady response cannot treat; run the load case in time instead"
+        )
+    return change

@@ -1,0 +1,405 @@
+"""Gear meshes in the rotating frame: the scalar signals through which everything that varies acts.
+
+The meshes of N planets are written as waves around the carrier, as the planets are: with the gradient g_n of the
+deflection of mesh n by the frame's coordinates u
+
+    d_n = d_0 + d_c cos theta_n + d_s sin theta_n,   rows g_0 = mean g_n, g_c = 2/N sum g_n cos theta_n, g_s likewise,
+
+and a force F_n in each mesh is a generalized force -(N g_0 F_0 + N/2 g_c F_c + N/2 g_s F_s). Planets that mesh in
+phase have one position in the mesh cycle, so that their stiffness k multiplies each wave by itself. Planets out of
+phase have all N waves, and the carrier's angle is a cause of its own: harmonic h of the stiffness carries a wave to
+another, and its line to one beside it, by a whole number of the carrier's turns.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from exugear.dynamics.assembly import Assembly
+from exugear.kernels.coordinates import BODY_SIZE, SPIN
+from exugear.steady.harmonics.lines import Modulator
+from exugear.steady.harmonics.products import fourier_coefficients
+from exugear.steady.mean_system.mean_system import MeanSystem
+from exugear.steady.mean_system.rotating_frame import PlanetSet, RotatingFrame
+from exugear.tooth_mesh.kernels.meshes import FRAME, ROW_SIZE, frame_row
+from exugear.tooth_mesh.laws.line_of_action import CURVE_FORM, EXPONENT
+from fe_ste.tools.arrays import Complexes, Floats
+
+SAMPLES = 64
+"""Samples of each cubic piece of a stiffness for its Fourier coefficients: aliases are below 1e-7 of it."""
+FEWEST, MOST_HARMONICS = 10, 1000
+"""Harmonics of a mesh frequency that are looked at in any case, and more than anyone asks for."""
+LEFT_OUT = 2e-2
+"""Share of the variation of a mesh's compliance that harmonics may leave out.
+
+With it the ten loudest peaks of the GRC and of a spur planetary gearbox keep within 1e-2 of those by half as many
+harmonics again."""
+CONSTANT = 1e-9
+"""Variation of a compliance over its mean below which there is none."""
+IN_PHASE = 1e-6
+"""Mesh cycles by which planets in phase may differ."""
+SAME_BASE = 1e-9
+"""Share by which mesh frequencies of one base may differ."""
+CycleQuantity = Literal["tangent", "secant", "exponent", "compliance"]
+"""Of a mesh at its static load: slope of the load, load over deflection (N/m), the curve's exponent less one, and one
+over the secant (m/N), which is the static transmission error of a unit load."""
+WAVES = ("mean", "cosine", "sine")
+"""The first three, which central bodies feel."""
+
+
+def wave_name(number: int, planets: int) -> str:
+    """Name of a wave of a set of planets.
+
+    Examples
+    --------
+    >>> [wave_name(n, 4) for n in range(4)]
+    ['mean', 'cosine', 'sine', 'alternating']
+    """
+    if number < len(WAVES):
+        return WAVES[number]
+    if planets % 2 == 0 and number == planets - 1:
+        return "alternating"
+    return f"{WAVES[2 - number % 2]} {(number + 1) // 2}"
+
+
+@dataclass(frozen=True)
+class MeshWave:
+    """One wave of the meshes of a family, or a single mesh.
+
+    Attributes
+    ----------
+    name : str
+        Family, with the wave where there are several.
+    family : str
+    first : int
+        Mesh that stands for the family in the assembly's arrays.
+    wave : int
+        0 mean, 1 cosine, 2 sine, and on where planets mesh out of phase.
+    weight : float
+        What a unit of its force counts in generalized forces.
+    base : int
+        Base whose angle is that of the mesh cycle.
+    sense : float
+        Mesh cycles per cycle of the base when the input turns about +z: 1 or -1.
+    carrier : float
+        Turns of the waves per turn of the input.
+    ahead : tuple of float
+        Cycles by which each planet's mesh is ahead of the first's, empty where the mean over a turn stands for all.
+    """
+
+    name: str
+    family: str
+    first: int
+    wave: int
+    weight: float
+    base: int
+    sense: float
+    carrier: float
+    ahead: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class MeshWaves:
+    """All mesh waves of a mean system; m waves.
+
+    Attributes
+    ----------
+    system : MeanSystem
+    waves : tuple of MeshWave
+    base_orders : (bases,) array
+        Mesh frequencies over the frequency of the input's turns.
+    base_names : tuple of str
+        Meshes of each base.
+    passing : int
+        Multiples of the passing of planets (thrice a turn of the carrier where there are three) whose lines are looked
+        at: planets in phase are then taken one by one as they turn, as those out of phase are, and not at their mean.
+    """
+
+    system: MeanSystem
+    waves: tuple[MeshWave, ...]
+    base_orders: Floats
+    base_names: tuple[str, ...]
+    passing: int = 0
+
+    @property
+    def assembly(self) -> Assembly:
+        """What was linearised."""
+        return self.system.frame.assembly
+
+    @cached_property
+    def groups(self) -> tuple[tuple[tuple[int, ...], PlanetSet | None], ...]:
+        """Meshes and planets of each family, in the order of the waves' families."""
+        return _groups(self.system.frame)
+
+    @cached_property
+    def carriers(self) -> tuple[tuple[str, Modulator], ...]:
+        """Carriers whose planets are looked at one by one, and the lines that turns put beside those of the meshes."""
+        found: dict[str, tuple[PlanetSet, set[int], set[int | None]]] = {}
+        for wave in self.waves:
+            planets = self.planets(wave)
+            if wave.ahead and planets is not None and wave.wave == 0:
+                _, bases, steps = found.setdefault(planets.carrier, (planets, set(), set()))
+                bases.add(wave.base)
+                steps.add(_turns_per_cycle(wave, planets))
+        return tuple(
+            (name, Modulator(abs(planets.ratio), tuple(sorted(bases)), planets.waves, *_one_of(steps)))
+            for name, (planets, bases, steps) in found.items()
+        )
+
+    def planets(self, wave: MeshWave) -> PlanetSet | None:
+        """Planets of the meshes of a wave, None of a single mesh."""
+        return next(planets for meshes, planets in self.groups if wave.first in meshes)
+
+    @cached_property
+    def weights(self) -> Floats:
+        """(m,) array."""
+        return np.array([wave.weight for wave in self.waves])
+
+    @cached_property
+    def mean_stiffness(self) -> Floats:
+        """Mean stiffness of each wave's mesh in the law's coordinate, (m,), N/m: of a curve the tangent."""
+        return np.array([float(np.mean(self.assembly.elements[wave.first].tangent)) for wave in self.waves])
+
+    @cached_property
+    def rest(self) -> Floats:
+        """Deflection at which the mean stiffness of each wave has no force, (m,), m: zero but for means of curves."""
+        return np.array([self.assembly.elements[wave.first].rest * (wave.wave == 0) for wave in self.waves])
+
+    @cached_property
+    def loads(self) -> Floats:
+        """Load of each wave's mesh at which stiffness and curve are, (m,), N; 0 of no curve."""
+        elements = [self.assembly.elements[wave.first] for wave in self.waves]
+        return np.array([element.load if element.is_curved else 0.0 for element in elements])
+
+    @cached_property
+    def damping(self) -> Floats:
+        """Damping of each wave's mesh in the law's coordinate, (m,), N s/m."""
+        return np.array([self.assembly.meshes.damping[wave.first] for wave in self.waves])
+
+    @cached_property
+    def line_of_action(self) -> Floats:
+        """Force on the transverse line of action per force of the law, (m,)."""
+        return np.array([self.assembly.meshes.line_of_action[wave.first] for wave in self.waves])
+
+    @cached_property
+    def partners(self) -> Floats:
+        """What a mesh that travels through the waves sees besides their own rates, (m, m).
+
+        The rate of wave a is d_a' + W p_ab d_b at the speed W of the input.
+        """
+        rates = np.zeros((len(self.waves),) * 2)
+        for n, wave in enumerate(self.waves):
+            if wave.wave % 2 == 1 and n + 1 < len(self.waves) and self.waves[n + 1].wave == wave.wave + 1:
+                turns = (wave.wave + 1) // 2 * wave.carrier
+                rates[n, n + 1], rates[n + 1, n] = turns, -turns
+        return rates
+
+    def gradients(self, rows: Floats, speed: float) -> Floats:
+        """Waves (m, size) of the gradients of rows (meshes, 12) by the frame's coordinates, at a speed (rad/s)."""
+        frame = self.system.frame
+        q, _, _ = frame.state(0.0, speed, self.system.static_at(speed))
+        found = np.array([_row(self.assembly, m, q, own)[1] for m, own in enumerate(rows)])
+        return self._waves_of(found @ frame.matrices(0.0)[0])
+
+    def values(self, rows: Floats, speed: float) -> Floats:
+        """Waves (m,) of the values of rows (meshes, 12) in the static state at a speed (rad/s)."""
+        frame = self.system.frame
+        q, _, _ = frame.state(0.0, speed, self.system.static_at(speed))
+        return self._waves_of(np.array([_row(self.assembly, m, q, own)[0] for m, own in enumerate(rows)]))
+
+    def position_rows(self) -> Floats:
+        """Rows of the position in the mesh cycle by the frame's coordinates, (m, size), cycles."""
+        assembly, gradients = self.assembly, np.zeros((len(self.assembly.elements), self.assembly.size))
+        for m, index in enumerate(assembly.meshes.coordinates):
+            for at, sign in ((SPIN, 1.0), (FRAME, -1.0)):
+                if index[at] >= 0:
+                    gradients[m, index[at]] += sign * assembly.meshes.cycles[m]
+        return self._waves_of(gradients @ self.system.frame.matrices(0.0)[0])
+
+    def positions(self, speed: float) -> Floats:
+        """Position in the mesh cycle of each wave's mesh at zero angle of the input, (m,), cycles."""
+        moved = self.position_rows() @ self.system.static_at(speed)
+        own = np.array([self.assembly.meshes.phase[wave.first] for wave in self.waves])
+        mean = {wave.family: float(moved[n]) for n, wave in enumerate(self.waves) if wave.wave == 0}
+        return np.asarray(own + np.array([mean[wave.family] for wave in self.waves]))
+
+    def cycle_coefficients(self, quantity: CycleQuantity, harmonics: int) -> Complexes:
+        """Fourier coefficients (m, harmonics + 1) of a quantity over the mesh cycle."""
+        found = np.zeros((len(self.waves), harmonics + 1), dtype=complex)
+        for own, wave in zip(found, self.waves, strict=True):
+            known = fourier_coefficients(self._over_cycle(wave, quantity), harmonics)
+            own[: len(known)] = known
+        return found
+
+    def _over_cycle(self, wave: MeshWave, quantity: CycleQuantity) -> Floats:
+        """Sample a quantity over the cycle of a wave's mesh."""
+        meshes, mesh = self.assembly.meshes, wave.first
+        pieces, curved = int(meshes.pieces[mesh]), meshes.form[mesh] == CURVE_FORM
+        powers = np.vander(np.arange(SAMPLES) / SAMPLES, 4, increasing=True).T
+        secant = (meshes.stiffness[mesh, :pieces, :4] @ powers).ravel()
+        more = meshes.stiffness[mesh, :pieces, EXPONENT : EXPONENT + 4] if curved else np.zeros((pieces, 4))
+        exponent = (more @ powers).ravel()
+        if quantity == "secant":
+            return np.asarray(secant)
+        if quantity == "compliance":
+            return np.asarray(1.0 / secant)
+        return np.asarray(exponent if quantity == "exponent" else secant * (1.0 + exponent))
+
+    def left_out(self, harmonics: int) -> Floats:
+        """Share (m,) of the variation of each wave's compliance over the mesh cycle that is above some harmonics.
+
+        The compliance is what transmission errors are made of; its variation is counted by its root mean square.
+        """
+        return np.array([self._tails[wave.first][harmonics] for wave in self.waves])
+
+    @property
+    def varies(self) -> bool:
+        """Whether any mesh has a compliance that changes over its cycle: else nothing excites the gearbox."""
+        return any(bool(tails[0]) for tails in self._tails.values())
+
+    def needed_harmonics(self) -> int:
+        """Count the harmonics of each mesh frequency that the compliance asks for.
+
+        They leave `LEFT_OUT` of its variation out, at most; from `FEWEST` to half of the positions of its table, above
+        which a table says nothing.
+        """
+        needed = FEWEST
+        for mesh, tails in self._tails.items():
+            most = max(int(self.assembly.meshes.pieces[mesh]) // 2, FEWEST)
+            enough = np.flatnonzero(tails[: most + 1] <= LEFT_OUT)
+            needed = max(needed, int(enough[0]) if enough.size else most)
+        return needed
+
+    @cached_property
+    def _tails(self) -> dict[int, Floats]:
+        """Share of the variation of compliance of each mesh that stands for waves, above each number of harmonics."""
+        found = {}
+        for mesh, wave in {wave.first: wave for wave in self.waves}.items():
+            values = self._over_cycle(wave, "compliance")
+            sizes = np.abs(fourier_coefficients(values, len(values) // 2))
+            above = np.sqrt(np.cumsum(sizes[:0:-1] ** 2)[::-1])
+            varies = above[0] > CONSTANT * sizes[0]
+            found[mesh] = np.append(above / above[0], np.zeros(MOST_HARMONICS)) if varies else np.zeros(MOST_HARMONICS)
+        return found
+
+    def _waves_of(self, values: Floats) -> Floats:
+        """Waves (m, ...) of values (meshes, ...) at zero angle of the input."""
+        out: Floats = np.empty((len(self.waves), *values.shape[1:]))
+        at = 0
+        for meshes, planets in self.groups:
+            own = values[list(meshes)]
+            if planets is None:
+                out[at] = own[0]
+                at += 1
+                continue
+            count = sum(self.planets(wave) is planets and wave.first == meshes[0] for wave in self.waves)
+            shapes = planets.shapes(0.0)[0][:, :count]
+            norms = (shapes**2).sum(axis=0)
+            out[at : at + count] = np.tensordot(shapes / norms, own, axes=(0, 0))
+            at += count
+        return out
+
+
+def mesh_waves(system: MeanSystem, passing: int = 0) -> MeshWaves:
+    """Mesh waves of a mean system; `passing` as `MeshWaves` says."""
+    assembly = system.frame.assembly
+    gearbox = assembly.gearbox
+    frequencies = gearbox.train.mesh_frequencies(2.0 * math.pi)
+    orders: list[float] = []
+    names: list[list[str]] = []
+    waves: list[MeshWave] = []
+    for meshes, planets in _groups(system.frame):
+        mesh = assembly.elements[meshes[0]].mesh
+        order = frequencies[mesh.name]
+        base = next((n for n, known in enumerate(orders) if abs(order - known) < SAME_BASE * known), len(orders))
+        if base == len(orders):
+            orders.append(order)
+            names.append([])
+        names[base].append(mesh.family)
+        sense = math.copysign(1.0, _cycles_per_turn(system.frame, meshes[0]))
+        own = (meshes[0],)
+        if planets is None:
+            waves.append(MeshWave(mesh.name, mesh.name, *own, 0, 1.0, base, sense, 0.0))
+            continue
+        ahead = _phases_ahead(assembly, meshes) or (0.0,) * (len(meshes) if passing else 0)
+        norms = (planets.shapes(0.0)[0] ** 2).sum(axis=0)
+        for number in range(planets.waves if ahead else len(WAVES)):
+            label = f"{mesh.family} {wave_name(number, planets.waves)}" if number else mesh.family
+            weight = float(norms[number])
+            waves.append(MeshWave(label, mesh.family, *own, number, weight, base, sense, planets.ratio, ahead))
+    return MeshWaves(system, tuple(waves), np.array(orders), tuple(", ".join(own) for own in names), passing)
+
+
+def _groups(frame: RotatingFrame) -> tuple[tuple[tuple[int, ...], PlanetSet | None], ...]:
+    """Meshes of each family of planets in the order of the planets, and single meshes."""
+    found: dict[str, tuple[tuple[int, ...], PlanetSet | None]] = {}
+    for m, element in enumerate(frame.assembly.elements):
+        ends = {element.mesh.pinion, element.mesh.gear}
+        planets = next((group for group in frame.sets if ends & set(group.names)), None)
+        if planets is None:
+            found[element.mesh.name] = ((m,), None)
+            continue
+        key = f"{element.mesh.family} of {planets.carrier} {planets.names[0]}"
+        found[key] = ((*found.get(key, ((), None))[0], m), planets)
+    out = []
+    for meshes, planets in found.values():
+        if planets is not None:
+            by_planet = {
+                name: m
+                for m in meshes
+                for name in planets.names
+                if name in (frame.assembly.elements[m].mesh.pinion, frame.assembly.elements[m].mesh.gear)
+            }
+            meshes = tuple(by_planet[name] for name in planets.names)
+        out.append((meshes, planets))
+    return tuple(out)
+
+
+def _cycles_per_turn(frame: RotatingFrame, mesh: int) -> float:
+    """Mesh cycles per rad of the input, signed."""
+    element = frame.assembly.elements[mesh]
+    speeds = frame.speeds
+    relative = speeds.get(element.mesh.pinion, 0.0) - speeds.get(element.mesh.frame, 0.0)
+    return float(frame.assembly.meshes.cycles[mesh] * relative)
+
+
+def _phases_ahead(assembly: Assembly, meshes: tuple[int, ...]) -> tuple[float, ...]:
+    """Cycles by which each mesh is ahead of the first, empty where all are in phase."""
+    phases = assembly.meshes.phase[list(meshes)]
+    apart = (phases - phases[0] + 0.5) % 1.0 - 0.5
+    return tuple(float(own) for own in apart) if np.abs(apart).max() > IN_PHASE else ()
+
+
+def _turns_per_cycle(wave: MeshWave, planets: PlanetSet) -> int | None:
+    """Find the carrier's turns that go with a mesh cycle, None where phases are not those of equally spaced planets.
+
+    Planets that are ahead by multiples of p / N of a cycle carry harmonic h into the wave h p; seen from the frame that
+    wave turns back with the carrier.
+    """
+    ahead, count = np.array(wave.ahead), planets.waves
+    step = round(float(ahead[1]) * count)
+    if np.abs((ahead - step * np.arange(count) / count + 0.5) % 1.0 - 0.5).max() > IN_PHASE:
+        return None
+    return int(-step * wave.sense * math.copysign(1.0, wave.carrier))
+
+
+def _one_of(steps: set[int | None]) -> tuple[int | None]:
+    """Tell the step that all meshes of a carrier have, None where they differ."""
+    return (next(iter(steps)),) if len(steps) == 1 else (None,)
+
+
+def _row(assembly: Assembly, mesh: int, q: Floats, row: Floats) -> tuple[float, Floats]:
+    """Value of a row (12,) of a mesh, and its gradient (size,) by the coordinates."""
+    meshes = assembly.meshes
+    index, out = meshes.coordinates[mesh], np.zeros(assembly.size)
+    local, turning = np.empty(ROW_SIZE), np.empty(ROW_SIZE)
+    value = frame_row(q, index, meshes.axis[mesh], row, local, turning)
+    for at in range(2 * BODY_SIZE + 1):
+        if index[at] >= 0:
+            out[index[at]] += local[at]
+    return float(value), out

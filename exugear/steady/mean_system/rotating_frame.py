@@ -1,0 +1,252 @@
+"""Coordinates in which a gearbox with planets has constant matrices: multi-blade (Coleman) coordinates.
+
+A planet's displacements and tilts are written along the radius and the tangent of its place on the turning carrier,
+and then as waves around the carrier: with N planets at angles theta_n = psi + phi_n,
+
+    z_n = z_0 + sum_m (z_cm cos m theta_n + z_sm sin m theta_n) [+ z_a (-1)^n for even N].
+
+The waves do not turn with the carrier: a central body on bearings that are not isotropic feels constant stiffness
+(Coleman and Feingold 1958, NACA report 1351). Bodies on fixed axes keep their coordinates.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeAlias
+
+import numpy as np
+
+from exugear.bearings.equal_planets import FEWEST, equally_spaced, planet_families
+from exugear.dynamics.assembly import Assembly
+from exugear.gearbox.parts import Body
+from exugear.kernels.coordinates import TILT
+from exugear.tooth_mesh.kernels.meshes import MeshArrays
+from exugear.tooth_mesh.laws.registry import LAWS
+from fe_ste.tools.arrays import Floats, Integers
+
+Jet: TypeAlias = tuple[Floats, Floats, Floats]
+"""A function of the input's angle with two derivatives by it."""
+
+
+class SteadyError(ValueError):
+    """A gearbox, or a wish, that the steady response cannot treat; the message says why."""
+
+
+@dataclass(frozen=True)
+class PlanetSet:
+    """Equal, equally spaced planets of one carrier.
+
+    Attributes
+    ----------
+    names : tuple of str
+        In the order of their angles.
+    carrier : str
+    angles : (N,) array
+        At zero angle of the carrier, rad.
+    ratio : float
+        Angle of the carrier over that of the overall input.
+    """
+
+    names: tuple[str, ...]
+    carrier: str
+    angles: Floats
+    ratio: float
+
+    @property
+    def waves(self) -> int:
+        """Number of planets, which is that of waves."""
+        return len(self.names)
+
+    def values(self, turned: Floats) -> Floats:
+        """Waves at the planets (..., planets, waves) where the carrier has turned by angles (...), rad."""
+        theta = turned[..., None] + self.angles
+        found = [np.ones_like(theta)]
+        for m in range(1, (self.waves - 1) // 2 + 1):
+            found += [np.cos(m * theta), np.sin(m * theta)]
+        if self.waves % 2 == 0:
+            found.append(np.broadcast_to(np.where(np.arange(self.waves) % 2, -1.0, 1.0), theta.shape))
+        return np.stack(found, axis=-1)
+
+    def shapes(self, psi: float) -> Jet:
+        """Waves at the planets (planets, waves), and two derivatives by the input's angle psi (rad).
+
+        The first three are the mean, the cosine and the sine.
+        """
+        theta, rate = self.ratio * psi + self.angles, self.ratio
+        value, slope, bend = [np.ones_like(theta)], [np.zeros_like(theta)], [np.zeros_like(theta)]
+        for m in range(1, (self.waves - 1) // 2 + 1):
+            c, s = np.cos(m * theta), np.sin(m * theta)
+            value += [c, s]
+            slope += [-m * rate * s, m * rate * c]
+            bend += [-((m * rate) ** 2) * c, -((m * rate) ** 2) * s]
+        if self.waves % 2 == 0:
+            value.append(np.where(np.arange(self.waves) % 2, -1.0, 1.0))
+            slope.append(np.zeros_like(theta))
+            bend.append(np.zeros_like(theta))
+        return np.array(value).T, np.array(slope).T, np.array(bend).T
+
+
+def planet_sets(assembly: Assembly) -> tuple[PlanetSet, ...]:
+    """Planet sets of a gearbox, checked.
+
+    Raises
+    ------
+    SteadyError
+        Two planets, planets that are not equally spaced, or an elastic carrier or planet.
+    """
+    gearbox = assembly.gearbox
+    bodies = {body.name: body for body in assembly.bodies}
+    speeds = gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)
+    sets = []
+    for planets in planet_families(assembly.bodies):
+        carrier, family = str(planets[0].carrier), planets[0].family
+        elastic = [name for name in (carrier, *(p.name for p in planets)) if name in assembly.elastic_bodies]
+        if elastic:
+            raise SteadyError(
+                f"bodies.{elastic[0]}: elastic and turning with planets, its shape has no constant stiffness seen from "
+                f"the housing; the steady response wants it rigid (flexibility = 'none')"
+            )
+        _check_spacing(family, planets)
+        names = tuple(planet.name for planet in planets)
+        angles = np.array([planet.orbit_angle for planet in planets])
+        sets.append(PlanetSet(names, bodies[carrier].name, angles, speeds[carrier]))
+    return tuple(sets)
+
+
+def _check_spacing(family: str, planets: Sequence[Body]) -> None:
+    if len(planets) < FEWEST:
+        raise SteadyError(
+            f"bodies.{family}: {len(planets)} planets; the matrices of fewer than {FEWEST} equally spaced ones turn "
+            "with their carrier, which the steady response cannot treat; run the load case in time instead"
+        )
+    if not equally_spaced(planets):
+        raise SteadyError(
+            f"bodies.{family}.planet_angles_deg: planets are not equally spaced, so that the matrices turn with their "
+            "carrier, which the steady response cannot treat; run the load case in time instead"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class RotatingFrame:
+    """The transformation q = q_rolling(psi) + T(psi) u of an assembly; psi is the angle of the overall input.
+
+    Attributes
+    ----------
+    assembly : Assembly
+    sets : tuple of PlanetSet
+    """
+
+    assembly: Assembly
+    sets: tuple[PlanetSet, ...]
+
+    @cached_property
+    def mean_meshes(self) -> MeshArrays:
+        """Meshes of the mean system: linear, their stiffness that of the mean over the mesh cycle.
+
+        Tables become their stiffness at the static load, curves their tangents there: as they are, stiffness would
+        change with each planet's misalignment and load.
+        """
+        if not LAWS[self.assembly.mesh_law].loses_contact:
+            return self.assembly.tangent_meshes
+        teeth = self.assembly.linear_meshes()
+        # What tables resist misalignment with is in the forces that they have beyond this.
+        return teeth._replace(tilt=np.zeros_like(teeth.tilt))
+
+    @cached_property
+    def speeds(self) -> dict[str, float]:
+        """Spins of all bodies per spin of the overall input."""
+        gearbox = self.assembly.gearbox
+        return gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)
+
+    @cached_property
+    def _planet_coordinates(self) -> tuple[tuple[PlanetSet, Integers], ...]:
+        """Coordinates (planets, 6) of each set, -1 where there is none."""
+        coordinates = self.assembly.coordinates
+        return tuple((planets, np.array([coordinates[name] for name in planets.names])) for planets in self.sets)
+
+    def _unit(self) -> Jet:
+        size = self.assembly.size
+        return np.eye(size), np.zeros((size, size)), np.zeros((size, size))
+
+    @cached_property
+    def _kept(self) -> dict[float, tuple[Jet, Jet]]:
+        """Matrices and rolling at the last angle: differences ask for one angle many times."""
+        return {}
+
+    def _at(self, psi: float) -> tuple[Jet, Jet]:
+        found = self._kept.get(psi)
+        if found is None:
+            found = self._matrices(psi), self._rolling(psi)
+            self._kept.clear()
+            self._kept[psi] = found
+        return found
+
+    def matrices(self, psi: float) -> Jet:
+        """T and its two derivatives by psi, each (size, size)."""
+        return self._at(psi)[0]
+
+    def rolling(self, psi: float) -> Jet:
+        """q_rolling and its two derivatives by psi, each (size,)."""
+        return self._at(psi)[1]
+
+    def _matrices(self, psi: float) -> Jet:
+        turned = self._unit()
+        for planets, coordinates in self._planet_coordinates:
+            waves = planets.shapes(psi)
+            for axis in range(coordinates.shape[1]):
+                if coordinates[0, axis] >= 0:
+                    place = np.ix_(coordinates[:, axis], coordinates[:, axis])
+                    for matrix, values in zip(turned, waves, strict=True):
+                        matrix[place] = values
+        for planets, coordinates in self._planet_coordinates:
+            if coordinates[0, 0] < 0:
+                continue
+            turned = self._with_directions(planets, coordinates, psi, turned)
+        return turned
+
+    def _with_directions(self, planets: PlanetSet, coordinates: Integers, psi: float, waves: Jet) -> Jet:
+        """Turn displacements and tilts along radius and tangent of each planet: R w and its derivatives."""
+        turning = self._unit()
+        for angle, own in zip(planets.ratio * psi + planets.angles, coordinates, strict=True):
+            c, s, rate = math.cos(angle), math.sin(angle), planets.ratio
+            plane = np.array([[c, -s], [s, c]])
+            around = rate * np.array([[-s, -c], [c, -s]])
+            for first in (0, TILT):
+                place = np.ix_(own[first : first + 2], own[first : first + 2])
+                for matrix, values in zip(turning, (plane, around, -(rate**2) * plane), strict=True):
+                    matrix[place] = values
+        (r, r1, r2), (w, w1, w2) = turning, waves
+        return r @ w, r1 @ w + r @ w1, r2 @ w + 2.0 * r1 @ w1 + r @ w2
+
+    def _rolling(self, psi: float) -> Jet:
+        assembly, still = self.assembly, np.zeros(self.assembly.size)
+        place = psi * assembly.rolling_velocity(still, self.speeds)
+        rate = assembly.rolling_velocity(still, self.speeds)
+        bend = assembly.rolling_acceleration(still, self.speeds, dict.fromkeys(self.speeds, 0.0))
+        for planets, coordinates in self._planet_coordinates:
+            if coordinates[0, 0] < 0:
+                continue
+            angle = planets.ratio * psi
+            c, s = math.cos(angle), math.sin(angle)
+            plane = np.array([[c, -s], [s, c]])
+            for own in coordinates[:, :2]:
+                # The centripetal acceleration points back along the radius.
+                radius = -bend[own] / planets.ratio**2 if planets.ratio else np.zeros(2)
+                place[own] = plane @ radius - radius
+                rate[own], bend[own] = plane @ rate[own], plane @ bend[own]
+        return place, rate, bend
+
+    def state(self, psi: float, speed: float, u: Floats, du: Floats | None = None, ddu: Floats | None = None) -> Jet:
+        """Coordinates, velocities and accelerations (size,) of the assembly at an input speed (rad/s)."""
+        (t, t1, t2), (place, rate, bend) = self.matrices(psi), self.rolling(psi)
+        q = place + t @ u
+        v = speed * (rate + t1 @ u)
+        a = speed**2 * (bend + t2 @ u)
+        if du is not None:
+            v, a = v + t @ du, a + 2.0 * speed * (t1 @ du)
+        if ddu is not None:
+            a = a + t @ ddu
+        return q, v, a

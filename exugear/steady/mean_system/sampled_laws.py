@@ -1,0 +1,201 @@
+"""Mesh laws on many samples at once: forces and their slopes by what the laws read, in compiled loops.
+
+A law along a row reads deflection and position; the law `table` both flanks, the centre distance, both misalignments
+and the position (`exugear.steady.mean_system.mesh_ports`). Loops are compiled by `fe_ste.tools.compilation`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from exugear.steady.mean_system.mesh_ports import BACK, BACK_TILT, CENTRE, FRONT, TILT
+from exugear.tooth_mesh.kernels.meshes import MeshArrays
+from exugear.tooth_mesh.kernels.table_law import (
+    BY_DISTANCE,
+    BY_MISALIGNMENT,
+    DAMPING_SIZE,
+    LAW_BY_DISTANCE,
+    LAW_BY_MISALIGNMENT,
+    LAW_FORCE,
+    LAW_STIFFNESS,
+    OF_DISTANCE,
+    ORDERS,
+    TableArrays,
+    scratch_memory,
+    surface_damping,
+    surface_law,
+    surface_tangent,
+)
+from exugear.tooth_mesh.laws.line_of_action import STRAIGHT
+from fe_ste.tools.arrays import Floats
+from fe_ste.tools.compilation import compiled
+
+TOUCHING = 0.25e-6
+"""Approach over which the damping of teeth that touch sets in, m.
+
+By the law itself it jumps at first touch, by 4 % of the load in the GRC: no balance of smooth lines ends there. The
+ramp costs a thousandth of the response, mostly in its phase.
+"""
+TABLE_READINGS, TABLE_FORCES = 6, 5
+
+
+class LawSamples(NamedTuple):
+    """A law on s samples, with r readings and f forces.
+
+    Attributes
+    ----------
+    force : (s, f) array
+        Elastic and damped parts together, N and N m.
+    slope : (s, f, r) array
+        Derivatives by the readings.
+    damping : (s, f, r) array
+        Derivatives by their rates.
+    """
+
+    force: Floats
+    slope: Floats
+    damping: Floats
+
+
+def widened(samples: LawSamples, forces: int, readings: int) -> LawSamples:
+    """Return samples with as many forces and readings as asked for: zeros where the law has none.
+
+    The last reading, the position in the cycle, stays the last.
+    """
+    force, slope, damping = samples
+    if slope.shape[1:] == (forces, readings):
+        return samples
+    wide = np.zeros((len(force), forces))
+    wide[:, : force.shape[1]] = force
+    slopes = []
+    for own in (slope, damping):
+        found = np.zeros((len(force), forces, readings))
+        found[:, : own.shape[1], : own.shape[2] - 1] = own[..., :-1]
+        found[:, : own.shape[1], -1] = own[..., -1]
+        slopes.append(found)
+    return LawSamples(wide, *slopes)
+
+
+def sample_line(stiffness: Floats, readings: Floats) -> LawSamples:
+    """Sample a straight law along a row without its damper, which is in the mean system.
+
+    Parameters
+    ----------
+    stiffness : (6, s) array
+        Stiffness where the mean speed alone has brought the mesh, N/m, and its two derivatives per cycle; the same of
+        the force that it has less, N.
+    readings : (s, 2) array
+        Deflection, m, and how far the vibration has moved the position, cycles. It is a thousandth of a cycle or less,
+        so that a parabola serves.
+    """
+    deflection, moved = readings.T
+    value, by_position = _moved(stiffness[:3], moved)
+    pull, pull_by_position = _moved(stiffness[3:], moved)
+    slope = np.stack([value, by_position * deflection - pull_by_position], axis=1)[:, None]
+    return LawSamples((value * deflection - pull)[:, None], slope, np.zeros_like(slope))
+
+
+def sample_curve(curve: Floats, readings: Floats, load: float) -> LawSamples:
+    """Sample a curve of load over deflection (`exugear.tooth_mesh.laws.line_of_action`), as `sample_line`.
+
+    Parameters
+    ----------
+    curve : (6, s) array
+        Load over deflection at a load, N/m, and its exponent less one; each with two derivatives per cycle.
+    readings : (s, 2) array
+    load : float
+        N.
+    """
+    deflection, moved = readings.T
+    (k, k_slope), (n, n_slope) = _moved(curve[:3], moved), _moved(curve[3:], moved)
+    pressed = k * np.abs(deflection) / load
+    bent = pressed > STRAIGHT
+    level = np.log(np.where(bent, pressed, STRAIGHT))
+    force = k * np.exp(n * level) * deflection
+    tangent = k * np.exp(n * level) * (1.0 + bent * n)
+    by_position = force * (n_slope * level + (1.0 + bent * n) * k_slope / k)
+    slope = np.stack([tangent, by_position], axis=1)[:, None]
+    return LawSamples(force[:, None], slope, np.zeros_like(slope))
+
+
+def _moved(values: Floats, moved: Floats) -> tuple[Floats, Floats]:
+    """Value and slope of a function (3, s) with two derivatives, beside its place by `moved` (s,)."""
+    return values[0] + moved * (values[1] + 0.5 * moved * values[2]), values[1] + moved * values[2]
+
+
+def sample_table(meshes: MeshArrays, mesh: int, readings: Floats, rates: Floats) -> LawSamples:
+    """Sample the law `table`; readings and their rates (s, 6), the position in the cycle among them as a whole."""
+    shape = len(readings), TABLE_FORCES
+    out = LawSamples(np.zeros(shape), np.zeros((*shape, TABLE_READINGS)), np.zeros((*shape, TABLE_READINGS)))
+    # The other flank runs backwards through its cycle.
+    turned = meshes.table.back_phase[mesh] + meshes.phase[mesh]
+    _fill_flank(1.0, mesh, readings, rates, turned, meshes.table, *out)
+    _fill_flank(-1.0, mesh, readings, rates, turned, meshes.table, *out)
+    return out
+
+
+@compiled
+def _fill_flank(
+    side: float,
+    m: int,
+    readings: Floats,
+    rates: Floats,
+    turned: float,
+    tables: TableArrays,
+    force: Floats,
+    slope: Floats,
+    damping: Floats,
+) -> None:
+    """Add one flank (1, -1) to forces and slopes; `turned` is the sum of both flanks' positions."""
+    own = FRONT if side > 0.0 else BACK
+    tilt = TILT if side > 0.0 else BACK_TILT
+    position = readings.shape[1] - 1
+    sense = side * tables.sense[m]
+    time = tables.damping_time[m]
+    memory, second, sizes = scratch_memory(), np.empty((4, 4)), np.empty(DAMPING_SIZE)
+    along, moving = np.ones(3), np.empty(3)
+    places = np.array([own, CENTRE, tilt, position])
+    signs = np.array([1.0, 1.0, sense, side])
+    piece = 0
+    for s in range(readings.shape[0]):
+        delta, rate = readings[s, own], rates[s, own]
+        if delta <= tables.lowest[m]:
+            continue
+        pmc = readings[s, position] if side > 0.0 else turned - readings[s, position]
+        centre, misalignment = readings[s, CENTRE], sense * readings[s, tilt]
+        piece, t = surface_law(delta, pmc, centre, misalignment, m, tables, piece, ORDERS.shape[0], memory)
+        if t < 0.0:
+            continue
+        surface_tangent(t, piece, m, tables, memory, second)
+        law, cubic = memory.law, memory.cubic
+        stiffness = law[LAW_STIFFNESS]
+        # Damping fades in over the approach after first touch; a piece beyond the first is well behind it.
+        ramp, ramp_slope = 1.0, 0.0
+        if piece == 0:
+            whole = min(TOUCHING, cubic[0, 1] + cubic[0, 2] + cubic[0, 3])
+            x = (delta - cubic[0, 0]) / whole
+            if x < 1.0:
+                ramp, ramp_slope = x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x) / whole
+        surface_damping(t, piece, m, tables, memory, sizes)
+        # Along the three that teeth push along, in the axes of the table: the own one of misalignment has a sense.
+        along[1], along[2] = -sizes[BY_DISTANCE], -sizes[BY_MISALIGNMENT]
+        moving[0], moving[1], moving[2] = rate, rates[s, CENTRE], sense * rates[s, tilt]
+        approaching = moving[0] + along[1] * moving[1] + along[2] * moving[2]
+        force[s, own] += law[LAW_FORCE]
+        force[s, CENTRE] += law[LAW_BY_DISTANCE]
+        force[s, tilt] += sense * law[LAW_BY_MISALIGNMENT]
+        for a in range(3):
+            for b in range(3):
+                by_rate = time * ramp * stiffness * along[a] * along[b]
+                if a > 0 and b > 0:
+                    by_rate += time * ramp * sizes[OF_DISTANCE + a + b - 2]
+                force[s, places[a]] += signs[a] * by_rate * moving[b]
+                damping[s, places[a], places[b]] += signs[a] * signs[b] * by_rate
+        for b in range(4):
+            # First touch itself moves with centre distance, misalignment and position.
+            touch = 1.0 if b == 0 else -cubic[b, 0]
+            changing = time * approaching * (ramp * second[3, b] + ramp_slope * touch * stiffness)
+            for a in range(3):
+                slope[s, places[a], places[b]] += signs[a] * signs[b] * (second[a, b] + along[a] * changing)

@@ -1,0 +1,168 @@
+"""What a steady response is told in: transmission errors, forces of meshes and bearings, accelerations of seats.
+
+Bearings of planets have waves around the carrier, along radius and tangent, as the planets themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.eigenmodes.modes import overall_row
+from exugear.kernels.coordinates import TILT
+from exugear.steady.mean_system.mean_system import MeanSystem, place_step
+from exugear.steady.mean_system.mesh_waves import MeshWaves, wave_name
+from exugear.steady.mean_system.rotating_frame import PlanetSet
+from fe_ste.tools.arrays import Complexes, Floats
+
+AXES = ("x", "y", "z")
+PLANET_AXES = ("radial", "tangential", "z")
+RATE_STEP = 1e-3
+"""Step of central differences by rates."""
+
+
+@dataclass(frozen=True)
+class SignalName:
+    """A signal of the steady response.
+
+    Attributes
+    ----------
+    name : str
+        ``quantity``, or ``quantity of what, which part``.
+    quantity, units : str
+    """
+
+    name: str
+    quantity: str
+    units: str
+
+
+@dataclass(frozen=True, eq=False)
+class SignalRows:
+    """Rows that give signals from the motion u at one speed of the input: (A + i w B - w^2 C) u.
+
+    Attributes
+    ----------
+    names : tuple of SignalName
+        Of these rows: overall transmission error, bearing forces, seat accelerations.
+    by_place, by_rate, by_acceleration : (signals, size) arrays
+    """
+
+    names: tuple[SignalName, ...]
+    by_place: Floats
+    by_rate: Floats
+    by_acceleration: Floats
+
+    def of(self, motion: Complexes, frequencies: Floats) -> Complexes:
+        """Coefficients (lines, signals) of the signals of a motion (lines, size) at angular frequencies."""
+        w = 1j * frequencies[:, None]
+        # Rows are real, and most have one part or two: products with the real numbers of the motion in those.
+        parts, lines = np.concatenate([motion.real, motion.imag]), len(motion)
+        found = np.zeros((lines, len(self.names)), dtype=np.complex128)
+        for factor, rows in ((1.0, self.by_place), (w, self.by_rate), (w**2, self.by_acceleration)):
+            own = np.flatnonzero(rows.any(axis=1))
+            values = parts @ rows[own].T
+            found[:, own] += factor * (values[:lines] + 1j * values[lines:])
+        return found
+
+
+def mesh_signal_names(waves: MeshWaves) -> tuple[SignalName, ...]:
+    """Names of transmission errors and forces of the meshes."""
+    errors = tuple(SignalName(f"mesh_dte {wave.name}", "mesh_dte", "m") for wave in waves.waves)
+    forces = tuple(SignalName(f"mesh_force {wave.name}", "mesh_force", "N") for wave in waves.waves)
+    return (*errors, *forces)
+
+
+def signal_rows(system: MeanSystem, speed: float) -> SignalRows:
+    """Rows of the signals that follow from the motion, at a speed of the input (rad/s)."""
+    frame, assembly = system.frame, system.frame.assembly
+    t, t1, t2 = frame.matrices(0.0)
+    overall = overall_row(assembly)
+    names = [SignalName("overall_dte", "overall_dte", "m")]
+    place, rate, acceleration = [overall @ t], [np.zeros(assembly.size)], [np.zeros(assembly.size)]
+    if assembly.supports:
+        q, v, _ = frame.state(0.0, speed, system.static_at(speed))
+        turn, labels = _support_waves(assembly, frame.sets)
+        by_q = turn @ _slopes(lambda step: _forces(assembly, q + step, v), assembly.size, place_step(assembly))
+        by_v = turn @ _slopes(lambda step: _forces(assembly, q, v + step), assembly.size, RATE_STEP)
+        seats = turn @ _seat_rows(assembly)
+        for quantity, units in (("support_force", "N"), ("seat_acceleration", "m/s2")):
+            names += [SignalName(f"{quantity} {label}", quantity, units) for label in labels]
+        place += [*(by_q @ t + speed * by_v @ t1), *(speed**2 * seats @ t2)]
+        rate += [*(by_v @ t), *(2.0 * speed * seats @ t1)]
+        acceleration += [*np.zeros_like(by_q), *(seats @ t)]
+    return SignalRows(tuple(names), np.array(place), np.array(rate), np.array(acceleration))
+
+
+def _forces(assembly: Assembly, q: Floats, v: Floats) -> Floats:
+    """Force on the body of each support along the global axes, (3 supports,), N."""
+    return -assembly.bearing_loads(q, v)[:, :3].ravel()
+
+
+def _slopes(function: Callable[[Floats], Floats], size: int, step: float) -> Floats:
+    columns = [(function(e) - function(-e)) / (2.0 * step) for e in step * np.eye(size)]
+    return np.array(columns).T
+
+
+def carried_seats(assembly: Assembly) -> dict[str, bool]:
+    """Tell of each bearing, planets' by their family, whether its seat's acceleration is that of what carries it.
+
+    It is where that is elastic, as a housing may be; else it is that of the shaft.
+    """
+    return {own.family: carried for own, carried in zip(assembly.supports, _carried(assembly), strict=True)}
+
+
+def _carried(assembly: Assembly) -> list[bool]:
+    starts = assembly.connectors.bodies
+    return [bool(starts[n][0] >= 0 and own.on in assembly.elastic_bodies) for n, own in enumerate(assembly.supports)]
+
+
+def _seat_rows(assembly: Assembly) -> Floats:
+    """Displacement of the seat of each support by the coordinates, (3 supports, size).
+
+    The seat is that in the housing where it is elastic, else that on the body.
+    """
+    rows, carried = np.zeros((3 * len(assembly.supports), assembly.size)), _carried(assembly)
+    for n, (starts, local) in enumerate(zip(assembly.connectors.bodies, assembly.connectors.local, strict=True)):
+        end = 0 if carried[n] or starts[1] < 0 else 1
+        if starts[end] < 0:
+            continue
+        x, y, z = local[end]
+        own = rows[3 * n : 3 * n + 3, starts[end] : starts[end] + TILT + 2]
+        own[:, :3] = np.eye(3)
+        own[:, TILT:] = [[0.0, z], [-z, 0.0], [y, -x]]
+    return rows
+
+
+def _support_waves(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> tuple[Floats, list[str]]:
+    """Matrix from values along global axes (3 supports,) to waves along radius and tangent, and what they are."""
+    count = len(assembly.supports)
+    turn, labels = np.eye(3 * count), [f"{support.name} {axis}" for support in assembly.supports for axis in AXES]
+    for planets in sets:
+        families = sorted({support.family for support in assembly.supports if support.body in planets.names})
+        for family in families:
+            own = [
+                n
+                for body in planets.names
+                for n, support in enumerate(assembly.supports)
+                if support.body == body and support.family == family
+            ]
+            if len(own) != planets.waves:
+                continue
+            shapes = planets.shapes(0.0)[0]
+            inverse = np.linalg.inv(shapes)
+            c, s = np.cos(planets.angles), np.sin(planets.angles)
+            radial = np.stack(
+                [np.stack([c, s, 0 * c], 1), np.stack([-s, c, 0 * c], 1), np.stack([0 * c, 0 * c, 1 + 0 * c], 1)], 1
+            )
+            for wave, at in enumerate(own):
+                for axis in range(3):
+                    row = np.zeros(3 * count)
+                    for n, support in enumerate(own):
+                        row[3 * support : 3 * support + 3] = inverse[wave, n] * radial[n, axis]
+                    turn[3 * at + axis] = row
+                    labels[3 * at + axis] = f"{family} {wave_name(wave, planets.waves)} {PLANET_AXES[axis]}"
+    return turn, labels

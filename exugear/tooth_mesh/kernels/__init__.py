@@ -1,0 +1,1 @@
+"""Compiled laws of meshes on arrays of coordinates."""

@@ -1,0 +1,269 @@
+"""Compiled geometry of gear meshes, arranged for speed: value, rate and gradient of a row in one pass.
+
+The formulas are those of `exugear.tooth_mesh.kernels.meshes`, which the tests hold them against. What differs: sines
+of the frames' angles are taken once per evaluation and handed in, missing coordinates point to one that stays zero,
+so that the loops need no exceptions, and nothing is allocated.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from exugear.kernels.coordinates import AXIAL, BODY_SIZE, PADDED, PADDED_SPIN, PADDED_TILT, SPIN, TILT
+from exugear.tooth_mesh.kernels.meshes import FRAME
+from exugear.tooth_mesh.kernels.table_law import Scratch, TableArrays, piece_at
+from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.compilation import kernel
+from fe_ste.tools.octets import eight, put, sum_of
+
+ALONG_DEFLECTION, ALONG_FORCE, TABLE_FORCE = range(3)
+"""Rows of `MeshMemory.gradient`."""
+LAST_DEFLECTION, LAST_RATE, LAST_OUTSIDE, LAST_FORCE, LAST_ENERGY, LAST_DAMPED, LAST_CYCLE, LAST_OTHER = range(8)
+LAST_CENTRE, LAST_MISALIGNMENT, LAST_CENTRE_RATE = range(8, 11)
+"""Columns of `MeshMemory.states`: deflection (m), rate (m/s), 1 outside a table, scalar force (N; of a table F_bt), and
+what an account of energy takes of the mesh: elastic energy (J); power damped, of the stiffness that changes with pmc,
+and of a force that is not conjugate to its deflection (W); of a table change of centre distance (m),
+misalignment (rad) and rate of the centre distance (m/s)."""
+STATES_SIZE = 11
+DEFLECTION_ROW, FORCE_ROW, CENTRE_ROW, MISALIGNMENT_ROW, BACK_ROW, BACK_MISALIGNMENT_ROW = range(6)
+"""Rows of `Meshes.rows`."""
+PLAIN_ROWS = 2
+"""Number of rows of meshes without a table."""
+FIXED, ALONG_COSINE, ALONG_SINE, SECOND = range(0, 4 * PADDED, PADDED)
+"""First columns of the parts of each of them, and of those of the second gear."""
+TILT_ROW_X, TILT_ROW_Y, TILT_SHIFT, TILT_RESISTANCE, TILT_DAMPER, TILT_ARM, TILT_PUSH = range(7)
+"""Columns of `Meshes.tilt`: the misalignment's row over the tilts of gear 1, its negative being that of gear 2;
+misalignment at zero tilts against that of the contact's state (rad); tilt stiffness, damping, lever and moment as in
+`exugear.tooth_mesh.kernels.meshes.MeshArrays.tilt`."""
+TURNING = 2 * PADDED
+"""Place of the frame's angle in a gradient of `MeshMemory.gradients`, behind two padded gears."""
+KINETIC, ELASTIC, OF_LOADS, DISSIPATED, OF_VARYING_STIFFNESS, NON_CONSERVATIVE, OF_BEARING_RATES = range(7)
+"""Columns of an account of energy, as runs take it (`exugear.transient.compiled.sampling`).
+
+Kinetic and elastic energy (J); powers (W): of the loads, damped, of the stiffness that changes with pmc, of mesh forces
+that are not conjugate to their deflection, of bearings whose rate is not the derivative of their displacement.
+"""
+
+
+class Meshes(NamedTuple):
+    """Meshes as in `exugear.tooth_mesh.kernels.meshes.MeshArrays`; missing coordinates point to one that stays zero.
+
+    Attributes
+    ----------
+    coordinates : (m, 13)
+    slot : (m,) where the cosine and sine of the frame's angle stand among those of all angles that turn anything
+    axis : (m, 2, 2) zero for gears without translations
+    conjugate : (m,) 1 where the force row is the deflection row
+    tilting : (m,) 1 where a law along a row resists misalignment
+    tilt : (m, 7) columns as named in this module
+    spinning : (m,) 1 where the gears have their spins alone
+    ends : (m, 2) numbers of the two gears' places
+    rows : (m, r, 48) rows over both gears' padded places: parts W0, W1, W2 of the first, then of the second gear, whose
+        row is W0 + W1 cos psi + W2 sin psi at the angle psi of the frame
+    offsets : (m, r, 3) of each row: what cos psi, sin psi and psi itself add to its value
+    mean : (m, 2) stiffness (N/m) and damping (N s/m) at the static load, mean over the cycle
+    nominal : (m,) deflection of gears in their nominal place, m
+    table : None where no mesh follows one
+    """
+
+    coordinates: Integers
+    slot: Integers
+    axis: Floats
+    form: Integers
+    deflection: Floats
+    force: Floats
+    conjugate: Integers
+    tilting: Integers
+    tilt: Floats
+    spinning: Integers
+    ends: Integers
+    rows: Floats
+    offsets: Floats
+    cycles: Floats
+    phase: Floats
+    pieces: Integers
+    stiffness: Floats
+    damping: Floats
+    mean: Floats
+    line_of_action: Floats
+    error_pieces: Integers
+    error: Floats
+    nominal: Floats
+    table: TableArrays | None
+
+
+class MeshMemory(NamedTuple):
+    """Memory of the meshes' laws.
+
+    Attributes
+    ----------
+    gradient : (3, 13) gradients of the deflection and of the force row, and the force of a mesh with a table
+    gradients : (4, 17) gradients over two padded places and the frame's angle; the last one is a sum
+    states : (m, 11) what each mesh does, columns as named in this module
+    pieces : (m, 2) load piece of each flank's table that was used last
+    law : memory of the law `table`; None where no mesh has it
+    row : (12,) row of the push between the axes and the moment of misalignment
+    damping : (5,) directions and sizes of the damping of a table
+    """
+
+    gradient: Floats
+    gradients: Floats
+    states: Floats
+    pieces: Integers
+    law: Scratch | None
+    row: Floats
+    damping: Floats
+
+
+def padded_rows(rows: Floats, axis: Floats) -> tuple[Floats, Floats]:
+    """Rows over padded places, their parts and offsets: see `Meshes`.
+
+    Parameters
+    ----------
+    rows : (m, r, 12) array
+        Rows over the coordinates of both gears seen from the frame.
+    axis : (m, 2, 2) array
+        Axis of each gear relative to the frame's at zero angles, m; zero for gears without translations.
+
+    Returns
+    -------
+    rows : (m, r, 48) array
+    offsets : (m, r, 3) array
+    """
+    count, kinds = rows.shape[:2]
+    gears = rows.reshape(count, kinds, 2, BODY_SIZE)
+    parts = np.zeros((count, kinds, 2, SECOND))
+    parts[..., FIXED + AXIAL], parts[..., FIXED + PADDED_SPIN] = gears[..., AXIAL], gears[..., SPIN]
+    for i, o in ((0, 0), (TILT, PADDED_TILT)):
+        # Turned forward by psi: (c x - s y, s x + c y).
+        parts[..., ALONG_COSINE + o], parts[..., ALONG_COSINE + o + 1] = gears[..., i], gears[..., i + 1]
+        parts[..., ALONG_SINE + o], parts[..., ALONG_SINE + o + 1] = -gears[..., i + 1], gears[..., i]
+    offsets = np.zeros((count, kinds, 3))
+    x, y, px, py = gears[..., 0], gears[..., 1], axis[:, None, :, 0], axis[:, None, :, 1]
+    offsets[..., 0], offsets[..., 1] = (x * px + y * py).sum(axis=2), (x * py - y * px).sum(axis=2)
+    offsets[..., 2] = -gears[..., SPIN].sum(axis=2)
+    return parts.reshape(count, kinds, 2 * SECOND), offsets
+
+
+@kernel
+def row_motion(
+    m: int, kind: int, psi: float, psi_rate: float, c: float, s: float, meshes: Meshes, places: Floats, gradient: Floats
+) -> tuple[float, float]:
+    """Value and rate of a row of mesh m; fills its gradient (17,). c and s are those of the frame's angle psi."""
+    row, offsets = meshes.rows[m, kind], meshes.offsets[m, kind]
+    first, second = places[meshes.ends[m, 0]], places[meshes.ends[m, 1]]
+    along, across = eight(row, ALONG_COSINE), eight(row, ALONG_SINE)
+    gradient_1, turning_1 = eight(row, FIXED) + along * c + across * s, across * c - along * s
+    along, across = eight(row, SECOND + ALONG_COSINE), eight(row, SECOND + ALONG_SINE)
+    gradient_2, turning_2 = eight(row, SECOND + FIXED) + along * c + across * s, across * c - along * s
+    place_1, place_2 = eight(first, 0), eight(second, 0)
+    level, lever, spins = offsets[0], offsets[1], offsets[2]
+    # What the frame's turning does to all of the above at once.
+    turning = sum_of(turning_1 * place_1 + turning_2 * place_2) + (c * lever - s * level) + spins
+    value = sum_of(gradient_1 * place_1 + gradient_2 * place_2) + ((c * level + s * lever - level) + spins * psi)
+    rate = sum_of(gradient_1 * eight(first, PADDED) + gradient_2 * eight(second, PADDED)) + turning * psi_rate
+    put(gradient, 0, gradient_1)
+    put(gradient, PADDED, gradient_2)
+    gradient[TURNING] = turning
+    return value, rate
+
+
+@kernel
+def tilt_motion(
+    m: int, psi_rate: float, c: float, s: float, meshes: Meshes, places: Floats
+) -> tuple[float, float, float, float, float]:
+    """Misalignment of mesh m against that of its contact's state, and its rate; its gradient in three numbers.
+
+    These are those by both tilts of gear 1, whose negatives belong to gear 2, and by the frame's angle.
+    """
+    row, first, second = meshes.tilt[m], places[meshes.ends[m, 0]], places[meshes.ends[m, 1]]
+    x, y = c * row[TILT_ROW_X] - s * row[TILT_ROW_Y], s * row[TILT_ROW_X] + c * row[TILT_ROW_Y]
+    a, b = first[PADDED_TILT] - second[PADDED_TILT], first[PADDED_TILT + 1] - second[PADDED_TILT + 1]
+    turning = x * b - y * a
+    a_rate = first[PADDED + PADDED_TILT] - second[PADDED + PADDED_TILT]
+    b_rate = first[PADDED + PADDED_TILT + 1] - second[PADDED + PADDED_TILT + 1]
+    return row[TILT_SHIFT] + x * a + y * b, x * a_rate + y * b_rate + turning * psi_rate, x, y, turning
+
+
+@kernel
+def mesh_row(
+    q: Floats, v: Floats, index: Integers, axis: Floats, row: Floats, c: float, s: float, gradient: Floats
+) -> tuple[float, float]:
+    """Value and rate of a row over the coordinates seen from its frame; fills its gradient (13,)."""
+    psi, psi_rate = q[index[FRAME]], v[index[FRAME]]
+    value, rate, turning = 0.0, 0.0, 0.0
+    for end in range(2):
+        o = BODY_SIZE * end
+        px, py = axis[end, 0], axis[end, 1]
+        for pair in (0, TILT):
+            i, j = index[o + pair], index[o + pair + 1]
+            # Turned back by psi; the row turned forward is its gradient, whose product with v is the rate.
+            x, y = px + q[i], py + q[j]
+            lx, ly = c * x + s * y, c * y - s * x
+            wx, wy = row[o + pair], row[o + pair + 1]
+            gx, gy = c * wx - s * wy, s * wx + c * wy
+            value += wx * (lx - px) + wy * (ly - py)
+            rate += gx * v[i] + gy * v[j]
+            turning += wx * ly - wy * lx
+            gradient[o + pair], gradient[o + pair + 1] = gx, gy
+            px, py = 0.0, 0.0  # tilts have no lever
+        axial, spin = row[o + AXIAL], row[o + SPIN]
+        value += axial * q[index[o + AXIAL]] + spin * (q[index[o + SPIN]] - psi)
+        rate += axial * v[index[o + AXIAL]] + spin * v[index[o + SPIN]]
+        turning -= spin
+        gradient[o + AXIAL], gradient[o + SPIN] = axial, spin
+    # The frame's angle comes last: what its turning does to all of the above at once.
+    gradient[FRAME] = turning
+    return value, rate + turning * psi_rate
+
+
+@kernel
+def error_at(m: int, end: int, angle: float, meshes: Meshes) -> tuple[float, float]:
+    """Error (m) of one gear of mesh m at its angle (rad) seen from the frame, and its slope per rad."""
+    pieces = meshes.error_pieces[m, end]
+    turns = angle / (2.0 * math.pi)
+    scaled = (turns - math.floor(turns)) * pieces
+    piece = piece_at(scaled, pieces)
+    t = scaled - piece
+    c = meshes.error[m, end, piece]
+    slope = (c[1] + t * (2.0 * c[2] + t * 3.0 * c[3])) * pieces / (2.0 * math.pi)
+    return c[0] + t * (c[1] + t * (c[2] + t * c[3])), slope
+
+
+@kernel
+def subtract_wheel_errors(
+    q: Floats, v: Floats, m: int, side: float, meshes: Meshes, gradient: Floats
+) -> tuple[float, float]:
+    """Change of a deflection and its rate by the gears' errors; changes its gradient too."""
+    delta, rate = 0.0, 0.0
+    index = meshes.coordinates[m]
+    for end in range(2):
+        if meshes.error_pieces[m, end] > 0:
+            spin, frame = index[BODY_SIZE * end + SPIN], index[FRAME]
+            error, slope = error_at(m, end, q[spin] - q[frame], meshes)
+            # A flank that stands back closes later; seen from the other flank it stands ahead (side -1).
+            delta -= side * error
+            rate -= side * slope * (v[spin] - v[frame])
+            gradient[BODY_SIZE * end + SPIN] -= side * slope
+            gradient[FRAME] += side * slope
+    return delta, rate
+
+
+@kernel
+def subtract_errors(q: Floats, v: Floats, m: int, side: float, meshes: Meshes, gradient: Floats) -> tuple[float, float]:
+    """Change of a deflection and its rate by the gears' errors; changes its padded gradient too."""
+    delta, rate = 0.0, 0.0
+    index = meshes.coordinates[m]
+    for end in range(2):
+        if meshes.error_pieces[m, end] > 0:
+            spin, frame = index[BODY_SIZE * end + SPIN], index[FRAME]
+            error, slope = error_at(m, end, q[spin] - q[frame], meshes)
+            # A flank that stands back closes later; seen from the other flank it stands ahead (side -1).
+            delta -= side * error
+            rate -= side * slope * (v[spin] - v[frame])
+            gradient[PADDED * end + PADDED_SPIN] -= side * slope
+            gradient[TURNING] += side * slope
+    return delta, rate

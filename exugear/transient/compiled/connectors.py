@@ -1,0 +1,257 @@
+"""Forces of bearings in the compiled solver, by pairs of bodies.
+
+Machine code is kept by `fe_ste.tools.compilation`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from exugear.bearings.kernels.rolling import CAGE_TORQUE, ELASTIC_PART, RollingArrays, rolling_force
+from exugear.kernels.coordinates import BODY_SIZE, PADDED, PADDED_TILT, SPIN, TILT
+from exugear.transient.compiled.arrays import (
+    DAMPED,
+    FIRST_ARM,
+    FIRST_TURNING,
+    GAP,
+    LAG,
+    NODES,
+    OFF_AXIS,
+    OFFSET,
+    RELATIVE_AXIS,
+    RELATIVE_PLACE,
+    RELATIVE_TILT,
+    RELATIVE_VELOCITY,
+    SECOND_ARM,
+    SECOND_TURNING,
+    SUPPORT_LOAD,
+    W_X,
+    W_Y,
+    W_Z,
+    WRENCH,
+    Bodies,
+    Connectors,
+    Pairs,
+    Work,
+)
+from exugear.transient.compiled.places import tilts_of_axis
+from fe_ste.tools.arrays import Floats
+from fe_ste.tools.compilation import kernel
+
+
+@kernel
+def turn_between(values: Floats, n: int, bodies: Bodies, connectors: Connectors) -> float:
+    """Spin of the second body of connector n less that of the first (rad), or their rates; the ground's stays zero."""
+    first, second = bodies.start[connectors.ends[n, 0]], bodies.start[connectors.ends[n, 1]]
+    return float(values[second + SPIN] - values[first + SPIN])
+
+
+@kernel
+def place_pair(p: int, places: Floats, pairs: Pairs, ground: int, work: Work) -> None:
+    """Fill `work.relative` with the second body's motion against the first, in the first one's axes."""
+    i, j = pairs.ends[p, 0], pairs.ends[p, 1]
+    out, place, frame = work.relative, places[j], work.frames[j]
+    # On the ground the first body's axes are the global ones: nothing has to be turned.
+    if i == ground:
+        for k in range(3):
+            out[RELATIVE_PLACE + k], out[RELATIVE_VELOCITY + k] = place[k], place[PADDED + k]
+            out[RELATIVE_AXIS + k], out[FIRST_TURNING + k] = frame[2 + 3 * k], 0.0
+            out[SECOND_TURNING + k] = frame[W_X + k]
+        out[RELATIVE_TILT], out[RELATIVE_TILT + 1] = place[PADDED_TILT], place[PADDED_TILT + 1]
+        out[RELATIVE_TILT + 2] = 0.0
+        return
+    first, turn = places[i], work.frames[i]
+    nodes = pairs.data[pairs.first[p]]
+    x, y, z = (
+        place[0] - first[0] + nodes[NODES],
+        place[1] - first[1] + nodes[NODES + 1],
+        place[2] - first[2] + nodes[NODES + 2],
+    )
+    ux, uy = place[PADDED] - first[PADDED], place[PADDED + 1] - first[PADDED + 1]
+    uz = place[PADDED + 2] - first[PADDED + 2]
+    for k in range(3):
+        r, s, t = turn[k], turn[3 + k], turn[6 + k]
+        out[RELATIVE_PLACE + k] = r * x + s * y + t * z
+        out[RELATIVE_VELOCITY + k] = r * ux + s * uy + t * uz
+        out[RELATIVE_AXIS + k] = r * frame[2] + s * frame[5] + t * frame[8]
+        out[FIRST_TURNING + k] = r * turn[W_X] + s * turn[W_Y] + t * turn[W_Z]
+        out[SECOND_TURNING + k] = r * frame[W_X] + s * frame[W_Y] + t * frame[W_Z]
+    # Tilts from the second body's z axis as the first body sees it.
+    out[RELATIVE_TILT], out[RELATIVE_TILT + 1] = tilts_of_axis(
+        out[RELATIVE_AXIS], out[RELATIVE_AXIS + 1], out[RELATIVE_AXIS + 2]
+    )
+    out[RELATIVE_TILT + 2] = 0.0
+
+
+@kernel
+def twist_of(i: int, j: int, work: Work) -> float:
+    """Angle about z of body j seen from body i (rad): it costs an arc tangent, and bearings rarely resist it."""
+    first, second = work.frames[i], work.frames[j]
+    cosine = first[0] * second[0] + first[3] * second[3] + first[6] * second[6]
+    sine = first[0] * second[1] + first[3] * second[4] + first[6] * second[7]
+    return math.atan2(-sine, cosine)
+
+
+@kernel
+def second_arm(i: int, j: int, one: Floats, work: Work) -> tuple[float, float, float]:
+    """Attachment in the second body j of a connector seen in the axes of the first, i (m)."""
+    x, y, z = one[SECOND_ARM], one[SECOND_ARM + 1], one[SECOND_ARM + 2]
+    if one[OFF_AXIS] == 0.0:
+        axis = work.relative
+        return axis[RELATIVE_AXIS] * z, axis[RELATIVE_AXIS + 1] * z, axis[RELATIVE_AXIS + 2] * z
+    turn, first = work.frames[j], work.frames[i]
+    gx = turn[0] * x + turn[1] * y + turn[2] * z
+    gy = turn[3] * x + turn[4] * y + turn[5] * z
+    gz = turn[6] * x + turn[7] * y + turn[8] * z
+    return (
+        first[0] * gx + first[3] * gy + first[6] * gz,
+        first[1] * gx + first[4] * gy + first[7] * gz,
+        first[2] * gx + first[5] * gy + first[8] * gz,
+    )
+
+
+@kernel
+def strain_connector(
+    one: Floats, on_ground: bool, bx: float, by: float, bz: float, motion: Floats, support: Floats
+) -> None:
+    """Fill strain and rate of a connector from the motion of its pair.
+
+    As Exudyn's RigidBodySpringDamper: second attachment (at b from its node) against the first in the first body's
+    axes, the rate not corrected for the turning of these axes.
+    """
+    ax, ay, az = one[FIRST_ARM], one[FIRST_ARM + 1], one[FIRST_ARM + 2]
+    x, y, z = motion[RELATIVE_PLACE], motion[RELATIVE_PLACE + 1], motion[RELATIVE_PLACE + 2]
+    if on_ground:  # where nothing turns, small differences come before large places
+        x += one[GAP] + (bx - one[SECOND_ARM])
+        y += one[GAP + 1] + (by - one[SECOND_ARM + 1])
+        z += one[GAP + 2] + (bz - one[SECOND_ARM + 2])
+    else:
+        x, y, z = x + bx - ax, y + by - ay, z + bz - az
+    ox, oy, oz = motion[FIRST_TURNING], motion[FIRST_TURNING + 1], motion[FIRST_TURNING + 2]
+    wx, wy, wz = motion[SECOND_TURNING], motion[SECOND_TURNING + 1], motion[SECOND_TURNING + 2]
+    support[0], support[1], support[2] = x, y, z
+    support[BODY_SIZE] = motion[RELATIVE_VELOCITY] + (wy * bz - wz * by) - (oy * az - oz * ay)
+    support[BODY_SIZE + 1] = motion[RELATIVE_VELOCITY + 1] + (wz * bx - wx * bz) - (oz * ax - ox * az)
+    support[BODY_SIZE + 2] = motion[RELATIVE_VELOCITY + 2] + (wx * by - wy * bx) - (ox * ay - oy * ax)
+    for k in range(3):
+        support[TILT + k] = motion[RELATIVE_TILT + k]
+    support[BODY_SIZE + TILT], support[BODY_SIZE + TILT + 1] = wx - ox, wy - oy
+    support[BODY_SIZE + SPIN] = wz - oz
+
+
+@kernel
+def load_connector(n: int, one: Floats, damping: Floats, support: Floats) -> None:
+    """Fill force and moment of connector n on its first body from strain and rate."""
+    # Two vectors of four sums in registers.
+    x, y, z, _x = one[OFFSET], one[OFFSET + 1], one[OFFSET + 2], one[OFFSET + 3]
+    a, b, c, _a = one[OFFSET + 4], one[OFFSET + 5], one[OFFSET + 6], one[OFFSET + 7]
+    time = one[LAG]
+    for column in range(BODY_SIZE):
+        # Damping in proportion to the stiffness acts as a strain that is ahead of itself.
+        ahead = support[column] + time * support[BODY_SIZE + column]
+        o = PADDED * column
+        x += one[o] * ahead
+        y += one[o + 1] * ahead
+        z += one[o + 2] * ahead
+        _x += one[o + 3] * ahead
+        a += one[o + 4] * ahead
+        b += one[o + 5] * ahead
+        c += one[o + 6] * ahead
+        _a += one[o + 7] * ahead
+    support[SUPPORT_LOAD], support[SUPPORT_LOAD + 1], support[SUPPORT_LOAD + 2] = x, y, z
+    support[SUPPORT_LOAD + 3], support[SUPPORT_LOAD + 4], support[SUPPORT_LOAD + 5] = a, b, c
+    if one[DAMPED] == 1.0:
+        for column in range(BODY_SIZE):
+            for row in range(BODY_SIZE):
+                support[SUPPORT_LOAD + row] += damping[n, column, row] * support[BODY_SIZE + column]
+
+
+@kernel
+def add_rolling(
+    q: Floats,
+    n: int,
+    bodies: Bodies,
+    connectors: Connectors,
+    rolling: RollingArrays | None,
+    support: Floats,
+    work: Work,
+) -> None:
+    """Add the rolling law of connector n, if it has one, to its force, its cage's torque to the spins."""
+    if rolling is None:
+        return
+    if rolling.first[n] == rolling.first[n + 1]:
+        return
+    turn = turn_between(q, n, bodies, connectors)
+    rolling_force(n, support[:BODY_SIZE], support[BODY_SIZE:SUPPORT_LOAD], turn, rolling, work.rolling)
+    for i in range(BODY_SIZE):
+        support[SUPPORT_LOAD + i] += work.rolling[ELASTIC_PART + i]
+    ground = bodies.start.size - 1
+    first, second = connectors.ends[n, 0], connectors.ends[n, 1]
+    if first != ground:
+        work.force[bodies.start[first] + SPIN] += work.rolling[CAGE_TORQUE]
+    if second != ground:
+        work.force[bodies.start[second] + SPIN] -= work.rolling[CAGE_TORQUE]
+
+
+@kernel
+def hand_to_body(frame: Floats, turned: bool, sign: float, sums: Floats, moment: int, load: Floats) -> None:
+    """Add a force and the moment that stands at an entry of sums, in a body's axes, to a load in global axes."""
+    x, y, z = sign * sums[0], sign * sums[1], sign * sums[2]
+    a, b, c = sign * sums[moment], sign * sums[moment + 1], sign * sums[moment + 2]
+    if turned:
+        x, y, z = (
+            frame[0] * x + frame[1] * y + frame[2] * z,
+            frame[3] * x + frame[4] * y + frame[5] * z,
+            frame[6] * x + frame[7] * y + frame[8] * z,
+        )
+        a, b, c = (
+            frame[0] * a + frame[1] * b + frame[2] * c,
+            frame[3] * a + frame[4] * b + frame[5] * c,
+            frame[6] * a + frame[7] * b + frame[8] * c,
+        )
+    load[WRENCH] += x
+    load[WRENCH + 1] += y
+    load[WRENCH + 2] += z
+    load[WRENCH + PADDED_TILT] += a
+    load[WRENCH + PADDED_TILT + 1] += b
+    load[WRENCH + PADDED_TILT + 2] += c
+
+
+@kernel
+def add_connectors(q: Floats, bodies: Bodies, connectors: Connectors, pairs: Pairs, work: Work) -> None:
+    """Add the forces of all connectors to `work.loads`, pair of bodies by pair; fill `work.supports`.
+
+    What both bodies do is turned into the first one's axes once for all connectors between them, and what they push
+    turned back once.
+    """
+    ground = bodies.start.size - 1
+    sums = work.sums
+    for p in range(pairs.ends.shape[0]):
+        i, j = pairs.ends[p, 0], pairs.ends[p, 1]
+        place_pair(p, work.places, pairs, ground, work)
+        if pairs.twisting[p] == 1:
+            work.relative[RELATIVE_TILT + 2] = twist_of(i, j, work)
+        for k in range(9):
+            sums[k] = 0.0
+        for n in range(pairs.first[p], pairs.first[p + 1]):
+            one, support = pairs.data[n], work.supports[n]
+            bx, by, bz = second_arm(i, j, one, work)
+            strain_connector(one, i == ground, bx, by, bz, work.relative, support)
+            load_connector(n, one, connectors.damping, support)
+            add_rolling(q, n, bodies, connectors, connectors.rolling, support, work)
+            fx, fy, fz = support[SUPPORT_LOAD], support[SUPPORT_LOAD + 1], support[SUPPORT_LOAD + 2]
+            ax, ay, az = one[FIRST_ARM], one[FIRST_ARM + 1], one[FIRST_ARM + 2]
+            mx, my, mz = support[SUPPORT_LOAD + 3], support[SUPPORT_LOAD + 4], support[SUPPORT_LOAD + 5]
+            sums[0] += fx
+            sums[1] += fy
+            sums[2] += fz
+            # Moments about both nodes.
+            sums[3] += mx + (ay * fz - az * fy)
+            sums[4] += my + (az * fx - ax * fz)
+            sums[5] += mz + (ax * fy - ay * fx)
+            sums[6] += mx + (by * fz - bz * fy)
+            sums[7] += my + (bz * fx - bx * fz)
+            sums[8] += mz + (bx * fy - by * fx)
+        if i != ground:
+            hand_to_body(work.frames[i], True, 1.0, sums, 3, work.loads[i])
+        hand_to_body(work.frames[i], i != ground, -1.0, sums, 6, work.loads[j])

@@ -1,0 +1,376 @@
+"""An assembly and its loads as the arrays of the compiled solver."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from exugear.bearings.kernels.rolling import rolling_memory
+from exugear.bodies.kernels.elastic import elastic_motion, scratch_for
+from exugear.bodies.kernels.travelling import travelling_memory
+from exugear.bodies.kernels.turning import turning_memory
+from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.loads import LoadTable
+from exugear.gearbox.sections.entries import GROUND
+from exugear.kernels.coordinates import BODY_SIZE, PADDED, PADDED_TILT, SPIN, TILT
+from exugear.kernels.products import filled_up
+from exugear.tooth_mesh.kernels.fast_meshes import (
+    STATES_SIZE,
+    TURNING,
+    Meshes,
+    MeshMemory,
+    padded_rows,
+)
+from exugear.tooth_mesh.kernels.meshes import (
+    FRAME,
+    ROW_SIZE,
+    SPIN_1,
+    SPIN_2,
+    TILT_DAMPING,
+    TILT_LEVER,
+    TILT_MOMENT,
+    TILT_REST,
+    TILT_STIFFNESS,
+    MeshArrays,
+)
+from exugear.tooth_mesh.kernels.table_law import (
+    DAMPING_SIZE,
+    NOMINAL_DEFLECTION,
+    NOMINAL_MISALIGNMENT,
+    scratch_memory,
+)
+from exugear.tooth_mesh.laws.registry import LAWS
+from exugear.tooth_mesh.laws.table import TABLE_FORM
+from exugear.transient.compiled.arrays import (
+    COS_A,
+    COS_B,
+    DAMPED,
+    FIRST_ARM,
+    FRAME_SIZE,
+    GAP,
+    LAG,
+    NODES,
+    OFF_AXIS,
+    OFFSET,
+    PAIR_SIZE,
+    RELATIVE_SIZE,
+    SECOND_ARM,
+    SUPPORT_SIZE,
+    Bodies,
+    Connectors,
+    Equations,
+    Joints,
+    Loads,
+    Pairs,
+    Places,
+    Springs,
+    Work,
+)
+from fe_ste.tools.arrays import Booleans, Floats, Integers
+
+ROUND_OFF = 1e-14
+"""Entries of a bearing's matrix this small beside its diagonal are left-overs of rotating it, and left out."""
+
+
+def extended_size(assembly: Assembly) -> int:
+    """Count the coordinates with those of travelling seats."""
+    return assembly.size + BODY_SIZE * assembly.travelling.first.size
+
+
+class _Numbers:
+    """Numbering of bodies and of the coordinates whose sine is needed."""
+
+    def __init__(self, assembly: Assembly) -> None:
+        self.assembly = assembly
+        self.size = extended_size(assembly)
+        self.starts = [int(start) for start in assembly.inertia.body]
+        # Of elastic bodies only seats in bearings turn anything out of their own coordinates.
+        seats = np.setdiff1d(assembly.connectors.bodies, [-1, *self.starts])
+        self.starts += [int(start) for start in seats]
+        self.turning = [self.size]
+
+    def body(self, start: int) -> int:
+        """Find the number of the body that starts at a coordinate; the ground (-1) comes last."""
+        return len(self.starts) if start < 0 else self.starts.index(start)
+
+    def slot(self, coordinate: int) -> int:
+        """Tell where a coordinate's sine stands, taking it up if it is new; 0 for none."""
+        if coordinate < 0:
+            return 0
+        if coordinate not in self.turning:
+            self.turning.append(coordinate)
+        return self.turning.index(coordinate)
+
+
+def _connectors(numbers: _Numbers) -> tuple[Connectors, Integers]:
+    """Connectors, and the slot of the sine of each body's spin where a connector needs it."""
+    given = numbers.assembly.connectors
+    ends = np.array([[numbers.body(int(s)) for s in pair] for pair in given.bodies], dtype=np.int64).reshape(-1, 2)
+    order = np.lexsort((ends[:, 1], ends[:, 0])).astype(np.int64)
+    given = given.chosen(order)
+    ends = ends[order]
+    slots = np.zeros(len(numbers.starts) + 1, dtype=np.int64)
+    twisting = np.zeros(len(ends), dtype=np.int64)
+    matrices = np.zeros((2, len(ends), BODY_SIZE, BODY_SIZE))
+    time = np.zeros(len(ends))
+    for n, (i, j) in enumerate(ends):
+        stiffness, damping = _without_round_off(given.stiffness[n]), _without_round_off(given.damping[n])
+        time[n] = _damping_time(stiffness, damping)
+        matrices[:, n] = stiffness.T, damping.T * (time[n] == 0.0)
+        twisting[(ends == ends[n]).all(axis=1)] |= stiffness[:, SPIN].any()
+        for end, needed in ((i, True), (j, stiffness[:, SPIN].any() or given.local[n, 1, :2].any())):
+            if needed and end < len(numbers.starts):
+                slots[end] = numbers.slot(numbers.starts[end] + SPIN)
+    connectors = Connectors(
+        number=order,
+        ends=ends,
+        local=given.local,
+        gap=(given.node[:, 1] + given.local[:, 1]) - (given.node[:, 0] + given.local[:, 0]),
+        repeated=np.append(0, (ends[1:] == ends[:-1]).all(axis=1)).astype(np.int64)[: len(ends)],
+        twisting=twisting,
+        stiffness=matrices[0],
+        offset=given.offset,
+        time=time,
+        damping=matrices[1],
+        damped=matrices[1].any(axis=(1, 2)).astype(np.int64),
+        rolling=given.rolling if given.rolling.layout.size else None,
+    )
+    return connectors, slots
+
+
+def _pairs(connectors: Connectors, nodes: Floats) -> Pairs:
+    """Pairs of bodies of the connectors; nodes (c, 3): second node against the first at zero angles."""
+    count = len(connectors.number)
+    begins = np.flatnonzero(connectors.repeated == 0)
+    data = np.zeros((count, PAIR_SIZE))
+    columns = data[:, : PADDED * BODY_SIZE].reshape(count, BODY_SIZE, PADDED)
+    columns[:, :, :TILT], columns[:, :, PADDED_TILT : PADDED_TILT + TILT] = (
+        connectors.stiffness[:, :, :TILT],
+        connectors.stiffness[:, :, TILT:],
+    )
+    data[:, OFFSET : OFFSET + TILT] = connectors.offset[:, :TILT]
+    data[:, OFFSET + PADDED_TILT : OFFSET + PADDED_TILT + TILT] = connectors.offset[:, TILT:]
+    data[:, FIRST_ARM : FIRST_ARM + 3] = connectors.local[:, 0]
+    data[:, LAG] = connectors.time
+    data[:, SECOND_ARM : SECOND_ARM + 3] = connectors.local[:, 1]
+    data[:, OFF_AXIS] = connectors.local[:, 1, :2].any(axis=1)
+    data[:, GAP : GAP + 3] = connectors.gap
+    data[:, NODES : NODES + 3] = nodes
+    data[:, DAMPED] = connectors.damped
+    return Pairs(
+        ends=connectors.ends[begins],
+        first=np.append(begins, count).astype(np.int64),
+        twisting=connectors.twisting[begins],
+        data=data,
+    )
+
+
+def _places(numbers: _Numbers) -> tuple[Places, Integers]:
+    """Places of bodies, of seats that connectors or meshes act on and of single spins; (m, 2) those of each mesh."""
+    given = numbers.assembly.meshes.coordinates
+    starts = [*numbers.starts, numbers.size]
+    spins: list[int] = []
+    gears = given[:, :FRAME].reshape(-1, 2, BODY_SIZE)
+    for x, spin in gears[:, :, [0, SPIN]].reshape(-1, 2):
+        if x >= 0 and x not in starts:
+            starts.append(int(x))
+        if x < 0 <= spin and spin not in spins:
+            spins.append(int(spin))
+    ends = np.full(gears.shape[:2], len(numbers.starts), dtype=np.int64)
+    for (m, end), _ in np.ndenumerate(ends):
+        x, spin = gears[m, end, 0], gears[m, end, SPIN]
+        if x >= 0:
+            ends[m, end] = starts.index(int(x))
+        elif spin >= 0:
+            ends[m, end] = len(starts) + spins.index(int(spin))
+    return Places(np.array(starts, dtype=np.int64), np.array(spins, dtype=np.int64)), ends
+
+
+def _damping_time(stiffness: Floats, damping: Floats) -> float:
+    """Damping over stiffness (s) if they are in proportion, else 0."""
+    largest = np.unravel_index(np.argmax(np.abs(stiffness)), stiffness.shape)
+    if stiffness[largest] == 0.0:
+        return 0.0
+    time = float(damping[largest] / stiffness[largest])
+    return time if np.allclose(damping, time * stiffness, rtol=1e-12, atol=1e-14 * np.abs(damping).max()) else 0.0
+
+
+def _without_round_off(matrix: Floats) -> Floats:
+    """Set entries to zero that are nothing beside the translations' and the tilts' stiffness."""
+    entries = np.abs(matrix)
+    size = np.sqrt(np.repeat([entries[:TILT, :TILT].max(), entries[TILT:, TILT:].max()], 3))
+    return np.where(entries <= ROUND_OFF * np.outer(size, size), 0.0, matrix)
+
+
+def spinning_alone(meshes: MeshArrays) -> Booleans:
+    """Tell of each mesh whether its gears have their spins alone, (m,)."""
+    others = np.delete(meshes.coordinates[:, :FRAME], [SPIN_1, SPIN_2], axis=1)
+    return np.asarray((others < 0).all(axis=1))
+
+
+def _meshes(numbers: _Numbers, ends: Integers) -> Meshes:
+    given = numbers.assembly.meshes
+    axis = given.axis.copy()
+    axis[given.coordinates[:, :FRAME].reshape(-1, 2, BODY_SIZE)[:, :, 0] < 0] = 0.0
+    elements = numbers.assembly.elements
+    table = given.table
+    kinds = [given.deflection, given.force]
+    if (given.form == TABLE_FORM).any():
+        kinds += [table.centre, table.misalignment, table.back, table.back_misalignment]
+    rows, offsets = padded_rows(np.stack(kinds, axis=1), axis)
+    return Meshes(
+        coordinates=np.where(given.coordinates < 0, numbers.size, given.coordinates),
+        slot=np.array([numbers.slot(int(c)) for c in given.coordinates[:, FRAME]], dtype=np.int64),
+        axis=axis,
+        form=given.form,
+        deflection=given.deflection,
+        force=given.force,
+        conjugate=np.all(given.deflection == given.force, axis=1).astype(np.int64),
+        tilting=(given.tilt[:, TILT_STIFFNESS] > 0.0).astype(np.int64),
+        tilt=_tilts(given),
+        spinning=spinning_alone(given).astype(np.int64),
+        ends=ends,
+        rows=rows,
+        offsets=offsets,
+        cycles=given.cycles,
+        phase=given.phase,
+        pieces=given.pieces,
+        stiffness=given.stiffness,
+        damping=given.damping,
+        mean=np.array([(e.tangent.mean(), e.damping) for e in elements]).reshape(-1, 2),
+        line_of_action=given.line_of_action,
+        error_pieces=given.error_pieces,
+        error=given.error,
+        nominal=table.nominal[:, NOMINAL_DEFLECTION].copy(),
+        table=table if (given.form == TABLE_FORM).any() else None,
+    )
+
+
+def _tilts(given: MeshArrays) -> Floats:
+    """How meshes resist misalignment, (m, 7): `Meshes.tilt`."""
+    rows = given.table.misalignment[:, TILT : TILT + 2]
+    shift = given.table.nominal[:, NOMINAL_MISALIGNMENT] - given.tilt[:, TILT_REST]
+    return np.column_stack([rows, shift, given.tilt[:, [TILT_STIFFNESS, TILT_DAMPING, TILT_LEVER, TILT_MOMENT]]])
+
+
+def _joints(numbers: _Numbers) -> Joints | None:
+    assembly = numbers.assembly
+    joints = assembly.gearbox.joints if assembly.variant == "rigid" else ()
+    bodies = {body.name: body for body in assembly.gearbox.bodies(assembly.inertias)}
+    number = {joint.body: n for n, joint in enumerate(joints)}
+    ends = [[number.get(e.mesh.pinion, -1), number.get(e.mesh.gear, -1)] for e in assembly.elements]
+    planet, carrier = np.zeros((len(joints), 3)), np.full(len(joints), numbers.size)
+    for n, joint in enumerate(joints):
+        body = bodies[joint.body]
+        if body.carrier is not None:
+            axis = np.array(body.axis) - np.array(bodies[body.carrier].axis)
+            planet[n] = body.mass, axis[0], axis[1]
+            carrier[n] = assembly.spin[body.carrier]
+    if not joints:
+        return None
+    return Joints(
+        ends=np.array(ends, dtype=np.int64).reshape(-1, 2),
+        host=np.array([-1 if j.on == GROUND else number.get(j.on, -1) for j in joints], dtype=np.int64),
+        planet=planet,
+        carrier=carrier.astype(np.int64),
+        slot=np.array([numbers.slot(int(c)) if c < numbers.size else 0 for c in carrier], dtype=np.int64),
+    )
+
+
+def _loads(assembly: Assembly, loads: LoadTable) -> Loads:
+    series = list(loads.series.values())
+    drive = () if loads.drive is None else (loads.drive,)
+    following = np.zeros(extended_size(assembly) - assembly.size)
+    return Loads(
+        steady=np.append(assembly.torque_vector(loads.constant) + assembly.weight, following),
+        coordinate=np.array([assembly.spin[name] for name in loads.series], dtype=np.int64),
+        first=np.cumsum([0] + [len(times) for times, _ in series]).astype(np.int64),
+        time=np.concatenate([np.zeros(0)] + [times for times, _ in series]),
+        torque=np.concatenate([np.zeros(0)] + [torques for _, torques in series]),
+        drive=np.array([assembly.spin[d.body] for d in drive], dtype=np.int64),
+        law=np.array([(d.stiffness, d.damping, *d.angle) for d in drive]).reshape(-1, 5),
+    )
+
+
+def equations_of(assembly: Assembly, loads: LoadTable) -> Equations:
+    """Arrays of an assembly under loads, as the compiled loops read them."""
+    numbers = _Numbers(assembly)
+    connectors, slots = _connectors(numbers)
+    places, ends = _places(numbers)
+    meshes, joints = _meshes(numbers, ends), _joints(numbers)
+    nodes = assembly.connectors.node[connectors.number]
+    inertia, springs = assembly.inertia, assembly.springs
+    # All sorts of elastic bodies together, so that few sorts of systems are compiled.
+    elastic = bool(assembly.elastic_bodies)
+    bodies = Bodies(
+        start=np.append(np.array(numbers.starts, dtype=np.int64), numbers.size),
+        slot=slots,
+        mass=inertia.mass,
+        transverse=inertia.transverse,
+        axial=inertia.axial,
+        shares=1.0 / np.stack([inertia.mass, inertia.transverse, inertia.axial], axis=1),
+        spin=inertia.spin,
+        spin_inertia=inertia.spin_inertia,
+        inverse=np.zeros((0, 0)) if LAWS[assembly.mesh_law].has_force else _rolling_inverse(assembly),
+        turning=np.array(numbers.turning, dtype=np.int64),
+    )
+    return Equations(
+        bodies=bodies,
+        places=places,
+        connectors=connectors,
+        pairs=_pairs(connectors, nodes[:, 1] - nodes[:, 0]),
+        meshes=meshes,
+        travelling=assembly.travelling if elastic else None,
+        springs=Springs(springs.coordinates, springs.stiffness, springs.damping),
+        loads=_loads(assembly, loads),
+        joints=joints,
+        elastic=elastic_motion(assembly.elastic) if elastic else None,
+        turning=assembly.turning_arrays if elastic else None,
+    )
+
+
+def _rolling_inverse(assembly: Assembly) -> Floats:
+    """Inverse mass matrix of spins that only roll: B (B^T M B)^-1 B^T with the free motions B."""
+    free, mass = assembly.motions, assembly.mass_matrix
+    inverse = free @ np.linalg.solve(free.T @ mass @ free, free.T)
+    return np.ascontiguousarray(inverse[np.ix_(assembly.inertia.spin, assembly.inertia.spin)])
+
+
+def work_for(equations: Equations, q: Floats, v: Floats) -> Work:
+    """Memory for the compiled loops, at the state q, v (size,)."""
+    size = filled_up(equations.loads.steady.size + BODY_SIZE)
+    count = equations.meshes.slot.size
+    count_of_places = equations.places.start.size + equations.places.spin.size
+    rolling = equations.connectors.rolling
+    frames = np.zeros((equations.bodies.start.size, FRAME_SIZE))
+    frames[-1, [0, 4, 8, COS_A, COS_B]] = 1.0  # the ground neither turns nor tilts
+    return Work(
+        q=np.append(q, np.zeros(size - q.size)),
+        v=np.append(v, np.zeros(size - q.size)),
+        stage_q=np.zeros(size),
+        stage_v=np.zeros(size),
+        force=np.zeros(size),
+        rate=np.zeros(size),
+        turns=np.zeros((equations.bodies.turning.size, 2)),
+        frames=frames,
+        places=np.zeros((count_of_places, 2 * PADDED)),
+        loads=np.zeros((count_of_places, 2 * PADDED)),
+        relative=np.zeros(RELATIVE_SIZE),
+        sums=np.zeros(9),
+        supports=np.zeros((equations.connectors.number.size, SUPPORT_SIZE)),
+        motion=np.zeros(3 * PADDED),
+        rolling=np.zeros(0) if rolling is None else rolling_memory(rolling),
+        mesh=MeshMemory(
+            gradient=np.zeros((3, ROW_SIZE)),
+            gradients=np.zeros((4, TURNING + 1)),
+            states=np.zeros((count, STATES_SIZE)),
+            pieces=np.zeros((count, 2), dtype=np.int64),
+            law=None if equations.meshes.table is None else scratch_memory(),
+            row=np.zeros(FRAME),
+            damping=np.zeros(DAMPING_SIZE),
+        ),
+        series=equations.loads.first[:-1].copy(),
+        shares=np.zeros((0, 0, 0)) if equations.travelling is None else travelling_memory(equations.travelling),
+        damped=np.zeros(2),
+        scratch=np.zeros((3, 0)) if equations.elastic is None else scratch_for(equations.elastic),
+        memory=np.zeros((7, 0)) if equations.turning is None else turning_memory(equations.turning),
+    )

@@ -1,0 +1,87 @@
+"""What stands in an Exudyn system, by the names of the assembly, and where others are fixed to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from exugear.dynamics.assembly import Assembly
+from exugear.gearbox.seats import node_position, seat_key
+from exugear.transient.exudyn_model.floating_bodies import FloatingBodies
+from exugear.transient.exudyn_model.library import exudyn, items
+from fe_ste.tools.arrays import Floats
+
+SPIN_COORDINATE = 5
+"""Coordinate of a rigid-body node that is its spin."""
+
+
+@dataclass
+class Parts:
+    """Nodes and objects of an Exudyn system.
+
+    Attributes
+    ----------
+    mbs : exudyn.MainSystem
+    assembly : Assembly
+    nodes : node of each body; of an elastic one that of its main seat, and those of its seats under
+        `exugear.gearbox.seats.seat_key`
+    bodies : object of each rigid body
+    elastic_nodes : all nodes of each elastic body: those of its seats, then one for its modal coordinates
+    seat_positions : (3,) of each seat by its key, m
+    floating : bodies in floating frames, if there are any
+    """
+
+    mbs: Any
+    assembly: Assembly
+    nodes: dict[str, Any] = field(default_factory=dict)
+    bodies: dict[str, Any] = field(default_factory=dict)
+    elastic_nodes: dict[str, list[Any]] = field(default_factory=dict)
+    seat_positions: dict[str, Floats] = field(default_factory=dict)
+    floating: FloatingBodies | None = None
+    _ground: Any = None
+
+    @property
+    def all_nodes(self) -> list[Any]:
+        """Nodes of all bodies in the order of the assembly's coordinates."""
+        rigid = [body.name for body in self.assembly.bodies if body.name not in self.elastic_nodes]
+        elastic = [node for nodes in self.elastic_nodes.values() for node in nodes]
+        return [self.nodes[name] for name in rigid] + elastic
+
+    def support_marker(self, body: str, item: str, position: Floats) -> Any:
+        """Marker of a support at a position (m, at zero angles) on a body, on an elastic one's seat, or the ground."""
+        key = seat_key(body, item)
+        if key in self.nodes and not (position - self.seat_positions[key]).any():
+            return self.mbs.AddMarker(items.MarkerNodeRigid(nodeNumber=self.nodes[key]))
+        if key in self.nodes:  # beside the seat's centre: a body without mass is the arm
+            arm = items.ObjectRigidBody(physicsMass=0.0, physicsInertia=[0.0] * 6, nodeNumber=self.nodes[key])
+            number, local = self.mbs.AddObject(arm), position - self.seat_positions[key]
+        elif body in self.bodies:
+            carrying = next(b for b in self.assembly.bodies if b.name == body)
+            number, local = self.bodies[body], position - node_position(carrying)
+        else:
+            number, local = self._ground_object(), position
+        return self.mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=number, localPosition=np.asarray(local).tolist()))
+
+    def support_spin(self, body: str, item: str) -> Callable[[], float]:
+        """Tell how to ask for the spin (rad, unwrapped) of what carries a support: a body, its seat, or the ground."""
+        node = self.nodes.get(seat_key(body, item), self.nodes.get(body))
+        if node is None:
+            return lambda: 0.0
+        coordinates = exudyn.OutputVariableType.Coordinates
+        return lambda: float(self.mbs.GetNodeOutput(node, coordinates)[SPIN_COORDINATE])
+
+    def _ground_object(self) -> Any:
+        if self._ground is None:
+            self._ground = self.mbs.AddObject(items.ObjectGround())
+        return self._ground
+
+    def spin_marker(self, body: str, seat: str | None = None) -> Any:
+        """Marker of a body's spin, of an elastic one at a seat or where torques act."""
+        key = seat_key(body, seat or "")
+        has_six = self.assembly.coordinates[body][0] >= 0
+        node = self.nodes[key if key in self.nodes else body]
+        coordinate = SPIN_COORDINATE if has_six else 0
+        return self.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=coordinate))

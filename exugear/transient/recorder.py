@@ -1,0 +1,280 @@
+"""What a run leaves behind: its states turned into signals, filtered, judged and written piece by piece.
+
+Two buffers take turns: while a solver fills one, a second thread filters, judges and writes the other. Its verdict is
+heard when the next buffer is full, whichever thread is faster, so that a run depends on no clock. A worker of a study
+shares the cores with others and does both in turn; the results are the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import NamedTuple
+
+import numpy as np
+
+from exugear.dynamics.signals import ENERGIES, POWERS
+from exugear.results.pieces import Checkpoint
+from exugear.results.run_file import RunFile
+from exugear.transient.account import EnergyAccount
+from exugear.transient.compiled.observers import Observer
+from exugear.transient.extent import buffer_rows
+from exugear.transient.plan import RunPlan
+from exugear.transient.start import RunStart
+from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.threads import second_thread
+
+FLUSH_INTERVAL = 0.25
+"""Simulated time between writes to disk, s."""
+FLUSH_FACTOR = {"compiled": 2, "exudyn": 1}
+"""How many times this interval each solver goes without: a piece costs as much as 2000 compiled steps."""
+
+
+class Room(NamedTuple):
+    """Rows of a `StateBuffer`: coordinates and velocities (n, size), signals (n, columns), energies, powers (n, 7)."""
+
+    q: Floats
+    v: Floats
+    signals: Floats
+    energies: Floats
+
+
+class StateBuffer:
+    """States of a run between two writes, and what was observed of them.
+
+    Parameters
+    ----------
+    rows, size, columns : int
+        Most states; coordinates and signals of a state.
+
+    Attributes
+    ----------
+    filled, observed : int
+        States that are in it, and how many of them have their signals.
+    """
+
+    def __init__(self, rows: int, size: int, columns: int) -> None:
+        self.filled = self.observed = 0
+        self._times = np.empty(rows)
+        widths = (size, size, columns, len(ENERGIES) + len(POWERS))
+        self._rows = Room._make(np.empty((rows, width)) for width in widths)
+
+    @property
+    def full(self) -> bool:
+        """Whether no state fits in any more."""
+        return self.filled == len(self._times)
+
+    def room(self, most: int) -> Room:
+        """Rows of the next states, up to so many, for a solver to fill."""
+        return self._between(self.filled, min(self.filled + most, len(self._times)))
+
+    def take(self, times: Floats) -> None:
+        """Count states that were filled into the room, at times (n,), s."""
+        end = self.filled + len(times)
+        self._times[self.filled : end] = times
+        self.filled = end
+
+    def states(self, first: int = 0) -> tuple[Floats, Room]:
+        """Return times (n,) and rows of the states in it, from a number on."""
+        return self._times[first : self.filled], self._between(first, self.filled)
+
+    def clear(self) -> None:
+        """Forget all states."""
+        self.filled = self.observed = 0
+
+    def _between(self, first: int, end: int) -> Room:
+        return Room._make(rows[first:end] for rows in self._rows)
+
+
+class Recorder:
+    """Keeper of a run in progress; as a context manager it waits for what is being written.
+
+    Parameters
+    ----------
+    plan : RunPlan
+    start : RunStart
+    file : RunFile
+        The file that grows with the run.
+    progress : callable, optional
+        Called after each write, in the caller's thread, with the time that is on the disk, s.
+
+    Attributes
+    ----------
+    buffer : StateBuffer
+        Where states wait to be written.
+    last_time : float
+        Time of the last state that counts, s.
+    fault : str
+        What ended the run, empty if nothing did.
+    past : (n, size) array
+        Accelerations that a solver with a memory goes on from after the last state, the latest last.
+    """
+
+    def __init__(
+        self, plan: RunPlan, start: RunStart, file: RunFile, progress: Callable[[float], None] | None = None
+    ) -> None:
+        self.last_time = 0.0
+        self.fault = ""
+        self._plan = plan
+        self._start = start
+        self._file = file
+        self._progress = progress
+        self._judge = start.judge
+        self._observer = Observer(plan.assembly, start.loads)
+        self._layout = self._observer.layout
+        self._decimator = plan.decimator()
+        self._decimator.pending, self._decimator.pending_first = start.state.pending, start.state.pending_first
+        self._account = EnergyAccount(plan.step, start.state.balance, start.state.powers)
+        self._mesh_times = start.state.mesh_times
+        self.past = start.state.past
+        wanted = FLUSH_FACTOR[plan.solver] * FLUSH_INTERVAL / plan.step
+        size = plan.assembly.size
+        rows = buffer_rows(wanted, size, self._layout.count)
+        self.buffer, self._spare = (StateBuffer(rows, size, self._layout.count) for _ in range(2))
+        self._stopped = self._judge.stop
+        self._writer = second_thread()
+        self._writing: Future[float] | None = None
+
+    def __enter__(self) -> Recorder:
+        """Have the loop over time compiled, which takes seconds once per installation, while Ctrl-C still ends it."""
+        nothing = np.empty((0, self._plan.assembly.size))
+        self._observer.observe(np.empty(0), nothing, nothing)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Wait for the second thread, and give back the memory of the buffers."""
+        self._writer.shutdown()
+        self.buffer = self._spare = StateBuffer(0, 0, 0)
+
+    @property
+    def halted(self) -> bool:
+        """Whether the run is known to be beyond a limit that no run may pass, or has a fault."""
+        return bool(self.fault) or self._stopped
+
+    def begin(self, time: float, q: Floats, v: Floats) -> None:
+        """Take the state that the run starts from, at a time (s); a resumed run has it in its pieces already."""
+        if self._start.resumed:
+            self.last_time = time
+            return
+        self.keep(time, q, v)
+        if not self.fault:
+            self._observe_rest(self.buffer)
+            self._account.begin(self.buffer.states()[1].energies[0, len(ENERGIES) :])
+
+    def keep(self, time: float, q: Floats, v: Floats) -> None:
+        """Take one state at a time (s); one that is not finite is a fault."""
+        if not (np.isfinite(q).all() and np.isfinite(v).all()):
+            self.fault = f"the state is not finite at t = {time:.6g} s"
+            return
+        room = self.buffer.room(1)
+        room.q[0], room.v[0] = q, v
+        self._take(np.array([time]))
+
+    def take_observed(self, times: Floats) -> None:
+        """Take the states that a solver left in the room of the buffer, with their signals, at times (n,), s."""
+        self.buffer.observed += len(times)
+        self._take(times)
+
+    def _take(self, times: Floats) -> None:
+        self.buffer.take(times)
+        if len(times):
+            self.last_time = float(times[-1])
+        if self.buffer.full:
+            self._hand_over()
+
+    def _observe_rest(self, buffer: StateBuffer) -> None:
+        """Observe the states that a solver left without signals: they follow those that have them."""
+        times, rows = buffer.states(buffer.observed)
+        if not len(times):
+            return
+        rows.signals[:], energies, powers = self._observer.observe(times, rows.q, rows.v)
+        rows.energies[:, : len(ENERGIES)], rows.energies[:, len(ENERGIES) :] = energies, powers
+        buffer.observed = buffer.filled
+
+    def finish(self) -> None:
+        """Write all that was taken; who ended the run hears no more of its progress."""
+        self._progress = None
+        self._hand_over()
+        self._await_writing()
+
+    def _hand_over(self) -> None:
+        """Have the buffer written and go on with the other, unless what was written before ends the run there."""
+        self._await_writing()
+        if self._stopped:
+            self.buffer.clear()
+            self.fault = ""  # of a state beyond the end
+        elif self.buffer.filled:
+            against = (self.fault,) if self.fault else ()
+            self._writing = self._writer.submit(self._write, self.buffer, self.past, against)
+            self.buffer, self._spare = self._spare, self.buffer
+
+    def _await_writing(self) -> None:
+        """Wait for the buffer that is being written, and hear the verdict on it."""
+        if self._writing is None:
+            return
+        written, self._writing = self._writing.result(), None
+        self._stopped = self._judge.stop
+        if self._stopped:
+            self.last_time = written
+        if self._progress is not None:
+            self._progress(written)
+
+    def _write(self, buffer: StateBuffer, past: Floats, against: tuple[str, ...]) -> float:
+        """Turn the states of a buffer into signals, write them and the state to go on from; return its time (s)."""
+        with np.errstate(over="ignore", invalid="ignore"):  # a run that diverges ends in numbers too large to add up
+            self._observe_rest(buffer)
+            times, rows = buffer.states()
+            self._observer.complete(rows.q, rows.v, rows.signals)
+            written = self._lines_to_write(len(times))
+            # A solver that observes its steps leaves out the energies, which are asked for seldom.
+            _, energies, _ = self._observer.observe(times[written], rows.q[written], rows.v[written])
+            balances = self._account.carry_on(rows.energies[:, len(ENERGIES) :], written, energies)
+        self._judge.see(times, self._layout.values("mesh_dte", rows.signals), rows.v, times[written], balances)
+        self._mesh_times = self._mesh_times + self._plan.step * self._layout.mesh_times(rows.signals)
+        centre, samples = self._decimator.push(rows.signals)
+        numbers = centre + self._decimator.factor * np.arange(len(samples), dtype=np.float64)
+        end = float(times[-1])
+        self._note_verdict(against + self._reasons(end))
+        state = self._checkpoint(end, rows, past)
+        pieces = self._start.pieces
+        self._file.add(pieces.append(self._plan.step * numbers, samples, times[written], balances, state))
+        buffer.clear()
+        return end
+
+    def _lines_to_write(self, count: int) -> Integers:
+        """Numbers of the lines of the account that are written, of so many: each interval's first, and the last."""
+        stride = max(1, round(FLUSH_INTERVAL / self._plan.step))
+        return np.unique(np.append(np.arange(0, count, stride), count - 1))
+
+    def _checkpoint(self, time: float, rows: Room, past: Floats) -> Checkpoint:
+        """State to go on from: the last of these rows, at a time (s)."""
+        return Checkpoint(
+            step=round(time / self._plan.step),
+            q=rows.q[-1],
+            v=rows.v[-1],
+            past=past,
+            pending=self._decimator.pending,
+            pending_first=self._decimator.pending_first,
+            balance=self._account.balance,
+            powers=self._account.powers,
+            start_angle=self._start.state.start_angle,
+            mesh_times=self._mesh_times,
+            judgement=self._judge.figures,
+        )
+
+    def reasons(self) -> tuple[str, ...]:
+        """Reasons why the run is not to be trusted so far."""
+        return self._reasons(self.last_time)
+
+    def _reasons(self, time: float) -> tuple[str, ...]:
+        return self._judge.reasons(self._mesh_times, time)
+
+    def note_verdict(self) -> None:
+        """Add to the pieces that follow what the run may claim so far, and what speaks against it."""
+        self._note_verdict(((self.fault,) if self.fault else ()) + self.reasons())
+
+    def _note_verdict(self, against: tuple[str, ...]) -> None:
+        pieces = self._start.pieces
+        pieces.note("limits", self._judge.limits.to_json())
+        pieces.note("verdict", "; ".join(against) or "within all limits")
+        pieces.note("trusted", 0 if against else 1)

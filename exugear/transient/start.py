@@ -1,0 +1,144 @@
+"""Where a run starts from and what acts on it, anew or from the last piece of a run that was stopped."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.loads import DriveLaw, LoadTable
+from exugear.dynamics.signals import BALANCE_TERMS, MESH_TIMES, POWERS, SignalLayout, signal_layout
+from exugear.dynamics.statics import accelerating_start
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.load_cases.summary import (
+    doubt_about_bearings,
+    drive_rate,
+    driven_start_speed,
+    summarise_loads,
+)
+from exugear.gearbox.load_cases.torque_series import torque_series
+from exugear.gearbox.parts import LoadCase
+from exugear.results.pieces import Checkpoint, RunPieces
+from exugear.results.run_file import EARLIER_PARTIAL_NAME
+from exugear.transient.outcome import RunError
+from exugear.transient.plan import EXPECTATIONS, RunPlan
+from exugear.transient.run_folder import refuse_to_resume
+from exugear.transient.trust import Judge
+from fe_ste.tools.arrays import Floats
+
+
+@dataclass(frozen=True, eq=False)
+class RunStart:
+    """A run that can begin.
+
+    Attributes
+    ----------
+    loads : LoadTable
+        What acts from outside.
+    state : Checkpoint
+        State to start from.
+    pieces : RunPieces
+        What is written so far, and where the rest goes.
+    judge : Judge
+    resumed : bool
+        Whether the state is that of a run that was stopped, which is in the file already.
+    """
+
+    loads: LoadTable
+    state: Checkpoint
+    pieces: RunPieces
+    judge: Judge
+    resumed: bool
+
+
+def prepare_start(plan: RunPlan, resume: bool) -> RunStart:
+    """Find the state to start from and open the pieces.
+
+    Raises
+    ------
+    RunError
+        There is nothing to resume, it was run with other choices, or was stopped for good.
+    """
+    assembly, case = plan.assembly, plan.case
+    gearbox = assembly.gearbox
+    series = torque_series(gearbox, case)
+    summary = summarise_loads(gearbox, case, assembly.inertias, plan.duration, series)
+    judge = Judge(assembly, summary)
+    layout = signal_layout(assembly)
+    if resume:
+        pieces = _pieces_to_resume(plan, layout)
+        state = pieces.last_checkpoint()
+        _take_over_judgement(plan, judge, state)
+    else:
+        state = _first_state(assembly, case, series, layout, judge)
+        (plan.directory / EARLIER_PARTIAL_NAME).unlink(missing_ok=True)
+        doubt = doubt_about_bearings(gearbox, summary, assembly.variant)
+        pieces = RunPieces(plan.partial_path, layout, {**plan.attributes(), "bearing_doubt": doubt})
+    return RunStart(_load_table(case, series, state.start_angle, gearbox), state, pieces, judge, resume)
+
+
+def _pieces_to_resume(plan: RunPlan, layout: SignalLayout) -> RunPieces:
+    reason = refuse_to_resume(plan.directory)
+    if reason:
+        raise RunError(f"{reason}; run without resuming")
+    pieces = RunPieces(plan.partial_path, layout)
+    for key, value in plan.attributes().items():
+        kept = pieces.attributes.get(key, "element" if key == "mesh_route" else None)  # earlier runs had no other
+        if key not in ("complete", "solver", *EXPECTATIONS) and kept != value:
+            raise RunError(f"{plan.partial_path}: was run with {key} = {kept}, not {value}; start anew")
+    return pieces
+
+
+def _take_over_judgement(plan: RunPlan, judge: Judge, state: Checkpoint) -> None:
+    judge.figures = state.judgement
+    if judge.stop:
+        reasons = judge.reasons(state.mesh_times, state.step * plan.step)
+        raise RunError(f"{plan.partial_path}: stopped for good: {'; '.join(reasons)}; run it anew")
+
+
+def _first_state(
+    assembly: Assembly,
+    case: LoadCase,
+    series: Mapping[str, tuple[Floats, Floats]],
+    layout: SignalLayout,
+    judge: Judge,
+) -> Checkpoint:
+    """State at the start in balance; a drive is ahead by the angle at which it carries its torque."""
+    torques = {**case.torques, **{name: float(values[0]) for name, (_, values) in series.items()}}
+    driven = None
+    if case.driven_body is not None:
+        driven = case.driven_body, drive_rate(assembly.gearbox, case)
+    balanced = accelerating_start(assembly, torques, assembly.gearbox.start_speeds(case), driven)
+    start_angle = 0.0
+    if case.driven_body is not None and case.drive_stiffness is not None:
+        start_angle = float(balanced.q[assembly.spin[case.driven_body]]) + balanced.drive_torque / case.drive_stiffness
+    return Checkpoint(
+        step=0,
+        q=balanced.q,
+        v=balanced.v,
+        past=np.zeros((0, assembly.size)),
+        pending=np.zeros((0, layout.count)),
+        pending_first=0,
+        balance=np.zeros(len(BALANCE_TERMS)),
+        powers=np.zeros(len(POWERS)),
+        start_angle=start_angle,
+        mesh_times=np.zeros((len(MESH_TIMES), len(layout.names["mesh"]))),
+        judgement=judge.figures,
+    )
+
+
+def _load_table(
+    case: LoadCase, series: Mapping[str, tuple[Floats, Floats]], start_angle: float, gearbox: Gearbox
+) -> LoadTable:
+    """Gather what acts from outside; a drive starts ahead by an angle (rad)."""
+    drive = None
+    if case.driven_body is not None and case.drive_stiffness is not None:
+        drive = DriveLaw(
+            body=case.driven_body,
+            stiffness=case.drive_stiffness,
+            damping=gearbox.case.damping.coupling_time_s * case.drive_stiffness,
+            angle=(start_angle, driven_start_speed(gearbox, case), 0.5 * drive_rate(gearbox, case)),
+        )
+    return LoadTable(case.torques, series, drive)

@@ -1,0 +1,155 @@
+"""Attributes are put into a REXS file of any kind, and every other byte stays as it is."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import zipfile
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from exugear.exchange.rexs.additions import Addition
+from exugear.exchange.rexs.containers import parsed, read_rexs, with_additions
+from exugear.exchange.rexs.faults import RexsError
+from exugear.exchange.rexs.parsing import parse_model
+
+from .own_files import spur_pair
+
+DATA = Path(__file__).parent / "data"
+FILES = sorted(path.name for path in DATA.iterdir() if path.suffix not in (".txt", ".md"))
+SEW = "SEW_3-stage_cylindrical_gearbox_1.0.rexs"
+SPECTRUM = "FVA-Industriegetriebe_2_stufig_1-6.rexs"
+
+
+def additions_for(model):
+    """One of each kind for every component, and one for every load case."""
+    for number in model.components:
+        yield Addition(number, "custom_exugear_list", "N / mm^2", (1.0, -2.5e-7))
+        yield Addition(number, "custom_exugear_text", "°", 'ä <&> "x"')
+        yield Addition(number, "normal_module", "mm", 7.0)
+    for case in model.load_cases:
+        for number in model.components:
+            yield Addition(number, "custom_exugear_force", "N", 1e20, case.number)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_all_that_was_there_is_read_again_with_what_was_added(name):
+    before = read_rexs(DATA / name)
+    after = parsed(with_additions(DATA / name, additions_for(before)), name)
+    assert (after.version, after.program, after.relations) == (before.version, before.program, before.relations)
+    assert after.components.keys() == before.components.keys()
+    for number, part in before.components.items():
+        twin = after.components[number]
+        assert (twin.type, twin.name) == (part.type, part.name)
+        new = {"custom_exugear_list", "custom_exugear_text", "normal_module"}
+        kept = {key: value for key, value in part.attributes.items() if key not in new}
+        assert {key: value for key, value in twin.attributes.items() if key not in new} == kept
+        assert [float(value) for value in twin.attributes["custom_exugear_list"].value] == [1.0, -2.5e-7]
+        assert twin.text("custom_exugear_text") == 'ä <&> "x"'
+        assert twin.attributes["custom_exugear_text"].unit == "°"
+        assert twin.quantity("normal_module", "mm") == 7.0
+    for case, again in zip(before.load_cases, after.load_cases, strict=True):
+        for number in before.components:
+            assert float(again.changes[number]["custom_exugear_force"].value) == 1e20
+            for key, attribute in case.changes.get(number, {}).items():
+                assert again.changes[number][key] == attribute
+
+
+@pytest.mark.parametrize("name", [name for name in FILES if name.endswith((".rexs", ".rexsj"))])
+def test_without_additions_the_file_is_the_same_to_the_byte(name):
+    assert with_additions(DATA / name, []) == (DATA / name).read_bytes()
+
+
+@pytest.mark.parametrize("name", [name for name in FILES if name.endswith((".rexs", ".rexsj"))])
+def test_new_attributes_change_no_line_that_was_there(name):
+    """In JSON the comma after the last of a list comes with them."""
+    model = read_rexs(DATA / name)
+    filled = [number for number, part in model.components.items() if part.attributes]
+    new = with_additions(DATA / name, [Addition(number, "custom_exugear_x", "mm", 1.0) for number in filled])
+    added = (
+        rb'\s*<attribute id="custom_exugear_x".*?</attribute>'
+        if name.endswith(".rexs")
+        else (rb',\s*\{"id": "custom_exugear_x"[^}]*\}')
+    )
+    without, count = re.subn(added, b"", new)
+    assert count == len(filled) > 0
+    assert without == (DATA / name).read_bytes()
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "iso-8859-1"])
+def test_the_encoding_stays(encoding, tmp_path):
+    text = (DATA / SEW).read_text(encoding="utf-8").replace('encoding="UTF-8"', f'encoding="{encoding}"')
+    text = text.replace("ANW [4]", "Wälle [4]")
+    path = tmp_path / "gearbox.rexs"
+    path.write_bytes(text.encode(encoding))
+    new = with_additions(path, [Addition(4, "custom_exugear_x", "°", "Größe")])
+    part = parse_model(new).components[4]
+    assert (part.name, part.text("custom_exugear_x")) == ("Wälle [4]", "Größe")
+    decoded = new.decode(encoding)
+    start = decoded.index("custom_exugear_x")
+    assert decoded[:start].rsplit("\n", 1)[0] == text[: len(decoded[:start].rsplit("\n", 1)[0])]
+    assert len(decoded) - len(text) == decoded[start:].index("\n") + len('\n      <attribute id="')
+
+
+def test_an_archive_keeps_its_other_members():
+    name = "example_xml.rexs.zip"
+    number = next(iter(read_rexs(DATA / name).components))
+    new = with_additions(DATA / name, [Addition(number, "custom_exugear_x", "mm", 2.0)])
+    with zipfile.ZipFile(DATA / name) as before, zipfile.ZipFile(io.BytesIO(new)) as after:
+        assert after.namelist() == before.namelist()
+        others = [one for one in before.namelist() if not one.endswith(".rexs")]
+        assert [after.read(one) for one in others] == [before.read(one) for one in others]
+
+
+def test_json_without_attributes_or_spaces_takes_them(tmp_path):
+    content = {"model": {"version": "1.4", "relations": [], "components": [{"id": 1, "type": "shaft"}, {"id": 2}]}}
+    content["model"]["components"][1]["attributes"] = []
+    path = tmp_path / "gearbox.rexsj"
+    path.write_text(json.dumps(content, separators=(",", ":")))
+    new = with_additions(path, [Addition(1, "a", "mm", 1.0), Addition(2, "b", "mm", (1.0,)), Addition(2, "c", "", "x")])
+    model = parse_model(new)
+    assert model.components[1].quantity("a", "mm") == 1.0
+    assert model.components[2].text("c") == "x"
+
+
+def test_elements_with_a_prefix_get_new_ones_with_that_prefix(tmp_path):
+    """Without it the new elements would lie outside of the namespace, and no program would find them."""
+    file, shafts = spur_pair()
+    file.load_case({shafts[0]: {"rotational_speed": 900.0}})
+    empty = file.add("lubricant")
+    path = tmp_path / "gearbox.rexs"
+    path.write_text(file.text("r").replace("></r:component>", "/>").replace('">\n  </r:component>', '"/>'))
+    assert f'<r:component id="{empty}" type="lubricant" name=""/>' in path.read_text()
+    new = [
+        Addition(shafts[0], "rotational_speed", "1 / min", 1.0),
+        Addition(shafts[0], "custom_exugear_list", "mm", (1.0, 2.0)),
+        Addition(empty, "custom_exugear_x", "mm", 3.0),
+        Addition(shafts[0], "custom_exugear_case", "mm", 4.0, 1),
+        Addition(shafts[1], "custom_exugear_new", "mm", 5.0, 1),
+    ]
+    content = with_additions(path, new)
+    tree = ElementTree.fromstring(content)
+    assert {element.tag.partition("}")[0] for element in tree.iter()} == {"{https://rexs.info"}
+    model = parse_model(content)
+    assert model.components[shafts[0]].quantity("rotational_speed", "1 / min") == 1.0
+    assert model.components[shafts[0]].attributes["custom_exugear_list"].value == ("1.0", "2.0")
+    assert model.components[empty].quantity("custom_exugear_x", "mm") == 3.0
+    changes = model.load_cases[0].changes
+    assert float(changes[shafts[0]]["custom_exugear_case"].value) == 4.0
+    assert float(changes[shafts[1]]["custom_exugear_new"].value) == 5.0
+
+
+def test_a_component_that_is_not_there_is_refused():
+    with pytest.raises(RexsError, match="there is no component 999"):
+        with_additions(DATA / SEW, [Addition(999, "custom_exugear_x", "mm", 1.0)])
+    with pytest.raises(RexsError, match="no component 1, load case 7"):
+        with_additions(DATA / SPECTRUM, [Addition(1, "custom_exugear_x", "mm", 1.0, 7)])
+
+
+def test_two_results_of_one_name_are_refused():
+    twice = [Addition(1, "custom_exugear_x", "mm", value) for value in (1.0, 2.0)]
+    with pytest.raises(RexsError, match="two results would be called custom_exugear_x"):
+        with_additions(DATA / SEW, twice)

@@ -1,0 +1,183 @@
+"""Load cases summed up before a run: against closed forms, and against the state that runs start from."""
+
+from __future__ import annotations
+
+import json
+import math
+import tomllib
+from pathlib import Path
+
+import pytest
+import xarray as xr
+from typer.testing import CliRunner
+
+from exugear.cli import app as cli
+from exugear.dynamics.assemble import assemble
+from exugear.dynamics.statics import accelerating_start
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.load_cases.summary import (
+    BURSTING_RIM_SPEED,
+    LoadSummary,
+    doubt_about_bearings,
+    doubts_about,
+    summarise_loads,
+)
+from exugear.gearbox.parts import RPM
+from exugear.gearbox.reading import CaseError
+from exugear.transient.runup import simulate
+
+from ...spur_case import SPUR_CASE
+
+INERTIA = 1e-2 + 3e-2 / 2.25
+"""Of both shafts at the pinion, kg m2."""
+BASE = 30e-3 * math.cos(math.radians(20.0))
+
+
+def spur(folder: Path = Path(), **load_case: object) -> Gearbox:
+    plain = Gearbox.from_dict(tomllib.loads(SPUR_CASE), str(folder / "spur.toml"))
+    return plain.varied({"load_cases.run_up": load_case})
+
+
+def summed(folder: Path = Path(), **load_case: object) -> LoadSummary:
+    gearbox = spur(folder, **load_case)
+    return summarise_loads(gearbox, gearbox.load_cases["run_up"])
+
+
+def checked(folder: Path, torques: str, *more: str):
+    case = folder / "spur.toml"
+    case.write_text(SPUR_CASE.replace("{ shaft_1 = 100.0, shaft_2 = 140.0 }", torques), encoding="utf-8")
+    return CliRunner().invoke(cli.app, ["check", str(case), *more])
+
+
+def test_two_gears_accelerate_as_by_hand():
+    loads = summed(torques_N_m={"shaft_1": 100.0, "shaft_2": 140.0}, duration_s=2.0, start_speed_rpm=60.0)
+    net = 100.0 - 140.0 / 1.5
+    assert loads.inertia == pytest.approx(INERTIA, rel=1e-12)
+    assert loads.net_torque == pytest.approx(net, rel=1e-12)
+    assert loads.end_speed == pytest.approx(2.0 * math.pi + net / INERTIA * 2.0, rel=1e-12)
+    assert loads.fastest_rim == ("shaft_1", pytest.approx(loads.end_speed * 33e-3, rel=1e-12))
+    # What the pinion does not need to accelerate itself goes through the mesh.
+    assert loads.mesh_forces["spur"] == pytest.approx((100.0 - 1e-2 * net / INERTIA) / BASE, rel=1e-12)
+    assert (dict(loads.flanks), loads.reversed_flanks) == ({"spur": "+"}, ())
+    assert doubts_about(loads) == ()
+
+
+@pytest.mark.parametrize("name", ["reference", "generating", "rated"])
+def test_the_reference_gearbox_is_loaded_as_at_the_start_of_its_runs(grc: Gearbox, stiffness: dict, name: str) -> None:
+    case = grc.load_cases[name]
+    assembly = assemble(grc, Choice("rigid", "constant"), stiffness)
+    start = accelerating_start(assembly, case.torques, case.start_speed)
+    loads = summarise_loads(grc, case)
+    rate = (loads.end_speed - loads.start_speed) / case.duration
+    assert rate == pytest.approx(start.rates["carrier"], rel=1e-6)
+    forces = assembly.mesh_states(start.q, start.v)[:, 4] * [element.flank for element in assembly.elements]
+    assert list(loads.mesh_forces.values()) == pytest.approx(forces.tolist(), rel=1e-6)
+
+
+def test_a_drive_holds_what_the_torques_do_not(grc: Gearbox, stiffness: dict) -> None:
+    case = grc.load_cases["speed_driven"]
+    loads = summarise_loads(grc, case)
+    assert loads.net_torque == pytest.approx(240e3)
+    assert loads.end_speed == pytest.approx(1800.0 * RPM / grc.train.ratio, rel=1e-12)
+    half = summarise_loads(grc, case, duration=2.5)  # the ramp is the load case's; a shorter run ends on it
+    assert half.end_speed == pytest.approx(0.5 * loads.end_speed, rel=1e-12)
+    assembly = assemble(grc, Choice("rigid", "constant"), stiffness)
+    rate = 1800.0 * RPM / case.duration
+    start = accelerating_start(assembly, case.torques, 0.0, ("hss", rate))
+    forces = assembly.mesh_states(start.q, start.v)[:, 4] * [element.flank for element in assembly.elements]
+    assert list(loads.mesh_forces.values()) == pytest.approx(forces.tolist(), rel=1e-6)
+
+
+def test_a_torque_series_is_integrated_and_its_flanks_are_told(tmp_path):
+    table = tmp_path / "torque.csv"
+    table.write_text("time_s,shaft_1_N_m\n0.1,0\n0.3,200\n0.5,-200\n0.7,0\n")
+    loads = summed(tmp_path, torque_series=table.name, duration_s=1.0)
+    assert loads.net_torque == 0.0
+    assert loads.end_speed == pytest.approx(0.0, abs=1e-9)  # two triangles that cancel
+    assert loads.fastest_speed == pytest.approx(0.5 * 0.3 * 200.0 / INERTIA, rel=1e-6)  # after the first
+    assert (dict(loads.flanks), loads.reversed_flanks) == ({"spur": "+-"}, ("spur",))
+
+
+def test_a_run_reaches_the_speed_that_was_told(tmp_path):
+    gearbox = spur(torques_N_m={"shaft_1": 100.0, "shaft_2": 140.0}, duration_s=0.5)
+    loads = summarise_loads(gearbox, gearbox.load_cases["run_up"])
+    run = simulate(gearbox, Choice("rigid", "rigid", load_case="run_up"), {}, tmp_path)
+    data = xr.load_dataset(run.path, engine="h5netcdf")
+    assert float(data.input_speed[-1]) == pytest.approx(loads.end_speed * float(data.time[-1]) / 0.5, rel=1e-9)
+
+
+def test_check_prints_torque_speed_and_flanks_of_each_load_case(grc):
+    outcome = CliRunner().invoke(cli.app, ["check", grc.source, "--json"])
+    assert outcome.exit_code == 0 and outcome.stderr == ""
+    rows = {row["load_case"]: row for row in json.loads(outcome.stdout)["load_cases"]}
+    assert list(rows) == ["reference", "generating", "speed_driven", "rated"]
+    # The case file says it of the first: net 4.47 kN m, 215 rpm at the end; the carrier turns -z.
+    assert rows["reference"]["net_torque_N_m"] == pytest.approx(-4472.0, abs=1.0)
+    assert rows["reference"]["end_speed_rpm"] == pytest.approx(-214.5, abs=0.1)
+    assert rows["speed_driven"]["driven"] is True
+    flanks = {"sun_planet": "-", "ring_planet": "+", "intermediate": "+", "high_speed": "-"}
+    assert all(row["loaded_flanks"] == flanks and row["doubts"] == [] for row in rows.values())
+    table = CliRunner().invoke(cli.app, ["check", grc.source]).stdout
+    assert "-4472.05" in table and "sun_planet -" in table
+
+
+def test_check_asks_about_the_sign_of_a_torque_that_loads_the_other_flanks(tmp_path):
+    outcome = checked(tmp_path, "{ shaft_1 = -100.0, shaft_2 = -140.0 }")
+    assert outcome.exit_code == 0
+    assert "load_cases.run_up: torque sign? spur loaded on another flank than by the static load" in outcome.stderr
+    assert "spur -!" in outcome.stdout
+    row = json.loads(checked(tmp_path, "{ shaft_1 = -100.0, shaft_2 = -140.0 }", "--json").stdout)["load_cases"][0]
+    assert (row["reversed_flanks"], row["loaded_flanks"]) == (["spur"], {"spur": "-"})
+
+
+def test_check_asks_about_the_sign_of_a_torque_that_lets_the_train_run_away(tmp_path):
+    outcome = checked(tmp_path, "{ shaft_1 = 100.0, shaft_2 = -300.0 }")
+    assert outcome.exit_code == 0
+    reached = 33e-3 * (100.0 + 300.0 / 1.5) / INERTIA
+    assert reached > BURSTING_RIM_SPEED
+    assert f"the torques bring a rim on shaft_1 to {reached:.4g} m/s" in " ".join(outcome.stderr.split())
+
+
+def test_check_reads_the_torque_series_too(tmp_path):
+    (tmp_path / "torque.csv").write_text("time_s,nobody_N_m\n0,1\n1,1\n")
+    with pytest.raises(CaseError, match="is no torque of a body"):
+        summed(tmp_path, torque_series="torque.csv")
+    case = tmp_path / "spur.toml"
+    case.write_text(
+        SPUR_CASE.replace("torques_N_m = { shaft_1 = 100.0, shaft_2 = 140.0 }", 'torque_series = "torque.csv"')
+    )
+    outcome = CliRunner().invoke(cli.app, ["check", str(case)])
+    assert outcome.exit_code == 2 and "is no torque of a body" in " ".join(outcome.stderr.split())
+
+
+def test_planets_count_with_their_orbits(grc: Gearbox) -> None:
+    unit = grc.train.rolling_speeds("carrier", 1.0)
+    bodies = grc.bodies()
+    spins = sum(body.axial * unit[body.name] ** 2 for body in bodies if not body.fixed)
+    orbits = sum(body.mass * 0.308**2 for body in bodies if body.carrier)
+    found = summarise_loads(grc, grc.load_cases["rated"]).inertia
+    assert found == pytest.approx(spins + orbits, rel=1e-9)
+    assert orbits > 1e-3 * found
+
+
+@pytest.mark.parametrize(
+    ("torques", "said"),
+    [
+        ({"carrier": 240e3, "hss": -2945.1}, ""),
+        ({"carrier": 40e3, "hss": -490.0}, "takes sun_planet, ring_planet, intermediate, high_speed to 0.17 of it"),
+        ({"carrier": -240e3, "hss": 2945.1}, "reverses the load of sun_planet, ring_planet, intermediate, high_speed"),
+    ],
+)
+def test_a_load_case_far_from_the_static_load_asks_for_rows(grc, torques, said):
+    """Linear bearings are of the static load: below a quarter of it, or reversed, the remedy is named."""
+    varied = grc.varied({"load_cases.rated.torques_N_m": torques})
+    loads = summarise_loads(varied, varied.load_cases["rated"])
+    doubt = doubt_about_bearings(varied, loads, "bushing")
+    assert bool(doubt) == bool(said)
+    assert said in doubt
+    assert not doubt or 'law = "iso16281"' in doubt
+    assert doubt_about_bearings(varied, loads, "rigid") == ""
+    names = [name for name, one in grc.case.bearings.items() if one.catalogue and one.catalogue.radial_load_kN is None]
+    rows = varied.varied({f"bearings.{name}.law": "iso16281" for name in names})
+    assert doubt_about_bearings(rows, loads, "bushing") == ""

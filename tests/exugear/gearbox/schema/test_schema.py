@@ -1,0 +1,85 @@
+"""The description of the gearbox file: complete, true, and what the documentation shows."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pydantic import ConfigDict, TypeAdapter
+from typer.testing import CliRunner
+
+from exugear.cli.app import app
+from exugear.gearbox.sections.schema.json_schema import json_schema
+from exugear.gearbox.sections.schema.keys import keys, meanings, tables
+from exugear.gearbox.sections.schema.page import page
+from exugear.gearbox.templates.kinds import KINDS, template
+
+ROOT = Path(__file__).parents[4]
+GRC = ROOT / "cases" / "grc750" / "gearbox.toml"
+
+
+def test_every_key_of_every_table_has_a_meaning() -> None:
+    for table, model in tables().items():
+        assert set(meanings(model)) == set(model.model_fields), table
+
+
+def test_every_number_with_a_dimension_names_its_unit_and_its_range() -> None:
+    numbers = [key for key in keys() if "number" in key.kind]
+    assert len(numbers) > 100
+    assert all(key.range for key in numbers if key.name != "profile" and key.name != "phase")
+    named = {key.name for key in numbers if key.unit}
+    assert {"teeth", "profile_shift"}.isdisjoint(named) and {"face_width_mm", "duration_s", "twist_um"} <= named
+
+
+def test_every_example_is_a_value_that_the_program_takes() -> None:
+    for key in keys():
+        if key.name == "matrix":
+            continue  # six rows; an empty one stands for them
+        field = tables()[key.table].model_fields[key.name]
+        annotated: Any = field.rebuild_annotation()
+        TypeAdapter(annotated, config=ConfigDict(strict=True)).validate_python(key.example)
+
+
+@pytest.mark.parametrize("text", [*(template(kind) for kind in KINDS), GRC.read_text(encoding="utf-8")])
+def test_files_that_run_have_only_keys_and_ranges_of_the_schema(text: str) -> None:
+    schema = json_schema()
+    assert _faults(tomllib.loads(text), schema, schema) == []
+    broken = tomllib.loads(text.replace("teeth = ", "teeth = 9000", 1).replace("face_width_mm", "face_width", 1))
+    assert len(_faults(broken, schema, schema)) == 3  # too many teeth, an unknown key, a missing one
+
+
+def _faults(value: Any, schema: dict[str, Any], root: dict[str, Any]) -> list[str]:
+    """Check what of JSON schema the tables use: references, keys, numbers."""
+    if "$ref" in schema:
+        schema = root["$defs"][schema["$ref"].rpartition("/")[2]]
+    if isinstance(value, dict):
+        found = [f"missing {key}" for key in schema.get("required", ()) if key not in value]
+        for key, entry in value.items():
+            patterns = list(schema.get("patternProperties", {}).values())
+            if key in schema.get("properties", {}):
+                found += _faults(entry, schema["properties"][key], root)
+            elif patterns:
+                found += _faults(entry, patterns[0], root)
+            else:
+                found.append(f"unknown {key}")
+        return found
+    if isinstance(value, int | float) and not isinstance(value, bool) and "minimum" in schema:
+        return [] if schema["minimum"] <= value <= schema["maximum"] else [f"range {value}"]
+    if isinstance(value, list):
+        return [fault for entry in value for fault in _faults(entry, schema.get("items", {}), root)]
+    return []
+
+
+def test_the_page_of_the_documentation_is_what_the_models_say() -> None:
+    assert (ROOT / "docs" / "case_file.md").read_text(encoding="utf-8") == page(), "exugear schema --page --out it"
+
+
+def test_schema_prints_or_writes_the_same(tmp_path: Path) -> None:
+    printed = CliRunner().invoke(app, ["schema"])
+    assert printed.exit_code == 0
+    assert json.loads(printed.stdout) == json_schema()
+    assert CliRunner().invoke(app, ["schema", "--out", str(tmp_path / "a" / "s.json")]).exit_code == 0
+    assert (tmp_path / "a" / "s.json").read_text(encoding="utf-8") == printed.stdout

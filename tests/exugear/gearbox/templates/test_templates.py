@@ -1,0 +1,78 @@
+"""Gearbox files to start from: without a fault or a warning, and through the verbs as they are."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from exugear.cli.app import app
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.templates.kinds import KINDS
+
+
+def exugear(*arguments: object):
+    return CliRunner().invoke(app, [*map(str, arguments)])
+
+
+@pytest.fixture(params=KINDS)
+def case(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    path = tmp_path / request.param / "gearbox.toml"
+    assert exugear("new", path, "--kind", request.param).exit_code == 0
+    return path
+
+
+def test_a_new_file_has_neither_fault_nor_warning_and_both_variants(case: Path) -> None:
+    found = json.loads(exugear("check", case, "--json").stdout)
+    assert found["warnings"] == []
+    assert not found["variants"]["rigid"] and not found["variants"]["bushing"]
+
+
+def test_the_run_up_ends_at_the_speed_that_the_file_says(case: Path) -> None:
+    stated = float(re.search(r"# 0 to (\d+) rpm", case.read_text(encoding="utf-8")).group(1))
+    gearbox = Gearbox.from_toml(case)
+    ends = json.loads(exugear("check", case, "--json").stdout)["load_cases"][0]
+    assert abs(ends["end_speed_rpm"]) == pytest.approx(stated, rel=0.01)
+    assert gearbox.load_cases["run_up"].duration >= 10.0
+
+
+def test_a_new_file_runs_and_has_modes_in_both_variants(case: Path) -> None:
+    out = case.parent / "out"
+    for variant in ("rigid", "bushing"):
+        how = ("--variant", variant, "--mesh-law", "iso6336", "--out", out)
+        ran = exugear("run", case, *how, "--duration", 0.05, "--json")
+        assert ran.exit_code == 0, ran.stderr
+        modes = exugear("modes", case, *how, "--json")
+        assert modes.exit_code == 0, modes.stderr
+    assert exugear("report", out).exit_code == 0
+
+
+@pytest.mark.validation
+def test_a_new_file_goes_through_all_verbs_with_tables_of_its_teeth(case: Path) -> None:
+    out = case.parent / "out"
+    assert exugear("ste", case, "--positions", 10, "--out", out).exit_code == 0
+    for variant in ("rigid", "bushing"):
+        how = ("--variant", variant, "--out", out)
+        assert exugear("run", case, *how, "--duration", 1.0).exit_code == 0
+        assert exugear("modes", case, *how).exit_code == 0
+    assert exugear("bearings", case, "--out", out).exit_code == 0
+    assert exugear("view", case, "--out", out).exit_code == 0
+    assert exugear("report", out).exit_code == 0
+
+
+def test_a_file_that_is_there_is_not_written_over(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.toml"
+    mine.write_text("mine", encoding="utf-8")
+    refused = exugear("new", mine, "--kind", "pair")
+    assert refused.exit_code == 2 and "not written over" in refused.stderr
+    assert mine.read_text(encoding="utf-8") == "mine"
+    assert exugear("new", tmp_path / "mine.txt", "--kind", "pair").exit_code == 2
+
+
+def test_a_place_where_no_file_can_be_is_bad_input(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    assert exugear("new", tmp_path / "file" / "mine.toml", "--kind", "pair").exit_code == 2
+    assert exugear("schema", "--out", tmp_path).exit_code == 2

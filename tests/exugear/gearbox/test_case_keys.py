@@ -1,0 +1,128 @@
+"""Every key of the case model is read somewhere: none is taken and left without effect."""
+
+from __future__ import annotations
+
+import ast
+import sys
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import exugear
+from exugear.bearings.rolling.catalogue import catalogue_rows
+from exugear.bearings.support_laws import catalogue_stiffness, linear_law
+from exugear.bearings.supports import elastic_names
+from exugear.bodies.of_gearbox.elastic_bodies import check_elastic_body
+from exugear.cli.app import app
+from exugear.dynamics.assemble import assemble
+from exugear.dynamics.bearing_duties import bearing_duties
+from exugear.dynamics.readiness.readiness import check_parts, lacking, remarks
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.parts import stiffness_matrix
+from exugear.gearbox.sections import bodies, case, connections, entries, gears, loads, lubricant
+from exugear.gearbox.sections.entries import Section
+from exugear.results.folder import keep_case
+from exugear.tooth_mesh.tables import wanted_table
+
+from .. import gear_trains
+from ..case_mutations import bases, toml_text
+
+ELSEWHERE = {f"CaseFile.{table}" for table in ("labels", "operation", "loads", "rating", "lubricant")}
+"""Keys of pages and of a life, whose computation takes too long here: another test looks for them in the program."""
+FOR_PEOPLE = {"LoadCaseSection.description", "BearingSection.designation", "CatalogueSection.designation"}
+"""Keys that stand in the file and its copy in the results for people to read."""
+
+
+LIFE_SECTIONS = (
+    loads.LoadsSection,
+    loads.SourceSection,
+    loads.WindSection,
+    lubricant.LubricantSection,
+    loads.RatingSection,
+    loads.StrengthSection,
+    case.OperationSection,
+)
+CASE_MODEL = (entries, gears, bodies, connections, case)
+"""Modules of the case model."""
+
+
+def sections() -> set[type[Any]]:
+    kinds = {kind for module in CASE_MODEL for kind in vars(module).values() if isinstance(kind, type)}
+    return {kind for kind in kinds if issubclass(kind, Section)}
+
+
+@pytest.fixture
+def read_keys(monkeypatch: pytest.MonkeyPatch) -> set[tuple[str, str]]:
+    """Collect the keys that anything but the case model itself reads."""
+    found: set[tuple[str, str]] = set()
+    plain = Section.__getattribute__
+    own_files = {module.__file__ for module in CASE_MODEL}
+
+    def noted(section: Any, name: str) -> Any:
+        if sys._getframe(1).f_code.co_filename not in own_files:
+            found.add((type(section).__name__, name))
+        return plain(section, name)
+
+    monkeypatch.setattr(Section, "__getattribute__", noted)
+    return found
+
+
+def test_every_key_is_read(read_keys: set[tuple[str, str]], tmp_path: Path) -> None:
+    catalogue_stiffness.cache_clear()  # what other tests had computed would not be read again
+    contents = bases(tmp_path)
+    contents |= {"waves": gear_trains.pair(), "values": gear_trains.pair()}
+    contents["values"]["pairs"]["helical"]["stiffness"] = {"over_cycle_N_per_m": [4e8, 3e8, 4e8]}
+    thinned = next(iter(contents["values"]["gears"].values()))
+    del thinned["tooth_thinning_mm"]
+    thinned["tooth_thickness"] = {"upper_allowance_um": -20.0, "tolerance_um": 20.0}
+    ring = next(gear for gear in contents["planetary"]["gears"].values() if gear.get("internal"))
+    ring["cutter"] = {"teeth": 30, "tip_radius": 0.2, "addendum": 1.25}
+    contents["spur"]["ste"] = {"method": "nonlinear", "positions": 8}
+    for kind in get_args(connections.BearingType):
+        catalogue_rows(connections.CatalogueSection(type=kind, bore_mm=50.0, outer_diameter_mm=90.0, width_mm=20.0))
+    ribbed = {"type": "cylindrical_roller", "ribs": "both"}
+    catalogue_rows(connections.CatalogueSection(bore_mm=50.0, outer_diameter_mm=90.0, width_mm=20.0, **ribbed))
+    for name, content in contents.items():
+        file = tmp_path / f"{name}.toml"
+        file.write_text(toml_text(content), encoding="utf-8")
+        gearbox = Gearbox.from_toml(file)
+        check_parts(gearbox)
+        remarks(gearbox)
+        for pair, spec in gearbox.pairs.items():
+            assert spec.table != bool(spec.stiffness)
+            wanted_table(gearbox, pair, gearbox.ste.positions, gearbox.ste.grid)
+        for variant in ("rigid", "bushing"):
+            lacking(gearbox, variant)
+            assembly = assemble(gearbox, Choice(variant), {pair: np.array([1e9]) for pair in gearbox.pairs})
+            assert assembly.weight.shape == (assembly.size,)
+            bearing_duties(assembly)
+        for support in (*gearbox.bearings, *gearbox.mounts):
+            linear_law(support, gearbox.case.damping.bearing_time_s)
+            stiffness_matrix(support.stiffness)
+        for body in elastic_names(gearbox):
+            check_elastic_body(gearbox, body)
+        assert gearbox.name
+    # Both are refused: the first solves the static state alone, the second finds nothing besides its case.
+    assert CliRunner().invoke(app, ["ste", str(tmp_path / "spur.toml"), "--grid"]).exit_code == 2
+    keep_case(gearbox, tmp_path)
+    assert CliRunner().invoke(app, ["report", str(tmp_path)]).exit_code == 2
+    known = {(kind.__name__, key) for kind in sections() for key in kind.model_fields}
+    of_life = {(kind.__name__, key) for kind in LIFE_SECTIONS for key in kind.model_fields}
+    unread = {f"{kind}.{key}" for kind, key in known - read_keys - of_life}
+    assert not unread - FOR_PEOPLE - ELSEWHERE, sorted(unread - FOR_PEOPLE - ELSEWHERE)
+
+
+def test_every_key_of_pages_and_of_a_life_is_read_in_the_program() -> None:
+    """A key counts as read where it is taken as an attribute, outside the models of the file."""
+    root = Path(exugear.__file__).parent
+    files = [file for file in root.rglob("*.py") if file.parent != root / "gearbox" / "sections"]
+    trees = [ast.parse(file.read_text(encoding="utf-8")) for file in files]
+    read = {node.attr for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+    keys = {key for kind in LIFE_SECTIONS for key in kind.model_fields}
+    keys |= {name.partition(".")[2] for name in ELSEWHERE}
+    only_one_value = {"curve"}
+    assert keys - only_one_value <= read, sorted(keys - read)

@@ -1,0 +1,104 @@
+"""Resonances ranked by three quantities: places by hand, ranges of operation, and whose accelerations they are."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from exugear.dynamics.assemble import assemble
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.load_cases.operating_range import operating_range
+from exugear.gearbox.parts import RPM
+from exugear.gearbox.reading import CaseError
+from exugear.report.findings.loudness.ranking import HOUSING, SHAFTS, ranking_of
+from exugear.steady.mean_system.quantities import quantities_of
+from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear.steady.steady_file import to_dataset
+from exugear.steady.steady_response import response_of
+
+SPEED = np.linspace(1.0, 5.0, 401)
+SIGNALS = ("overall_dte", *(f"{kind} brg {axis}" for kind in ("support_force", "seat_acceleration") for axis in "xyz"))
+
+
+def hill(at, height):
+    return height / (1.0 + ((SPEED - at) / 0.05) ** 2)
+
+
+def response(operation, carried=False):
+    """Two lines: one is loud in the error at 2, the other in force and acceleration near 4, and in the error at 1.5."""
+    amplitude = np.zeros((len(SPEED), 3, len(SIGNALS)), dtype=np.float32)
+    amplitude[:, 1, 0] = hill(2.0, 5e-6)
+    amplitude[:, 1, 1] = hill(2.0, 10.0)
+    amplitude[:, 2, 0] = hill(1.5, 2e-6) + hill(4.0, 1e-6)
+    amplitude[:, 2, 1], amplitude[:, 2, 2] = hill(3.99, 30.0), hill(3.99, 40.0)
+    amplitude[:, 2, 4] = hill(4.01, 7.0)
+    return xr.Dataset(
+        {
+            "speed": ("point", -SPEED),
+            "amplitude": (("point", "line", "signal"), amplitude),
+            "index": (("line", "base"), np.array([[0], [1], [2]])),
+            "order": ("line", np.array([0.0, 10.0, 20.0])),
+        },
+        {"signal": list(SIGNALS), "base": ["mesh"]},
+        {"operating_range": json.dumps(operation), "carried_seats": json.dumps({"brg": carried})},
+    )
+
+
+def test_three_quantities_stand_side_by_side_and_the_best_place_in_any_comes_first():
+    ranking = ranking_of(response(None))
+    assert ranking.whole and ranking.accelerates == SHAFTS
+    first, second, third = ranking.resonances
+    assert (first.line, first.best, second.line, second.best) == ("mesh", 1, "2 x mesh", 1)
+    assert (first.loudness["error"].place, first.loudness["force"].place) == (1, 2)
+    assert first.loudness["acceleration"].place is None
+    assert second.frequency == pytest.approx(20.0 * 3.99 / (2.0 * np.pi))
+    assert second.loudness["force"].amplitude == pytest.approx(50.0, rel=1e-6)  # 30, 40 and 50: Pythagoras
+    assert {name: own.place for name, own in second.loudness.items()} == {"error": 3, "force": 1, "acceleration": 1}
+    assert (third.line, third.best, third.speed) == ("2 x mesh", 2, pytest.approx(-1.5))
+
+
+def test_only_speeds_of_operation_are_ranked_and_all_where_none_of_them_was_computed():
+    inside = ranking_of(response([1.8, 3.0], carried=True))
+    assert [own.line for own in inside.resonances] == ["mesh"]
+    assert (inside.speeds, inside.whole, inside.accelerates) == ((1.8, 3.0), False, HOUSING)
+    assert inside.resonances[0].loudness["force"].place == 1
+    beyond = ranking_of(response([50.0, 60.0]))
+    assert beyond.whole and len(beyond.resonances) == 3
+
+
+def test_forces_of_planets_are_the_mean_square_over_them():
+    """Three waves make the forces of three planets; both ways give one root of the mean square."""
+    waves = np.array([3.0 + 1.0j, 2.0 - 1.0j, 0.5 + 2.0j])
+    theta = 2.0 * np.pi * np.arange(3) / 3
+    planets = waves[0] + waves[1] * np.cos(theta) + waves[2] * np.sin(theta)
+    names = [f"support_force pin{wave} radial" for wave in (" mean", " cosine", " sine")]
+    (force,) = quantities_of(names)
+    assert force.sizes(np.abs(waves))[0] == pytest.approx(np.sqrt(np.mean(np.abs(planets) ** 2)), rel=1e-12)
+
+
+def test_the_range_of_operation_is_stated_or_follows_from_the_rated_speed(grc):
+    assert operating_range(grc) == pytest.approx((0.5 * 22.1 * RPM, 1.25 * 22.1 * RPM))
+    assert operating_range(grc.varied({"operation.speed_range_rpm": [10.0, 30.0]})) == pytest.approx(
+        (10.0 * RPM, 30.0 * RPM)
+    )
+    with pytest.raises(CaseError, match="lower speed comes first"):
+        grc.varied({"operation.speed_range_rpm": [30.0, 10.0]})
+    with pytest.raises(CaseError, match="speed_range_rpm"):
+        grc.varied({"operation.speed_range_rpm": [-30.0, 10.0]})
+
+
+def test_the_ranking_of_the_grc_is_of_its_speeds_of_operation_and_of_shafts(grc, stiffness):
+    assembly = assemble(grc, Choice("bushing"), stiffness)
+    data = to_dataset(response_of(assembly, SteadySettings(SpeedRange(-1.0, -3.0, 40), harmonics=4)))
+    ranking = ranking_of(data)
+    low, high = operating_range(grc)
+    assert (ranking.speeds, ranking.whole, ranking.accelerates) == ((low, high), False, SHAFTS)
+    assert all(low <= -own.speed <= high for own in ranking.resonances)
+    assert [own.best for own in ranking.resonances] == sorted(own.best for own in ranking.resonances)
+    for quantity in ("error", "force", "acceleration"):
+        found = {own.loudness[quantity].place: own.loudness[quantity].amplitude for own in ranking.resonances}
+        placed = [found[place] for place in sorted(place for place in found if place is not None)]
+        assert placed == sorted(placed, reverse=True)

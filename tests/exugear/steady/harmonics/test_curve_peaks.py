@@ -1,0 +1,46 @@
+"""Peaks of curves known at few places: their tops by closed forms, and which of them stand out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.optimize
+
+from exugear.steady.harmonics.curve_peaks import predicted_top, standing_peaks
+
+
+def two_modes(x, second):
+    """Response of two lightly damped modes at 1 and at another place, of unlike size and sign."""
+    return 1.0 / (1.0 - x**2 + 2j * 0.01 * x) - 0.3 / (second**2 - x**2 + 2j * 0.006 * second * x)
+
+
+@pytest.mark.parametrize("second", [1.03, 1.08, 1.5])
+def test_a_curve_through_five_places_knows_the_top_of_the_response_of_two_modes(second):
+    """In x such a response has four poles and two near: those far away bend it by less than 1e-3 here."""
+    x = np.array([0.97, 0.985, 0.996, 1.008, 1.022])
+    top = scipy.optimize.minimize_scalar(lambda at: -abs(two_modes(at, second)), bounds=(0.99, 1.01), method="bounded")
+    place, height = predicted_top(x, two_modes(x, second)[:, None], 2)
+    assert place == pytest.approx(top.x, abs=1e-4)
+    assert height == pytest.approx(-top.fun, rel=1e-3)
+
+
+def test_several_signals_of_one_resonance_have_one_top():
+    x = np.array([0.97, 0.985, 0.996, 1.008, 1.022])
+    sizes = np.array([3.0, 4.0 * np.exp(0.5j)])
+    place, height = predicted_top(x, two_modes(x, 1.5)[:, None] * sizes, 2)
+    alone, own = predicted_top(x, two_modes(x, 1.5)[:, None], 2)
+    assert (place, height) == (pytest.approx(alone, abs=1e-6), pytest.approx(5.0 * own, rel=1e-6))
+
+
+def test_a_top_beside_the_end_of_the_places_is_found_as_well():
+    x = np.array([0.99, 1.008, 1.022, 1.05, 1.09])
+    place, height = predicted_top(x, two_modes(x, 1.5)[:, None], 1)
+    assert place == pytest.approx(1.0, abs=2e-3)
+    assert height > abs(two_modes(x[1], 1.5))
+
+
+def test_what_rises_at_an_end_or_ripples_by_less_than_a_hundredth_is_no_peak():
+    x = np.linspace(0.0, 1.0, 201)
+    assert not standing_peaks(1.0 + x).size
+    assert not standing_peaks(2.0 + 0.008 * np.cos(60.0 * x)).size
+    assert len(standing_peaks(2.0 + 0.03 * np.cos(60.0 * x))) == 9

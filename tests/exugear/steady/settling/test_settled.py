@@ -1,0 +1,25 @@
+"""Motions in time as the rotating frame sees them, against the frame's own way from its coordinates to motions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from exugear.dynamics.assemble import assemble
+from exugear.gearbox.choice import Choice
+from exugear.steady.mean_system.rotating_frame import RotatingFrame, planet_sets
+from exugear.steady.settling.frame_motion import frame_coordinates
+
+FOUR = {"bodies.planet.planet_angles_deg": [0.0, 90.0, 180.0, 270.0]}
+
+
+@pytest.mark.parametrize("variant", ["rigid", "bushing"])
+@pytest.mark.parametrize("changes", [{}, FOUR], ids=["three planets", "four planets"])
+def test_coordinates_in_the_frame_come_back(grc, stiffness, variant, changes):
+    assembly = assemble(grc.varied(changes), Choice(variant), stiffness)
+    frame = RotatingFrame(assembly, planet_sets(assembly))
+    psi = np.array([0.0, 0.7, -3.0, 40.0])
+    u = 1e-4 * np.random.default_rng(0).normal(size=(len(psi), assembly.size))
+    q = np.array([frame.state(float(angle), 1.0, own)[0] for angle, own in zip(psi, u, strict=True)])
+    # Angles of hundreds of radians are taken off.
+    np.testing.assert_allclose(frame_coordinates(frame, q, psi), u, rtol=0.0, atol=1e-10)
