@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import errno
 import functools
 import io
 from collections.abc import Iterator
@@ -283,3 +284,24 @@ def test_why_a_contact_could_not_be_solved_stands_in_its_place(kept: Path) -> No
     error, fine = known_contacts([overloaded, WANTED])
     assert isinstance(error, ContactError) and isinstance(fine, MeanContact)
     assert len(list(kept.glob("contact-*.npz"))) == 1
+
+
+def test_a_folder_that_cannot_be_written_costs_nothing_but_time(
+    kept: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    (tmp_path / "file").write_text("no folder")
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "file"))
+    (contact,) = known_contacts([WANTED])
+    assert isinstance(contact, MeanContact)
+    assert "solved contacts cannot be kept" in caplog.text
+
+
+def test_a_full_disk_costs_nothing_but_time(
+    kept: Path, solved: list[str], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def full(path: Path, content: bytes) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(fe_ste.transmission_error.known_contacts, "write_sealed", full)
+    known_contacts([WANTED])
+    assert "No space left on device" in caplog.text and not list(kept.glob("contact-*"))
