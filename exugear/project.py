@@ -18,7 +18,7 @@ from exugear.bearings.duty import BearingDuty
 from exugear.bearings.rolling.rows import BearingError
 from exugear.bodies.elastic_body import ElasticBody
 from exugear.dynamics.assemble import assemble
-from exugear.dynamics.assembly import Assembly, VariantError
+from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.bearing_duties import bearing_duties, mesh_duties
 from exugear.dynamics.eigenmodes.modes import Modes, eigenmodes
 from exugear.dynamics.fingerprint import input_hash
@@ -27,6 +27,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import NOTHING_MORE, Permissions
 from exugear.gearbox.reading import CaseError
+from exugear.gearbox.variant import Variant, VariantError
 from exugear.results.bearings_file import write_duties
 from exugear.results.folder import bearings_path, bodies_folder, keep_case, kept_case, modes_path, time_noted
 from exugear.results.run_file import FINAL_NAME
@@ -165,7 +166,7 @@ class Project:
         ste = self.gearbox.ste
         if ste.misalignment_um is not None and ste.centre_distance_offsets_um is not None:
             return {}
-        choice = replace(self.choice, variant="bushing", mesh_law="iso6336")
+        choice = replace(self.choice, variant=Variant.bushing, mesh_law="iso6336")
         try:
             at_rest = static_state(assemble(self.gearbox, choice, mesh_stiffness(self.gearbox, choice.mesh_law)))
         except (VariantError, BalanceError, MeshError, BearingError):
@@ -239,7 +240,7 @@ class Project:
         begin : callable, optional
             Called with the name of each body before it is reduced.
         """
-        if self.choice.variant != "flexible":
+        if not self.choice.variant.is_elastic:
             return {}
         inertias = self.choice.inertia_set(self.gearbox)
         from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies  # loads finite elements

@@ -199,3 +199,16 @@ def test_compiled_run_loads_only_what_it_uses(tmp_path):
         "scipy.stats",
     )
     assert "0.01 s simulated" in left_unloaded([*run, "--out", str(tmp_path)], heavy)
+
+
+def test_no_module_but_one_names_a_variant_as_text():
+    """A new variant is a row of one table; `rigid` is the name of a mesh law, too."""
+    names = {"rigid", "bushing", "flexible", "jointed"}
+    homes = {"exugear.gearbox.variant", "exugear.tooth_mesh.laws.registry"}
+    found = {
+        module
+        for module, file in MODULES.items()
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Constant) and node.value in names
+    }
+    assert found <= homes, sorted(found - homes)

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Bearing
-
-ON_BEARINGS = ("bushing", "flexible")
-"""Variants whose bodies sit on bearings."""
+from exugear.gearbox.variant import Variant
 
 
 def unsupported(gearbox: Gearbox, variant: str) -> str:
     """Say what a variant lacks that its bodies are held by; empty if nothing.
 
-    Every body of the variant `rigid` needs its joint: without one it would not turn on a fixed axis.
+    Off bearings every body needs its joint: without one it would not turn on a fixed axis.
 
     Examples
     --------
@@ -20,8 +18,8 @@ def unsupported(gearbox: Gearbox, variant: str) -> str:
     >>> unsupported(gearbox, "bushing"), unsupported(gearbox.varied({"bearings": {}}), "bushing")
     ('', 'the gearbox file has no [bearings]')
     """
-    elastic = elastic_names(gearbox)
-    if variant not in ON_BEARINGS:
+    chosen, elastic = Variant.of(variant), elastic_names(gearbox)
+    if not chosen.on_bearings:
         held = {joint.body for joint in gearbox.joints}
         missing = [b.name for b in gearbox.bodies() if not (b.fixed or b.spin_only or b.name in held)]
         if missing:
@@ -38,17 +36,17 @@ def unsupported(gearbox: Gearbox, variant: str) -> str:
         return f"only the designation is known of {names}; give each a [.catalogue] or a [.stiffness] table"
     if not gearbox.bearings:
         return "the gearbox file has no [bearings]"
-    if variant == "flexible" and not elastic:
+    if chosen.is_elastic and not elastic:
         return 'no body is elastic; give one a shape and flexibility = "elastic"'
     mounted = {mount.body for mount in mounts_at_work(gearbox)}
     for body in gearbox.bodies():
-        if variant == "flexible" and body.fixed and body.name in elastic and body.name not in mounted:
+        if chosen.is_elastic and body.fixed and body.name in elastic and body.name not in mounted:
             return f"body {body.name} is elastic, but nothing holds it; add [mounts] on the ground"
     return ""
 
 
 def elastic_names(gearbox: Gearbox) -> tuple[str, ...]:
-    """Names of the bodies that the variant `flexible` takes as elastic."""
+    """Names of the bodies that are elastic in variants that have such."""
     return tuple(body.name for body in gearbox.bodies() if gearbox.case.bodies[body.family].flexibility != "none")
 
 

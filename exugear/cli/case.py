@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from exugear.cli.console import counted, note
 from exugear.cli.errors import BadInputError, model_errors
-from exugear.cli.options import Variant
+from exugear.gearbox.variant import Variant
 
 if TYPE_CHECKING:
     from exugear.gearbox.choice import Choice
@@ -107,9 +107,10 @@ def steady_lack(gearbox: Gearbox, variant: str) -> str:
     from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 
     law = "iso6336"
-    elastic, rigid = (elastic_names(gearbox), Variant.bushing) if variant == Variant.flexible else ((), variant)
+    is_elastic = Variant.of(variant).is_elastic
+    elastic, rigid = (elastic_names(gearbox), Variant.bushing) if is_elastic else ((), variant)
     with model_errors():
-        assembly = assemble(gearbox, Choice(str(rigid), law), mesh_stiffness(gearbox, law))
+        assembly = assemble(gearbox, Choice(rigid, law), mesh_stiffness(gearbox, law))
     return unsuitable(assembly, elastic)
 
 
@@ -129,13 +130,13 @@ def check_choice(gearbox: Gearbox, choice: Choice, folder: Path) -> None:
         reason = lacking(gearbox, choice.variant)
         if reason:
             raise gearbox.fault(f"variant {choice.variant}: {reason}")
-        if choice.variant == Variant.flexible:
+        if choice.variant.is_elastic:
             check_solids(gearbox, bodies_folder(folder))
     if LAWS[choice.mesh_law].needs_axes:
         without = without_table(gearbox, [mesh.pair.name for mesh in gearbox.meshes])
         if without:
             raise BadInputError(gearbox.fault(without))
-    if not LAWS[choice.mesh_law].has_force and choice.variant != Variant.rigid:
+    if not LAWS[choice.mesh_law].has_force and not choice.variant.spins_only:
         raise BadInputError(
             f"--mesh-law {choice.mesh_law}: its gears only roll, which needs the variant rigid, not {choice.variant}"
         )

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from exugear.cli.console import note, progress_bar
 from exugear.cli.errors import BadInputError, FailedError, interruption, model_errors
-from exugear.cli.options import Variant
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
 
 def reduce_elastic_bodies(project: Project) -> dict[str, ElasticBody]:
     """Reduce the elastic bodies of the variant behind a progress bar, or find those that are kept."""
-    if project.choice.variant != Variant.flexible:
+    if not project.choice.variant.is_elastic:
         return {}
     from exugear.bearings.supports import elastic_names
 

@@ -130,9 +130,9 @@ def end_with(what: str, reason: object, code: int) -> NoReturn:
 def model_errors() -> Iterator[None]:
     """Turn errors of the model's parts into those of the command line."""
     from exugear.bearings.rolling.rows import BearingError
-    from exugear.dynamics.assembly import VariantError
     from exugear.dynamics.statics import BalanceError
     from exugear.gearbox.reading import CaseError
+    from exugear.gearbox.variant import VariantError
     from exugear.steady.harmonics.krylov import HarmonicBalanceError
     from exugear.steady.mean_system.rotating_frame import SteadyError
     from exugear.tooth_mesh.placement import MeshError

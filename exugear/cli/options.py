@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from exugear.gearbox.variant import OFFERED, Variant, VariantError
 from exugear.tooth_mesh.laws.registry import LAWS
 
 CaseArgument = Annotated[Path, typer.Argument(metavar="CASE.toml", help="The gearbox file.", show_default=False)]
@@ -16,14 +17,6 @@ OutOption = Annotated[
     Path | None,
     typer.Option("--out", metavar="DIR", help="Results folder. (default: results/FOLDER-OF-THE-CASE)"),
 ]
-
-
-class Variant(StrEnum):
-    """How the shafts are held: on ideal joints, on their rolling bearings, or these with elastic bodies."""
-
-    rigid = "rigid"
-    bushing = "bushing"
-    flexible = "flexible"
 
 
 class MeshLaw(StrEnum):
@@ -70,7 +63,17 @@ DistancesOption = Annotated[
 USUAL_LAW = MeshLaw("line_of_action")
 
 
-VariantOption = Annotated[Variant, typer.Option(help="How the shafts are held.", show_default=False)]
+def _variant(name: str) -> Variant:
+    try:
+        return Variant.offered(name)
+    except VariantError as error:
+        raise typer.BadParameter(str(error)) from error
+
+
+VariantOption = Annotated[
+    Variant,
+    typer.Option("--variant", parser=_variant, metavar=f"<{'|'.join(OFFERED)}>", help="How the shafts are held."),
+]
 _LAWS_TOLD = "How teeth in mesh push each other. " + "; ".join(
     f"{law.name}: {law.description.replace('; ', ', ')}" for law in LAWS.values()
 )

@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 from exugear.bearings.kernels.connectors import ConnectorArrays, no_connectors
 from exugear.bearings.kernels.rolling import no_rolling
 from exugear.bearings.support_laws import linear_law, with_laws
-from exugear.bearings.supports import ON_BEARINGS, elastic_names, mounts_at_work, unsupported
+from exugear.bearings.supports import elastic_names, mounts_at_work, unsupported
 from exugear.bodies.elastic_body import ElasticBody
 from exugear.bodies.kernels.elastic import ElasticArrays, no_elastic
 from exugear.bodies.kernels.travelling import TravellingArrays, no_travelling
-from exugear.dynamics.assembly import Assembly, VariantError
+from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.operating_points import at_static_load
-from exugear.gearbox.choice import VARIANTS, Choice
+from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.parts import Bearing, Body
-from exugear.gearbox.seats import node_position, seat_key
+from exugear.gearbox.parts import Bearing, Body, node_position, seat_key
+from exugear.gearbox.variant import Variant, VariantError
 from exugear.kernels.inertia import InertiaArrays
 from exugear.kernels.springs import SpringArrays
 from exugear.tooth_mesh.contact_state import ContactState
@@ -78,27 +78,25 @@ def assemble(
     8
     """
     variant, law, inertias = choice.variant, choice.mesh_law, choice.inertia_set(gearbox)
-    if variant not in VARIANTS:
-        raise VariantError(f"variant {variant!r} is unknown; variants are {', '.join(VARIANTS)}")
-    elastic = elastic_names(gearbox) if variant == "flexible" else ()
+    elastic = elastic_names(gearbox) if variant.is_elastic else ()
     moving = [body for body in gearbox.bodies(inertias) if not body.fixed or body.name in elastic]
     lacking = unsupported(gearbox, variant)
     if lacking:
         raise VariantError(f"variant {variant}: {lacking}")
     only_rolls = law in LAWS and not LAWS[law].has_force
-    if only_rolls and variant != "rigid":
+    if only_rolls and not variant.spins_only:
         raise VariantError(f"mesh law {law}: its gears only roll, which needs the variant rigid, not {variant}")
     flexible = _chosen_bodies(elastic, bodies or {})
     rigid = [body for body in moving if body.name not in flexible]
-    six = [body for body in rigid if variant != "rigid" and not body.spin_only]
+    six = [body for body in rigid if not (variant.spins_only or body.spin_only)]
     alone = [body for body in rigid if body not in six]
     coordinates, nodes = _coordinates(six, alone), {body.name: node_position(body) for body in moving}
     size = 6 * len(six) + len(alone)
     for name, shaft in flexible.items():
         size = _take_seats(name, shaft, size, coordinates, nodes)
     travelling = _travelling(gearbox, flexible, size, coordinates, nodes)
-    supports = _supports(gearbox, flexible) if variant in ON_BEARINGS else ()
-    displaced = gearbox.pin_offsets if variant not in ON_BEARINGS else {}  # bearings carry the planets along
+    supports = _supports(gearbox, flexible) if variant.on_bearings else ()
+    displaced = gearbox.pin_offsets if not variant.on_bearings else {}  # bearings carry the planets along
     settings = (inertias, flanks, angles, displaced, nodes, contact)
     elements = () if only_rolls else mesh_elements(gearbox, stiffness, law_of(law), *settings)
     assembly = Assembly(
@@ -254,12 +252,12 @@ def _coordinates(six: list[Body], alone: list[Body]) -> dict[str, tuple[int, ...
     return found
 
 
-def _inertia(variant: str, six: list[Body], alone: list[Body]) -> InertiaArrays:
+def _inertia(variant: Variant, six: list[Body], alone: list[Body]) -> InertiaArrays:
     orbiting = {
         carrier.name: sum(
             body.mass * math.dist(body.axis, carrier.axis) ** 2
             for body in alone
-            if body.carrier == carrier.name and variant == "rigid"
+            if body.carrier == carrier.name and variant.spins_only
         )
         for carrier in alone
     }

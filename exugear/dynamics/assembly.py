@@ -51,6 +51,7 @@ from exugear.bodies.turning_frame import TurningBody, turning_arrays
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Bearing, Body
+from exugear.gearbox.variant import Variant, VariantError
 from exugear.kernels.inertia import InertiaArrays, accelerations
 from exugear.kernels.springs import SpringArrays, add_spring_forces
 from exugear.tooth_mesh.element import MeshElement
@@ -62,10 +63,6 @@ from exugear.tooth_mesh.static_contact import StaticContacts
 from fe_ste.tools.arrays import Floats
 
 
-class VariantError(ValueError):
-    """A variant that cannot be built from this gearbox."""
-
-
 @dataclass(frozen=True)
 class Assembly:
     """Equations of motion of a gearbox variant.
@@ -75,7 +72,7 @@ class Assembly:
     gearbox, choice : what was assembled; the choice names its inertia set
     bodies : moving bodies in the order of their coordinates, elastic fixed ones among them
     coordinates : the six state indices of each body by name, -1 where there is none; of an elastic body those of
-        its main seat, and those of each seat under `exugear.gearbox.seats.seat_key`
+        its main seat, and those of each seat under `exugear.gearbox.parts.seat_key`
     size : number of coordinates
     elements, meshes : mesh elements and their arrays
     travelling : seats of meshes on an elastic ring; their coordinates follow those of the system
@@ -122,7 +119,7 @@ class Assembly:
         return f"Assembly({self.gearbox.name!r}, {choice}: {self.size} coordinates, {len(self.elements)} meshes)"
 
     @property
-    def variant(self) -> str:
+    def variant(self) -> Variant:
         """How bodies are held."""
         return self.choice.variant
 
@@ -235,7 +232,7 @@ class Assembly:
     @cached_property
     def housing_factor(self) -> float:
         """Factor on bearings' stiffness that stands for their seats: 1 where an elastic housing has these itself."""
-        replaced = self.variant == "flexible" and all(support.factor == 1.0 for support in self.supports)
+        replaced = self.variant.is_elastic and all(support.factor == 1.0 for support in self.supports)
         return 1.0 if replaced else self.gearbox.case.housing.factor
 
     @cached_property

@@ -432,9 +432,9 @@ def signal_layout(assembly: Assembly) -> SignalLayout:
     Supports are bearings, or the ideal joints of the variant `rigid`.
     """
     gearbox = assembly.gearbox
-    joints = tuple(joint.name for joint in gearbox.joints) if assembly.variant == "rigid" else ()
+    joints = tuple(joint.name for joint in gearbox.joints) if assembly.variant.spins_only else ()
     return SignalLayout(
-        signals_of(LAWS[assembly.mesh_law].signals_positions, assembly.variant == "rigid"),
+        signals_of(LAWS[assembly.mesh_law].signals_positions, assembly.variant.spins_only),
         {"mesh": assembly.mesh_names, "support": assembly.connector_names or joints, "axis": AXES},
         gearbox.output_radius,
     )
@@ -446,7 +446,7 @@ def bodies_of_forces(assembly: Assembly) -> dict[str, str]:
     Of a mesh those of gear 1 and gear 2; of a support its body and what this sits on.
     """
     meshes = [f"{element.mesh.name}: {element.mesh.pinion}, {element.mesh.gear}" for element in assembly.elements]
-    joints = assembly.gearbox.joints if assembly.variant == "rigid" else ()
+    joints = assembly.gearbox.joints if assembly.variant.spins_only else ()
     supports = [f"{support.name}: {support.body}, {support.on}" for support in assembly.supports or joints]
     return {"mesh_bodies": "; ".join(meshes), "support_bodies": "; ".join(supports)}
 

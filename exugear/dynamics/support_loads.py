@@ -42,7 +42,7 @@ def support_loads(assembly: Assembly, run: Mapping[str, Floats]) -> Floats:
         Joints under the law `table`, whose teeth press unevenly along the face by an amount that no file holds.
     """
     force = np.asarray(run["support_force"], dtype=np.float64)
-    if assembly.variant != "rigid":
+    if not assembly.variant.spins_only:
         return np.concatenate([force, np.asarray(run["support_moment"], dtype=np.float64)], axis=2)
     if LAWS[assembly.mesh_law].needs_axes:
         raise LoadsUnknownError(

@@ -3,31 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
 
 from exugear.gearbox.gearbox import Gearbox
-
-Variant = Literal["rigid", "bushing", "flexible", "jointed"]
-VARIANTS: tuple[str, ...] = get_args(Variant)
-"""How bodies are held: on ideal joints in minimal coordinates, on bearings, on these with elastic bodies, on joints."""
-USER_VARIANTS = ("rigid", "bushing", "flexible")
-"""Those that the command line offers; `jointed` is what `rigid` is checked against."""
+from exugear.gearbox.variant import Variant
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class Choice:
     """One way to compute a gearbox; what is None is chosen by the gearbox file.
 
     Attributes
     ----------
-    variant : {"rigid", "bushing", "flexible", "jointed"}
-        How bodies are held.
+    variant : Variant
+        How bodies are held; chosen by its name.
     mesh_law : str
         How teeth in mesh push each other; `exugear.tooth_mesh.laws.registry` lists the laws.
     inertias : str, optional
         Inertia set.
     load_case : str, optional
         Load case of a run.
+
+    Raises
+    ------
+    VariantError
+        No variant has this name.
 
     Examples
     --------
@@ -36,10 +35,22 @@ class Choice:
     Choice(variant='bushing', mesh_law='line_of_action', inertias='assemblies', load_case='reference')
     """
 
-    variant: str = "bushing"
-    mesh_law: str = "line_of_action"
-    inertias: str | None = None
-    load_case: str | None = None
+    variant: Variant
+    mesh_law: str
+    inertias: str | None
+    load_case: str | None
+
+    def __init__(
+        self,
+        variant: str = Variant.bushing,
+        mesh_law: str = "line_of_action",
+        inertias: str | None = None,
+        load_case: str | None = None,
+    ) -> None:
+        """Take the variant by its name."""
+        values = {"variant": Variant.of(variant), "mesh_law": mesh_law, "inertias": inertias, "load_case": load_case}
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
 
     def of(self, gearbox: Gearbox) -> Choice:
         """Return the same choice with what it leaves open filled in: default inertia set, first load case."""

@@ -417,3 +417,19 @@ def stiffness_matrix(section: StiffnessSection | None) -> Floats:
         return np.array(section.matrix, dtype=np.float64)
     radial, tilt = section.radial_N_per_m, section.tilt_N_m_per_rad
     return np.diag([radial, radial, section.axial_N_per_m, tilt, tilt, section.torsion_N_m_per_rad])
+
+
+def seat_key(body: str, item: str) -> str:
+    """Name of the seat of a gear or bearing on an elastic body.
+
+    Examples
+    --------
+    >>> seat_key("lss", "sun")
+    'lss.sun'
+    """
+    return f"{body}.{item}"
+
+
+def node_position(body: Body) -> Floats:
+    """Position of a body's node, its centre of mass, at zero angles, m."""
+    return np.array([*body.axis, body.centre_of_mass_z])

@@ -191,7 +191,7 @@ def compute_life(
     sharing = {family: balance.load_sharing(numbers, acting.torques, hub) for family, numbers in families.items()}
     told = {name: one for name, one in sharing.items() if len(families[name]) > 1 or one > TOLD_SHARING}
     return Life(
-        variant=assembly.variant,
+        variant=str(assembly.variant),
         mesh_law=assembly.mesh_law,
         inertias=assembly.inertias,
         edition=rating.edition,

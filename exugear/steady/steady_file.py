@@ -118,7 +118,7 @@ def _attributes(response: SteadyResponse) -> dict[str, Any]:
     assembly = response.assembly
     return {
         "gearbox": assembly.gearbox.name,
-        "variant": assembly.variant,
+        "variant": str(assembly.variant),
         "mesh_law": assembly.mesh_law,
         "inertias": assembly.inertias,
         "level": response.settings.level,

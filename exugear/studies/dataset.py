@@ -115,7 +115,7 @@ def _attributes(study: Study, at: list[tuple[tuple[int, ...], Record | None]]) -
         "study": study.file.model_dump_json(exclude_none=True),
         "case": json.dumps(study.gearbox.content),
         "gearbox": study.gearbox.name,
-        "variant": study.choice.variant,
+        "variant": str(study.choice.variant),
         "mesh_law": study.choice.mesh_law,
         "inertias": str(study.choice.inertias),
         "load_case": str(study.choice.load_case),

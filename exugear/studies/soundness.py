@@ -12,6 +12,7 @@ from exugear.bearings.supports import elastic_names, mounts_at_work
 from exugear.dynamics.signals import signals_of
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.variant import Variant
 from exugear.studies.design.sampling import PARAMETER, SAMPLE, SIDE, Design
 from exugear.studies.design.sections import StudyFile
 from exugear.studies.figures.of_life import LEAST, LIVES, SAFETIES
@@ -166,7 +167,7 @@ def faults_of_needs(study: StudyFile, kept: Mapping[str, KeptFigure], gearbox: G
         needs = figure.figure.needs
         if needs == "steady" and study.steady is None:
             yield f"figures.{name}: is read from a steady response; give a section [steady] with speeds"
-        if needs == "bearings" and (study.choice.variant == "rigid" or not _rated_bearings(gearbox)):
+        if needs == "bearings" and (not Variant.of(study.choice.variant).on_bearings or not _rated_bearings(gearbox)):
             yield (
                 f"figures.{name}: is one of bearings with a section catalogue, which the variant "
                 f"{study.choice.variant!r} of this gearbox has not"
@@ -175,7 +176,7 @@ def faults_of_needs(study: StudyFile, kept: Mapping[str, KeptFigure], gearbox: G
 
 def faults_of_signals(kept: Mapping[str, KeptFigure], gearbox: Gearbox, choice: Choice) -> Iterator[str]:
     """Tell signals and lines that neither runs nor steady responses of this gearbox have."""
-    tabled, jointed = choice.mesh_law == "table", choice.variant == "rigid"
+    tabled, jointed = choice.mesh_law == "table", choice.variant.spins_only
     of_runs = [one for one in signals_of(tabled, jointed) if one.stored and one.dimensions[0] == "time"]
     families = [mesh.family for mesh in gearbox.meshes]
     parts = {"mesh_dte": families, "mesh_force": families}
@@ -216,9 +217,9 @@ def _names(gearbox: Gearbox, choice: Choice) -> dict[str, Sequence[str]]:
     families = list(dict.fromkeys(mesh.family for mesh in gearbox.meshes))
     law = LAWS.get(choice.mesh_law)
     elements = [mesh.name for mesh in gearbox.meshes] if law is None or law.has_force else []
-    if choice.variant != "rigid":
+    if choice.variant.on_bearings:
         elements += [bearing.name for bearing in gearbox.bearings]
-    if choice.variant == "flexible":
+    if choice.variant.is_elastic:
         elements += [mount.name for mount in mounts_at_work(gearbox)]
         elements += [f"{name}_body" for name in elastic_names(gearbox)]
     elements += [coupling.name for coupling in gearbox.couplings]

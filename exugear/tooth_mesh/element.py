@@ -33,8 +33,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.parts import Body, Mesh
-from exugear.gearbox.seats import node_position, seat_key
+from exugear.gearbox.parts import Body, Mesh, node_position, seat_key
 from exugear.gearbox.sections.entries import GROUND
 from exugear.kernels.coordinates import BODY_SIZE
 from exugear.tooth_mesh.contact_state import ContactState, even_contact

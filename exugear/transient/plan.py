@@ -96,14 +96,14 @@ class RunPlan:
     @property
     def is_implicit(self) -> bool:
         """Whether Exudyn solves constraints, which its explicit solvers cannot."""
-        return self.assembly.variant == "jointed" or bool(self.assembly.floating)
+        return self.assembly.variant.is_constrained or bool(self.assembly.floating)
 
     def attributes(self) -> dict[str, Any]:
         """Attributes that the file of the run begins with."""
         assembly, gearbox = self.assembly, self.assembly.gearbox
         return {
             "gearbox": gearbox.name,
-            "variant": assembly.variant,
+            "variant": str(assembly.variant),
             "load_case": self.case.name,
             "mesh_law": assembly.mesh_law,
             "inertias": assembly.inertias,

@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 from exugear import CaseError, Choice, Gearbox, Modes, Project, Run
 from exugear.cli.app import app
 from exugear.dynamics.assemble import assemble
-from exugear.dynamics.assembly import VariantError
 from exugear.dynamics.eigenmodes.modes import load_modes
+from exugear.gearbox.variant import VariantError
 from exugear.project import default_folder
 from exugear.results.run_file import load_run
 

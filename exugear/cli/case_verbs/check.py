@@ -14,6 +14,7 @@ from exugear.cli.console import counted, note, print_json, print_table, progress
 from exugear.cli.dynamics import contacts_shown
 from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption, model_errors
 from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption, OutOption
+from exugear.gearbox.variant import OFFERED, Variant
 
 if TYPE_CHECKING:
     from exugear.gearbox.gearbox import Gearbox
@@ -46,16 +47,15 @@ def check(
             _rate(case, out, files_below, as_json)
             return
         from exugear.dynamics.readiness.readiness import lacking, remarks
-        from exugear.gearbox.choice import USER_VARIANTS
 
         gearbox = _read(case, files_below, as_json)
         _tell_scripts(gearbox)
         pairs = [_pair_summary(gearbox, name) for name in gearbox.pairs]
         thicknesses = _thickness_summaries(gearbox)
         loads = _load_summaries(gearbox)
-        variants = {variant: lacking(gearbox, variant) for variant in USER_VARIANTS}
+        variants = {str(variant): lacking(gearbox, variant) for variant in OFFERED}
         steady = _steady_lacks(gearbox, variants)
-        bearings, doubts = ([], []) if variants["bushing"] else _bearing_summaries(gearbox)
+        bearings, doubts = ([], []) if variants[Variant.bushing] else _bearing_summaries(gearbox)
         warnings = [*remarks(gearbox), *doubts]
         if as_json:
             summary = {"case": str(case), "name": gearbox.name, "ratio": gearbox.train.ratio, "pairs": pairs}
@@ -250,7 +250,7 @@ def _bearing_summaries(gearbox: Gearbox) -> tuple[list[dict[str, Any]], list[str
     law = "iso6336"
     try:
         with model_errors():
-            assembly = assemble(gearbox, Choice("bushing", law), mesh_stiffness(gearbox, law))
+            assembly = assemble(gearbox, Choice(Variant.bushing, law), mesh_stiffness(gearbox, law))
             every = bearing_duties(assembly)
             duties = {duty.family: duty for duty in reversed(every)}
             points = {point.bearing.family: point for point in reversed(bearing_points(assembly))}
@@ -326,7 +326,7 @@ def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
                     "reversed_flanks": list(loads.reversed_flanks),
                     "doubts": [
                         *doubts_about(loads),
-                        *filter(None, [doubt_about_bearings(gearbox, loads, "bushing")]),
+                        *filter(None, [doubt_about_bearings(gearbox, loads, Variant.bushing)]),
                         *_beyond_band(loads.mesh_frequencies, BAND),
                     ],
                 }

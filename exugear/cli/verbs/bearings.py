@@ -18,10 +18,10 @@ from exugear.cli.options import (
     LawOption,
     OutOption,
     ScriptsOption,
-    Variant,
     VariantOption,
 )
 from exugear.cli.tables import compute_missing_tables
+from exugear.gearbox.variant import Variant
 
 if TYPE_CHECKING:
     from exugear.bearings.duty import BearingDuty
@@ -48,8 +48,8 @@ def bearings(
         from exugear.gearbox.choice import Choice
         from exugear.results.bearings_file import duties_summary
 
-        if variant == Variant.rigid:
-            raise BadInputError("--variant rigid: has ideal joints in place of bearings; use bushing or flexible")
+        if not variant.on_bearings:
+            raise BadInputError(f"--variant {variant}: has ideal joints in place of bearings; use bushing or flexible")
         project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
         if not any(bearing.catalogue for bearing in project.gearbox.bearings):
             raise BadInputError(f"{case}: no bearing has catalogue data; add a [bearings.NAME.catalogue]")

@@ -22,10 +22,10 @@ from exugear.cli.options import (
     LawOption,
     OutOption,
     ScriptsOption,
-    Variant,
     VariantOption,
 )
 from exugear.cli.tables import compute_tables
+from exugear.gearbox.variant import Variant
 
 if TYPE_CHECKING:
     from pathlib import Path

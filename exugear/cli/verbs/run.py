@@ -29,10 +29,10 @@ from exugear.cli.options import (
     LawOption,
     OutOption,
     ScriptsOption,
-    Variant,
     VariantOption,
 )
 from exugear.cli.tables import compute_missing_tables
+from exugear.gearbox.variant import Variant
 
 if TYPE_CHECKING:
     from exugear.gearbox.gearbox import Gearbox
@@ -137,7 +137,7 @@ def _check_extent(project: Project, duration: float | None, folder: Path) -> Non
     from exugear.transient.extent import check_disk, check_duration, sample_bytes
 
     gearbox, load_case = project.gearbox, _load_case(project)
-    jointed, tabled = project.choice.variant == Variant.rigid, LAWS[project.choice.mesh_law].signals_positions
+    jointed, tabled = project.choice.variant.spins_only, LAWS[project.choice.mesh_law].signals_positions
     supports = gearbox.joints if jointed else gearbox.bearings
     size = sample_bytes(len(gearbox.meshes), len(supports), tabled, jointed)
     with model_errors():
@@ -148,7 +148,7 @@ def _check_extent(project: Project, duration: float | None, folder: Path) -> Non
 def _check_solver(gearbox: Gearbox, variant: Variant, solver: Solver) -> None:
     """Refuse a solver that cannot run what the file asks for, before anything is computed."""
     floating = [name for name, body in gearbox.case.bodies.items() if body.flexibility == "ffrf"]
-    if variant is Variant.flexible and solver is Solver.compiled and floating:
+    if variant.is_elastic and solver is Solver.compiled and floating:
         raise BadInputError(
             f"--solver compiled: bodies.{floating[0]}.flexibility = 'ffrf' runs in Exudyn only; "
             "add --solver exudyn, or choose 'nonrotating'"
@@ -159,8 +159,8 @@ def _check_mesh_route(route: MeshRoute, variant: Variant, solver: Solver) -> Non
     """Refuse loads on bodies where there are no loads, or no rigid bodies, before anything is computed."""
     if route is MeshRoute.element:
         return
-    if variant is not Variant.bushing:
-        why = "has no bodies, only their spins" if variant is Variant.rigid else "has elastic bodies"
+    if variant.spins_only or variant.is_elastic:
+        why = "has no bodies, only their spins" if variant.spins_only else "has elastic bodies"
         raise BadInputError(
             f"--mesh-route loads: its loads act on rigid bodies, and the variant {variant} {why}; "
             "take --variant bushing, or --mesh-route element"

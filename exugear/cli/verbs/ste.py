@@ -103,15 +103,16 @@ def _tell_misalignment(gearbox: Gearbox, folder: Path) -> None:
     from exugear.bearings.supports import unsupported
     from exugear.dynamics.statics import BalanceError, static_state
     from exugear.gearbox.choice import Choice
+    from exugear.gearbox.variant import Variant
     from exugear.project import Project
     from exugear.tooth_mesh.placement import MeshError
     from exugear.tooth_mesh.tables import missing_tables
 
-    if unsupported(gearbox, "bushing") or missing_tables(gearbox, folder):
+    if unsupported(gearbox, Variant.bushing) or missing_tables(gearbox, folder):
         return
     try:
         with contacts_shown():
-            state = static_state(Project(gearbox, folder, Choice("bushing")).assembly())
+            state = static_state(Project(gearbox, folder, Choice(Variant.bushing)).assembly())
     except (BalanceError, BearingError, MeshError):  # of which the verbs tell that need it
         return
     largest: dict[str, float] = {}

@@ -303,7 +303,7 @@ def _tell_of_wandering_loads(project: Project) -> tuple[WanderingLoad, ...]:
     from exugear.tooth_mesh.wandering_load import wandering_loads
 
     law = LAWS[project.choice.mesh_law]
-    if law.needs_axes or not law.needs_tables or project.choice.variant == "rigid":
+    if law.needs_axes or not law.needs_tables or project.choice.variant.spins_only:
         return ()
     found = wandering_loads(project.gearbox, project.folder)
     if found and found[0].over_error > NOTICED_WAY:

@@ -20,9 +20,10 @@ from exugear.cli.options import (
     LawOption,
     OutOption,
     ScriptsOption,
-    Variant,
+    VariantOption,
 )
 from exugear.cli.tables import compute_missing_tables
+from exugear.gearbox.variant import Variant
 
 if TYPE_CHECKING:
     from exugear.dynamics.eigenmodes.modes import Modes
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 
 def view(
     case: CaseArgument,
-    variant: Annotated[Variant, typer.Option(help="How the shafts are held.")] = Variant.bushing,
+    variant: VariantOption = Variant.bushing,
     mesh_law: LawOption = USUAL_LAW,
     inertias: InertiasOption = None,
     near: Annotated[

@@ -121,7 +121,7 @@ class Modes:
         }
         attributes = {
             "gearbox": assembly.gearbox.name,
-            "variant": assembly.variant,
+            "variant": str(assembly.variant),
             "mesh_law": assembly.mesh_law,
             "inertias": assembly.inertias,
             "input_hash": input_hash(assembly),

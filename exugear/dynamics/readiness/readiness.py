@@ -11,7 +11,7 @@ import numpy as np
 from exugear.bearings.rolling.catalogue import catalogue_rows
 from exugear.bearings.rolling.rows import BearingError
 from exugear.bearings.support_laws import linear_law, misplaced_factor
-from exugear.bearings.supports import ON_BEARINGS, elastic_names, unsupported
+from exugear.bearings.supports import elastic_names, unsupported
 from exugear.dynamics.readiness.margins import doubts_about_pairs
 from exugear.dynamics.readiness.plausibility import doubts_about_parts
 from exugear.dynamics.readiness.restraint import free_motion
@@ -19,6 +19,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases.torque_series import torque_series
 from exugear.gearbox.parts import Bearing
 from exugear.gearbox.reading import CaseError, fault_line, readable
+from exugear.gearbox.variant import Variant
 from exugear.tooth_mesh.placement import MeshError, loaded_flanks, tooth_places
 
 MOST_STATES = 200_000
@@ -67,18 +68,18 @@ def lacking(gearbox: Gearbox, variant: str) -> str:
     Examples
     --------
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
-    >>> [lacking(gearbox, variant) for variant in ("rigid", "bushing", "flexible")]
+    >>> [lacking(gearbox, variant) for variant in OFFERED]
     ['', '', '']
     """
-    lack = unsupported(gearbox, variant)
-    if lack or variant not in ON_BEARINGS:
+    chosen, lack = Variant.of(variant), unsupported(gearbox, variant)
+    if lack or not chosen.on_bearings:
         return lack
-    return _misfits(gearbox, variant) or free_motion(gearbox, variant) or _misplaced_factors(gearbox, variant)
+    return _misfits(gearbox, chosen) or free_motion(gearbox, variant) or _misplaced_factors(gearbox, chosen)
 
 
-def _misfits(gearbox: Gearbox, variant: str) -> str:
+def _misfits(gearbox: Gearbox, variant: Variant) -> str:
     """Say which elastic body cannot be, or has a seat beside it: the first fault that `check_parts` tells of them."""
-    for name in elastic_names(gearbox) if variant == "flexible" else ():
+    for name in elastic_names(gearbox) if variant.is_elastic else ():
         try:
             _build_elastic_body(gearbox, name)
         except CaseError as error:
@@ -86,9 +87,9 @@ def _misfits(gearbox: Gearbox, variant: str) -> str:
     return ""
 
 
-def _misplaced_factors(gearbox: Gearbox, variant: str) -> str:
+def _misplaced_factors(gearbox: Gearbox, variant: Variant) -> str:
     """Say which bearing's seat no factor can stand for; an elastic housing has seats of its own."""
-    elastic = elastic_names(gearbox) if variant == "flexible" else ()
+    elastic = elastic_names(gearbox) if variant.is_elastic else ()
     seats = {body.name for body in gearbox.bodies() if body.fixed and body.name in elastic}
     reasons = (misplaced_factor(bearing) for bearing in gearbox.bearings if not seats & {bearing.on, bearing.body})
     return next(filter(None, reasons), "")

@@ -14,6 +14,7 @@ from exugear.bearings.support_laws import linear_law
 from exugear.bearings.supports import elastic_names, mounts_at_work
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Body
+from exugear.gearbox.variant import Variant
 from exugear.kernels.coordinates import BODY_SIZE, SPIN
 from exugear.tooth_mesh.placement import line_of_action_row, loaded_flanks
 from fe_ste.tools.arrays import Floats
@@ -46,9 +47,10 @@ def free_motion(gearbox: Gearbox, variant: str) -> str:
     >>> free_motion(gearbox.varied({**floating, "bearings.lss_a.stiffness": {}}), "bushing")
     'body lss can move along z without resistance; add or stiffen a bearing'
     """
-    moving = [body for body in gearbox.bodies() if not body.fixed or _is_elastic(gearbox, variant, body)]
+    elastic = elastic_names(gearbox) if Variant.of(variant).is_elastic else ()
+    moving = [body for body in gearbox.bodies() if not body.fixed or body.name in elastic]
     starts = {body.name: 6 * number for number, body in enumerate(moving)}
-    rows = np.array([row for row in _held_directions(gearbox, variant, starts) if row.any()])
+    rows = np.array([row for row in _held_directions(gearbox, Variant.of(variant), starts) if row.any()])
     if not rows.size:
         return "no bearing holds anything"
     # Each row of one length: how stiff a support is does not matter, only that it holds.
@@ -63,15 +65,11 @@ def free_motion(gearbox: Gearbox, variant: str) -> str:
     return f"body {moving[body].name} can {DIRECTIONS[direction]} without resistance; add or stiffen a bearing"
 
 
-def _is_elastic(gearbox: Gearbox, variant: str, body: Body) -> bool:
-    return variant == "flexible" and body.name in elastic_names(gearbox)
-
-
-def _held_directions(gearbox: Gearbox, variant: str, starts: Mapping[str, int]) -> Iterator[Floats]:
+def _held_directions(gearbox: Gearbox, variant: Variant, starts: Mapping[str, int]) -> Iterator[Floats]:
     """Rows over all coordinates, rotations times `TILT_LENGTH`, of what supports, meshes and couplings hold."""
     bodies = {body.name: body for body in gearbox.bodies()}
     size = 6 * len(starts)
-    for support in (*gearbox.bearings, *(mounts_at_work(gearbox) if variant == "flexible" else ())):
+    for support in (*gearbox.bearings, *(mounts_at_work(gearbox) if variant.is_elastic else ())):
         motion = np.zeros((6, size))
         for name, sense in ((support.body, 1.0), (support.on, -1.0)):
             if name in starts:

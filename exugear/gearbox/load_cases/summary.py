@@ -18,6 +18,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases.torque_series import torque_series
 from exugear.gearbox.parts import LoadCase
 from exugear.gearbox.train.statics import UNLOADED
+from exugear.gearbox.variant import Variant
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.notebook import html_table, value_range
 
@@ -206,7 +207,7 @@ def doubt_about_bearings(gearbox: Gearbox, loads: LoadSummary, variant: str) -> 
         if own.catalogue is not None and own.catalogue.radial_load_kN is None and own.law == "stiffness"
     ]
     light = {family: share for family, share in loads.least_shares.items() if share < LEAST_SHARE}
-    if not led or not light or variant == "rigid":
+    if not led or not light or not Variant.of(variant).on_bearings:
         return ""
     turned = [family for family, share in light.items() if share < 0.0]
     least = min(light.values())

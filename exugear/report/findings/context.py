@@ -13,13 +13,14 @@ from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.variant import Variant
 from exugear.results.folder import bodies_folder
 from exugear.tooth_mesh.law import MeshCurve
 from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 from fe_ste.tools.arrays import Floats
 from fe_ste.transmission_error.surface import SteSurface
 
-REFERENCE_VARIANT = "rigid"
+REFERENCE_VARIANT = Variant.rigid
 """Variant that others are compared with."""
 VISIBLE_SHARE = 0.01
 """Least share of the overall transmission error's mobility for a mode to be called seen by it."""
@@ -103,7 +104,7 @@ class Context:
 
     def bodies_of(self, choice: Choice) -> Callable[[Gearbox], dict[str, ElasticBody]]:
         """Reduced elastic bodies of a gearbox, varied or not, as a choice has them."""
-        if choice.variant != "flexible":
+        if not choice.variant.is_elastic:
             return lambda gearbox: {}
         return lambda gearbox: reduced_bodies(gearbox, choice.inertia_set(gearbox), bodies_folder(self.folder))
 

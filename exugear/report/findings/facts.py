@@ -9,12 +9,13 @@ from dataclasses import dataclass
 import xarray as xr
 
 from exugear.gearbox.parts import RPM
+from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import REFERENCE_VARIANT, Context, choice_of
 from exugear.report.findings.groups import RankedResonance, RunGroup
 from exugear.report.findings.levers import Lever, levers_of
 from exugear.report.findings.loudness.ranking import Loudness, Ranking
 from exugear.report.findings.variations import GAIN, BestChange, ModelVariations, best_change
-from exugear.report.findings.words import VARIANTS, Words, figure_text
+from exugear.report.findings.words import Words, figure_text
 from exugear.results.spectra.orders import order_lines
 from exugear.steady.peaks import peaks
 
@@ -105,7 +106,7 @@ def facts_of_response(words: Words, response: xr.Dataset) -> tuple[Fact, ...]:
         f"Excited by {words.told(top.line)}. The overall transmission error swings by {amplitude_text(level)} "
         f"({figure_text(level)} dB) at constant speed."
     )
-    beside = f"at {speed_text(top.speed)}, {VARIANTS[choice_of(response.attrs).variant]}"
+    beside = f"at {speed_text(top.speed)}, {Variant.of(choice_of(response.attrs).variant).label}"
     return (Fact("Loudest resonance", frequency_text(top.frequency), beside, said, "steady"),)
 
 
@@ -126,7 +127,7 @@ def _loudest(context: Context, words: Words, group: RunGroup) -> Fact | None:
         f"{amplitude_text(top.loudness)} ({figure_text(top.loudness)} dB){_how(group, top)}{_moves(words, group, top)}."
         f"{_against_rated(context, group)}"
     )
-    beside = f"at {speed_text(top.speed)}, {VARIANTS[group.main]}"
+    beside = f"at {speed_text(top.speed)}, {Variant.of(group.main).label}"
     return Fact("Loudest resonance", frequency_text(top.frequency), beside, said, "rings")
 
 
@@ -150,7 +151,7 @@ def _in_operation(words: Words, group: RunGroup, ranking: Ranking) -> Fact:
     moves = next((told for told in (_moves(words, group, own) for own in near) if told), "")
     mode = f" What moves{moves}." if moves else ""
     said = f"Excited by {words.told(top.line)}. At constant speed, {where}: {'; '.join(parts)}.{mode}"
-    beside = f"at {speed_text(top.speed)}, {VARIANTS[group.main]}"
+    beside = f"at {speed_text(top.speed)}, {Variant.of(group.main).label}"
     return Fact("Loudest resonance", frequency_text(top.frequency), beside, said, "ranking")
 
 
@@ -178,7 +179,7 @@ def _unseen(context: Context, words: Words, group: RunGroup, top: RankedResonanc
         f"({figure_text(at.level)} dB) at constant speed. The run-up is too fast to tell it from what is near: the "
         f"loudest there is {frequency_text(top.finding.resonance.frequency)} with {amplitude_text(top.peak.level)}."
     )
-    beside = f"at {speed_text(at.speed)}, {VARIANTS[group.main]}"
+    beside = f"at {speed_text(at.speed)}, {Variant.of(group.main).label}"
     return Fact("Loudest resonance", frequency_text(at.frequency), beside, said, "steady")
 
 
@@ -228,11 +229,12 @@ def _compliance(group: RunGroup) -> Fact | None:
     counted = "" if group.responses else " Counted are those that windows of five lengths show."
     said = (
         f"On ideal joints the loudest is {frequency_text(stiff.finding.resonance.frequency)} at "
-        f"{speed_text(stiff.peak.speed)} with {amplitude_text(stiff.peak.level)}. {VARIANTS[group.main].capitalize()} "
-        f"{_resonances(fresh)} that the rigid model lacks, and {gone} of its own disappear.{counted}"
+        f"{speed_text(stiff.peak.speed)} with {amplitude_text(stiff.peak.level)}. "
+        f"{Variant.of(group.main).label.capitalize()} {_resonances(fresh)} that the rigid model lacks, "
+        f"and {gone} of its own disappear.{counted}"
     )
     sign = "−" if change < 0.0 else "+"
-    kind = "What elastic bodies do" if group.main == "flexible" else "What the bearings do"
+    kind = "What elastic bodies do" if Variant.of(group.main).is_elastic else "What the bearings do"
     return Fact(kind, f"{sign}{figure_text(abs(change), 2)} dB", "at the loudest peak", said, "ranking")
 
 

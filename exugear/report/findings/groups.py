@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from exugear.gearbox.choice import Choice
+from exugear.gearbox.variant import OFFERED, Variant
 from exugear.report.findings.constant_speed import (
     ConstantSpeed,
     Highest,
@@ -33,9 +34,6 @@ from exugear.results.spectra.waterfall import Waterfall
 from exugear.results.spectra.windows import OtherWindow, other_windows, stays_absent, survives
 from exugear.steady.campbell.campbell import campbell_from
 from exugear.steady.steady_file import settings_of, steady_path
-
-STIFF_TO_SOFT = ("rigid", "bushing", "flexible")
-"""Variants in the order in which they are shown."""
 
 
 @dataclass(frozen=True)
@@ -159,7 +157,7 @@ def run_groups(context: Context, results: StoredResults) -> tuple[RunGroup, ...]
 def _group(context: Context, key: tuple[str, str, str], runs: Sequence[VariantRun], results: StoredResults) -> RunGroup:
     lines = order_lines(context.gearbox)
     context.tell(f"other windows, {', '.join(key)}")
-    ordered = sorted(runs, key=lambda run: STIFF_TO_SOFT.index(run.variant))
+    ordered = sorted(runs, key=lambda run: OFFERED.index(Variant.of(run.variant)))
     windows = other_windows(ordered, lines)
     by_variant = {run.variant: run for run in ordered}
     levels = {variant: truest_of(results.steady, Choice(variant, *key[1:])) for variant in by_variant}
@@ -194,7 +192,7 @@ def _response_group(
     context: Context, key: tuple[str, str, str], responses: Mapping[str, xr.Dataset], results: StoredResults
 ) -> RunGroup:
     context.tell(f"lines at constant speed, {', '.join(key)}")
-    own = {variant: responses[variant] for variant in sorted(responses, key=STIFF_TO_SOFT.index)}
+    own = {str(variant): responses[variant] for variant in OFFERED if variant in responses}
     runs = {variant: _as_run(context, data, results) for variant, data in own.items()}
     ranked = {variant: _ranked_lines(runs, own, variant) for variant in runs}
     reference, rule = runs.get(REFERENCE_VARIANT), AbsenceRule()

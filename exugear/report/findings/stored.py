@@ -10,12 +10,12 @@ from typing import Any
 import xarray as xr
 
 from exugear.bearings.rolling.rows import BearingError
-from exugear.dynamics.assembly import VariantError
 from exugear.dynamics.eigenmodes.modes import load_modes
 from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.statics import BalanceError
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.reading import CaseError
+from exugear.gearbox.variant import VariantError
 from exugear.report.findings.context import Context, choice_of
 from exugear.results.run_file import FINAL_NAME, PARTIAL_NAME, load_run
 from exugear.results.spectra.orders import order_lines

@@ -11,9 +11,10 @@ import xarray as xr
 
 from exugear.dynamics.signals import BALANCE_TERMS, MESH_TIMES, energy_residual
 from exugear.gearbox.parts import RPM
+from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import Context
 from exugear.report.findings.groups import RunGroup
-from exugear.report.findings.words import VARIANTS, figure_text
+from exugear.report.findings.words import figure_text
 from exugear.results.run_file import read_run
 from exugear.results.spectra.run_spectra import VariantRun
 from exugear.steady.peaks import pulls
@@ -114,7 +115,7 @@ def _of_run(run: VariantRun, figures: RunFigures) -> list[Verdict]:
     if apart > 0.0:
         verdicts.append(Verdict(True, f"teeth were apart for {figure_text(apart)} s, and the law knows it"))
     if not pulling and not apart:
-        verdicts.append(Verdict(True, f"no tooth had to pull, {VARIANTS[run.variant]}"))
+        verdicts.append(Verdict(True, f"no tooth had to pull, {Variant.of(run.variant).label}"))
     if outside > 0.0:
         verdicts.append(Verdict(False, f"a mesh was outside its table for {figure_text(outside)} s"))
     if not int(run.attributes["complete"]):

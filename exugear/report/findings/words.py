@@ -24,8 +24,6 @@ MOTIONS = {
     "deformation": ("deforms", "deform"),
 }
 """Motions of bodies as verbs, of one body and of several."""
-VARIANTS = {"rigid": "on ideal joints", "bushing": "on bearings", "flexible": "with elastic bodies"}
-"""Variants in words."""
 TOLD, LEAST_TOLD = 0.8, 0.1
 """Share of the kinetic energy that is told of a mode, and the least share of what is told."""
 GIVES = 2

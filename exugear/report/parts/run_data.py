@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from exugear.gearbox.parts import RPM
+from exugear.gearbox.variant import Variant
 from exugear.report.findings.channels import Channel, channels_of, loudest_order
 from exugear.report.findings.constant_speed import TOP, ConstantSpeed, highest_drawn
 from exugear.report.findings.groups import RankedResonance, RunGroup
 from exugear.report.findings.response_channels import channels_of_response
-from exugear.report.findings.words import VARIANTS, figure_text, percentages
+from exugear.report.findings.words import figure_text, percentages
 from exugear.report.parts.material import Material, group_words, model_name
 from exugear.report.parts.pooling import cut_levels, level_bytes, pooled, tenths
 from exugear.report.web.arrays import rounded
@@ -84,7 +85,7 @@ def _variant(material: Material, group: RunGroup, run: VariantRun) -> dict[str, 
         if channel.kind == "support":
             loudest[channel.name] = _loudest(material, channel)
     return {
-        "words": VARIANTS[run.variant],
+        "words": Variant.of(run.variant).label,
         "model": model_name(group.choice(run.variant)),
         "window": run.spectra.description,
         "channels": channels,
@@ -216,7 +217,7 @@ def _facts(material: Material, group: RunGroup, run: VariantRun, own: RankedReso
     for variant, level in own.elsewhere.items():
         lacks = "does not show it, " if variant in own.lacking else ""
         there = f"{figure_text(level)} dB there" if math.isfinite(level) else "did not go there"
-        facts.append([VARIANTS[variant].capitalize(), f"{lacks}{there}"])
+        facts.append([Variant.of(variant).label.capitalize(), f"{lacks}{there}"])
     facts += _mode_facts(material, group, run, own)
     if not own.steady:
         facts.append(["Mind", "not every length of the window shows it: it may be no resonance"])

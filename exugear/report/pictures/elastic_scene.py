@@ -11,7 +11,7 @@ import numpy as np
 
 from exugear.bodies.reduced_body import Surface
 from exugear.dynamics.assembly import Assembly
-from exugear.gearbox.seats import seat_key
+from exugear.gearbox.parts import seat_key
 from exugear.report.pictures.animation import gif_path, half_period_images, write_animation
 from exugear.report.pictures.motions import placed
 from exugear.report.pictures.scene import (

@@ -11,14 +11,14 @@ import xarray as xr
 
 from exugear.bearings.duty import BearingDuty
 from exugear.bearings.rolling.rows import BearingError
-from exugear.bearings.supports import ON_BEARINGS
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.bearing_duties import bearing_duties, mesh_duties
 from exugear.dynamics.statics import BalanceError
 from exugear.gearbox.parts import RPM
+from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import choice_of, words_of
 from exugear.report.findings.groups import RunGroup
-from exugear.report.findings.words import VARIANTS, figure_text
+from exugear.report.findings.words import figure_text
 from exugear.report.parts.material import Material, Part, only_for
 from exugear.report.web import pieces
 from exugear.report.web.pieces import Cell
@@ -78,7 +78,7 @@ def _forces(material: Material, data: Mapping[str, Any], group: RunGroup, varian
         for name, figures in loudest.items()
     }
     rows = [_force_row(group, variant, name, figures, largest) for name, figures in loudest.items()]
-    caption = f"Transverse forces {VARIANTS[variant]}, {group.source}"
+    caption = f"Transverse forces {Variant.of(variant).label}, {group.source}"
     lifting = [
         f"{figures['words']}: the force swings by {100.0 * figures['amplitude'] / figures['mean']:.0f} % of its mean; "
         "a linear bearing cannot lift off, a real one would."
@@ -181,7 +181,7 @@ def _seat_words(material: Material, signal: str) -> str:
 
 
 def _duties(material: Material, assembly: Assembly) -> str:
-    if assembly.variant not in ON_BEARINGS or not any(support.catalogue for support in assembly.supports):
+    if not assembly.variant.on_bearings or not any(support.catalogue for support in assembly.supports):
         return ""
     name = words_of(assembly.choice)
     try:

@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from exugear.gearbox.variant import Variant
 from exugear.report.findings.facts import best_words, shift_text
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.levers import levers_of
 from exugear.report.findings.variations import ModelVariations, best_change, guarded
-from exugear.report.findings.words import VARIANTS, figure_text
+from exugear.report.findings.words import figure_text
 from exugear.report.parts.charts import Axis, Curve, chart
 from exugear.report.parts.material import Material, Part, only_for
 from exugear.report.web import pieces
@@ -38,7 +39,7 @@ def _group(material: Material, group: RunGroup, charts: dict[str, Any]) -> str:
     mode = top.finding.mode
     frequency = float(modes["frequency"][mode])
     scope = (
-        f"For the mode at {frequency:.1f} Hz {VARIANTS[group.main]}, inertias {group.inertias}: "
+        f"For the mode at {frequency:.1f} Hz {Variant.of(group.main).label}, inertias {group.inertias}: "
         f"{material.words.moves(modes, mode)}."
     )
     own = next((one for one in material.variations if one.choice == group.choice(group.main)), None)

@@ -12,9 +12,9 @@ from typing import Any
 import xarray as xr
 
 from exugear.bearings.rolling.rows import BearingError
-from exugear.dynamics.assembly import VariantError
 from exugear.dynamics.statics import BalanceError
 from exugear.gearbox.reading import CaseError
+from exugear.gearbox.variant import VariantError
 from exugear.life.life_diagrams import draw_life
 from exugear.life.life_file import limits
 from exugear.life.rating.beside import FlankKey, of_life

@@ -99,7 +99,7 @@ def _fastest(material: Material, model: Choice) -> float:
 
 
 def _deformed(material: Material, model: Choice, data: xr.Dataset) -> set[int]:
-    if model.variant != "flexible":
+    if not model.variant.is_elastic:
         return set()
     matched = {
         own.finding.mode

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 
 from exugear.gearbox.parts import RPM
+from exugear.gearbox.variant import Variant
 from exugear.report.findings.groups import RankedResonance, RunGroup
 from exugear.report.findings.loudness.ranking import Resonance
-from exugear.report.findings.words import VARIANTS, figure_text, percentages
+from exugear.report.findings.words import figure_text, percentages
 from exugear.report.parts.material import Material, Part, only_for, told_groups
 from exugear.report.web import pieces
 from exugear.report.web.pieces import Cell
@@ -63,7 +64,7 @@ def _in_operation(material: Material, group: RunGroup) -> str:
     low, high = (figure_text(speed / RPM, 4) for speed in ranking.speeds)
     which = "all speeds" if ranking.whole else "speeds of operation"
     rows = [_loud_row(material, own) for own in ranking.resonances[:SHOWN]]
-    title = f"At constant speed, {VARIANTS[group.main]}, {which}, {low} to {high} rpm: the first {len(rows)}"
+    title = f"At constant speed, {Variant.of(group.main).label}, {which}, {low} to {high} rpm: the first {len(rows)}"
     table = pieces.table(rows, ("Excited by", "At"), caption=title, name=f"in-operation-{group.name}", sortable=True)
     note = (
         f"In the order of the best place in any of the three; the place stands in brackets. Accelerations are those of "
@@ -122,7 +123,7 @@ def _rules() -> str:
 
 def _table(material: Material, group: RunGroup, variant: str) -> str:
     run, ranked = group.runs[variant], group.ranked[variant]
-    title = f"{VARIANTS[variant][0].upper()}{VARIANTS[variant][1:]}, inertias {group.inertias}, {group.source}"
+    title = f"{Variant.of(variant).label.capitalize()}, inertias {group.inertias}, {group.source}"
     heading = pieces.element("h3", pieces.text(f"{title}: {len(ranked)}"))
     rows = [_row(material, group, run, number, own) for number, own in enumerate(ranked, start=1)]
     if not rows:
@@ -140,7 +141,7 @@ def _table(material: Material, group: RunGroup, variant: str) -> str:
 
 
 def _others(group: RunGroup, variant: str) -> list[str]:
-    return [f"{VARIANTS[name].capitalize()} / dB" for name in group.runs if name != variant]
+    return [f"{Variant.of(name).label.capitalize()} / dB" for name in group.runs if name != variant]
 
 
 def _row(material: Material, group: RunGroup, run: VariantRun, number: int, own: RankedResonance) -> dict[str, object]:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from exugear.gearbox.parts import RPM
+from exugear.gearbox.variant import Variant
 from exugear.report.findings.groups import RunGroup
-from exugear.report.findings.words import VARIANTS, figure_text
+from exugear.report.findings.words import figure_text
 from exugear.report.parts.material import Material, Part
 from exugear.report.web import pieces
 from exugear.report.web.stage_figure import stage_figure
@@ -52,4 +53,4 @@ def _in_words(groups: Sequence[RunGroup]) -> str:
     group = groups[0]
     loudest = [own for own in group.ranked[group.main] if own.steady][:3]
     told = [f"{own.frequency:.0f} Hz at {own.speed / RPM:.1f} rpm, {figure_text(own.loudness)} dB" for own in loudest]
-    return f"Loudest, {VARIANTS[group.main]}, {group.source}: {'; '.join(told) or 'nothing stands out'}."
+    return f"Loudest, {Variant.of(group.main).label}, {group.source}: {'; '.join(told) or 'nothing stands out'}."

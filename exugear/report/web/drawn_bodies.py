@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exugear.dynamics.assembly import Assembly
-from exugear.gearbox.seats import seat_key
+from exugear.gearbox.parts import seat_key
 from exugear.report.pictures.motions import displacement_of, motions_of
 from exugear.report.pictures.scene import body_colours
 from exugear.report.pictures.shapes import BodyShape, bodies_of

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import AllowInfNan, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, AllowInfNan, BaseModel, ConfigDict, Field, model_validator
 
 from exugear.gearbox.sections.entries import Name, Text
+from exugear.gearbox.variant import Variant
 
 Value = int | Annotated[float, AllowInfNan(True)] | str | bool | list[Any]
 """What may stand at a key of a case; what may not becomes a failed point with its name."""
@@ -148,7 +149,7 @@ class ParameterSection(StudyPart):
 class ChoiceSection(StudyPart):
     """What is computed of the gearbox, as on the command line."""
 
-    variant: Literal["rigid", "bushing", "flexible"] = "bushing"
+    variant: Annotated[str, AfterValidator(Variant.offered)] = Variant.bushing
     """How bodies are held."""
     mesh_law: str = "line_of_action"
     """How teeth push each other."""

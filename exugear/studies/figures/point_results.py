@@ -106,7 +106,7 @@ class PointResults:
     @cached_property
     def bodies(self) -> dict[str, ElasticBody]:
         """Reduced elastic bodies of the variant."""
-        if self.choice.variant != "flexible":
+        if not self.choice.variant.is_elastic:
             return {}
         return self.shared.bodies(self.gearbox, self.choice.inertia_set(self.gearbox))
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from exugear.gearbox.seats import seat_key
+from exugear.gearbox.parts import seat_key
 from exugear.kernels.coordinates import BODY_SIZE, SPIN, TILT
 from exugear.tooth_mesh.element import MeshElement
 from exugear.tooth_mesh.kernels.meshes import (

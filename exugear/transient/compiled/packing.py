@@ -254,7 +254,7 @@ def _tilts(given: MeshArrays) -> Floats:
 
 def _joints(numbers: _Numbers) -> Joints | None:
     assembly = numbers.assembly
-    joints = assembly.gearbox.joints if assembly.variant == "rigid" else ()
+    joints = assembly.gearbox.joints if assembly.variant.spins_only else ()
     bodies = {body.name: body for body in assembly.gearbox.bodies(assembly.inertias)}
     number = {joint.body: n for n, joint in enumerate(joints)}
     ends = [[number.get(e.mesh.pinion, -1), number.get(e.mesh.gear, -1)] for e in assembly.elements]

@@ -36,7 +36,7 @@ def unsupported_reason(assembly: Assembly) -> str:
     Every body of an assembly is axially symmetric with its centre of mass on its axis and at its node, as the
     equations need it; what is left to refuse are constraints.
     """
-    if assembly.variant == "jointed":
+    if assembly.variant.is_constrained:
         return "the variant jointed keeps ideal joints as constraints, which an explicit method cannot solve"
     if assembly.floating:
         family = assembly.gearbox.body(next(iter(assembly.floating))).family

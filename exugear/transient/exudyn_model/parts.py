@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from exugear.dynamics.assembly import Assembly
-from exugear.gearbox.seats import node_position, seat_key
+from exugear.gearbox.parts import node_position, seat_key
 from exugear.transient.exudyn_model.floating_bodies import FloatingBodies
 from exugear.transient.exudyn_model.library import exudyn, items
 from fe_ste.tools.arrays import Floats
@@ -27,7 +27,7 @@ class Parts:
     mbs : exudyn.MainSystem
     assembly : Assembly
     nodes : node of each body; of an elastic one that of its main seat, and those of its seats under
-        `exugear.gearbox.seats.seat_key`
+        `exugear.gearbox.parts.seat_key`
     bodies : object of each rigid body
     elastic_nodes : all nodes of each elastic body: those of its seats, then one for its modal coordinates
     seat_positions : (3,) of each seat by its key, m

@@ -19,8 +19,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from exugear.dynamics.assembly import Assembly, VariantError
+from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.loads import Loading
+from exugear.gearbox.variant import VariantError
 from exugear.tooth_mesh.kernels.meshes import MeshArrays
 from exugear.transient.exudyn_model.bodies import add_bodies
 from exugear.transient.exudyn_model.connections import add_couplings, add_joint, add_supports
@@ -80,7 +81,7 @@ class ExudynSystem:
         self._container = exudyn.SystemContainer()
         self.mbs = self._container.AddSystem()
         self.parts = Parts(self.mbs, assembly)
-        self._minimal = assembly.variant == "rigid"
+        self._minimal = assembly.variant.spins_only
         if assembly.elastic_bodies and mesh_route != "element":
             raise VariantError("mesh_route 'loads' needs rigid bodies: use the variant jointed or bushing")
         if self._minimal and mesh_route != "element":
@@ -102,7 +103,7 @@ class ExudynSystem:
         add_supports(parts)
         add_couplings(parts)
         add_loading(parts, self.loading)
-        if self.assembly.variant == "jointed":
+        if self.assembly.variant.is_constrained:
             for joint in self.assembly.gearbox.joints:
                 add_joint(parts, joint)
         if parts.floating is not None:
@@ -174,7 +175,7 @@ class ExudynSystem:
         integration.generalizedAlpha.spectralRadius = 0.9
         integration.newton.useModifiedNewton = True
         # Stiff elastic bodies leave more round-off than joints; below it Exudyn would cut its steps in vain.
-        jointed = self.assembly.variant == "jointed"
+        jointed = self.assembly.variant.is_constrained
         integration.newton.relativeTolerance = 1e-10 if jointed else 1e-8
         integration.newton.absoluteTolerance = 1e-12 if jointed else 1e-10
         settings.linearSolverType = exudyn.LinearSolverType.EigenSparse

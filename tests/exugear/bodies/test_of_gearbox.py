@@ -11,7 +11,7 @@ from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies
 from exugear.bodies.of_gearbox.shafts import shaft_model
 from exugear.bodies.of_gearbox.solids import solid_body
 from exugear.dynamics.assemble import assemble
-from exugear.dynamics.assembly import Assembly, VariantError
+from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.eigenmodes.modes import counterparts, eigenmodes, modes_of
 from exugear.dynamics.linearised import linearise
 from exugear.dynamics.loads import Loading, LoadTable
@@ -20,6 +20,7 @@ from exugear.dynamics.statics import accelerating_start, locked_equilibrium
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
+from exugear.gearbox.variant import VariantError
 from exugear.report.pictures.elastic_scene import (
     animate_elastic_bodies,
     draw_elastic_bodies,

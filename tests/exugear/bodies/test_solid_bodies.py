@@ -16,7 +16,7 @@ from exugear.bodies.finite_elements.solid_seats import seat_rows
 from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies
 from exugear.bodies.of_gearbox.solids import solid_body
 from exugear.dynamics.assemble import assemble
-from exugear.dynamics.assembly import Assembly, VariantError
+from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.eigenmodes.energy_shares import BODY_MOTIONS
 from exugear.dynamics.eigenmodes.modes import counterparts, eigenmodes, modes_of
 from exugear.dynamics.fingerprint import input_hash
@@ -28,6 +28,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import Permissions
 from exugear.gearbox.reading import CaseError
+from exugear.gearbox.variant import VariantError
 from exugear.report.pictures.elastic_scene import elastic_scene
 from exugear.transient.compiled.solver import CompiledSystem
 from exugear.transient.exudyn_model.system import ExudynSystem

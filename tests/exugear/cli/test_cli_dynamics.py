@@ -13,10 +13,11 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from exugear.cli.app import app
-from exugear.cli.options import MeshLaw, Variant
+from exugear.cli.options import MeshLaw
 from exugear.cli.verbs.run import Solver
-from exugear.gearbox.choice import USER_VARIANTS
+from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.variant import Variant, VariantError
 from exugear.tooth_mesh.laws.registry import MESH_LAWS
 from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.tooth_mesh.placement import MeshError
@@ -54,8 +55,14 @@ def iso(verb, case, *more):
 def test_the_choices_offered_are_those_of_the_library():
     assert [law.value for law in MeshLaw] == list(MESH_LAWS)
     assert {solver.value for solver in Solver} == set(SOLVERS)
-    # The third variant keeps joints as constraints: a cross-check, not a model for users.
-    assert [variant.value for variant in Variant] == list(USER_VARIANTS)
+
+
+def test_a_variant_is_refused_at_once_and_the_one_meant_is_named():
+    for name, text in (("bush", "did you mean 'bushing'"), ("none", "variants are rigid, bushing, flexible")):
+        with pytest.raises(VariantError, match=text):
+            Choice(name)
+    with pytest.raises(VariantError, match="there to check others"):
+        Variant.offered("jointed")
 
 
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
@@ -150,7 +157,7 @@ def test_dynamics_refuses_a_table_of_another_input_but_not_of_other_positions(ca
 @pytest.mark.parametrize(
     ("verb", "options", "said"),
     [
-        ("run", ["--variant", "flexibel"], "'rigid', 'bushing'"),
+        ("run", ["--variant", "flexibel"], "did you mean 'flexible'?"),
         ("run", ["--variant", "rigid", "--inertias", "none"], "sets are disc"),
         ("modes", ["--variant", "rigid", "--inertias", "none"], "sets are disc"),
         ("run", ["--variant", "rigid", "--load-case", "nothing"], "load cases are run_up"),

@@ -11,8 +11,8 @@ import pytest
 from typer.testing import CliRunner
 
 from exugear.cli.app import app
-from exugear.gearbox.choice import USER_VARIANTS
 from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.variant import OFFERED
 from exugear.project import Project
 from exugear.tooth_mesh import tables
 
@@ -51,13 +51,13 @@ def test_each_kind_goes_through_all_verbs_or_check_says_why_not(kind: str, tmp_p
     checked = exugear("check", case, "--json")
     assert checked.exit_code == 0, checked.output
     lacks = json.loads(checked.stdout)
-    assert lacks["variants"] == dict.fromkeys(USER_VARIANTS, "")
+    assert lacks["variants"] == dict.fromkeys(OFFERED, "")
     assert lacks["load_cases"][0]["net_torque_N_m"] == 0.0
 
     speed = content["load_cases"]["steady"]["start_speed_rpm"]
     options = {"modes": (), "run": (), "steady": ("--speeds", f"{0.9 * speed}:{speed}:2")}
     worked: dict[str, list[str]] = {verb: [] for verb in options}
-    for variant in USER_VARIANTS:
+    for variant in OFFERED:
         for verb, further in options.items():
             result = exugear(verb, case, "--variant", variant, *further, "--out", folder)
             reason = lacks["steady"][variant] if verb == "steady" else ""

@@ -20,12 +20,13 @@ from typer.testing import CliRunner
 from exugear.bearings.rolling.life import basic_rating_life
 from exugear.cli import app as cli
 from exugear.dynamics.assemble import assemble
-from exugear.dynamics.assembly import Assembly, VariantError
+from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.statics import locked_equilibrium, rolled_coordinates
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
 from exugear.gearbox.sections.loads import RatingSection
+from exugear.gearbox.variant import VariantError
 from exugear.life.acting_loads import acting_loads
 from exugear.life.dynamic_factors.dynamic_factor import stated_factors
 from exugear.life.gear_life import beyond_tables, flank_lives

@@ -11,8 +11,7 @@ from exugear.dynamics.statics import static_state
 from exugear.exchange.rexs.export.names import Results
 from exugear.exchange.rexs.export.teeth import Target, instance_of
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.parts import RPM, Body
-from exugear.gearbox.seats import seat_key
+from exugear.gearbox.parts import RPM, Body, seat_key
 from fe_ste.tools.arrays import Floats
 
 SPEED = "rotational_speed"

@@ -13,13 +13,14 @@ from exugear.bearings.rolling.rows import BearingError
 from exugear.bodies.elastic_body import ElasticBody
 from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies
 from exugear.dynamics.assemble import assemble
-from exugear.dynamics.assembly import Assembly, VariantError
+from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.eigenmodes.modes import load_modes
 from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.statics import BalanceError
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
+from exugear.gearbox.variant import VariantError
 from exugear.results.bearings_file import read_duties
 from exugear.results.folder import bodies_folder
 from exugear.results.run_file import FINAL_NAME, load_run
@@ -74,14 +75,14 @@ class StoredResults:
     def duties(self) -> list[Mapping[str, Any]]:
         """Return what bearings bear, from the most complete variant that was asked."""
         found = dict(self._each("*/*/bearings.json", self._duties))
-        best = sorted(found, key=lambda choice: choice.variant == "flexible")[-1:]
+        best = sorted(found, key=lambda choice: choice.variant.is_elastic)[-1:]
         return [duty for choice in best for duty in found[choice]]
 
     @property
     def loaded(self) -> Assembly | None:
         """The most complete variant with bearings of which results were read."""
-        found = [one for one in self._assemblies.values() if one.variant != "rigid"]
-        return max(found, key=lambda one: one.variant == "flexible", default=None)
+        found = [one for one in self._assemblies.values() if one.variant.on_bearings]
+        return max(found, key=lambda one: one.variant.is_elastic, default=None)
 
     def _each(self, pattern: str, read: Callable[[Path], tuple[Choice, Result]]) -> Iterator[tuple[Choice, Result]]:
         """Read files one by one; what does not belong to the gearbox is noted."""
@@ -121,7 +122,7 @@ class StoredResults:
         """
         if choice not in self._assemblies:
             bodies: dict[str, ElasticBody] = {}
-            if choice.variant == "flexible":
+            if choice.variant.is_elastic:
                 bodies = reduced_bodies(self.gearbox, choice.inertia_set(self.gearbox), bodies_folder(self.folder))
             stiffness = mesh_stiffness(self.gearbox, choice.mesh_law, self.folder)
             self._assemblies[choice] = assemble(self.gearbox, choice, stiffness, bodies)

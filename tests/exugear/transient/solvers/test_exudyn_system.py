@@ -7,13 +7,14 @@ import pytest
 
 from exugear.bearings.kernels.connectors import add_connector_forces
 from exugear.dynamics.assemble import assemble
-from exugear.dynamics.assembly import Assembly, VariantError
+from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.eigenmodes.modes import modes_of
 from exugear.dynamics.linearised import linearise
 from exugear.dynamics.loads import Loading
 from exugear.dynamics.statics import StartState, accelerating_start
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.variant import VariantError
 from exugear.kernels.springs import add_spring_forces
 from exugear.transient.exudyn_model.system import ExudynSystem
 
