@@ -16,9 +16,7 @@ import tomllib
 import numpy as np
 from matplotlib.figure import Figure
 
-from exugear import Choice, Gearbox, eigenmodes
-from exugear.gearbox.templates.kinds import template
-from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear import Choice, Gearbox, eigenmodes, mesh_stiffness, template
 
 gearbox = Gearbox.from_dict(tomllib.loads(template("parallel")))
 stiffness = mesh_stiffness(gearbox, "iso6336")

@@ -15,10 +15,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from exugear import Choice, Gearbox, Project
-from exugear.gearbox.templates.kinds import template
-from exugear.results.spectra.orders import order_lines
-from exugear.results.spectra.run_spectra import run_waterfall
+from exugear import Choice, Gearbox, Project, order_lines, run_waterfall, template
 from exugear.results.spectra.waterfall import line_level
 
 plain = Gearbox.from_dict(tomllib.loads(template("parallel")))

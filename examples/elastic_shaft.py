@@ -15,9 +15,8 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from exugear import Choice, Gearbox, Project, static_state
+from exugear import Choice, Gearbox, Project, static_state, template
 from exugear.dynamics.eigenmodes.modes import counterparts
-from exugear.gearbox.templates.kinds import template
 
 rigid_shafts = Gearbox.from_dict(tomllib.loads(template("parallel")))
 shape = {

@@ -17,8 +17,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from exugear import Choice, Project
-from exugear.gearbox.templates.kinds import template
+from exugear import Choice, Project, template
 
 case = Path("results/planetary/gearbox.toml")
 case.parent.mkdir(parents=True, exist_ok=True)

@@ -13,9 +13,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from exugear import Choice, Project
-from exugear.exchange.rexs.containers import read_rexs
-from exugear.exchange.rexs.to_case.conversion import to_case
+from exugear import Choice, Project, read_rexs, to_case
 
 source = Path("../tests/exugear/exchange/rexs/data/FVA-Industriegetriebe_2stufig_1-4.rexs")
 imported = to_case(read_rexs(source), source.name)

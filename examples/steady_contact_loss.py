@@ -16,8 +16,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from exugear import Choice, Gearbox, Project
-from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear import Choice, Gearbox, Project, SpeedRange, SteadySettings
 
 CASE = """
 name = "one spur pair"

@@ -15,8 +15,7 @@ from pathlib import Path
 
 import gmsh
 
-from exugear import Choice, Gearbox, Project
-from exugear.gearbox.templates.kinds import template
+from exugear import Choice, Gearbox, Project, template
 from exugear.report.pictures.solid_scene import draw_free_vibration
 
 folder = Path("results/housing")

@@ -14,9 +14,9 @@ them through the balance at rest of a gearbox, and says how long its bearings la
 import numpy as np
 from matplotlib.figure import Figure
 
-from exugear import Choice, Gearbox, Project
+from exugear import Choice, Gearbox, Project, compute_life
 from exugear.life.dynamic_factors.dynamic_factor import stated_factors
-from exugear.life.life import checked_loads, compute_life
+from exugear.life.life import checked_loads
 
 gearbox = Gearbox.from_toml("../cases/grc750/gearbox.toml")
 counted = checked_loads(gearbox)

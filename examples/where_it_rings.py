@@ -12,17 +12,12 @@ eigenmodes say what moves in each.
 
 from pathlib import Path
 
-from exugear import Choice, Project
-from exugear.gearbox.templates.kinds import template
-from exugear.report.pictures.mode_diagrams import plot_campbell
-from exugear.report.pictures.run_diagrams import plot_waterfalls
-from exugear.results.spectra.orders import order_lines
+from exugear import Choice, Project, order_lines, plot_campbell, plot_waterfalls, run_waterfall, template
 from exugear.results.spectra.resonances import (
     group_by_frequency,
     match_eigenfrequencies,
     pick_resonances,
 )
-from exugear.results.spectra.run_spectra import run_waterfall
 
 case = Path("results/parallel/gearbox.toml")
 case.parent.mkdir(parents=True, exist_ok=True)

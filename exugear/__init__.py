@@ -9,14 +9,31 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from exugear.bodies.solids import SolidModel
+    from exugear.dynamics.assemble import assemble
     from exugear.dynamics.eigenmodes.modes import Modes, eigenmodes
     from exugear.dynamics.statics import static_state
+    from exugear.exchange.rexs.containers import read_rexs
+    from exugear.exchange.rexs.to_case.conversion import to_case
     from exugear.gearbox.choice import Choice
     from exugear.gearbox.gearbox import Gearbox
     from exugear.gearbox.reading import CaseError
+    from exugear.gearbox.templates.kinds import template
+    from exugear.gearbox.variant import Variant
+    from exugear.life.life import compute_life
     from exugear.project import Project
+    from exugear.report.pictures.mode_diagrams import plot_campbell
+    from exugear.report.pictures.run_diagrams import plot_waterfalls
     from exugear.report.writer import write_report
+    from exugear.results.run_file import load_run
+    from exugear.results.spectra.orders import order_lines
+    from exugear.results.spectra.run_spectra import run_waterfall
+    from exugear.steady.settings import SpeedRange, SteadySettings
     from exugear.steady.steady_response import steady_response
+    from exugear.studies.dataset import load_study
+    from exugear.studies.study import Study
+    from exugear.studies.sweep import sweep
+    from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
     from exugear.transient.outcome import Run
     from exugear.transient.runup import simulate
 
@@ -28,10 +45,28 @@ _HOMES = {
     "Modes": "exugear.dynamics.eigenmodes.modes",
     "Project": "exugear.project",
     "Run": "exugear.transient.outcome",
+    "SolidModel": "exugear.bodies.solids",
+    "SpeedRange": "exugear.steady.settings",
+    "SteadySettings": "exugear.steady.settings",
+    "Study": "exugear.studies.study",
+    "Variant": "exugear.gearbox.variant",
+    "assemble": "exugear.dynamics.assemble",
+    "compute_life": "exugear.life.life",
     "eigenmodes": "exugear.dynamics.eigenmodes.modes",
+    "load_run": "exugear.results.run_file",
+    "load_study": "exugear.studies.dataset",
+    "mesh_stiffness": "exugear.tooth_mesh.laws.stiffness",
+    "order_lines": "exugear.results.spectra.orders",
+    "plot_campbell": "exugear.report.pictures.mode_diagrams",
+    "plot_waterfalls": "exugear.report.pictures.run_diagrams",
+    "read_rexs": "exugear.exchange.rexs.containers",
+    "run_waterfall": "exugear.results.spectra.run_spectra",
     "simulate": "exugear.transient.runup",
     "static_state": "exugear.dynamics.statics",
     "steady_response": "exugear.steady.steady_response",
+    "sweep": "exugear.studies.sweep",
+    "template": "exugear.gearbox.templates.kinds",
+    "to_case": "exugear.exchange.rexs.to_case.conversion",
     "write_report": "exugear.report.writer",
 }
 
@@ -42,11 +77,29 @@ __all__ = [
     "Modes",
     "Project",
     "Run",
+    "SolidModel",
+    "SpeedRange",
+    "SteadySettings",
+    "Study",
+    "Variant",
     "__version__",
+    "assemble",
+    "compute_life",
     "eigenmodes",
+    "load_run",
+    "load_study",
+    "mesh_stiffness",
+    "order_lines",
+    "plot_campbell",
+    "plot_waterfalls",
+    "read_rexs",
+    "run_waterfall",
     "simulate",
     "static_state",
     "steady_response",
+    "sweep",
+    "template",
+    "to_case",
     "write_report",
 ]
 

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from one_variant import grc_project, show
 
-from exugear import Choice, Modes, Project, static_state
+from exugear import Choice, Modes, Project, order_lines, plot_waterfalls, run_waterfall, static_state
 from exugear.dynamics.eigenmodes.energy_shares import BODY_MOTIONS
 from exugear.dynamics.eigenmodes.modes import counterparts, modes_of
 from exugear.report.pictures.elastic_scene import (
@@ -26,15 +26,12 @@ from exugear.report.pictures.elastic_scene import (
     draw_elastic_bodies,
     elastic_scene,
 )
-from exugear.report.pictures.run_diagrams import plot_waterfalls
-from exugear.results.spectra.orders import order_lines
 from exugear.results.spectra.resonances import (
     Pick,
     group_by_frequency,
     match_eigenfrequencies,
     pick_resonances,
 )
-from exugear.results.spectra.run_spectra import run_waterfall
 
 VARIANTS = ("rigid", "bushing", "flexible")
 MAIN_SHAFT_MODES = 500.0

@@ -5,16 +5,12 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from exugear import Choice, Project
-from exugear.report.pictures.mode_diagrams import plot_campbell
-from exugear.report.pictures.run_diagrams import plot_waterfalls
-from exugear.results.spectra.orders import order_lines
+from exugear import Choice, Project, order_lines, plot_campbell, plot_waterfalls, run_waterfall
 from exugear.results.spectra.resonances import (
     group_by_frequency,
     match_eigenfrequencies,
     pick_resonances,
 )
-from exugear.results.spectra.run_spectra import run_waterfall
 from exugear.transient.outcome import Progress
 
 CASE = Path(__file__).with_name("gearbox.toml")

@@ -12,9 +12,8 @@ import math
 
 from one_variant import grc_project, show
 
-from exugear import Choice
+from exugear import Choice, load_run
 from exugear.gearbox.parts import RPM
-from exugear.results.run_file import load_run
 from exugear.results.spectra.order_cut import OrderCut
 from exugear.results.spectra.orders import OrderLine
 from exugear.results.spectra.sweeps import run_up_cut, sweep_rate

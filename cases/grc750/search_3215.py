@@ -31,10 +31,8 @@ import numpy as np
 import scipy.linalg
 from one_variant import grc_project
 
-from exugear import Choice, Project
-from exugear.dynamics.assemble import assemble
+from exugear import Choice, Gearbox, Project, assemble
 from exugear.dynamics.fingerprint import input_hash
-from exugear.gearbox.gearbox import Gearbox
 from exugear.steady.excitation import Gearset
 from exugear.steady.mean_system.mean_system import MeanSystem
 from exugear.steady.point_solver import gearset_of

@@ -13,10 +13,10 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from exugear import Gearbox, SolidModel
 from exugear.bodies.of_gearbox.solids import solid_body
 from exugear.bodies.reduced_body import ReducedBody
-from exugear.bodies.solids import SolidModel, load_or_reduce_solid
-from exugear.gearbox.gearbox import Gearbox
+from exugear.bodies.solids import load_or_reduce_solid
 from exugear.report.pictures.solid_scene import draw_free_vibration
 
 RIM = {

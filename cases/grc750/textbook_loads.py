@@ -17,8 +17,7 @@ from typing import Literal
 import numpy as np
 import xarray as xr
 
-from exugear import Choice, Project
-from exugear.results.run_file import load_run
+from exugear import Choice, Project, load_run
 
 CASE = Path(__file__).with_name("gearbox.toml")
 CHOICE = Choice("bushing", "iso6336")

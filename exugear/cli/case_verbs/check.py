@@ -97,7 +97,7 @@ def _rate(case: Path, out: Path | None, files_below: Path | None, as_json: bool)
     from exugear.project import Project, default_folder
 
     gearbox = read_gearbox(case, files_below, tell=not as_json)
-    project = Project(gearbox, out or default_folder(case), Choice("bushing", "line_of_action"))
+    project = Project(gearbox, out or default_folder(case), Choice(Variant.bushing, "line_of_action"))
     with progress_bar() as bar, model_errors():
         task = bar.add_task("static balance", total=None)
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from exugear.dynamics.assembly import Assembly
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.variant import Variant
 from exugear.life.acting_loads import acting_loads
 from exugear.life.gear_life import check_strengths
 from exugear.life.life import checked_loads, rating_of
@@ -16,7 +17,7 @@ from exugear.life.rating.nominal import nominal_loads
 from exugear.life.rating.sheet import RatingSheet, rating_sheet
 from exugear.life.static_balance import StaticBalance, static_balance
 
-RATED_AS = Choice("bushing", "iso6336")
+RATED_AS = Choice(Variant.bushing, "iso6336")
 """Forces and misalignment of the standard: shafts on their bearings, teeth as stiff as ISO 6336-1 has them."""
 
 
