@@ -1,11 +1,80 @@
-"""The README's example runs as printed."""
+"""What the README shows runs as printed."""
 
 from __future__ import annotations
 
 import re
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
-README = Path(__file__).parent.parent / "README.md"
+import pytest
+from typer.testing import CliRunner
+
+import exugear
+from exugear.cli.app import app
+
+ROOT = Path(__file__).parent.parent
+README = ROOT / "README.md"
+TEXT = README.read_text(encoding="utf-8")
+COMMANDS = [line.strip() for line in re.findall(r"^    (.*)$", re.sub(r"```.*?```", "", TEXT, flags=re.DOTALL), re.M)]
+
+
+def commands_of(program: str) -> list[list[str]]:
+    """Arguments of all lines that call a program, what explains them left out."""
+    lines = [re.split(r"\s{2,}", line)[0].split() for line in COMMANDS]
+    return [words[1:] for words in lines if Path(words[0]).name == program]
+
+
+def test_every_command_is_one_that_is_tested_here() -> None:
+    assert {Path(line.split()[0]).name for line in COMMANDS} == {"make", "pip", "exugear"}
+
+
+def test_both_commands_stand_first() -> None:
+    assert [words[0] for words in commands_of("make")] == ["demo", "test"]
+
+
+@pytest.mark.parametrize("target", sorted(set(re.findall(r"\bmake ([a-z-]+)", TEXT))))
+def test_a_target_is_one_of_the_makefile(target: str) -> None:
+    make = shutil.which("make")
+    if make is None:
+        pytest.skip("there is no make here")
+    asked = subprocess.run([make, "--dry-run", target], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert asked.returncode == 0, asked.stderr
+
+
+def test_what_pip_installs_is_there_and_of_this_version() -> None:
+    checkout, wheel = commands_of("pip")
+    assert (ROOT / checkout[checkout.index("-c") + 1]).is_file()
+    assert f"exugear-{exugear.__version__}-py3-none-any.whl[all]" in " ".join(wheel)
+    assert f"Version {exugear.__version__}" in TEXT
+    assert "[all]" in checkout[-1]
+
+
+@pytest.mark.parametrize("words", commands_of("exugear"), ids=" ".join)
+def test_a_verb_has_the_options_that_are_shown(words: list[str]) -> None:
+    asked = CliRunner().invoke(app, [words[0], "--help"], env={"COLUMNS": "200"})
+    assert asked.exit_code == 0
+    for word in words[1:]:
+        assert not word.startswith("--") or word in asked.output
+
+
+@pytest.mark.validation
+def test_a_gearbox_of_ones_own_goes_from_file_to_report(tmp_path: Path) -> None:
+    """The lines with a path of the environment, as a user types them; a moment of the run-up."""
+    lines = [line.split()[1:] for line in COMMANDS if line.startswith(".venv/bin/exugear")]
+    assert [words[0] for words in lines] == ["new", "run", "report"]
+    for words in lines:
+        more = ["--duration", "0.5"] if words[0] == "run" else []
+        command = [
+            sys.executable,
+            "-c",
+            "import sys; from exugear.cli.app import main; sys.exit(main())",
+            *words,
+            *more,
+        ]
+        subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    assert (tmp_path / "results" / "my" / "report.html").is_file()
 
 
 def test_the_python_example_runs(capsys):
