@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from exugear.bodies.solids import SolidModel
     from exugear.dynamics.assemble import assemble
-    from exugear.dynamics.eigenmodes.modes import Modes
-    from exugear.dynamics.eigenmodes.modes import eigenmodes
+    from exugear.dynamics.eigenmodes.modes import Modes, eigenmodes
     from exugear.dynamics.statics import static_state
     from exugear.exchange.rexs.containers import read_rexs
     from exugear.exchange.rexs.to_case.conversion import to_case
@@ -29,8 +28,7 @@ if TYPE_CHECKING:
     from exugear.results.run_file import load_run
     from exugear.results.spectra.orders import order_lines
     from exugear.results.spectra.run_spectra import run_waterfall
-    from exugear.steady.settings import SpeedRange
-    from exugear.steady.settings import SteadySettings
+    from exugear.steady.settings import SpeedRange, SteadySettings
     from exugear.steady.steady_response import steady_response
     from exugear.studies.dataset import load_study
     from exugear.studies.study import Study

@@ -52,7 +52,7 @@ _LAYOUT = Layout(
     LIFE,
     {f"flank_{name}": ("flank",) for name in FLANK_NUMBERS}
     | {f"bearing_{name}": ("bearing",) for name in (*BEARING_NUMBERS, "dynamic_rating", "static_rating")}
-    | {name: ("bin",) for name in ("torque", "hours", "revolutions", "speed")}
+    | dict.fromkeys(("torque", "hours", "revolutions", "speed"), ("bin",))
     | {"flank": ("flank",), "bearing": ("bearing",)}
     | {f"flank_{name}": ("flank",) for name in FLANK_WORDS}
     | {f"{name}_{by_bin}": (name, "bin") for name, _, by_bin in DAMAGES.values()},

@@ -14,6 +14,7 @@ rows that begin with ``#`` are skipped::
 from __future__ import annotations
 
 import csv
+import itertools
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -59,7 +60,7 @@ class FlankTopography:
     def __post_init__(self) -> None:
         """Refuse grids that are none."""
         for name, values in (("radius", self.radius), ("axial", self.axial)):
-            if len(values) < 2 or not all(b > a for a, b in zip(values, values[1:], strict=False)):
+            if len(values) < 2 or not all(b > a for a, b in itertools.pairwise(values)):
                 raise GeometryError(f"topography: {name} must hold two rising values or more, m, not {list(values)}")
         if [len(row) for row in self.removed] != [len(self.axial)] * len(self.radius):
             raise GeometryError(
@@ -151,7 +152,7 @@ def _number(path: Path, line: int, cell: str) -> float:
 
 
 def _check_rising(path: Path, line: int, what: str, values: list[float]) -> None:
-    for before, after in zip(values, values[1:], strict=False):
+    for before, after in itertools.pairwise(values):
         if not after > before:
             raise GeometryError(f"{path}: line {line}: {what} {after:g} mm must be above {before:g} mm")
 

@@ -47,7 +47,7 @@ def single_load_case(dataset: xr.Dataset) -> xr.Dataset:
         raise ValueError(
             f"dataset: {name} has {dataset.sizes[name]} values; choose one, such as dataset.isel({name}=0)"
         )
-    return dataset.isel({name: 0 for name in conditions}).sortby("pmc")
+    return dataset.isel(dict.fromkeys(conditions, 0)).sortby("pmc")
 
 
 def plot_ste_curves(datasets: Mapping[str, xr.Dataset], path: str | Path | None = None) -> Figure:

@@ -7,6 +7,7 @@ Edges at the corner where the blocks of tooth and rim meet are left out: the mes
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,7 +57,7 @@ def gauge_places(mesh: SectorMesh) -> GaugePlaces:
         chain = _chain(loose, int(flank[0 if not mesh.gear.internal else -1]), set(flank.tolist()), set(cut.tolist()))
         points = section.points[chain]
         along = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
-        for place, (first, second) in enumerate(zip(chain[:-1], chain[1:], strict=True)):
+        for place, (first, second) in enumerate(itertools.pairwise(chain)):
             if max(corners[first], corners[second]) <= 2:
                 edges.append((first, second))
                 sides.append(side)

@@ -48,8 +48,8 @@ _LAYOUT = Layout(
     "finished positions of a table",
     TABLE,
     {"solved": ("pmc", "centre_distance"), "line_load": ("pmc", *STATE_AXES, "tooth", "axial_position")}
-    | {name: ("pmc", *STATE_AXES) for name in (*RESULTS, "iterations")}
-    | {name: ("pmc", *STATE_AXES, "tooth") for name in ("load_share", "tangent_load_share")},
+    | dict.fromkeys((*RESULTS, "iterations"), ("pmc", *STATE_AXES))
+    | dict.fromkeys(("load_share", "tangent_load_share"), ("pmc", *STATE_AXES, "tooth")),
     (_PARTIAL_OF, "failures"),
 )
 _log = logging.getLogger(__name__)

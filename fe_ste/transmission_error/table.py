@@ -45,7 +45,7 @@ _LAYOUT = Layout(
     TABLE,
     {name: (name,) for name in ("pmc", *STATE_AXES, "tooth", "axial_position")}
     | {name: ("pmc", *STATE_AXES) for name in (*RESULTS, "mesh_stiffness", "converged") if name != CUT_OFF}
-    | {name: ("pmc", *STATE_AXES, "tooth") for name in ("load_share", "tangent_load_share")},
+    | dict.fromkeys(("load_share", "tangent_load_share"), ("pmc", *STATE_AXES, "tooth")),
     ("input_hash", "failures", "pair", "static_centre_distance", "static_misalignment"),
 )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -130,7 +131,7 @@ def locate(sections: Sequence[ShaftSection], seat: SeatBand) -> tuple[int, float
         )
     under = [
         number
-        for number, (start, end) in enumerate(zip(places[:-1], places[1:], strict=True))
+        for number, (start, end) in enumerate(itertools.pairwise(places))
         if (start < high - SAME and end > low + SAME) or (seat.width == 0.0 and start - SAME <= low <= end + SAME)
     ]
     ends = {diameter for one in under for diameter in (sections[one].outer_diameter, sections[one].outer_end)}
@@ -195,6 +196,6 @@ def check_sections(sections: tuple[ShaftSection, ...]) -> None:
     """
     if not sections:
         raise ShaftError("a shaft needs at least one section")
-    for number, (left, right) in enumerate(zip(sections[:-1], sections[1:], strict=True), start=1):
+    for number, (left, right) in enumerate(itertools.pairwise(sections), start=1):
         if min(left.outer_end, right.outer_diameter) <= max(left.inner_end, right.inner_diameter):
             raise ShaftError(f"sections {number} and {number + 1} do not touch: the bore of one clears the other")

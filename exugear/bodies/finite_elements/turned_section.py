@@ -16,6 +16,7 @@ rigid tilts and is left out together, as is usual in rotor dynamics (Friswell et
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -381,7 +382,7 @@ def _graded_line(breaks: Sequence[float], corners: set[float], size: float, grad
         if not unique or place - unique[-1] > SAME:
             unique.append(place)
     lines = [unique[0]]
-    for low, high in zip(unique[:-1], unique[1:], strict=True):
+    for low, high in itertools.pairwise(unique):
         ends = [any(abs(end - corner) < SAME for corner in corners) for end in (low, high)]
         room = min(size, (high - low) / (2.0 if all(ends) else 1.0))
         closing = room * GRADING ** np.arange(grading, 0, -1)

@@ -36,7 +36,7 @@ def blocks_of_lines(path: Path) -> Iterator[list[bytes]]:
                     raise LoadFileError(f"{path}: a line of more than {LONGEST_LINE:g} bytes; expected a table")
                 yield [line.rstrip(b"\r\n") for line in lines]
             if rest:
-                yield [line for line in rest.splitlines()]
+                yield list(rest.splitlines())
     except FileError as error:
         raise LoadFileError(str(error)) from None
 

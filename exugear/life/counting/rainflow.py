@@ -5,6 +5,7 @@ For what does not turn through its load: housings, arms, pins, splines, coupling
 
 from __future__ import annotations
 
+import itertools
 from array import array
 
 import numpy as np
@@ -72,7 +73,7 @@ class Rainflow:
         stack, closed = list(self._open), array("d", self._closed)
         if len(self._tail):
             _take(float(self._tail[-1]), stack, closed)
-        for one, other in zip(stack[:-1], stack[1:], strict=True):
+        for one, other in itertools.pairwise(stack):
             closed.extend((abs(other - one), 0.5 * (one + other), 0.5))
         table = np.frombuffer(closed, dtype=np.float64).reshape(-1, 3)
         return table[:, 0], table[:, 1], table[:, 2]

@@ -16,6 +16,7 @@ step is halved, too.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -101,7 +102,7 @@ def mode_tracks(modes_at: Callable[[float], Found], low: float, high: float) -> 
         speeds = sorted(found)
         steps = [
             (_clarity(found[a], found[b], narrowest / (b - a)), 0.5 * (a + b))
-            for a, b in zip(speeds, speeds[1:], strict=False)
+            for a, b in itertools.pairwise(speeds)
             if b - a > narrowest
         ]
         unclear = min(steps, default=(1.0, 0.0))
@@ -141,7 +142,7 @@ def _joined(speeds: Floats, found: list[Found]) -> ModeTracks:
     """Tracks from modes at each speed, in the order of their mean frequency."""
     places = [list(range(len(found[0][0])))]
     count = len(found[0][0])
-    for one, other in zip(found, found[1:], strict=False):
+    for one, other in itertools.pairwise(found):
         rows, columns, _ = _matches(one, other)
         own = dict(zip(columns.tolist(), (places[-1][row] for row in rows), strict=True))
         new = [n for n in range(len(other[0])) if n not in own]

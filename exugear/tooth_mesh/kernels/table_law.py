@@ -139,7 +139,7 @@ def piece_at(scaled: float, pieces: int) -> int:
     piece = int(scaled)
     if piece >= pieces:
         return pieces - 1
-    return piece if piece > 0 else 0
+    return max(0, piece)
 
 
 @kernel

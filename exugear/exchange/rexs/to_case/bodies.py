@@ -383,7 +383,7 @@ def _names(groups: Mapping[int, list[Component]], carriers: set[int]) -> dict[in
         role = "housing" if _is_fixed(parts) else "carrier" if root in carriers else "shaft"
         roles.setdefault(role, []).append(root)
     names = {root: _lettered("carrier", n, len(roles["carrier"])) for n, root in enumerate(roles.get("carrier", []))}
-    names |= {root: "housing" for root in roles.get("housing", [])}
+    names |= dict.fromkeys(roles.get("housing", []), "housing")
     return names | {root: f"shaft_{number}" for number, root in enumerate(roles.get("shaft", []), 1)}
 
 

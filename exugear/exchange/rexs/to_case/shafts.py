@@ -277,5 +277,5 @@ def _merged(pieces: Sequence[Cylinder]) -> list[Cylinder]:
 
 def is_continuous(sections: Sequence[Cylinder]) -> bool:
     """Tell whether sections make one piece, each beginning where the last one ends."""
-    ends = zip(sections, sections[1:], strict=False)
+    ends = itertools.pairwise(sections)
     return bool(sections) and all(abs(a.start + a.length - b.start) <= TOUCHING for a, b in ends)

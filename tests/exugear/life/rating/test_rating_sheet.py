@@ -93,9 +93,23 @@ def test_a_sheet_has_the_figures_of_a_rating_program():
     """
     found = rate(rules(), loads())
     printed = {
-        **{"F_t": 240064.4, "v": 20.83, "K_A": 1.25, "Z_H": 2.307, "Z_eps": 0.827, "Z_beta": 1.008, "Z_BD": 1.0},
-        **{"Z_L": 1.020, "Z_v": 1.022, "Z_R": 1.007, "Z_NT": 0.881, "Y_F": 1.24, "Y_beta": 0.917, "Y_NT": 0.870},
-        **{"Y_deltarelT": 1.005, "Y_RrelT": 0.957, "Y_X": 0.910},
+        "F_t": 240064.4,
+        "v": 20.83,
+        "K_A": 1.25,
+        "Z_H": 2.307,
+        "Z_eps": 0.827,
+        "Z_beta": 1.008,
+        "Z_BD": 1.0,
+        "Z_L": 1.020,
+        "Z_v": 1.022,
+        "Z_R": 1.007,
+        "Z_NT": 0.881,
+        "Y_F": 1.24,
+        "Y_beta": 0.917,
+        "Y_NT": 0.870,
+        "Y_deltarelT": 1.005,
+        "Y_RrelT": 0.957,
+        "Y_X": 0.910,
     }
     for name, value in printed.items():
         digits = len(repr(value).partition(".")[2])
