@@ -20,6 +20,10 @@ export OPENBLAS_NUM_THREADS ?= 1
 # Tests of one file stay together: they share tables and runs.
 SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist loadfile
 
+# Tests and docstrings of one room, such as steady or transmission_error.
+ROOM ?=
+OF_ROOM = $(or $(wildcard exugear/$(ROOM) fe_ste/$(ROOM) tests/exugear/$(ROOM) tests/fe_ste/$(ROOM)),$(error no room $(ROOM)))
+
 CASE := cases/grc750/gearbox.toml
 RESULTS := results/grc750
 SITE := build/docs/html
@@ -80,6 +84,7 @@ help:
 	@echo "make demo        GRC 750 from gear data to waterfalls, modes and a report, into $(RESULTS)"
 	@echo "make demo-short  the same with 10 positions of the mesh cycle and 4 s of the run-up"
 	@echo "make test        tests and documentation examples"
+	@echo "make test ROOM=steady  the tests of one room"
 	@echo "make test-browser  claims about the report page in a browser, desk and phone; needs chromium"
 	@echo "make validate    the long comparisons with references"
 	@echo "make validate-long  the longest ones, before a release; docs/validation.md records them"
@@ -118,7 +123,7 @@ demo-short: $(INSTALLED)
 	$(call end,$(RESULTS)-short)
 
 test: $(INSTALLED)
-	$(RUN)/python -m pytest $(SIDE_BY_SIDE)
+	$(RUN)/python -m pytest $(SIDE_BY_SIDE) $(if $(ROOM),$(OF_ROOM))
 
 # Pages in a real browser: skipped, and said, where no chromium is.
 test-browser: $(INSTALLED)
