@@ -68,7 +68,7 @@ def lacking(gearbox: Gearbox, variant: str) -> str:
     Examples
     --------
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
-    >>> [lacking(gearbox, variant) for variant in OFFERED]
+    >>> [lacking(gearbox, variant) for variant in ("rigid", "bushing", "flexible")]
     ['', '', '']
     """
     chosen, lack = Variant.of(variant), unsupported(gearbox, variant)

@@ -75,14 +75,17 @@ def run_from(gearset, response, duration, step, torque):
 def fitted(solver, response, duration, step, last):
     """Mean speed of a run in time that starts on a response, and lines of its overall transmission error.
 
-    Lines above half the rate at which the run is read would appear as others below it: they are left at zero.
+    A line above half the rate at which the run is read appears as another one below it, which may be one of the
+    others: those that hardly are there are left at zero.
     """
     gearset = solver.gearset
     time, overall, angle = run_from(gearset, response, duration, step, drive_of(gearset, response))
     late = time > duration - last
     speed, start = np.polyfit(time[late], angle[late], 1)
     half_rate = np.pi / (time[1] - time[0])
-    seen = np.flatnonzero(abs(speed * gearset.lines.orders) < half_rate)
+    size = abs(signals(gearset, response)[:, 0])
+    size[0] = np.inf
+    seen = np.flatnonzero((abs(speed * gearset.lines.orders) < half_rate) | (size > 1e-6 * size[1:].max()))
     angles = np.outer(np.copysign(1.0, speed) * (speed * time[late] + start), gearset.lines.orders[seen])
     columns = np.hstack([np.cos(angles), -np.sin(angles[:, 1:])])
     found = np.linalg.lstsq(columns, overall[late], rcond=None)[0]
