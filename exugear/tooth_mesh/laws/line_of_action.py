@@ -1,7 +1,7 @@
 """Mesh law `line_of_action`: a curve of load over deflection along the line of action, which changes over the cycle.
 
 A table of one load F0 knows the deflection s(pmc) and the tangent stiffness. The curve through both that passes the
-origin is a power of the deflection d,
+origin is a power of the deflection d::
 
     F = F0 sgn(d) x^m,  x = |d| / s,  m = tangent stiffness / (F0 / s),  tangent m F / d,  U = |F d| / (m + 1).
 
