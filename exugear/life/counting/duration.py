@@ -40,7 +40,8 @@ class DurationDistribution:
     @property
     def speed(self) -> Floats:
         """Mean speed of each bin, rad/s, without sign."""
-        return np.asarray(2.0 * np.pi * self.revolutions / (3600.0 * self.hours))
+        seconds = 3600.0 * self.hours
+        return np.divide(2.0 * np.pi * self.revolutions, seconds, out=np.zeros_like(seconds), where=seconds > 0.0)
 
     def torques(self, value: str) -> Floats:
         """Torque that stands for each bin: its ``mean``, or its ``upper`` edge, which adds damage."""
@@ -116,7 +117,8 @@ class LoadPoints:
     @property
     def speed(self) -> Floats:
         """Mean speed of each point, rad/s, without sign."""
-        return np.asarray(2.0 * np.pi * self.revolutions / (3600.0 * self.hours))
+        seconds = 3600.0 * self.hours
+        return np.divide(2.0 * np.pi * self.revolutions, seconds, out=np.zeros_like(seconds), where=seconds > 0.0)
 
 
 def load_points(
