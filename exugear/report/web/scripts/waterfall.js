@@ -54,7 +54,9 @@ function drawFrame() {
   const bounds = { x: [0, state.limit], y: [0, highest] };
   const loud = chosenVariant()?.resonances ?? [];
   const talk = Math.max(300, ...loud.filter((own) => own.level > loud[0].level - TALK).map((own) => own.peak));
-  const home = { x: bounds.x, y: /** @type {[number, number]} */ ([0, Math.min(highest, 1.25 * talk)]) };
+  // What is loud, and the first harmonic of every mesh up to the highest speed.
+  const wanted = Math.max(1.25 * talk, ...firstHarmonics().map((order) => (order * state.limit) / 60));
+  const home = { x: bounds.x, y: /** @type {[number, number]} */ ([0, Math.min(highest, wanted)]) };
   const before = plotIn(box());
   const kept = before && before.bounds.x[1] === state.limit ? shownPart(before.plot) : null;
   const plot = drawPlot(box(), frameOptions(), [[0, state.limit], [0, highest]], bounds, home);
@@ -64,6 +66,9 @@ function drawFrame() {
   }
   plot.over.addEventListener("click", (event) => clicked(plot, event));
 }
+
+/** @returns {number[]} orders of the meshes */
+const firstHarmonics = () => pageData.lines.filter((line) => line.harmonic === 1).map((line) => line.order);
 
 /** @param {Plot} plot @returns {import("./plots.js").Bounds} */
 function shownPart(plot) {
