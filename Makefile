@@ -18,7 +18,7 @@ PIP := $(RUN)/python -m pip --quiet --quiet --disable-pip-version-check
 export OPENBLAS_NUM_THREADS ?= 1
 
 # Tests of one file stay together: they share tables and runs.
-SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist loadfile
+SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist loadfile --durations 20
 
 # Tests and docstrings of one room, such as steady or transmission_error.
 ROOM ?=

@@ -11,6 +11,7 @@ from exugear.cli.errors import BadInputError, model_errors
 from exugear.gearbox.variant import Variant
 
 if TYPE_CHECKING:
+    from exugear.dynamics.assembly import Assembly
     from exugear.gearbox.choice import Choice
     from exugear.gearbox.gearbox import Gearbox
     from exugear.project import Project
@@ -90,28 +91,33 @@ def make_results_folder(folder: Path) -> None:
         raise BadInputError(f"--out {folder}: not writable; name another folder")
 
 
-def steady_lack(gearbox: Gearbox, variant: str) -> str:
-    """Say why a variant has no steady response over speed; empty where it has one.
-
-    What speaks against it does not depend on finite elements: teeth are as stiff as ISO 6336-1 says, bodies rigid.
+def assembled_by_iso(gearbox: Gearbox, variant: Variant) -> Assembly:
+    """Assemble a variant with rigid bodies and teeth as stiff as ISO 6336-1 says, which needs no finite elements.
 
     Raises
     ------
     FailedError
         The variant finds no balance so.
     """
-    from exugear.bearings.supports import elastic_names
     from exugear.dynamics.assemble import assemble
     from exugear.gearbox.choice import Choice
-    from exugear.steady.mean_system.mean_system import unsuitable
     from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 
     law = "iso6336"
-    is_elastic = Variant.of(variant).is_elastic
-    elastic, rigid = (elastic_names(gearbox), Variant.bushing) if is_elastic else ((), variant)
+    rigid = Variant.bushing if variant.is_elastic else variant
     with model_errors():
-        assembly = assemble(gearbox, Choice(rigid, law), mesh_stiffness(gearbox, law))
-    return unsuitable(assembly, elastic)
+        return assemble(gearbox, Choice(rigid, law), mesh_stiffness(gearbox, law))
+
+
+def steady_lack(assembly: Assembly, variant: Variant) -> str:
+    """Say why a variant has no steady response over speed, by its `assembled_by_iso`; empty where it has one.
+
+    What speaks against it does not depend on finite elements.
+    """
+    from exugear.bearings.supports import elastic_names
+    from exugear.steady.mean_system.mean_system import unsuitable
+
+    return unsuitable(assembly, elastic_names(assembly.gearbox) if variant.is_elastic else ())
 
 
 def check_choice(gearbox: Gearbox, choice: Choice, folder: Path) -> None:

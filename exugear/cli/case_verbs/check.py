@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from exugear.cli.case import read_gearbox, steady_lack
+from exugear.cli.case import assembled_by_iso, read_gearbox, steady_lack
 from exugear.cli.console import counted, note, print_json, print_table, progress_bar, say
 from exugear.cli.dynamics import contacts_shown
 from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption, model_errors
@@ -17,6 +17,7 @@ from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption, OutO
 from exugear.gearbox.variant import OFFERED, Variant
 
 if TYPE_CHECKING:
+    from exugear.dynamics.assembly import Assembly
     from exugear.gearbox.gearbox import Gearbox
 
 
@@ -54,8 +55,9 @@ def check(
         thicknesses = _thickness_summaries(gearbox)
         loads = _load_summaries(gearbox)
         variants = {str(variant): lacking(gearbox, variant) for variant in OFFERED}
-        steady = _steady_lacks(gearbox, variants)
-        bearings, doubts = ([], []) if variants[Variant.bushing] else _bearing_summaries(gearbox)
+        assemblies = _assemblies(gearbox, variants)
+        steady = _steady_lacks(assemblies)
+        bearings, doubts = _bearing_summaries(gearbox, assemblies.get(Variant.bushing))
         warnings = [*remarks(gearbox), *doubts]
         if as_json:
             summary = {"case": str(case), "name": gearbox.name, "ratio": gearbox.train.ratio, "pairs": pairs}
@@ -131,15 +133,26 @@ def _read(case: Path, files_below: Path | None, as_json: bool) -> Gearbox:
         raise
 
 
-def _steady_lacks(gearbox: Gearbox, variants: dict[str, str]) -> dict[str, str]:
-    """Say of each variant that is possible why it has no steady response over speed; empty where it has one."""
-    reasons = {}
-    for variant in (name for name, lack in variants.items() if not lack):
+def _assemblies(gearbox: Gearbox, variants: Mapping[str, str]) -> dict[Variant, Assembly | FailedError]:
+    """Assemble each variant that is possible, once: those on bearings are one as long as all bodies are rigid."""
+    found: dict[Variant, Assembly | FailedError] = {}
+    for variant in (Variant.of(name) for name, lack in variants.items() if not lack):
+        if variant.is_elastic and Variant.bushing in found:
+            found[variant] = found[Variant.bushing]
+            continue
         try:
-            reasons[variant] = steady_lack(gearbox, variant)
+            found[variant] = assembled_by_iso(gearbox, variant)
         except FailedError as error:
-            reasons[variant] = str(error)
-    return reasons
+            found[variant] = error
+    return found
+
+
+def _steady_lacks(assemblies: Mapping[Variant, Assembly | FailedError]) -> dict[str, str]:
+    """Say of each variant why it has no steady response over speed; empty where it has one."""
+    return {
+        str(variant): str(found) if isinstance(found, FailedError) else steady_lack(found, variant)
+        for variant, found in assemblies.items()
+    }
 
 
 def _tell_scripts(gearbox: Gearbox) -> None:
@@ -233,24 +246,23 @@ def _thickness_row(one: dict[str, Any]) -> dict[str, str]:
     }
 
 
-def _bearing_summaries(gearbox: Gearbox) -> tuple[list[dict[str, Any]], list[str]]:
+def _bearing_summaries(
+    gearbox: Gearbox, assembly: Assembly | FailedError | None
+) -> tuple[list[dict[str, Any]], list[str]]:
     """Load and stiffness of catalogue bearings, a line for those of all planets, and what is doubtful about them.
 
     With the mesh stiffness of ISO 6336: tables may not be there, and the static loads hardly depend on it.
     """
     from exugear.bearings.duty import estimate_effects
-    from exugear.dynamics.assemble import assemble
     from exugear.dynamics.bearing_duties import bearing_duties, bearing_points
-    from exugear.gearbox.choice import Choice
     from exugear.results.bearings_file import duty_summary
-    from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
 
-    if not any(bearing.catalogue for bearing in gearbox.bearings):
+    if assembly is None or not any(bearing.catalogue for bearing in gearbox.bearings):
         return [], []
-    law = "iso6336"
+    if isinstance(assembly, FailedError):
+        return [], [f"bearings: {assembly}"]
     try:
         with model_errors():
-            assembly = assemble(gearbox, Choice(Variant.bushing, law), mesh_stiffness(gearbox, law))
             every = bearing_duties(assembly)
             duties = {duty.family: duty for duty in reversed(every)}
             points = {point.bearing.family: point for point in reversed(bearing_points(assembly))}

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from exugear.cli.case import begin_results, open_project, steady_lack
+from exugear.cli.case import assembled_by_iso, begin_results, open_project, steady_lack
 from exugear.cli.console import note, print_json, print_table, progress_bar, say
 from exugear.cli.dynamics import contacts_shown, reduce_elastic_bodies
 from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption, model_errors
@@ -118,7 +118,8 @@ def steady(
 def _refuse_what_has_none(project: Project) -> None:
     """Refuse a variant without a steady response before tables and finite elements."""
     with suppress(FailedError):  # which says nothing of the law that is asked for
-        if reason := steady_lack(project.gearbox, project.choice.variant):
+        variant = project.choice.variant
+        if reason := steady_lack(assembled_by_iso(project.gearbox, variant), variant):
             raise BadInputError(reason)
 
 

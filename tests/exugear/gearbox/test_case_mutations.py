@@ -103,8 +103,8 @@ def test_the_cases_to_start_from_have_no_fault(starts: tuple[Path, dict[str, dic
 
 def test_damaged_files_are_refused_in_words_or_pass(starts: tuple[Path, dict[str, dict[str, Any]]]) -> None:
     file, cases = starts
-    passed = [survives_check(cases, seed, file) is not None for seed in range(200)]
-    assert 10 < sum(passed) < 150  # else the mutants are no test of anything
+    passed = [survives_check(cases, seed, file) is not None for seed in range(80)]
+    assert 4 < sum(passed) < 60  # else the mutants are no test of anything
 
 
 def test_what_check_passes_modes_takes(starts: tuple[Path, dict[str, dict[str, Any]]]) -> None:
@@ -114,16 +114,16 @@ def test_what_check_passes_modes_takes(starts: tuple[Path, dict[str, dict[str, A
 
 
 @pytest.mark.validation
-def test_thousands_of_damaged_files_are_refused_in_words_or_pass(
+def test_hundreds_of_damaged_files_are_refused_in_words_or_pass(
     starts: tuple[Path, dict[str, dict[str, Any]]],
 ) -> None:
     file, cases = starts
-    for seed in range(1000, 4000):
+    for seed in range(1000, 1600):
         survives_check(cases, seed, file)
 
 
 @pytest.mark.validation
 def test_what_check_passes_modes_takes_of_many(starts: tuple[Path, dict[str, dict[str, Any]]]) -> None:
     file, cases = starts
-    for seed in range(100, 160):
+    for seed in range(100, 120):
         survives_modes(cases, seed, file)
