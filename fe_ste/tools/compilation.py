@@ -61,6 +61,7 @@ compile_as_asked(sys.stdin.buffer)
 #: numba's settings, which have no types.
 _settings: Any = config
 _log = logging.getLogger(__name__)
+_with_kernels: set[Path] = set()
 _compiled_ahead: dict[tuple[Callable[..., object], Any], subprocess.Popen[bytes]] = {}
 
 
@@ -249,6 +250,7 @@ def _package_of(source: Path) -> Path:
 @cache
 def _folder_of(package: Path) -> Path | None:
     name = _FOLDER + _digest(package)
+    _with_kernels.add(package)
     for folder in _places(package):
         with suppress(OSError):
             return _opened(folder, name)
@@ -256,14 +258,15 @@ def _folder_of(package: Path) -> Path | None:
 
 
 def _digest(package: Path) -> str:
-    """Digest of all sources with kernels, of a package and this one, and of what else shapes the machine code.
+    """Digest of all sources with kernels, of a package and those before it, and of what else shapes the machine code.
 
-    numba keeps the processor and its features apart within the folder.
+    A kernel calls those of its own package and of packages that were imported before it. numba keeps the processor and
+    its features apart within the folder.
     """
     compilers = numba.__version__, llvmlite.__version__
     shaping = _settings.OPT, _settings.BOUNDSCHECK, _settings.LOOP_VECTORIZE, _settings.SLP_VECTORIZE
     digest = hashlib.sha256(repr((compilers, shaping)).encode())
-    for folder in sorted({package, _package_of(Path(__file__))}):
+    for folder in sorted({package, _package_of(Path(__file__)), *_with_kernels}):
         for file in sorted(folder.rglob("*.py")):
             source = file.read_bytes()
             if __name__.encode() in source or file.name == Path(__file__).name:

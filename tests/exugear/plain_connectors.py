@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
 from exugear.bearings.kernels.connectors import ConnectorArrays
@@ -21,6 +20,7 @@ from exugear.bearings.kernels.rolling import (
     rolling_force,
 )
 from exugear.kernels.coordinates import BODY_SIZE, SPIN, TILT
+from fe_ste.tools.compilation import compiled
 
 Floats = np.ndarray
 ARM, POSITION, VELOCITY, ANGULAR_VELOCITY = range(4)
@@ -29,7 +29,7 @@ DISPLACEMENT, RATE, TRUE_RATE = range(3)
 """Rows of `connector_motion`."""
 
 
-@numba.njit
+@compiled
 def memory_for(rolling: RollingArrays) -> Floats:
     """Memory for `exugear.bearings.kernels.rolling.rolling_forces`."""
     most = 0
@@ -38,7 +38,7 @@ def memory_for(rolling: RollingArrays) -> Floats:
     return np.zeros(TOUCHING + CONTACT_SIZE * most)
 
 
-@numba.njit
+@compiled
 def rotation(a: float, b: float, spin: float, out: Floats) -> None:
     """Rotation matrix Rx(a) Ry(b) Rz(spin), (3, 3)."""
     ca, sa, cb, sb = math.cos(a), math.sin(a), math.cos(b), math.sin(b)
@@ -48,7 +48,7 @@ def rotation(a: float, b: float, spin: float, out: Floats) -> None:
     out[2, 0], out[2, 1], out[2, 2] = sa * sg - ca * sb * cg, sa * cg + ca * sb * sg, ca * cb
 
 
-@numba.njit
+@compiled
 def body_point(q: Floats, v: Floats, start: int, node: Floats, local: Floats, turn: Floats, out: Floats) -> None:
     """Move a body-fixed point: turn (3, 3); out (4, 3) = arm, position, velocity, angular velocity."""
     if start < 0:
@@ -76,7 +76,7 @@ def body_point(q: Floats, v: Floats, start: int, node: Floats, local: Floats, tu
     out[ANGULAR_VELOCITY, 0], out[ANGULAR_VELOCITY, 1], out[ANGULAR_VELOCITY, 2] = wx, wy, wz
 
 
-@numba.njit
+@compiled
 def connector_motion(
     q: Floats, v: Floats, n: int, connectors: ConnectorArrays, turn: Floats, arms: Floats, out: Floats
 ) -> None:
@@ -123,7 +123,7 @@ def connector_motion(
     out[TRUE_RATE, TILT] = w[TILT] - math.sin(b) * out[TRUE_RATE, SPIN]
 
 
-@numba.njit
+@compiled
 def turn_between(q: Floats, n: int, connectors: ConnectorArrays) -> float:
     """Spin of the second body less that of the first, rad, unwrapped; the ground has none."""
     first, second = connectors.bodies[n]
@@ -135,7 +135,7 @@ def turn_between(q: Floats, n: int, connectors: ConnectorArrays) -> float:
     return turn
 
 
-@numba.njit
+@compiled
 def connector_load(q: Floats, v: Floats, n: int, connectors: ConnectorArrays, arms: Floats, out: Floats) -> float:
     """Fill force and moment (6,) that connector n takes from its second body, global axes; arms (2, 3).
 
@@ -166,7 +166,7 @@ def connector_load(q: Floats, v: Floats, n: int, connectors: ConnectorArrays, ar
     return torque
 
 
-@numba.njit
+@compiled
 def add_wrench(q: Floats, start: int, sign: float, load: Floats, arm: Floats, f: Floats) -> None:
     """Add a global force and moment (6,) acting at `arm` from the node to the Rxyz coordinates of a body."""
     if start < 0:
@@ -185,7 +185,7 @@ def add_wrench(q: Floats, start: int, sign: float, load: Floats, arm: Floats, f:
     f[start + SPIN] += sb * mx - sa * cb * my + ca * cb * mz
 
 
-@numba.njit
+@compiled
 def add_forces(q: Floats, v: Floats, connectors: ConnectorArrays, f: Floats) -> None:
     """Add the generalized forces of all connectors to f."""
     arms, load = np.empty((2, 3)), np.empty(BODY_SIZE)

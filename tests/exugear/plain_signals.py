@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
 from exugear.bearings.kernels.rolling import (
@@ -36,6 +35,7 @@ from exugear.tooth_mesh.kernels.meshes import (
 )
 from exugear.tooth_mesh.kernels.table_law import scratch_memory
 from exugear.tooth_mesh.laws.forms import MEMORY, pass_meshes
+from fe_ste.tools.compilation import compiled
 
 from .plain_connectors import connector_load, connector_motion, memory_for, turn_between
 
@@ -75,7 +75,7 @@ def energies_of(assembly: Assembly, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     return out
 
 
-@numba.njit
+@compiled
 def mesh_states(q, v, meshes, out) -> None:
     """Fill (m, 10): what each mesh does, by the readable laws."""
     none = np.empty((0, 0))
@@ -84,7 +84,7 @@ def mesh_states(q, v, meshes, out) -> None:
     )
 
 
-@numba.njit
+@compiled
 def mesh_signals(q, v, meshes, out) -> None:
     """Fill (samples, 2 m): deflection (m), then F_bt (N) of each mesh; q and v (samples, size)."""
     count = meshes.cycles.size
@@ -96,7 +96,7 @@ def mesh_signals(q, v, meshes, out) -> None:
             out[n, count + m] = state[m, FORCE]
 
 
-@numba.njit
+@compiled
 def bearing_signals(q, v, connectors, out, moments) -> None:
     """Fill (samples, 3 c) each: force (N) and moment (N m) of each bearing on its body, global axes."""
     load, arms = np.empty(6), np.empty((2, 3))
@@ -108,7 +108,7 @@ def bearing_signals(q, v, connectors, out, moments) -> None:
                 moments[n, 3 * c + i] = -load[3 + i]
 
 
-@numba.njit
+@compiled
 def joint_signals(q, v, meshes, ends, hosts, planets, out) -> None:
     """Fill (samples, 3 j): force of each ideal joint on its body (N), global axes, in minimal coordinates.
 
@@ -147,7 +147,7 @@ def joint_signals(q, v, meshes, ends, hosts, planets, out) -> None:
                     out[n, 3 * hosts[j] + i] += out[n, 3 * j + i]
 
 
-@numba.njit
+@compiled
 def mesh_energies(q, v, meshes, state, out) -> None:
     """Add elastic energy (J) and the powers (W) damped, of k(PMC), non-conservative to out (5,)."""
     mesh_states(q, v, meshes, state)
@@ -156,7 +156,7 @@ def mesh_energies(q, v, meshes, state, out) -> None:
             out[i] += state[m, ENERGY + i]
 
 
-@numba.njit
+@compiled
 def bearing_energies(q, v, connectors, out) -> None:
     """Add elastic energy (J), damping power and power of the rate's own (W) of all bearings to out (5,).
 
@@ -182,7 +182,7 @@ def bearing_energies(q, v, connectors, out) -> None:
             out[1] += forces[CAGE_DAMPING] * turn_between(v, n, connectors)
 
 
-@numba.njit
+@compiled
 def spring_energies(q, v, springs, out) -> None:
     """Add elastic energy (J) and damping power (W) of all couplings to out (5,)."""
     for n in range(springs.coordinates.shape[0]):
@@ -191,7 +191,7 @@ def spring_energies(q, v, springs, out) -> None:
         out[1] += springs.damping[n] * (v[j] - v[i]) ** 2
 
 
-@numba.njit
+@compiled
 def energy_signals(
     q,
     v,
@@ -213,7 +213,7 @@ def energy_signals(
         spring_energies(q[n], v[n], springs, out[n, 1:])
 
 
-@numba.njit
+@compiled
 def add_elastic_signals(q, v, elastic, scratch, out) -> None:
     """Add kinetic and elastic energy (J) and the damped power (W) of elastic bodies to out (samples, 6)."""
     for n in range(q.shape[0]):
@@ -223,7 +223,7 @@ def add_elastic_signals(q, v, elastic, scratch, out) -> None:
         out[n, 2] += damped
 
 
-@numba.njit
+@compiled
 def add_turning_signals(q, v, turning, memory, out) -> None:
     """Add the same of elastic bodies in turning frames."""
     unused = np.zeros(q.shape[1])

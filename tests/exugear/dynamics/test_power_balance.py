@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 import pytest
 
@@ -31,6 +30,7 @@ from exugear.tooth_mesh.kernels.table_law import scratch_memory
 from exugear.tooth_mesh.laws.forms import MEMORY, pass_meshes
 from exugear.transient.compiled.solver import CompiledSystem
 from exugear.transient.compiled.step import choose_integration
+from fe_ste.tools.compilation import compiled
 
 from ..assembled import assembled
 from ..plain_connectors import add_forces
@@ -45,7 +45,7 @@ passes through; so the limit is lower, and the law's account has one in terms of
 """
 
 
-@numba.njit
+@compiled
 def mesh_powers(q, v, mesh, straight, out):
     """Fill (samples, 5) of one mesh: power into the bodies, damped, of the cycle (W); elastic energy (J).
 
@@ -65,7 +65,7 @@ def mesh_powers(q, v, mesh, straight, out):
         out[n, 3] = state[0, ENERGY]
 
 
-@numba.njit
+@compiled
 def bearing_powers(q, v, bearing, out):
     """Fill (samples,): power of one bearing into its bodies, W."""
     f = np.empty(q.shape[1])
