@@ -28,7 +28,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -73,6 +73,8 @@ class MeshElement:
     offset : (3,) deflection (m), change of centre distance (m) and misalignment (rad) at zero coordinates
     table : for a law that follows a table; `stiffness` and `damping` are then what it has at the static load
     computed_from : input of the pair's table where contact is to be solved at the static misalignment
+    load_way : (n,) way of the load along the face over the mesh cycle about its mean, in the axes of the mesh, m; empty
+        where it stays or nothing is known of it
     """
 
     mesh: Mesh
@@ -96,6 +98,7 @@ class MeshElement:
     offset: Floats
     table: TableFlanks | None = None
     computed_from: TableInput | None = None
+    load_way: Floats = field(default_factory=lambda: np.zeros(0))
 
     def with_contact(self, contact: ContactState) -> MeshElement:
         """Return the mesh, whose teeth bear evenly so far, with a contact that was solved, in the axes of its table.
@@ -225,6 +228,7 @@ def mesh_elements(
             offset=_offset(mesh, displaced or {}, deflection, centre),
             table=law.table_flanks(mesh, flank, ends, phase, data, time),
             computed_from=data.table if isinstance(data, MeshCurve) and flank == usual[mesh.name] else None,
+            load_way=_load_way(law, data, flank, usual[mesh.name]),
         )
         elements.append(element if known is None or not law.tilts else element.with_contact(known))
     return tuple(elements)
@@ -238,6 +242,12 @@ def _at_load(law: Law, data: MeshData, mesh: Mesh, static_force: float) -> tuple
         if not (np.all(np.isfinite(values)) and np.all(values > 0.0)):
             raise MeshError(f"pair {mesh.pair.name}: mesh stiffness must be positive and finite")
     return secant, tangent, load
+
+
+def _load_way(law: Law, data: MeshData, flank: int, usual: int) -> Floats:
+    """Way of the load (n,) as `MeshElement.load_way`; of the flank that a table is of, not of that behind."""
+    # A flank -1 is that of the table turned about: the ends of the face change places.
+    return flank * law.load_way(data) if flank == usual else np.zeros(0)
 
 
 def _offset(mesh: Mesh, displaced: Mapping[str, tuple[float, float]], deflection: Floats, centre: Floats) -> Floats:

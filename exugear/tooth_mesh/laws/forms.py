@@ -27,12 +27,12 @@ from exugear.tooth_mesh.kernels.meshes import (
     STATE_SIZE,
     STIFFNESS,
     TILT_DAMPING,
-    TILT_LEVER,
     TILT_MOMENT,
     TILT_REST,
     TILT_STIFFNESS,
     MeshArrays,
     frame_row,
+    mesh_lever,
     mesh_pmc,
     net_deflection,
     rate_gradient,
@@ -72,13 +72,13 @@ def row_law(
 
 
 @kernel
-def tilted(q: Floats, m: int, meshes: MeshArrays, memory: Floats) -> float:
+def tilted(q: Floats, m: int, meshes: MeshArrays, lever: float, memory: Floats) -> float:
     """Misalignment of mesh m against that of its contact's state, rad; its gradient stays in `memory`.
 
     Rows of the deflection that stand there become those of e (`exugear.tooth_mesh.contact_state`).
     """
     gradient, turning, tilting, tilt_turning = memory[GRADIENT], memory[TURNING], memory[TILTING], memory[TILT_TURNING]
-    table, lever = meshes.table, meshes.tilt[m, TILT_LEVER]
+    table = meshes.table
     tilt: float = table.nominal[m, NOMINAL_MISALIGNMENT] - meshes.tilt[m, TILT_REST]
     tilt += frame_row(q, meshes.coordinates[m], meshes.axis[m], table.misalignment[m], tilting, tilt_turning)
     for i in range(ROW_SIZE):
@@ -97,16 +97,17 @@ def row_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Floats, 
     delta += net_deflection(q, m, meshes, meshes.deflection[m], 1.0, gradient, turning, bend)
     rate = row_dot(index, gradient, v)
     out[DEFLECTION], out[RATE] = delta, rate
+    pmc = mesh_pmc(q, m, meshes)
+    cycling = meshes.cycles[m] * relative_spin(v, index, 0)
     moment, turned, stored, lost = 0.0, 0.0, 0.0, 0.0
+    lever, moving = mesh_lever(m, pmc, meshes)
     if resists[TILT_STIFFNESS] > 0.0:
-        turned = tilted(q, m, meshes, memory)
+        turned = tilted(q, m, meshes, lever, memory)
         tilt_rate = row_dot(index, tilting, v)
-        delta, rate = delta - resists[TILT_LEVER] * turned, rate - resists[TILT_LEVER] * tilt_rate
+        delta, rate = delta - lever * turned, rate - lever * tilt_rate
         moment = resists[TILT_MOMENT] - resists[TILT_STIFFNESS] * turned - resists[TILT_DAMPING] * tilt_rate
         stored = (0.5 * resists[TILT_STIFFNESS] * turned - resists[TILT_MOMENT]) * turned
         lost = resists[TILT_DAMPING] * tilt_rate * tilt_rate
-    pmc = mesh_pmc(q, m, meshes)
-    cycling = meshes.cycles[m] * relative_spin(v, index, 0)
     # The law, and its damper beside it.
     elastic, k, _, energy, cycle_power = row_law(
         meshes.form[m], meshes.stiffness[m], meshes.pieces[m], delta, pmc, cycling
@@ -116,12 +117,12 @@ def row_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Floats, 
     net_deflection(q, m, meshes, meshes.force[m], 1.0, acting, turning, bend)
     if resists[TILT_STIFFNESS] > 0.0:
         for i in range(ROW_SIZE):
-            acting[i] -= resists[TILT_LEVER] * tilting[i]
+            acting[i] -= lever * tilting[i]
     out[PMC], out[STIFFNESS] = pmc - math.floor(pmc), k
     out[FORCE] = force * meshes.line_of_action[m]
     out[ENERGY] = energy + stored
     out[DAMPED_POWER] = meshes.damping[m] * rate * rate + lost
-    out[CYCLE_POWER] = cycle_power
+    out[CYCLE_POWER] = cycle_power + elastic * moving * turned * cycling
     out[OTHER_POWER] = force * (row_dot(index, acting, v) - rate)
     out[OUTSIDE] = 0.0
     for i in range(ROW_SIZE):
@@ -139,27 +140,32 @@ def add_row_tangent(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Fl
     tilting, tilt_turning, resists = memory[TILTING], memory[TILT_TURNING], meshes.tilt[m]
     delta = meshes.table.nominal[m, NOMINAL_DEFLECTION]
     delta += net_deflection(q, m, meshes, meshes.deflection[m], 1.0, gradient, turning, bend)
+    pmc, turned = mesh_pmc(q, m, meshes), 0.0
+    lever, moving = mesh_lever(m, pmc, meshes)
     if resists[TILT_STIFFNESS] > 0.0:
-        turned = tilted(q, m, meshes, memory)
-        delta -= resists[TILT_LEVER] * turned
+        turned = tilted(q, m, meshes, lever, memory)
+        delta -= lever * turned
         add_tilt_tangent(v, index, turned, resists, memory, jq, jv)
-    elastic, k, by_pmc, _, _ = row_law(
-        meshes.form[m], meshes.stiffness[m], meshes.pieces[m], delta, mesh_pmc(q, m, meshes), 0.0
-    )
+    elastic, k, by_pmc, _, _ = row_law(meshes.form[m], meshes.stiffness[m], meshes.pieces[m], delta, pmc, 0.0)
     c = meshes.damping[m]
     force = elastic + c * row_dot(index, gradient, v)
     # Slope of the scalar force: of the damper's rate, of the deflection, and of pmc by both its angles.
     rate_gradient(v, index, turning, bend, slope)
     for i in range(ROW_SIZE):
         slope[i] = c * slope[i] + k * gradient[i]
+    if meshes.way_pieces[m] > 0:
+        by_pmc -= moving * (k * turned + c * row_dot(index, tilting, v))
     slope[SPIN_1] += by_pmc * meshes.cycles[m]
     slope[FRAME] -= by_pmc * meshes.cycles[m]
     # Product rule: the row times the force's slope, and the row's own turning times the force.
     net_deflection(q, m, meshes, meshes.force[m], 1.0, acting, acting_turning, bend)
     if resists[TILT_STIFFNESS] > 0.0:
         for i in range(ROW_SIZE):
-            acting[i] -= resists[TILT_LEVER] * tilting[i]
-            acting_turning[i] -= resists[TILT_LEVER] * tilt_turning[i]
+            acting[i] -= lever * tilting[i]
+            acting_turning[i] -= lever * tilt_turning[i]
+            # As the load moves along the face, its moment turns with the row.
+            jq[i, SPIN_1] -= moving * meshes.cycles[m] * force * tilting[i]
+            jq[i, FRAME] += moving * meshes.cycles[m] * force * tilting[i]
     for i in range(ROW_SIZE):
         for j in range(ROW_SIZE):
             jq[i, j] += acting[i] * slope[j]
