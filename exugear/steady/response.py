@@ -204,7 +204,7 @@ def given_forces(gearset: Gearset, interface: Interface) -> Complexes:
 
 
 def _answer(interface: Interface, excess: Complexes) -> Complexes:
-    """Readings -G F (n, m, f) along which laws push, under their forces (n, m, f); of laws along a row."""
+    """Find the readings -G F (n, m, f) that laws along a row push along, under their forces (n, m, f)."""
     if excess.shape[2] == 1:
         return np.asarray(-np.einsum("nij,nj->ni", interface.deflection[..., 0], excess[..., 0]))[..., None]
     return np.asarray(-(interface.along_forces @ excess.reshape(len(excess), -1, 1))).reshape(excess.shape)

@@ -12,7 +12,7 @@ means over the mesh cycle, in the transverse plane of action from the middle of 
 Over the mesh cycle the load moves along the face, most of helical teeth: w(pmc) is the load centre of the table against
 its mean. It moves with the whole load, F w, so that no moment is left where teeth part; by the same potential the
 deflection under a constant load follows the misalignment by w (g - g0). While w changes, teeth take or give the power
-F w' (g - g0) dpmc/dt, as they do while the stiffness changes.
+F w' (g - g0) dpmc/dt, as they do while the stiffness changes. Dampers act along the mean lever zt.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """Mesh laws on many samples at once: forces and their slopes by what the laws read, in compiled loops.
 
 A law along a row reads deflection and position, and the misalignment between them where its load moves along the face,
-with a moment along that (`exugear.tooth_mesh.contact_state`); the law `table` both flanks, the centre distance, both misalignments
-and the position (`exugear.steady.mean_system.mesh_ports`). Loops are compiled by `fe_ste.tools.compilation`.
+with a moment along that (`exugear.tooth_mesh.contact_state`); the law `table` both flanks, the centre distance, both
+misalignments and the position (`exugear.steady.mean_system.mesh_ports`). Loops are compiled by
+`fe_ste.tools.compilation`.
 """
 
 from __future__ import annotations
@@ -127,8 +128,8 @@ def sample_wandering_line(tangents: Floats, readings: Floats) -> LawSamples:
     Parameters
     ----------
     tangents : (15, s) array
-        Stiffness k (N/m), force that it has less p (N), and with the way w of the load k w, p w and k w^2; each with two
-        derivatives per cycle.
+        Stiffness k (N/m), force that it has less p (N), and with the way w of the load k w, p w and k w^2; each with
+        two derivatives per cycle.
     readings : (s, 3) array
         Deflection (m), misalignment against that of the contact's state (rad), and position as `sample_line` has it.
     """

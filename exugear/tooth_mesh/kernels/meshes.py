@@ -233,13 +233,11 @@ def mesh_pmc(q: Floats, m: int, meshes: MeshArrays) -> float:
 
 
 @kernel
-def mesh_lever(m: int, pmc: float, meshes: MeshArrays) -> tuple[float, float]:
-    """Lever zt + w of the load of mesh m at a position in its cycle, m, and its slope per cycle."""
-    lever = meshes.tilt[m, TILT_LEVER]
+def load_way(m: int, pmc: float, meshes: MeshArrays) -> tuple[float, float]:
+    """Way of the load of mesh m along the face at a position in its cycle, m, and its slope per cycle."""
     if meshes.way_pieces[m] == 0:
-        return lever, 0.0
-    way, slope = stiffness_at(meshes.way[m], meshes.way_pieces[m], pmc)
-    return lever + way, slope
+        return 0.0, 0.0
+    return stiffness_at(meshes.way[m], meshes.way_pieces[m], pmc)
 
 
 @kernel

@@ -27,12 +27,13 @@ from exugear.tooth_mesh.kernels.meshes import (
     STATE_SIZE,
     STIFFNESS,
     TILT_DAMPING,
+    TILT_LEVER,
     TILT_MOMENT,
     TILT_REST,
     TILT_STIFFNESS,
     MeshArrays,
     frame_row,
-    mesh_lever,
+    load_way,
     mesh_pmc,
     net_deflection,
     rate_gradient,
@@ -72,13 +73,13 @@ def row_law(
 
 
 @kernel
-def tilted(q: Floats, m: int, meshes: MeshArrays, lever: float, memory: Floats) -> float:
+def tilted(q: Floats, m: int, meshes: MeshArrays, memory: Floats) -> float:
     """Misalignment of mesh m against that of its contact's state, rad; its gradient stays in `memory`.
 
     Rows of the deflection that stand there become those of e (`exugear.tooth_mesh.contact_state`).
     """
     gradient, turning, tilting, tilt_turning = memory[GRADIENT], memory[TURNING], memory[TILTING], memory[TILT_TURNING]
-    table = meshes.table
+    table, lever = meshes.table, meshes.tilt[m, TILT_LEVER]
     tilt: float = table.nominal[m, NOMINAL_MISALIGNMENT] - meshes.tilt[m, TILT_REST]
     tilt += frame_row(q, meshes.coordinates[m], meshes.axis[m], table.misalignment[m], tilting, tilt_turning)
     for i in range(ROW_SIZE):
@@ -97,27 +98,28 @@ def row_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Floats, 
     delta += net_deflection(q, m, meshes, meshes.deflection[m], 1.0, gradient, turning, bend)
     rate = row_dot(index, gradient, v)
     out[DEFLECTION], out[RATE] = delta, rate
-    pmc = mesh_pmc(q, m, meshes)
-    cycling = meshes.cycles[m] * relative_spin(v, index, 0)
     moment, turned, stored, lost = 0.0, 0.0, 0.0, 0.0
-    lever, moving = mesh_lever(m, pmc, meshes)
     if resists[TILT_STIFFNESS] > 0.0:
-        turned = tilted(q, m, meshes, lever, memory)
+        turned = tilted(q, m, meshes, memory)
         tilt_rate = row_dot(index, tilting, v)
-        delta, rate = delta - lever * turned, rate - lever * tilt_rate
+        delta, rate = delta - resists[TILT_LEVER] * turned, rate - resists[TILT_LEVER] * tilt_rate
         moment = resists[TILT_MOMENT] - resists[TILT_STIFFNESS] * turned - resists[TILT_DAMPING] * tilt_rate
         stored = (0.5 * resists[TILT_STIFFNESS] * turned - resists[TILT_MOMENT]) * turned
         lost = resists[TILT_DAMPING] * tilt_rate * tilt_rate
-    # The law, and its damper beside it.
+    pmc = mesh_pmc(q, m, meshes)
+    cycling = meshes.cycles[m] * relative_spin(v, index, 0)
+    # The law, and its damper beside it, which stays where the load is in the mean.
+    way, moving = load_way(m, pmc, meshes)
     elastic, k, _, energy, cycle_power = row_law(
-        meshes.form[m], meshes.stiffness[m], meshes.pieces[m], delta, pmc, cycling
+        meshes.form[m], meshes.stiffness[m], meshes.pieces[m], delta - way * turned, pmc, cycling
     )
+    moment += way * elastic
     force = elastic + meshes.damping[m] * rate
     # It acts along a row of its own, which for most laws is that of the deflection.
     net_deflection(q, m, meshes, meshes.force[m], 1.0, acting, turning, bend)
     if resists[TILT_STIFFNESS] > 0.0:
         for i in range(ROW_SIZE):
-            acting[i] -= lever * tilting[i]
+            acting[i] -= resists[TILT_LEVER] * tilting[i]
     out[PMC], out[STIFFNESS] = pmc - math.floor(pmc), k
     out[FORCE] = force * meshes.line_of_action[m]
     out[ENERGY] = energy + stored
@@ -141,12 +143,15 @@ def add_row_tangent(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Fl
     delta = meshes.table.nominal[m, NOMINAL_DEFLECTION]
     delta += net_deflection(q, m, meshes, meshes.deflection[m], 1.0, gradient, turning, bend)
     pmc, turned = mesh_pmc(q, m, meshes), 0.0
-    lever, moving = mesh_lever(m, pmc, meshes)
     if resists[TILT_STIFFNESS] > 0.0:
-        turned = tilted(q, m, meshes, lever, memory)
-        delta -= lever * turned
+        turned = tilted(q, m, meshes, memory)
+        delta -= resists[TILT_LEVER] * turned
         add_tilt_tangent(v, index, turned, resists, memory, jq, jv)
-    elastic, k, by_pmc, _, _ = row_law(meshes.form[m], meshes.stiffness[m], meshes.pieces[m], delta, pmc, 0.0)
+    way, moving = load_way(m, pmc, meshes)
+    elastic, k, by_pmc, _, _ = row_law(
+        meshes.form[m], meshes.stiffness[m], meshes.pieces[m], delta - way * turned, pmc, 0.0
+    )
+    by_pmc -= k * moving * turned
     c = meshes.damping[m]
     force = elastic + c * row_dot(index, gradient, v)
     # Slope of the scalar force: of the damper's rate, of the deflection, and of pmc by both its angles.
@@ -154,23 +159,41 @@ def add_row_tangent(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Fl
     for i in range(ROW_SIZE):
         slope[i] = c * slope[i] + k * gradient[i]
     if meshes.way_pieces[m] > 0:
-        by_pmc -= moving * (k * turned + c * row_dot(index, tilting, v))
+        add_way_tangent(elastic, k, by_pmc * meshes.cycles[m], way, moving * meshes.cycles[m], memory, jq)
     slope[SPIN_1] += by_pmc * meshes.cycles[m]
     slope[FRAME] -= by_pmc * meshes.cycles[m]
     # Product rule: the row times the force's slope, and the row's own turning times the force.
     net_deflection(q, m, meshes, meshes.force[m], 1.0, acting, acting_turning, bend)
     if resists[TILT_STIFFNESS] > 0.0:
         for i in range(ROW_SIZE):
-            acting[i] -= lever * tilting[i]
-            acting_turning[i] -= lever * tilt_turning[i]
-            # As the load moves along the face, its moment turns with the row.
-            jq[i, SPIN_1] -= moving * meshes.cycles[m] * force * tilting[i]
-            jq[i, FRAME] += moving * meshes.cycles[m] * force * tilting[i]
+            acting[i] -= resists[TILT_LEVER] * tilting[i]
+            acting_turning[i] -= resists[TILT_LEVER] * tilt_turning[i]
     for i in range(ROW_SIZE):
         for j in range(ROW_SIZE):
             jq[i, j] += acting[i] * slope[j]
             jv[i, j] += acting[i] * c * gradient[j]
     turn_rows(acting_turning, bend, force, jq)
+
+
+@kernel
+def add_way_tangent(
+    elastic: float, k: float, by_spin: float, way: float, moving: float, memory: Floats, jq: Floats
+) -> None:
+    """Add the derivatives of the moment of a load that moves along the face to the negative force, (13, 13).
+
+    What the misalignment takes of the force's slope goes to `memory`; `by_spin` and `moving` are slopes of the elastic
+    force (N) and of the load's way (m) by the spin of gear 1.
+    """
+    gradient, tilting, slope = memory[GRADIENT], memory[TILTING], memory[SLOPE]
+    straight = memory[STILL]
+    straight[:] = 0.0
+    for i in range(ROW_SIZE):
+        slope[i] -= k * way * tilting[i]
+        for j in range(ROW_SIZE):
+            jq[i, j] -= tilting[i] * way * k * (gradient[j] - way * tilting[j])
+        jq[i, SPIN_1] -= tilting[i] * (way * by_spin + moving * elastic)
+        jq[i, FRAME] += tilting[i] * (way * by_spin + moving * elastic)
+    turn_rows(memory[TILT_TURNING], straight, -way * elastic, jq)
 
 
 @kernel

@@ -144,18 +144,18 @@ def add_tilting_mesh(
     frame, resists, state = meshes.coordinates[m, FRAME], meshes.tilt[m], work.mesh.states[m]
     turned, tilt_rate, x, y, turning = tilt_motion(m, v[frame], c, s, meshes, work.places)
     arm, stiffness, lost = resists[TILT_ARM], resists[TILT_RESISTANCE], resists[TILT_DAMPER] * tilt_rate
-    moving = 0.0
+    way, moving = 0.0, 0.0
     if meshes.way_pieces[m] > 0:
         pmc, cycling = mesh_cycle(q, v, m, meshes)
         way, slope = stiffness_at(meshes.way[m], meshes.way_pieces[m], pmc)
-        arm, moving = arm + way, slope * cycling
+        moving = slope * cycling
     # Where the load bears beside the middle of the face, it deflects with the misalignment.
     approach, approaching = delta - arm * turned, rate - arm * tilt_rate
-    elastic, _, _, energy, cycle_power = mesh_law(q, v, m, approach, meshes)
+    elastic, _, _, energy, cycle_power = mesh_law(q, v, m, approach - way * turned, meshes)
     cycle_power += elastic * moving * turned
     force = elastic + meshes.damping[m] * approaching
     push_apart(m, force, work.mesh.gradients[DEFLECTION_ROW], meshes, work)
-    moment = resists[TILT_PUSH] - stiffness * turned - lost + arm * force
+    moment = resists[TILT_PUSH] - stiffness * turned - lost + arm * force + way * elastic
     first, second = work.loads[meshes.ends[m, 0]], work.loads[meshes.ends[m, 1]]
     first[PADDED_TILT] += moment * x
     first[PADDED_TILT + 1] += moment * y
