@@ -235,8 +235,9 @@ def signals(gearset: Gearset, response: Response) -> Complexes:
     interface = response.interface
     of_motion = interface.rows.of(response.motion, interface.frequencies)
     # Rows have the bearings of the mean system; what non-linear ones have beyond it acts on their bodies, too.
-    beyond = response.excess[:, len(gearset.waves.waves) :, : gearset.bearing_signals.shape[1]]
-    of_motion[:, gearset.bearing_signals] -= beyond
+    if gearset.bearings is not None:
+        beyond = response.excess[:, len(gearset.waves.waves) :, : gearset.bearing_signals.shape[1]]
+        of_motion[:, gearset.bearing_signals] -= beyond
     levers, deflection = interface.ports.levers, response.deflection
     if levers.any():
         deflection = deflection + response.motion @ levers[:, :-1].T
