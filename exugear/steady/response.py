@@ -77,7 +77,7 @@ def linear_response(gearset: Gearset, interface: Interface) -> Response:
     """Response to the static transmission errors as given displacements, of first order in the variation of stiffness.
 
     F = -k_mean e with e = s - mean of s, the transmission error under the static force F_0; of a curve k_mean is the
-    mean of the tangent. Where the load moves along the face by w, s has w g in it, and F_0 w is a moment.
+    mean of the tangent. Where the load moves along the face by w, s has w (g - g0) in it, and F_0 w is a moment.
     """
     static = interface.ports.static[:, DEFLECTION]
     excess = transmission_errors(gearset, interface)

@@ -2,7 +2,7 @@
 
 With the deflection d at mid-face and the misalignment g, both of the loaded flank, a law along a row reads
 
-    e = d - zt (g - g0) - w g,   force F(e),   moment M = F0 zc + zt (F - F0) + w F - kg (g - g0),
+    e = d - (zt + w) (g - g0),   force F(e),   moment M = F0 zc + zt (F - F0) + w F - kg (g - g0),
 
 which has a potential, U = U(e) + (zt - zc) F0 (g - g0) + kg (g - g0)^2 / 2: the generalized force of the mesh is
 -F dd/dq + M dg/dq. Teeth yield otherwise where the axes stand apart, by sa (a - a0) for a centre distance a: the row of
@@ -10,10 +10,9 @@ d has that in it, so that the load pushes between the axes as well. The load cen
 means over the mesh cycle, in the transverse plane of action from the middle of the common face towards +z.
 
 Over the mesh cycle the load moves along the face, most of helical teeth: w(pmc) is the load centre of the table against
-its mean. It moves with the whole load, F w, so that no moment is left where teeth part. By the same potential the
-transmission error, which tables have of gears that stand straight, has w g more where they are askew. While w changes,
-teeth take or give the power F w' g dpmc/dt, as they do while the stiffness changes. Dampers act along the mean lever
-zt.
+its mean. It moves with the whole load, F w, so that no moment is left where teeth part; by the same potential the
+deflection under a constant load follows the misalignment by w (g - g0). While w changes, teeth take or give the power
+F w' (g - g0) dpmc/dt, as they do while the stiffness changes. Dampers act along the mean lever zt.
 """
 
 from __future__ import annotations

@@ -83,17 +83,17 @@ def mesh_ports(waves: MeshWaves, speed: float, parting: bool) -> MeshPorts:
 def _row_rows(meshes: MeshArrays, wander: bool) -> tuple[list[Floats], list[Floats]]:
     """Rows that a law along a row reads (`exugear.tooth_mesh.contact_state`), and their values at zero coordinates.
 
-    They are its deflection with the mean lever of the load and, where loads wander along the face, the misalignment;
-    zeros of a mesh whose load stays.
+    They are its deflection with the mean lever of the load and, where loads wander along the face, the misalignment
+    against that of the contact's state; zeros of a mesh whose load stays.
     """
     lever, nominal = meshes.tilt[:, TILT_LEVER], meshes.table.nominal
-    row = meshes.deflection - lever[:, None] * meshes.table.misalignment
-    offset = lever * (nominal[:, NOMINAL_MISALIGNMENT] - meshes.tilt[:, TILT_REST])
+    turned = nominal[:, NOMINAL_MISALIGNMENT] - meshes.tilt[:, TILT_REST]
+    row, offset = meshes.deflection - lever[:, None] * meshes.table.misalignment, lever * turned
     if not wander:
         return [row], [nominal[:, NOMINAL_DEFLECTION] - offset]
     moves = meshes.way_pieces > 0
     rows = [row, moves[:, None] * meshes.table.misalignment]
-    return rows, [nominal[:, NOMINAL_DEFLECTION] - offset, moves * nominal[:, NOMINAL_MISALIGNMENT]]
+    return rows, [nominal[:, NOMINAL_DEFLECTION] - offset, moves * turned]
 
 
 def _table_rows(meshes: MeshArrays) -> tuple[list[Floats], list[Floats]]:

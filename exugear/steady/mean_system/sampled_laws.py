@@ -131,7 +131,7 @@ def sample_wandering_line(tangents: Floats, readings: Floats) -> LawSamples:
         Stiffness k (N/m), force that it has less p (N), and with the way w of the load k w, p w and k w^2; each with
         two derivatives per cycle.
     readings : (s, 3) array
-        Deflection (m), misalignment (rad), and position as `sample_line` has it.
+        Deflection (m), misalignment against that of the contact's state (rad), and position as `sample_line` has it.
     """
     deflection, tilt, moved = readings.T
     (k, k_slope), (p, p_slope), (kw, kw_slope), (pw, pw_slope), (kww, kww_slope) = (

@@ -34,10 +34,10 @@ PLAIN_ROWS = 2
 """Number of rows of meshes without a table."""
 FIXED, ALONG_COSINE, ALONG_SINE, SECOND = range(0, 4 * PADDED, PADDED)
 """First columns of the parts of each of them, and of those of the second gear."""
-TILT_ROW_X, TILT_ROW_Y, TILT_SHIFT, TILT_RESISTANCE, TILT_DAMPER, TILT_ARM, TILT_PUSH, TILT_STATE = range(8)
+TILT_ROW_X, TILT_ROW_Y, TILT_SHIFT, TILT_RESISTANCE, TILT_DAMPER, TILT_ARM, TILT_PUSH = range(7)
 """Columns of `Meshes.tilt`: the misalignment's row over the tilts of gear 1, its negative being that of gear 2;
-misalignment at zero tilts against that of the contact's state (rad); tilt stiffness, damping, lever, moment and
-misalignment of the state as in `exugear.tooth_mesh.kernels.meshes.MeshArrays.tilt`."""
+misalignment at zero tilts against that of the contact's state (rad); tilt stiffness, damping, lever and moment as in
+`exugear.tooth_mesh.kernels.meshes.MeshArrays.tilt`."""
 TURNING = 2 * PADDED
 """Place of the frame's angle in a gradient of `MeshMemory.gradients`, behind two padded gears."""
 KINETIC, ELASTIC, OF_LOADS, DISSIPATED, OF_VARYING_STIFFNESS, NON_CONSERVATIVE, OF_BEARING_RATES = range(7)
@@ -58,7 +58,7 @@ class Meshes(NamedTuple):
     axis : (m, 2, 2) zero for gears without translations
     conjugate : (m,) 1 where the force row is the deflection row
     tilting : (m,) 1 where a law along a row resists misalignment
-    tilt : (m, 8) columns as named in this module
+    tilt : (m, 7) columns as named in this module
     way_pieces, way : of the load along the face
     spinning : (m,) 1 where the gears have their spins alone
     ends : (m, 2) numbers of the two gears' places

@@ -9,8 +9,7 @@ rotation by psi, p a gear's place relative to the frame's axis and S = z x,
     f     = -F dg/dq,  g = sum_b V_b . z_b                                 generalized force of a scalar force F
 
 A law along a row that resists misalignment gamma has the deflection and the moment of
-`exugear.tooth_mesh.contact_state` instead: e = delta - zt (gamma - g0) - w gamma for delta, and + M d gamma/dq beside
-it.
+`exugear.tooth_mesh.contact_state` instead: e = delta - (zt + w) (gamma - g0) for delta, and + M d gamma/dq beside it.
 
 The row g does not change when everything turns with psi: the carrier's share of the force balances moments exactly.
 Which force F a deflection raises is the matter of the mesh laws (`exugear.tooth_mesh.laws`). Errors of pitch and

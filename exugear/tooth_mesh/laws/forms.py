@@ -110,9 +110,8 @@ def row_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Floats, 
     cycling = meshes.cycles[m] * relative_spin(v, index, 0)
     # The law, and its damper beside it, which stays where the load is in the mean.
     way, moving = load_way(m, pmc, meshes)
-    askew = resists[TILT_REST] + turned
     elastic, k, _, energy, cycle_power = row_law(
-        meshes.form[m], meshes.stiffness[m], meshes.pieces[m], delta - way * askew, pmc, cycling
+        meshes.form[m], meshes.stiffness[m], meshes.pieces[m], delta - way * turned, pmc, cycling
     )
     moment += way * elastic
     force = elastic + meshes.damping[m] * rate
@@ -125,7 +124,7 @@ def row_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Floats, 
     out[FORCE] = force * meshes.line_of_action[m]
     out[ENERGY] = energy + stored
     out[DAMPED_POWER] = meshes.damping[m] * rate * rate + lost
-    out[CYCLE_POWER] = cycle_power + elastic * moving * askew * cycling
+    out[CYCLE_POWER] = cycle_power + elastic * moving * turned * cycling
     out[OTHER_POWER] = force * (row_dot(index, acting, v) - rate)
     out[OUTSIDE] = 0.0
     for i in range(ROW_SIZE):
@@ -149,11 +148,10 @@ def add_row_tangent(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Fl
         delta -= resists[TILT_LEVER] * turned
         add_tilt_tangent(v, index, turned, resists, memory, jq, jv)
     way, moving = load_way(m, pmc, meshes)
-    askew = resists[TILT_REST] + turned
     elastic, k, by_pmc, _, _ = row_law(
-        meshes.form[m], meshes.stiffness[m], meshes.pieces[m], delta - way * askew, pmc, 0.0
+        meshes.form[m], meshes.stiffness[m], meshes.pieces[m], delta - way * turned, pmc, 0.0
     )
-    by_pmc -= k * moving * askew
+    by_pmc -= k * moving * turned
     c = meshes.damping[m]
     force = elastic + c * row_dot(index, gradient, v)
     # Slope of the scalar force: of the damper's rate, of the deflection, and of pmc by both its angles.

@@ -22,7 +22,6 @@ from exugear.tooth_mesh.kernels.fast_meshes import (
     TILT_DAMPER,
     TILT_PUSH,
     TILT_RESISTANCE,
-    TILT_STATE,
     TURNING,
     Meshes,
     row_motion,
@@ -152,9 +151,8 @@ def add_tilting_mesh(
         moving = slope * cycling
     # Where the load bears beside the middle of the face, it deflects with the misalignment.
     approach, approaching = delta - arm * turned, rate - arm * tilt_rate
-    askew = resists[TILT_STATE] + turned
-    elastic, _, _, energy, cycle_power = mesh_law(q, v, m, approach - way * askew, meshes)
-    cycle_power += elastic * moving * askew
+    elastic, _, _, energy, cycle_power = mesh_law(q, v, m, approach - way * turned, meshes)
+    cycle_power += elastic * moving * turned
     force = elastic + meshes.damping[m] * approaching
     push_apart(m, force, work.mesh.gradients[DEFLECTION_ROW], meshes, work)
     moment = resists[TILT_PUSH] - stiffness * turned - lost + arm * force + way * elastic

@@ -248,11 +248,10 @@ def _meshes(numbers: _Numbers, ends: Integers) -> Meshes:
 
 
 def _tilts(given: MeshArrays) -> Floats:
-    """How meshes resist misalignment, (m, 8): `Meshes.tilt`."""
+    """How meshes resist misalignment, (m, 7): `Meshes.tilt`."""
     rows = given.table.misalignment[:, TILT : TILT + 2]
     shift = given.table.nominal[:, NOMINAL_MISALIGNMENT] - given.tilt[:, TILT_REST]
-    resists = given.tilt[:, [TILT_STIFFNESS, TILT_DAMPING, TILT_LEVER, TILT_MOMENT, TILT_REST]]
-    return np.column_stack([rows, shift, resists])
+    return np.column_stack([rows, shift, given.tilt[:, [TILT_STIFFNESS, TILT_DAMPING, TILT_LEVER, TILT_MOMENT]]])
 
 
 def _joints(numbers: _Numbers) -> Joints | None:
