@@ -13,6 +13,7 @@ from exugear.tooth_mesh.kernels.meshes import (
     FRAME,
     ROW_SIZE,
     TILT_COLUMNS,
+    TILT_STIFFNESS,
     MeshArrays,
     periodic_cubic,
 )
@@ -54,7 +55,8 @@ def pack(
     index = _indices(elements, coordinates)
     tilts = _pack_tilts(elements, index, linear)
     # Its mean is in the lever; of gears that do not tilt it does nothing.
-    ways = [np.zeros(0) if averaged or not row.any() else e.load_way for row, e in zip(tilts, elements, strict=True)]
+    resists = tilts[:, TILT_STIFFNESS] > 0.0
+    ways = [e.load_way if own and not averaged else np.zeros(0) for own, e in zip(resists, elements, strict=True)]
     tables = pack_tables(elements, index, averaged, linear)
     if tangent:
         tables.nominal[:, NOMINAL_DEFLECTION] -= [element.rest for element in elements]
