@@ -39,9 +39,8 @@ def test_the_moment_is_the_force_times_the_place_of_the_load(grc: Gearbox, curve
         q = np.zeros(moving.size)
         # Teeth roll to one of the samples, and the other gear closes them by 20 um.
         q[own[5]] = (place / len(way) - element.phase) / element.cycles
-        q[moving.coordinates[element.mesh.gear][5]] = (
-            20e-6 - element.deflection[5] * q[own[5]]
-        ) / element.deflection[11]
+        closed = 20e-6 - element.deflection[5] * q[own[5]]
+        q[moving.coordinates[element.mesh.gear][5]] = closed / element.deflection[11]
         state = moving.mesh_states(q, rest, one)[0]
         assert (state[PMC] * len(way)) % len(way) == pytest.approx(place, abs=1e-6)
         added = (moving.mesh_forces(q, rest, one) - moving.mesh_forces(q, rest, other))[list(own[TILT : TILT + 2])]
