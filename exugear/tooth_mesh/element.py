@@ -36,7 +36,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Body, Mesh, node_position, seat_key
 from exugear.gearbox.sections.entries import GROUND
 from exugear.kernels.coordinates import BODY_SIZE
-from exugear.tooth_mesh.contact_state import ContactState, even_contact
+from exugear.tooth_mesh.contact_state import ContactState, changed_over_cycle, even_contact
 from exugear.tooth_mesh.law import Angles, Law, MeshCurve, MeshData, TableFlanks
 from exugear.tooth_mesh.placement import MeshError, loaded_flanks, position_rows, tooth_places
 from exugear.tooth_mesh.wheel_errors import wheel_errors
@@ -103,15 +103,17 @@ class MeshElement:
     def with_contact(self, contact: ContactState) -> MeshElement:
         """Return the mesh, whose teeth bear evenly so far, with a contact that was solved, in the axes of its table.
 
-        The mean of a curved law's stiffness is then that of the contact, the table's changes over the mesh cycle upon
-        it. Where gears stand so askew that flanks touch long before or after their middles would, the deflection at
-        mid-face is mostly that gap, and no measure of how teeth yield: the curve then begins at the gap.
+        The mean of a curved law's stiffness is then that of the contact. So are its changes over the mesh cycle and the
+        load's way along the face, as far as the positions of the contact tell; finer ones stay the table's. Where gears
+        stand so askew that flanks touch long before or after their middles would, the deflection at mid-face is mostly
+        that gap, and no measure of how teeth yield: the curve then begins at the gap.
         """
-        secant, tangent, load, gap = self.stiffness, self.tangent, self.load, 0.0
+        secant, tangent, way, load, gap = self.stiffness, self.tangent, self.load_way, self.load, 0.0
         if self.is_curved:
             straight = contact.force / contact.tangent_stiffness
             yielding = float(np.clip(contact.deflection, straight, STEEPEST * straight))
             gap = contact.deflection - yielding
+            secant, tangent, way = self._over_cycle(contact, yielding)
             secant = secant * (contact.force / yielding / np.mean(secant))
             tangent = tangent * (contact.tangent_stiffness / np.mean(tangent))
             load = contact.force
@@ -122,12 +124,30 @@ class MeshElement:
             stiffness=secant,
             tangent=tangent,
             load=load,
+            load_way=way,
             contact=contact.seen_by(self.flank),
             damping=self.damping_time * float(np.mean(tangent)),
             deflection=self.deflection - slope * self.centre,
             force=self.force - slope * self.centre,
             offset=self.offset - np.array([shift + gap, 0.0, 0.0]),
         )
+
+    def _over_cycle(self, contact: ContactState, yielding: float) -> tuple[Floats, Floats, Floats]:
+        """Secant and tangent stiffness (n,), N/m, and way of the load (n,), m, as they change where the gears stand."""
+        cycle = contact.cycle
+        if cycle is None:
+            return self.stiffness, self.tangent, self.load_way
+        deflection = changed_over_cycle(contact.force / self.stiffness, cycle.deflection)
+        deflection += yielding - np.mean(deflection)
+        softness = changed_over_cycle(1.0 / self.tangent, tuple(1.0 / np.array(cycle.tangent_stiffness)))
+        softness += 1.0 / contact.tangent_stiffness - np.mean(softness)
+        # A curve needs teeth that yield wherever they are.
+        deflection = np.maximum(deflection, yielding / STEEPEST)
+        softness = np.maximum(softness, 1.0 / (STEEPEST * contact.tangent_stiffness))
+        way = self.load_way
+        if len(way):
+            way = self.flank * changed_over_cycle(self.flank * way, cycle.load_centre)
+        return contact.force / deflection, 1.0 / softness, way
 
     @property
     def is_curved(self) -> bool:
@@ -178,8 +198,9 @@ def mesh_elements(
         Position (3,) of the node that carries a gear, by `seat_key` of body and gear; the body's own otherwise.
     contact : mapping of mesh name to ContactState, optional
         Contact at the static misalignment, in the axes of the pair's table (of the flank +1). A law that is curved has
-        its stiffness from there, the table's changes over the mesh cycle upon it. Meshes without one, or loaded on
-        the other flank, bear evenly along the common face (`even_contact`).
+        its stiffness from there, and how that and the place of the load change over the mesh cycle
+        (`MeshElement.with_contact`). Meshes without one, or loaded on the other flank, bear evenly along the common
+        face (`even_contact`).
 
     Raises
     ------
