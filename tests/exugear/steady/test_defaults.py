@@ -40,16 +40,16 @@ def test_the_default_is_the_best_model_within(pair, what, count, most):
         assert abs(own.share) < most, own.name
 
 
-@pytest.mark.parametrize("frequency", [620.0, 1077.0])
-def test_the_loudest_peaks_of_the_default_are_as_high_as_the_best_models(defaults, pair, frequency):
+@pytest.mark.parametrize("frequency", [620.0, 812.0, 1077.0])
+def test_the_loudest_peaks_of_the_default_are_as_high_as_those_of_the_best_law(defaults, pair, frequency):
     """Where gears tilt, which the load excites that moves along the face: each peak at its own resonance.
 
-    Left out, the default has a fifth and two fifths of them. 3.1 and 1.0 % were left: transmission error and load
-    centre over the cycle are those of gears that stand straight.
+    Both on linear bearings: what rolling elements by their rows do to a resonance is another matter. Without the moment
+    of the load the default has a fifth of the first and two fifths of the last.
     """
     gearbox = defaults.CASES["pair"]()
     default = Project(gearbox, pair[0], defaults.DEFAULT)
-    best = Project(defaults.by_rows(gearbox), pair[0] / "best", defaults.BEST)
+    best = Project(gearbox, pair[0], defaults.BEST)
     speed = 2.0 * np.pi * frequency / gearbox.gears["pinion"].teeth / RPM
     speeds = SpeedRange.from_text(f"{0.99 * speed}:{1.01 * speed}:11")
     heights = []
