@@ -164,10 +164,11 @@ def parametric_response(gearset: Gearset, interface: Interface) -> Response:
 
     def following(readings: Complexes) -> Complexes:
         found = np.zeros(readings.shape, dtype=complex)
+        for (force, read), (own, _) in tangents.items():
+            found[..., force] += gearset.stretched(own, readings[..., read])
         found[..., DEFLECTION] -= mean * readings[..., DEFLECTION]
-        for (force, read), (own, ahead) in tangents.items():
-            values = readings[..., read]
-            found[..., force] += gearset.stretched(own, values) + gearset.stretched(ahead, values[:, means])
+        for (force, read), (_, ahead) in tangents.items():
+            found[..., force] += gearset.stretched(ahead, readings[:, means, read])
         return found
 
     def apply(scaled: Complexes) -> Complexes:
