@@ -109,10 +109,10 @@ def test_few_positions_stand_for_the_whole_mesh_cycle(contact: MeanContact) -> N
 
 
 def test_what_changes_over_the_mesh_cycle_is_that_of_states_on_their_own(contact: MeanContact) -> None:
-    """At ten positions of each misalignment; their first harmonics are those of forty positions."""
+    """At twenty positions of each misalignment; their first harmonics are those of forty positions."""
     for end, tilt in enumerate(contact.misalignment):
         asked = functools.partial(static_transmission_error, compliance(), contact.force * GEAR.base_radius)
-        alone = asked(10, misalignment=float(tilt)).squeeze()
+        alone = asked(20, misalignment=float(tilt)).squeeze()
         whole = asked(40, misalignment=float(tilt)).squeeze()
         for own, name in (
             (contact.cycle_deflection, "ste"),
