@@ -187,7 +187,7 @@ def amplitudes(gearset: Gearset, system: MeanSystem) -> dict[str, np.ndarray]:
     for line in range(1, len(gearset.lines.index)):
         multiples = gearset.lines.index[line]
         name = f"{multiples.max()} x {gearset.waves.base_names[int(np.argmax(multiples))].split(', ')[0]}"
-        amplitude = 2.0 * np.abs(seen @ transmission_error_line(gearset, ports, speed, line))
+        amplitude = 2.0 * np.abs(seen @ transmission_error_line(gearset, ports, speed, line).ravel())
         reached = gearset.lines.orders[line] * FASTEST >= 2.0 * np.pi * FREQUENCIES
         found[name] = np.where(reached, amplitude, np.nan)
     return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import astuple
+from dataclasses import astuple, replace
 
 import numpy as np
 
@@ -61,9 +61,14 @@ def input_hash(assembly: Assembly, load_case: str | None = None) -> str:
             if element.is_curved
         },
         "mesh_contact": {
-            element.mesh.name: [f"{value:.9g}" for value in astuple(element.contact)]
+            element.mesh.name: [f"{value:.9g}" for value in astuple(replace(element.contact, cycle=None))[:-1]]
             for element in assembly.elements
             if element.contact is not None
+        },
+        "load_ways": {
+            element.mesh.name: [f"{value:.9g}" for value in element.load_way]
+            for element in assembly.elements
+            if len(element.load_way)
         },
         "tables": {
             element.mesh.name: _digest(element.table.surface)

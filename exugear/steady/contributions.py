@@ -68,7 +68,8 @@ def contributions(gearset: Gearset, speed: float, line: int) -> Contributions:
     motion = np.linalg.solve(dynamic, loads).astype(np.complex128)
     total = complex(row @ motion)
     meshes: dict[str, float] = {}
-    for wave, part in zip(gearset.waves.waves, adjoint @ forces, strict=True):
+    parts = (adjoint @ forces).reshape(len(gearset.waves.waves), -1).sum(axis=1)
+    for wave, part in zip(gearset.waves.waves, parts, strict=True):
         meshes[wave.family] = meshes.get(wave.family, 0.0) + _share(complex(part), total)
     supports, bodies = _derivatives(gearset, speed, frequency, adjoint, motion, total)
     modes = _modes(gearset, speed, frequency, loads, row, total)
@@ -95,10 +96,10 @@ def loudest_near(gearset: Gearset, speed: float, width: float, line: int) -> flo
 
 
 def _excitation(gearset: Gearset, speed: float, line: int) -> tuple[Complexes, Complexes]:
-    """Generalized peak forces of each wave (size, m) on a line, and their sum (size,)."""
+    """Generalized peak forces of each wave (size, m f) on a line, and their sum (size,)."""
     ports = gearset.ports_at(speed)
     excess = transmission_error_line(gearset, ports, speed, line)
-    forces = -2.0 * gearset.loads(ports) * excess
+    forces = -2.0 * gearset.loads(ports) * excess.ravel()
     return forces, np.asarray(forces.sum(axis=1))
 
 

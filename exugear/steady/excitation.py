@@ -32,6 +32,7 @@ from exugear.steady.mean_system.mesh_places import MeshPlaces, mesh_places
 from exugear.steady.mean_system.mesh_ports import (
     BACK_TILT,
     DEFLECTION,
+    MISALIGNMENT,
     POSITION,
     TILT,
     MeshPorts,
@@ -97,6 +98,13 @@ class Interface:
         # A row's numbers are real: so are the products with both parts of the motion.
         found = rows @ self.motion.view(np.float64).reshape(lines, size, -1)
         return np.asarray(found.view(np.complex128).reshape(lines, len(rows), *loads))
+
+    @cached_property
+    def along_forces(self) -> Complexes:
+        """What laws along a row read along what they push along, (n, m f, m f), under a unit of each force."""
+        lines, waves, forces = self.motion.shape[0], *self.motion.shape[2:]
+        read = self.readings[:, :waves, :forces]
+        return np.ascontiguousarray(read).reshape(lines, waves * forces, waves * forces)
 
     @cached_property
     def readings(self) -> Complexes:
@@ -179,6 +187,11 @@ class Gearset:
         }
         self._row_names = rows[0].names
         self.signal_names: tuple[SignalName, ...] = (*self._row_names, *mesh_signal_names(waves))
+
+    @property
+    def wander(self) -> bool:
+        """Whether the load of any mesh with a law along a row moves along the face."""
+        return self.waves.wander and not self.parting
 
     @property
     def bent(self) -> bool:
@@ -362,23 +375,54 @@ class Gearset:
     @cached_property
     def cycle_coefficients(self) -> Complexes:
         """Fourier coefficients (m, harmonics + 1) of the stiffness over the mesh cycle, N/m; of curves the tangent."""
-        return self.waves.cycle_coefficients("tangent", self.harmonics)
+        return self.waves.cycle_coefficients("tangent", harmonics=self.harmonics)
 
     @cached_property
     def cycle_compliances(self) -> Complexes:
         """Fourier coefficients (m, harmonics + 1) of the static transmission error over the static load, m/N."""
-        return self.waves.cycle_coefficients("compliance", self.harmonics)
+        return self.waves.cycle_coefficients("compliance", harmonics=self.harmonics)
 
     @cached_property
     def cycle_curves(self) -> tuple[Complexes, Complexes]:
         """Fourier coefficients (m, harmonics + 1) of load over deflection (N/m), and of the exponents less one."""
         waves, harmonics = self.waves, self.harmonics
-        return waves.cycle_coefficients("secant", harmonics), waves.cycle_coefficients("exponent", harmonics)
+        secant = waves.cycle_coefficients("secant", harmonics=harmonics)
+        return secant, waves.cycle_coefficients("exponent", harmonics=harmonics)
 
     @cached_property
     def cycle_pulls(self) -> Complexes:
         """Fourier coefficients (m, harmonics + 1) of what the tangent has more than the curve without deflection, N."""
         return np.asarray(self.waves.loads[:, None] * self.cycle_curves[1])
+
+    @cached_property
+    def cycle_ways(self) -> Complexes:
+        """Fourier coefficients (m, harmonics + 1) of the way of the load along the face, m."""
+        return self.waves.cycle_coefficients("way", harmonics=self.harmonics)
+
+    @cached_property
+    def cycle_moments(self) -> tuple[Complexes, Complexes, Complexes]:
+        """Fourier coefficients (m, harmonics + 1) of that way times stiffness (N), pull (N m), and squared (N m)."""
+        waves, harmonics = self.waves, self.harmonics
+        pulls = self.waves.loads[:, None] * waves.cycle_coefficients("exponent", "way", harmonics=harmonics)
+        return (
+            waves.cycle_coefficients("tangent", "way", harmonics=harmonics),
+            pulls,
+            waves.cycle_coefficients("tangent", "way", "way", harmonics=harmonics),
+        )
+
+    @cached_property
+    def cycle_tangents(self) -> dict[tuple[int, int], Complexes]:
+        """Slopes (m, harmonics + 1) of the static law of each force by each reading, as those of stiffness over cycles.
+
+        Of the force by the deflection; where loads wander along the face, of force and moment by it and the
+        misalignment.
+        """
+        found = {(DEFLECTION, DEFLECTION): self.cycle_coefficients}
+        if self.wander:
+            across, _, twice = self.cycle_moments
+            found[DEFLECTION, MISALIGNMENT] = found[MISALIGNMENT, DEFLECTION] = -across
+            found[MISALIGNMENT, MISALIGNMENT] = twice
+        return found
 
     def pressed(self, static: Floats) -> Floats:
         """Deflections (m,) from where the mean stiffness has no force, at readings (m, r) of the static state, m."""
@@ -404,6 +448,8 @@ class Gearset:
         pitch = np.abs(meshes.deflection[firsts, SPIN_1] / meshes.cycles[firsts])
         found, count = np.ones(self._ports["static"].shape[1:]), len(firsts)
         found[:count, POSITION] = pitch
+        if self.wander:
+            found[:count, MISALIGNMENT] = pitch
         if self.parting:
             found[:count, [TILT, BACK_TILT]] = pitch[:, None]
         if self.bearings is not None:
@@ -464,10 +510,6 @@ class Gearset:
     def row_of_overall(self, speed: float) -> Floats:
         """Row (size,) of the overall transmission error by the frame's coordinates, m/m and m/rad."""
         return np.asarray(self.system.at(self._rows["by_place"], speed)[0])
-
-    def coefficients(self, speed: float) -> Complexes:
-        """Fourier coefficients (m, harmonics + 1) of the stiffness by the bases' angles, N/m."""
-        return self.by_angle(self.cycle_coefficients, self.system.at(self._ports["positions"], speed), speed)
 
     def stretched(self, coefficients: Complexes, deflection: Complexes) -> Complexes:
         """Products (n, m) of each wave's stiffness, by its `coefficients`, with its deflection (n, m), N."""

@@ -16,13 +16,15 @@ from exugear.steady.harmonics.krylov import HarmonicBalanceError, solve_lines
 from exugear.steady.harmonics.lattice import Lattice
 from exugear.steady.mean_system.bearing_waves import COMPONENTS
 from exugear.steady.mean_system.mesh_places import MeshPlaces
-from exugear.steady.mean_system.mesh_ports import BACK, DEFLECTION, FRONT, POSITION
+from exugear.steady.mean_system.mesh_ports import BACK, DEFLECTION, FRONT, MISALIGNMENT, POSITION
 from exugear.steady.mean_system.sampled_bearings import sample_rolling
 from exugear.steady.mean_system.sampled_laws import (
     LawSamples,
     sample_curve,
     sample_line,
     sample_table,
+    sample_wandering_curve,
+    sample_wandering_line,
     widened,
 )
 from exugear.steady.response import Response, rates_of
@@ -101,17 +103,18 @@ class Balance:
         return bool(self.gearset.waves.loads.any()) and not self.frozen
 
     def _stiffness(self, places: MeshPlaces) -> Floats:
-        """Stiffness in places, N/m, and two derivatives per cycle, (6, s, u); none for laws that have tables.
+        """Stiffness in places, N/m, and two derivatives per cycle, (3 q, s, u); none for laws that have tables.
 
-        The last three are the curves' exponents less one; of tangents the forces that these have less, N. No harmonics
-        stand in it but those of the level `parametric`: others would alias.
+        Then follow the curves' exponents less one; of tangents the forces that these have less, N. Where loads wander
+        along the face, their way follows, or what `sample_wandering_line` asks for. No harmonics stand in it but those
+        of the level `parametric`: others would alias.
         """
         if self.gearset.parting:
-            return np.zeros((6, 0, 0))
+            return np.zeros((0, 0, 0))
         positions, spectra = places.positions, self._cycle_spectra
         rate = 2j * np.pi * np.arange(spectra.shape[2])
         twice = np.where(np.arange(spectra.shape[2]) > 0, 2.0, 1.0)
-        out = np.empty((6, *positions.shape))
+        out = np.empty((spectra.shape[1], *positions.shape))
         for u, n in enumerate(places.means[: positions.shape[1]]):
             if u and n == places.means[u - 1] and np.array_equal(positions[:, u], positions[:, u - 1]):
                 out[:, :, u] = out[:, :, u - 1]
@@ -121,11 +124,15 @@ class Balance:
 
     @cached_property
     def _cycle_spectra(self) -> Complexes:
-        """Harmonics (m, 6, h + 1) over the mesh cycle of what `_stiffness` has."""
+        """Harmonics (m, 3 q, h + 1) over the mesh cycle of what `_stiffness` has."""
         gearset = self.gearset
-        both = gearset.cycle_curves if self._curved else (gearset.cycle_coefficients, gearset.cycle_pulls)
-        rate = 2j * np.pi * np.arange(both[0].shape[1])
-        return np.stack([own * rate**order for own in both for order in range(3)], axis=1)
+        if self._curved:
+            found = [*gearset.cycle_curves] + [gearset.cycle_ways] * gearset.wander
+        else:
+            found = [gearset.cycle_coefficients, gearset.cycle_pulls]
+            found += [*gearset.cycle_moments] if gearset.wander else []
+        rate = 2j * np.pi * np.arange(gearset.harmonics + 1)
+        return np.stack([own * rate**order for own in found for order in range(3)], axis=1)
 
     @cached_property
     def _on_lattice(self) -> Floats:
@@ -134,7 +141,7 @@ class Balance:
             return self._stiffness(self.places)
         waves, positions = self.gearset.waves.waves, self.places.positions
         forward, spectra = self.gearset.forward(self.interface.speed), self._cycle_spectra
-        out = np.empty((6, *positions.shape))
+        out = np.empty((spectra.shape[1], *positions.shape))
         for u, n in enumerate(self.places.means[: positions.shape[1]]):
             if u and n == self.places.means[u - 1] and positions[0, u] == positions[0, u - 1]:
                 out[:, :, u] = out[:, :, u - 1]
@@ -156,13 +163,22 @@ class Balance:
                 whole[:, POSITION] += places.positions[:, u]
                 found.append(sample_table(meshes, waves.waves[n].first, whole, rates[:, u]))
             else:
-                own, load = readings[:, u][:, [DEFLECTION, POSITION]], float(waves.loads[n]) * self._curved
-                found.append(
-                    sample_curve(stiffness[..., u], own, load) if load else sample_line(stiffness[..., u], own)
-                )
+                found.append(self._sample_row(n, readings[:, u], stiffness[..., u]))
         shape = self.interface.ports.forces.shape[1], readings.shape[2]
         found = [widened(own, *shape) for own in found]
         return LawSamples(*(np.stack(own, axis=1) for own in zip(*found, strict=True)))
+
+    def _sample_row(self, wave: int, readings: Floats, stiffness: Floats) -> LawSamples:
+        """Sample the law of a mesh along a row with readings (s, r), stiffness (3 q, s)."""
+        load = float(self.gearset.waves.loads[wave])
+        if self.gearset.wander:
+            own = readings[:, [DEFLECTION, MISALIGNMENT, POSITION]]
+            if not self._curved:
+                return sample_wandering_line(stiffness, own)
+            # A straight line among curves is a curve of exponent one, through any load.
+            return sample_wandering_curve(stiffness, own, load or 1.0)
+        own = readings[:, [DEFLECTION, POSITION]]
+        return sample_curve(stiffness, own, load) if self._curved and load else sample_line(stiffness, own)
 
     def _sample_bearing(self, wave: int, readings: Floats) -> LawSamples:
         """Sample the law of a bearing with readings (s, r), their last one none of it."""

@@ -8,6 +8,7 @@ exponents of the whole system at one speed, one base at a time, the meshes of ot
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +17,6 @@ from exugear.dynamics.linearised import RIGID_BODY_LIMIT
 from exugear.steady.excitation import Gearset
 from exugear.steady.harmonics.floquet import exponents, kicks_needed
 from exugear.steady.mean_system.mean_modes import mean_modes
-from exugear.steady.mean_system.mesh_ports import DEFLECTION
 from exugear.steady.nonlinear import Balance
 from fe_ste.tools.arrays import Complexes
 
@@ -54,18 +54,19 @@ def candidates(gearset: Gearset, low: float, high: float) -> tuple[Candidate, ..
     values, right, left = mean_modes(gearset.system, middle)
     size, ports = gearset.system.size, gearset.ports_at(middle)
     felt = left[:, size:] @ np.linalg.solve(gearset.system.mass, gearset.loads(ports).astype(complex))
-    seen = right[:, :size] @ ports.readings[:, DEFLECTION].T
+    felt = felt.reshape(len(felt), len(gearset.waves.waves), -1)
+    seen = right[:, :size] @ np.moveaxis(ports.readings, (0, 1, 2), (2, 0, 1))
     decay, frequency = -values.real, values.imag
     slow = min(abs(low), abs(high))
     found = []
     for base, order in enumerate(gearset.waves.base_orders):
         own = np.array([wave.base == base for wave in gearset.waves.waves])
         for harmonic in range(1, gearset.harmonics + 1):
-            stiffness = own * gearset.cycle_coefficients[:, harmonic]
+            tangents = {at: own * values[:, harmonic] for at, values in gearset.cycle_tangents.items()}
+            turned = {at: values.conj() for at, values in tangents.items()}
             for sign in (1.0, -1.0):
-                partner = seen.conj() if sign > 0.0 else seen
-                there = (felt * stiffness) @ partner.T
-                back = there.conj() if sign > 0.0 else (felt * stiffness.conj()) @ seen.T
+                there = _between(felt, tangents, seen.conj() if sign > 0.0 else seen)
+                back = there.conj() if sign > 0.0 else _between(felt, turned, seen)
                 product = there * back.T
                 growth = -0.5 * (decay[:, None] + decay) + np.real(
                     np.sqrt(0.25 * (decay[:, None] - decay) ** 2 + product)
@@ -77,6 +78,12 @@ def candidates(gearset: Gearset, low: float, high: float) -> tuple[Candidate, ..
                     at = float(np.copysign(speed[i, j], middle))
                     found.append(Candidate(at, base, harmonic, float(growth[i, j])))
     return tuple(sorted(found, key=lambda candidate: -candidate.growth))
+
+
+def _between(felt: Complexes, tangents: Mapping[tuple[int, int], Complexes], seen: Complexes) -> Complexes:
+    """Couple modes (k, k) by tangents (m,) of forces by readings; what they feel (k, m, f) and make seen (r, k, m)."""
+    parts = [(felt[..., force] * own) @ seen[read].T for (force, read), own in tangents.items()]
+    return np.asarray(np.sum(parts, axis=0))
 
 
 def growth_at(balance: Balance, readings: Complexes, base: int, least: int = SMOOTH_KICKS) -> float:

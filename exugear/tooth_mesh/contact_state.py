@@ -2,19 +2,48 @@
 
 With the deflection d at mid-face and the misalignment g, both of the loaded flank, a law along a row reads
 
-    e = d - zt (g - g0),   force F(e),   moment M = F0 zc + zt (F - F0) - kg (g - g0),
+    e = d - (zt + w) (g - g0),   force F(e),   moment M = F0 zc + zt (F - F0) + w F - kg (g - g0),
 
 which has a potential, U = U(e) + (zt - zc) F0 (g - g0) + kg (g - g0)^2 / 2: the generalized force of the mesh is
 -F dd/dq + M dg/dq. Teeth yield otherwise where the axes stand apart, by sa (a - a0) for a centre distance a: the row of
 d has that in it, so that the load pushes between the axes as well. The load centre zc and that of a load more, zt, are
 means over the mesh cycle, in the transverse plane of action from the middle of the common face towards +z.
+
+Over the mesh cycle the load moves along the face, most of helical teeth: w(pmc) is the load centre of the table against
+its mean. It moves with the whole load, F w, so that no moment is left where teeth part; by the same potential the
+deflection under a constant load follows the misalignment by w (g - g0). While w changes, teeth take or give the power
+F w' (g - g0) dpmc/dt, as they do while the stiffness changes. Dampers act along the mean lever zt.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from fe_ste.geometry.gears import GearPair
+from fe_ste.tools.arrays import Floats
+
+Samples = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class ContactCycle:
+    """What of a contact changes over the mesh cycle, at equal steps from its beginning.
+
+    Attributes
+    ----------
+    deflection : tuple of float
+        Static transmission error, m.
+    tangent_stiffness : tuple of float
+        N/m.
+    load_centre : tuple of float
+        m.
+    """
+
+    deflection: Samples
+    tangent_stiffness: Samples
+    load_centre: Samples
 
 
 @dataclass(frozen=True)
@@ -40,6 +69,8 @@ class ContactState:
         kg: how much the load's moment falls with the misalignment while the load stays, N m/rad.
     centre_distance, deflection_by_distance : float
         a0 (m), and sa: change of the deflection with the centre distance under constant load.
+    cycle : ContactCycle, optional
+        What of it changes over the mesh cycle, if that is known.
 
     Examples
     --------
@@ -57,18 +88,57 @@ class ContactState:
     tilt_stiffness: float
     centre_distance: float = 0.0
     deflection_by_distance: float = 0.0
+    cycle: ContactCycle | None = None
 
     def seen_by(self, flank: int) -> ContactState:
         """Take the state from the axes of a table to those of a mesh with this flank, or back.
 
         The flank -1 is that of the table turned about the line of centres: the ends of the face change places.
         """
+        cycle = self.cycle
+        if cycle is not None:
+            cycle = replace(cycle, load_centre=tuple(flank * centre for centre in cycle.load_centre))
         return replace(
             self,
             misalignment=flank * self.misalignment,
             load_centre=flank * self.load_centre,
             tangent_load_centre=flank * self.tangent_load_centre,
+            cycle=cycle,
         )
+
+
+def changed_over_cycle(known: Floats, found: Samples) -> Floats:
+    """Give what is known finely over the mesh cycle the changes that were found at some positions of it.
+
+    Their difference has no more harmonics than these positions can tell apart, and no mean: finer harmonics stay those
+    that are known.
+
+    Parameters
+    ----------
+    known : (n,) array
+        At pmc = 0, 1/n, ...
+    found : tuple of k floats
+        At pmc = 0, 1/k, ...
+
+    Returns
+    -------
+    (n,) array
+        With the mean of `known`.
+
+    Examples
+    --------
+    >>> cycle = 2.0 * np.pi * np.arange(20) / 20
+    >>> fine = 3.0 + np.cos(7 * cycle)
+    >>> found = tuple(fine[::2] + 0.5 + np.cos(2 * cycle[::2]))
+    >>> np.allclose(changed_over_cycle(fine, found), fine + np.cos(2 * cycle))
+    True
+    """
+    count, size = len(found), len(known)
+    there = np.interp(np.arange(count) / count, np.arange(size) / size, known, period=1.0)
+    spectrum = np.fft.rfft(np.array(found) - there) / count
+    spectrum[0] = 0.0
+    spectrum[(count + 1) // 2 :] = 0.0
+    return np.asarray(known + size * np.fft.irfft(spectrum, size))
 
 
 def even_contact(pair: GearPair, force: float, stiffness: float, tangent_stiffness: float) -> ContactState:

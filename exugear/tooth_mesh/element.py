@@ -28,7 +28,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -36,7 +36,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Body, Mesh, node_position, seat_key
 from exugear.gearbox.sections.entries import GROUND
 from exugear.kernels.coordinates import BODY_SIZE
-from exugear.tooth_mesh.contact_state import ContactState, even_contact
+from exugear.tooth_mesh.contact_state import ContactState, changed_over_cycle, even_contact
 from exugear.tooth_mesh.law import Angles, Law, MeshCurve, MeshData, TableFlanks
 from exugear.tooth_mesh.placement import MeshError, loaded_flanks, position_rows, tooth_places
 from exugear.tooth_mesh.wheel_errors import wheel_errors
@@ -73,6 +73,8 @@ class MeshElement:
     offset : (3,) deflection (m), change of centre distance (m) and misalignment (rad) at zero coordinates
     table : for a law that follows a table; `stiffness` and `damping` are then what it has at the static load
     computed_from : input of the pair's table where contact is to be solved at the static misalignment
+    load_way : (n,) way of the load along the face over the mesh cycle about its mean, in the axes of the mesh, m; empty
+        where it stays or nothing is known of it
     """
 
     mesh: Mesh
@@ -96,19 +98,22 @@ class MeshElement:
     offset: Floats
     table: TableFlanks | None = None
     computed_from: TableInput | None = None
+    load_way: Floats = field(default_factory=lambda: np.zeros(0))
 
     def with_contact(self, contact: ContactState) -> MeshElement:
         """Return the mesh, whose teeth bear evenly so far, with a contact that was solved, in the axes of its table.
 
-        The mean of a curved law's stiffness is then that of the contact, the table's changes over the mesh cycle upon
-        it. Where gears stand so askew that flanks touch long before or after their middles would, the deflection at
-        mid-face is mostly that gap, and no measure of how teeth yield: the curve then begins at the gap.
+        The mean of a curved law's stiffness is then that of the contact. So are its changes over the mesh cycle and the
+        load's way along the face, as far as the positions of the contact tell; finer ones stay the table's. Where gears
+        stand so askew that flanks touch long before or after their middles would, the deflection at mid-face is mostly
+        that gap, and no measure of how teeth yield: the curve then begins at the gap.
         """
-        secant, tangent, load, gap = self.stiffness, self.tangent, self.load, 0.0
+        secant, tangent, way, load, gap = self.stiffness, self.tangent, self.load_way, self.load, 0.0
         if self.is_curved:
             straight = contact.force / contact.tangent_stiffness
             yielding = float(np.clip(contact.deflection, straight, STEEPEST * straight))
             gap = contact.deflection - yielding
+            secant, tangent, way = self._over_cycle(contact, yielding)
             secant = secant * (contact.force / yielding / np.mean(secant))
             tangent = tangent * (contact.tangent_stiffness / np.mean(tangent))
             load = contact.force
@@ -119,12 +124,30 @@ class MeshElement:
             stiffness=secant,
             tangent=tangent,
             load=load,
+            load_way=way,
             contact=contact.seen_by(self.flank),
             damping=self.damping_time * float(np.mean(tangent)),
             deflection=self.deflection - slope * self.centre,
             force=self.force - slope * self.centre,
             offset=self.offset - np.array([shift + gap, 0.0, 0.0]),
         )
+
+    def _over_cycle(self, contact: ContactState, yielding: float) -> tuple[Floats, Floats, Floats]:
+        """Secant and tangent stiffness (n,), N/m, and way of the load (n,), m, as they change where the gears stand."""
+        cycle = contact.cycle
+        if cycle is None:
+            return self.stiffness, self.tangent, self.load_way
+        deflection = changed_over_cycle(contact.force / self.stiffness, cycle.deflection)
+        deflection += yielding - np.mean(deflection)
+        softness = changed_over_cycle(1.0 / self.tangent, tuple(1.0 / np.array(cycle.tangent_stiffness)))
+        softness += 1.0 / contact.tangent_stiffness - np.mean(softness)
+        # A curve needs teeth that yield wherever they are.
+        deflection = np.maximum(deflection, yielding / STEEPEST)
+        softness = np.maximum(softness, 1.0 / (STEEPEST * contact.tangent_stiffness))
+        way = self.load_way
+        if len(way):
+            way = self.flank * changed_over_cycle(self.flank * way, cycle.load_centre)
+        return contact.force / deflection, 1.0 / softness, way
 
     @property
     def is_curved(self) -> bool:
@@ -175,8 +198,9 @@ def mesh_elements(
         Position (3,) of the node that carries a gear, by `seat_key` of body and gear; the body's own otherwise.
     contact : mapping of mesh name to ContactState, optional
         Contact at the static misalignment, in the axes of the pair's table (of the flank +1). A law that is curved has
-        its stiffness from there, the table's changes over the mesh cycle upon it. Meshes without one, or loaded on
-        the other flank, bear evenly along the common face (`even_contact`).
+        its stiffness from there, and how that and the place of the load change over the mesh cycle
+        (`MeshElement.with_contact`). Meshes without one, or loaded on the other flank, bear evenly along the common
+        face (`even_contact`).
 
     Raises
     ------
@@ -225,6 +249,7 @@ def mesh_elements(
             offset=_offset(mesh, displaced or {}, deflection, centre),
             table=law.table_flanks(mesh, flank, ends, phase, data, time),
             computed_from=data.table if isinstance(data, MeshCurve) and flank == usual[mesh.name] else None,
+            load_way=_load_way(law, data, flank, usual[mesh.name]),
         )
         elements.append(element if known is None or not law.tilts else element.with_contact(known))
     return tuple(elements)
@@ -238,6 +263,12 @@ def _at_load(law: Law, data: MeshData, mesh: Mesh, static_force: float) -> tuple
         if not (np.all(np.isfinite(values)) and np.all(values > 0.0)):
             raise MeshError(f"pair {mesh.pair.name}: mesh stiffness must be positive and finite")
     return secant, tangent, load
+
+
+def _load_way(law: Law, data: MeshData, flank: int, usual: int) -> Floats:
+    """Way of the load (n,) as `MeshElement.load_way`; of the flank that a table is of, not of that behind."""
+    # A flank -1 is that of the table turned about: the ends of the face change places.
+    return flank * law.load_way(data) if flank == usual else np.zeros(0)
 
 
 def _offset(mesh: Mesh, displaced: Mapping[str, tuple[float, float]], deflection: Floats, centre: Floats) -> Floats:

@@ -32,6 +32,8 @@ class MeshCurve:
         Load on the transverse line of action at which they are, N.
     table : TableInput, optional
         What they were computed from: contact at other loads and misalignments can be solved then.
+    load_centre : (n,) array, optional
+        Where the load bears along the face at the same positions, m from its middle, in the axes of the table.
 
     Examples
     --------
@@ -44,6 +46,7 @@ class MeshCurve:
     tangent: Floats
     force: float
     table: TableInput | None = None
+    load_centre: Floats | None = None
 
     def at(self, force: float) -> MeshCurve:
         """Return the same curve by its stiffness at another load (N); without any, at that of the table."""
@@ -118,6 +121,10 @@ class Law:
         """F_bt over STE and its slope along the line of action, each (n,), N/m, at the static force (N)."""
         values = data.stiffness if isinstance(data, MeshCurve) else np.atleast_1d(np.asarray(data, dtype=np.float64))
         return values, values
+
+    def load_way(self, data: MeshData) -> Floats:
+        """Way of the load along the face about its mean (n,), in the axes of the table, m; empty where it stays."""
+        return np.zeros(0)
 
     def stiffness(self, mesh: Mesh, line_of_action: Floats, angles: Angles) -> tuple[Floats, float]:
         """Stiffness (n,) in the law's own coordinate, N/m, from that of `samples`; F_bt per scalar force of the law."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from exugear.tooth_mesh.contact_state import ContactState
+from exugear.tooth_mesh.contact_state import ContactCycle, ContactState
 from fe_ste.contact.kinematics import ContactError
 from fe_ste.transmission_error.known_contacts import known_contacts
 from fe_ste.transmission_error.mean_contact import POSITIONS, MeanContact, contact_input
@@ -119,6 +119,7 @@ def contact_state(contact: MeanContact) -> ContactState:
         float(contact.at(values, middle))
         for values in (contact.deflection, contact.stiffness, contact.load_centre, contact.tangent_load_centre)
     )
+    over_cycle = (contact.cycle_deflection, contact.cycle_stiffness, contact.cycle_load_centre)
     return ContactState(
         force=contact.force,
         deflection=deflection,
@@ -129,4 +130,5 @@ def contact_state(contact: MeanContact) -> ContactState:
         tilt_stiffness=contact.tilt_stiffness,
         centre_distance=contact.centre_distance,
         deflection_by_distance=contact.deflection_by_distance,
+        cycle=ContactCycle(*(tuple(contact.at(values, middle).tolist()) for values in over_cycle)),
     )

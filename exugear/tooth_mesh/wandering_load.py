@@ -1,4 +1,4 @@
-"""How far the load moves along the face over a mesh cycle, which laws along a row leave out, and how much that is."""
+"""How far the load moves along the face over a mesh cycle, which the law `seed` leaves out, and how much that is."""
 
 from __future__ import annotations
 

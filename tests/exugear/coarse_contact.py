@@ -39,6 +39,7 @@ def coarse_curves(gearbox: Gearbox) -> dict[str, MeshCurve]:
             state["tangent_stiffness"].to_numpy(),
             wanted.torque[0] / wanted.pair.pinion.base_radius,
             wanted,
+            state["load_centre"].to_numpy(),
         )
     return curves
 

@@ -299,19 +299,19 @@ def _tell_of_stability(data: xr.Dataset, growth: float) -> None:
 
 
 def _tell_of_wandering_loads(project: Project) -> tuple[WanderingLoad, ...]:
-    """Say where the load moves along the face so far that its moment, which laws along a row leave out, counts."""
+    """Say where the load moves along the face so far that its moment counts, if the law leaves it out."""
     from exugear.tooth_mesh.laws.registry import LAWS
     from exugear.tooth_mesh.wandering_load import wandering_loads
 
     law = LAWS[project.choice.mesh_law]
-    if law.needs_axes or not law.needs_tables or project.choice.variant.spins_only:
+    if law.moves_load or not law.needs_tables or project.choice.variant.spins_only:
         return ()
     found = wandering_loads(project.gearbox, project.folder)
     if found and found[0].over_error > NOTICED_WAY:
         note(
             f"{found[0].in_words}; its moment, {found[0].over_error:.2g} times the push of the transmission error, is "
-            "left out: peaks of modes in which gears tilt may be many times higher; --mesh-law table --level "
-            "nonlinear has it",
+            f"left out by the law {law.name}: peaks of modes in which gears tilt may be many times higher; "
+            "--mesh-law line_of_action has it",
             style="yellow",
         )
     return found

@@ -1,7 +1,8 @@
 """What mesh laws read of the motion and what they push along: rows by the frame's coordinates, as waves.
 
 A law along a row reads its deflection and the position in the mesh cycle, and has one force; what it resists
-misalignment with is in the mean system. The law `table` reads the
+misalignment with is in the mean system. Where its load moves along the face it reads the misalignment, too, and has a
+moment along that. The law `table` reads the
 approach of both flanks, the centre distance, the misalignment of both flanks and the position, and pushes along all
 but the last (`exugear.tooth_mesh.laws.table`). Kernels of `fe_ste.tools.compilation` read the numbers of its rows.
 """
@@ -21,8 +22,8 @@ from exugear.tooth_mesh.kernels.table_law import (
 )
 from fe_ste.tools.arrays import Floats
 
-DEFLECTION, POSITION = 0, -1
-"""Places among what a law reads: the first and the last."""
+DEFLECTION, MISALIGNMENT, POSITION = 0, 1, -1
+"""Places among what a law along a row reads: the first, the second where its load moves along the face, the last."""
 FRONT, BACK, CENTRE, TILT, BACK_TILT = range(5)
 """Places among what the law `table` reads and pushes along."""
 
@@ -59,7 +60,7 @@ class MeshPorts:
 def mesh_ports(waves: MeshWaves, speed: float, parting: bool) -> MeshPorts:
     """Rows of all mesh waves at a speed of the input (rad/s); `parting` for the law `table`."""
     meshes = waves.assembly.meshes
-    rows, offsets = _table_rows(meshes) if parting else _row_rows(meshes)
+    rows, offsets = _table_rows(meshes) if parting else _row_rows(meshes, waves.wander)
     means = np.array([wave.wave == 0 for wave in waves.waves])
     firsts = [wave.first for wave in waves.waves]
     readings = [waves.gradients(row, speed) for row in rows] + [waves.position_rows()]
@@ -67,7 +68,7 @@ def mesh_ports(waves: MeshWaves, speed: float, parting: bool) -> MeshPorts:
     # The mean position counts from the static state; what planets are ahead of each other by stays.
     ahead = np.where(means, 0.0, readings[-1] @ waves.system.static_at(speed))
     levers = meshes.tilt[:, [TILT_LEVER]] * meshes.table.misalignment
-    forces = readings[:-1] if parting else [waves.gradients(meshes.force - levers, speed)]
+    forces = readings[:-1] if parting else [waves.gradients(meshes.force - levers, speed), *readings[1:-1]]
     shift = meshes.tilt[:, TILT_LEVER] * (meshes.table.nominal[:, NOMINAL_MISALIGNMENT] - meshes.tilt[:, TILT_REST])
     beside = waves.values(levers, speed) + means * shift[firsts]
     return MeshPorts(
@@ -79,12 +80,20 @@ def mesh_ports(waves: MeshWaves, speed: float, parting: bool) -> MeshPorts:
     )
 
 
-def _row_rows(meshes: MeshArrays) -> tuple[list[Floats], list[Floats]]:
-    """Row of the deflection that a law reads (`exugear.tooth_mesh.contact_state`), its value at zero coordinates."""
+def _row_rows(meshes: MeshArrays, wander: bool) -> tuple[list[Floats], list[Floats]]:
+    """Rows that a law along a row reads (`exugear.tooth_mesh.contact_state`), and their values at zero coordinates.
+
+    They are its deflection with the mean lever of the load and, where loads wander along the face, the misalignment
+    against that of the contact's state; zeros of a mesh whose load stays.
+    """
     lever, nominal = meshes.tilt[:, TILT_LEVER], meshes.table.nominal
-    rest = lever * (nominal[:, NOMINAL_MISALIGNMENT] - meshes.tilt[:, TILT_REST])
-    row = meshes.deflection - lever[:, None] * meshes.table.misalignment
-    return [row], [nominal[:, NOMINAL_DEFLECTION] - rest]
+    turned = nominal[:, NOMINAL_MISALIGNMENT] - meshes.tilt[:, TILT_REST]
+    row, offset = meshes.deflection - lever[:, None] * meshes.table.misalignment, lever * turned
+    if not wander:
+        return [row], [nominal[:, NOMINAL_DEFLECTION] - offset]
+    moves = meshes.way_pieces > 0
+    rows = [row, moves[:, None] * meshes.table.misalignment]
+    return rows, [nominal[:, NOMINAL_DEFLECTION] - offset, moves * turned]
 
 
 def _table_rows(meshes: MeshArrays) -> tuple[list[Floats], list[Floats]]:

@@ -45,9 +45,9 @@ IN_PHASE = 1e-6
 """Mesh cycles by which planets in phase may differ."""
 SAME_BASE = 1e-9
 """Share by which mesh frequencies of one base may differ."""
-CycleQuantity = Literal["tangent", "secant", "exponent", "compliance"]
-"""Of a mesh at its static load: slope of the load, load over deflection (N/m), the curve's exponent less one, and one
-over the secant (m/N), which is the static transmission error of a unit load."""
+CycleQuantity = Literal["tangent", "secant", "exponent", "compliance", "way"]
+"""Of a mesh at its static load: slope of the load, load over deflection (N/m), the curve's exponent less one, one over
+the secant (m/N), which is the static transmission error of a unit load, and the way of the load along the face (m)."""
 WAVES = ("mean", "cosine", "sine")
 """The first three, which central bodies feel."""
 
@@ -228,11 +228,17 @@ class MeshWaves:
         mean = {wave.family: float(moved[n]) for n, wave in enumerate(self.waves) if wave.wave == 0}
         return np.asarray(own + np.array([mean[wave.family] for wave in self.waves]))
 
-    def cycle_coefficients(self, quantity: CycleQuantity, harmonics: int) -> Complexes:
-        """Fourier coefficients (m, harmonics + 1) of a quantity over the mesh cycle."""
+    @property
+    def wander(self) -> bool:
+        """Whether the load of any mesh moves along the face over its cycle."""
+        return bool(self.assembly.meshes.way_pieces.any())
+
+    def cycle_coefficients(self, *quantities: CycleQuantity, harmonics: int) -> Complexes:
+        """Fourier coefficients (m, harmonics + 1) of the product of quantities over the mesh cycle."""
         found = np.zeros((len(self.waves), harmonics + 1), dtype=complex)
         for own, wave in zip(found, self.waves, strict=True):
-            known = fourier_coefficients(self._over_cycle(wave, quantity), harmonics)
+            product = np.prod([self._over_cycle(wave, quantity) for quantity in quantities], axis=0)
+            known = fourier_coefficients(product, harmonics)
             own[: len(known)] = known
         return found
 
@@ -241,6 +247,9 @@ class MeshWaves:
         meshes, mesh = self.assembly.meshes, wave.first
         pieces, curved = int(meshes.pieces[mesh]), meshes.form[mesh] == CURVE_FORM
         powers = np.vander(np.arange(SAMPLES) / SAMPLES, 4, increasing=True).T
+        if quantity == "way":
+            moves = meshes.way_pieces[mesh] > 0
+            return np.asarray((meshes.way[mesh, :pieces] @ powers).ravel() if moves else np.zeros(pieces * SAMPLES))
         secant = (meshes.stiffness[mesh, :pieces, :4] @ powers).ravel()
         more = meshes.stiffness[mesh, :pieces, EXPONENT : EXPONENT + 4] if curved else np.zeros((pieces, 4))
         exponent = (more @ powers).ravel()
@@ -259,8 +268,8 @@ class MeshWaves:
 
     @property
     def varies(self) -> bool:
-        """Whether any mesh has a compliance that changes over its cycle: else nothing excites the gearbox."""
-        return any(bool(tails[0]) for tails in self._tails.values())
+        """Whether the compliance of any mesh or its load's place changes over the cycle: else nothing excites."""
+        return self.wander or any(bool(tails[0]) for tails in self._tails.values())
 
     def needed_harmonics(self) -> int:
         """Count the harmonics of each mesh frequency that the compliance asks for.

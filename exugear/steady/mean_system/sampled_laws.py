@@ -1,7 +1,9 @@
 """Mesh laws on many samples at once: forces and their slopes by what the laws read, in compiled loops.
 
-A law along a row reads deflection and position; the law `table` both flanks, the centre distance, both misalignments
-and the position (`exugear.steady.mean_system.mesh_ports`). Loops are compiled by `fe_ste.tools.compilation`.
+A law along a row reads deflection and position, and the misalignment between them where its load moves along the face,
+with a moment along that (`exugear.tooth_mesh.contact_state`); the law `table` both flanks, the centre distance, both
+misalignments and the position (`exugear.steady.mean_system.mesh_ports`). Loops are compiled by
+`fe_ste.tools.compilation`.
 """
 
 from __future__ import annotations
@@ -10,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from exugear.steady.mean_system.mesh_ports import BACK, BACK_TILT, CENTRE, FRONT, TILT
+from exugear.steady.mean_system.mesh_ports import BACK, BACK_TILT, CENTRE, FRONT, POSITION, TILT
 from exugear.tooth_mesh.kernels.meshes import MeshArrays
 from exugear.tooth_mesh.kernels.table_law import (
     BY_DISTANCE,
@@ -118,6 +120,46 @@ def sample_curve(curve: Floats, readings: Floats, load: float) -> LawSamples:
     by_position = force * (n_slope * level + (1.0 + bent * n) * k_slope / k)
     slope = np.stack([tangent, by_position], axis=1)[:, None]
     return LawSamples(force[:, None], slope, np.zeros_like(slope))
+
+
+def sample_wandering_line(tangents: Floats, readings: Floats) -> LawSamples:
+    """Sample a straight law whose load moves along the face, as `sample_line`.
+
+    Parameters
+    ----------
+    tangents : (15, s) array
+        Stiffness k (N/m), force that it has less p (N), and with the way w of the load k w, p w and k w^2; each with
+        two derivatives per cycle.
+    readings : (s, 3) array
+        Deflection (m), misalignment against that of the contact's state (rad), and position as `sample_line` has it.
+    """
+    deflection, tilt, moved = readings.T
+    (k, k_slope), (p, p_slope), (kw, kw_slope), (pw, pw_slope), (kww, kww_slope) = (
+        _moved(own, moved) for own in tangents.reshape(5, 3, -1)
+    )
+    force = k * deflection - kw * tilt - p
+    moment = kww * tilt - kw * deflection + pw
+    by_position = k_slope * deflection - kw_slope * tilt - p_slope
+    turning = kww_slope * tilt - kw_slope * deflection + pw_slope
+    slope = np.stack([np.stack([k, -kw, by_position], axis=1), np.stack([-kw, kww, turning], axis=1)], axis=1)
+    return LawSamples(np.stack([force, moment], axis=1), slope, np.zeros_like(slope))
+
+
+def sample_wandering_curve(curve: Floats, readings: Floats, load: float) -> LawSamples:
+    """Sample a curve whose load moves along the face, as `sample_curve`; its way (3, s) follows the curve's numbers.
+
+    Readings (s, 3) are those of `sample_wandering_line`.
+    """
+    deflection, tilt, moved = readings.T
+    way, way_slope = _moved(curve[6:], moved)
+    own = sample_curve(curve[:6], np.stack([deflection - way * tilt, moved], axis=1), load)
+    force, k = own.force[:, 0], own.slope[:, 0, 0]
+    by_position = own.slope[:, 0, 1] - k * way_slope * tilt
+    along = np.stack([k, -way * k, by_position], axis=1)
+    across = -way[:, None] * along
+    across[:, POSITION] -= way_slope * force
+    slope = np.stack([along, across], axis=1)
+    return LawSamples(np.stack([force, -way * force], axis=1), slope, np.zeros_like(slope))
 
 
 def _moved(values: Floats, moved: Floats) -> tuple[Floats, Floats]:

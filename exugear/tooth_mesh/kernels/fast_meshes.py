@@ -59,6 +59,7 @@ class Meshes(NamedTuple):
     conjugate : (m,) 1 where the force row is the deflection row
     tilting : (m,) 1 where a law along a row resists misalignment
     tilt : (m, 7) columns as named in this module
+    way_pieces, way : of the load along the face
     spinning : (m,) 1 where the gears have their spins alone
     ends : (m, 2) numbers of the two gears' places
     rows : (m, r, 48) rows over both gears' padded places: parts W0, W1, W2 of the first, then of the second gear, whose
@@ -78,6 +79,8 @@ class Meshes(NamedTuple):
     conjugate: Integers
     tilting: Integers
     tilt: Floats
+    way_pieces: Integers
+    way: Floats
     spinning: Integers
     ends: Integers
     rows: Floats

@@ -9,7 +9,7 @@ rotation by psi, p a gear's place relative to the frame's axis and S = z x,
     f     = -F dg/dq,  g = sum_b V_b . z_b                                 generalized force of a scalar force F
 
 A law along a row that resists misalignment gamma has the deflection and the moment of
-`exugear.tooth_mesh.contact_state` instead: e = delta - zt (gamma - g0) for delta, and + M d gamma/dq beside it.
+`exugear.tooth_mesh.contact_state` instead: e = delta - (zt + w) (gamma - g0) for delta, and + M d gamma/dq beside it.
 
 The row g does not change when everything turns with psi: the carrier's share of the force balances moments exactly.
 Which force F a deflection raises is the matter of the mesh laws (`exugear.tooth_mesh.laws`). Errors of pitch and
@@ -69,6 +69,8 @@ class MeshArrays(NamedTuple):
     damping : (m,) N s/m
     tilt : (m, 5) of a law along a row that resists misalignment: tilt stiffness kg (N m/rad) and damping (N m s/rad),
         lever zt (m), moment F0 (zc - zt) (N m) and misalignment g0 (rad); zeros where it does not
+    way_pieces : (m,) number of equal pieces of the load's way along the face; 0 where it stays
+    way : (m, w, 4) coefficients of that way w over each piece of the mesh cycle, m
     line_of_action : (m,) F_bt per scalar mesh force
     error_pieces : (m, 2) number of equal cubic pieces of each gear's error over its revolution; 0 for no error
     error : (m, 2, e, 4) coefficients of the error over each piece, m along the transverse line of action
@@ -86,6 +88,8 @@ class MeshArrays(NamedTuple):
     stiffness: Floats
     damping: Floats
     tilt: Floats
+    way_pieces: Integers
+    way: Floats
     line_of_action: Floats
     error_pieces: Integers
     error: Floats
@@ -226,6 +230,14 @@ def mesh_pmc(q: Floats, m: int, meshes: MeshArrays) -> float:
     psi = q[meshes.coordinates[m, FRAME]] if meshes.coordinates[m, FRAME] >= 0 else 0.0
     pmc: float = meshes.phase[m] + meshes.cycles[m] * (spin - psi)
     return pmc
+
+
+@kernel
+def load_way(m: int, pmc: float, meshes: MeshArrays) -> tuple[float, float]:
+    """Way of the load of mesh m along the face at a position in its cycle, m, and its slope per cycle."""
+    if meshes.way_pieces[m] == 0:
+        return 0.0, 0.0
+    return stiffness_at(meshes.way[m], meshes.way_pieces[m], pmc)
 
 
 @kernel

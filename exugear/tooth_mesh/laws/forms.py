@@ -33,6 +33,7 @@ from exugear.tooth_mesh.kernels.meshes import (
     TILT_STIFFNESS,
     MeshArrays,
     frame_row,
+    load_way,
     mesh_pmc,
     net_deflection,
     rate_gradient,
@@ -107,10 +108,12 @@ def row_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Floats, 
         lost = resists[TILT_DAMPING] * tilt_rate * tilt_rate
     pmc = mesh_pmc(q, m, meshes)
     cycling = meshes.cycles[m] * relative_spin(v, index, 0)
-    # The law, and its damper beside it.
+    # The law, and its damper beside it, which stays where the load is in the mean.
+    way, moving = load_way(m, pmc, meshes)
     elastic, k, _, energy, cycle_power = row_law(
-        meshes.form[m], meshes.stiffness[m], meshes.pieces[m], delta, pmc, cycling
+        meshes.form[m], meshes.stiffness[m], meshes.pieces[m], delta - way * turned, pmc, cycling
     )
+    moment += way * elastic
     force = elastic + meshes.damping[m] * rate
     # It acts along a row of its own, which for most laws is that of the deflection.
     net_deflection(q, m, meshes, meshes.force[m], 1.0, acting, turning, bend)
@@ -121,7 +124,7 @@ def row_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Floats, 
     out[FORCE] = force * meshes.line_of_action[m]
     out[ENERGY] = energy + stored
     out[DAMPED_POWER] = meshes.damping[m] * rate * rate + lost
-    out[CYCLE_POWER] = cycle_power
+    out[CYCLE_POWER] = cycle_power + elastic * moving * turned * cycling
     out[OTHER_POWER] = force * (row_dot(index, acting, v) - rate)
     out[OUTSIDE] = 0.0
     for i in range(ROW_SIZE):
@@ -139,19 +142,24 @@ def add_row_tangent(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Fl
     tilting, tilt_turning, resists = memory[TILTING], memory[TILT_TURNING], meshes.tilt[m]
     delta = meshes.table.nominal[m, NOMINAL_DEFLECTION]
     delta += net_deflection(q, m, meshes, meshes.deflection[m], 1.0, gradient, turning, bend)
+    pmc, turned = mesh_pmc(q, m, meshes), 0.0
     if resists[TILT_STIFFNESS] > 0.0:
         turned = tilted(q, m, meshes, memory)
         delta -= resists[TILT_LEVER] * turned
         add_tilt_tangent(v, index, turned, resists, memory, jq, jv)
+    way, moving = load_way(m, pmc, meshes)
     elastic, k, by_pmc, _, _ = row_law(
-        meshes.form[m], meshes.stiffness[m], meshes.pieces[m], delta, mesh_pmc(q, m, meshes), 0.0
+        meshes.form[m], meshes.stiffness[m], meshes.pieces[m], delta - way * turned, pmc, 0.0
     )
+    by_pmc -= k * moving * turned
     c = meshes.damping[m]
     force = elastic + c * row_dot(index, gradient, v)
     # Slope of the scalar force: of the damper's rate, of the deflection, and of pmc by both its angles.
     rate_gradient(v, index, turning, bend, slope)
     for i in range(ROW_SIZE):
         slope[i] = c * slope[i] + k * gradient[i]
+    if meshes.way_pieces[m] > 0:
+        add_way_tangent(elastic, k, by_pmc * meshes.cycles[m], way, moving * meshes.cycles[m], memory, jq)
     slope[SPIN_1] += by_pmc * meshes.cycles[m]
     slope[FRAME] -= by_pmc * meshes.cycles[m]
     # Product rule: the row times the force's slope, and the row's own turning times the force.
@@ -165,6 +173,27 @@ def add_row_tangent(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Fl
             jq[i, j] += acting[i] * slope[j]
             jv[i, j] += acting[i] * c * gradient[j]
     turn_rows(acting_turning, bend, force, jq)
+
+
+@kernel
+def add_way_tangent(
+    elastic: float, k: float, by_spin: float, way: float, moving: float, memory: Floats, jq: Floats
+) -> None:
+    """Add the derivatives of the moment of a load that moves along the face to the negative force, (13, 13).
+
+    What the misalignment takes of the force's slope goes to `memory`; `by_spin` and `moving` are slopes of the elastic
+    force (N) and of the load's way (m) by the spin of gear 1.
+    """
+    gradient, tilting, slope = memory[GRADIENT], memory[TILTING], memory[SLOPE]
+    straight = memory[STILL]
+    straight[:] = 0.0
+    for i in range(ROW_SIZE):
+        slope[i] -= k * way * tilting[i]
+        for j in range(ROW_SIZE):
+            jq[i, j] -= tilting[i] * way * k * (gradient[j] - way * tilting[j])
+        jq[i, SPIN_1] -= tilting[i] * (way * by_spin + moving * elastic)
+        jq[i, FRAME] += tilting[i] * (way * by_spin + moving * elastic)
+    turn_rows(memory[TILT_TURNING], straight, -way * elastic, jq)
 
 
 @kernel

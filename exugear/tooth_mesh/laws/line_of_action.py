@@ -61,7 +61,8 @@ class LineOfAction(Law):
             return stiffness
         tangent = np.asarray(point["tangent_stiffness"].to_numpy(), dtype=np.float64)
         computed_from = wanted_table(gearbox, pair, len(stiffness))
-        return MeshCurve(stiffness, tangent, float(point["line_of_action_force"].mean()), computed_from)
+        centre = np.asarray(point["load_centre"].to_numpy(), dtype=np.float64)
+        return MeshCurve(stiffness, tangent, float(point["line_of_action_force"].mean()), computed_from, centre)
 
     def samples(self, data: MeshData, mesh: Mesh, static_force: float) -> tuple[Floats, Floats]:
         """Secant and tangent stiffness along the line of action, as `Law.samples`."""
@@ -69,6 +70,11 @@ class LineOfAction(Law):
             curve = data.at(static_force)
             return curve.stiffness, curve.tangent
         return super().samples(data, mesh, static_force)
+
+    def load_way(self, data: MeshData) -> Floats:
+        """Way of the table's load, as `Law.load_way`; none of a stiffness alone."""
+        centre = data.load_centre if self.curved and isinstance(data, MeshCurve) else None
+        return np.zeros(0) if centre is None else centre - np.mean(centre)
 
 
 def curve_coefficients(stiffness: Floats, tangent: Floats, force: float) -> Floats:

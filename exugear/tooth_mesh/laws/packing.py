@@ -13,6 +13,7 @@ from exugear.tooth_mesh.kernels.meshes import (
     FRAME,
     ROW_SIZE,
     TILT_COLUMNS,
+    TILT_STIFFNESS,
     MeshArrays,
     periodic_cubic,
 )
@@ -52,6 +53,10 @@ def pack(
     for block, (_, values) in zip(stiffness, forms, strict=True):
         block[: len(values), : values.shape[1]] = values
     index = _indices(elements, coordinates)
+    tilts = _pack_tilts(elements, index, linear)
+    # Its mean is in the lever; of gears that do not tilt it does nothing.
+    resists = tilts[:, TILT_STIFFNESS] > 0.0
+    ways = [e.load_way if own and not averaged else np.zeros(0) for own, e in zip(resists, elements, strict=True)]
     tables = pack_tables(elements, index, averaged, linear)
     if tangent:
         tables.nominal[:, NOMINAL_DEFLECTION] -= [element.rest for element in elements]
@@ -66,7 +71,9 @@ def pack(
         pieces=np.array([len(values) for _, values in forms], dtype=np.int64),
         stiffness=stiffness,
         damping=np.array([e.damping for e in elements]),
-        tilt=_pack_tilts(elements, index, linear),
+        tilt=tilts,
+        way_pieces=np.array([len(way) for way in ways], dtype=np.int64),
+        way=_pack_cycles(ways),
         line_of_action=np.array([e.line_of_action for e in elements]),
         error_pieces=np.array([[len(error) for error in e.errors] for e in elements], dtype=np.int64).reshape(count, 2),
         error=_pack_errors(elements),
@@ -112,6 +119,15 @@ def _indices(elements: tuple[MeshElement, ...], coordinates: Mapping[str, tuple[
             row[start : start + BODY_SIZE] = next(carrying, _NO_COORDINATES)
         row[FRAME] = coordinates.get(mesh.frame, _NO_COORDINATES)[SPIN]
     return index
+
+
+def _pack_cycles(samples: list[Floats]) -> Floats:
+    """Coefficients (m, n, 4) of periodic cubics through samples (n,) of each mesh; zeros behind shorter ones."""
+    coefficients = np.zeros((len(samples), max((len(own) for own in samples), default=0), 4))
+    for block, own in zip(coefficients, samples, strict=True):
+        if len(own):
+            block[: len(own)] = periodic_cubic(own)
+    return coefficients
 
 
 def _pack_errors(elements: tuple[MeshElement, ...]) -> Floats:

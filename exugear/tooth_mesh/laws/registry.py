@@ -28,6 +28,7 @@ class LawProperties:
     needs_axes : whether these are to be tables over load, centre distance and misalignment
     loses_contact : whether teeth part and touch on the other flank
     signals_positions : whether a run records where the gears of each mesh stand
+    moves_load : whether the load moves along the face over the mesh cycle as the table has it
     """
 
     name: str
@@ -37,6 +38,7 @@ class LawProperties:
     needs_axes: bool = False
     loses_contact: bool = False
     signals_positions: bool = False
+    moves_load: bool = False
 
 
 _TABLE_OF_LAWS = (
@@ -52,6 +54,7 @@ _TABLE_OF_LAWS = (
         "line_of_action",
         "load over deflection over the mesh cycle by secant and tangent of the table, stiffness against misalignment; "
         "all motions along the line of action",
+        moves_load=True,
     ),
     LawProperties(
         "table",
@@ -60,6 +63,7 @@ _TABLE_OF_LAWS = (
         needs_axes=True,
         loses_contact=True,
         signals_positions=True,
+        moves_load=True,
     ),
 )
 LAWS = {law.name: law for law in _TABLE_OF_LAWS}

@@ -28,7 +28,7 @@ from exugear.tooth_mesh.kernels.fast_meshes import (
     subtract_errors,
     tilt_motion,
 )
-from exugear.tooth_mesh.kernels.meshes import FRAME, ROW_SIZE, SPIN_1, SPIN_2
+from exugear.tooth_mesh.kernels.meshes import FRAME, ROW_SIZE, SPIN_1, SPIN_2, stiffness_at
 from exugear.tooth_mesh.kernels.table_law import Scratch, TableArrays
 from exugear.tooth_mesh.laws.forms import row_law
 from exugear.tooth_mesh.laws.table import TABLE_FORM, fast_table_force
@@ -53,11 +53,17 @@ def spinning_motion(q: Floats, v: Floats, m: int, meshes: Meshes) -> tuple[float
 
 
 @kernel
-def mesh_law(q: Floats, v: Floats, m: int, delta: float, meshes: Meshes) -> tuple[float, float, float, float, float]:
-    """Elastic force of mesh m at a deflection (m), of a law along a row; results as of `row_law`."""
+def mesh_cycle(q: Floats, v: Floats, m: int, meshes: Meshes) -> tuple[float, float]:
+    """Position in the mesh cycle of mesh m, unwrapped, and its rate, 1/s."""
     index = meshes.coordinates[m]
     pmc = meshes.phase[m] + meshes.cycles[m] * (q[index[SPIN_1]] - q[index[FRAME]])
-    cycling = meshes.cycles[m] * (v[index[SPIN_1]] - v[index[FRAME]])
+    return pmc, meshes.cycles[m] * (v[index[SPIN_1]] - v[index[FRAME]])
+
+
+@kernel
+def mesh_law(q: Floats, v: Floats, m: int, delta: float, meshes: Meshes) -> tuple[float, float, float, float, float]:
+    """Elastic force of mesh m at a deflection (m), of a law along a row; results as of `row_law`."""
+    pmc, cycling = mesh_cycle(q, v, m, meshes)
     return row_law(meshes.form[m], meshes.stiffness[m], meshes.pieces[m], delta, pmc, cycling)
 
 
@@ -138,12 +144,18 @@ def add_tilting_mesh(
     frame, resists, state = meshes.coordinates[m, FRAME], meshes.tilt[m], work.mesh.states[m]
     turned, tilt_rate, x, y, turning = tilt_motion(m, v[frame], c, s, meshes, work.places)
     arm, stiffness, lost = resists[TILT_ARM], resists[TILT_RESISTANCE], resists[TILT_DAMPER] * tilt_rate
+    way, moving = 0.0, 0.0
+    if meshes.way_pieces[m] > 0:
+        pmc, cycling = mesh_cycle(q, v, m, meshes)
+        way, slope = stiffness_at(meshes.way[m], meshes.way_pieces[m], pmc)
+        moving = slope * cycling
     # Where the load bears beside the middle of the face, it deflects with the misalignment.
     approach, approaching = delta - arm * turned, rate - arm * tilt_rate
-    elastic, _, _, energy, cycle_power = mesh_law(q, v, m, approach, meshes)
+    elastic, _, _, energy, cycle_power = mesh_law(q, v, m, approach - way * turned, meshes)
+    cycle_power += elastic * moving * turned
     force = elastic + meshes.damping[m] * approaching
     push_apart(m, force, work.mesh.gradients[DEFLECTION_ROW], meshes, work)
-    moment = resists[TILT_PUSH] - stiffness * turned - lost + arm * force
+    moment = resists[TILT_PUSH] - stiffness * turned - lost + arm * force + way * elastic
     first, second = work.loads[meshes.ends[m, 0]], work.loads[meshes.ends[m, 1]]
     first[PADDED_TILT] += moment * x
     first[PADDED_TILT + 1] += moment * y

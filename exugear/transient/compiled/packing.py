@@ -227,6 +227,8 @@ def _meshes(numbers: _Numbers, ends: Integers) -> Meshes:
         conjugate=np.all(given.deflection == given.force, axis=1).astype(np.int64),
         tilting=(given.tilt[:, TILT_STIFFNESS] > 0.0).astype(np.int64),
         tilt=_tilts(given),
+        way_pieces=given.way_pieces,
+        way=given.way,
         spinning=spinning_alone(given).astype(np.int64),
         ends=ends,
         rows=rows,

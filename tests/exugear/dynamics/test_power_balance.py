@@ -23,11 +23,20 @@ from exugear.tooth_mesh.kernels.meshes import (
     CYCLE_POWER,
     DAMPED_POWER,
     ENERGY,
+    FORCE,
+    PMC,
+    RATE,
     ROW_SIZE,
     STATE_SIZE,
+    TILT_DAMPING,
+    TILT_LEVER,
+    TILT_MOMENT,
+    TILT_STIFFNESS,
+    load_way,
+    row_dot,
 )
 from exugear.tooth_mesh.kernels.table_law import scratch_memory
-from exugear.tooth_mesh.laws.forms import MEMORY, pass_meshes
+from exugear.tooth_mesh.laws.forms import MEMORY, TILTING, pass_meshes, tilted
 from exugear.transient.compiled.solver import CompiledSystem
 from exugear.transient.compiled.step import choose_integration
 from fe_ste.tools.compilation import compiled
@@ -46,23 +55,35 @@ passes through; so the limit is lower, and the law's account has one in terms of
 
 
 @compiled
-def mesh_powers(q, v, mesh, straight, out):
+def tilting_power(q, v, mesh, state, memory):
+    """Power of the moment of one mesh along its misalignment, W, by `exugear.tooth_mesh.contact_state`."""
+    resists = mesh.tilt[0]
+    if resists[TILT_STIFFNESS] == 0.0:
+        return 0.0
+    turned = tilted(q, 0, mesh, memory)
+    rate = row_dot(mesh.coordinates[0], memory[TILTING], v)
+    force, damper = state[FORCE] / mesh.line_of_action[0], mesh.damping[0] * (state[RATE] - resists[TILT_LEVER] * rate)
+    moment = resists[TILT_MOMENT] - resists[TILT_STIFFNESS] * turned - resists[TILT_DAMPING] * rate
+    moment += resists[TILT_LEVER] * force + load_way(0, state[PMC], mesh)[0] * (force - damper)
+    return moment * rate
+
+
+@compiled
+def mesh_powers(q, v, mesh, out):
     """Fill (samples, 5) of one mesh: power into the bodies, damped, of the cycle (W); elastic energy (J).
 
-    The last is the power into the bodies of the same mesh that does not resist misalignment, `straight`.
+    The last is the power into the bodies less that of the moment along the misalignment.
     """
     f, state, none = np.empty(q.shape[1]), np.empty((1, STATE_SIZE)), np.empty((0, 0))
     memory = np.empty((MEMORY, ROW_SIZE))
     for n in range(q.shape[0]):
-        f[:] = 0.0
-        pass_meshes(q[n], v[n], straight, straight.table, state, f, none, none, memory, scratch_memory())
-        out[n, 4] = np.dot(f, v[n])
         f[:] = 0.0
         pass_meshes(q[n], v[n], mesh, mesh.table, state, f, none, none, memory, scratch_memory())
         out[n, 0] = np.dot(f, v[n])
         out[n, 1] = state[0, DAMPED_POWER]
         out[n, 2] = -state[0, CYCLE_POWER]
         out[n, 3] = state[0, ENERGY]
+        out[n, 4] = out[n, 0] - tilting_power(q[n], v[n], mesh, state[0], memory)
 
 
 @compiled
@@ -111,7 +132,6 @@ def account_of(assembly: Assembly, start_speed: float, duration: float) -> Accou
     step = choose_integration(assembly, 20e3, 6.4e3, integrator="rk4").step
     layout = signal_layout(assembly)
     meshes = [assembly.meshes.one(m) for m in range(len(assembly.elements))]
-    straight = [mesh._replace(tilt=np.zeros_like(mesh.tilt)) for mesh in meshes]
     bearings = [assembly.connectors.one(n) for n in range(len(assembly.connector_names))]
     system = CompiledSystem(assembly, start.q, start.v, LoadTable(LOAD), step)
     load = assembly.torque_vector(LOAD) + assembly.weight
@@ -126,8 +146,8 @@ def account_of(assembly: Assembly, start_speed: float, duration: float) -> Accou
         delta = layout.values("mesh_dte", signals)
         force = layout.values("mesh_force", signals) / assembly.meshes.line_of_action
         powers = np.empty((count, size + 1, 5))
-        for mesh, plain, out in zip(meshes, straight, powers, strict=True):
-            mesh_powers(q, v, mesh, plain, out)
+        for mesh, out in zip(meshes, powers, strict=True):
+            mesh_powers(q, v, mesh, out)
         others = np.empty((len(bearings) + 1, size + 1))
         for bearing, out in zip(bearings, others[:-1], strict=True):
             bearing_powers(q, v, bearing, out)

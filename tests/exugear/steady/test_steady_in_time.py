@@ -13,10 +13,12 @@ from exugear.dynamics.loads import LoadTable
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.steady.mean_system.mean_system import torque_of_vibration
-from exugear.steady.nonlinear import Balance
+from exugear.steady.mean_system.mesh_ports import MISALIGNMENT
+from exugear.steady.nonlinear import Balance, nonlinear_response
 from exugear.steady.point_solver import PointSolver, gearset_of
 from exugear.steady.response import dissipated_and_given, signals
 from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear.tooth_mesh.law import MeshCurve
 from exugear.transient.compiled.solver import CompiledSystem
 
 from .. import gear_trains, table_case
@@ -233,9 +235,53 @@ def test_planets_ahead_of_each_other_count_at_every_level(grc, stiffness):
     assert np.linalg.norm(found["linear"] - found["nonlinear"]) < 0.2 * size
 
 
-@pytest.mark.parametrize("law", ["line_of_action", "table"])
+def moving_load():
+    """Curve whose load moves along the face by a tenth of its width."""
+    stiffness, cycle = spur_stiffness()["spur"], 2.0 * np.pi * np.arange(50) / 50
+    centre = 1.5e-3 * np.cos(cycle + 0.7) + 0.3e-3 * np.sin(2 * cycle)
+    return {"spur": MeshCurve(stiffness, 1.15 * stiffness, 1e3, load_centre=centre)}
+
+
+@pytest.mark.parametrize("speed", [60.0, 100.0])
+def test_a_pair_whose_load_moves_along_the_face_stays_on_its_steady_state(speed):
+    """As above; lines of the shafts' tilting are excited by the moment alone."""
+    solver = solver_of(assemble(SPUR, Choice("bushing"), moving_load()), (50.0, 150.0), "nonlinear")
+    assert solver.gearset.wander
+    assert apart(solver, speed, 0.4, 1.0 / 60e3, 0.2)[0] < 3e-4
+
+
+def test_levels_agree_on_a_load_that_moves_along_the_face():
+    """Of small variations: then what is linear in them, tangents and whole laws are one."""
+    found, (curve,) = {}, moving_load().values()
+    mean = curve.stiffness.mean()
+    stiffness = mean + 1e-3 * (curve.stiffness - mean)
+    small = MeshCurve(stiffness, 1.15 * stiffness, curve.force, load_centre=1e-3 * curve.load_centre)
+    for level in ("linear", "parametric", "nonlinear"):
+        solver = solver_of(assemble(SPUR, Choice("bushing"), {"spur": small}), (50.0, 150.0), level)
+        found[level] = solver.response(100.0)
+        assert np.linalg.norm(found[level].excess[1:, :, MISALIGNMENT]) > 0.0
+    moved = {level: own.motion[1:] for level, own in found.items()}
+    for level in ("linear", "parametric"):
+        # Displacements and tilts apart, so that tilts, which are small numbers, count.
+        off = np.linalg.norm(moved[level] - moved["nonlinear"], axis=0)
+        size = np.linalg.norm(moved["nonlinear"], axis=0)
+        assert (off < 5e-3 * np.maximum(size, 1e-3 * size.max())).all()
+
+
+def test_tangents_and_laws_held_in_place_are_one_where_the_load_moves():
+    """The level `parametric` by products of lines, and by samples in time."""
+    solver = solver_of(assemble(SPUR, Choice("bushing"), moving_load()), (50.0, 150.0), "parametric")
+    by_lines = solver.response(80.0)
+    by_time = nonlinear_response(solver.gearset, solver.gearset.at(80.0), solver.lattice, None, True)[0]
+    assert np.linalg.norm(by_lines.motion - by_time.motion) < 1e-6 * np.linalg.norm(by_time.motion[1:])
+    taken, given = dissipated_and_given(solver.gearset, by_lines)
+    assert given == pytest.approx(taken, rel=1e-6)
+
+
+@pytest.mark.parametrize("law", ["line_of_action", "moving load", "table"])
 def test_the_tangents_of_the_balance_are_those_of_differences(law, spur_surface):
-    data = spur_surface if law == "table" else spur_stiffness()
+    data = {"table": spur_surface, "moving load": moving_load()}.get(law, spur_stiffness())
+    law = "table" if law == "table" else "line_of_action"
     solver = solver_of(assemble(SPUR, Choice("bushing", law), data), (50.0, 150.0), "nonlinear")
     balance = Balance(solver.gearset, solver.gearset.at(80.0), solver.lattice)
     rng = np.random.default_rng(0)

@@ -108,6 +108,22 @@ def test_few_positions_stand_for_the_whole_mesh_cycle(contact: MeanContact) -> N
     assert contact.face_load_factor == pytest.approx(whole.face_load_factor, rel=0.08)
 
 
+def test_what_changes_over_the_mesh_cycle_is_that_of_states_on_their_own(contact: MeanContact) -> None:
+    """At twenty positions of each misalignment; their first harmonics are those of forty positions."""
+    for end, tilt in enumerate(contact.misalignment):
+        asked = functools.partial(static_transmission_error, compliance(), contact.force * GEAR.base_radius)
+        alone = asked(20, misalignment=float(tilt)).squeeze()
+        whole = asked(40, misalignment=float(tilt)).squeeze()
+        for own, name in (
+            (contact.cycle_deflection, "ste"),
+            (contact.cycle_stiffness, "tangent_stiffness"),
+            (contact.cycle_load_centre, "load_centre"),
+        ):
+            assert own[end] == pytest.approx(alone[name].to_numpy(), rel=1e-6)
+            few, many = (np.fft.rfft(values)[1:3] / len(values) for values in (own[end], whole[name].to_numpy()))
+            assert np.abs(few - many).max() < 0.1 * np.abs(many).max(), name
+
+
 def test_between_the_two_states_all_is_straight(contact: MeanContact) -> None:
     """Against a state of its own in the middle."""
     middle = float(contact.misalignment.mean())
