@@ -72,7 +72,7 @@ class MeshElement:
     errors : errors of gear 1 and gear 2 over a revolution of each from zero angle, m; empty for none
     offset : (3,) deflection (m), change of centre distance (m) and misalignment (rad) at zero coordinates
     table : for a law that follows a table; `stiffness` and `damping` are then what it has at the static load
-    computed_from : input of the pair's table where contact is to be solved at the static misalignment
+    computed_from : input of the pair's table where contact is still to be solved at the static misalignment
     load_way : (n,) way of the load along the face over the mesh cycle about its mean, in the axes of the mesh, m; empty
         where it stays or nothing is known of it
     """
@@ -251,7 +251,9 @@ def mesh_elements(
             computed_from=data.table if isinstance(data, MeshCurve) and flank == usual[mesh.name] else None,
             load_way=_load_way(law, data, flank, usual[mesh.name]),
         )
-        elements.append(element if known is None or not law.tilts else element.with_contact(known))
+        if known is not None and law.tilts:
+            element = replace(element.with_contact(known), computed_from=None)
+        elements.append(element)
     return tuple(elements)
 
 

@@ -38,6 +38,7 @@ from exugear.tooth_mesh.law import MeshCurve
 from exugear.tooth_mesh.laws.packing import pack
 from exugear.tooth_mesh.laws.registry import LAWS, law_of
 from exugear.tooth_mesh.placement import loaded_flanks
+from exugear.tooth_mesh.tables import wanted_table
 
 from ..contact_case import contacts
 from ..table_case import STIFFNESS, surface_of
@@ -50,6 +51,20 @@ TILTING = [name for name in ALONG_A_ROW if law_of(name).tilts]
 @pytest.fixture(scope="module")
 def bent(grc: Gearbox, curves: dict[str, MeshCurve]) -> Assembly:
     return assemble(grc, Choice("bushing"), curves, contact=contacts(grc))
+
+
+def test_contact_that_is_given_is_not_solved_again(
+    grc: Gearbox, curves: dict[str, MeshCurve], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def solved(places: object) -> None:
+        raise LookupError("solved")
+
+    monkeypatch.setattr("exugear.dynamics.operating_points.static_contacts", solved)
+    of_tables = {name: replace(curve, table=wanted_table(grc, name, 10)) for name, curve in curves.items()}
+    with pytest.raises(LookupError, match="solved"):
+        assemble(grc, Choice("bushing"), of_tables)
+    given = assemble(grc, Choice("bushing"), of_tables, contact=contacts(grc)).elements
+    assert [element.load for element in given] == [contact.force for contact in contacts(grc).values()]
 
 
 def over_velocity(assembly: Assembly, q: np.ndarray, v: np.ndarray) -> np.ndarray:
