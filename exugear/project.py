@@ -6,7 +6,6 @@ there and fits, and writes into its folder only.
 
 from __future__ import annotations
 
-import html
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -41,6 +40,7 @@ from exugear.tooth_mesh.tables import TableRequest, missing_tables, requested_ta
 from exugear.transient.outcome import Run
 from exugear.transient.run_folder import run_directory
 from exugear.transient.runup import simulate
+from fe_ste.tools.display import Displayed
 from fe_ste.transmission_error.table import MeshTable
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ Figures = dict[tuple[str, str, str], dict[str, float]]
 
 
 @dataclass(frozen=True)
-class Project:
+class Project(Displayed):
     """A gearbox with the folder of its results and the choices made.
 
     Attributes
@@ -72,7 +72,7 @@ class Project:
     --------
     >>> project = Project.from_toml("cases/grc750/gearbox.toml", choice=Choice("bushing", "iso6336"))
     >>> project
-    Project('GRC 750 kW', results/grc750, bushing, iso6336, assemblies, reference)
+    <Project 'GRC 750 kW', results/grc750, bushing, iso6336, assemblies, reference>
     >>> project.chosen(variant="rigid").assembly().size
     8
     """
@@ -121,14 +121,10 @@ class Project:
         """Return the same gearbox and folder with other choices: `variant`, `mesh_law`, `inertias`, `load_case`."""
         return replace(self, choice=replace(self.choice, **changes))
 
-    def __repr__(self) -> str:
-        """One line."""
+    def _line(self) -> str:
         choice = self.choice
         chosen = ", ".join(str(what) for what in (choice.variant, choice.mesh_law, choice.inertias, choice.load_case))
-        return f"Project({self.gearbox.name!r}, {self.folder}, {chosen})"
-
-    def _repr_html_(self) -> str:
-        return f"<p>{html.escape(repr(self))}</p>"
+        return f" {self.gearbox.name!r}, {self.folder}, {chosen}"
 
     @property
     def modes_path(self) -> Path:

@@ -22,13 +22,14 @@ from exugear.bearings.rolling.rows import BearingOfRows, RollingRow
 from exugear.bearings.support_laws import LEAST_LOAD, holding_force
 from exugear.gearbox.parts import Bearing
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.display import Displayed
 
 CAGE_POSITIONS = 4
 """Positions of the cage within one pitch over which the stiffness is averaged: a linear bearing knows no cage."""
 
 
 @dataclass(frozen=True)
-class OperatingPoint:
+class OperatingPoint(Displayed):
     """A catalogue bearing under the static load of its gearbox.
 
     Attributes
@@ -58,10 +59,9 @@ class OperatingPoint:
     first_roller_angle: float = 0.0
     load_stands_still: bool = True
 
-    def __repr__(self) -> str:
-        """Name and load in one line."""
+    def _line(self) -> str:
         radial, axial = 1e-3 * self.radial_load, 1e-3 * float(self.load[2])
-        return f"<OperatingPoint of {self.bearing.name!r}: {radial:.4g} kN radially, {axial:.4g} kN axially>"
+        return f" of {self.bearing.name!r}: {radial:.4g} kN radially, {axial:.4g} kN axially"
 
     @property
     def radial_load(self) -> float:

@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 
 from exugear.bodies.floating_body import FloatingBody
 from exugear.bodies.reduced_body import ReducedBody, RigidInertia
+from fe_ste.tools.display import Displayed
 
 
 @dataclass(frozen=True)
-class ElasticBody:
+class ElasticBody(Displayed):
     """A reduced body of a gearbox.
 
     Attributes
@@ -32,8 +33,7 @@ class ElasticBody:
     floating: FloatingBody | None = None
     file_digest: str | None = None
 
-    def __repr__(self) -> str:
-        """Reduced body and how it takes part, in one line."""
+    def _line(self) -> str:
         more = f", {len(self.sectors)} gears on sectors" if self.sectors else ""
         frame = ", floating frame" if self.floating is not None else ""
-        return f"<ElasticBody of {self.reduced!r}: main seat {self.main_seat}{more}{frame}>"
+        return f" of {self.reduced!r}: main seat {self.main_seat}{more}{frame}"

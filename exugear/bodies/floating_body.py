@@ -8,10 +8,11 @@ import numpy as np
 
 from exugear.kernels.coordinates import BODY_SIZE
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.display import Displayed
 
 
 @dataclass(frozen=True)
-class FloatingBody:
+class FloatingBody(Displayed, line=" {name}: {seats!n} seats, {stiffness!n} modes, {mass:.4g} kg"):
     """A solid as modes in its own frame; n coordinates of the reduced body, k modes, s seats.
 
     Attributes
@@ -41,10 +42,6 @@ class FloatingBody:
     second_moments: Floats
     centrifugal_tension: Floats
     turning: Floats
-
-    def __repr__(self) -> str:
-        """Name, sizes and mass in one line."""
-        return f"<FloatingBody {self.name}: {len(self.seats)} seats, {len(self.stiffness)} modes, {self.mass:.4g} kg>"
 
     @property
     def frequencies(self) -> Floats:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from exugear.kernels.coordinates import AXIAL, BODY_SIZE, TILT
 from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.display import Displayed
 
 Frame = Literal["nonrotating", "carrier", "ground"]
 """Where coordinates are seen from: a frame that does not turn, the carrier's own, or the ground."""
@@ -94,7 +95,10 @@ class ReductionSummary:
 
 
 @dataclass(frozen=True)
-class ReducedBody:
+class ReducedBody(
+    Displayed,
+    line=" {name}: {seats!n} seats, {modal_groups!n} modal coordinates, {rigid_inertia.mass:.4g} kg, frame {frame}",
+):
     """A reduced elastic body; n coordinates.
 
     Coordinates are six per seat (ux uy uz, tilts thx thy, and thz unwrapped; m and rad), then the modal coordinates
@@ -124,13 +128,6 @@ class ReducedBody:
     modal_groups: tuple[str, ...]
     surface: Surface
     summary: ReductionSummary
-
-    def __repr__(self) -> str:
-        """Name, sizes and mass in one line."""
-        return (
-            f"<ReducedBody {self.name}: {len(self.seats)} seats, {len(self.modal_groups)} modal coordinates, "
-            f"{self.rigid_inertia.mass:.4g} kg, frame {self.frame}>"
-        )
 
     @property
     def size(self) -> int:

@@ -61,10 +61,11 @@ from exugear.tooth_mesh.laws.forms import add_mesh_forces, add_mesh_jacobian, me
 from exugear.tooth_mesh.laws.packing import pack
 from exugear.tooth_mesh.static_contact import StaticContacts
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.display import Displayed
 
 
 @dataclass(frozen=True)
-class Assembly:
+class Assembly(Displayed):
     """Equations of motion of a gearbox variant.
 
     Attributes
@@ -113,10 +114,9 @@ class Assembly:
     contacts: StaticContacts = StaticContacts()
     planet_spread: float = 0.0
 
-    def __repr__(self) -> str:
-        """One line."""
+    def _line(self) -> str:
         choice = f"{self.variant}, {self.mesh_law}, {self.inertias}"
-        return f"Assembly({self.gearbox.name!r}, {choice}: {self.size} coordinates, {len(self.elements)} meshes)"
+        return f" {self.gearbox.name!r}, {choice}: {self.size} coordinates, {len(self.elements)} meshes"
 
     @property
     def variant(self) -> Variant:

@@ -15,6 +15,7 @@ from exugear.dynamics.assembly import Assembly
 from exugear.kernels.springs import SpringArrays, add_spring_forces
 from exugear.tooth_mesh.kernels.meshes import MeshArrays
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.display import Displayed
 
 DIFFERENCE_STEP = 1e-6
 """Step of central differences, m or rad, and per second."""
@@ -25,7 +26,7 @@ RIGID_BODY_LIMIT = 0.1
 
 
 @dataclass(frozen=True)
-class Linearised:
+class Linearised(Displayed, line=": {mass!n} coordinates, {stiffness!n} elements"):
     """Mass, and stiffness and damping by element, about a state; each matrix (size, size).
 
     Attributes
@@ -37,10 +38,6 @@ class Linearised:
     mass: Floats
     stiffness: Mapping[str, Floats]
     damping: Mapping[str, Floats]
-
-    def __repr__(self) -> str:
-        """Sizes in one line."""
-        return f"<Linearised: {len(self.mass)} coordinates, {len(self.stiffness)} elements>"
 
     @property
     def total_stiffness(self) -> Floats:

@@ -23,6 +23,7 @@ from exugear.tooth_mesh.kernels.meshes import FORCE, OUTSIDE, MeshArrays
 from exugear.tooth_mesh.kernels.table_law import GUESSED
 from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.display import Displayed
 
 MOST_NEWTON_STEPS = 30
 """Steps after which the search for a balance is given up."""
@@ -69,7 +70,7 @@ class _Solve(Protocol):
 
 
 @dataclass(frozen=True)
-class StartState:
+class StartState(Displayed, line=": {q!n} coordinates, drive torque {drive_torque:.4g} N m"):
     """Coordinates and velocities at the start of a run, with the spin rates (rad/s2) it starts with.
 
     Attributes
@@ -83,10 +84,6 @@ class StartState:
     v: Floats
     rates: Mapping[str, float]
     drive_torque: float
-
-    def __repr__(self) -> str:
-        """Sizes and drive torque in one line."""
-        return f"<StartState: {len(self.q)} coordinates, drive torque {self.drive_torque:.4g} N m>"
 
 
 def _newton(
@@ -233,7 +230,7 @@ def rolled_coordinates(assembly: Assembly, body: str, angle: float) -> Floats:
 
 
 @dataclass(frozen=True)
-class StaticState:
+class StaticState(Displayed):
     """A variant at rest under the static load of its gearbox file, mesh stiffness at its mean over the cycle.
 
     Attributes
@@ -262,11 +259,10 @@ class StaticState:
         states = self.assembly.mesh_states(self.q, np.zeros_like(self.q), self.assembly.mean_meshes)
         return np.asarray(states[:, FORCE])
 
-    def __repr__(self) -> str:
-        """One line."""
+    def _line(self) -> str:
         meshes = zip(self.assembly.mesh_names, 1e6 * self.misalignment, strict=True)
         tilts = ", ".join(f"{mesh} {tilt:.0f}" for mesh, tilt in meshes)
-        return f"StaticState({self.assembly.variant}: misalignment in rad / 1e6: {tilts})"
+        return f" of {self.assembly.variant}: misalignment in rad / 1e6: {tilts}"
 
 
 def static_state(assembly: Assembly) -> StaticState:

@@ -35,7 +35,7 @@ from exugear.gearbox.train.train import Train
 from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.standards import iso6336
-from fe_ste.tools.notebook import html_table
+from fe_ste.tools.display import Displayed, TitledRows
 
 BESIDE_EQUATIONS = ("labels", "load_cases", "loads", "lubricant", "operation", "rating", "report", "ste")
 """Tables of the file that change nothing in the equations: words and speeds for pages, what acts over a life, how parts
@@ -44,7 +44,7 @@ own."""
 
 
 @dataclass(frozen=True)
-class Gearbox:
+class Gearbox(Displayed):
     """A checked gearbox. Build one with :meth:`from_toml` or :meth:`from_dict`.
 
     Attributes
@@ -204,27 +204,23 @@ class Gearbox:
                 lines.append(f"gears.{name}: undercut by its rack; its flank begins at a diameter of {start:.3f} mm")
         return tuple(dict.fromkeys(lines))
 
-    def __repr__(self) -> str:
-        """Return one short line."""
+    def _line(self) -> str:
         return (
-            f"<Gearbox {shortened(self.name)}: ratio {self.train.ratio:.6g}, {len(self.named_bodies)} bodies, "
-            f"{len(self.meshes)} meshes>"
+            f" {shortened(self.name)}: ratio {self.train.ratio:.6g}, {len(self.named_bodies)} bodies, "
+            f"{len(self.meshes)} meshes"
         )
 
-    def _repr_html_(self) -> str:
-        return html_table(
-            self.name,
-            {
-                "file": self.source,
-                "ratio": f"{self.train.ratio:.6g}",
-                "bodies": ", ".join(self.named_bodies),
-                "meshes": ", ".join(mesh.name for mesh in self.meshes),
-                "bearings": str(len(self.bearings)),
-                "inertia sets": ", ".join(self.inertia_sets),
-                "load cases": ", ".join(self.load_cases),
-                "warnings": str(len(self.warnings)),
-            },
-        )
+    def _table(self) -> TitledRows:
+        return self.name, {
+            "file": self.source,
+            "ratio": f"{self.train.ratio:.6g}",
+            "bodies": ", ".join(self.named_bodies),
+            "meshes": ", ".join(mesh.name for mesh in self.meshes),
+            "bearings": str(len(self.bearings)),
+            "inertia sets": ", ".join(self.inertia_sets),
+            "load cases": ", ".join(self.load_cases),
+            "warnings": str(len(self.warnings)),
+        }
 
     # -- bodies ------------------------------------------------------------------------------------------
 

@@ -14,13 +14,14 @@ from exugear.gearbox.sections.bodies import BodySection
 from exugear.gearbox.sections.case import CaseFile
 from exugear.gearbox.sections.entries import GROUND
 from fe_ste.geometry.checks import GeometryError
+from fe_ste.tools.display import Displayed
 
 Entry = TypeVar("Entry")
 Part = TypeVar("Part")
 
 
 @dataclass(frozen=True)
-class Origin:
+class Origin(Displayed):
     """A gearbox file as the builders of parts see it.
 
     Attributes
@@ -35,9 +36,8 @@ class Origin:
     source: str
     permissions: Permissions
 
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<Origin {shortened(self.source)}>"
+    def _line(self) -> str:
+        return f" {shortened(self.source)}"
 
     def fault(self, text: str) -> CaseError:
         """Error that names the file before `text` (key, value and what would be right)."""

@@ -14,14 +14,14 @@ from exugear.gearbox.sections.connections import CatalogueSection, StiffnessSect
 from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.notebook import html_table, value_range
+from fe_ste.tools.display import Displayed, TitledRows, value_range
 
 RPM = math.pi / 30.0
 """One revolution a minute, rad/s."""
 
 
 @dataclass(frozen=True)
-class Body:
+class Body(Displayed, line=" {name!r}: {_kind}, {mass:g} kg, {axial:g} kg m2 about its axis"):
     """A rigid body, its place at zero angles and its mass properties (about the centre of mass).
 
     Attributes
@@ -61,23 +61,16 @@ class Body:
     wheels: Mapping[str, float]
     planet_of: str | None = None
 
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<Body {self.name!r}: {self._kind}, {self.mass:g} kg, {self.axial:g} kg m2 about its axis>"
-
-    def _repr_html_(self) -> str:
-        return html_table(
-            f"body {self.name}",
-            {
-                "kind": self._kind,
-                "axis": _point(self.axis),
-                "centre of mass": value_range(self.centre_of_mass_z, "mm", 1e3),
-                "mass": value_range(self.mass, "kg"),
-                "axial inertia": value_range(self.axial, "kg m2"),
-                "transverse inertia": value_range(self.transverse, "kg m2"),
-                "gears": ", ".join(f"{gear} at {1e3 * z:g} mm" for gear, z in self.wheels.items()) or "none",
-            },
-        )
+    def _table(self) -> TitledRows:
+        return f"body {self.name}", {
+            "kind": self._kind,
+            "axis": _point(self.axis),
+            "centre of mass": value_range(self.centre_of_mass_z, "mm", 1e3),
+            "mass": value_range(self.mass, "kg"),
+            "axial inertia": value_range(self.axial, "kg m2"),
+            "transverse inertia": value_range(self.transverse, "kg m2"),
+            "gears": ", ".join(f"{gear} at {1e3 * z:g} mm" for gear, z in self.wheels.items()) or "none",
+        }
 
     @property
     def _kind(self) -> str:
@@ -110,7 +103,7 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Bearing:
+class Bearing(Displayed):
     """Compliant support: a 6x6 stiffness in the axes of `on`, order x y z rx ry rz.
 
     Attributes
@@ -150,22 +143,18 @@ class Bearing:
     law: Literal["stiffness", "iso16281"] = "stiffness"
     cage: Literal["averaged", "turning"] = "averaged"
 
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<Bearing {self.name!r}: {self.body} on {self.on} at {_point(self.position)}, {self._source}>"
+    def _line(self) -> str:
+        return f" {self.name!r}: {self.body} on {self.on} at {_point(self.position)}, {self._source}"
 
-    def _repr_html_(self) -> str:
-        return html_table(
-            f"bearing {self.name}",
-            {
-                "holds": self.body,
-                "on": self.on,
-                "position": _point(self.position),
-                "stiffness": self._source,
-                "damping": "in proportion to the stiffness" if self.damping is None else "given",
-                "factor of the housing": f"{self.factor:g}",
-            },
-        )
+    def _table(self) -> TitledRows:
+        return f"bearing {self.name}", {
+            "holds": self.body,
+            "on": self.on,
+            "position": _point(self.position),
+            "stiffness": self._source,
+            "damping": "in proportion to the stiffness" if self.damping is None else "given",
+            "factor of the housing": f"{self.factor:g}",
+        }
 
     @property
     def _source(self) -> str:
@@ -199,7 +188,7 @@ class Coupling:
 
 
 @dataclass(frozen=True)
-class Mesh:
+class Mesh(Displayed):
     """A gear pair at work.
 
     Attributes
@@ -235,31 +224,27 @@ class Mesh:
     centre_distance: float
     phase: float | None
 
-    def __repr__(self) -> str:
-        """Return one short line."""
+    def _line(self) -> str:
         pinion, gear = self.pair.pinion, self.pair.gear
         return (
-            f"<Mesh {self.name!r}: {pinion.name} ({pinion.teeth} teeth) on {self.pinion} with "
-            f"{gear.name} ({gear.teeth} teeth) on {self.gear}>"
+            f" {self.name!r}: {pinion.name} ({pinion.teeth} teeth) on {self.pinion} with "
+            f"{gear.name} ({gear.teeth} teeth) on {self.gear}"
         )
 
-    def _repr_html_(self) -> str:
-        return html_table(
-            f"mesh {self.name}",
-            {
-                "pair": self.pair.name,
-                "gear 1": f"{self.pair.pinion.name} on {self.pinion}",
-                "gear 2": f"{self.pair.gear.name} on {self.gear}",
-                "line of centres turns with": self.frame,
-                "middle of the faces": value_range(self.z, "mm", 1e3),
-                "centre distance": value_range(self.centre_distance, "mm", 1e3),
-                "position angle": value_range(math.degrees(self.position_angle), "deg"),
-            },
-        )
+    def _table(self) -> TitledRows:
+        return f"mesh {self.name}", {
+            "pair": self.pair.name,
+            "gear 1": f"{self.pair.pinion.name} on {self.pinion}",
+            "gear 2": f"{self.pair.gear.name} on {self.gear}",
+            "line of centres turns with": self.frame,
+            "middle of the faces": value_range(self.z, "mm", 1e3),
+            "centre distance": value_range(self.centre_distance, "mm", 1e3),
+            "position angle": value_range(math.degrees(self.position_angle), "deg"),
+        }
 
 
 @dataclass(frozen=True)
-class WheelDeviation:
+class WheelDeviation(Displayed):
     """Errors of one wheel that return with each of its revolutions.
 
     Attributes
@@ -279,25 +264,21 @@ class WheelDeviation:
     eccentricity: float
     eccentricity_angle: float
 
-    def __repr__(self) -> str:
-        """Return one short line."""
+    def _line(self) -> str:
         runout = value_range(2.0 * self.eccentricity, "um", 1e6)
-        return f"<WheelDeviation: {self.teeth} teeth, runout {runout}, pitch {value_range(self.pitch, 'um', 1e6)}>"
+        return f": {self.teeth} teeth, runout {runout}, pitch {value_range(self.pitch, 'um', 1e6)}"
 
-    def _repr_html_(self) -> str:
-        return html_table(
-            "errors of a wheel",
-            {
-                "teeth": str(self.teeth),
-                "cumulative pitch on the line of action": value_range(self.pitch, "um", 1e6),
-                "runout": value_range(2.0 * self.eccentricity, "um", 1e6),
-                "angle of the eccentricity": value_range(math.degrees(self.eccentricity_angle), "deg"),
-            },
-        )
+    def _table(self) -> TitledRows:
+        return "errors of a wheel", {
+            "teeth": str(self.teeth),
+            "cumulative pitch on the line of action": value_range(self.pitch, "um", 1e6),
+            "runout": value_range(2.0 * self.eccentricity, "um", 1e6),
+            "angle of the eccentricity": value_range(math.degrees(self.eccentricity_angle), "deg"),
+        }
 
 
 @dataclass(frozen=True)
-class LoadCase:
+class LoadCase(Displayed, line=" {name!r}: {duration:g} s, {_drive}, torques on {torques!n} bodies"):
     """Loads of a run.
 
     Attributes
@@ -333,11 +314,7 @@ class LoadCase:
     drive_stiffness: float | None
     description: str
 
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<LoadCase {self.name!r}: {self.duration:g} s, {self._drive}, torques on {len(self.torques)} bodies>"
-
-    def _repr_html_(self) -> str:
+    def _table(self) -> TitledRows:
         rows = {
             "duration": value_range(self.duration, "s"),
             "start speed": value_range(self.start_speed / RPM, "rpm"),
@@ -345,7 +322,7 @@ class LoadCase:
             "torque series": "none" if self.torque_series is None else str(self.torque_series),
         }
         torques = {f"torque on {body}": value_range(torque, "N m") for body, torque in self.torques.items()}
-        return html_table(f"load case {self.name}", rows | torques | {"description": self.description})
+        return f"load case {self.name}", rows | torques | {"description": self.description}
 
     @property
     def _drive(self) -> str:
@@ -355,7 +332,7 @@ class LoadCase:
 
 
 @dataclass(frozen=True)
-class PairSpec:
+class PairSpec(Displayed):
     """What the STE table of a pair needs.
 
     Attributes
@@ -383,26 +360,22 @@ class PairSpec:
     modifications: tuple[FlankModification, FlankModification]
     stiffness: tuple[float, ...] = ()
 
-    def __repr__(self) -> str:
-        """Return one short line."""
+    def _line(self) -> str:
         pinion, gear = self.pair.pinion, self.pair.gear
         return (
-            f"<PairSpec {self.name!r}: {pinion.teeth} and {gear.teeth} teeth, "
-            f"{self.static_torque:g} N m on gear 1, flank {self.flank:+d}>"
+            f" {self.name!r}: {pinion.teeth} and {gear.teeth} teeth, "
+            f"{self.static_torque:g} N m on gear 1, flank {self.flank:+d}"
         )
 
-    def _repr_html_(self) -> str:
-        return html_table(
-            f"gear pair {self.name} in the gearbox",
-            {
-                "gear 1": f"{self.pair.pinion.name}, {self.pair.pinion.teeth} teeth",
-                "gear 2": f"{self.pair.gear.name}, {self.pair.gear.teeth} teeth",
-                "static torque on gear 1": value_range(self.static_torque, "N m"),
-                "loaded flank": f"{self.flank:+d}",
-                "table": "wanted" if self.table else "not wanted",
-                "stated stiffness": value_range(np.array(self.stiffness), "N/m") if self.stiffness else "none",
-            },
-        )
+    def _table(self) -> TitledRows:
+        return f"gear pair {self.name} in the gearbox", {
+            "gear 1": f"{self.pair.pinion.name}, {self.pair.pinion.teeth} teeth",
+            "gear 2": f"{self.pair.gear.name}, {self.pair.gear.teeth} teeth",
+            "static torque on gear 1": value_range(self.static_torque, "N m"),
+            "loaded flank": f"{self.flank:+d}",
+            "table": "wanted" if self.table else "not wanted",
+            "stated stiffness": value_range(np.array(self.stiffness), "N/m") if self.stiffness else "none",
+        }
 
 
 def _point(coordinates: tuple[float, ...]) -> str:

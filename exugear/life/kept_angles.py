@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from exugear.life.static_balance import States
+from fe_ste.tools.display import Displayed
 from fe_ste.tools.files import FileError
 from fe_ste.tools.sealed import read_sealed, write_sealed
 
 
-class KeptAngles:
+class KeptAngles(Displayed):
     """Solved angles in one sealed file, written anew with each.
 
     Parameters
@@ -31,9 +32,8 @@ class KeptAngles:
         self._path, self._hash = path, input_hash
         self._angles = _read(path, input_hash)
 
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<KeptAngles: {len(self._angles)} in {self._path.as_posix()}>"
+    def _line(self) -> str:
+        return f": {len(self._angles)} in {self._path.as_posix()}"
 
     def stored(self, number: int) -> States | None:
         """States of an angle by its number, None where they are not there."""

@@ -25,13 +25,14 @@ from exugear.life.load_spectrum.sources import Progress
 from exugear.life.static_balance import AngleStore, StaticBalance, static_balance
 from exugear.life.verdict import LEFT_OUT, failures, needs_of_relief, reaches, shortfalls
 from fe_ste.root_stress.mesh_cycle import MeshCycleStress
+from fe_ste.tools.display import Displayed
 
 TOLD_SHARING = 1.0005
 """K_gamma of a single mesh from which it is told: loads of a hub turn into forces of teeth."""
 
 
 @dataclass(frozen=True, eq=False)
-class Life:
+class Life(Displayed, line=" of {variant}: {flanks!n} flanks, {bearings!n} bearings"):
     """What a gearbox bears over its life.
 
     Attributes
@@ -74,10 +75,6 @@ class Life:
     reliefs: tuple[str, ...]
     assumptions: tuple[str, ...]
     input_hash: str
-
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<Life of {self.variant}: {len(self.flanks)} flanks, {len(self.bearings)} bearings>"
 
 
 def rating_of(gearbox: Gearbox) -> RatingSection:

@@ -21,6 +21,7 @@ from exugear.gearbox.variant import VariantError
 from exugear.tooth_mesh.kernels.meshes import FORCE, OUTSIDE
 from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.display import Displayed
 
 TORQUE_SHARES = (0.1, 0.25, 0.5, 0.75, 1.0)
 """Torques over the largest at which laws that are not linear are solved."""
@@ -47,7 +48,7 @@ class Response:
 
 
 @dataclass(frozen=True, eq=False)
-class StaticBalance:
+class StaticBalance(Displayed, line=": {torque!n} torques, {angle!n} angles, linear: {linear}"):
     """Forces over torques and angles.
 
     Attributes
@@ -75,10 +76,6 @@ class StaticBalance:
     bearing_tilt: Response
     linear: bool
     outside: tuple[str, ...] = ()
-
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<StaticBalance: {len(self.torque)} torques, {len(self.angle)} angles, linear: {self.linear}>"
 
     def at(self, response: Response, torque: Floats, hub: Floats | None = None) -> Floats:
         """Values of a response at torques (n,) and loads of a hub (n, 5): (n, a, ...).

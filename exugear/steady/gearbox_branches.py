@@ -15,13 +15,14 @@ from exugear.steady.nonlinear import Balance, Tangent
 from exugear.steady.point_solver import PointSolver
 from exugear.steady.stability import growth_of_state
 from fe_ste.tools.arrays import Booleans, Complexes, Floats
+from fe_ste.tools.display import Displayed
 
 LONGEST = 0.4
 """Longest step along a branch: in tenths of the static deflections, and in hundredths of the speed."""
 
 
 @dataclass(frozen=True, eq=False)
-class SteadyBranch:
+class SteadyBranch(Displayed):
     """Steady states along a branch; n points.
 
     Attributes
@@ -44,13 +45,9 @@ class SteadyBranch:
     folds: tuple[float, ...]
     ended: str = ""
 
-    def __repr__(self) -> str:
-        """Points, range and folds in one line."""
+    def _line(self) -> str:
         folds = ", ".join(f"{speed:.5g}" for speed in self.folds) or "none"
-        return (
-            f"<SteadyBranch: {len(self.speed)} points, {self.speed.min():.4g} to {self.speed.max():.4g} rad/s, "
-            f"folds at {folds}>"
-        )
+        return f": {len(self.speed)} points, {self.speed.min():.4g} to {self.speed.max():.4g} rad/s, folds at {folds}"
 
     @property
     def stable(self) -> Booleans:

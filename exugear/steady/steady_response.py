@@ -33,7 +33,7 @@ from exugear.steady.response import Response, dissipated_and_given, signals
 from exugear.steady.settings import SteadySettings, check_law, check_speeds, usual_speeds
 from exugear.tooth_mesh.law import MeshData
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers, SingleComplexes, Texts
-from fe_ste.tools.notebook import html_table, value_range
+from fe_ste.tools.display import Displayed, TitledRows, value_range
 from fe_ste.tools.threads import one_dense_thread
 
 
@@ -85,7 +85,7 @@ class Solved:
 
 
 @dataclass(frozen=True, eq=False)
-class SteadyResponse:
+class SteadyResponse(Displayed):
     """Steady response over speed.
 
     Attributes
@@ -153,25 +153,20 @@ class SteadyResponse:
     change_with_more: float
     campbell: Campbell
 
-    def __repr__(self) -> str:
-        """Gearbox, variant, level and sizes in one line."""
+    def _line(self) -> str:
         assembly = self.assembly
         return (
-            f"<SteadyResponse of {assembly.gearbox.name[:60]!r}, {assembly.variant}, {assembly.mesh_law}, "
-            f"{self.settings.level}: {len(self.solved.speed)} speeds, {len(self.lines.orders)} lines>"
+            f" of {assembly.gearbox.name[:60]!r}, {assembly.variant}, {assembly.mesh_law}, "
+            f"{self.settings.level}: {len(self.solved.speed)} speeds, {len(self.lines.orders)} lines"
         )
 
-    def _repr_html_(self) -> str:
-        """Sizes as a small table in a notebook."""
-        return html_table(
-            repr(self).strip("<>"),
-            {
-                "speed of the input": value_range(self.solved.speed, "rpm", 1.0 / RPM),
-                "lines": str(len(self.lines.orders)),
-                "signals": str(len(self.signals)),
-                "fastest growth of the mean system": f"{self.growth_rate:.3g} 1/s",
-            },
-        )
+    def _table(self) -> TitledRows:
+        return repr(self).strip("<>"), {
+            "speed of the input": value_range(self.solved.speed, "rpm", 1.0 / RPM),
+            "lines": str(len(self.lines.orders)),
+            "signals": str(len(self.signals)),
+            "fastest growth of the mean system": f"{self.growth_rate:.3g} 1/s",
+        }
 
     def amplitude(self, signal: str, line: tuple[int, ...]) -> Complexes:
         """Amplitude (points,) of a line, given by its multiples of the bases, in a signal, given by its name.

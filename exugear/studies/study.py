@@ -38,11 +38,12 @@ from exugear.studies.soundness import (
     faults_of_signals,
     faults_of_values,
 )
+from fe_ste.tools.display import Displayed
 from fe_ste.tools.versions import TABLE
 
 
 @dataclass(frozen=True)
-class Study:
+class Study(Displayed):
     """What is varied, computed and kept. Build one with `from_toml` or `from_dict`.
 
     Attributes
@@ -151,9 +152,8 @@ class Study:
             life_loads(gearbox, choice)
         return cls(file, source, gearbox, choice, settings, kept, design, case_digest(case, of_life), tolerances)
 
-    def __repr__(self) -> str:
-        """One line."""
-        return f"<Study {self.file.name[:60]!r}: {len(self.design.points)} points, {', '.join(self.figures)}>"
+    def _line(self) -> str:
+        return f" {self.file.name[:60]!r}: {len(self.design.points)} points, {', '.join(self.figures)}"
 
     @cached_property
     def case_hash(self) -> str:

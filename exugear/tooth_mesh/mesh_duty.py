@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 from exugear.tooth_mesh.static_contact import MeshPlace, static_contacts
+from fe_ste.tools.display import Displayed
 
 POSITIONS = 10
 """Positions of the mesh cycle over which the load along the face is averaged: with five it is up to 6 % too uneven,
@@ -13,7 +14,7 @@ with ten by 1 %."""
 
 
 @dataclass(frozen=True)
-class MeshDuty:
+class MeshDuty(Displayed):
     """A mesh under the static load.
 
     Attributes
@@ -45,9 +46,8 @@ class MeshDuty:
     pressure: float = math.nan
     remark: str = ""
 
-    def __repr__(self) -> str:
-        """Name, opening and factor in one line."""
-        return f"<MeshDuty of {self.name!r}: open by {1e6 * self.opening:.3g} um, K_Hbeta {self.face_load_factor:.3g}>"
+    def _line(self) -> str:
+        return f" of {self.name!r}: open by {1e6 * self.opening:.3g} um, K_Hbeta {self.face_load_factor:.3g}"
 
 
 def with_contact(duty: MeshDuty, place: MeshPlace | None, flank: int) -> MeshDuty:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from fe_ste.tools.notebook import html_table
+from fe_ste.tools.display import Displayed, TitledRows
 
 
 class RunError(RuntimeError):
@@ -69,7 +69,7 @@ class ProgressMeter:
 
 
 @dataclass(frozen=True)
-class Run:
+class Run(Displayed):
     """A finished or stopped run.
 
     Attributes
@@ -86,7 +86,7 @@ class Run:
     Examples
     --------
     >>> Run(Path("rigid/run.nc"), complete=True, end=0.5, wall=1.25)
-    Run(rigid/run.nc: complete, 0.5 s simulated in 1.2 s, trusted)
+    <Run rigid/run.nc: complete, 0.5 s simulated in 1.2 s, trusted>
     """
 
     path: Path
@@ -107,12 +107,11 @@ class Run:
             return "complete"
         return "stopped beyond a limit" if self.halted else "stopped"
 
-    def __repr__(self) -> str:
-        """One line."""
+    def _line(self) -> str:
         trust = "trusted" if self.trusted else "not to be trusted"
-        return f"Run({self.path}: {self._state}, {self.end:g} s simulated in {self.wall:.1f} s, {trust})"
+        return f" {self.path}: {self._state}, {self.end:g} s simulated in {self.wall:.1f} s, {trust}"
 
-    def _repr_html_(self) -> str:
+    def _table(self) -> TitledRows:
         rows = {
             "file": str(self.path),
             "state": self._state,
@@ -120,4 +119,4 @@ class Run:
             "wall time": f"{self.wall:.1f} s",
             "to be trusted": "yes" if self.trusted else f"no: {'; '.join(self.reasons)}",
         }
-        return html_table("Run", rows)
+        return "Run", rows

@@ -14,6 +14,7 @@ import numpy as np
 from fe_ste.contact.kinematics import FlankPair, circle_limit, rigid_gap
 from fe_ste.tools.arrays import Booleans, Floats, Integers
 from fe_ste.tools.compilation import compiled
+from fe_ste.tools.display import Displayed
 
 #: A cell cut by a tip edge to less than this part of its width is joined to its neighbour: so narrow a cell would
 #: have a pressure of its own that is all rounding.
@@ -109,7 +110,7 @@ def _lay_cells(
 
 
 @dataclass(frozen=True)
-class Cells:
+class Cells(Displayed):
     """Contact cells of one position.
 
     Attributes
@@ -141,10 +142,9 @@ class Cells:
         """Return the cells for which `keep` holds."""
         return Cells(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
 
-    def __repr__(self) -> str:
-        """Return one short line."""
+    def _line(self) -> str:
         tooth_pairs, cut = np.unique(self.tooth), np.count_nonzero(self.cut)
-        return f"<Cells: {len(self.tooth)} on {len(tooth_pairs)} tooth pairs, {cut} cut by a tip edge>"
+        return f": {len(self.tooth)} on {len(tooth_pairs)} tooth pairs, {cut} cut by a tip edge"
 
 
 def lay_cells(

@@ -15,6 +15,7 @@ from scipy.linalg.lapack import dpotrf
 from fe_ste.contact.kinematics import ContactError
 from fe_ste.tools.arrays import Booleans, Floats, Integers
 from fe_ste.tools.compilation import compiled
+from fe_ste.tools.display import Displayed
 
 #: Changes of the active set that a factor is carried over, as a part of its size: a border of k cells costs k / 3 n of
 #: a new factor in arithmetic, and more in calls.
@@ -22,7 +23,7 @@ _BORDER = 0.15
 
 
 @dataclass(frozen=True)
-class ContactSolution:
+class ContactSolution(Displayed):
     """Forces on the cells of one position.
 
     Attributes
@@ -49,10 +50,9 @@ class ContactSolution:
     force_per_load: Floats
     iterations: int
 
-    def __repr__(self) -> str:
-        """Return one short line."""
+    def _line(self) -> str:
         loaded, approach = np.count_nonzero(self.force), 1e6 * self.approach
-        return f"<ContactSolution: {loaded} of {len(self.force)} cells in contact, approach {approach:.4g} um>"
+        return f": {loaded} of {len(self.force)} cells in contact, approach {approach:.4g} um"
 
 
 def solve_complementarity(

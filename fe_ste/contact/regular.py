@@ -16,6 +16,7 @@ from fe_ste.contact.cells import Cells
 from fe_ste.geometry.splines import cubic_coefficients, cubic_knots, cubic_values
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import summing, summing_kernel
+from fe_ste.tools.display import Displayed
 
 if TYPE_CHECKING:
     from fe_ste.elasticity.flank import FlankCompliance
@@ -27,7 +28,7 @@ _ONE, _TWO, _THREE, _FOUR = np.uintp(1), np.uintp(2), np.uintp(3), np.uintp(4)
 
 
 @dataclass(frozen=True)
-class RegularCompliance:
+class RegularCompliance(Displayed):
     """Regular compliance of one gear: coefficients of cubic splines over profile and face width.
 
     Attributes
@@ -103,10 +104,9 @@ class RegularCompliance:
         profile, width = _first_and_weights(arc, self.knots), _first_and_weights(axial, self.axial_knots)
         _add_regular(matrix, groups.astype(np.uintp), tooth, layer, *profile, *width, self.table, number)
 
-    def __repr__(self) -> str:
-        """Return one short line."""
+    def _line(self) -> str:
         blocks, splines, layers = self.table.shape[:3]
-        return f"<RegularCompliance: {blocks} blocks, {splines} splines over the profile, {layers} over the face width>"
+        return f": {blocks} blocks, {splines} splines over the profile, {layers} over the face width"
 
 
 def _first_and_weights(at: Floats, knots: Floats) -> tuple[Places, Floats]:

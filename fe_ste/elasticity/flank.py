@@ -23,7 +23,7 @@ from fe_ste.elasticity.halfspace import tent_integrals, tent_means, wedge_images
 from fe_ste.elasticity.hexmesh import MeshSettings, SectorMesh, sector_mesh
 from fe_ste.geometry.gears import Gear
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.notebook import html_table
+from fe_ste.tools.display import Displayed, TitledRows
 from fe_ste.tools.threads import both, one_dense_thread
 
 #: Teeth on either side of the loaded one whose displacement is kept, unless more may touch at once.
@@ -31,7 +31,7 @@ TOOTH_REACH = 4
 
 
 @dataclass(frozen=True)
-class FlankCompliance:
+class FlankCompliance(Displayed):
     """Compliance of one flank of every tooth of a gear whose hub (or outer rim) is held.
 
     Attributes
@@ -109,26 +109,19 @@ class FlankCompliance:
         """Slope d phi / d z of a generator in flank coordinates, rad/m."""
         return _flank_lead(self.gear, self.side)
 
-    def __repr__(self) -> str:
-        """Return one short line."""
+    def _line(self) -> str:
         flank = "counter-clockwise" if self.side > 0 else "clockwise"
         extent = "closed ring" if self.closed else f"open sector of {2 * self.tooth_reach + 1} teeth"
-        return (
-            f"<FlankCompliance of {self.gear.name!r}: {flank} flank, "
-            f"{len(self.roll)} x {len(self.axial)} nodes, {extent}>"
-        )
+        return f" of {self.gear.name!r}: {flank} flank, {len(self.roll)} x {len(self.axial)} nodes, {extent}"
 
-    def _repr_html_(self) -> str:
-        return html_table(
-            f"compliance of a flank of gear {self.gear.name}",
-            {
-                "flank": "counter-clockwise" if self.side > 0 else "clockwise",
-                "teeth": "closed ring" if self.closed else f"open sector of {2 * self.tooth_reach + 1}",
-                "nodes along the profile": str(len(self.roll)),
-                "nodes along the face": str(len(self.axial)),
-            }
-            | {name.replace("_", " "): f"{value}" for name, value in self.figures.items()},
-        )
+    def _table(self) -> TitledRows:
+        return f"compliance of a flank of gear {self.gear.name}", {
+            "flank": "counter-clockwise" if self.side > 0 else "clockwise",
+            "teeth": "closed ring" if self.closed else f"open sector of {2 * self.tooth_reach + 1}",
+            "nodes along the profile": str(len(self.roll)),
+            "nodes along the face": str(len(self.axial)),
+            **{name.replace("_", " "): f"{value}" for name, value in self.figures.items()},
+        }
 
 
 def _flank_lead(gear: Gear, side: int) -> float:

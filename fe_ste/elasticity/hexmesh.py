@@ -17,6 +17,7 @@ from fe_ste.geometry.checks import GeometryError
 from fe_ste.geometry.gears import Gear
 from fe_ste.geometry.profile import ToothProfile, tooth_profile
 from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.display import Displayed
 
 #: Tangent angle to the tooth centre line at which the fillet is split between tooth core and rim.
 _FILLET_SPLIT_ANGLE = np.radians(50.0)
@@ -86,7 +87,7 @@ class MeshSettings:
 
 
 @dataclass(frozen=True)
-class SectionMesh:
+class SectionMesh(Displayed, line=": {points!n} nodes, {quads!n} quadrilaterals"):
     """Quadrilaterals of the transverse section of one tooth, centred on the +x axis.
 
     Attributes
@@ -123,13 +124,9 @@ class SectionMesh:
         """Nodes of the clockwise flank, by ascending roll angle."""
         return np.asarray(self.between_flanks[0])
 
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<SectionMesh: {len(self.points)} nodes, {len(self.quads)} quadrilaterals>"
-
 
 @dataclass(frozen=True)
-class SectorMesh:
+class SectorMesh(Displayed, line=" of {gear.name!r}: {points!n} nodes, {hexahedra!n} hexahedra"):
     """Hexahedra of one tooth sector; node ``layer * section nodes + section node``.
 
     Attributes
@@ -199,10 +196,6 @@ class SectorMesh:
         edges = corners[:, neighbours] - corners[:, :, None]
         edges = edges / np.linalg.norm(edges, axis=-1, keepdims=True)
         return np.asarray(np.linalg.det(edges).min(axis=1))
-
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<SectorMesh of {self.gear.name!r}: {len(self.points)} nodes, {len(self.hexahedra)} hexahedra>"
 
 
 def sector_mesh(gear: Gear, settings: MeshSettings | None = None) -> SectorMesh:

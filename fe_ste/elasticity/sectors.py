@@ -14,6 +14,7 @@ import numpy as np
 from fe_ste.elasticity.hexmesh import MeshSettings, SectorMesh, refined_sector_mesh, sector_mesh
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.display import Displayed
 
 #: Corners of the six faces of a hexahedron in VTK order, counter-clockwise seen from outside.
 HEXAHEDRON_FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])
@@ -70,7 +71,7 @@ class ContactMesh:
 
 
 @dataclass(frozen=True)
-class OpenSector:
+class OpenSector(Displayed):
     """Bricks of some neighbouring teeth of one gear, in its place in the pair.
 
     Attributes
@@ -101,10 +102,9 @@ class OpenSector:
         element, face = self.contact_faces.T
         return np.asarray(self.hexahedra[element[:, None], HEXAHEDRON_FACES[face]])
 
-    def __repr__(self) -> str:
-        """Return one short line."""
+    def _line(self) -> str:
         nodes, elements, faces = len(self.points), len(self.hexahedra), len(self.tooth)
-        return f"<OpenSector: {nodes} nodes, {elements} hexahedra, {faces} contact faces>"
+        return f": {nodes} nodes, {elements} hexahedra, {faces} contact faces"
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from fe_ste.flanks.topography import FlankTopography
 from fe_ste.geometry.checks import GeometryError
 from fe_ste.geometry.gears import Gear
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.notebook import html_table, value_range
+from fe_ste.tools.display import Displayed, TitledRows, value_range
 
 
 class ReliefShape(StrEnum):
@@ -59,7 +59,7 @@ class Relief:
 
 
 @dataclass(frozen=True, kw_only=True)
-class FlankModification:
+class FlankModification(Displayed):
     """Modification of both flanks of every tooth of a gear.
 
     Parameters
@@ -156,13 +156,12 @@ class FlankModification:
             gap = gap + self.topography.gap(gear, radius, z)
         return gap
 
-    def __repr__(self) -> str:
-        """Return one short line."""
+    def _line(self) -> str:
         amounts = ", ".join(f"{kind} {amount}" for kind, amount in self._amounts().items())
-        return f"<FlankModification: {amounts or 'none'}>"
+        return f": {amounts or 'none'}"
 
-    def _repr_html_(self) -> str:
-        return html_table("flank modification", self._amounts() or {"material removed": "none"})
+    def _table(self) -> TitledRows:
+        return "flank modification", self._amounts() or {"material removed": "none"}
 
     def _amounts(self) -> dict[str, str]:
         """Kind of modification -> amount, of those that there are."""

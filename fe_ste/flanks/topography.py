@@ -24,11 +24,11 @@ import numpy as np
 from fe_ste.geometry.checks import GeometryError
 from fe_ste.geometry.gears import Gear
 from fe_ste.tools.arrays import Floats, Integers
-from fe_ste.tools.notebook import value_range
+from fe_ste.tools.display import Displayed, value_range
 
 
 @dataclass(frozen=True)
-class FlankTopography:
+class FlankTopography(Displayed):
     """Material removed over a grid, linear between its points in roll length and axial position.
 
     Beyond the grid the values of its edge go on.
@@ -135,10 +135,9 @@ class FlankTopography:
         high = (1.0 - t) * values[i + 1, j] + t * values[i + 1, j + 1]
         return np.asarray((1.0 - s) * low + s * high, dtype=np.float64)
 
-    def __repr__(self) -> str:
-        """Return one short line."""
+    def _line(self) -> str:
         radii, removed = value_range(self.radius, "mm", 1e3), value_range(self.removed, "um", 1e6)
-        return f"<FlankTopography: {len(self.radius)} x {len(self.axial)} points, radius {radii}, {removed} removed>"
+        return f": {len(self.radius)} x {len(self.axial)} points, radius {radii}, {removed} removed"
 
 
 def _number(path: Path, line: int, cell: str) -> float:

@@ -13,13 +13,13 @@ from fe_ste.geometry.checks import check_gear, check_gear_pair
 from fe_ste.geometry.cutter import PinionCutter
 from fe_ste.geometry.gear_relations import BasicRack, Material, UncheckedGear
 from fe_ste.geometry.pair_relations import UncheckedPair
-from fe_ste.tools.notebook import html_table, value_range
+from fe_ste.tools.display import Displayed, TitledRows, value_range
 
 __all__ = ["BasicRack", "Gear", "GearPair", "Material", "PinionCutter"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Gear(UncheckedGear):
+class Gear(UncheckedGear, Displayed):
     """One cylindrical involute gear, external or internal, spur or helical.
 
     Parameters
@@ -86,34 +86,30 @@ class Gear(UncheckedGear):
         """Return the gear with the other hand of helix."""
         return dataclasses.replace(self, helix_angle=-self.helix_angle)
 
-    def __repr__(self) -> str:
-        """Return one short line."""
+    def _line(self) -> str:
         kind = "internal, " if self.internal else ""
         return (
-            f"<Gear {self.name!r}: {kind}{self.teeth} teeth, normal module {1e3 * self.normal_module:g} mm, "
-            f"helix {math.degrees(self.helix_angle):.4g} deg, width {1e3 * self.face_width:g} mm>"
+            f" {self.name!r}: {kind}{self.teeth} teeth, normal module {1e3 * self.normal_module:g} mm, "
+            f"helix {math.degrees(self.helix_angle):.4g} deg, width {1e3 * self.face_width:g} mm"
         )
 
-    def _repr_html_(self) -> str:
-        return html_table(
-            f"{'internal' if self.internal else 'external'} gear {self.name}",
-            {
-                "teeth": str(self.teeth),
-                "normal module": value_range(self.normal_module, "mm", 1e3),
-                "normal pressure angle": value_range(math.degrees(self.normal_pressure_angle), "deg"),
-                "helix angle": f"{math.degrees(self.helix_angle):.6g} deg ({self.hand})",
-                "profile shift": value_range(self.profile_shift, "normal modules"),
-                "face width": value_range(self.face_width, "mm", 1e3),
-                "tip, form and root diameter": ", ".join(
-                    value_range(radius, "mm", 2e3) for radius in (self.tip_radius, self.form_radius, self.root_radius)
-                ),
-                "held diameter": value_range(self.held_diameter, "mm", 1e3),
-            },
-        )
+    def _table(self) -> TitledRows:
+        return f"{'internal' if self.internal else 'external'} gear {self.name}", {
+            "teeth": str(self.teeth),
+            "normal module": value_range(self.normal_module, "mm", 1e3),
+            "normal pressure angle": value_range(math.degrees(self.normal_pressure_angle), "deg"),
+            "helix angle": f"{math.degrees(self.helix_angle):.6g} deg ({self.hand})",
+            "profile shift": value_range(self.profile_shift, "normal modules"),
+            "face width": value_range(self.face_width, "mm", 1e3),
+            "tip, form and root diameter": ", ".join(
+                value_range(radius, "mm", 2e3) for radius in (self.tip_radius, self.form_radius, self.root_radius)
+            ),
+            "held diameter": value_range(self.held_diameter, "mm", 1e3),
+        }
 
 
 @dataclass(frozen=True, kw_only=True)
-class GearPair(UncheckedPair):
+class GearPair(UncheckedPair, Displayed):
     """Two gears on parallel axes.
 
     Parameters
@@ -168,24 +164,20 @@ class GearPair(UncheckedPair):
         """Return the pair with the hands of both helices swapped."""
         return dataclasses.replace(self, pinion=self.pinion.mirrored(), gear=self.gear.mirrored())
 
-    def __repr__(self) -> str:
-        """Return one short line."""
+    def _line(self) -> str:
         return (
-            f"<GearPair {self.name!r}: {self.pinion.teeth} and {self.gear.teeth} teeth, "
-            f"centre distance {1e3 * self.centre_distance:.6g} mm, contact ratio {self.total_contact_ratio:.3f}>"
+            f" {self.name!r}: {self.pinion.teeth} and {self.gear.teeth} teeth, "
+            f"centre distance {1e3 * self.centre_distance:.6g} mm, contact ratio {self.total_contact_ratio:.3f}"
         )
 
-    def _repr_html_(self) -> str:
-        return html_table(
-            f"gear pair {self.name}",
-            {
-                "pinion": f"{self.pinion.name}, {self.pinion.teeth} teeth",
-                "gear": f"{self.gear.name}, {self.gear.teeth} teeth{', internal' if self.gear.internal else ''}",
-                "centre distance": value_range(self.centre_distance, "mm", 1e3),
-                "face width": value_range(self.face_width, "mm", 1e3),
-                "working pressure angle": value_range(math.degrees(self.working_pressure_angle), "deg"),
-                "transverse contact ratio": f"{self.transverse_contact_ratio:.3f}",
-                "overlap ratio": f"{self.overlap_ratio:.3f}",
-                "circumferential backlash": value_range(self.circumferential_backlash, "um", 1e6),
-            },
-        )
+    def _table(self) -> TitledRows:
+        return f"gear pair {self.name}", {
+            "pinion": f"{self.pinion.name}, {self.pinion.teeth} teeth",
+            "gear": f"{self.gear.name}, {self.gear.teeth} teeth{', internal' if self.gear.internal else ''}",
+            "centre distance": value_range(self.centre_distance, "mm", 1e3),
+            "face width": value_range(self.face_width, "mm", 1e3),
+            "working pressure angle": value_range(math.degrees(self.working_pressure_angle), "deg"),
+            "transverse contact ratio": f"{self.transverse_contact_ratio:.3f}",
+            "overlap ratio": f"{self.overlap_ratio:.3f}",
+            "circumferential backlash": value_range(self.circumferential_backlash, "um", 1e6),
+        }

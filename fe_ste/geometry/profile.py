@@ -9,13 +9,14 @@ import numpy as np
 from fe_ste.geometry.fillet import cartesian, root_fillet
 from fe_ste.geometry.gears import Gear
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.display import Displayed
 
 _FILLET_POINTS = 201
 _OVERSAMPLING = 10
 
 
 @dataclass(frozen=True)
-class ToothProfile:
+class ToothProfile(Displayed):
     """Counter-clockwise side of a tooth centred on the +x axis.
 
     Parameters
@@ -51,10 +52,9 @@ class ToothProfile:
         """
         return cartesian(radius, self.gear.half_angle(radius))
 
-    def __repr__(self) -> str:
-        """Return one short line."""
+    def _line(self) -> str:
         tip, form, root = (f"{1e3 * radius:.6g}" for radius in (self.tip_radius, self.form_radius, self.root_radius))
-        return f"<ToothProfile of {self.gear.name!r}: tip radius {tip} mm, form {form} mm, root {root} mm>"
+        return f" of {self.gear.name!r}: tip radius {tip} mm, form {form} mm, root {root} mm"
 
 
 def tooth_profile(gear: Gear) -> ToothProfile:

@@ -13,6 +13,7 @@ import numpy as np
 from fe_ste.elasticity.hexmesh import MeshSettings, sector_mesh
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.tools.arrays import Floats, Integers, Pixels
+from fe_ste.tools.display import Displayed
 from fe_ste.tools.drawing import drawing_style, finish_figure, new_figure
 from fe_ste.tools.rendering import offscreen_plotter, place_picture, rendered_image, without_margins
 
@@ -32,7 +33,7 @@ _PRESSURE_MAP: Final = "inferno_r"
 
 
 @dataclass(frozen=True)
-class HexahedraMesh:
+class HexahedraMesh(Displayed, line=": {points!n} nodes, {hexahedra!n} hexahedra"):
     """Hexahedra of one body.
 
     Attributes
@@ -52,10 +53,6 @@ class HexahedraMesh:
 
         grid = pyvista.UnstructuredGrid({pyvista.CellType.HEXAHEDRON: self.hexahedra}, self.points)
         return grid.extract_surface(algorithm="geometry")
-
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<HexahedraMesh: {len(self.points)} nodes, {len(self.hexahedra)} hexahedra>"
 
 
 def draw_tooth_contact(

@@ -10,6 +10,7 @@ import numpy as np
 from fe_ste.reference.finite_deformation import Bricks
 from fe_ste.reference.mortar import Surface
 from fe_ste.tools.arrays import Booleans, Floats, Integers
+from fe_ste.tools.display import Displayed
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class TurningHub:
 
 
 @dataclass(frozen=True)
-class ContactModel:
+class ContactModel(Displayed):
     """Elastic bodies, what holds and loads them, and where they may touch.
 
     Attributes
@@ -69,10 +70,9 @@ class ContactModel:
     allowed_overlap: float = 0.0
     hub: TurningHub | None = None
 
-    def __repr__(self) -> str:
-        """Return one short line."""
+    def _line(self) -> str:
         facets = f"surfaces of {len(self.first.facets)} and {len(self.second.facets)} facets"
-        return f"<ContactModel: {len(self.bricks.nodes)} bricks, {len(self.bricks.points)} nodes, {facets}>"
+        return f": {len(self.bricks.nodes)} bricks, {len(self.bricks.points)} nodes, {facets}"
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class Iteration:
 
 
 @dataclass(frozen=True)
-class Equilibrium:
+class Equilibrium(Displayed):
     """Bodies in equilibrium.
 
     Attributes
@@ -145,10 +145,9 @@ class Equilibrium:
     hub: float
     iterations: tuple[Iteration, ...]
 
-    def __repr__(self) -> str:
-        """Return one short line."""
+    def _line(self) -> str:
         touching = np.count_nonzero(self.pressure)
-        return f"<Equilibrium: {touching} of {len(self.pressure)} nodes in contact, {len(self.iterations)} iterations>"
+        return f": {touching} of {len(self.pressure)} nodes in contact, {len(self.iterations)} iterations"
 
 
 def convergence_table(iterations: Sequence[Iteration]) -> str:

@@ -22,6 +22,7 @@ from fe_ste.elasticity.bricks import brick_gradients, brick_values
 from fe_ste.geometry.gears import Material
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import compiled
+from fe_ste.tools.display import Displayed
 
 _POINTS = 8
 _FUNCTIONS = 11
@@ -281,7 +282,7 @@ class BrickTangent:
 
 
 @dataclass(frozen=True)
-class Bricks:
+class Bricks(Displayed):
     """8-node bricks with incompatible modes, ready to be evaluated at any displacement.
 
     Attributes
@@ -417,10 +418,9 @@ class Bricks:
         count = np.bincount(self.nodes.ravel(), minlength=len(self.points))
         return np.asarray(total / np.maximum(count, 1)[:, None, None])
 
-    def __repr__(self) -> str:
-        """Return one short line."""
+    def _line(self) -> str:
         deformation = "finite" if self.finite else "small"
-        return f"<Bricks: {len(self.nodes)} elements, {len(self.points)} nodes, {deformation} deformation>"
+        return f": {len(self.nodes)} elements, {len(self.points)} nodes, {deformation} deformation"
 
 
 def von_mises(stress: Floats) -> Floats:

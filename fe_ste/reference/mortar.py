@@ -16,6 +16,7 @@ import scipy.sparse
 
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import compiled
+from fe_ste.tools.display import Displayed
 
 #: Facets whose common part is smaller than this part of the first one are not integrated over.
 _LEAST_OVERLAP = 1e-10
@@ -50,7 +51,7 @@ def summed(numbers: Integers, values: Floats, count: int) -> Floats:
 
 
 @dataclass(frozen=True)
-class Surface:
+class Surface(Displayed, line=": {facets!n} facets"):
     """Quadrilaterals of a boundary.
 
     Attributes
@@ -90,10 +91,6 @@ class Surface:
         diagonals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
         quarter = np.linalg.norm(diagonals, axis=1) / 8.0
         return summed(self.local, np.repeat(quarter, 4), len(self.nodes))
-
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<Surface: {len(self.facets)} facets>"
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from fe_ste.reference.contact_model import ContactModel, Equilibrium, Iteration,
 from fe_ste.reference.finite_deformation import Bricks
 from fe_ste.reference.mortar import Surface
 from fe_ste.reference.newton import EquilibriumError, NewtonSettings, solve_contact
-from fe_ste.tools.notebook import html_table, value_range
+from fe_ste.tools.display import Displayed, TitledRows, value_range
 from fe_ste.transmission_error.search import hertz_half_width, least_contact_length, normal_load
 
 #: Mesh stiffness per face width for the first guess of the approach, N/m^2 (ISO 6336-1: 14 to 20 N/(mm um)).
@@ -31,7 +31,7 @@ _ALLOWED_OVERLAP = 2e-3
 
 
 @dataclass(frozen=True)
-class NonlinearSettings:
+class NonlinearSettings(Displayed):
     """How a position is analysed.
 
     Parameters
@@ -54,14 +54,13 @@ class NonlinearSettings:
         if self.teeth < 1 or self.teeth % 2 == 0:
             raise ValueError(f"teeth = {self.teeth}: must be an odd number")
 
-    def __repr__(self) -> str:
-        """Return one short line."""
+    def _line(self) -> str:
         strains = "finite deformation" if self.finite_deformation else "small strains"
-        return f"<NonlinearSettings: sectors of {self.teeth} teeth, {self.mesh.layers} layers, {strains}>"
+        return f": sectors of {self.teeth} teeth, {self.mesh.layers} layers, {strains}"
 
 
 @dataclass(frozen=True)
-class NonlinearPosition:
+class NonlinearPosition(Displayed):
     """One position solved.
 
     Attributes
@@ -103,26 +102,19 @@ class NonlinearPosition:
         """Displacements, held ones too."""
         return int(self.model.held.size)
 
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return (
-            f"<NonlinearPosition of {self.pair.name!r}: pmc {self.pmc:.4g}, torque {self.torque:g} N m, "
-            f"ste {1e6 * self.ste:.5g} um>"
-        )
+    def _line(self) -> str:
+        return f" of {self.pair.name!r}: pmc {self.pmc:.4g}, torque {self.torque:g} N m, ste {1e6 * self.ste:.5g} um"
 
-    def _repr_html_(self) -> str:
-        return html_table(
-            f"gear pair {self.pair.name} by the reference analysis",
-            {
-                "position in the mesh cycle": f"{self.pmc:.4g}",
-                "torque": value_range(self.torque, "N m"),
-                "static transmission error": value_range(self.ste, "um", 1e6),
-                "load share": ", ".join(f"tooth pair {tooth}: {share:.1%}" for tooth, share in self.load_share.items()),
-                "unknowns": str(self.unknowns),
-                "Newton iterations": str(len(self.equilibrium.iterations)),
-                "wall time": value_range(self.wall_time, "s"),
-            },
-        )
+    def _table(self) -> TitledRows:
+        return f"gear pair {self.pair.name} by the reference analysis", {
+            "position in the mesh cycle": f"{self.pmc:.4g}",
+            "torque": value_range(self.torque, "N m"),
+            "static transmission error": value_range(self.ste, "um", 1e6),
+            "load share": ", ".join(f"tooth pair {tooth}: {share:.1%}" for tooth, share in self.load_share.items()),
+            "unknowns": str(self.unknowns),
+            "Newton iterations": str(len(self.equilibrium.iterations)),
+            "wall time": value_range(self.wall_time, "s"),
+        }
 
 
 def nonlinear_position(

@@ -17,6 +17,7 @@ from fe_ste.reference.mortar import Surface
 from fe_ste.reference.newton import fixed_body_displacement
 from fe_ste.reference.position import NonlinearPosition, NonlinearSettings, gear_model
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.display import Displayed
 from fe_ste.transmission_error.compliance import PairCompliance
 from fe_ste.transmission_error.search import hertz_half_width, least_contact_length
 from fe_ste.transmission_error.states import ContactState
@@ -29,7 +30,7 @@ _CANDIDATES = 100
 
 
 @dataclass(frozen=True)
-class StressField:
+class StressField(Displayed):
     """Both gears at one position, deformed.
 
     Attributes
@@ -64,11 +65,10 @@ class StressField:
         pinion_nodes = len(self.sectors[0].points)
         return slice(pinion_nodes, None) if number else slice(0, pinion_nodes)
 
-    def __repr__(self) -> str:
-        """Return one short line."""
+    def _line(self) -> str:
         return (
-            f"<StressField of {self.pair.name!r}: pmc {self.pmc:.4g}, torque {self.torque:g} N m, {self.method}, "
-            f"von Mises up to {1e-6 * self.von_mises.max():.4g} MPa>"
+            f" of {self.pair.name!r}: pmc {self.pmc:.4g}, torque {self.torque:g} N m, {self.method}, "
+            f"von Mises up to {1e-6 * self.von_mises.max():.4g} MPa"
         )
 
 

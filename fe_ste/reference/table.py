@@ -25,8 +25,8 @@ from fe_ste.reference.contact_model import Iteration, convergence_table
 from fe_ste.reference.finite_deformation import von_mises
 from fe_ste.reference.newton import EquilibriumError
 from fe_ste.reference.position import NonlinearPosition, NonlinearSettings, nonlinear_position
+from fe_ste.tools.display import Displayed, TitledRows, value_range
 from fe_ste.tools.files import FileError
-from fe_ste.tools.notebook import html_table, value_range
 from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
 from fe_ste.tools.versions import NONLINEAR_TABLE
 from fe_ste.transmission_error.table import TableError
@@ -60,7 +60,7 @@ _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, kw_only=True)
-class NonlinearInput:
+class NonlinearInput(Displayed, line=" of {pair.name!r}: {positions} positions, torque {torque:g} N m"):
     """All that the numbers of a table depend on.
 
     Parameters
@@ -100,13 +100,9 @@ class NonlinearInput:
         """SHA-256 of the resolved input."""
         return hashlib.sha256(json.dumps(self.resolved(), sort_keys=True).encode()).hexdigest()
 
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<NonlinearInput of {self.pair.name!r}: {self.positions} positions, torque {self.torque:g} N m>"
-
 
 @dataclass(frozen=True)
-class NonlinearTable:
+class NonlinearTable(Displayed):
     """Static transmission error of a pair over the mesh cycle by the reference analysis.
 
     Attributes
@@ -228,24 +224,20 @@ class NonlinearTable:
             dataset["load_share"].loc[{"pmc": dataset["pmc"][number], "tooth": tooth}] = share
         return NonlinearTable(dataset)
 
-    def __repr__(self) -> str:
-        """Return one short line."""
+    def _line(self) -> str:
         solved, torque = int(self.dataset["converged"].sum()), value_range(self.dataset["torque"], "N m")
         pair, positions = self.dataset.attrs["pair"], self.dataset.sizes["pmc"]
-        return f"<NonlinearTable of {pair!r}: {solved} of {positions} positions solved, torque {torque}>"
+        return f" of {pair!r}: {solved} of {positions} positions solved, torque {torque}"
 
-    def _repr_html_(self) -> str:
-        return html_table(
-            f"gear pair {self.dataset.attrs['pair']} by the reference analysis",
-            {
-                "positions solved": f"{int(self.dataset['converged'].sum())} of {self.dataset.sizes['pmc']}",
-                "torque": value_range(self.dataset["torque"], "N m"),
-                "static transmission error": value_range(self.dataset["ste"], "um", 1e6),
-                "mesh stiffness": value_range(self.dataset["mesh_stiffness"], "N/um", 1e-6),
-                "positions that failed": str(len(self.failures)),
-                "input": self.input_hash[:12],
-            },
-        )
+    def _table(self) -> TitledRows:
+        return f"gear pair {self.dataset.attrs['pair']} by the reference analysis", {
+            "positions solved": f"{int(self.dataset['converged'].sum())} of {self.dataset.sizes['pmc']}",
+            "torque": value_range(self.dataset["torque"], "N m"),
+            "static transmission error": value_range(self.dataset["ste"], "um", 1e6),
+            "mesh stiffness": value_range(self.dataset["mesh_stiffness"], "N/um", 1e-6),
+            "positions that failed": str(len(self.failures)),
+            "input": self.input_hash[:12],
+        }
 
 
 def _figures(position: NonlinearPosition) -> dict[str, float]:

@@ -15,13 +15,14 @@ import scipy.sparse
 
 from fe_ste.elasticity.hexmesh import SectorMesh
 from fe_ste.tools.arrays import Floats, Integers, SparseMatrix
+from fe_ste.tools.display import Displayed
 
 COMPONENTS = 3
 """Strains of a gauge: along the section, along the face, shear."""
 
 
 @dataclass(frozen=True)
-class GaugePlaces:
+class GaugePlaces(Displayed, line=": {edges!n} edges"):
     """Where gauges lie.
 
     Attributes
@@ -40,10 +41,6 @@ class GaugePlaces:
     side: Integers
     depth: Floats
     radius: Floats
-
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<GaugePlaces: {len(self.edges)} edges>"
 
 
 def gauge_places(mesh: SectorMesh) -> GaugePlaces:

@@ -16,6 +16,7 @@ import xarray as xr
 from fe_ste.geometry.gears import GearPair
 from fe_ste.root_stress.root import RootGauges
 from fe_ste.tools.arrays import Booleans, Floats
+from fe_ste.tools.display import Displayed
 
 PATH_MARGIN = 0.05
 """Part of the path of contact at either end that counts as its edge."""
@@ -26,7 +27,7 @@ PITCH_ZONE = 0.05
 
 
 @dataclass(frozen=True)
-class MeshCycleStress:
+class MeshCycleStress(Displayed, line=": {torque!n} torques, {misalignment!n} misalignments"):
     """Largest stresses of a pair over the mesh cycle, by torque and misalignment.
 
     Attributes
@@ -51,10 +52,6 @@ class MeshCycleStress:
     face_load: Floats
     root: Floats
     compression: Floats
-
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<MeshCycleStress: {len(self.torque)} torques, {len(self.misalignment)} misalignments>"
 
     def at(self, values: Floats, power: float, torque: Floats, misalignment: Floats) -> Floats:
         """One of the stresses at torques (N m) and misalignments (rad), broadcast against each other.

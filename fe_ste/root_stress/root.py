@@ -17,6 +17,7 @@ from fe_ste.elasticity.ring import Chain, ring_faces
 from fe_ste.geometry.gears import Gear
 from fe_ste.root_stress.gauges import COMPONENTS, GaugePlaces, gauge_columns, gauge_places
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.display import Displayed
 from fe_ste.tools.threads import one_dense_thread
 
 REACH = 3
@@ -24,7 +25,7 @@ REACH = 3
 
 
 @dataclass(frozen=True)
-class RootGauges:
+class RootGauges(Displayed, line=" of {gear.name!r}: {places.edges!n} edges, {axial!n} layers"):
     """Stress at the root of the teeth of a gear under loads on the flank of one tooth.
 
     Attributes
@@ -46,10 +47,6 @@ class RootGauges:
     roll: Floats
     axial: Floats
     stress: dict[int, Floats]
-
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<RootGauges of {self.gear.name!r}: {len(self.places.edges)} edges, {len(self.axial)} layers>"
 
     def node_loads(self, roll: Floats, axial: Floats, force: Floats) -> Floats:
         """Share forces (N) at places of a flank among its nodes, bilinear, (f l,); places off the flank at its edge."""

@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 
 from fe_ste.geometry.gears import Gear, GearPair
-from fe_ste.tools.notebook import html_table, value_range
+from fe_ste.tools.display import Displayed, TitledRows, value_range
 
 _STEEL = 206e9
 """Young's modulus behind the series, Pa."""
@@ -26,7 +26,7 @@ _MEASURED_TO_THEORETICAL = 0.8
 
 
 @dataclass(frozen=True)
-class MethodBStiffness:
+class MethodBStiffness(Displayed):
     """Stiffness of a gear pair by ISO 6336-1 method B.
 
     Parameters
@@ -59,22 +59,20 @@ class MethodBStiffness:
         """Mean mesh stiffness along the transverse line of action, N/m."""
         return self.mesh_stiffness * self.face_width
 
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<MethodBStiffness: mesh {1e-9 * self.mesh_stiffness:.4g} N/(mm um), {1e-6 * self.stiffness:.4g} N/um>"
+    def _line(self) -> str:
+        return f": mesh {1e-9 * self.mesh_stiffness:.4g} N/(mm um), {1e-6 * self.stiffness:.4g} N/um"
 
-    def _repr_html_(self) -> str:
+    def _table(self) -> TitledRows:
         per_width = {
             "theoretical single stiffness": self.theoretical_single_stiffness,
             "single stiffness": self.single_stiffness,
             "mesh stiffness": self.mesh_stiffness,
         }
-        return html_table(
-            "stiffness by ISO 6336-1 method B",
-            {name: value_range(value, "N/(mm um)", 1e-9) for name, value in per_width.items()}
-            | {"mean mesh stiffness": value_range(self.stiffness, "N/um", 1e-6)}
-            | {"outside validity": "; ".join(self.outside_validity) or "no"},
-        )
+        return "stiffness by ISO 6336-1 method B", {
+            **{name: value_range(value, "N/(mm um)", 1e-9) for name, value in per_width.items()},
+            "mean mesh stiffness": value_range(self.stiffness, "N/um", 1e-6),
+            "outside validity": "; ".join(self.outside_validity) or "no",
+        }
 
 
 def mesh_stiffness(

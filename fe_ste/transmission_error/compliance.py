@@ -19,7 +19,7 @@ from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats, Integers
-from fe_ste.tools.notebook import html_table, value_range
+from fe_ste.tools.display import Displayed, TitledRows, value_range
 from fe_ste.tools.threads import one_dense_thread
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class PairCompliance:
+class PairCompliance(Displayed):
     """A gear pair with the compliance of both loaded flanks: all that does not depend on position or load.
 
     Attributes
@@ -116,24 +116,20 @@ class PairCompliance:
         """Axial width of a contact slice, m."""
         return self.pair.face_width / len(self.axial)
 
-    def __repr__(self) -> str:
-        """Return one short line."""
+    def _line(self) -> str:
         lowest, highest = self.teeth[0], self.teeth[-1]
-        return f"<PairCompliance of {self.pair.name!r}: {len(self.axial)} slices, tooth pairs {lowest} to {highest}>"
+        return f" of {self.pair.name!r}: {len(self.axial)} slices, tooth pairs {lowest} to {highest}"
 
-    def _repr_html_(self) -> str:
+    def _table(self) -> TitledRows:
         pinion, gear = self.modifications
-        return html_table(
-            f"compliance of gear pair {self.pair.name}",
-            {
-                "pinion": repr(self.flanks[0]),
-                "gear": repr(self.flanks[1]),
-                "modifications": f"{pinion} {gear}",
-                "contact": repr(self.contact),
-                "tooth pairs that may touch": f"{self.teeth[0]} to {self.teeth[-1]}",
-                "gaps of tooth pairs": "none" if self.tooth_gap is None else value_range(self.tooth_gap, "um", 1e6),
-            },
-        )
+        return f"compliance of gear pair {self.pair.name}", {
+            "pinion": repr(self.flanks[0]),
+            "gear": repr(self.flanks[1]),
+            "modifications": f"{pinion} {gear}",
+            "contact": repr(self.contact),
+            "tooth pairs that may touch": f"{self.teeth[0]} to {self.teeth[-1]}",
+            "gaps of tooth pairs": "none" if self.tooth_gap is None else value_range(self.tooth_gap, "um", 1e6),
+        }
 
 
 def _teeth_in_contact(pair: GearPair, flanks: tuple[FlankCompliance, FlankCompliance]) -> tuple[int, int]:

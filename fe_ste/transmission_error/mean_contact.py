@@ -21,6 +21,7 @@ from fe_ste.contact.kinematics import ContactError
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.display import Displayed
 from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance
 from fe_ste.transmission_error.face_load import face_load_factor, load_along_face
 from fe_ste.transmission_error.states import StateAxes
@@ -52,7 +53,7 @@ _SHARED_PAIRS = 8
 
 
 @dataclass(frozen=True, eq=False)
-class MeanContact:
+class MeanContact(Displayed):
     """Contact of a pair over its mesh cycle under one force, at two misalignments.
 
     Lengths and forces are along the transverse line of action. Arrays are over the misalignments.
@@ -105,10 +106,9 @@ class MeanContact:
     cycle_stiffness: Floats
     cycle_load_centre: Floats
 
-    def __repr__(self) -> str:
-        """Return one short line."""
+    def _line(self) -> str:
         low, high = 1e6 * self.misalignment
-        return f"<MeanContact: {self.force:.5g} N, misalignment {low:.4g} to {high:.4g} urad>"
+        return f": {self.force:.5g} N, misalignment {low:.4g} to {high:.4g} urad"
 
     @property
     def tilt_stiffness(self) -> float:

@@ -19,7 +19,7 @@ from fe_ste.contact.complementarity import ContactSolution
 from fe_ste.contact.kinematics import ContactError
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Booleans, Floats, Integers
-from fe_ste.tools.notebook import html_table, value_range
+from fe_ste.tools.display import Displayed, TitledRows, value_range
 from fe_ste.transmission_error.compliance import PairCompliance
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class ContactState:
+class ContactState(Displayed):
     """Solved contact at one position.
 
     Attributes
@@ -51,10 +51,9 @@ class ContactState:
     pressure: Floats
     cut_off_share: float = 0.0
 
-    def __repr__(self) -> str:
-        """Return one short line."""
+    def _line(self) -> str:
         cells = len(self.cells.tooth)
-        return f"<ContactState: pmc {self.pmc:.4g}, normal load {self.normal_load:.5g} N, {cells} cells>"
+        return f": pmc {self.pmc:.4g}, normal load {self.normal_load:.5g} N, {cells} cells"
 
 
 @dataclass
@@ -87,7 +86,7 @@ class SearchStart:
 
 
 @dataclass(frozen=True)
-class StateAxes:
+class StateAxes(Displayed):
     """Axes of a grid of states.
 
     Attributes
@@ -143,12 +142,11 @@ class StateAxes:
             "misalignment": self.misalignment,
         }
 
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<StateAxes: {', '.join(self.ranges().values())}>"
+    def _line(self) -> str:
+        return f": {', '.join(self.ranges().values())}"
 
-    def _repr_html_(self) -> str:
-        return html_table("axes of a grid of states", self.ranges())
+    def _table(self) -> TitledRows:
+        return "axes of a grid of states", self.ranges()
 
     def ranges(self) -> dict[str, str]:
         """Return the values along each axis as text for people, with units."""
@@ -214,7 +212,7 @@ def cut_off_variable(values: Floats) -> xr.Variable:
 
 
 @dataclass
-class StateResults:
+class StateResults(Displayed):
     """Results of states over (pmc, torque, centre_distance, misalignment); those that failed are not a number.
 
     Attributes
@@ -353,7 +351,6 @@ class StateResults:
         dataset.attrs["failures"] = "\n".join(self.failures)
         return dataset
 
-    def __repr__(self) -> str:
-        """Return one short line."""
+    def _line(self) -> str:
         solved = int(np.isfinite(self.values["ste"]).sum())
-        return f"<StateResults: {solved} of {self.iterations.size} states solved, {len(self.failures)} failed>"
+        return f": {solved} of {self.iterations.size} states solved, {len(self.failures)} failed"

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fe_ste.tools.arrays import Booleans, Floats, Integers
-from fe_ste.tools.notebook import html_table, value_range
+from fe_ste.tools.display import Displayed, TitledRows, value_range
 from fe_ste.transmission_error.gaps import GapError, complete_loads
 
 if TYPE_CHECKING:
@@ -124,7 +124,7 @@ def _slope_matrix(x: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
-class SteSurface:
+class SteSurface(Displayed):
     """Static transmission error s(pmc, centre distance, misalignment, force) of one loaded flank.
 
     Attributes
@@ -328,23 +328,19 @@ class SteSurface:
                     "between the nodes of the table: lay more of them"
                 )
 
-    def __repr__(self) -> str:
-        """Return one short line."""
+    def _line(self) -> str:
         return (
-            f"<SteSurface: {len(self.coefficients)} positions, {value_range(self.centre_distance, 'mm', 1e3)}, "
-            f"{value_range(self.misalignment, 'urad', 1e6)}, force up to {self.root_force[-1] ** 2:.5g} N>"
+            f": {len(self.coefficients)} positions, {value_range(self.centre_distance, 'mm', 1e3)}, "
+            f"{value_range(self.misalignment, 'urad', 1e6)}, force up to {self.root_force[-1] ** 2:.5g} N"
         )
 
-    def _repr_html_(self) -> str:
-        return html_table(
-            "surface of the static transmission error",
-            {
-                "position in the mesh cycle": f"{len(self.coefficients)} positions",
-                "centre distance": value_range(self.centre_distance, "mm", 1e3),
-                "misalignment": value_range(self.misalignment, "urad", 1e6),
-                "line-of-action force": value_range(self.root_force**2, "N"),
-            },
-        )
+    def _table(self) -> TitledRows:
+        return "surface of the static transmission error", {
+            "position in the mesh cycle": f"{len(self.coefficients)} positions",
+            "centre distance": value_range(self.centre_distance, "mm", 1e3),
+            "misalignment": value_range(self.misalignment, "urad", 1e6),
+            "line-of-action force": value_range(self.root_force**2, "N"),
+        }
 
 
 def _load_slopes(root: Floats, nodes: Floats, tangent: Floats) -> Floats:

@@ -24,8 +24,8 @@ from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.gear_relations import inputs_that_are_given
 from fe_ste.geometry.gears import GearPair
+from fe_ste.tools.display import Displayed, TitledRows, value_range
 from fe_ste.tools.files import FileError
-from fe_ste.tools.notebook import html_table, value_range
 from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
 from fe_ste.tools.versions import TABLE
 from fe_ste.tools.workers import Workers
@@ -55,7 +55,7 @@ class TableError(FileError):
 
 
 @dataclass(frozen=True, kw_only=True)
-class TableInput:
+class TableInput(Displayed):
     """All that the numbers of a table depend on.
 
     Parameters
@@ -104,21 +104,17 @@ class TableInput:
         """SHA-256 of the resolved input."""
         return hashlib.sha256(json.dumps(self.resolved(), sort_keys=True).encode()).hexdigest()
 
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<TableInput of {self.pair.name!r}: {', '.join(self.axes().ranges().values())}>"
+    def _line(self) -> str:
+        return f" of {self.pair.name!r}: {', '.join(self.axes().ranges().values())}"
 
-    def _repr_html_(self) -> str:
-        return html_table(
-            f"input of a table of gear pair {self.pair.name}",
-            self.axes().ranges()
-            | {
-                "pinion modification": repr(self.pinion_modification),
-                "gear modification": repr(self.gear_modification),
-                "mesh": repr(self.mesh),
-                "contact": repr(self.contact),
-            },
-        )
+    def _table(self) -> TitledRows:
+        return f"input of a table of gear pair {self.pair.name}", {
+            **self.axes().ranges(),
+            "pinion modification": repr(self.pinion_modification),
+            "gear modification": repr(self.gear_modification),
+            "mesh": repr(self.mesh),
+            "contact": repr(self.contact),
+        }
 
     def axes(self) -> StateAxes:
         """Axes of the table, not checked."""
@@ -131,7 +127,7 @@ class TableInput:
 
 
 @dataclass(frozen=True)
-class MeshTable:
+class MeshTable(Displayed):
     """Static transmission error of a pair over its axes.
 
     Attributes
@@ -250,21 +246,17 @@ class MeshTable:
         """Positions that were not solved, with the reason."""
         return [line for line in str(self.dataset.attrs["failures"]).splitlines() if line]
 
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<MeshTable of {self.dataset.attrs['pair']!r}: {', '.join(self._ranges().values())}>"
+    def _line(self) -> str:
+        return f" of {self.dataset.attrs['pair']!r}: {', '.join(self._ranges().values())}"
 
-    def _repr_html_(self) -> str:
-        return html_table(
-            f"static transmission error of gear pair {self.dataset.attrs['pair']}",
-            self._ranges()
-            | {
-                "static transmission error": value_range(self.dataset["ste"], "um", 1e6),
-                "mesh stiffness": value_range(self.dataset["mesh_stiffness"], "N/um", 1e-6),
-                "states not solved": str(len(self.failures)),
-                "input": self.input_hash[:12],
-            },
-        )
+    def _table(self) -> TitledRows:
+        return f"static transmission error of gear pair {self.dataset.attrs['pair']}", {
+            **self._ranges(),
+            "static transmission error": value_range(self.dataset["ste"], "um", 1e6),
+            "mesh stiffness": value_range(self.dataset["mesh_stiffness"], "N/um", 1e-6),
+            "states not solved": str(len(self.failures)),
+            "input": self.input_hash[:12],
+        }
 
     def _ranges(self) -> dict[str, str]:
         positions, values = self.dataset.sizes["pmc"], (self.dataset[axis].to_numpy() for axis in STATE_AXES)

@@ -88,7 +88,7 @@ def test_an_unknown_load_case_is_refused_and_nothing_is_written(project: Project
 
 
 def test_it_is_one_line(project: Project) -> None:
-    assert repr(project).startswith("Project('") and "\n" not in repr(project) and len(repr(project)) < 300
+    assert repr(project).startswith("<Project '") and "\n" not in repr(project) and len(repr(project)) < 300
     assert "bushing, iso6336, disc, run_up" in repr(project)
 
 

@@ -40,6 +40,7 @@ from exugear.bearings.rolling.rows import (
     on_raceways,
 )
 from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.display import Displayed
 
 LINE_CONTACT_EXPONENT = 10.0 / 9.0
 """Load of a line contact over its approach."""
@@ -282,7 +283,7 @@ def loads_of_laminae(contacts: RowContacts, displacement: Floats) -> tuple[Float
 
 
 @dataclass(frozen=True)
-class BearingState:
+class BearingState(Displayed):
     """A bearing in equilibrium with a force.
 
     Attributes
@@ -314,14 +315,13 @@ class BearingState:
     energy: float
     contacts: RowContacts
 
-    def __repr__(self) -> str:
-        """Displacement and load in one line."""
+    def _line(self) -> str:
         displacement, load = (
             ", ".join(f"{round(value, 3) + 0.0:.3g}" for value in values.tolist())
             for values in (1e6 * self.displacement[:3], 1e-3 * self.load[:3])
         )
         carrying = f"{np.count_nonzero(self.element_load)} of {len(self.element_load)} elements loaded"
-        return f"<BearingState ({displacement}) um under ({load}) kN, {carrying}>"
+        return f" ({displacement}) um under ({load}) kN, {carrying}"
 
     @property
     def radial_stiffness(self) -> float:

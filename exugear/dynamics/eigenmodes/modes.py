@@ -29,7 +29,7 @@ from exugear.tooth_mesh.kernels.meshes import STIFFNESS, TILT_COLUMNS, TILT_STIF
 from exugear.tooth_mesh.law import Angles, MeshData
 from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.notebook import html_table
+from fe_ste.tools.display import Displayed, TitledRows
 from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ SHOWN_MODES = 12
 
 
 @dataclass(frozen=True)
-class Modes:
+class Modes(Displayed):
     """Eigenmodes in order of frequency; n modes, in the variant `flexible` those in the band of its elastic bodies.
 
     Attributes
@@ -73,23 +73,21 @@ class Modes:
     names: tuple[str, ...]
     growth_rate: float
 
-    def __repr__(self) -> str:
-        """Gearbox, variant, number of modes and their range in one line."""
+    def _line(self) -> str:
         assembly = self.assembly
         return (
-            f"<Modes of {assembly.gearbox.name[:60]!r}, {assembly.variant}, {assembly.mesh_law}: "
-            f"{len(self.frequency)} modes up to {self.frequency.max(initial=0.0):.5g} Hz>"
+            f" of {assembly.gearbox.name[:60]!r}, {assembly.variant}, {assembly.mesh_law}: "
+            f"{len(self.frequency)} modes up to {self.frequency.max(initial=0.0):.5g} Hz"
         )
 
-    def _repr_html_(self) -> str:
-        """Table of the first modes for notebooks."""
+    def _table(self) -> TitledRows:
         rows = {
             f"{number}: {frequency:.1f} Hz, damping {100.0 * ratio:.2f} %": name
             for number, (frequency, ratio, name) in enumerate(
                 zip(self.frequency[:SHOWN_MODES], self.damping_ratio[:SHOWN_MODES], self.names, strict=False), start=1
             )
         }
-        return html_table(repr(self).strip("<>"), rows)
+        return repr(self).strip("<>"), rows
 
     def nearest(self, frequency: float) -> int:
         """Find the number of the mode nearest to a frequency (Hz)."""

@@ -18,6 +18,7 @@ from exugear.gearbox.parts import Body
 from exugear.tooth_mesh.contact_state import ContactState
 from exugear.tooth_mesh.law import MeshData
 from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.display import Displayed
 
 FRACTIONS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
 """Parts of the default value that a parameter without a natural range takes."""
@@ -53,7 +54,7 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class ParameterVariation:
+class ParameterVariation(Displayed):
     """Modes over a parameter; n values, m modes, each followed by its shape.
 
     Attributes
@@ -74,10 +75,9 @@ class ParameterVariation:
     amplification: Floats
     damping_ratio: Floats
 
-    def __repr__(self) -> str:
-        """One line."""
+    def _line(self) -> str:
         values, modes = self.frequency.shape
-        return f"ParameterVariation({self.parameter.label}: {values} values, {modes} modes)"
+        return f" {self.parameter.label}: {values} values, {modes} modes"
 
     def near(self, window: tuple[float, float], least_share: float) -> ParameterVariation:
         """Keep modes that somewhere lie in a window (Hz) while they have a least share."""
@@ -273,7 +273,7 @@ def scaled_bearings(assembly: Assembly, numbers: Sequence[int], factor: float) -
 
 
 @dataclass(frozen=True)
-class FrequencyMatch:
+class FrequencyMatch(Displayed, line=" {parameter.label} = {value:.3g}: {frequency:.5g} Hz"):
     """An assumption that brings a mode to a frequency.
 
     Attributes
@@ -291,10 +291,6 @@ class FrequencyMatch:
     value: float
     modes: Modes
     index: int
-
-    def __repr__(self) -> str:
-        """One line."""
-        return f"FrequencyMatch({self.parameter.label} = {self.value:.3g}: {self.frequency:.5g} Hz)"
 
     @property
     def frequency(self) -> float:

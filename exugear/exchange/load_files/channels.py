@@ -12,6 +12,7 @@ import numpy as np
 
 from exugear.exchange.load_files.units import SI_NAMES, USUAL_NAMES, Unit, unit_of
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.display import Displayed
 
 ALIASES: tuple[tuple[str, ...], ...] = (
     ("rottorq", "lsshfttq", "lsshftmxa", "lsshftmxs", "lssgagmxa", "lssgagmxs"),
@@ -38,7 +39,7 @@ class LoadFileError(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class Channels:
+class Channels(Displayed):
     """Channels over time.
 
     Attributes
@@ -58,9 +59,8 @@ class Channels:
     time_unit: str
     read: Read
 
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<Channels of {self.path.name}: {', '.join(self.names[:SHOWN_NAMES])}>"
+    def _line(self) -> str:
+        return f" of {self.path.name}: {', '.join(self.names[:SHOWN_NAMES])}"
 
     @cached_property
     def time(self) -> Floats:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from fe_ste.tools.display import Displayed
+
 SHOWN_FAULTS = 20
 """Most faults that one message shows."""
 LONGEST_TEXT = 80
@@ -27,15 +29,11 @@ class RexsError(ValueError):
         super().__init__("\n".join([*self.faults[:SHOWN_FAULTS], *rest]))
 
 
-class Faults:
+class Faults(Displayed, line=": {_found!n}"):
     """Faults gathered over several attempts."""
 
     def __init__(self) -> None:
         self._found: list[str] = []
-
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<Faults: {len(self._found)}>"
 
     def add(self, sentence: str) -> None:
         """Keep a fault."""

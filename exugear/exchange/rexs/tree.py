@@ -9,6 +9,7 @@ from functools import cached_property
 
 from exugear.exchange.rexs.faults import RexsError, plain
 from exugear.exchange.rexs.synonyms import unit_factor
+from fe_ste.tools.display import Displayed
 
 LARGEST_NUMBER = 1e40
 """Numbers beyond it are no quantity of a gearbox; files write 1e23 for 'rigid'. Powers of it are still numbers."""
@@ -164,7 +165,7 @@ class LoadCase:
 
 
 @dataclass(frozen=True)
-class Model:
+class Model(Displayed, line=" REXS {version}: {components!n} components, {relations!n} relations"):
     """All of a REXS file.
 
     Attributes
@@ -183,10 +184,6 @@ class Model:
     components: Mapping[int, Component]
     relations: tuple[Relation, ...]
     load_cases: tuple[LoadCase, ...] = ()
-
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<Model REXS {self.version}: {len(self.components)} components, {len(self.relations)} relations>"
 
     def of_type(self, *types: str) -> tuple[Component, ...]:
         """Return all components of some types, in the order of the file."""

@@ -20,7 +20,7 @@ from exugear.gearbox.parts import LoadCase
 from exugear.gearbox.train.statics import UNLOADED
 from exugear.gearbox.variant import Variant
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.notebook import html_table, value_range
+from fe_ste.tools.display import Displayed, TitledRows, value_range
 
 Series = Mapping[str, tuple[Floats, Floats]]
 BURSTING_RIM_SPEED = 300.0
@@ -34,7 +34,7 @@ INSTANTS = 2001
 
 
 @dataclass(frozen=True)
-class LoadSummary:
+class LoadSummary(Displayed, line=" {name!r}: net torque {net_torque:g} N m, {start_speed:g} to {end_speed:g} rad/s"):
     """A load case in figures, of the rolling train.
 
     Attributes
@@ -77,26 +77,16 @@ class LoadSummary:
     reversed_flanks: tuple[str, ...]
     least_shares: Mapping[str, float]
 
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return (
-            f"<LoadSummary {self.name!r}: net torque {self.net_torque:g} N m, "
-            f"{self.start_speed:g} to {self.end_speed:g} rad/s>"
-        )
-
-    def _repr_html_(self) -> str:
+    def _table(self) -> TitledRows:
         speeds = (self.start_speed, self.end_speed, self.fastest_speed)
-        return html_table(
-            f"load case {self.name} of the rolling train",
-            {
-                "inertia at the input": value_range(self.inertia, "kg m2"),
-                "net torque at the input": value_range(self.net_torque, "N m"),
-                "driven": "yes" if self.driven else "no",
-                "start, end and fastest speed of the input": ", ".join(value_range(speed, "rad/s") for speed in speeds),
-                "flanks": ", ".join(f"{family} {flank}" for family, flank in self.flanks.items()),
-                "on another flank than by the static load": ", ".join(self.reversed_flanks) or "none",
-            },
-        )
+        return f"load case {self.name} of the rolling train", {
+            "inertia at the input": value_range(self.inertia, "kg m2"),
+            "net torque at the input": value_range(self.net_torque, "N m"),
+            "driven": "yes" if self.driven else "no",
+            "start, end and fastest speed of the input": ", ".join(value_range(speed, "rad/s") for speed in speeds),
+            "flanks": ", ".join(f"{family} {flank}" for family, flank in self.flanks.items()),
+            "on another flank than by the static load": ", ".join(self.reversed_flanks) or "none",
+        }
 
     @property
     def fastest_rim(self) -> tuple[str, float]:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, TypeVar
 from pydantic import BaseModel, ConfigDict, Field
 
 from exugear.gearbox.sections import quantities as q
-from fe_ste.tools.notebook import html_table
+from fe_ste.tools.display import html_table
 
 GROUND = "ground"
 """Name of what stands still, where a body could be named."""

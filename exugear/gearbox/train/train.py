@@ -19,11 +19,13 @@ from exugear.gearbox.train.kinematics import (
 )
 from exugear.gearbox.train.statics import holding_forces, without_round_off
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.notebook import html_table
+from fe_ste.tools.display import Displayed, TitledRows
 
 
 @dataclass(frozen=True, eq=False)
-class Train:
+class Train(
+    Displayed, line=" from {input!r} to {output!r}: {spins!n} spins, {meshes!n} meshes, {couplings!n} couplings"
+):
     """Bodies that turn about fixed or orbiting axes, tied by rigid meshes and couplings.
 
     It knows no gearbox: what it cannot do it tells through `fault`, which names the file.
@@ -64,24 +66,14 @@ class Train:
     locked: tuple[str, ...]
     fault: Callable[[str], Exception]
 
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return (
-            f"<Train from {self.input!r} to {self.output!r}: {len(self.spins)} spins, {len(self.meshes)} meshes, "
-            f"{len(self.couplings)} couplings>"
-        )
-
-    def _repr_html_(self) -> str:
-        return html_table(
-            f"train from {self.input} to {self.output}",
-            {
-                "ratio": f"{self.ratio:.6g}",
-                "degrees of freedom": str(self.degrees_of_freedom),
-                "spins": ", ".join(self.spins),
-                "static load": ", ".join(f"{torque:g} N m on {body}" for body, torque in self.torques.items()),
-                "held by": ", ".join(self.locked) or "nothing",
-            },
-        )
+    def _table(self) -> TitledRows:
+        return f"train from {self.input} to {self.output}", {
+            "ratio": f"{self.ratio:.6g}",
+            "degrees of freedom": str(self.degrees_of_freedom),
+            "spins": ", ".join(self.spins),
+            "static load": ", ".join(f"{torque:g} N m on {body}" for body, torque in self.torques.items()),
+            "held by": ", ".join(self.locked) or "nothing",
+        }
 
     @cached_property
     def spin_rows(self) -> Floats:

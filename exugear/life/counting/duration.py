@@ -11,10 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.display import Displayed
 
 
 @dataclass(frozen=True, eq=False)
-class DurationDistribution:
+class DurationDistribution(Displayed):
     """Hours and revolutions over bins of torque; empty bins are left out.
 
     Attributes
@@ -33,9 +34,8 @@ class DurationDistribution:
     hours: Floats
     revolutions: Floats
 
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<DurationDistribution: {len(self.hours)} bins, {self.hours.sum():.6g} h>"
+    def _line(self) -> str:
+        return f": {len(self.hours)} bins, {self.hours.sum():.6g} h"
 
     @property
     def speed(self) -> Floats:
@@ -90,7 +90,7 @@ def load_duration(
 
 
 @dataclass(frozen=True, eq=False)
-class LoadPoints:
+class LoadPoints(Displayed):
     """Torques with what acts beside them: the bins of a distribution, split where other loads differ.
 
     Attributes
@@ -110,9 +110,8 @@ class LoadPoints:
     revolutions: Floats
     bin: Integers
 
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<LoadPoints: {len(self.hours)} points, {self.hours.sum():.6g} h>"
+    def _line(self) -> str:
+        return f": {len(self.hours)} points, {self.hours.sum():.6g} h"
 
     @property
     def speed(self) -> Floats:

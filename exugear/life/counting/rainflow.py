@@ -11,6 +11,7 @@ from array import array
 import numpy as np
 
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.display import Displayed
 
 _AT_ONCE = 100_000
 """Turning points that are Python's numbers at once."""
@@ -34,7 +35,7 @@ def reversals(series: Floats) -> Floats:
     return np.asarray(points[np.unique(np.concatenate([[0], inner, [len(points) - 1]]))])
 
 
-class Rainflow:
+class Rainflow(Displayed):
     """Cycles of a series that comes in pieces, counted as `rainflow` counts them; the series itself is not kept.
 
     Examples
@@ -53,9 +54,8 @@ class Rainflow:
         self._closed = array("d")  # range, mean and count, one after the other
         self._tail = np.zeros(0)
 
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<Rainflow: {len(self._closed) // 3} cycles closed, {len(self._open)} turning points open>"
+    def _line(self) -> str:
+        return f": {len(self._closed) // 3} cycles closed, {len(self._open)} turning points open"
 
     def add(self, piece: Floats) -> None:
         """Take the next piece of the series."""

@@ -18,6 +18,7 @@ from exugear.gearbox.parts import RPM
 from exugear.gearbox.sections.loads import RatingSection
 from exugear.results.run_file import read_run
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.display import Displayed
 from fe_ste.tools.files import FileError
 
 CYCLES = 20.0
@@ -29,7 +30,7 @@ WITHIN = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class DynamicFactor:
+class DynamicFactor(Displayed):
     """K_v over the speed of the loaded body.
 
     Attributes
@@ -47,9 +48,8 @@ class DynamicFactor:
     least: float = 1.0
     source: str = ""
 
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<DynamicFactor: {self.value.min():.3f} to {self.value.max():.3f} at {len(self.speed)} speeds>"
+    def _line(self) -> str:
+        return f": {self.value.min():.3f} to {self.value.max():.3f} at {len(self.speed)} speeds"
 
     def at(self, speed: Floats) -> Floats:
         """Largest factor near each speed (rad/s); beyond the run that of its end."""

@@ -29,13 +29,14 @@ from exugear.life.load_spectrum.sources import (
     section_of,
     told,
 )
+from fe_ste.tools.display import Displayed
 
 EXPONENTS = (3.0, 10.0 / 3.0, 6.61, 8.74)
 """Slopes of the S-N curves of steel structures, of roller bearings, and of contact and bending of gears over torque."""
 
 
 @dataclass(frozen=True, eq=False)
-class CountedLoads:
+class CountedLoads(Displayed, line=" on {body!r}: {sources!n} sources, {distribution!r}"):
     """Loads of a gearbox, counted.
 
     Attributes
@@ -69,10 +70,6 @@ class CountedLoads:
     bearings: Mapping[str, float]
     mesh_forces: Mapping[str, float]
     bin_value: str
-
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<CountedLoads on {self.body!r}: {len(self.sources)} sources, {self.distribution!r}>"
 
     @property
     def remarks(self) -> tuple[str, ...]:

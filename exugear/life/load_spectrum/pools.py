@@ -14,6 +14,7 @@ import numpy as np
 
 from exugear.life.counting.rainflow import Rainflow, equivalent_range
 from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.display import Displayed
 
 HUB_LOADS = 5
 """Loads of a hub beside its torque: force along x, y, z, moment about x and y."""
@@ -30,7 +31,7 @@ FINE, COARSE = 42, 47
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
+class Samples(Displayed):
     """Loads that last.
 
     Attributes
@@ -50,9 +51,8 @@ class Samples:
         """Return the number of samples."""
         return len(self.torque)
 
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<Samples: {len(self)}>"
+    def _line(self) -> str:
+        return f": {len(self)}"
 
     def within(self, kept: np.ndarray) -> Samples:
         """Return those of a mask."""

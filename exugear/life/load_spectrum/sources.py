@@ -31,6 +31,7 @@ from exugear.life.load_spectrum.rexs_load_cases import rexs_load_cases
 from exugear.life.load_spectrum.series import LARGEST_SPEED, LARGEST_TORQUE, SeriesReader
 from exugear.life.load_spectrum.wind import bin_of_wind, hours_of_bins
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.display import Displayed
 
 HOURS_PER_YEAR = 8766.0
 HUB_CELLS = 8
@@ -47,7 +48,7 @@ Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, eq=False)
-class LoadSource:
+class LoadSource(Displayed):
     """Samples of one source over the life of the gearbox.
 
     Attributes
@@ -104,9 +105,8 @@ class LoadSource:
     equivalent_ranges: Mapping[tuple[str, float], float]
     remarks: tuple[str, ...] = ()
 
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<LoadSource {self.name!r}: {self.kind}, {self.count} samples, {self.hours.sum():.6g} h>"
+    def _line(self) -> str:
+        return f" {self.name!r}: {self.kind}, {self.count} samples, {self.hours.sum():.6g} h"
 
     @property
     def hub_loads(self) -> Floats:

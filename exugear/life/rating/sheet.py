@@ -20,6 +20,7 @@ from exugear.life.static_balance import StaticBalance
 from exugear.life.verdict import LEFT_OUT
 from fe_ste.standards.pitting import tangential_force
 from fe_ste.standards.tooth_root import root_stress_factors
+from fe_ste.tools.display import Displayed
 
 LEAST_FORCE = 1.0
 """Tangential force, N, below which a mesh carries nothing: there is no line load to rate."""
@@ -68,7 +69,7 @@ class FlankSheet:
 
 
 @dataclass(frozen=True, eq=False)
-class RatingSheet:
+class RatingSheet(Displayed, line=" by {edition}: {flanks!n} flanks"):
     """All flanks that are loaded, under what, and what is left out.
 
     Attributes
@@ -84,10 +85,6 @@ class RatingSheet:
     shortfalls: tuple[str, ...]
     assumptions: tuple[str, ...]
     left_out: tuple[str, ...] = LEFT_OUT
-
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<RatingSheet by {self.edition}: {len(self.flanks)} flanks>"
 
     def summary(self) -> dict[str, Any]:
         """Figures for programs: units in the keys; numbers that are none are left out, infinite ones are words."""

@@ -13,7 +13,7 @@ import numpy as np
 from exugear.results.spectra.resonances import Pick, peaks_on_line
 from exugear.results.spectra.run_spectra import Finding, VariantRun
 from exugear.results.spectra.waterfall import Waterfall
-from fe_ste.tools.notebook import html_table
+from fe_ste.tools.display import Displayed, TitledRows
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def _is_absent(pick: Pick, other: Waterfall, peaks: Sequence[Pick], rule: Absenc
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Comparison(Displayed):
     """Run-ups of two variants under the same law, inertia set and load case.
 
     Attributes
@@ -88,18 +88,16 @@ class Comparison:
     second: VariantRun
     rule: AbsenceRule
 
-    def __repr__(self) -> str:
-        """Name both variants, and count the resonances that only one shows."""
+    def _line(self) -> str:
         counts = f"only first {len(self.only_first)}, only second {len(self.only_second)}"
-        return f"Comparison({shorten(self._title, 130)}: {counts})"
+        return f" {shorten(self._title, 130)}: {counts}"
 
-    def _repr_html_(self) -> str:
-        """Show the resonances that only one run shows as a small table in a notebook."""
+    def _table(self) -> TitledRows:
         rows = {
             f"only {run.variant}": ", ".join(f"{finding.resonance.frequency:.0f} Hz" for finding in findings) or "none"
             for run, findings in ((self.first, self.only_first), (self.second, self.only_second))
         }
-        return html_table(self._title, rows | {"rule": self.rule.description})
+        return self._title, rows | {"rule": self.rule.description}
 
     @property
     def _title(self) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.display import Displayed
 
 NEAR = 0.05
 """A mode within this part of a frequency counts as near it."""
@@ -28,7 +29,7 @@ def mobility_shares(modes: xr.Dataset) -> Floats:
 
 
 @dataclass(frozen=True)
-class ModeReport:
+class ModeReport(Displayed):
     """One eigenmode in figures.
 
     Attributes
@@ -61,10 +62,9 @@ class ModeReport:
     strain: Mapping[str, float]
     kinetic: Mapping[str, float]
 
-    def __repr__(self) -> str:
-        """Name the mode in short; the shares of energy stand in `strain` and `kinetic`."""
+    def _line(self) -> str:
         share = f"share {100 * self.share:.2g} %"
-        return f"ModeReport({self.index}: {self.frequency:.1f} Hz, {share}, {shorten(self.name, 90)})"
+        return f" {self.index}: {self.frequency:.1f} Hz, {share}, {shorten(self.name, 90)}"
 
     def is_near(self, frequency: float, tolerance: float = NEAR) -> bool:
         """Tell whether the mode lies within a part of a frequency (Hz)."""

@@ -13,11 +13,11 @@ from exugear.gearbox.parts import RPM
 from exugear.results.spectra.orders import OrderLine
 from exugear.results.spectra.waterfall import overlapping_frames
 from fe_ste.tools.arrays import Complexes, Floats
-from fe_ste.tools.notebook import html_table, value_range
+from fe_ste.tools.display import Displayed, TitledRows, value_range
 
 
 @dataclass(frozen=True)
-class OrderCut:
+class OrderCut(Displayed):
     """Amplitude and phase along an order.
 
     Attributes
@@ -36,13 +36,11 @@ class OrderCut:
     frequency: Floats
     amplitude: Complexes
 
-    def __repr__(self) -> str:
-        """Order, spans and the highest amplitude; no arrays."""
-        return f"OrderCut({shorten(', '.join(f'{name} {value}' for name, value in self._rows.items()), 180)})"
+    def _line(self) -> str:
+        return f": {shorten(', '.join(f'{name} {value}' for name, value in self._rows.items()), 180)}"
 
-    def _repr_html_(self) -> str:
-        """Show the same as a small table in a notebook."""
-        return html_table("Order cut", self._rows)
+    def _table(self) -> TitledRows:
+        return "Order cut", self._rows
 
     @property
     def _rows(self) -> dict[str, str]:

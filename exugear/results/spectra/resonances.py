@@ -14,7 +14,7 @@ from exugear.gearbox.parts import RPM
 from exugear.results.spectra.orders import OrderLine
 from exugear.results.spectra.waterfall import Waterfall
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.notebook import html_table
+from fe_ste.tools.display import Displayed, TitledRows
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ def _pick_at(
 
 
 @dataclass(frozen=True)
-class Resonance:
+class Resonance(Displayed, line=" {_frequency_text}, {_highest_text}, {picks!n} peaks"):
     """Peaks of several order lines at one frequency.
 
     Attributes
@@ -139,14 +139,9 @@ class Resonance:
     resolution: float
     picks: tuple[Pick, ...]
 
-    def __repr__(self) -> str:
-        """Frequency with its resolution, and the orders that show it."""
-        return f"Resonance({self._frequency_text}, {self._highest_text}, {len(self.picks)} peaks)"
-
-    def _repr_html_(self) -> str:
-        """Show frequency and each order's level as a small table in a notebook."""
+    def _table(self) -> TitledRows:
         rows = {pick.line.name: f"{pick.level:.1f} dB at {pick.speed / RPM:.1f} rpm" for pick in self.picks}
-        return html_table(f"Resonance, {self._frequency_text}", rows)
+        return f"Resonance, {self._frequency_text}", rows
 
     @property
     def _frequency_text(self) -> str:

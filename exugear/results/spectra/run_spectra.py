@@ -26,7 +26,7 @@ from exugear.results.spectra.resonances import (
 from exugear.results.spectra.spectrum import sweep_matched_window
 from exugear.results.spectra.waterfall import Waterfall, waterfall
 from fe_ste.tools.arrays import Floats, Integers
-from fe_ste.tools.notebook import html_table
+from fe_ste.tools.display import Displayed, TitledRows
 
 LEAST_SHARE = 1e-5
 """Modes with a smaller share of the overall transmission error's mobility are no match for a resonance of it."""
@@ -39,7 +39,7 @@ _NAMES = ("time", "input_speed", "overall_dte")
 
 
 @dataclass(frozen=True)
-class RunSignals:
+class RunSignals(Displayed, line=": {overall.size} samples at {rate:.6g} Hz"):
     """What the waterfall of a run-up is made of.
 
     Attributes
@@ -61,10 +61,6 @@ class RunSignals:
     span: float
     speed: Floats
     overall: Floats
-
-    def __repr__(self) -> str:
-        """One line."""
-        return f"RunSignals({self.overall.size} samples at {self.rate:.6g} Hz)"
 
     @property
     def suitable_window(self) -> float:
@@ -156,7 +152,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class VariantRun:
+class VariantRun(Displayed):
     """A run-up with its spectra, resonances and modes.
 
     Attributes
@@ -176,15 +172,13 @@ class VariantRun:
     picks: tuple[Pick, ...]
     modes: xr.Dataset | None
 
-    def __repr__(self) -> str:
-        """Name the model and the load case, and count what stands out."""
-        return f"VariantRun({shorten(f'{self.variant}, {self.conditions}', 150)}, {len(self.picks)} peaks)"
+    def _line(self) -> str:
+        return f" {shorten(f'{self.variant}, {self.conditions}', 150)}, {len(self.picks)} peaks"
 
-    def _repr_html_(self) -> str:
-        """Show each resonance as a row of a small table in a notebook."""
+    def _table(self) -> TitledRows:
         peaks = [(finding.resonance.frequency, finding.strongest) for finding in self.findings()]
         rows = {f"{frequency:.0f} Hz": f"{peak.level:.1f} dB on {peak.line.name}" for frequency, peak in peaks}
-        return html_table(f"Run-up of variant {self.variant}, {self.conditions}", rows)
+        return f"Run-up of variant {self.variant}, {self.conditions}", rows
 
     @property
     def variant(self) -> str:

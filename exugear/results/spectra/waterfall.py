@@ -16,11 +16,11 @@ from exugear.gearbox.parts import RPM
 from exugear.results.spectra.orders import OrderLine
 from exugear.results.spectra.spectrum import amplitude_spectrum, sweep_limited_resolution
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.notebook import html_table, value_range
+from fe_ste.tools.display import Displayed, TitledRows, value_range
 
 
 @dataclass(frozen=True)
-class Waterfall:
+class Waterfall(Displayed, line=": {time.size} spectra of {frequency.size} lines, {_spans}, {description}"):
     """Spectra over the speed of the reference shaft.
 
     Attributes
@@ -53,12 +53,7 @@ class Waterfall:
     reference: float
     unit: str
 
-    def __repr__(self) -> str:
-        """Sizes, spans and window; no arrays."""
-        return f"Waterfall({self.time.size} spectra of {self.frequency.size} lines, {self._spans}, {self.description})"
-
-    def _repr_html_(self) -> str:
-        """Show the same as a small table in a notebook."""
+    def _table(self) -> TitledRows:
         rows = {
             "spectra": str(self.time.size),
             "spectral lines": str(self.frequency.size),
@@ -68,7 +63,7 @@ class Waterfall:
             "level": value_range(self.level, f"dB re {self.reference_text}"),
             "analysis": self.description,
         }
-        return html_table("Waterfall", rows)
+        return "Waterfall", rows
 
     @property
     def _spans(self) -> str:

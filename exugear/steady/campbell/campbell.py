@@ -12,6 +12,7 @@ from exugear.steady.campbell.mode_tracks import Found, ModeTracks, mode_tracks
 from exugear.steady.mean_system.mean_modes import mean_modes
 from exugear.steady.mean_system.mean_system import MeanSystem
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.display import Displayed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,7 +31,7 @@ SAME_FREQUENCY = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Campbell:
+class Campbell(Displayed, line=": {names!n} modes at {speeds!n} speeds"):
     """Modes over speed; n speeds, m modes.
 
     Attributes
@@ -50,10 +51,6 @@ class Campbell:
     whirl: Floats
     kinds: tuple[str, ...]
     names: tuple[str, ...]
-
-    def __repr__(self) -> str:
-        """Sizes in one line."""
-        return f"<Campbell: {len(self.names)} modes at {len(self.speeds)} speeds>"
 
     def mode_at(self, speed: float, frequency: float) -> int | None:
         """Find the mode that has a frequency (Hz) at a speed (rad/s), None where none is near."""

@@ -14,6 +14,7 @@ import numpy as np
 
 from exugear.steady.harmonics.lines import LineSet
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
+from fe_ste.tools.display import Displayed
 
 GROWTH = 1.15
 """Factor from one number of samples that is tried to the next."""
@@ -26,7 +27,7 @@ class LatticeError(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class Lattice:
+class Lattice(Displayed, line=": {samples} samples for {lines.index!n} lines"):
     """Samples of quasi-periodic signals.
 
     Attributes
@@ -39,10 +40,6 @@ class Lattice:
     lines: LineSet
     generator: Integers
     samples: int
-
-    def __repr__(self) -> str:
-        """Sizes in one line."""
-        return f"<Lattice: {self.samples} samples for {len(self.lines.index)} lines>"
 
     @cached_property
     def angles(self) -> Floats:

@@ -20,6 +20,7 @@ from functools import cached_property
 import numpy as np
 
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
+from fe_ste.tools.display import Displayed
 
 LARGEST_RATIO = 40
 """Integers up to which a ratio of two bases is looked for: harmonics that any set has."""
@@ -28,7 +29,7 @@ SAME = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class LineSet:
+class LineSet(Displayed, line=": {index!n} lines of {index.shape[1]} bases"):
     r"""Lines of a real signal x = x_0 + sum_k (c_k e^(i k . theta) + its conjugate).
 
     Arrays of a signal have the coefficients c along their first axis; the first one, the mean, is real. The peak
@@ -47,10 +48,6 @@ class LineSet:
     index: Integers
     bases: Floats
     units: Integers
-
-    def __repr__(self) -> str:
-        """Sizes in one line."""
-        return f"<LineSet: {len(self.index)} lines of {self.index.shape[1]} bases>"
 
     @cached_property
     def orders(self) -> Floats:

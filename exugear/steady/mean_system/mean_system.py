@@ -31,6 +31,7 @@ from exugear.steady.mean_system.rotating_frame import (
     planet_sets,
 )
 from fe_ste.tools.arrays import Complexes, Floats
+from fe_ste.tools.display import Displayed
 
 PLACE_STEP, RATE_STEP = 1e-6, 1e-3
 """Steps of central differences by u and u'; forces are all but linear in the latter."""
@@ -65,7 +66,7 @@ LEAST_ENERGY = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class MeanSystem:
+class MeanSystem(Displayed):
     """Mean system of an assembly over speed.
 
     Attributes
@@ -102,9 +103,8 @@ class MeanSystem:
     planet_spread: float
     variation: float
 
-    def __repr__(self) -> str:
-        """Size and speeds in one line."""
-        return f"<MeanSystem: {self.size} coordinates, {self.speeds.min():.4g} to {self.speeds.max():.4g} rad/s>"
+    def _line(self) -> str:
+        return f": {self.size} coordinates, {self.speeds.min():.4g} to {self.speeds.max():.4g} rad/s"
 
     @property
     def size(self) -> int:

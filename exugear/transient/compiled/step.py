@@ -23,6 +23,7 @@ from exugear.transient.compiled.methods import (
     stabilised,
 )
 from fe_ste.tools.arrays import Complexes, Floats
+from fe_ste.tools.display import Displayed
 
 MARGIN = 1.2
 """By this factor all motions may be faster before the step is not stable: stiffness by 1.44, room for teeth that carry
@@ -48,7 +49,7 @@ MOST_DIVISIONS = 100_000
 
 
 @dataclass(frozen=True, eq=False)
-class Integration:
+class Integration(Displayed):
     """How a run is integrated.
 
     Attributes
@@ -82,9 +83,8 @@ class Integration:
         """Whether both errors are as small as a run that chooses its step asks for."""
         return abs(self.forced_error) <= FORCED_ERROR and self.resonance_error <= RESONANCE_ERROR
 
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<Integration: {self.method.name}, step {1e6 * self.step:.4g} us, margin {self.margin:.2g}>"
+    def _line(self) -> str:
+        return f": {self.method.name}, step {1e6 * self.step:.4g} us, margin {self.margin:.2g}"
 
 
 def eigenvalues(assembly: Assembly) -> Complexes:

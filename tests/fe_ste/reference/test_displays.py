@@ -100,7 +100,8 @@ class Page(HTMLParser):
 
 
 def test_a_notebook_shows_small_tables_and_runs_no_name(shown):
-    tables = {name: value._repr_html_() for name, value in shown.items() if hasattr(value, "_repr_html_")}
+    pieces = {name: value._repr_html_() for name, value in shown.items()}
+    tables = {name: piece for name, piece in pieces.items() if piece.startswith("<table>")}
     assert {"Gear", "GearPair", "FlankModification", "MeshTable", "NonlinearTable", "SteSurface"} < set(tables)
     for name, table in tables.items():
         page = Page()

@@ -26,10 +26,11 @@ from exugear.exchange.rexs.to_case.conversion import to_case
 from exugear.exchange.rexs.to_case.notes import Rules
 from exugear.exchange.rexs.tree import Model
 from exugear.gearbox.gearbox import Gearbox
+from fe_ste.tools.display import Displayed
 
 
 @dataclass(frozen=True)
-class Exported:
+class Exported(Displayed, line=": {named} attributes of REXS, {own} of exugear"):
     """A REXS file with results.
 
     Attributes
@@ -51,10 +52,6 @@ class Exported:
     named: int
     replaced: tuple[str, ...]
     left_out: tuple[str, ...]
-
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<Exported: {self.named} attributes of REXS, {self.own} of exugear>"
 
 
 def with_results(gearbox: Gearbox, folder: Path, path: str | Path, rules: Rules | None = None) -> Exported:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from exugear.exchange.rexs.additions import OWN, Addition, AdditionValue, unit_in
+from fe_ste.tools.display import Displayed
 
 Version = tuple[int, int]
 
@@ -96,7 +97,7 @@ def stiffness_names(version: Version) -> Iterator[tuple[str, int, int, str, floa
 
 
 @dataclass
-class Results:
+class Results(Displayed, line=": {additions!n} attributes"):
     """Attributes gathered for a file.
 
     Attributes
@@ -108,10 +109,6 @@ class Results:
 
     version: Version
     additions: list[Addition] = field(default_factory=list)
-
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<Results: {len(self.additions)} attributes>"
 
     def put(
         self, component: int, key: str, unit: str, value: AdditionValue | None, load_case: int | None = None

@@ -14,10 +14,11 @@ from exugear.exchange.rexs.to_case.places import Places
 from exugear.exchange.rexs.to_case.supports import BEARINGS, PLACE_TOLERANCE
 from exugear.exchange.rexs.tree import Component, Model
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.display import Displayed
 
 
 @dataclass(frozen=True)
-class Origins:
+class Origins(Displayed, line=" of {gears!n} gears, {pairs!n} pairs, {bearings!n} bearings"):
     """Numbers of components by the names of parts; those of planets in the order of their angles.
 
     Attributes
@@ -37,10 +38,6 @@ class Origins:
     bodies: Mapping[str, tuple[tuple[int, ...], ...]]
     axes: Mapping[int, Floats]
     places: Mapping[int, float]
-
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<Origins of {len(self.gears)} gears, {len(self.pairs)} pairs, {len(self.bearings)} bearings>"
 
 
 def origins_of(found: Found) -> Origins:

@@ -10,6 +10,7 @@ from exugear.exchange.rexs.faults import RexsError
 from exugear.exchange.rexs.to_case.notes import Notes
 from exugear.exchange.rexs.to_case.places import Places
 from exugear.exchange.rexs.tree import Component, Model
+from fe_ste.tools.display import Displayed
 
 GEARS = ("cylindrical_gear", "ring_gear")
 JOINING = (
@@ -77,7 +78,7 @@ class Body:
         return self.of_type(*GEARS)
 
 
-class Bodies:
+class Bodies(Displayed):
     """All bodies of a gearbox, by name and by component."""
 
     def __init__(self, members: Sequence[Body]) -> None:
@@ -85,9 +86,8 @@ class Bodies:
         self._of_part = {part.number: body for body in members for part in body.parts}
         self._of_other = {part.number: body for body in members for each in body.others for part in each}
 
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<Bodies: {', '.join(body.name for body in self.members)}>"
+    def _line(self) -> str:
+        return f": {', '.join(body.name for body in self.members)}"
 
     def of(self, part: Component) -> Body | None:
         """Body of a component; None for what is idle, or a planet that is not the first of its set."""

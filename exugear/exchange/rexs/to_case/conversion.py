@@ -63,6 +63,7 @@ from exugear.exchange.rexs.to_case.supports import (
 from exugear.exchange.rexs.tree import Component, Model
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
+from fe_ste.tools.display import Displayed
 
 OTHER_GEARS = {"bevel": "bevel gears", "worm": "worm gears", "hypoid": "hypoid gears"}
 """Beginnings of the types of gears that are not cylindrical."""
@@ -111,7 +112,7 @@ READ_TYPES = frozenset(
 
 
 @dataclass(frozen=True)
-class Found:
+class Found(Displayed, line=" in {model!r}: {bodies!r}"):
     """What an import found in a REXS file, with the names of the gearbox file.
 
     Attributes
@@ -129,13 +130,9 @@ class Found:
     teeth: Teeth
     bearings: Mapping[str, Block]
 
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<Found in {self.model!r}: {self.bodies!r}>"
-
 
 @dataclass(frozen=True)
-class Imported:
+class Imported(Displayed, line=" {gearbox!r}: {changed!n} assumptions, {ignored!n} left out"):
     """Outcome of an import.
 
     Attributes
@@ -164,10 +161,6 @@ class Imported:
     checked: tuple[str, ...]
     found: Found
     spectrum: str
-
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<Imported {self.gearbox!r}: {len(self.changed)} assumptions, {len(self.ignored)} left out>"
 
 
 def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules: Rules | None = None) -> Imported:

@@ -10,6 +10,7 @@ from exugear.exchange.rexs.faults import Faults, RexsError
 from exugear.exchange.rexs.to_case.notes import tidy
 from exugear.exchange.rexs.tree import Component, Model
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.display import Displayed
 
 PARALLEL = 1e-6
 """Largest sine of the angle between axes that count as parallel."""
@@ -19,7 +20,7 @@ TURNING = ("shaft", "cylindrical_gear", "ring_gear", "side_plate")
 """Types whose u axis is an axis that something turns about."""
 
 
-class Places:
+class Places(Displayed):
     """Positions (mm) and senses of components.
 
     REXS places a component in the frame (u, v, w) of another, most often of the gear unit. Here x, y, z are the
@@ -48,9 +49,8 @@ class Places:
             names = ", ".join(str(part) for part in skew[:3])
             raise RexsError(f"the axis of {names} is not parallel to the others; only parallel axes can be imported")
 
-    def __repr__(self) -> str:
-        """Return one short line."""
-        return f"<Places along {np.round(self._axes[2], 3).tolist()}>"
+    def _line(self) -> str:
+        return f" along {np.round(self._axes[2], 3).tolist()}"
 
     def position(self, part: Component) -> tuple[float, float, float]:
         """Origin of a component, mm: the left end of a shaft or plate, the middle of all else.

@@ -21,11 +21,11 @@ def spectra(runs):
     cut = order_cut(time, speed, RATE, OrderLine("<b>" + 300 * "long ", 60.0), window_length=0.1)
     conditions = "load case run_up, law line_of_action, inertias gears"
     return {
-        "Waterfall(995 spectra of 820 lines, ": run,
-        "OrderCut(order 60 (<b>long long": cut,
-        "Resonance(60": group_by_frequency(pick_resonances(run, [MESH]))[0],
-        f"VariantRun(bushing, {conditions}, 3 peaks)": runs[0],
-        f"Comparison(bushing with rigid, {conditions}: only first 2, only second 0)": compare(*runs),
+        "<Waterfall: 995 spectra of 820 lines, ": run,
+        "<OrderCut: order 60 (<b>long long": cut,
+        "<Resonance 60": group_by_frequency(pick_resonances(run, [MESH]))[0],
+        f"<VariantRun bushing, {conditions}, 3 peaks>": runs[0],
+        f"<Comparison bushing with rigid, {conditions}: only first 2, only second 0>": compare(*runs),
     }
 
 
@@ -53,5 +53,5 @@ def test_a_comparison_lists_what_only_one_run_shows(runs):
 def test_a_mode_in_figures_is_short_whatever_moves():
     modes = modes_dataset([0.0, 90.0], [0.0, 0.5])
     modes["name"][1] = 50 * "planet_1 spin 3 %, "
-    assert repr(report_mode(modes, 1)).startswith("ModeReport(1: 90.0 Hz, share 1e+02 %, planet_1 spin")
+    assert repr(report_mode(modes, 1)).startswith("<ModeReport 1: 90.0 Hz, share 1e+02 %, planet_1 spin")
     assert len(repr(report_mode(modes, 1))) < 200

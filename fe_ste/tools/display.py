@@ -1,0 +1,128 @@
+"""How objects show themselves: a line of text, a small HTML table in a notebook, ranges of values with their unit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from html import escape
+from string import Formatter
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+TitledRows = tuple[str, Mapping[str, str]]
+"""Title of a table, and what is told -> its value as text, with its unit."""
+
+
+class _Fields(Formatter):
+    """Formats attributes of an object as strings format fields, and ``!n`` as the number of entries."""
+
+    def __init__(self, owner: object) -> None:
+        self.owner = owner
+
+    def get_value(self, key: int | str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> Any:
+        return getattr(self.owner, str(key))
+
+    def convert_field(self, value: Any, conversion: str | None) -> Any:
+        return {"n": len, "r": repr}[conversion](value) if conversion else value
+
+
+class Displayed:
+    """Shows itself as one line of text, and in a notebook as a small table.
+
+    A class states its line, or computes it in `_line`; one with a table gives its title and rows in `_table`.
+
+    Parameters
+    ----------
+    line : str
+        What stands behind the name of the class. Fields are attributes of the object, also dotted ones; ``!n`` is
+        the number of their entries.
+
+    Examples
+    --------
+    >>> class Shafts(Displayed, line=" of {gearbox!r}: {names!n} shafts, {mass:.1f} kg"):
+    ...     gearbox, names, mass = "GRC <1>", ("low", "high"), 812.345
+    >>> Shafts()
+    <Shafts of 'GRC <1>': 2 shafts, 812.3 kg>
+    >>> Shafts()._repr_html_()
+    '<p>&lt;Shafts of &#x27;GRC &lt;1&gt;&#x27;: 2 shafts, 812.3 kg&gt;</p>'
+    """
+
+    _stated_line: ClassVar[str] = ""
+
+    def __init_subclass__(cls, line: str | None = None) -> None:
+        """Take the line that the class states."""
+        super().__init_subclass__()
+        if line is not None:
+            cls._stated_line = line
+        # A dataclass keeps what its own class has and replaces what it inherits.
+        if "__repr__" not in vars(cls):
+            type.__setattr__(cls, "__repr__", Displayed.__repr__)
+
+    def __repr__(self) -> str:
+        """Return one short line."""
+        return f"<{type(self).__name__}{self._line()}>"
+
+    def _repr_html_(self) -> str:
+        title, rows = self._table()
+        return html_table(title, rows) if rows else f"<p>{_shown(repr(self))}</p>"
+
+    def _line(self) -> str:
+        return _Fields(self).format(self._stated_line)
+
+    def _table(self) -> TitledRows:
+        return "", {}
+
+
+def html_table(title: str, rows: Mapping[str, str]) -> str:
+    """Return a small HTML table; any text can be shown, none of it acts as HTML.
+
+    Parameters
+    ----------
+    title : str
+        Stands above the table.
+    rows : mapping of str to str
+        What is told -> its value as text, with its unit.
+
+    Returns
+    -------
+    str
+        One ``<table>`` without style, which takes that of the page.
+
+    Examples
+    --------
+    >>> html_table("gear <1>", {"teeth": "30"})
+    '<table><caption>gear &lt;1&gt;</caption><tr><th>teeth</th><td>30</td></tr></table>'
+    """
+    cells = (f"<tr><th>{_shown(name)}</th><td>{_shown(value)}</td></tr>" for name, value in rows.items())
+    return f"<table><caption>{_shown(title)}</caption>{''.join(cells)}</table>"
+
+
+def _shown(text: str) -> str:
+    """Escape a text; halves of characters, which no page can hold, become question marks."""
+    return escape(text.encode("utf-8", "replace").decode("utf-8"))
+
+
+def value_range(values: ArrayLike, unit: str, scale: float = 1.0) -> str:
+    """Return the least and the greatest of some values as text, or the one value.
+
+    Parameters
+    ----------
+    values : array_like
+        In any shape; those that are not a number are left out.
+    unit : str
+        Unit that is shown.
+    scale : float
+        What the values are multiplied by to have that unit.
+
+    Examples
+    --------
+    >>> value_range([0.09, 0.0905], "mm", 1e3), value_range(200.0, "N m")
+    ('90 to 90.5 mm', '200 N m')
+    """
+    numbers = scale * np.asarray(values, dtype=np.float64).ravel()
+    numbers = numbers[~np.isnan(numbers)]
+    if not numbers.size:
+        return "no value"
+    ends = [f"{number:.6g}" for number in (numbers.min(), numbers.max())]
+    return f"{' to '.join(dict.fromkeys(ends))} {unit}"
