@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from exugear.gearbox.named_files import Permissions
 from exugear.report.findings.context import Context
-from exugear.report.findings.groups import response_groups, run_groups
+from exugear.report.findings.groups import groups_of
 from exugear.report.findings.stored import bytes_of_runs, stored_models, with_responses
 from exugear.report.findings.variations import begin_variations, model_variations
 from exugear.report.findings.words import Words
@@ -140,7 +140,7 @@ def _material(context: Context, executor: Executor | None) -> Material:
     if not results:
         reasons = context.notes.left_out or ["no files"]
         raise ReportError("\n".join([f"{context.folder}: nothing here belongs to its case", *reasons]))
-    groups = (*run_groups(context, results), *response_groups(context, results))
+    groups = groups_of(context, results)
     words = Words(context.gearbox)
     material = Material(context, results, words, groups, (), lines_of(context), ArrayStore())
     # Last what another process computes meanwhile.

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from exugear.results.spectra.order_cut import OrderCut
-from exugear.results.spectra.orders import OrderLine
+from exugear.results.spectra.orders import SAME_ORDER, OrderLine
 from exugear.results.spectra.sweeps import sweep_severity
 from exugear.steady.harmonics.curve_peaks import standing_peaks
 from exugear.steady.mean_system.rotating_frame import SteadyError
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 LEAST_SPEEDS = 3
 """Speeds without which nothing stands out."""
-SAME_ORDER = 1e-6
-"""Share by which orders of one line may differ."""
 SAME_SPEED = 0.02
 """Share of the speed within which a peak belongs to the crossing of its line with a mode."""
 DRAWN, MANY_TURNS = 4096, 2e4
@@ -347,9 +345,10 @@ def steady_cut(data: xr.Dataset, line: OrderLine, signal: str = "overall_dte") -
     names, orders = [str(name) for name in data["signal"].to_numpy()], data["order"].to_numpy()
     if signal not in names:
         raise SteadyError(f"no signal {signal!r}; signals are {', '.join(names)}")
-    place = int(np.argmin(np.abs(orders - line.order)))
-    if abs(orders[place] - line.order) > SAME_ORDER * line.order:
-        raise SteadyError(f"no line of order {line.order:g}; the nearest is {orders[place]:g}")
+    place = line.place(orders)
+    if place is None:
+        nearest = orders[np.argmin(np.abs(orders - line.order))]
+        raise SteadyError(f"no line of order {line.order:g}; the nearest is {nearest:g}")
     own = data.isel(line=place, signal=names.index(signal))
     speed: Floats = data["speed"].to_numpy().astype(np.float64)
     amplitude = own["amplitude"].to_numpy() * np.exp(1j * own["phase"].to_numpy())

@@ -19,6 +19,7 @@ from exugear.gearbox.parts import RPM
 from exugear.steady.campbell.campbell import Campbell, campbell_of, modes_over_speed
 from exugear.steady.campbell.mode_tracks import ModeTracks
 from exugear.steady.contributions import Contributions, contributions, loudest_near
+from exugear.steady.crossings import HARMONICS, Crossing, crossings, missed_tops, with_crossings
 from exugear.steady.excitation import Gearset
 from exugear.steady.gearbox_branches import follow_branch
 from exugear.steady.harmonics.curve_peaks import standing_peaks
@@ -28,7 +29,6 @@ from exugear.steady.mean_system.quantities import Quantity, quantities_of
 from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.mean_system.signals import SignalName
 from exugear.steady.point_solver import PointSolver, gearset_of
-from exugear.steady.resonances import HARMONICS, Crossing, crossings, missed_tops, with_crossings
 from exugear.steady.response import Response, dissipated_and_given, signals
 from exugear.steady.settings import SteadySettings, check_law, check_speeds, usual_speeds
 from exugear.tooth_mesh.law import MeshData

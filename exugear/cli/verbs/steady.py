@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from exugear.project import Project
-    from exugear.report.findings.loudness.ranking import Ranking, Resonance
+    from exugear.report.findings.loudness import Ranking, Resonance
     from exugear.steady.peaks import Peak, Pull
     from exugear.steady.settings import SteadySettings
     from exugear.tooth_mesh.wandering_load import WanderingLoad
@@ -149,7 +149,7 @@ def _respond(project: Project, settings: SteadySettings) -> xr.Dataset:
 
 def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json: bool) -> None:
     from exugear.gearbox.parts import RPM
-    from exugear.report.findings.loudness.ranking import ranking_of
+    from exugear.report.findings.loudness import ranking_of
 
     growth, ranking = float(data.attrs["growth_rate"]), ranking_of(data)
     _tell_of_stability(data, growth)

@@ -1,6 +1,7 @@
-"""Channels of a run-up beside the overall transmission error: forces of bearings and joints, forces of meshes.
+"""Channels beside the overall transmission error: forces of bearings and joints, and of meshes, whichever source.
 
-Of the copies of a planet set one stands for all: the one whose force swings most.
+In a run-up one copy of a planet set stands for all: the one whose force swings most. In a steady response each wave
+around the carrier is a channel: mean, cosine, sine.
 """
 
 from __future__ import annotations
@@ -11,8 +12,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
+from exugear.report.findings.constant_speed import response_spectra
 from exugear.report.findings.words import Words
 from exugear.results.run_file import read_run
 from exugear.results.spectra.orders import OrderLine
@@ -26,6 +29,8 @@ SAMPLED = 8
 """Every which sample tells how much a force swings."""
 MEAN_PART = slice(1, 2)
 """Third of the run whose mean force is told: neither the start nor the fastest."""
+AXIAL = "z"
+"""Axis of a bearing's force that is not transverse."""
 
 _Signals = Mapping[str, NDArray[Any]]
 """Variables of a run by their names."""
@@ -33,7 +38,7 @@ _Signals = Mapping[str, NDArray[Any]]
 
 @dataclass(frozen=True)
 class Channel:
-    """A signal of a run-up with its waterfall.
+    """A signal of a run-up or a steady response with its waterfall.
 
     Attributes
     ----------
@@ -46,8 +51,9 @@ class Channel:
         How many equal parts it stands for.
     mean : float
         Mean force over the middle third of the run, N; of bearings that go round with a carrier, of its magnitude.
+        NaN of a steady response, which has what vibrates.
     axial : float
-        Mean axial force of a bearing there, N; NaN for a mesh.
+        Mean axial force of a bearing there, N; NaN for a mesh and of a steady response.
     spectra : Waterfall
         Of a support the root of the summed squares of both transverse forces.
     """
@@ -80,8 +86,11 @@ class LoudestOrder:
     frequency: float
 
 
-def channels_of(run: VariantRun, words: Words) -> Iterator[Channel]:
-    """Compute the channels of a run-up, bearings and joints first."""
+def channels_of(run: VariantRun, words: Words, response: xr.Dataset | None) -> Iterator[Channel]:
+    """Compute the channels of a run-up, or of the steady response that it was made of, bearings and joints first."""
+    if response is not None:
+        yield from _lines(response, words, float(run.spectra.frequency[-1]))
+        return
     data, _ = read_run(run.path, ("time", "input_speed", "support", "mesh", "mesh_force", "support_force"))
     yield from _supports(data, run, words)
     yield from _meshes(data, run, words)
@@ -111,6 +120,24 @@ def _meshes(data: _Signals, run: VariantRun, words: Words) -> Iterator[Channel]:
         told = words.of(words.family(names[place])) if copies > 1 else words.of(names[place])
         mean = float(_middle(own).mean(dtype=np.float64))
         yield Channel(names[place], "mesh", f"mesh {told}", copies, mean, math.nan, _waterfall(own, data, run))
+
+
+def _lines(response: xr.Dataset, words: Words, highest: float) -> Iterator[Channel]:
+    supports: dict[str, list[str]] = {}
+    meshes: dict[str, list[str]] = {}
+    for name in map(str, response["signal"].to_numpy()):
+        quantity, _, rest = name.partition(" ")
+        place, _, axis = rest.rpartition(" ")
+        if quantity == "support_force" and axis != AXIAL:
+            supports.setdefault(place, []).append(name)
+        elif quantity == "mesh_force":
+            meshes[rest] = [name]
+    for kind, before, places in (("support", "", supports), ("mesh", "mesh ", meshes)):
+        for place, signals in places.items():
+            spectra = response_spectra(response, signals, highest, 1.0, "N")
+            name, *wave = place.split(" ")
+            told = " ".join([before + words.of(name), *wave])
+            yield Channel(place, kind, told, 1, math.nan, math.nan, spectra)
 
 
 def _standing_for(names: Sequence[str], swings: Floats, words: Words) -> list[tuple[int, int]]:

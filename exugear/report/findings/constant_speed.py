@@ -14,7 +14,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.report.findings.context import choice_of
 from exugear.results.spectra.line_spectra import LineSpectra, line_spectra
 from exugear.results.spectra.orders import OrderLine
-from exugear.steady.peaks import BESIDE, SAME_ORDER
+from exugear.steady.peaks import BESIDE
 from exugear.steady.settings import LEVELS
 from exugear.steady.steady_file import settings_of
 from fe_ste.tools.arrays import Floats
@@ -69,9 +69,8 @@ class ConstantSpeed:
 
     def along(self, line: OrderLine) -> Floats | None:
         """Level at each speed, dB re 1 µm; None if the response has no such order."""
-        place = int(np.argmin(np.abs(self.orders - line.order)))
-        same = abs(self.orders[place] - line.order) < SAME_ORDER * line.order
-        return self.level[:, place] if same else None
+        place = line.place(self.orders)
+        return None if place is None else self.level[:, place]
 
     def near(self, line: OrderLine, frequency: float, resolution: float) -> Highest | None:
         """Return the highest peak of an order within what a run-up resolves about a frequency (both Hz).

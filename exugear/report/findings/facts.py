@@ -13,7 +13,7 @@ from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import REFERENCE_VARIANT, Context, choice_of
 from exugear.report.findings.groups import RankedResonance, RunGroup
 from exugear.report.findings.levers import Lever, levers_of
-from exugear.report.findings.loudness.ranking import Loudness, Ranking
+from exugear.report.findings.loudness import Loudness, Ranking
 from exugear.report.findings.variations import GAIN, BestChange, ModelVariations, best_change
 from exugear.report.findings.words import Words, figure_text
 from exugear.results.spectra.orders import order_lines

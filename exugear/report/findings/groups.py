@@ -23,12 +23,12 @@ from exugear.report.findings.constant_speed import (
     truest_response,
 )
 from exugear.report.findings.context import REFERENCE_VARIANT, Context, choice_of
-from exugear.report.findings.loudness.ranking import Ranking, ranking_of
+from exugear.report.findings.loudness import Ranking, ranking_of
 from exugear.report.findings.stored import StoredResults, run_key
 from exugear.results.spectra.comparison import AbsenceRule, Comparison, compare, only_in_first
-from exugear.results.spectra.line_spectra import pick_line_peaks
+from exugear.results.spectra.line_spectra import line_peaks
 from exugear.results.spectra.orders import order_lines
-from exugear.results.spectra.resonances import Pick
+from exugear.results.spectra.resonances import Pick, pick_resonances
 from exugear.results.spectra.run_spectra import Finding, VariantRun
 from exugear.results.spectra.waterfall import Waterfall
 from exugear.results.spectra.windows import OtherWindow, other_windows, stays_absent, survives
@@ -144,102 +144,87 @@ class RunGroup:
         return f"{self.source}, law {self.mesh_law}, inertias {self.inertias}, housing factor {', '.join(factors)}"
 
 
-def run_groups(context: Context, results: StoredResults) -> tuple[RunGroup, ...]:
-    """Gather the run-ups of a folder, those of the default inertia set first."""
-    gathered: dict[tuple[str, str, str], list[VariantRun]] = {}
-    for run in results.runs:
-        gathered.setdefault(run_key(run.attributes), []).append(run)
-    default = context.gearbox.case.default_inertias
-    keys = sorted(gathered, key=lambda key: (key[2] != default, key))
-    return tuple(_group(context, key, gathered[key], results) for key in keys)
+def groups_of(context: Context, results: StoredResults) -> tuple[RunGroup, ...]:
+    """Gather the run-ups of a folder, then its steady responses over a range of speeds.
 
-
-def _group(context: Context, key: tuple[str, str, str], runs: Sequence[VariantRun], results: StoredResults) -> RunGroup:
-    lines = order_lines(context.gearbox)
-    context.tell(f"other windows, {', '.join(key)}")
-    ordered = sorted(runs, key=lambda run: OFFERED.index(Variant.of(run.variant)))
-    windows = other_windows(ordered, lines)
-    by_variant = {run.variant: run for run in ordered}
-    levels = {variant: truest_of(results.steady, Choice(variant, *key[1:])) for variant in by_variant}
-    constant = {variant: own for variant, own in levels.items() if own is not None}
-    ranked = {variant: _ranked(by_variant, variant, windows, levels[variant]) for variant in by_variant}
-    reference = by_variant.get(REFERENCE_VARIANT)
-    comparisons = {
-        variant: compare(run, reference)
-        for variant, run in by_variant.items()
-        if reference is not None and run is not reference
-    }
-    response = truest_response(results.steady, Choice(ordered[-1].variant, *key[1:]))
-    loud = None if response is None or not is_over_speed(response) else ranking_of(response)
-    return RunGroup(f"run-up {key[0]}", *key[1:], by_variant, ranked, comparisons, constant, in_operation=loud)
-
-
-def response_groups(context: Context, results: StoredResults) -> tuple[RunGroup, ...]:
-    """Gather the steady responses of a folder that go over a range of speeds, those of the default inertia set first.
-
-    What `run_groups` reads out of run-ups is read out of the lines of these: the same orders, the same rules.
+    Of each the default inertia set comes first. What is read out of run-ups is read out of the lines of responses: the
+    same orders, the same rules.
     """
-    gathered: dict[tuple[str, str, str], dict[str, xr.Dataset]] = {}
+    runs: dict[tuple[str, str, str], list[VariantRun]] = {}
+    for run in results.runs:
+        runs.setdefault(run_key(run.attributes), []).append(run)
+    responses: dict[tuple[str, str, str], dict[str, xr.Dataset]] = {}
     for data in filter(is_over_speed, results.steady):
         key = str(data.attrs["level"]), str(data.attrs["mesh_law"]), str(data.attrs["inertias"])
-        gathered.setdefault(key, {})[str(data.attrs["variant"])] = data
+        responses.setdefault(key, {})[str(data.attrs["variant"])] = data
     default = context.gearbox.case.default_inertias
-    keys = sorted(gathered, key=lambda key: (key[2] != default, key))
-    return tuple(_response_group(context, key, gathered[key], results) for key in keys)
+
+    def rank(key: tuple[str, str, str]) -> tuple[bool, tuple[str, str, str]]:
+        return key[2] != default, key
+
+    return (
+        *(_of_runs(context, key, runs[key], results) for key in sorted(runs, key=rank)),
+        *(_of_responses(context, key, responses[key], results) for key in sorted(responses, key=rank)),
+    )
 
 
-def _response_group(
+def _of_runs(
+    context: Context, key: tuple[str, str, str], runs: Sequence[VariantRun], results: StoredResults
+) -> RunGroup:
+    context.tell(f"other windows, {', '.join(key)}")
+    by_variant = {run.variant: run for run in sorted(runs, key=lambda run: OFFERED.index(Variant.of(run.variant)))}
+    windows = other_windows(list(by_variant.values()), order_lines(context.gearbox))
+    levels = {variant: truest_of(results.steady, Choice(variant, *key[1:])) for variant in by_variant}
+    constant = {variant: own for variant, own in levels.items() if own is not None}
+    response = truest_response(results.steady, Choice(list(by_variant)[-1], *key[1:]))
+    loud = response if response is not None and is_over_speed(response) else None
+    return _group(f"run-up {key[0]}", key, by_variant, windows, constant, {}, loud)
+
+
+def _of_responses(
     context: Context, key: tuple[str, str, str], responses: Mapping[str, xr.Dataset], results: StoredResults
 ) -> RunGroup:
     context.tell(f"lines at constant speed, {', '.join(key)}")
     own = {str(variant): responses[variant] for variant in OFFERED if variant in responses}
     runs = {variant: _as_run(context, data, results) for variant, data in own.items()}
-    ranked = {variant: _ranked_lines(runs, own, variant) for variant in runs}
-    reference, rule = runs.get(REFERENCE_VARIANT), AbsenceRule()
+    return _group(f"constant speed, level {key[0]}", key, runs, (), {}, own, list(own.values())[-1])
+
+
+def _group(
+    source: str,
+    key: tuple[str, str, str],
+    runs: Mapping[str, VariantRun],
+    windows: Sequence[OtherWindow],
+    constant: Mapping[str, ConstantSpeed],
+    responses: Mapping[str, xr.Dataset],
+    loud: xr.Dataset | None,
+) -> RunGroup:
+    """Group of run-ups, or of steady responses taken as such; `loud` is what is ranked by three quantities."""
+    ranked = {name: _ranked(runs, name, windows, constant.get(name), responses.get(name)) for name in runs}
+    reference = runs.get(REFERENCE_VARIANT)
     others = {variant: run for variant, run in runs.items() if run is not reference}
-    comparisons = {} if reference is None else {name: Comparison(run, reference, rule) for name, run in others.items()}
-    loud = ranking_of(list(own.values())[-1])
-    return RunGroup(f"constant speed, level {key[0]}", *key[1:], runs, ranked, comparisons, {}, own, loud)
+    comparisons = {} if reference is None else {name: compare(run, reference) for name, run in others.items()}
+    in_operation = None if loud is None else ranking_of(loud)
+    return RunGroup(source, *key[1:], runs, ranked, comparisons, constant, responses, in_operation)
 
 
 def _as_run(context: Context, data: xr.Dataset, results: StoredResults) -> VariantRun:
     """Take a steady response as a run-up: its lines as spectra, its peaks as picks."""
     choice = choice_of(data.attrs)
     spectra = response_spectra(data, ("overall_dte",), highest_drawn(context.gearbox, data))
-    picks = pick_line_peaks(spectra, order_lines(context.gearbox))
+    picks = pick_resonances(spectra, order_lines(context.gearbox), peaks=line_peaks)
     path = steady_path(context.folder, choice, settings_of(data.attrs))
     return VariantRun(path, data.attrs, spectra, picks, results.modes.get(choice))
 
 
-def _ranked_lines(
-    runs: Mapping[str, VariantRun], responses: Mapping[str, xr.Dataset], variant: str
-) -> tuple[RankedResonance, ...]:
-    run, rule = runs[variant], AbsenceRule()
-    others = {name: other.spectra for name, other in runs.items() if name != variant}
-    ranked = []
-    for own in run.findings():
-        peak = own.strongest
-        finding = _named(own, responses[variant]) if run.modes is None else run.located(own, peak.frequency)
-        lacking = tuple(name for name, spectra in others.items() if only_in_first([peak], spectra, rule))
-        elsewhere = {name: _level_at(spectra, peak) for name, spectra in others.items()}
-        ranked.append(RankedResonance(finding, True, lacking, elsewhere, None))
-    return tuple(sorted(ranked, key=lambda own: -own.loudness))
-
-
-def _named(finding: Finding, data: xr.Dataset) -> Finding:
-    """Name the mode of a resonance by those that the response followed over speed, where no others were computed."""
-    diagram, peak = campbell_from(data), finding.strongest
-    sense = 1.0 if float(data["speed"][0]) >= 0.0 else -1.0
-    mode = diagram.mode_at(sense * peak.speed, peak.frequency)
-    if mode is None:
-        return finding
-    frequency = float(np.interp(sense * peak.speed, diagram.speeds, diagram.frequency[:, mode]))
-    return Finding(finding.resonance, None, frequency, diagram.names[mode])
-
-
 def _ranked(
-    runs: Mapping[str, VariantRun], variant: str, windows: Sequence[OtherWindow], constant: ConstantSpeed | None
+    runs: Mapping[str, VariantRun],
+    variant: str,
+    windows: Sequence[OtherWindow],
+    constant: ConstantSpeed | None,
+    response: xr.Dataset | None,
 ) -> tuple[RankedResonance, ...]:
+    """Resonances of a variant, judged; of a steady response there are no windows, and none is needed."""
     run, rule = runs[variant], AbsenceRule()
     others = {name: other.spectra for name, other in runs.items() if name != variant}
     ranked = []
@@ -254,8 +239,21 @@ def _ranked(
         level = None if constant is None else constant.near(peak.line, peak.frequency, peak.resolution)
         if level is not None:
             finding = run.located(finding, level.frequency)
+        elif response is not None:
+            finding = _named(finding, response) if run.modes is None else run.located(finding, peak.frequency)
         ranked.append(RankedResonance(finding, survives(peak, variant, windows), lacking, elsewhere, level))
     return tuple(sorted(ranked, key=lambda own: -own.loudness))
+
+
+def _named(finding: Finding, data: xr.Dataset) -> Finding:
+    """Name the mode of a resonance by those that the response followed over speed, where no others were computed."""
+    diagram, peak = campbell_from(data), finding.strongest
+    sense = 1.0 if float(data["speed"][0]) >= 0.0 else -1.0
+    mode = diagram.mode_at(sense * peak.speed, peak.frequency)
+    if mode is None:
+        return finding
+    frequency = float(np.interp(sense * peak.speed, diagram.speeds, diagram.frequency[:, mode]))
+    return Finding(finding.resonance, None, frequency, diagram.names[mode])
 
 
 def _level_at(spectra: Waterfall, peak: Pick) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -11,9 +10,8 @@ import numpy as np
 from exugear.gearbox.parts import RPM
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.channels import Channel, channels_of, loudest_order
-from exugear.report.findings.constant_speed import TOP, ConstantSpeed, highest_drawn
+from exugear.report.findings.constant_speed import TOP, ConstantSpeed
 from exugear.report.findings.groups import RankedResonance, RunGroup
-from exugear.report.findings.response_channels import channels_of_response
 from exugear.report.findings.words import figure_text, percentages
 from exugear.report.parts.material import Material, group_words, model_name
 from exugear.report.parts.pooling import cut_levels, level_bytes, pooled, tenths
@@ -68,19 +66,12 @@ def _group(material: Material, group: RunGroup) -> dict[str, Any]:
     }
 
 
-def _channels(material: Material, group: RunGroup, run: VariantRun) -> Iterator[Channel]:
-    response = group.responses.get(run.variant)
-    if response is None:
-        return channels_of(run, material.words)
-    return channels_of_response(response, material.words, highest_drawn(material.context.gearbox, response))
-
-
 def _variant(material: Material, group: RunGroup, run: VariantRun) -> dict[str, Any]:
     material.context.tell(f"channels of {run.variant}, {group.source}, {group.inertias}")
     channels = [_overall(material, run.spectra)]
     loudest: dict[str, dict[str, Any] | None] = {}
     # One at a time: spectra are large.
-    for channel in _channels(material, group, run):
+    for channel in channels_of(run, material.words, group.responses.get(run.variant)):
         channels.append(_channel(material, channel))
         if channel.kind == "support":
             loudest[channel.name] = _loudest(material, channel)

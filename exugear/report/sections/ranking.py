@@ -7,7 +7,7 @@ import math
 from exugear.gearbox.parts import RPM
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.groups import RankedResonance, RunGroup
-from exugear.report.findings.loudness.ranking import Resonance
+from exugear.report.findings.loudness import Resonance
 from exugear.report.findings.words import figure_text, percentages
 from exugear.report.parts.material import Material, Part, only_for, told_groups
 from exugear.report.web import pieces

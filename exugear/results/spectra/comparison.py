@@ -132,8 +132,8 @@ def compare(first: VariantRun, second: VariantRun, rule: AbsenceRule | None = No
     ValueError
         They differ in more than the variant, or were analysed with different windows.
     """
-    for key in ("gearbox", "load_case", "mesh_law", "inertias"):
-        values = first.attributes[key], second.attributes[key]
+    for key in ("gearbox", "load_case", "level", "mesh_law", "inertias"):
+        values = first.attributes.get(key), second.attributes.get(key)
         if values[0] != values[1]:
             raise ValueError(f"runs to compare differ in {key}: {values[0]!r} and {values[1]!r}")
     if not math.isclose(first.spectra.window_length, second.spectra.window_length, rel_tol=1e-9):  # of rounded times

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,8 +15,6 @@ from exugear.results.spectra.resonances import Pick
 from exugear.results.spectra.waterfall import Waterfall
 from fe_ste.tools.arrays import Floats
 
-SAME_ORDER = 1e-6
-"""Share by which orders of one line may differ."""
 FRAMES, ROWS = 880, 1536
 """Least number of speeds, and number of frequencies, of the picture."""
 THICK = 2
@@ -42,10 +40,8 @@ class LineSpectra(Waterfall):
 
     def along(self, line: OrderLine) -> Floats:
         """Level (dB) of an order at each speed, shape (n,); NaN throughout if it is none of the lines."""
-        place = int(np.argmin(np.abs(self.orders - line.order)))
-        if abs(self.orders[place] - line.order) > SAME_ORDER * line.order:
-            return np.full(self.speed.size, np.nan)
-        return self.line_level[:, place]
+        place = line.place(self.orders)
+        return np.full(self.speed.size, np.nan) if place is None else self.line_level[:, place]
 
     def resolution(self, line: OrderLine) -> Floats:
         """Distance of the speeds along an order, Hz, shape (n,)."""
@@ -128,33 +124,11 @@ def _picture(speed: Floats, orders: Floats, amplitude: Floats, frequency: Floats
     return picture
 
 
-def pick_line_peaks(
-    spectra: LineSpectra, lines: Sequence[OrderLine], *, prominence: float = 6.0, depth: float = 60.0
-) -> tuple[Pick, ...]:
-    """Find the peaks along order lines, as `exugear.results.spectra.resonances.pick_resonances` does in run-ups.
+def line_peaks(spectra: Waterfall, line: OrderLine, prominence: float) -> list[Pick]:
+    """Find the peaks of a least prominence (dB) along an order at steady speeds.
 
-    Parameters
-    ----------
-    spectra : LineSpectra
-    lines : sequence of OrderLine
-        Where to look.
-    prominence : float
-        Least height of a peak over the higher of the two valleys beside it, dB.
-    depth : float
-        Peaks so far below the highest level on any of the lines, dB, are left out.
-
-    Returns
-    -------
-    tuple of Pick
-        Each with half of its width at half power as its resolution: what lies nearer to it cannot be told apart.
+    Each has half of its width at half power as its resolution: what lies nearer to it cannot be told apart.
     """
-    picks = [pick for line in lines for pick in _line_peaks(spectra, line, prominence)]
-    known = [float(np.nanmax(level)) for level in map(spectra.along, lines) if np.isfinite(level).any()]
-    highest = max(known, default=0.0)
-    return tuple(pick for pick in picks if pick.level > highest - depth)
-
-
-def _line_peaks(spectra: LineSpectra, line: OrderLine, prominence: float) -> list[Pick]:
     usable = np.flatnonzero(np.isfinite(spectra.along(line)))
     if usable.size < 3:
         return []

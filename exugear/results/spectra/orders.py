@@ -15,6 +15,9 @@ from numpy.typing import ArrayLike
 from exugear.gearbox.gearbox import Gearbox
 from fe_ste.tools.arrays import Floats
 
+SAME_ORDER = 1e-6
+"""Share by which orders of one line may differ."""
+
 
 @dataclass(frozen=True)
 class OrderLine:
@@ -30,6 +33,11 @@ class OrderLine:
 
     name: str
     order: float
+
+    def place(self, orders: Floats) -> int | None:
+        """Place of the line among orders (n,); None if it is none of them."""
+        nearest = int(np.argmin(np.abs(orders - self.order)))
+        return nearest if abs(orders[nearest] - self.order) <= SAME_ORDER * self.order else None
 
     def frequency(self, speed: ArrayLike) -> Floats:
         """Frequency on the line, Hz, at speeds of the reference shaft in rad/s."""

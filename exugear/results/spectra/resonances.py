@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from textwrap import shorten
 
@@ -42,8 +42,17 @@ class Pick:
     resolution: float
 
 
+Peaks = Callable[[Waterfall, OrderLine, float], list[Pick]]
+"""Finds the peaks of a least prominence (dB) along an order line."""
+
+
 def pick_resonances(
-    spectra: Waterfall, lines: Iterable[OrderLine], *, prominence: float = 6.0, depth: float = 60.0
+    spectra: Waterfall,
+    lines: Iterable[OrderLine],
+    *,
+    prominence: float = 6.0,
+    depth: float = 60.0,
+    peaks: Peaks | None = None,
 ) -> tuple[Pick, ...]:
     """Find the peaks along order lines.
 
@@ -58,6 +67,9 @@ def pick_resonances(
     depth : float
         Peaks so far below the highest level on any of the lines, dB, are left out: where an order excites
         nothing, its line shows the ripple of the spectral floor.
+    peaks : callable, optional
+        Finds the peaks of a least prominence (dB) along a line: `peaks_on_line` by default, or that of steady
+        responses, `exugear.results.spectra.line_spectra.line_peaks`.
 
     Returns
     -------
@@ -76,7 +88,7 @@ def pick_resonances(
     """
     searched = tuple(lines)
     highest = max((_highest(spectra.along(line)) for line in searched), default=0.0)
-    picks = (pick for line in searched for pick in peaks_on_line(spectra, line, prominence))
+    picks = (pick for line in searched for pick in (peaks or peaks_on_line)(spectra, line, prominence))
     return tuple(pick for pick in picks if pick.level > highest - depth)
 
 

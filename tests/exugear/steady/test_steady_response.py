@@ -8,8 +8,8 @@ import pytest
 from exugear.dynamics.assemble import assemble
 from exugear.gearbox.choice import Choice
 from exugear.steady.campbell.campbell import modes_over_speed
+from exugear.steady.crossings import crossings, with_crossings
 from exugear.steady.point_solver import gearset_of
-from exugear.steady.resonances import crossings, with_crossings
 from exugear.steady.response import (
     dissipated_and_given,
     linear_response,

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from exugear.results.spectra.line_spectra import LineSpectra, line_spectra, pick_line_peaks
+from exugear.results.spectra.line_spectra import LineSpectra, line_peaks, line_spectra
 from exugear.results.spectra.orders import OrderLine
+from exugear.results.spectra.resonances import pick_resonances
 
 MESH, OTHER = OrderLine("mesh", 20.0), OrderLine("other", 50.0)
 RESONANCE, DAMPING = 300.0, 0.01
@@ -22,7 +23,7 @@ def resonant(unknown: tuple[float, ...] = ()) -> LineSpectra:
 
 def test_the_peak_of_an_oscillator_has_its_frequency_level_and_half_width():
     """Highest at f0 sqrt(1 - 2 zeta^2) with 1 / (2 zeta) to first order; half as wide as zeta f0 at half power."""
-    (peak,) = pick_line_peaks(resonant(), [MESH, OTHER])
+    (peak,) = pick_resonances(resonant(), [MESH, OTHER], peaks=line_peaks)
     assert peak.line is MESH
     # Frequencies stand 0.5 Hz apart; the level is that of the nearest, less than 1 % of half the width off.
     assert peak.frequency == pytest.approx(RESONANCE, abs=0.5)

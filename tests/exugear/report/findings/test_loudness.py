@@ -13,7 +13,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.load_cases.operating_range import operating_range
 from exugear.gearbox.parts import RPM
 from exugear.gearbox.reading import CaseError
-from exugear.report.findings.loudness.ranking import HOUSING, SHAFTS, ranking_of
+from exugear.report.findings.loudness import HOUSING, SHAFTS, ranking_of
 from exugear.steady.mean_system.quantities import quantities_of
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import to_dataset
