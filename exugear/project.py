@@ -41,6 +41,7 @@ from exugear.transient.outcome import Run
 from exugear.transient.run_folder import run_directory
 from exugear.transient.runup import simulate
 from fe_ste.tools.display import Displayed
+from fe_ste.tools.stores.store import Store
 from fe_ste.transmission_error.table import MeshTable
 
 if TYPE_CHECKING:
@@ -367,7 +368,7 @@ class Project(Displayed):
         rating = rating_of(self.gearbox)
         dynamic = factors(assembly, rating, self.folder, counted.body)
         digest = life_hash(assembly, counted, tables, source_hash(assembly, rating, self.folder))
-        angles = KeptAngles(self.life_path.with_suffix(".partial.npz"), digest)
+        angles = Store(self.life_path.with_suffix(".partial.npz"), digest)
         kept = stored_life(self.life_path, digest)
         if kept is not None:
             angles.discard()  # what was killed behind its last file left them
@@ -378,7 +379,7 @@ class Project(Displayed):
                 if request.stored is None:
                     request.compute()
             stresses = pair_stresses(self.stress_tables(counted), self.folder, begin)
-            life = compute_life(assembly, counted, stresses, dynamic, digest, progress, angles)
+            life = compute_life(assembly, counted, stresses, dynamic, digest, progress, KeptAngles(angles))
             data = write_life(self.life_path, life, self.gearbox.name)
             angles.discard()
             return data

@@ -27,7 +27,8 @@ from exugear.bodies.floating_body import FloatingBody
 from exugear.bodies.reduced_body import ELASTIC, ReducedBody, RigidInertia
 from exugear.bodies.rotations import skew
 from exugear.bodies.solids import ReducedSolid, SolidModel, reduce_matrices, reduced_body
-from exugear.bodies.store import load_or_reduce, store_arrays, stored_arrays
+from exugear.bodies.store import load_or_reduce
+from fe_ste.tools.stores.store import Store
 
 
 def floating_body(model: SolidModel, matrices: ReducedSolid | None = None) -> FloatingBody:
@@ -108,12 +109,11 @@ def load_or_reduce_floating(model: SolidModel, folder: Path | None) -> tuple[Red
         return reduced_body(model, matrices()), floating_body(model, matrices())
     name = f"{model.name}-{model.key[:16]}"
     reduced = load_or_reduce(folder / f"{name}.npz", model.key, lambda: reduced_body(model, matrices()))
-    path = folder / f"{name}-floating.npz"
-    arrays = stored_arrays(path, model.key)
-    if arrays is not None:
-        return reduced, _from_arrays(arrays)
-    body = floating_body(model, matrices())
-    store_arrays(path, model.key, {stored: np.asarray(getattr(body, name)) for stored, name in _STORED.items()})
+    store = Store(folder / f"{name}-floating.npz", model.key)
+    body = store.read(_from_arrays)
+    if body is None:
+        body = floating_body(model, matrices())
+        store.write({stored: getattr(body, name) for stored, name in _STORED.items()}, compressed=True)
     return reduced, body
 
 

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import io
 import json
-import logging
-import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -14,10 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exugear.bodies.reduced_body import ReducedBody, ReductionSummary, Seat, Surface
-from fe_ste.tools.files import FileError
-from fe_ste.tools.sealed import read_sealed, write_sealed
-
-_log = logging.getLogger(__name__)
+from fe_ste.tools.stores.store import Store
 
 
 def load_or_reduce(path: Path, key: str, reduce: Callable[[], ReducedBody]) -> ReducedBody:
@@ -31,32 +25,12 @@ def load_or_reduce(path: Path, key: str, reduce: Callable[[], ReducedBody]) -> R
     reduce : callable
         Called only where the file does not serve.
     """
-    arrays = stored_arrays(path, key)
-    if arrays is not None:
-        return _from_arrays(arrays)
-    body = reduce()
-    store_arrays(path, key, _arrays_of(body))
+    store = Store(path, key)
+    body = store.read(_from_arrays)
+    if body is None:
+        body = reduce()
+        store.write(_arrays_of(body), compressed=True)
     return body
-
-
-def store_arrays(path: Path, key: str, arrays: Mapping[str, Any]) -> None:
-    """Write arrays into a sealed file of a key."""
-    content = io.BytesIO()
-    np.savez_compressed(content, key=np.array(key), **arrays)
-    write_sealed(path, content.getvalue())
-
-
-def stored_arrays(path: Path, key: str) -> dict[str, NDArray[Any]] | None:
-    """Read what `store_arrays` wrote; nothing if the file is missing, damaged or of another key."""
-    if not path.exists():
-        return None
-    try:
-        with np.load(io.BytesIO(read_sealed(path)), allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-    except (FileError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        _log.warning("%s; the body is reduced again", error)
-        return None
-    return arrays if str(arrays.pop("key", "")) == key else None
 
 
 _MATRICES = ("mass", "stiffness", "gyroscopic", "spin")

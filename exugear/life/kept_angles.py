@@ -2,38 +2,32 @@
 
 from __future__ import annotations
 
-import io
-from pathlib import Path
-
-import numpy as np
-
 from exugear.life.static_balance import States
 from fe_ste.tools.display import Displayed
-from fe_ste.tools.files import FileError
-from fe_ste.tools.sealed import read_sealed, write_sealed
+from fe_ste.tools.stores.store import Arrays, Store
 
 
 class KeptAngles(Displayed):
-    """Solved angles in one sealed file, written anew with each.
+    """Solved angles in one file, written anew with each.
 
     Parameters
     ----------
-    path : Path
-    input_hash : str
-        Of all that the life rests on; angles of another input are not taken.
+    store : Store
+        Of all that the life rests on.
 
     Examples
     --------
-    >>> KeptAngles(Path("nowhere/life.partial.npz"), "")
+    >>> from pathlib import Path
+    >>> KeptAngles(Store(Path("nowhere/life.partial.npz"), key="this input"))
     <KeptAngles: 0 in nowhere/life.partial.npz>
     """
 
-    def __init__(self, path: Path, input_hash: str) -> None:
-        self._path, self._hash = path, input_hash
-        self._angles = _read(path, input_hash)
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self._angles = store.read(_unpacked) or {}
 
     def _line(self) -> str:
-        return f": {len(self._angles)} in {self._path.as_posix()}"
+        return f": {len(self._angles)} in {self._store.path.as_posix()}"
 
     def stored(self, number: int) -> States | None:
         """States of an angle by its number, None where they are not there."""
@@ -42,28 +36,11 @@ class KeptAngles(Displayed):
     def store(self, number: int, states: States) -> None:
         """Keep the states of an angle."""
         self._angles[number] = states
-        arrays = {
-            f"{name}_{place}": part
-            for place, one in self._angles.items()
-            for name, part in zip(States._fields, one, strict=True)
-        }
-        content = io.BytesIO()
-        np.savez(content, allow_pickle=False, input_hash=np.array(self._hash), **arrays)
-        self._path.parent.mkdir(parents=True, exist_ok=True)
-        write_sealed(self._path, content.getbuffer())
-
-    def discard(self) -> None:
-        """Remove the file: the life is written."""
-        self._path.unlink(missing_ok=True)
+        self._store.write(
+            {f"{name}_{angle}": array for angle, kept in self._angles.items() for name, array in kept._asdict().items()}
+        )
 
 
-def _read(path: Path, input_hash: str) -> dict[int, States]:
-    """Angles of a file that belong to this input; none of a file that is missing, damaged, or of another one."""
-    try:
-        with np.load(io.BytesIO(read_sealed(path)), allow_pickle=False) as data:
-            if str(data["input_hash"]) != input_hash:
-                return {}
-            numbers = [int(name.removeprefix("force_")) for name in data.files if name.startswith("force_")]
-            return {number: States(*(data[f"{name}_{number}"] for name in States._fields)) for number in numbers}
-    except (FileError, KeyError, ValueError):
-        return {}
+def _unpacked(arrays: Arrays) -> dict[int, States]:
+    numbers = [int(name.removeprefix("force_")) for name in arrays if name.startswith("force_")]
+    return {number: States(*(arrays[f"{name}_{number}"] for name in States._fields)) for number in numbers}

@@ -18,8 +18,8 @@ from exugear.life.gear_life import FlankLife
 from exugear.life.life import Life
 from exugear.life.load_spectrum.spectra_files import write_table
 from exugear.results.folder import modes_path
-from fe_ste.tools.files import FileError
 from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
+from fe_ste.tools.stores.store import Store
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -123,11 +123,7 @@ def flank_label(one: FlankLife) -> str:
 
 def stored_life(path: Path, input_hash: str) -> xr.Dataset | None:
     """Life of a file that was computed from exactly this input; None without one."""
-    try:
-        dataset = load_dataset(path, _LAYOUT)
-    except FileError:
-        return None
-    return dataset if dataset.attrs["input_hash"] == input_hash else None
+    return Store(path, input_hash).read_dataset(_LAYOUT)
 
 
 def read_life(path: Path) -> xr.Dataset:
@@ -144,7 +140,6 @@ def read_life(path: Path) -> xr.Dataset:
 def write_life(path: Path, life: Life, gearbox: str) -> xr.Dataset:
     """Write a life whole or not at all, with tables of its flanks and bearings beside it; return its arrays."""
     dataset = to_dataset(life, gearbox)
-    path.parent.mkdir(parents=True, exist_ok=True)
     write_table(path.with_name("life_gears.csv"), ("flank", *FLANK_NUMBERS), _rows(dataset, "flank", FLANK_NUMBERS))
     write_table(
         path.with_name("life_bearings.csv"), ("bearing", *BEARING_NUMBERS), _rows(dataset, "bearing", BEARING_NUMBERS)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,8 +14,11 @@ from exugear.tooth_mesh.tables import TableRequest
 from fe_ste.geometry.gears import Gear
 from fe_ste.root_stress.mesh_cycle import MeshCycleStress, mesh_cycle_stress
 from fe_ste.root_stress.root import RootGauges, root_gauges
-from fe_ste.tools.files import FileError
-from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
+from fe_ste.tools.sealed import Layout
+from fe_ste.tools.stores.store import Store
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _FIELDS = {
     "hertz": (("torque", "misalignment"), "Pa", "largest Hertzian stress inside the path of contact"),
@@ -61,32 +65,24 @@ def pair_stresses(
     for request in requests:
         if request.stored is None:
             continue
-        pair, path = request.wanted.pair, folder / "stress" / f"{request.name}.nc"
+        pair = request.wanted.pair
         digest = hashlib.sha256(f"{LIFE} {request.stored.input_hash}".encode()).hexdigest()
-        kept = _kept(path, digest)
-        if kept is None:
+        store = Store(folder / "stress" / f"{request.name}.nc", digest)
+        dataset = store.read_dataset(_LAYOUT)
+        if dataset is not None:
+            kept = MeshCycleStress(**{name: dataset[name].to_numpy() for name in ("torque", "misalignment", *_FIELDS)})
+        else:
             if begin is not None:
                 begin(request.name)
             both = gauges(pair.pinion, 1), gauges(pair.gear, -1 if pair.gear.internal else 1)
             kept = mesh_cycle_stress(pair, request.stored.dataset, both)
             if keep:
-                _keep(path, kept, request.name, digest)
+                store.write_dataset(_to_dataset(kept, request.name))
         found[request.name] = kept
     return found
 
 
-def _kept(path: Path, digest: str) -> MeshCycleStress | None:
-    """Stresses of a file; None if there is none that fits."""
-    try:
-        dataset = load_dataset(path, _LAYOUT)
-    except FileError:
-        return None
-    if dataset.attrs["input_hash"] != digest:
-        return None
-    return MeshCycleStress(**{name: dataset[name].to_numpy() for name in ("torque", "misalignment", *_FIELDS)})
-
-
-def _keep(path: Path, stress: MeshCycleStress, pair: str, digest: str) -> None:
+def _to_dataset(stress: MeshCycleStress, pair: str) -> xr.Dataset:
     import xarray as xr
 
     variables = {
@@ -97,6 +93,4 @@ def _keep(path: Path, stress: MeshCycleStress, pair: str, digest: str) -> None:
         "torque": (("torque",), stress.torque, {"units": "N m"}),
         "misalignment": (("misalignment",), stress.misalignment, {"units": "rad"}),
     }
-    attributes = {"pair": pair, "input_hash": digest, "method_version": LIFE}
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_dataset(path, xr.Dataset(variables, coordinates, attributes))
+    return xr.Dataset(variables, coordinates, {"pair": pair, "method_version": LIFE})

@@ -7,7 +7,6 @@ They are no netCDF, because making some 30 variables anew takes 60 ms, and a pie
 
 from __future__ import annotations
 
-import io
 import itertools
 import json
 import logging
@@ -27,7 +26,7 @@ from exugear.dynamics.signals import BALANCE_TERMS, MESH_TIMES, SignalLayout
 from exugear.results.variables import GROWING, VARIABLES
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.files import FileError
-from fe_ste.tools.sealed import open_sealed, write_sealed
+from fe_ste.tools.sealed import open_sealed, write_arrays
 
 _PIECE_NAME = re.compile(r"\d{6}\.npz")
 _log = logging.getLogger(__name__)
@@ -98,10 +97,7 @@ class Piece:
     def write(self, path: Path) -> str:
         """Write it whole or not at all; return its checksum."""
         words = {"attributes": self.attributes, "names": self.names, "follows": self.follows}
-        content = io.BytesIO()
-        arrays: Mapping[str, Any] = self.arrays
-        np.savez(content, words=np.array(json.dumps(words)), **arrays)
-        return write_sealed(path, content.getvalue())
+        return write_arrays(path, {"words": np.array(json.dumps(words)), **self.arrays})
 
     @classmethod
     def read(cls, path: Path, names: Collection[str] | None = None) -> tuple[Piece, str]:

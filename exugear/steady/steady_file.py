@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Callable, Mapping
-from contextlib import suppress
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,8 +20,8 @@ from exugear.steady.campbell.campbell import LAYOUT
 from exugear.steady.mean_system.signals import carried_seats
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_response import Solved, SteadyResponse, response_of
-from fe_ste.tools.files import FileError
-from fe_ste.tools.sealed import Layout, load_dataset, read_sealed, write_dataset, write_sealed
+from fe_ste.tools.sealed import Layout, load_dataset
+from fe_ste.tools.stores.store import Store
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -69,7 +67,7 @@ def steady_path(folder: str | Path, choice: Choice, settings: SteadySettings) ->
 
 
 def to_dataset(response: SteadyResponse) -> xr.Dataset:
-    """Labelled arrays with units, what `write_response` writes."""
+    """Labelled arrays with units, what `stored_or_computed` writes."""
     import xarray as xr
 
     solved, amplitude = response.solved, response.solved.amplitude
@@ -152,14 +150,8 @@ def _shared(multiples: tuple[int, ...], bases: tuple[str, ...]) -> str:
     return " = ".join(names)
 
 
-def write_response(path: Path, response: SteadyResponse) -> None:
-    """Write a steady response whole or not at all, and forget the points of one that was stopped."""
-    write_dataset(path, to_dataset(response))
-    partial_path(path).unlink(missing_ok=True)
-
-
 def load_response(path: str | Path) -> xr.Dataset:
-    """Read what `write_response` wrote.
+    """Read what `stored_or_computed` wrote.
 
     Raises
     ------
@@ -185,21 +177,21 @@ def stored_or_computed(
 
     Points that a stopped computation left are taken up; what is stopped again leaves its points.
     """
-    wanted = settings.hash_with(assembly)
-    with suppress(FileError):
+    store = Store(path, settings.hash_with(assembly))
+    points = Store(partial_path(path), store.key)
+    stored = store.read_dataset(_LAYOUT)
+    if stored is None:
+        response = response_of(
+            assembly,
+            settings,
+            known=points.read(lambda arrays: Solved(**arrays)),
+            progress=progress,
+            keep=lambda solved: points.write(vars(solved)),
+        )
+        store.write_dataset(to_dataset(response))
+        points.discard()
         stored = load_response(path)
-        if stored.attrs["input_hash"] == wanted:
-            return stored
-    path.parent.mkdir(parents=True, exist_ok=True)
-    response = response_of(
-        assembly,
-        settings,
-        known=kept_points(path, wanted),
-        progress=progress,
-        keep=lambda solved: keep_points(path, wanted, solved),
-    )
-    write_response(path, response)
-    return load_response(path)
+    return stored
 
 
 def settings_of(attributes: Mapping[str, Any]) -> SteadySettings:
@@ -220,19 +212,3 @@ def settings_of(attributes: Mapping[str, Any]) -> SteadySettings:
 def partial_path(path: Path) -> Path:
     """Place of the points of a response that is not complete."""
     return path.with_suffix(".partial.npz")
-
-
-def keep_points(path: Path, input_hash: str, solved: Solved) -> None:
-    """Write the points that are solved so far beside the response at `path`, whole or not at all."""
-    content = io.BytesIO()
-    arrays = {own.name: getattr(solved, own.name) for own in fields(Solved)}
-    np.savez(content, input_hash=np.array(input_hash), **arrays)
-    write_sealed(partial_path(path), content.getbuffer())
-
-
-def kept_points(path: Path, input_hash: str) -> Solved | None:
-    """Points of a response that was stopped and had the same input, None where there are none."""
-    with suppress(FileError), np.load(io.BytesIO(read_sealed(partial_path(path))), allow_pickle=False) as data:
-        if str(data["input_hash"]) == input_hash:
-            return Solved(**{own.name: data[own.name] for own in fields(Solved)})
-    return None

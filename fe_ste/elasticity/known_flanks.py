@@ -1,7 +1,7 @@
 """Flanks computed once: both flanks of a gear from one, kept in memory and in files for the next process.
 
-A file is named by a hash of all that its numbers follow from: the gear but for its name, the mesh, and the sources of
-the method. One that is missing or damaged is computed again; two processes may compute and write one at once.
+The key is a hash of all that its numbers follow from: the gear but for its name, the mesh, and the sources of the
+method.
 """
 
 from __future__ import annotations
@@ -9,15 +9,8 @@ from __future__ import annotations
 import dataclasses
 import functools
 import hashlib
-import io
 import json
-import logging
-import os
-import threading
-import zipfile
-from collections import OrderedDict
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -26,20 +19,15 @@ import numpy as np
 from fe_ste.elasticity.flank import TOOTH_REACH, FlankCompliance, flank_compliance
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.geometry.gears import Gear
-from fe_ste.tools.files import kept_folder
-from fe_ste.tools.sealed import read_sealed, write_sealed
+from fe_ste.tools.stores.cache import Cache
+from fe_ste.tools.stores.store import Arrays
 from fe_ste.tools.threads import one_dense_thread, side_by_side
-
-#: Flanks kept in memory, and bytes of files; of the default mesh each takes 5 MB.
-_IN_MEMORY = 16
-_BYTES = 300_000_000
 
 #: Rooms whose sources make the numbers.
 _ROOMS = ("tools", "geometry", "elimination", "elasticity")
 
-_log = logging.getLogger(__name__)
-_memory: OrderedDict[str, FlankCompliance] = OrderedDict()
-_memory_lock = threading.Lock()
+#: Of the default mesh each takes 5 MB.
+_flanks = Cache[FlankCompliance]("flank", in_memory=16, in_files=300_000_000)
 
 
 def known_flanks(
@@ -82,13 +70,14 @@ def known_flanks(
     for key, (gear, _) in zip(keys, wanted, strict=True):
         gears.setdefault(key, gear)
 
-    flanks = {key: flank for key, gear in gears.items() if (flank := _known(key, gear))}
+    stored = {key: _flanks.get(key, functools.partial(_unpacked, gear)) for key, gear in gears.items()}
+    flanks = {key: flank for key, flank in stored.items() if flank is not None}
     missing = [key for key in gears if key not in flanks]
     with one_dense_thread():
         computed = side_by_side(lambda key: flank_compliance(gears[key], 1, settings, **options), missing)
     for key, flank in zip(missing, computed, strict=True):
         flanks[key] = flank
-        _keep(key, flank)
+        _flanks.keep(key, flank, _packed(flank))
     return [
         dataclasses.replace(flanks[key] if side > 0 else flanks[key].turned(), gear=gear)
         for key, (gear, side) in zip(keys, wanted, strict=True)
@@ -97,8 +86,7 @@ def known_flanks(
 
 def forget_flanks() -> None:
     """Drop all flanks from memory."""
-    with _memory_lock:
-        _memory.clear()
+    _flanks.forget()
 
 
 def _key(gear: Gear, settings: MeshSettings, options: dict[str, Any]) -> str:
@@ -118,56 +106,16 @@ def _method() -> str:
     return digest.hexdigest()
 
 
-def _known(key: str, gear: Gear) -> FlankCompliance | None:
-    """Flank from memory or from its file."""
-    with _memory_lock:
-        flank = _memory.get(key)
-    if flank is None and (path := _path(key)):
-        flank = _read(path, gear)
-    if flank is not None:
-        _remember(key, flank)
-    return flank
+def _unpacked(gear: Gear, arrays: Arrays) -> FlankCompliance:
+    """Flank of a gear from what `_packed` made of it."""
+    values: dict[str, Any] = json.loads(str(arrays.pop("values")))
+    names = [tuple(name) for name in values.pop("regular")]
+    values["regular"] = dict(zip(names, arrays.pop("regular"), strict=True))
+    return FlankCompliance(gear=gear, **values | arrays)
 
 
-def _keep(key: str, flank: FlankCompliance) -> None:
-    _remember(key, flank)
-    if path := _path(key):
-        _write(path, flank)
-
-
-def _remember(key: str, flank: FlankCompliance) -> None:
-    with _memory_lock:
-        _memory[key] = flank
-        _memory.move_to_end(key)
-        while len(_memory) > _IN_MEMORY:
-            _memory.popitem(last=False)
-
-
-def _path(key: str) -> Path | None:
-    """File of a flank, or None where none is kept."""
-    folder = kept_folder()
-    return None if folder is None else folder / f"flank-{key}.npz"
-
-
-def _read(path: Path, gear: Gear) -> FlankCompliance | None:
-    """Flank of a file, or None if there is none that can be used."""
-    try:
-        with np.load(io.BytesIO(read_sealed(path)), allow_pickle=False) as content:
-            stored: dict[str, Any] = json.loads(str(content["values"]))
-            names = [tuple(name) for name in stored.pop("regular")]
-            regular = dict(zip(names, content["regular"], strict=True))
-            stored |= {name: content[name] for name in content.files if name not in ("values", "regular")}
-            flank = FlankCompliance(gear=gear, regular=regular, **stored)
-    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
-        if path.exists():  # else nothing was kept so far
-            _log.warning("%s; it is computed again", error)
-        return None
-    with suppress(OSError):
-        os.utime(path)  # the files used least lately go first
-    return flank
-
-
-def _write(path: Path, flank: FlankCompliance) -> None:
+def _packed(flank: FlankCompliance) -> dict[str, Any]:
+    """Arrays of a flank, and what is none as one text; without its gear."""
     values: dict[str, Any] = {"regular": list(flank.regular)}
     arrays: dict[str, Any] = {"regular": np.stack(list(flank.regular.values()))}
     for field in dataclasses.fields(flank):
@@ -176,30 +124,4 @@ def _write(path: Path, flank: FlankCompliance) -> None:
             arrays[field.name] = value
         elif field.name not in ("gear", "regular"):
             values[field.name] = value
-    content = io.BytesIO()
-    np.savez(content, values=np.array(json.dumps(values)), **arrays)
-    try:
-        write_sealed(path, content.getvalue())
-        _prune(path.parent)
-    except OSError as error:
-        _tell_unkept(str(path.parent), str(error.strerror))
-
-
-def _prune(folder: Path) -> None:
-    """Remove the files used least lately beyond the bound; another process may do so, too."""
-    files = []
-    for path in folder.glob("flank-*.npz"):
-        with suppress(OSError):
-            status = path.stat()
-            files.append((status.st_mtime, status.st_size, path))
-    total = 0
-    for _, size, path in sorted(files, reverse=True):
-        total += size
-        if total > _BYTES:
-            with suppress(OSError):
-                path.unlink()
-
-
-@functools.cache
-def _tell_unkept(folder: str, reason: str) -> None:
-    _log.warning("%s: computed flanks cannot be kept (%s); the next process computes them again", folder, reason)
+    return {"values": np.array(json.dumps(values)), **arrays}

@@ -20,9 +20,6 @@ if TYPE_CHECKING:
 _ABANDONED = 3600.0
 _TEXT_LIMIT = 50_000_000
 
-#: Environment variable: another folder for what is kept, or "off" for none.
-FOLDER_VARIABLE = "EXUGEAR_FLANKS"
-
 
 class FileError(OSError):
     """A file that cannot be used: missing, cut short, damaged or of another making; the message says which."""
@@ -186,14 +183,3 @@ def exclusive(path: Path, work: str) -> Iterator[None]:
         with suppress(OSError):  # Windows lets go of the name only with the lock
             os.unlink(path)
         lock.release()
-
-
-def kept_folder() -> Path | None:
-    """Folder of what is computed once and kept for all results folders; None where nothing is to be kept."""
-    asked = os.environ.get(FOLDER_VARIABLE, "")
-    if asked:
-        return None if asked == "off" else Path(asked)
-    import platformdirs  # needed for a table only: not worth its time at each start
-
-    user = platformdirs.user_cache_path("exugear", appauthor=False)
-    return user / "flanks" if user.is_absolute() else None  # a user without a home has none

@@ -16,7 +16,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from fe_ste.tools.files import FileError, open_regular, replacement, write_all
 
@@ -32,6 +35,10 @@ SETTLED = 2.0
 """Age (s) from which a file is trusted to tell by its times that it was changed since: clocks of files are coarse."""
 _checked: dict[tuple[int, ...], str] = {}
 """Checksums of the files that this process found to fit, by what the system says of each."""
+
+
+class VersionError(FileError):
+    """A whole file of another version of the method."""
 
 
 def write_sealed(path: Path, content: ReadableBuffer) -> str:
@@ -117,18 +124,6 @@ def open_sealed(path: Path) -> Iterator[tuple[IO[bytes], str]]:
         yield file, checksum
 
 
-def read_sealed(path: Path) -> bytes:
-    """Read the content of a sealed file, without the seal.
-
-    Raises
-    ------
-    FileError
-        As `open_sealed`.
-    """
-    with open_sealed(path) as (file, _):
-        return file.read()[:-_SEAL_LENGTH]
-
-
 class ErrorKeeper(io.RawIOBase):
     """File for HDF5 to write into: the first error is kept, and raised by `check` instead of inside HDF5.
 
@@ -199,6 +194,31 @@ class ErrorKeeper(io.RawIOBase):
         return size
 
 
+def write_arrays(path: Path, arrays: Mapping[str, Any], *, compressed: bool = False) -> str:
+    """Write a sealed npz file of arrays by name whole or not at all; return its checksum."""
+    content = io.BytesIO()
+    save = np.savez_compressed if compressed else np.savez
+    save(content, allow_pickle=False, **arrays)
+    return write_sealed(path, content.getbuffer())
+
+
+def load_arrays(path: Path) -> dict[str, NDArray[Any]]:
+    """Read a sealed npz file into memory; what would run code in it is refused.
+
+    Raises
+    ------
+    FileError
+        It is missing, damaged, or no npz file.
+    """
+    with open_sealed(path) as (file, _):
+        try:
+            with np.load(file, allow_pickle=False) as content:
+                return {name: content[name] for name in content.files}
+        # As in `open_dataset`: only a file of another make comes here.
+        except Exception as error:
+            raise FileError(f"{path}: is no npz file ({error})") from error
+
+
 def write_dataset(path: Path, dataset: xr.Dataset) -> None:
     """Write a sealed netCDF file whole or not at all."""
     content = io.BytesIO()
@@ -233,6 +253,7 @@ class Layout:
         Raises
         ------
         FileError
+            `VersionError` if it is of another version only.
         """
         for name, dimensions in self.variables.items():
             if name not in dataset.variables or dataset[name].dims != dimensions:
@@ -242,7 +263,7 @@ class Layout:
                 raise FileError(f"{path}: holds no {self.kind}: its attribute {name} is missing")
         version = dataset.attrs.get("method_version")
         if version != self.version:
-            raise FileError(
+            raise VersionError(
                 f"{path}: was computed by version {version} of its method, now at {self.version}; compute it again"
             )
 

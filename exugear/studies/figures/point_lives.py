@@ -21,6 +21,7 @@ from exugear.steady.steady_file import steady_path, stored_or_computed
 from exugear.studies.figures.shared import Shared
 from exugear.tooth_mesh.laws.registry import LAWS
 from exugear.tooth_mesh.tables import TableRequest, requested_tables
+from fe_ste.tools.stores.store import Store
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -82,7 +83,7 @@ def point_life(
     dynamic = factors(assembly, rating, folder, counted.body)
     tables = {request.name: request.wanted.hash for request in requests}
     digest = life_hash(assembly, counted, tables, source_hash(assembly, rating, folder))
-    angles = KeptAngles(folder / KEPT_ANGLES, digest)
+    angles = KeptAngles(Store(folder / KEPT_ANGLES, digest))
     life = compute_life(assembly, counted, stresses, dynamic, digest, progress, angles)
     data = to_dataset(life, gearbox.name)
     return data, [*_doubts(data)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import sys
@@ -16,6 +15,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.life.kept_angles import KeptAngles
 from exugear.life.static_balance import static_balance
+from fe_ste.tools.stores.store import Store
 
 from ..table_case import surfaces
 
@@ -36,7 +36,7 @@ def solved(path: Path, progress=None, input_hash: str = "this input"):
     gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml").varied(changes)
     assembly = assemble(gearbox, Choice("bushing", "table"), surfaces(gearbox))
     hub = np.array([10e3, 0.0, 0.0, 0.0, 20e3])
-    kept = KeptAngles(path, input_hash)
+    kept = KeptAngles(Store(path, input_hash))
     return static_balance(assembly, "main_shaft", np.array([240e3, -60e3]), 4, progress, hub, kept)
 
 
@@ -49,7 +49,7 @@ def test_a_balance_that_was_killed_goes_on_with_the_same_bits(tmp_path):
     whole, partial = solved(tmp_path / "whole.npz"), tmp_path / "killed.npz"
     done = subprocess.run([sys.executable, "-c", KILLED, str(partial)], check=False)
     assert done.returncode == -signal.SIGKILL
-    assert repr(KeptAngles(partial, "this input")).startswith("<KeptAngles: 2 in")
+    assert repr(KeptAngles(Store(partial, "this input"))).startswith("<KeptAngles: 2 in")
     counted: list[int] = []
     resumed = solved(partial, lambda number, total: counted.append(number))
     assert counted[:2] == [10, 20], "two angles are there and need no solution"
@@ -61,12 +61,10 @@ def test_angles_of_another_input_and_damaged_files_are_not_taken(tmp_path):
     path = tmp_path / "life.partial.npz"
     with pytest.raises(KeyboardInterrupt):
         solved(path, interrupt)
-    assert repr(KeptAngles(path, "this input")).startswith("<KeptAngles: 1 in")
-    assert repr(KeptAngles(path, "another")).startswith("<KeptAngles: 0 in")
+    assert repr(KeptAngles(Store(path, "this input"))).startswith("<KeptAngles: 1 in")
+    assert repr(KeptAngles(Store(path, "another"))).startswith("<KeptAngles: 0 in")
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
-    assert repr(KeptAngles(path, "this input")).startswith("<KeptAngles: 0 in")
-    KeptAngles(path, "this input").discard()
-    assert not os.path.exists(path)
+    assert repr(KeptAngles(Store(path, "this input"))).startswith("<KeptAngles: 0 in")
 
 
 def interrupt(done: int, total: int) -> None:

@@ -15,8 +15,7 @@ from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.nonlinear import Balance
 from exugear.steady.response import dissipated_and_given, signals
 from exugear.steady.settings import SpeedRange, SteadySettings
-from exugear.steady.steady_file import load_response, write_response
-from exugear.steady.steady_response import response_of
+from exugear.steady.steady_file import stored_or_computed
 
 from .. import table_case
 from ..assembled import assembled
@@ -206,8 +205,7 @@ def test_the_file_says_which_bearings_followed_their_law(tmp_path):
     assembly, attributes = assemble(LOOSE, Choice("bushing"), varying(0.1)), {}
     for level in ("parametric", "nonlinear"):
         settings = SteadySettings(SpeedRange(80.0, 90.0, 2), level, at_resonances=False)
-        write_response(tmp_path / f"{level}.nc", response_of(assembly, settings))
-        data = load_response(tmp_path / f"{level}.nc")
+        data = stored_or_computed(tmp_path / f"{level}.nc", assembly, settings)
         attributes[level] = data.attrs["bearings_in_time"]
         assert ("free_share" in data) == (level == "nonlinear")
         assert "rows by ISO/TS 16281" in data.attrs["bearing_laws"]

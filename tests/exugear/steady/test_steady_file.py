@@ -13,9 +13,10 @@ from exugear.steady.campbell.campbell import campbell_from
 from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.peaks import line_name, peaks, planet_sidebands, sidebands
 from exugear.steady.settings import SpeedRange, SteadySettings
-from exugear.steady.steady_file import keep_points, kept_points, load_response, partial_path, stored_or_computed
+from exugear.steady.steady_file import load_response, partial_path, stored_or_computed
 from exugear.steady.steady_response import response_of
 from fe_ste.tools.files import FileError
+from fe_ste.tools.sealed import load_arrays, write_arrays
 
 SETTINGS = SteadySettings(SpeedRange(0.0, 20.0, 21), at_resonances=False)
 
@@ -50,20 +51,8 @@ def test_a_file_that_fits_is_taken_and_another_input_is_computed(assembly, tmp_p
     assert stored_or_computed(path, assembly, other).sizes["point"] == 10
 
 
-def test_points_of_a_stopped_response_fit_their_input_alone(assembly, tmp_path):
-    path, solved = tmp_path / "steady.nc", response_of(assembly, SETTINGS).solved
-    keep_points(path, "this", solved)
-    found = kept_points(path, "this")
-    assert found is not None
-    np.testing.assert_array_equal(found.amplitude, solved.amplitude)
-    assert kept_points(path, "that") is None
-    whole = partial_path(path).read_bytes()
-    partial_path(path).write_bytes(whole[: len(whole) // 2])
-    assert kept_points(path, "this") is None
-
-
-def test_what_stopped_is_gone_on_with_and_leaves_nothing_behind(assembly, tmp_path):
-    path, seen = tmp_path / "steady.nc", []
+def stopped(path, assembly):
+    """Leave the points of a response that is stopped after the fifth."""
 
     def stop(done, total):
         if done == 5:
@@ -72,9 +61,24 @@ def test_what_stopped_is_gone_on_with_and_leaves_nothing_behind(assembly, tmp_pa
     with pytest.raises(KeyboardInterrupt):
         stored_or_computed(path, assembly, SETTINGS, stop)
     assert partial_path(path).exists() and not path.exists()
-    stored_or_computed(path, assembly, SETTINGS, lambda done, total: seen.append(done))
-    assert seen[0] == 6
-    assert not partial_path(path).exists()
+
+
+@pytest.mark.parametrize("kept", ["whole", "cut", "of another input", "of 0.3.0"])
+def test_what_stopped_is_gone_on_with_if_it_fits_and_leaves_nothing_behind(assembly, tmp_path, kept):
+    path, seen = tmp_path / "steady.nc", []
+    stopped(path, assembly)
+    points = partial_path(path)
+    arrays = load_arrays(points)
+    if kept == "cut":
+        points.write_bytes(points.read_bytes()[:-200])
+    elif kept == "of another input":
+        write_arrays(points, {**arrays, "key": np.array("another")})
+    elif kept == "of 0.3.0":
+        write_arrays(points, {"input_hash": arrays.pop("key"), **arrays})
+    data = stored_or_computed(path, assembly, SETTINGS, lambda done, total: seen.append(done))
+    assert seen[0] == (6 if kept == "whole" else 1)
+    assert data.identical(stored_or_computed(tmp_path / "other.nc", assembly, SETTINGS))
+    assert not points.exists()
 
 
 def test_a_damaged_file_is_refused(assembly, tmp_path):

@@ -18,7 +18,7 @@ from fe_ste.elasticity.flank import FlankCompliance, flank_compliance
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.elasticity.known_flanks import forget_flanks, known_flanks
 from fe_ste.geometry.gears import Gear
-from fe_ste.tools.files import FOLDER_VARIABLE
+from fe_ste.tools.stores.cache import FOLDER_VARIABLE
 
 COARSE = MeshSettings(layers=3, flank=6, thickness=4, fillet=1, root=1, rim=3)
 HELICAL = Gear(
@@ -168,7 +168,7 @@ def test_a_folder_that_cannot_be_written_costs_nothing_but_time(
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "file"))
     (flank,) = known_flanks([(HELICAL, 1)], COARSE)
     assert flank.gear == HELICAL
-    assert "computed flanks cannot be kept" in caplog.text
+    assert "each flank cannot be kept" in caplog.text
 
 
 def test_files_used_least_lately_are_removed(kept: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -181,7 +181,7 @@ def test_files_used_least_lately_are_removed(kept: Path, monkeypatch: pytest.Mon
         os.utime(path, (path.stat().st_atime, path.stat().st_mtime - age))
     forget_flanks()
     known_flanks([(gears[0], 1)], COARSE)  # used again
-    monkeypatch.setattr(fe_ste.elasticity.known_flanks, "_BYTES", int(2.5 * paths[0].stat().st_size))
+    monkeypatch.setattr(fe_ste.elasticity.known_flanks._flanks, "in_files", int(2.5 * paths[0].stat().st_size))
     known_flanks([(gears[2], 1)], COARSE)
     left = set(kept.iterdir())
     assert len(left) == 2

@@ -15,7 +15,7 @@ import pytest
 import xarray as xr
 
 from fe_ste.tools.files import FileError, append_line, exclusive, read_text, replacement, write_file
-from fe_ste.tools.sealed import read_sealed, write_dataset
+from fe_ste.tools.sealed import load_arrays, write_dataset
 
 DATA = xr.Dataset(
     {"a": (("x", "y"), np.random.default_rng(1).random((50, 40)), {"units": "m"})},
@@ -57,7 +57,7 @@ def test_a_link_is_replaced_and_never_written_through(tmp_path: Path) -> None:
 @pytest.mark.parametrize("make", [os.mkfifo, os.mkdir])
 def test_what_is_no_file_is_refused_without_waiting(tmp_path: Path, make: Callable[[Path], None]) -> None:
     make(tmp_path / "it")
-    for read in (read_sealed, read_text):
+    for read in (load_arrays, read_text):
         with pytest.raises(FileError, match="is no regular file"):
             read(tmp_path / "it")
     with pytest.raises(FileError, match="no such file"):

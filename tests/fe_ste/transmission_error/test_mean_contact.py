@@ -18,8 +18,9 @@ from fe_ste.contact.kinematics import ContactError
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.flanks.modifications import FlankModification
 from fe_ste.geometry.gears import Gear, GearPair
-from fe_ste.tools.files import FOLDER_VARIABLE
+from fe_ste.tools import sealed
 from fe_ste.tools.sealed import write_sealed
+from fe_ste.tools.stores.cache import FOLDER_VARIABLE
 from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance
 from fe_ste.transmission_error.known_contacts import contacts_told, forget_contacts, known_contacts
 from fe_ste.transmission_error.mean_contact import MeanContact, contact_input, mean_contact
@@ -278,7 +279,7 @@ def test_what_is_stopped_goes_on_from_the_contacts_that_are_solved(kept: Path, s
 
 
 def test_contacts_used_least_lately_are_removed(kept: Path, solved: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fe_ste.transmission_error.known_contacts, "_FILES", 1)
+    monkeypatch.setattr(fe_ste.transmission_error.known_contacts._contacts, "in_files", 6000)
     known_contacts([WANTED])
     other = dataclasses.replace(WANTED, misalignment=(0.0, 1e-5))
     known_contacts([other])
@@ -309,15 +310,15 @@ def test_a_folder_that_cannot_be_written_costs_nothing_but_time(
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "file"))
     (contact,) = known_contacts([WANTED])
     assert isinstance(contact, MeanContact)
-    assert "solved contacts cannot be kept" in caplog.text
+    assert "each contact cannot be kept" in caplog.text
 
 
 def test_a_full_disk_costs_nothing_but_time(
     kept: Path, solved: list[str], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    def full(path: Path, content: bytes) -> None:
+    def full(path: Path, content: memoryview) -> str:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(fe_ste.transmission_error.known_contacts, "write_sealed", full)
+    monkeypatch.setattr(sealed, "write_sealed", full)
     known_contacts([WANTED])
     assert "No space left on device" in caplog.text and not list(kept.glob("contact-*"))

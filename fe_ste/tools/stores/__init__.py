@@ -1,0 +1,1 @@
+"""What is kept under a key, in one file or in many."""
