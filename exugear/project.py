@@ -6,7 +6,7 @@ there and fits, and writes into its folder only.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,7 +19,7 @@ from exugear.bodies.elastic_body import ElasticBody
 from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.bearing_duties import bearing_duties, mesh_duties
-from exugear.dynamics.eigenmodes.modes import Modes, eigenmodes
+from exugear.dynamics.eigenmodes.modes import Modes, kept_modes, modes_of
 from exugear.dynamics.fingerprint import input_hash
 from exugear.dynamics.statics import BalanceError, static_state
 from exugear.gearbox.choice import Choice
@@ -60,6 +60,10 @@ Figures = dict[tuple[str, str, str], dict[str, float]]
 @dataclass(frozen=True)
 class Project(Displayed):
     """A gearbox with the folder of its results and the choices made.
+
+    Tables, elastic bodies, modes, steady responses and lives are kept in the folder, and taken as they are where they
+    belong to this input and method. A run is made anew each time, or goes on (`resume`); what bearings and meshes bear,
+    and a rating, are found anew.
 
     Attributes
     ----------
@@ -198,7 +202,12 @@ class Project(Displayed):
             Called with the number of finished states of the table at work, and of all its states.
         """
         self.keep_case()
-        requests = self.requested_tables(names, positions, grid=grid)
+        return self.computed(self.requested_tables(names, positions, grid=grid), progress)
+
+    def computed(
+        self, requests: Sequence[TableRequest], progress: Callable[[int, int], None] | None = None
+    ) -> dict[str, MeshTable]:
+        """Table of each request by its name; those that are not stored are computed, as `tables` does."""
         return {request.name: request.stored or request.compute(progress) for request in requests}
 
     def missing_tables(self) -> list[TableRequest]:
@@ -221,9 +230,9 @@ class Project(Displayed):
         try:
             return self._read_stiffness()
         except MeshError:  # looking for what is missing reads the tables once more
-            for request in self.missing_tables():
+            if requests := self.missing_tables():
                 self.keep_case()
-                request.compute()
+                self.computed(requests)
             return self._read_stiffness()
 
     def _read_stiffness(self) -> dict[str, MeshData]:
@@ -249,13 +258,14 @@ class Project(Displayed):
         return assemble(self.gearbox, self.choice, self.stiffness(), self.bodies())
 
     def modes(self) -> Modes:
-        """Eigenmodes at the static load, written to `modes_path`."""
-        stiffness, bodies = self.stiffness(), self.bodies()
-        self.keep_case()
-        choice = self.choice
-        with time_noted(self.folder, f"modes, {choice.variant}, {choice.inertias}, {choice.mesh_law}"):
-            modes = eigenmodes(self.gearbox, choice, stiffness, bodies)
-            modes.save(self.modes_path)
+        """Eigenmodes at the static load, written to `modes_path`; those that are there and fit are taken."""
+        assembly, choice = self.assembly(), self.choice
+        modes = kept_modes(self.modes_path, assembly)
+        if modes is None:
+            self.keep_case()
+            with time_noted(self.folder, f"modes, {choice.variant}, {choice.inertias}, {choice.mesh_law}"):
+                modes = modes_of(assembly)
+                modes.save(self.modes_path)
         return modes
 
     def steady(
@@ -360,9 +370,10 @@ class Project(Displayed):
         from exugear.life.life_file import stored_life, write_life
         from exugear.life.pair_stresses import pair_stresses
 
-        counted, assembly = counted or self.checked_loads(), self.assembly()
+        counted = counted or self.checked_loads()
         if any(request.stored is None for request in self.life_tables()):
             self.tables(grid=LAWS[self.choice.mesh_law].needs_axes)
+        assembly = self.assembly()
         requests = self.stress_tables(counted)
         tables = {request.name: request.wanted.hash for request in requests}
         rating = rating_of(self.gearbox)
@@ -375,9 +386,7 @@ class Project(Displayed):
             return kept
         self.keep_case()
         with time_noted(self.folder, f"life, {self.choice.variant}, {self.choice.mesh_law}"):
-            for request in requests:
-                if request.stored is None:
-                    request.compute()
+            self.computed(requests)
             stresses = pair_stresses(self.stress_tables(counted), self.folder, begin)
             life = compute_life(assembly, counted, stresses, dynamic, digest, progress, KeptAngles(angles))
             data = write_life(self.life_path, life, self.gearbox.name)

@@ -1,20 +1,20 @@
-"""What verbs ask of a gearbox file and of a results folder before they work."""
+"""What verbs ask of a gearbox file before they work."""
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from exugear.cli.console import counted, note
 from exugear.cli.errors import BadInputError, model_errors
+from exugear.cli.folders import check_results_folder
 from exugear.gearbox.variant import Variant
 
 if TYPE_CHECKING:
+    from exugear.cli.watched import WatchedProject
     from exugear.dynamics.assembly import Assembly
     from exugear.gearbox.choice import Choice
     from exugear.gearbox.gearbox import Gearbox
-    from exugear.project import Project
 
 
 def read_gearbox(case: Path, files_below: Path | None = None, scripts: bool = False, *, tell: bool = True) -> Gearbox:
@@ -51,44 +51,16 @@ def open_project(
     out: Path | None,
     files_below: Path | None,
     scripts: bool,
-) -> Project:
+) -> WatchedProject:
     """Read a gearbox file and refuse choices that it does not have, or may not have; write nothing."""
-    from exugear.project import Project, default_folder
+    from exugear.cli.watched import WatchedProject
+    from exugear.project import default_folder
 
     gearbox = read_gearbox(case, files_below, scripts)
     folder = out or default_folder(case)
     check_choice(gearbox, choice, folder)
     check_results_folder(folder)
-    return Project(gearbox, folder, choice)
-
-
-def check_results_folder(folder: Path) -> None:
-    """Refuse a folder that a verb could not write into, before it works, and make none."""
-    there = next(parent for parent in (folder, *folder.absolute().parents) if parent.exists())
-    if not there.is_dir():
-        raise BadInputError(f"--out {folder}: {there} is no folder; name one that can be made")
-    if not os.access(there, os.W_OK):
-        raise BadInputError(f"--out {folder}: {there} is not writable; name another folder")
-
-
-def begin_results(project: Project) -> None:
-    """Make the folder of a project that a verb writes into, after the last refusal.
-
-    That is of tables whose axes ask for what the gears cannot do.
-    """
-    with model_errors():
-        project.missing_tables()
-    make_results_folder(project.folder)
-
-
-def make_results_folder(folder: Path) -> None:
-    """Make the folder that a verb writes into, so that a wrong one shows before the work, not after."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BadInputError(f"--out {folder}: {error.strerror}; name a folder that can be made") from error
-    if not os.access(folder, os.W_OK):
-        raise BadInputError(f"--out {folder}: not writable; name another folder")
+    return WatchedProject(gearbox, folder, choice)
 
 
 def assembled_by_iso(gearbox: Gearbox, variant: Variant) -> Assembly:
@@ -128,16 +100,15 @@ def check_choice(gearbox: Gearbox, choice: Choice, folder: Path) -> None:
     from exugear.tooth_mesh.laws.registry import LAWS
     from exugear.tooth_mesh.tables import without_table
 
-    with model_errors():
-        gearbox.bodies(choice.inertias)
-        if choice.load_case is not None and choice.load_case not in gearbox.load_cases:
-            known = ", ".join(gearbox.load_cases) or "none"
-            raise gearbox.fault(f"no load case {choice.load_case!r}; load cases are {known}")
-        reason = lacking(gearbox, choice.variant)
-        if reason:
-            raise gearbox.fault(f"variant {choice.variant}: {reason}")
-        if choice.variant.is_elastic:
-            check_solids(gearbox, bodies_folder(folder))
+    gearbox.bodies(choice.inertias)
+    if choice.load_case is not None and choice.load_case not in gearbox.load_cases:
+        known = ", ".join(gearbox.load_cases) or "none"
+        raise gearbox.fault(f"no load case {choice.load_case!r}; load cases are {known}")
+    reason = lacking(gearbox, choice.variant)
+    if reason:
+        raise gearbox.fault(f"variant {choice.variant}: {reason}")
+    if choice.variant.is_elastic:
+        check_solids(gearbox, bodies_folder(folder))
     if LAWS[choice.mesh_law].needs_axes:
         without = without_table(gearbox, [mesh.pair.name for mesh in gearbox.meshes])
         if without:

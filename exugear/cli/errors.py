@@ -95,11 +95,11 @@ interruption = Interruption()
 def exit_codes() -> Iterator[None]:
     """Turn errors the user can act on into one message and an exit code; others keep their traceback.
 
-    2 after `BadInputError`, 1 after `FailedError` and whatever goes wrong in reading and writing, 130 after
-    `StoppedError` and Ctrl-C.
+    2 after `BadInputError` and what a gearbox or its choice cannot be, 1 after `FailedError`, a search without a
+    result, and whatever goes wrong in reading and writing, 130 after `StoppedError` and Ctrl-C.
     """
     try:
-        with interruption.listening():
+        with interruption.listening(), model_errors():
             yield
     except BadInputError as error:
         end_with("Bad input", error, EXIT_BAD_INPUT)
@@ -128,7 +128,21 @@ def end_with(what: str, reason: object, code: int) -> NoReturn:
 
 @contextmanager
 def model_errors() -> Iterator[None]:
-    """Turn errors of the model's parts into those of the command line."""
+    """Turn errors of the model's parts into those of the command line, for those who look at them themselves."""
+    try:
+        yield
+    except Exception as error:
+        told = _told_to_the_user(error)
+        if told is None:
+            raise
+        raise told from error
+
+
+def _told_to_the_user(error: Exception) -> Exception | None:
+    """Return what the command line makes of an error of the model's parts; None of another one."""
+    if not type(error).__module__.startswith("exugear."):
+        return None
+    # Imported after the fact: a verb that goes well need not load them.
     from exugear.bearings.rolling.rows import BearingError
     from exugear.dynamics.statics import BalanceError
     from exugear.gearbox.reading import CaseError
@@ -137,9 +151,8 @@ def model_errors() -> Iterator[None]:
     from exugear.steady.mean_system.rotating_frame import SteadyError
     from exugear.tooth_mesh.placement import MeshError
 
-    try:
-        yield
-    except (CaseError, VariantError, MeshError, BearingError, SteadyError) as error:
-        raise BadInputError(error) from error
-    except (BalanceError, HarmonicBalanceError) as error:
-        raise FailedError(error) from error
+    if isinstance(error, (CaseError, VariantError, MeshError, BearingError, SteadyError)):
+        return BadInputError(error)
+    if isinstance(error, (BalanceError, HarmonicBalanceError)):
+        return FailedError(error)
+    return None

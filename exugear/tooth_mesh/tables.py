@@ -23,6 +23,10 @@ if TYPE_CHECKING:
 TABLE_FOLDER = "tables"
 
 
+FINITE_ELEMENTS = 500
+"""States whose solution takes as long as the finite elements of two gears."""
+
+
 @dataclass(frozen=True)
 class TableRequest:
     """The table of one pair: its input, its file and, where the file fits the input, its content.
@@ -46,6 +50,17 @@ class TableRequest:
     path: Path
     stored: MeshTable | None
     replaces: str = ""
+
+    @property
+    def states(self) -> int:
+        """Number of states of the table."""
+        wanted = self.wanted
+        return wanted.positions * len(wanted.torque) * max(len(wanted.centre_distance), 1) * len(wanted.misalignment)
+
+    @property
+    def work(self) -> int:
+        """Work of the table, in states: the finite elements of both gears count as `FINITE_ELEMENTS`."""
+        return FINITE_ELEMENTS + self.states
 
     def compute(self, progress: Callable[[int, int], None] | None = None) -> MeshTable:
         """Compute the table and write its file; what a stopped computation had finished is taken up.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -58,6 +59,24 @@ def test_its_modes_are_those_of_the_command_line(project: Project, case: Path, t
     ours = load_modes(project.modes_path)
     assert ours.identical(theirs)
     assert np.array_equal(ours["frequency"], modes.frequency)
+
+
+def test_modes_that_are_there_are_taken_to_the_bit_and_those_of_another_input_are_not(
+    project: Project, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = project.modes()
+    with monkeypatch.context() as patched:
+        patched.setattr("exugear.project.modes_of", None)
+        again = project.modes()
+    for field in fields(Modes):
+        if field.name != "assembly":
+            one, other = getattr(first, field.name), getattr(again, field.name)
+            assert np.array_equal(one, other) and np.asarray(one).dtype == np.asarray(other).dtype, field.name
+    assert again.to_dataset().identical(first.to_dataset())
+    softer = replace(project, gearbox=project.gearbox.varied({"housing.factor": 0.2}))
+    assert not np.array_equal(softer.modes().frequency, first.frequency)
+    project.modes_path.write_bytes(project.modes_path.read_bytes()[:-100])
+    assert np.array_equal(project.modes().frequency, first.frequency)
 
 
 def test_its_run_is_that_of_the_command_line(project: Project, case: Path, tmp_path: Path) -> None:

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from exugear.cli.case import assembled_by_iso, read_gearbox, steady_lack
-from exugear.cli.console import counted, note, print_json, print_table, progress_bar, say
-from exugear.cli.dynamics import contacts_shown
-from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption, model_errors
+from exugear.cli.console import counted, note, print_json, print_table, say
+from exugear.cli.errors import BadInputError, FailedError, exit_codes, model_errors
 from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption, OutOption
 from exugear.gearbox.variant import OFFERED, Variant
 
@@ -95,24 +94,13 @@ def check(
 def _rate(case: Path, out: Path | None, files_below: Path | None, as_json: bool) -> None:
     """Print the rating of all gears; end with code 1 where one has less safety than is asked for."""
     from exugear.cli.rating_tables import tell_rating
+    from exugear.cli.watched import WatchedProject
     from exugear.gearbox.choice import Choice
-    from exugear.project import Project, default_folder
+    from exugear.project import default_folder
 
     gearbox = read_gearbox(case, files_below, tell=not as_json)
-    project = Project(gearbox, out or default_folder(case), Choice(Variant.bushing, "line_of_action"))
-    with progress_bar() as bar, model_errors():
-        task = bar.add_task("static balance", total=None)
-
-        def begin(pair: str) -> None:
-            interruption.check()
-            bar.update(task, description=f"{pair}: root stress by finite elements")
-
-        def show(done: int, total: int) -> None:
-            interruption.check()
-            bar.update(task, completed=done, total=total, description="static balance")
-
-        with contacts_shown(bar, task):
-            sheet = project.rating(begin, show)
+    project = WatchedProject(gearbox, out or default_folder(case), Choice(Variant.bushing, "line_of_action"))
+    sheet = project.rating()
     if as_json:
         print_json({"case": str(case), "name": gearbox.name, "rating": sheet.summary()})
     else:
@@ -159,14 +147,13 @@ def _tell_scripts(gearbox: Gearbox) -> None:
     """Check the solids, and say which of them only a script makes."""
     from exugear.bodies.of_gearbox.solids import solids_of
 
-    with model_errors():
-        for key, model in solids_of(gearbox):
-            if model.mesh.is_script:
-                note(
-                    f"{key}.file = {model.mesh.path.name!r}: a gmsh script can run any command, so modes, run and "
-                    "view want --allow-scripts or EXUGEAR_ALLOW_SCRIPTS=1 for the variant flexible",
-                    style="yellow",
-                )
+    for key, model in solids_of(gearbox):
+        if model.mesh.is_script:
+            note(
+                f"{key}.file = {model.mesh.path.name!r}: a gmsh script can run any command, so modes, run and "
+                "view want --allow-scripts or EXUGEAR_ALLOW_SCRIPTS=1 for the variant flexible",
+                style="yellow",
+            )
 
 
 def _pair_summary(gearbox: Gearbox, name: str) -> dict[str, Any]:
@@ -317,32 +304,31 @@ def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
     from exugear.transient.runup import BAND
 
     found = []
-    with model_errors():
-        for name, case in gearbox.load_cases.items():
-            check_duration(gearbox, case)
-            loads = summarise_loads(gearbox, case)
-            body, rim = loads.fastest_rim
-            found.append(
-                {
-                    "load_case": name,
-                    "net_torque_N_m": loads.net_torque,
-                    "driven": loads.driven,
-                    "duration_s": case.duration,
-                    "start_speed_rpm": loads.start_speed / RPM,
-                    "end_speed_rpm": loads.end_speed / RPM,
-                    "highest_mesh_frequency_Hz": max(loads.mesh_frequencies.values(), default=0.0),
-                    "band_Hz": BAND,
-                    "fastest_rim_m_per_s": rim,
-                    "fastest_rim_on": body,
-                    "loaded_flanks": dict(loads.flanks),
-                    "reversed_flanks": list(loads.reversed_flanks),
-                    "doubts": [
-                        *doubts_about(loads),
-                        *filter(None, [doubt_about_bearings(gearbox, loads, Variant.bushing)]),
-                        *_beyond_band(loads.mesh_frequencies, BAND),
-                    ],
-                }
-            )
+    for name, case in gearbox.load_cases.items():
+        check_duration(gearbox, case)
+        loads = summarise_loads(gearbox, case)
+        body, rim = loads.fastest_rim
+        found.append(
+            {
+                "load_case": name,
+                "net_torque_N_m": loads.net_torque,
+                "driven": loads.driven,
+                "duration_s": case.duration,
+                "start_speed_rpm": loads.start_speed / RPM,
+                "end_speed_rpm": loads.end_speed / RPM,
+                "highest_mesh_frequency_Hz": max(loads.mesh_frequencies.values(), default=0.0),
+                "band_Hz": BAND,
+                "fastest_rim_m_per_s": rim,
+                "fastest_rim_on": body,
+                "loaded_flanks": dict(loads.flanks),
+                "reversed_flanks": list(loads.reversed_flanks),
+                "doubts": [
+                    *doubts_about(loads),
+                    *filter(None, [doubt_about_bearings(gearbox, loads, Variant.bushing)]),
+                    *_beyond_band(loads.mesh_frequencies, BAND),
+                ],
+            }
+        )
     return found
 
 

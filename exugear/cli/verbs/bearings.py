@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from exugear.cli.case import begin_results, open_project
+from exugear.cli.case import open_project
 from exugear.cli.console import note, print_json, print_table, say
-from exugear.cli.dynamics import contacts_shown, reduce_elastic_bodies
-from exugear.cli.errors import BadInputError, exit_codes, model_errors
+from exugear.cli.errors import BadInputError, exit_codes
 from exugear.cli.options import (
     USUAL_LAW,
     CaseArgument,
@@ -20,7 +19,6 @@ from exugear.cli.options import (
     ScriptsOption,
     VariantOption,
 )
-from exugear.cli.tables import compute_missing_tables
 from exugear.gearbox.variant import Variant
 
 if TYPE_CHECKING:
@@ -53,11 +51,9 @@ def bearings(
         project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
         if not any(bearing.catalogue for bearing in project.gearbox.bearings):
             raise BadInputError(f"{case}: no bearing has catalogue data; add a [bearings.NAME.catalogue]")
-        begin_results(project)
-        compute_missing_tables(project)
-        reduce_elastic_bodies(project)
-        with model_errors(), contacts_shown():
-            duties, meshes = project.duties()
+        project.begin()
+        project.prepare()
+        duties, meshes = project.duties()
         path = project.bearings_path
         if as_json:
             choice = {"variant": variant.value, "mesh_law": mesh_law.value, "inertias": project.choice.inertias}

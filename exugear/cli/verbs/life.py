@@ -8,11 +8,10 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import TYPE_CHECKING
 
-from exugear.cli.case import make_results_folder, open_project
-from exugear.cli.console import note, print_json, print_table, progress_bar, say
-from exugear.cli.dynamics import contacts_shown, reduce_elastic_bodies
-from exugear.cli.errors import FailedError, exit_codes, interruption, model_errors
-from exugear.cli.load_files import files_bar
+from exugear.cli.case import open_project
+from exugear.cli.console import note, print_json, print_table, say
+from exugear.cli.errors import FailedError, exit_codes
+from exugear.cli.folders import make_results_folder
 from exugear.cli.options import (
     USUAL_LAW,
     CaseArgument,
@@ -24,16 +23,12 @@ from exugear.cli.options import (
     ScriptsOption,
     VariantOption,
 )
-from exugear.cli.tables import compute_tables
 from exugear.gearbox.variant import Variant
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     import xarray as xr
-
-    from exugear.life.load_spectrum.counted import CountedLoads
-    from exugear.project import Project
 
 SHOWN_LIMITS = 8
 
@@ -58,18 +53,9 @@ def life(
         from exugear.life.life_file import summary
 
         project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
-        with model_errors(), files_bar() as read:
-            counted = project.checked_loads(read)
+        counted = project.checked_loads()
         make_results_folder(project.folder)
-        project.keep_case()
-        with model_errors():
-            requests = project.life_tables()
-        compute_tables(requests)
-        reduce_elastic_bodies(project)
-        with model_errors(), contacts_shown():
-            states = project.stress_tables(counted)
-        compute_tables(states)
-        data = _rate(project, counted)
+        data = project.life(counted=counted)
         picture = project.life_path.with_suffix(".png")
         draw_life(data, picture)
         if as_json:
@@ -85,23 +71,6 @@ def _fail_if_short(data: xr.Dataset, path: Path) -> None:
     lines = [line for key in ("failures", "shortfalls") for line in json.loads(data.attrs[key])]
     if lines:
         raise FailedError("\n".join(["the gearbox does not live as long as it shall:", *lines, f"It is in {path}"]))
-
-
-def _rate(project: Project, counted: CountedLoads) -> xr.Dataset:
-    """Rate behind a progress bar, or find what is kept."""
-    with progress_bar() as bar:
-        task = bar.add_task(f"{project.choice.variant}: stresses of pairs", total=None)
-
-        def begin(pair: str) -> None:
-            interruption.check()
-            bar.update(task, description=f"{pair}: root stress by finite elements")
-
-        def show(done: int, total: int) -> None:
-            interruption.check()
-            bar.update(task, completed=done, total=total, description=f"{project.choice.variant}: static balance")
-
-        with model_errors(), contacts_shown(bar, task):
-            return project.life(begin, show, counted)
 
 
 def _tell(data: xr.Dataset) -> None:

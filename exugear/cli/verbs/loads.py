@@ -6,10 +6,11 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from exugear.cli.case import check_results_folder, make_results_folder, read_gearbox
+from exugear.cli.bars import Bars, files_read
+from exugear.cli.case import read_gearbox
 from exugear.cli.console import note, print_json, print_table, say
-from exugear.cli.errors import exit_codes, model_errors
-from exugear.cli.load_files import files_bar
+from exugear.cli.errors import exit_codes
+from exugear.cli.folders import check_results_folder, make_results_folder
 from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption, OutOption, ScriptsOption
 
 if TYPE_CHECKING:
@@ -36,8 +37,8 @@ def loads(
         gearbox = read_gearbox(case, files_below, scripts)
         folder = (out or default_folder(case)) / "loads"
         check_results_folder(folder)
-        with model_errors(), files_bar() as read:
-            counted = count_loads(gearbox, read)
+        with Bars().row() as row:
+            counted = count_loads(gearbox, files_read(row))
         make_results_folder(folder)
         picture = folder / "load_duration.png"
         draw_duration(counted.distribution, counted.body, picture)

@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from exugear.cli.case import begin_results, open_project
+from exugear.cli.case import open_project
 from exugear.cli.console import note, print_json, print_table, say
-from exugear.cli.dynamics import compute_modes, label_of
 from exugear.cli.errors import exit_codes
 from exugear.cli.options import (
     USUAL_LAW,
@@ -20,7 +19,7 @@ from exugear.cli.options import (
     ScriptsOption,
     VariantOption,
 )
-from exugear.cli.tables import compute_missing_tables, refuse_unsolved
+from exugear.cli.tables import refuse_unsolved
 
 if TYPE_CHECKING:
     from exugear.dynamics.eigenmodes.modes import Modes
@@ -43,14 +42,12 @@ def modes(
     with exit_codes():
         from exugear.dynamics.statics import beside_unsolved_states
         from exugear.gearbox.choice import Choice
-        from exugear.results.folder import time_noted
 
         project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
-        begin_results(project)
-        compute_missing_tables(project)
-        with time_noted(project.folder, f"modes, {variant}, {project.choice.inertias}, {mesh_law}"):
-            found, path = compute_modes(project), project.modes_path
-            picture = _draw_campbell(found, path)
+        project.begin()
+        project.prepare()
+        found, path = project.modes(), project.modes_path
+        picture = _draw_campbell(found, path)
         rows = _mode_summaries(found)
         if found.growth_rate > 0.0:
             note(f"Unstable: disturbances grow by up to {found.growth_rate:.3g} 1/s; a run diverges", style="yellow")
@@ -59,7 +56,7 @@ def modes(
             label = {"variant": assembly.variant, "mesh_law": assembly.mesh_law, "inertias": assembly.inertias}
             print_json({"case": str(case), **label, "modes": rows, "file": str(path), "picture": str(picture)})
         else:
-            print_table(f"Modes of {label_of(found)}", [_mode_row(row) for row in rows], ("what moves",))
+            print_table(f"Modes of {found.label}", [_mode_row(row) for row in rows], ("what moves",))
             say(f"Modes in {path}, diagram in {picture}")
         refuse_unsolved(beside_unsolved_states(found.assembly))
 
@@ -83,7 +80,7 @@ def _draw_campbell(found: Modes, path: Path) -> Path:
         picture,
         weights=(shares[seen] / shares.max()) ** 0.5,
         highest_frequency=top,
-        title=f"{label_of(found)}: modes with a share over {100 * least:g} %",
+        title=f"{found.label}: modes with a share over {100 * least:g} %",
     )
     return picture
 

@@ -11,7 +11,7 @@ import typer
 
 from exugear.cli.case import check_files_below
 from exugear.cli.console import note, print_json, print_table, progress_bar, say
-from exugear.cli.errors import BadInputError, exit_codes, interruption, model_errors
+from exugear.cli.errors import BadInputError, exit_codes, interruption
 from exugear.cli.options import FilesBelowOption, JsonOption
 
 
@@ -30,7 +30,6 @@ def report(
     scripts never run: what they would make must be there.
     """
     with exit_codes():
-        from exugear.gearbox.reading import CaseError
         from exugear.report.writer import ReportError, write_report
         from exugear.results.folder import time_noted
 
@@ -38,7 +37,7 @@ def report(
         if not folder.is_dir():
             raise BadInputError(f"{folder}: no such folder; name the one that `exugear run` wrote into")
         try:
-            with time_noted(folder, "report"), model_errors(), progress_bar() as bar, _beside() as executor:
+            with time_noted(folder, "report"), progress_bar() as bar, _beside() as executor:
                 task = bar.add_task("report", total=None)
 
                 def tell(what: str) -> None:
@@ -46,7 +45,7 @@ def report(
                     bar.update(task, description=what)
 
                 written = write_report(folder, near, tell, files_below, executor)
-        except (CaseError, ReportError) as error:
+        except ReportError as error:
             raise BadInputError(error) from error
         _tell_report(folder, written.path, written.statements, written.left_out, as_json)
 

@@ -9,16 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from exugear.cli.case import begin_results, open_project
-from exugear.cli.console import note, print_json, progress_bar, say
-from exugear.cli.dynamics import contacts_shown, reduce_elastic_bodies
+from exugear.cli.case import open_project
+from exugear.cli.console import note, print_json, say
 from exugear.cli.errors import (
     BadInputError,
     FailedError,
     StoppedError,
     exit_codes,
-    interruption,
-    model_errors,
 )
 from exugear.cli.options import (
     USUAL_LAW,
@@ -31,14 +28,13 @@ from exugear.cli.options import (
     ScriptsOption,
     VariantOption,
 )
-from exugear.cli.tables import compute_missing_tables
 from exugear.gearbox.variant import Variant
 
 if TYPE_CHECKING:
     from exugear.gearbox.gearbox import Gearbox
     from exugear.gearbox.parts import LoadCase
     from exugear.project import Project
-    from exugear.transient.outcome import Progress, Run
+    from exugear.transient.outcome import Run
 
 
 class Solver(StrEnum):
@@ -107,10 +103,10 @@ def run(
         if integrator and solver is Solver.exudyn:
             raise BadInputError(f"--integrator {integrator}: is a method of the compiled solver; leave it out")
         if not resume:
-            begin_results(project)
+            project.begin()
         _check_run_directory(project.run_directory, resume)
         _tell_doubts(project, duration)
-        compute_missing_tables(project)
+        project.prepare()
         with time_noted(project.folder, _label_of(project, solver, mesh_route)):
             how = {"solver": solver.value, "mesh_route": mesh_route.value, "integrator": integrator}
             finished = _simulate(project, resume, duration=duration, **how)
@@ -140,9 +136,8 @@ def _check_extent(project: Project, duration: float | None, folder: Path) -> Non
     jointed, tabled = project.choice.variant.spins_only, LAWS[project.choice.mesh_law].signals_positions
     supports = gearbox.joints if jointed else gearbox.bearings
     size = sample_bytes(len(gearbox.meshes), len(supports), tabled, jointed)
-    with model_errors():
-        check_duration(gearbox, load_case, duration)
-        check_disk(gearbox, load_case, folder, duration, sample_bytes=size)
+    check_duration(gearbox, load_case, duration)
+    check_disk(gearbox, load_case, folder, duration, sample_bytes=size)
 
 
 def _check_solver(gearbox: Gearbox, variant: Variant, solver: Solver) -> None:
@@ -190,42 +185,31 @@ def _tell_doubts(project: Project, duration: float | None) -> None:
     )
 
     load_case = _load_case(project)
-    with model_errors():
-        loads = summarise_loads(project.gearbox, load_case, project.choice.inertias, duration)
+    loads = summarise_loads(project.gearbox, load_case, project.choice.inertias, duration)
     of_bearings = doubt_about_bearings(project.gearbox, loads, project.choice.variant)
     for doubt in (*doubts_about(loads), *([of_bearings] if of_bearings else [])):
         note(f"load_cases.{load_case.name}: {doubt}", style="yellow")
 
 
 def _simulate(project: Project, resume: bool, **options: Any) -> Run:
-    """Run the load case behind a progress bar; options as those of `exugear.transient.runup.simulate`."""
+    """Run the load case; options as those of `exugear.transient.runup.simulate`."""
     from exugear.results.pieces import has_pieces
     from exugear.results.run_file import PARTIAL_NAME
     from exugear.transient.outcome import LimitError, RunError
 
-    directory, variant = project.run_directory, project.choice.variant
+    directory = project.run_directory
     if not resume and has_pieces(directory / PARTIAL_NAME):
         note(f"{directory}: a stopped run is begun anew; --resume would have gone on from it")
-    reduce_elastic_bodies(project)
-    with progress_bar() as bar:
-        task = bar.add_task(f"{variant}: start in balance", total=None)
-
-        def show(at: Progress) -> None:
-            interruption.check()
-            text = f"{variant}: {at.simulated:.2f} of {at.total:g} s, {at.speed:.2f} simulated s per s"
-            bar.update(task, completed=at.simulated, total=at.total, description=text)
-
-        try:
-            with model_errors(), contacts_shown(bar, task):
-                return project.run(resume=resume, progress=show, **options)
-        except LimitError as error:
-            return error.run
-        except RunError as error:
-            raise FailedError(error) from error
-        except KeyboardInterrupt:
-            if not has_pieces(directory / PARTIAL_NAME):
-                raise
-            raise StoppedError(f"kept in {directory}, --resume goes on from there") from None
+    try:
+        return project.run(resume=resume, **options)
+    except LimitError as error:
+        return error.run
+    except RunError as error:
+        raise FailedError(error) from error
+    except KeyboardInterrupt:
+        if not has_pieces(directory / PARTIAL_NAME):
+            raise
+        raise StoppedError(f"kept in {directory}, --resume goes on from there") from None
 
 
 def _tell_run(case: Path, finished: Run, as_json: bool) -> None:

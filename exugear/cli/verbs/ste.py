@@ -11,16 +11,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from exugear.cli.case import make_results_folder, read_gearbox
+from exugear.cli.case import read_gearbox
 from exugear.cli.console import note, print_json, print_table, progress_bar, say
-from exugear.cli.dynamics import contacts_shown
 from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption
+from exugear.cli.folders import make_results_folder
 from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption, OutOption
-from exugear.cli.tables import compute_tables, tell_of_tables
+from exugear.cli.tables import tell_of_tables
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
+    from exugear.cli.watched import WatchedProject
     from exugear.gearbox.gearbox import Gearbox
     from exugear.tooth_mesh.reference_tables import ReferenceRequest
     from exugear.tooth_mesh.tables import TableRequest
@@ -74,6 +75,10 @@ def ste(
     the others and serve to check them; dynamics do not use them.
     """
     with exit_codes():
+        from exugear.cli.watched import WatchedProject
+        from exugear.gearbox.choice import Choice
+        from exugear.gearbox.variant import Variant
+        from exugear.project import default_folder
         from exugear.results.folder import time_noted
         from exugear.tooth_mesh.tables import stored_tables
 
@@ -85,34 +90,32 @@ def ste(
             return
         if positions is not None and positions < LEAST_TABLE_POSITIONS:
             raise BadInputError(f"--positions {positions}: a table for dynamics needs at least {LEAST_TABLE_POSITIONS}")
-        requests, folder = _requested_tables(gearbox, case, out, mesh or [], positions, grid)
+        project = WatchedProject(gearbox, out or default_folder(case), Choice(Variant.bushing))
+        folder, requests = project.folder, _requested_tables(project, mesh or [], positions, grid)
         with time_noted(folder, "tables of transmission error"):
-            tables = compute_tables(requests)
+            tables = project.computed(requests)
         with time_noted(folder, "pictures of the tables"):
             beside = stored_tables(gearbox, folder, positions)
             with _curves_beside({**beside, **tables}, folder, requests) as curves:
                 contacts = _draw_contacts(requests, tables, folder)
             pictures = curves.result() + contacts
-        _tell_misalignment(gearbox, folder)
+        _tell_misalignment(project)
         _tell_tables(case, folder, requests, tables, pictures, as_json)
 
 
-def _tell_misalignment(gearbox: Gearbox, folder: Path) -> None:
+def _tell_misalignment(project: WatchedProject) -> None:
     """Say how far the gears stand off straight, for which static tables are; nothing where bearings are unknown."""
     from exugear.bearings.rolling.rows import BearingError
     from exugear.bearings.supports import unsupported
     from exugear.dynamics.statics import BalanceError, static_state
-    from exugear.gearbox.choice import Choice
-    from exugear.gearbox.variant import Variant
-    from exugear.project import Project
     from exugear.tooth_mesh.placement import MeshError
     from exugear.tooth_mesh.tables import missing_tables
 
-    if unsupported(gearbox, Variant.bushing) or missing_tables(gearbox, folder):
+    if unsupported(project.gearbox, project.choice.variant) or missing_tables(project.gearbox, project.folder):
         return
     try:
-        with contacts_shown():
-            state = static_state(Project(gearbox, folder, Choice(Variant.bushing)).assembly())
+        with project.bars.row():
+            state = static_state(project.assembly())
     except (BalanceError, BearingError, MeshError):  # of which the verbs tell that need it
         return
     largest: dict[str, float] = {}
@@ -124,23 +127,17 @@ def _tell_misalignment(gearbox: Gearbox, folder: Path) -> None:
 
 
 def _requested_tables(
-    gearbox: Gearbox, case: Path, out: Path | None, names: list[str], positions: int | None, grid: bool
-) -> tuple[list[TableRequest], Path]:
-    from exugear.gearbox.reading import CaseError
-    from exugear.project import Project, default_folder
-    from exugear.results.folder import keep_case
+    project: WatchedProject, names: list[str], positions: int | None, grid: bool
+) -> list[TableRequest]:
     from exugear.tooth_mesh.tables import without_table
 
-    folder = out or default_folder(case)
-    try:
-        requests = Project(gearbox, folder).requested_tables(names, positions, grid=grid)
-    except CaseError as error:
-        raise BadInputError(error) from error
+    gearbox = project.gearbox
+    requests = project.requested_tables(names, positions, grid=grid)
     if not requests:
         why = without_table(gearbox, gearbox.pairs) or "pairs: none wants a table; give table = true, or --mesh NAME"
         raise BadInputError(gearbox.fault(why))
-    make_results_folder(folder)
-    keep_case(gearbox, folder)
+    make_results_folder(project.folder)
+    project.keep_case()
     for request in requests:
         if request.stored:
             note(f"{request.name}: kept {request.path}, computed from the same input")
@@ -150,23 +147,19 @@ def _requested_tables(
         if len(request.wanted.misalignment) > 1:
             ranges = request.wanted.axes().ranges()
             note(f"{request.name}: grid over {', '.join(f'{axis} {values}' for axis, values in ranges.items())}")
-    return requests, folder
+    return requests
 
 
 def _compute_references(
     gearbox: Gearbox, case: Path, out: Path | None, names: list[str], positions: int | None, as_json: bool
 ) -> None:
     """Run the reference analysis of the pairs and report; each position is kept as soon as it is solved."""
-    from exugear.gearbox.reading import CaseError
     from exugear.project import default_folder
     from exugear.results.folder import keep_case, time_noted
     from exugear.tooth_mesh.reference_tables import requested_references, summarise_reference
 
     folder = out or default_folder(case)
-    try:
-        requests = requested_references(gearbox, folder, names, positions)
-    except CaseError as error:
-        raise BadInputError(error) from error
+    requests = requested_references(gearbox, folder, names, positions)
     make_results_folder(folder)
     keep_case(gearbox, folder)
     tables = {}

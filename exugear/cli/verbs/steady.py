@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from exugear.cli.case import assembled_by_iso, begin_results, open_project, steady_lack
-from exugear.cli.console import note, print_json, print_table, progress_bar, say
-from exugear.cli.dynamics import contacts_shown, reduce_elastic_bodies
-from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption, model_errors
+from exugear.cli.case import assembled_by_iso, open_project, steady_lack
+from exugear.cli.console import note, print_json, print_table, say
+from exugear.cli.errors import BadInputError, FailedError, exit_codes
 from exugear.cli.options import (
     USUAL_LAW,
     CaseArgument,
@@ -25,7 +24,7 @@ from exugear.cli.options import (
     ScriptsOption,
     VariantOption,
 )
-from exugear.cli.tables import compute_missing_tables, refuse_unsolved
+from exugear.cli.tables import refuse_unsolved
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -105,14 +104,11 @@ def steady(
         from exugear.gearbox.choice import Choice
 
         project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
-        with model_errors():
-            settings = _settings(project, level, speeds, harmonics, branches)
+        settings = _settings(project, level, speeds, harmonics, branches)
         _refuse_what_has_none(project)
-        begin_results(project)
-        compute_missing_tables(project)
-        reduce_elastic_bodies(project)
-        data = _respond(project, settings)
-        _tell(project, settings, data, as_json)
+        project.begin()
+        project.prepare()
+        _tell(project, settings, project.steady(settings), as_json)
 
 
 def _refuse_what_has_none(project: Project) -> None:
@@ -132,19 +128,6 @@ def _settings(
     asked = usual_speeds(project.gearbox) if speeds is None else SpeedRange.from_text(speeds)
     check_speeds(project.gearbox, asked)
     return SteadySettings(asked, level.value, harmonics, branches=branches)
-
-
-def _respond(project: Project, settings: SteadySettings) -> xr.Dataset:
-    """Compute the response behind a progress bar, or find one that is kept."""
-    with progress_bar() as bar:
-        task = bar.add_task(f"{project.choice.variant}: mean system", total=None)
-
-        def show(done: int, total: int) -> None:
-            interruption.check()
-            bar.update(task, completed=done, total=total, description=f"{project.choice.variant}: steady response")
-
-        with model_errors(), contacts_shown(bar, task):
-            return project.steady(settings, show)
 
 
 def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json: bool) -> None:

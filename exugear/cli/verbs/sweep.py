@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from exugear.cli.case import check_choice, check_files_below, make_results_folder
+from exugear.cli.case import check_choice, check_files_below
 from exugear.cli.console import note, print_json, print_table, progress_bar, say
 from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption
+from exugear.cli.folders import make_results_folder
 from exugear.cli.libraries import let_in_dask
 from exugear.cli.options import FilesBelowOption, JsonOption, OutOption, ScriptsOption
 

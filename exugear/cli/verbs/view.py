@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from exugear.cli.case import begin_results, open_project
+from exugear.cli.case import open_project
 from exugear.cli.console import note, print_json, say
-from exugear.cli.dynamics import compute_modes, label_of
 from exugear.cli.errors import BadInputError, exit_codes
 from exugear.cli.options import (
     USUAL_LAW,
@@ -22,7 +21,6 @@ from exugear.cli.options import (
     ScriptsOption,
     VariantOption,
 )
-from exugear.cli.tables import compute_missing_tables
 from exugear.gearbox.variant import Variant
 
 if TYPE_CHECKING:
@@ -51,9 +49,9 @@ def view(
         from exugear.gearbox.choice import Choice
 
         project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
-        begin_results(project)
-        compute_missing_tables(project)
-        found = compute_modes(project)
+        project.begin()
+        project.prepare()
+        found = project.modes()
         wanted = project.gearbox.case.report.reference_frequency_Hz if near is None else near
         first = int(found.overall.argmax()) if wanted is None else found.nearest(wanted)
         written = _draw_modes(found, project.modes_path.parent, first, animation)
@@ -79,7 +77,7 @@ def _draw_modes(found: Modes, folder: Path, first: int, animation: bool) -> list
         if frequency > 0.0 and any(motion.any() for body, motion in motions.items() if body in drawn):
             places.append(place)
     if not places:
-        raise BadInputError(f"{label_of(found)}: no elastic mode to show")
+        raise BadInputError(f"{found.label}: no elastic mode to show")
     shown = places.index(first) if first in places else 0
     words, modes = Words(assembly.gearbox), found.to_dataset()
     page = write_mode_page(
@@ -87,7 +85,7 @@ def _draw_modes(found: Modes, folder: Path, first: int, animation: bool) -> list
         found.shapes[:, places],
         [(float(found.frequency[place]), words.moves(modes, place)) for place in places],
         folder / "modes.html",
-        heading=f"{assembly.gearbox.name}, {label_of(found)}",
+        heading=f"{assembly.gearbox.name}, {found.label}",
         first=shown,
         labels=words.labels,
     )

@@ -31,6 +31,7 @@ from exugear.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import Displayed, TitledRows
 from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
+from fe_ste.tools.stores.store import Store
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -88,6 +89,13 @@ class Modes(Displayed):
             )
         }
         return repr(self).strip("<>"), rows
+
+    @property
+    def label(self) -> str:
+        """What the modes belong to: variant, mesh law, inertia set and housing factor."""
+        assembly = self.assembly
+        law = f"law {assembly.mesh_law}, inertias {assembly.inertias}"
+        return f"{assembly.variant}, {law}, housing factor {assembly.housing_factor:g}"
 
     def nearest(self, frequency: float) -> int:
         """Find the number of the mode nearest to a frequency (Hz)."""
@@ -172,6 +180,26 @@ def load_modes(path: str | Path) -> xr.Dataset:
     fe_ste.tools.files.FileError: nowhere/modes.nc: no such file
     """
     return load_dataset(Path(path), _LAYOUT)
+
+
+def kept_modes(path: Path, assembly: Assembly) -> Modes | None:
+    """Read modes of exactly this assembly that `Modes.save` wrote, the same to the bit; None where there are none."""
+    data = Store(path, input_hash(assembly)).read_dataset(_LAYOUT)
+    if data is None:
+        return None
+    return Modes(
+        assembly=assembly,
+        frequency=data["frequency"].to_numpy(),
+        damping_ratio=data["damping_ratio"].to_numpy(),
+        shapes=data["shape"].to_numpy(),
+        element_names=tuple(data["element"].to_numpy().tolist()),
+        strain=data["strain_energy_share"].to_numpy(),
+        kinetic=data["kinetic_energy_share"].to_numpy(),
+        overall=data["overall_dte"].to_numpy(),
+        amplification=data["amplification"].to_numpy(),
+        names=tuple(data["name"].to_numpy().tolist()),
+        growth_rate=float(data.attrs["growth_rate"]),
+    )
 
 
 def coordinate_labels(assembly: Assembly) -> list[str]:

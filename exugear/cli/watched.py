@@ -1,0 +1,179 @@
+"""A project whose long work is seen while it goes on, for the verbs; loaded inside them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from exugear.bearings.duty import BearingDuty
+from exugear.bearings.supports import elastic_names
+from exugear.bodies.elastic_body import ElasticBody
+from exugear.cli.bars import Bars, Row, files_read
+from exugear.cli.console import note
+from exugear.cli.errors import BadInputError, FailedError
+from exugear.cli.folders import make_results_folder
+from exugear.cli.tables import tell_of_tables
+from exugear.dynamics.assembly import Assembly
+from exugear.dynamics.eigenmodes.modes import Modes
+from exugear.gearbox.reading import CaseError
+from exugear.project import Project
+from exugear.results.folder import time_noted
+from exugear.tooth_mesh.mesh_duty import MeshDuty
+from exugear.tooth_mesh.tables import TableRequest
+from exugear.transient.outcome import Progress, Run
+from fe_ste.elimination.sparse import FactorisationError
+from fe_ste.geometry.checks import GeometryError
+from fe_ste.transmission_error.grid import GridError
+from fe_ste.transmission_error.table import MeshTable
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from exugear.life.load_spectrum.counted import CountedLoads
+    from exugear.life.rating.sheet import RatingSheet
+    from exugear.steady.settings import SteadySettings
+
+
+@dataclass(frozen=True, repr=False)
+class WatchedProject(Project):
+    """A project that shows what takes long in rows of one display, and ends with Ctrl-C between its steps.
+
+    Attributes
+    ----------
+    bars : Bars
+    """
+
+    bars: Bars = field(default_factory=Bars, compare=False)
+
+    def begin(self) -> None:
+        """Make the folder, after the last refusal: that of tables whose axes ask for what the gears cannot do."""
+        self.missing_tables()
+        make_results_folder(self.folder)
+
+    def prepare(self) -> None:
+        """Compute the tables that the mesh law needs and that are not there or belong to another input."""
+        requests = self.missing_tables()
+        self.keep_case()
+        for request in requests:
+            note(request.replaces or f"{request.name}: no table in {self.folder}; it is computed first")
+        with time_noted(self.folder, "tables, computed before dynamics") if requests else nullcontext():
+            self.computed(requests)
+        # What a law cannot do with it refuses itself.
+        for doubt in tell_of_tables(self.tables_at_work()):
+            note(doubt, style="yellow")
+
+    def computed(
+        self, requests: Sequence[TableRequest], progress: Callable[[int, int], None] | None = None
+    ) -> dict[str, MeshTable]:
+        """Table of each request; those that are missing share one row."""
+        total, before = sum(request.work for request in requests if not request.stored), 0
+        tables = {}
+        with self.bars.row() as row:
+            for request in requests:
+                tables[request.name] = request.stored or _computed(request, row, before, total)
+                before += 0 if request.stored else request.work
+        return tables
+
+    def bodies(self, begin: Callable[[str], None] | None = None) -> dict[str, ElasticBody]:
+        """Reduced elastic bodies of the variant, or those that are kept."""
+        names = elastic_names(self.gearbox)
+        with self.bars.row() as row:
+
+            def show(name: str) -> None:
+                row(f"{name}: finite elements, reduced to its seats", names.index(name), len(names))
+
+            try:
+                return super().bodies(show)
+            except CaseError as error:  # a mesh that only reading shows to be none: the work has begun
+                raise FailedError(error) from error
+
+    def assembly(self) -> Assembly:
+        """Equations of motion."""
+        with self.bars.row():
+            return super().assembly()
+
+    def modes(self) -> Modes:
+        """Eigenmodes; tells how elastic bodies were reduced."""
+        with self.bars.row():
+            modes = super().modes()
+        for name, body in modes.assembly.elastic_bodies.items():
+            figures = body.reduced.summary
+            unknowns, took = sum(figures.unknowns.values()), figures.seconds
+            note(f"{name}: {unknowns} unknowns reduced to {body.reduced.size} coordinates in {took:.1f} s")
+        return modes
+
+    def duties(self) -> tuple[tuple[BearingDuty, ...], tuple[MeshDuty, ...]]:
+        """Find what catalogue bearings and meshes bear."""
+        with self.bars.row():
+            return super().duties()
+
+    def steady(
+        self, settings: SteadySettings | None = None, progress: Callable[[int, int], None] | None = None
+    ) -> xr.Dataset:
+        """Steady response over speed."""
+        words = f"{self.choice.variant}: steady response"
+        with self.bars.row() as row:
+            row(words)
+            return super().steady(settings, lambda done, total: row(words, done, total))
+
+    def run(self, **options: Any) -> Run:
+        """Run of the load case in time."""
+        variant = self.choice.variant
+        with self.bars.row() as row:
+
+            def show(at: Progress) -> None:
+                text = f"{variant}: {at.simulated:.2f} of {at.total:g} s, {at.speed:.2f} simulated s per s"
+                row(text, at.simulated, at.total)
+
+            row(f"{variant}: start in balance")
+            return super().run(progress=show, **options)
+
+    def checked_loads(self, progress: Callable[[int, int], None] | None = None) -> CountedLoads:
+        """Read the loads of a life."""
+        with self.bars.row() as row:
+            return super().checked_loads(files_read(row))
+
+    def life(
+        self,
+        begin: Callable[[str], None] | None = None,
+        progress: Callable[[int, int], None] | None = None,
+        counted: CountedLoads | None = None,
+    ) -> xr.Dataset:
+        """Life of gears and bearings."""
+        with self.bars.row() as row:
+            row("stresses of pairs")
+            return super().life(*_of_life(row), counted)
+
+    def rating(
+        self, begin: Callable[[str], None] | None = None, progress: Callable[[int, int], None] | None = None
+    ) -> RatingSheet:
+        """Rating of all gears by the standard."""
+        with self.bars.row() as row:
+            row("static balance")
+            return super().rating(*_of_life(row))
+
+
+def _of_life(row: Row) -> tuple[Callable[[str], None], Callable[[int, int], None]]:
+    """Return what is told of pairs whose root stress begins, and of static states that are solved."""
+    return (
+        lambda pair: row(f"{pair}: root stress by finite elements"),
+        lambda done, total: row("static balance", done, total),
+    )
+
+
+def _computed(request: TableRequest, row: Row, before: int, total: int) -> MeshTable:
+    """Compute a table; its row counts the work of all that are missing, of which some is done before."""
+    row(f"{request.name}: finite elements", before, total)
+    what = "position" if request.states == request.wanted.positions else "state"
+
+    def show(done: int, of: int) -> None:
+        row(f"{request.name}: {what} {done} of {of}", before + request.work - of + done, total)
+
+    try:
+        return request.compute(show)
+    except GeometryError as error:
+        raise BadInputError(f"pairs.{request.name}: {error}") from error
+    except (FactorisationError, GridError) as error:
+        raise FailedError(f"{request.name}: {error}") from error
