@@ -16,6 +16,6 @@ RUN = 8
 #: Life of gears and bearings (`exugear.life`, and the root stress of `fe_ste.root_stress`).
 LIFE = 7
 #: Steady responses (`exugear.steady`, and all that modes rest on).
-STEADY = 8
+STEADY = 9
 #: Points of studies (`exugear.studies`: their figures; what these rest on has its own version).
 STUDY = 1

@@ -14,7 +14,7 @@ import numpy as np
 from exugear.dynamics.linearised import linearise
 from exugear.steady.excitation import Gearset
 from exugear.steady.mean_system.mean_modes import mean_modes
-from exugear.steady.response import transmission_error_line
+from exugear.steady.response import transmission_errors
 from fe_ste.tools.arrays import Complexes, Floats
 
 LEAST_MODE = 0.01
@@ -98,7 +98,7 @@ def loudest_near(gearset: Gearset, speed: float, width: float, line: int) -> flo
 def _excitation(gearset: Gearset, speed: float, line: int) -> tuple[Complexes, Complexes]:
     """Generalized peak forces of each wave (size, m f) on a line, and their sum (size,)."""
     ports = gearset.ports_at(speed)
-    excess = transmission_error_line(gearset, ports, speed, line)
+    excess = transmission_errors(gearset, ports, speed)[line]
     forces = -2.0 * gearset.loads(ports) * excess.ravel()
     return forces, np.asarray(forces.sum(axis=1))
 

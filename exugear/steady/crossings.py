@@ -22,6 +22,8 @@ from fe_ste.tools.arrays import Booleans, Complexes, Floats, SingleComplexes
 from fe_ste.tools.threads import side_by_side
 
 Forcing = Callable[[Interface], Complexes]
+KnownTops = dict[tuple[str, int, int, int, bytes], tuple[float, float]]
+"""Place and height of tops by quantity, line, place of the quantity, and the speeds around."""
 HARMONICS = 3
 """Multiples of the fastest mesh frequency up to which modes are followed."""
 LEAST_SHARE = 1e-3
@@ -141,6 +143,7 @@ def missed_tops(
     smooth: Booleans,
     quantities: Sequence[Quantity],
     operation: tuple[float, float] | None,
+    known: KnownTops | None = None,
 ) -> Floats:
     """Speeds at which the loudest peaks are higher than at any known speed, by curves through five neighbours.
 
@@ -156,9 +159,12 @@ def missed_tops(
         Whose peaks count.
     operation : (float, float) or None
         Speeds between which the loudest count by themselves, rad/s without sign.
+    known : dict, optional
+        Tops that were found between the same speeds before, to which those found now are added.
     """
     if len(speeds) < NEIGHBOURS:
         return np.zeros(0)
+    known = {} if known is None else known
     found: list[float] = []
     inside = np.ones(len(speeds), dtype=bool)
     if operation is not None:
@@ -176,8 +182,12 @@ def missed_tops(
             around = slice(max(point - NEIGHBOURS, 0), point + NEIGHBOURS + 1)
             if not smooth[around].all():
                 continue
-            values = quantity.at(amplitude[around, line + 1], int(places[point, line]))
-            top, height = predicted_top(speeds[around], values, point - around.start)
+            place = int(places[point, line])
+            key = quantity.name, line, place, point - around.start, speeds[around].tobytes()
+            if key not in known:
+                values = quantity.at(amplitude[around, line + 1], place)
+                known[key] = predicted_top(speeds[around], values, point - around.start)
+            top, height = known[key]
             near = APART * (speeds[point + 1] - speeds[point - 1])
             new = all(abs(top - other) > near for other in found)
             new &= bool((np.abs(speeds[around] - top) > COINCIDE * abs(top)).all())

@@ -18,7 +18,7 @@ from exugear.steady.harmonics.lines import (
     line_set,
     modulated,
 )
-from exugear.steady.harmonics.products import Product
+from exugear.steady.harmonics.products import Coupling
 from exugear.steady.mean_system.bearing_waves import (
     TILTS,
     BearingMean,
@@ -28,6 +28,7 @@ from exugear.steady.mean_system.bearing_waves import (
     ports_with_bearings,
 )
 from exugear.steady.mean_system.mean_system import MeanSystem
+from exugear.steady.mean_system.mesh_couplings import Family, Spectra, coupled, families, group_of
 from exugear.steady.mean_system.mesh_places import MeshPlaces, mesh_places
 from exugear.steady.mean_system.mesh_ports import (
     BACK_TILT,
@@ -361,12 +362,6 @@ class Gearset:
         """Names of all bases: meshes, and carriers whose turns put lines beside those of their planets."""
         return (*self.waves.base_names, *(name for name, _ in self.waves.carriers))
 
-    @cached_property
-    def mean_waves(self) -> Integers:
-        """Mean wave of each wave's meshes, (m,)."""
-        means = [n for n, wave in enumerate(self.waves.waves) if wave.wave == 0]
-        return np.array([max(n for n in means if n <= own) for own in range(len(self.waves.waves))])
-
     @property
     def system(self) -> MeanSystem:
         """The mean system."""
@@ -429,14 +424,18 @@ class Gearset:
         return np.asarray(static[: len(self.waves.waves), DEFLECTION] - self.waves.rest)
 
     @cached_property
-    def products(self) -> tuple[Product, ...]:
-        """Product with the stiffness of each base."""
-        return tuple(Product(self.lines, base, self.harmonics) for base in range(len(self.waves.base_orders)))
+    def _families(self) -> tuple[Family, ...]:
+        return families(self.waves)
 
     @cached_property
-    def _waves_by_base(self) -> tuple[Integers, ...]:
-        bases = np.array([wave.base for wave in self.waves.waves])
-        return tuple(np.flatnonzero(bases == base) for base in range(len(self.waves.base_orders)))
+    def coupling(self) -> Coupling:
+        """Products of all forces along a row with functions of the mesh cycles."""
+        forces, bases = self._ports["forces"].shape[2], self.lines.index.shape[1]
+        return Coupling(self.lines, tuple(group_of(family, self.harmonics, forces, bases) for family in self._families))
+
+    def coupled(self, spectra: Spectra, ports: MeshPorts, speed: float) -> list[Complexes]:
+        """Functions of the mesh cycles, by their harmonics, as `coupling` takes them at a speed of the input."""
+        return [coupled(self.waves, family, spectra, ports, speed, ports.forces.shape[1]) for family in self._families]
 
     @cached_property
     def lengths(self) -> Floats:
@@ -459,12 +458,6 @@ class Gearset:
     def forward(self, speed: float) -> Booleans:
         """Tell which waves' meshes (m,) run through their cycles forward at a speed of the input."""
         return np.array([wave.sense for wave in self.waves.waves]) * math.copysign(1.0, speed) > 0.0
-
-    def by_angle(self, coefficients: Complexes, positions: Floats, speed: float) -> Complexes:
-        """Coefficients (m, h + 1) over mesh cycles, by the angles of the bases instead."""
-        shift = np.exp(2j * math.pi * positions[:, None] * np.arange(coefficients.shape[1]))
-        turned = coefficients * shift
-        return np.asarray(np.where(self.forward(speed)[:, None], turned, np.conj(turned)))
 
     def ports_at(self, speed: float) -> MeshPorts:
         """Find what the meshes read and push along at a speed of the input, rad/s."""
@@ -510,23 +503,6 @@ class Gearset:
     def row_of_overall(self, speed: float) -> Floats:
         """Row (size,) of the overall transmission error by the frame's coordinates, m/m and m/rad."""
         return np.asarray(self.system.at(self._rows["by_place"], speed)[0])
-
-    def stretched(self, coefficients: Complexes, deflection: Complexes) -> Complexes:
-        """Products (n, m) of each wave's stiffness, by its `coefficients`, with its deflection (n, m), N."""
-        out, values = np.zeros(deflection.shape, dtype=np.complex128), np.ascontiguousarray(deflection)
-        for product, waves in zip(self.products, self._waves_by_base, strict=True):
-            product.add(coefficients, values, waves, out)
-        return out
-
-    def slopes(self, coefficients: Complexes, speed: float) -> Complexes:
-        """Coefficients (m, h + 1) by the bases' angles of what planets ahead in the mesh cycle have more of a function.
-
-        `coefficients` are those of the function itself. Planets stand ahead by as much as their static spins differ,
-        1e-4 of a cycle in the GRC: to first order that gives a mean wave to cosine and sine.
-        """
-        ahead = self.system.at(self._ports["static"], speed)[:, POSITION]
-        rate = 2j * math.pi * np.where(self.forward(speed), 1.0, -1.0)[:, None] * np.arange(coefficients.shape[1])
-        return np.asarray(ahead[:, None] * rate * coefficients)
 
 
 def _stacked(ports: list[MeshPorts]) -> dict[str, Floats]:

@@ -34,8 +34,6 @@ BALANCED = 1e-8
 """Residual of the balance over the size of the deflections."""
 STEP_TOLERANCE = 1e-3
 """Residual of a Newton step's linear equations over that of the balance."""
-LINEAR_TOLERANCE = 1e-9
-"""The same where forces are linear in the readings."""
 MOST_STEPS = 40
 PATIENCE, STALLED = 6, 0.5
 """Newton steps over which the residual has to fall to this share, or the search is given up."""
@@ -52,14 +50,11 @@ class Balance:
     gearset : Gearset
     interface : Interface
     lattice : Lattice
-    frozen : bool
-        Whether the position in the mesh cycle moves with the mean speed alone, as at the level `parametric`.
     """
 
     gearset: Gearset
     interface: Interface
     lattice: Lattice
-    frozen: bool = False
 
     @cached_property
     def static(self) -> Complexes:
@@ -100,7 +95,7 @@ class Balance:
     @cached_property
     def _curved(self) -> bool:
         """Whether laws along a row are curves, and not their tangents."""
-        return bool(self.gearset.waves.loads.any()) and not self.frozen
+        return bool(self.gearset.waves.loads.any())
 
     def _stiffness(self, places: MeshPlaces) -> Floats:
         """Stiffness in places, N/m, and two derivatives per cycle, (3 q, s, u); none for laws that have tables.
@@ -188,14 +183,6 @@ class Balance:
         slope = np.pad(slope, ((0, 0), (0, 0), (0, readings.shape[1] - COMPONENTS)))
         return LawSamples(force, slope, np.zeros_like(slope))
 
-    def _held(self, readings: Complexes, still: Complexes) -> Complexes:
-        """Hold the position of readings at that of others where it does not move with the vibration."""
-        if not self.frozen:
-            return readings
-        held = readings.copy()
-        held[..., POSITION] = still[..., POSITION]
-        return held
-
     def _in_time(self, readings: Complexes) -> tuple[Floats, Floats]:
         """Sample (s, m, r) readings and of their rates, the latter zero where no law asks for them."""
         values = self.lattice.values(readings)
@@ -210,7 +197,7 @@ class Balance:
         """
         if not self._last or self._last[0][0] is not readings:
             there, back = self.places.there, self.places.back
-            values, rates = self._in_time(self._held(readings, self.static))
+            values, rates = self._in_time(readings)
             sampled = self._sample(there @ values, there @ rates, self.places, self._on_lattice)
             excess = self.lattice.coefficients(back @ sampled.force) - self._mean_part(readings)
             self._last[:] = [(readings, excess, sampled)]
@@ -228,7 +215,7 @@ class Balance:
     def change(self, sampled: LawSamples, step: Complexes) -> Complexes:
         """Find how the forces (n, m, f) follow a small change (n, m, r) of the readings that were sampled."""
         there, back = self.places.there, self.places.back
-        moved, moving = self._in_time(self._held(step, np.zeros_like(step)))
+        moved, moving = self._in_time(step)
         found = np.einsum("sufr,sur->suf", sampled.slope, there @ moved)
         if self.gearset.parting:
             found += np.einsum("sufr,sur->suf", sampled.damping, there @ moving)
@@ -384,7 +371,7 @@ class Tangent:
 
 
 def nonlinear_response(
-    gearset: Gearset, interface: Interface, lattice: Lattice, start: Complexes | None = None, frozen: bool = False
+    gearset: Gearset, interface: Interface, lattice: Lattice, start: Complexes | None = None
 ) -> tuple[Response, Complexes]:
     """Response by the laws in time, and the readings (n, m, r), from which a neighbouring speed may start.
 
@@ -393,7 +380,7 @@ def nonlinear_response(
     HarmonicBalanceError
         Newton's method found no balance from this start.
     """
-    balance = Balance(gearset, interface, lattice, frozen)
+    balance = Balance(gearset, interface, lattice)
     readings, products = solve_balance(balance, balance.static if start is None else start)
     return response_of_readings(balance, readings, products), readings
 
@@ -415,8 +402,7 @@ def solve_balance(balance: Balance, readings: Complexes, enough: float = BALANCE
         if error > STALLED * before[-PATIENCE]:
             break
         before.append(error)
-        # Forces that are linear in the readings take one step, which is as good as its equations are solved.
-        step, took = tangent.solved(-missing, LINEAR_TOLERANCE if balance.frozen else STEP_TOLERANCE)
+        step, took = tangent.solved(-missing)
         products += took
         share = 1.0
         while True:

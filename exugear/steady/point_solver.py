@@ -137,7 +137,7 @@ class PointSolver:
     def forcing(self, interface: Interface) -> Complexes:
         """Find the forces of the meshes (lines, m, f) that vary in the static state, N, bearings being linear."""
         if not self.linear.parting:
-            return transmission_errors(self.linear, interface)
+            return transmission_errors(self.linear, interface.ports, interface.speed)
         balance = Balance(self.linear, interface, self.linear.lattice)
         return balance.forces(balance.static)[0]
 
@@ -162,7 +162,7 @@ class PointSolver:
         interface = self.gearset.at(speed)
         if self._level == "linear":
             return linear_response(self.gearset, interface)
-        if self._level == "parametric" and not self.gearset.waves.carriers:
+        if self._level == "parametric":
             return parametric_response(self.gearset, interface)
         if self.gearset.bent:
             self.state = _with_passing(self._parting(speed))
@@ -193,13 +193,12 @@ class PointSolver:
         return PartingState(gearset, readings, found, np.nan).on(self.gearset, interface).response
 
     def _in_time(self, interface: Interface) -> Response:
-        frozen = self._level == "parametric"
         try:
-            found, self._last = nonlinear_response(self.gearset, interface, self.lattice, self._last, frozen)
+            found, self._last = nonlinear_response(self.gearset, interface, self.lattice, self._last)
         except HarmonicBalanceError:
             if self._last is None:
                 raise
-            found, self._last = nonlinear_response(self.gearset, interface, self.lattice, None, frozen)
+            found, self._last = nonlinear_response(self.gearset, interface, self.lattice)
         return found
 
     def _parting(self, speed: float) -> PartingState:

@@ -20,10 +20,12 @@ import numpy as np
 
 from exugear.steady.excitation import Gearset, Interface
 from exugear.steady.harmonics.krylov import solve_lines
-from exugear.steady.harmonics.lines import SAME
-from exugear.steady.mean_system.mesh_places import mesh_places
-from exugear.steady.mean_system.mesh_ports import DEFLECTION, MISALIGNMENT, POSITION, MeshPorts
+from exugear.steady.harmonics.products import Group, add_answered, flat
+from exugear.steady.mean_system.mesh_couplings import Spectra
+from exugear.steady.mean_system.mesh_ports import DEFLECTION, MISALIGNMENT, MeshPorts
 from fe_ste.tools.arrays import Complexes, Floats
+from fe_ste.tools.inner_kernels import kept_bundle
+from fe_ste.tools.octets import SIZE
 
 TOLERANCE = 1e-9
 """Residual of the balance over the static deflections."""
@@ -80,112 +82,79 @@ def linear_response(gearset: Gearset, interface: Interface) -> Response:
     mean of the tangent. Where the load moves along the face by w, s has w (g - g0) in it, and F_0 w is a moment.
     """
     static = interface.ports.static[:, DEFLECTION]
-    excess = transmission_errors(gearset, interface)
+    excess = transmission_errors(gearset, interface.ports, interface.speed)
     deflection = _answer(interface, excess)[..., DEFLECTION]
     deflection[0] += static
     return _response(gearset, interface, deflection, excess, 0)
 
 
-def transmission_errors(gearset: Gearset, interface: Interface) -> Complexes:
+def transmission_errors(gearset: Gearset, ports: MeshPorts, speed: float) -> Complexes:
     """Find the forces (n, m, f) that static transmission errors make of the mean stiffness, and moments, N and N m."""
-    if gearset.waves.carriers:
-        return _errors_in_time(gearset, interface.ports, interface.speed)
-    errors = _harmonics_of_errors(gearset, interface.ports, interface.speed)
-    excess = np.zeros((len(gearset.lines.index), len(errors), errors.shape[2]), dtype=complex)
-    for n, wave in enumerate(gearset.waves.waves):
-        alone = np.zeros((gearset.harmonics + 1, gearset.lines.index.shape[1]), dtype=np.int64)
-        alone[:, wave.base] = np.arange(gearset.harmonics + 1)
-        at, mirrored = gearset.lines.find(alone)
-        use = (at > 0) & ~mirrored
-        excess[at[use], n] = errors[n, use]
-    return excess
-
-
-def transmission_error_line(gearset: Gearset, ports: MeshPorts, speed: float, line: int) -> Complexes:
-    """Find the forces (m, f) of one line of a single base as `transmission_errors` does for all."""
-    if gearset.waves.carriers:
-        return np.asarray(_errors_in_time(gearset, ports, speed)[line])
-    # A line may be a harmonic of several bases.
-    ratios = gearset.lines.orders[line] / gearset.waves.base_orders[[wave.base for wave in gearset.waves.waves]]
-    harmonics = np.rint(ratios).astype(np.int64)
-    own = (np.abs(ratios - harmonics) < SAME * ratios) & (harmonics <= gearset.harmonics)
-    errors = _harmonics_of_errors(gearset, ports, speed)
-    return np.asarray(errors[np.arange(len(own)), np.where(own, harmonics, 0)] * own[:, None])
-
-
-def _errors_in_time(gearset: Gearset, ports: MeshPorts, speed: float) -> Complexes:
-    """Find the forces of `transmission_errors` (n, m, f) where each planet meshes out of phase with the others."""
-    places = mesh_places(gearset.waves, speed, ports.positions, gearset.lattice.angles)
-    deflection, ahead = places.there @ gearset.pressed(ports.static), places.there @ ports.static[:, POSITION]
-    mean = gearset.waves.mean_stiffness[list(places.means)]
-    excess = np.empty((*places.positions.shape, ports.forces.shape[1]))
-    for u, n in enumerate(places.means):
-        harmonics = np.arange(1, gearset.harmonics + 1)
-        turning = np.exp(2j * np.pi * (places.positions[:, [u]] + ahead[..., [u]]) * harmonics)
-        force = mean[u] * deflection[..., u]
-        excess[:, u, DEFLECTION] = -mean[u] * force * 2.0 * (turning @ gearset.cycle_compliances[n, 1:]).real
-        if gearset.wander:
-            way = 2.0 * (turning @ gearset.cycle_ways[n, 1:]).real
-            tilt = (places.there @ ports.static[:, MISALIGNMENT])[..., u]
-            excess[:, u, DEFLECTION] -= mean[u] * tilt * way
-            excess[:, u, MISALIGNMENT] = -force * way
-    found = gearset.lattice.coefficients(places.back @ excess)
+    mean = gearset.waves.mean_stiffness[:, None]
+    compliances, ways = (_varying(own) for own in (gearset.cycle_compliances, gearset.cycle_ways))
+    spectra = {(DEFLECTION, DEFLECTION): -mean * compliances}
+    # What the errors go with: force, and misalignment.
+    static = np.zeros((len(gearset.lines.index), *ports.forces.shape[:2]), dtype=complex)
+    static[0, :, DEFLECTION] = mean[:, 0] * gearset.pressed(ports.static)
+    if gearset.wander:
+        static[0, :, MISALIGNMENT] = ports.static[: len(mean), MISALIGNMENT]
+        spectra |= {(DEFLECTION, MISALIGNMENT): -mean * ways, (MISALIGNMENT, DEFLECTION): -ways}
+    found = _products(gearset, spectra, ports, speed, static)
     found[0] = 0.0
     return found
 
 
-def _harmonics_of_errors(gearset: Gearset, ports: MeshPorts, speed: float) -> Complexes:
-    """Harmonics (m, h + 1, f) by the bases' angles of the forces of static transmission errors; the first is none."""
-    mean = gearset.waves.mean_stiffness
-    force = mean * gearset.pressed(ports.static)
-    excess = [-mean[:, None] * _along_cycle(gearset, gearset.cycle_compliances, force, ports, speed)]
-    if gearset.wander:
-        static = ports.static[: len(mean)]
-        excess[0] -= mean[:, None] * _along_cycle(gearset, gearset.cycle_ways, static[:, MISALIGNMENT], ports, speed)
-        excess.append(-_along_cycle(gearset, gearset.cycle_ways, force, ports, speed))
-    return np.stack(excess, axis=2)
+def _varying(cycle: Complexes) -> Complexes:
+    """Harmonics (m, h + 1) without the mean."""
+    return np.asarray(cycle * (np.arange(cycle.shape[1]) > 0))
 
 
-def _along_cycle(
-    gearset: Gearset, coefficients: Complexes, values: Floats, ports: MeshPorts, speed: float
-) -> Complexes:
-    """Harmonics (m, h + 1) by the bases' angles of static values (m,) times a function of the mesh cycle."""
-    turned = gearset.by_angle(coefficients, ports.positions, speed)
-    ahead = gearset.slopes(turned, speed)
-    return np.asarray(values[:, None] * turned + values[gearset.mean_waves, None] * ahead)
+def _products(gearset: Gearset, spectra: Spectra, ports: MeshPorts, speed: float, values: Complexes) -> Complexes:
+    """Products (n, m, f) of values (n, m, f) with functions of the mesh cycles."""
+    functions = gearset.coupled(spectra, ports, speed)
+    return gearset.coupling.of(functions, values.reshape(len(values), -1)).reshape(values.shape)
 
 
 def parametric_response(gearset: Gearset, interface: Interface) -> Response:
-    """Response to stiffness that varies with the position in the mesh cycle, this moving with the mean speed alone."""
-    tangents = {at: turned_tangents(gearset, interface, own) for at, own in gearset.cycle_tangents.items()}
-    mean, means = gearset.waves.mean_stiffness, gearset.mean_waves
+    """Response to stiffness that varies with the position in the mesh cycle, this moving with the mean speed alone.
+
+    The equations y = y_static - G (K y - given) of all lines are solved with readings as lengths, l y.
+    """
+    shape = len(gearset.lines.index), *interface.ports.forces.shape[:2]
+    functions = _beyond_the_mean(gearset, interface)
+    lengths = gearset.lengths[: shape[1], : shape[2]].ravel()
+    answers, coupling = lengths[:, None] * interface.along_forces, gearset.coupling
+    scaled = [own / _of_group(lengths, group) for own, group in zip(functions, coupling.groups, strict=True)]
+    parts = *flat(scaled), *flat([answers])
+    memory, octets = coupling.memory(), np.empty(2 * SIZE)
+
+    def apply(readings: Complexes) -> Complexes:
+        out = np.empty_like(readings)
+        add_answered(kept_bundle(coupling.terms), *parts, readings, *memory, octets, out)
+        return out
+
+    given = given_forces(gearset, interface).reshape(shape[0], -1)
+    start = -(answers @ given[..., None])[..., 0]
+    start[0] += lengths * interface.ports.static[:, : shape[2]].ravel()
+    found, products = solve_lines(apply, start, TOLERANCE)
+    excess = (given + coupling.of(scaled, found)).reshape(shape)
+    return _response(gearset, interface, (found / lengths).reshape(shape)[..., DEFLECTION], excess, products)
+
+
+def _beyond_the_mean(gearset: Gearset, interface: Interface) -> list[Complexes]:
+    """Slopes of the forces along a row beyond those of the mean system, as `Gearset.coupled` has functions."""
+    functions = gearset.coupled(gearset.cycle_tangents, interface.ports, interface.speed)
     forces = interface.ports.forces.shape[1]
-    lengths = gearset.lengths[: len(mean), :forces]
-
-    def following(readings: Complexes) -> Complexes:
-        found = np.zeros(readings.shape, dtype=complex)
-        for (force, read), (own, _) in tangents.items():
-            found[..., force] += gearset.stretched(own, readings[..., read])
-        found[..., DEFLECTION] -= mean * readings[..., DEFLECTION]
-        for (force, read), (_, ahead) in tangents.items():
-            found[..., force] += gearset.stretched(ahead, readings[:, means, read])
-        return found
-
-    def apply(scaled: Complexes) -> Complexes:
-        return np.asarray(scaled - lengths * _answer(interface, following(scaled / lengths)))
-
-    given = given_forces(gearset, interface)
-    start = _answer(interface, given)
-    start[0] += interface.ports.static[:, :forces]
-    scaled, products = solve_lines(apply, lengths * start, TOLERANCE)
-    readings = scaled / lengths
-    return _response(gearset, interface, readings[..., DEFLECTION], given + following(readings), products)
+    for group, own in zip(gearset.coupling.groups, functions, strict=True):
+        mean = np.flatnonzero(~group.harmonics.any(axis=1))[0]
+        at = np.arange(DEFLECTION, group.size, forces)
+        own[mean, at, at] -= gearset.waves.mean_stiffness[(group.begin + at) // forces]
+    return functions
 
 
-def turned_tangents(gearset: Gearset, interface: Interface, cycle: Complexes) -> tuple[Complexes, Complexes]:
-    """Coefficients (m, h + 1) over mesh cycles by the bases' angles, and their slopes as `Gearset.slopes` has them."""
-    own = gearset.by_angle(cycle, interface.ports.positions, interface.speed)
-    return own, gearset.slopes(own, interface.speed)
+def _of_group(values: Floats, group: Group) -> Floats:
+    """Values (k,) of all signals for those of a group."""
+    return values[group.begin : group.begin + group.size]
 
 
 def given_forces(gearset: Gearset, interface: Interface) -> Complexes:
@@ -194,12 +163,12 @@ def given_forces(gearset: Gearset, interface: Interface) -> Complexes:
     found = np.zeros((len(gearset.lines.index), *ports.forces.shape[:2]), dtype=complex)
     if not waves.loads.any():
         return found
-    one, ahead = (np.zeros(found.shape[:2], dtype=complex) for _ in range(2))
-    one[0], ahead[0] = [wave.wave == 0 for wave in waves.waves], 1.0
-    pulls = [gearset.cycle_pulls] + [-gearset.cycle_moments[1]] * gearset.wander
-    for force, cycle in enumerate(pulls):
-        own, slopes = turned_tangents(gearset, interface, cycle)
-        found[..., force] -= gearset.stretched(own, one) + gearset.stretched(slopes, ahead)
+    # What all places have is what the mean wave has.
+    found[0, :, DEFLECTION] = [wave.wave == 0 for wave in waves.waves]
+    spectra = {(DEFLECTION, DEFLECTION): -gearset.cycle_pulls}
+    if gearset.wander:
+        spectra[MISALIGNMENT, DEFLECTION] = gearset.cycle_moments[1]
+    found = _products(gearset, spectra, ports, interface.speed, found)
     found[0, :, DEFLECTION] += waves.mean_stiffness * waves.rest
     return found
 

@@ -19,7 +19,7 @@ from exugear.gearbox.parts import RPM
 from exugear.steady.campbell.campbell import Campbell, campbell_of, modes_over_speed
 from exugear.steady.campbell.mode_tracks import ModeTracks
 from exugear.steady.contributions import Contributions, contributions, loudest_near
-from exugear.steady.crossings import HARMONICS, Crossing, crossings, missed_tops, with_crossings
+from exugear.steady.crossings import HARMONICS, Crossing, KnownTops, crossings, missed_tops, with_crossings
 from exugear.steady.excitation import Gearset
 from exugear.steady.gearbox_branches import follow_branch
 from exugear.steady.harmonics.curve_peaks import standing_peaks
@@ -358,8 +358,9 @@ def _with_tops(solver: PointSolver, settings: SteadySettings, solved: Solved, wo
     """
     quantities = quantities_of([own.name for own in solver.gearset.signal_names])
     operation = operating_range(solver.gearset.waves.assembly.gearbox)
+    tops: KnownTops = {}
     for _ in range(ROUNDS):
-        more = _missed(solved, quantities, operation)
+        more = _missed(solved, quantities, operation, tops)
         if not more.size:
             break
         count = len(solved.speed)
@@ -373,12 +374,14 @@ def _with_tops(solver: PointSolver, settings: SteadySettings, solved: Solved, wo
     return solved
 
 
-def _missed(solved: Solved, quantities: tuple[Quantity, ...], operation: tuple[float, float] | None) -> Floats:
+def _missed(
+    solved: Solved, quantities: tuple[Quantity, ...], operation: tuple[float, float] | None, tops: KnownTops
+) -> Floats:
     """Speeds of tops between those of solved points, which stand in any order."""
     there = np.flatnonzero(np.isfinite(solved.drive_torque))
     known = solved.part(there[np.argsort(solved.speed[there], kind="stable")])
     smooth = np.asarray(~(known.apart.any(axis=1) | known.free.any(axis=1)))
-    return missed_tops(known.speed, known.amplitude, smooth, quantities, operation)
+    return missed_tops(known.speed, known.amplitude, smooth, quantities, operation, tops)
 
 
 def _change_with_more(solver: PointSolver, settings: SteadySettings, solved: Solved) -> float:

@@ -126,11 +126,14 @@ def ranking_of(data: xr.Dataset) -> Ranking:
         for place, (point, line) in enumerate(peaks[own.name], start=1)
     ]
     groups: list[dict[str, tuple[int, int, int]]] = []
+    of_line: dict[int, list[dict[str, tuple[int, int, int]]]] = {}
     for place, _, name, point, line in sorted(places):
-        group = next((own for own in groups if name not in own and _is_one(own, speed, point, line)), None)
+        others = of_line.setdefault(line, [])
+        group = next((own for own in others if name not in own and _is_one(own, speed, point)), None)
         if group is None:
             group = {}
             groups.append(group)
+            others.append(group)
         group[name] = place, point, line
     found = tuple(_resonance(data, quantities, sizes, group) for group in groups)
     return Ranking(found, (low, high), whole, _whose(data))
@@ -152,10 +155,10 @@ def _peaks(quantity: Quantity, values: Floats, inside: Booleans) -> list[tuple[i
     return sorted((peak for peak in found if values[peak] > least), key=lambda peak: -values[peak])
 
 
-def _is_one(group: Mapping[str, tuple[int, int, int]], speed: Floats, point: int, line: int) -> bool:
-    """Tell whether a peak belongs to a resonance: of the same line, at all but the same speed."""
-    _, first, own = next(iter(group.values()))
-    return own == line and abs(speed[point] - speed[first]) <= ONE * speed[first]
+def _is_one(group: Mapping[str, tuple[int, int, int]], speed: Floats, point: int) -> bool:
+    """Tell whether a peak belongs to a resonance of the same line: it is at all but the same speed."""
+    _, first, _ = next(iter(group.values()))
+    return bool(abs(speed[point] - speed[first]) <= ONE * speed[first])
 
 
 def _resonance(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -10,6 +11,10 @@ from fe_ste.tools.arrays import Complexes, Floats
 
 MOST_PRODUCTS = 400
 """Products with the operator after which the search is given up."""
+
+
+ROOM = 40
+"""Products for which there is room from the beginning; more of it is made where they are not enough."""
 
 
 class HarmonicBalanceError(RuntimeError):
@@ -62,30 +67,45 @@ def solve_lines(
     if size <= wanted:
         return lines(x), 0
     most = min(MOST_PRODUCTS, 2 * right.size)
-    basis, hessenberg = np.zeros((most + 1, x.size)), np.zeros((most + 1, most))
+    basis = np.empty((min(most, ROOM) + 1, x.size))
     # Givens rotations keep the least-squares problem triangular; its residual is then known without solving it.
-    turns, rest = np.zeros((most, 2)), np.zeros(most + 1)
-    basis[0], rest[0] = remainder / size, size
+    columns: list[list[float]] = []
+    turns: list[tuple[float, float]] = []
+    rest = [size]
+    basis[0] = remainder / size
     for n in range(most):
         w = real(apply(lines(basis[n])))
-        for _ in range(2):  # orthogonal to round-off
-            shares = basis[: n + 1] @ w
-            hessenberg[: n + 1, n] += shares
-            w = w - shares @ basis[: n + 1]
-        length = float(np.linalg.norm(w))
-        column = hessenberg[:, n]
-        for i in range(n):
-            c, s = turns[i]
+        column, w = _orthogonal(w, basis[: n + 1])
+        length = math.sqrt(w @ w)
+        for i, (c, s) in enumerate(turns):
             column[i], column[i + 1] = c * column[i] + s * column[i + 1], c * column[i + 1] - s * column[i]
-        radius = float(np.hypot(column[n], length))
-        turns[n] = column[n] / radius, length / radius
+        radius = math.hypot(column[n], length)
+        turns.append((column[n] / radius, length / radius))
         column[n] = radius
-        rest[n], rest[n + 1] = turns[n, 0] * rest[n], -turns[n, 1] * rest[n]
+        columns.append(column)
+        rest[n:] = turns[n][0] * rest[n], -turns[n][1] * rest[n]
         if abs(rest[n + 1]) <= wanted or length == 0.0:
-            steps = np.linalg.solve(np.triu(hessenberg[: n + 1, : n + 1]), rest[: n + 1])
-            return lines(x + steps @ basis[: n + 1]), n + 1
+            return lines(x + _steps(columns, rest) @ basis[: n + 1]), n + 1
+        if n + 1 == len(basis):
+            basis = np.concatenate([basis, np.empty_like(basis)])
         basis[n + 1] = w / length
     raise HarmonicBalanceError(
         f"harmonic balance: the residual stays at {abs(rest[most]) / max(size, 1e-300):.1e} of its start after "
         f"{most} products"
     )
+
+
+def _orthogonal(w: Floats, basis: Floats) -> tuple[list[float], Floats]:
+    """Shares of a vector along an orthonormal basis, and what is left of it, orthogonal to round-off."""
+    first = basis @ w
+    w = w - first @ basis
+    second = basis @ w
+    return (first + second).tolist(), w - second @ basis
+
+
+def _steps(columns: list[list[float]], rest: list[float]) -> Floats:
+    """Solve the triangular equations of all columns."""
+    triangle = np.zeros((len(columns), len(columns)))
+    for n, column in enumerate(columns):
+        triangle[: n + 1, n] = column
+    return np.asarray(np.linalg.solve(triangle, rest[: len(columns)]))

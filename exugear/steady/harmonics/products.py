@@ -1,7 +1,12 @@
-"""Products of a signal with periodic coefficients: each harmonic of the coefficient carries every line to another."""
+"""Products of signals with functions of the bases' angles that couple them: each harmonic carries lines to others.
+
+Signals fall into groups that couple among themselves alone. The functions of a group are a matrix for each of its
+harmonics; one compiled pass over all lines and terms then makes all products.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -12,6 +17,7 @@ from exugear.steady.harmonics.lines import LineSet
 from fe_ste.tools.arrays import Complexes, Floats, Integers
 from fe_ste.tools.compilation import kernel
 from fe_ste.tools.inner_kernels import kept_bundle
+from fe_ste.tools.octets import SIZE, all_eight, eight, put
 
 
 def fourier_coefficients(samples: Floats, harmonics: int) -> Complexes:
@@ -26,81 +32,182 @@ def fourier_coefficients(samples: Floats, harmonics: int) -> Complexes:
     return np.asarray(np.fft.rfft(samples)[: harmonics + 1] / len(samples))
 
 
-class Terms(NamedTuple):
-    """Terms of the products of a line set of n lines: which lines each line takes in.
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Signals that functions of the same angles couple.
 
     Attributes
     ----------
-    first : (n + 1,) first term of each line in the arrays that follow
-    place, mirrored, order : (t,) line that is taken in, whether as its conjugate, and the harmonic that carries it
+    begin, size : int
+        First signal, and number of them.
+    harmonics : (q, bases) array of int
+        Multiples of the bases' angles that the functions have, of each pair k, -k both.
     """
 
+    begin: int
+    size: int
+    harmonics: Integers
+
+
+class Terms(NamedTuple):
+    """Terms of the products of g groups on n lines: which lines each line takes in.
+
+    Attributes
+    ----------
+    begin, size : (g,) first signal and number of signals of each group
+    room : (g,) number of signals filled up to whole octets, as coefficients and products stand in memory
+    first : (g, n + 1) first term of each line in the arrays that follow
+    place, mirrored : (t,) line that is taken in, and whether as its conjugate
+    block : (t,) first coefficient of the harmonic that carries it
+    """
+
+    begin: Integers
+    size: Integers
+    room: Integers
     first: Integers
     place: Integers
     mirrored: Integers
-    order: Integers
+    block: Integers
 
 
 @dataclass(frozen=True, eq=False)
-class Product:
-    """The product with a function of one base's angle, as a map of lines.
+class Coupling:
+    """Products of the signals of some groups with functions of the bases' angles, as maps of lines.
 
     Attributes
     ----------
     lines : LineSet
-    base : int
-        Base whose angle the function depends on.
-    harmonics : int
-        Highest harmonic of the function.
+    groups : tuple of Group
+        One after the other they have all signals.
     """
 
     lines: LineSet
-    base: int
-    harmonics: int
+    groups: tuple[Group, ...]
 
     @cached_property
-    def _terms(self) -> Terms:
-        count, orders = len(self.lines.index), np.arange(-self.harmonics, self.harmonics + 1)
-        source = np.repeat(self.lines.index[:, None, :], len(orders), axis=1)
-        source[:, :, self.base] -= orders
-        # The mean is its own conjugate, and is found as it stands.
-        place, mirrored = self.lines.find(source)
-        line, at = np.nonzero(place >= 0)
-        first = np.searchsorted(line, np.arange(count + 1))
-        return Terms(first, place[line, at], mirrored[line, at].astype(np.int64), orders[at])
+    def terms(self) -> Terms:
+        """All terms, group by group and line by line."""
+        first: list[Integers] = []
+        parts: list[tuple[Integers, Integers, Integers]] = []
+        terms = blocks = 0
+        for group in self.groups:
+            # The mean is its own conjugate, and is found as it stands.
+            place, mirrored = self.lines.find(self.lines.index[:, None, :] - group.harmonics)
+            line, at = np.nonzero(place >= 0)
+            coefficients = group.size * _filled(group.size)
+            first.append(terms + np.searchsorted(line, np.arange(len(self.lines.index) + 1)))
+            parts.append((place[line, at], mirrored[line, at].astype(np.int64), blocks + coefficients * at))
+            terms, blocks = terms + len(line), blocks + coefficients * len(group.harmonics)
+        places, conjugates, at_blocks = (np.concatenate(own) for own in zip(*parts, strict=True))
+        begin, size, room = (
+            np.array(own, dtype=np.int64)
+            for own in zip(*((own.begin, own.size, _filled(own.size)) for own in self.groups), strict=True)
+        )
+        return Terms(begin, size, room, np.array(first), places, conjugates, at_blocks)
 
-    def add(self, coefficients: Complexes, values: Complexes, signals: Integers, out: Complexes) -> None:
-        """Add products of some signals and a real function for each to others.
+    def memory(self) -> tuple[Floats, Floats]:
+        """Make memory (lines times the room of all groups,) for products, real and imaginary parts."""
+        size = len(self.lines.index) * int(self.terms.room.sum())
+        return np.empty(size), np.empty(size)
+
+    def of(self, functions: Sequence[Complexes], values: Complexes) -> Complexes:
+        """Products (n, k) of signals (n, k) with functions.
 
         Parameters
         ----------
-        coefficients : (m, h + 1) complex array
-            c_0 .. c_h of the functions.
-        values : (n, m) complex array
-        signals : (k,) array of int
-            Signals that are looked at.
-        out : (n, m) complex array
-            What is added to.
+        functions : sequence of (q, size, size) complex arrays
+            By group: coefficients at its harmonics, rows what signals take in and columns what they give.
+        values : (n, k) complex array
         """
-        add_products(kept_bundle(self._terms), signals, coefficients, values, out)
+        real, imaginary = self.memory()
+        take_in(kept_bundle(self.terms), *flat(functions), np.ascontiguousarray(values, complex), real, imaginary)
+        whole = (real + 1j * imaginary).reshape(len(values), -1)
+        ends = np.cumsum(self.terms.room)
+        return np.hstack(
+            [whole[:, end - _filled(own.size) :][:, : own.size] for own, end in zip(self.groups, ends, strict=True)]
+        )
 
-    def of(self, coefficients: Complexes, values: Complexes) -> Complexes:
-        """Coefficients (n,) of the product of a signal `values` (n,) and a real function, `coefficients` c_0 .. c_h."""
-        out = np.zeros((len(values), 1), dtype=np.complex128)
-        one = np.zeros(1, dtype=np.int64)
-        self.add(coefficients[None].astype(np.complex128), values[:, None].astype(np.complex128), one, out)
-        return out[:, 0]
+
+def _filled(size: int) -> int:
+    """Whole octets."""
+    return -(-size // SIZE) * SIZE
+
+
+def flat(functions: Sequence[Complexes]) -> tuple[Floats, Floats]:
+    """Real and imaginary parts of functions (..., rows, columns) as kernels read them.
+
+    One column after the other, rows filled up to whole octets.
+    """
+    parts = []
+    for own in functions:
+        columns = np.zeros((*own.shape[:-2], own.shape[-1], _filled(own.shape[-2])), dtype=complex)
+        columns[..., : own.shape[-2]] = np.swapaxes(own, -1, -2)
+        parts.append(columns.ravel())
+    whole = np.concatenate(parts)
+    return np.ascontiguousarray(whole.real), np.ascontiguousarray(whole.imag)
 
 
 @kernel
-def add_products(terms: Terms, signals: Integers, coefficients: Complexes, values: Complexes, out: Complexes) -> None:
-    """Add the products of some `signals` (k,) among `values` (n, m) and functions (m, h + 1) to `out` (n, m)."""
-    for line in range(terms.first.size - 1):
-        for term in range(terms.first[line], terms.first[line + 1]):
-            place, order = terms.place[term], terms.order[term]
-            for signal in signals:
-                factor = coefficients[signal, abs(order)]
-                value = values[place, signal]
-                c, s = factor.real, factor.imag if order >= 0 else -factor.imag
-                a, b = value.real, -value.imag if terms.mirrored[term] else value.imag
-                out[line, signal] += complex(c * a - s * b, c * b + s * a)
+def take_in(
+    terms: Terms, real: Floats, imaginary: Floats, values: Complexes, out_real: Floats, out_imaginary: Floats
+) -> None:
+    """Fill products (n times all rooms,) of signals (n, k) and functions as `flat` has them."""
+    room = 0
+    for group in range(terms.room.size):
+        room += terms.room[group]
+    to = 0
+    for group in range(terms.room.size):
+        begin, size, rows = terms.begin[group], terms.size[group], terms.room[group]
+        for octet in range(0, rows, SIZE):
+            for line in range(values.shape[0]):
+                x, y = all_eight(0.0), all_eight(0.0)
+                for term in range(terms.first[group, line], terms.first[group, line + 1]):
+                    place, at = terms.place[term], terms.block[term] + octet
+                    sign = -1.0 if terms.mirrored[term] else 1.0
+                    for column in range(begin, begin + size):
+                        a, b = values[place, column].real, sign * values[place, column].imag
+                        c, s = eight(real, at), eight(imaginary, at)
+                        x, y = x + c * a - s * b, y + c * b + s * a
+                        at += rows
+                put(out_real, line * room + to + octet, x)
+                put(out_imaginary, line * room + to + octet, y)
+        to += rows
+
+
+@kernel
+def add_answered(
+    terms: Terms,
+    real: Floats,
+    imaginary: Floats,
+    answers_real: Floats,
+    answers_imaginary: Floats,
+    values: Complexes,
+    taken_real: Floats,
+    taken_imaginary: Floats,
+    memory: Floats,
+    out: Complexes,
+) -> None:
+    """Fill signals (n, k) plus what lines answer by themselves to the products of these.
+
+    `answers` are those of each line (n, k, k) as `flat` has them, `taken` and `memory` (16,) room.
+    """
+    take_in(terms, real, imaginary, values, taken_real, taken_imaginary)
+    lines, size = values.shape
+    at = product = 0
+    for line in range(lines):
+        from_line, from_answers = product, at
+        for octet in range(0, size, SIZE):
+            x, y = all_eight(0.0), all_eight(0.0)
+            product, at = from_line, from_answers + octet
+            for group in range(terms.room.size):
+                for column in range(product, product + terms.size[group]):
+                    a, b = taken_real[column], taken_imaginary[column]
+                    c, s = eight(answers_real, at), eight(answers_imaginary, at)
+                    x, y = x + c * a - s * b, y + c * b + s * a
+                    at += SIZE * ((size + SIZE - 1) // SIZE)
+                product += terms.room[group]
+            put(memory, 0, x)
+            put(memory, SIZE, y)
+            for row in range(octet, min(octet + SIZE, size)):
+                out[line, row] = values[line, row] + complex(memory[row - octet], memory[SIZE + row - octet])
+            at -= octet

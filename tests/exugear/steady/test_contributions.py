@@ -26,7 +26,7 @@ def gearset(grc, stiffness):
 @pytest.fixture(scope="module")
 def peak(gearset):
     tracks = modes_over_speed(gearset.system, *RANGE, 3e3)
-    crossing = crossings(gearset, tracks, lambda interface: transmission_errors(gearset, interface))[0]
+    crossing = crossings(gearset, tracks, lambda at: transmission_errors(gearset, at.ports, at.speed))[0]
     return loudest_near(gearset, crossing.speed, 2.0 * crossing.damping, crossing.line), crossing.line
 
 
@@ -56,7 +56,7 @@ def amplitude_with(other, gearset, peak):
     """Amplitude of the line with the mean system of another gearset, the excitation staying as it is."""
     speed, line = peak
     interface = gearset.at(speed)
-    loads = gearset.loads(interface.ports) @ transmission_errors(gearset, interface)[line, :, 0]
+    loads = gearset.loads(interface.ports) @ transmission_errors(gearset, interface.ports, interface.speed)[line, :, 0]
     dynamic = other.system.dynamic(speed, speed * gearset.lines.orders[line])
     return abs(gearset.row_of_overall(speed) @ np.linalg.solve(dynamic, loads))
 
@@ -109,7 +109,7 @@ def test_the_derivative_by_a_mesh_error_is_its_share(grc, stiffness, gearset, pe
         compliance = 1.0 / stiffness[family]
         own = 1.0 / (compliance.mean() + (1.0 + sign * STEP) * (compliance - compliance.mean()))
         other = gearset_of(assemble(grc, Choice("bushing"), {**stiffness, family: own}), RANGE)
-        forces = transmission_errors(other, other.at(speed))[line, :, 0]
+        forces = transmission_errors(other, other.ports_at(speed), speed)[line, :, 0]
         interface = gearset.at(speed)
         dynamic = gearset.system.dynamic(speed, speed * gearset.lines.orders[line])
         loads = gearset.loads(interface.ports) @ forces

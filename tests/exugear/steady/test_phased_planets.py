@@ -11,10 +11,12 @@ import pytest
 from exugear.dynamics.assemble import assemble
 from exugear.gearbox.choice import Choice
 from exugear.steady.gearbox_branches import follow_branch
+from exugear.steady.mean_system.mesh_places import mesh_places
+from exugear.steady.mean_system.mesh_ports import POSITION
 from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.nonlinear import Balance, solve_balance
 from exugear.steady.point_solver import PointSolver, gearset_of
-from exugear.steady.response import dissipated_and_given, signals
+from exugear.steady.response import dissipated_and_given, signals, transmission_errors
 from exugear.steady.settings import SpeedRange, SteadySettings
 
 from .test_steady_in_time import apart, solver_of
@@ -65,6 +67,29 @@ def test_lateral_forces_stand_one_turn_of_the_carrier_beside_odd_harmonics(gears
     assert own[0] > 10.0 * max(others)
 
 
+@pytest.mark.parametrize("speed", [8.0, -8.0])
+def test_errors_of_planets_out_of_phase_excite_what_sampling_their_turn_and_cycle_gives(gearset, speed):
+    """Each planet by itself, at 64 x 32 angles of mesh cycle and carrier: no line takes from another."""
+    ports, waves = gearset.ports_at(speed), gearset.waves
+    angle, turn = 2.0 * np.pi * np.arange(64) / 64, 2.0 * np.pi * np.arange(32) / 32
+    angles = np.zeros((angle.size * turn.size, 4))
+    angles[:, 0], angles[:, 3] = np.repeat(angle, turn.size), np.tile(turn, angle.size)
+    places = mesh_places(waves, speed, ports.positions, angles)
+    pressed, ahead = places.there @ gearset.pressed(ports.static), places.there @ ports.static[:, POSITION]
+    forces = np.empty(places.positions.shape)
+    for u, n in enumerate(places.means):
+        turning = np.exp(2j * np.pi * (places.positions[:, [u]] + ahead[:, [u]]) * np.arange(1, gearset.harmonics + 1))
+        error = 2.0 * (turning @ gearset.cycle_compliances[n, 1:]).real
+        forces[:, u] = -(waves.mean_stiffness[n] ** 2) * pressed[:, u] * error
+    lines = np.fft.fft2((places.back @ forces[..., None])[..., 0].reshape(64, 32, -1), axes=(0, 1)) / 64.0 / 32.0
+    found = transmission_errors(gearset, ports, speed)[..., 0]
+    own = [n for n, wave in enumerate(waves.waves) if wave.base == 0]
+    for line, (harmonic, *others, turns) in enumerate(gearset.lines.index):
+        if harmonic and not any(others):
+            largest = np.abs(lines[harmonic][:, own]).max()
+            np.testing.assert_allclose(found[line, own], lines[harmonic, turns, own], rtol=0.0, atol=1e-9 * largest)
+
+
 @pytest.mark.parametrize("level", ["linear", "parametric", "nonlinear"])
 def test_damping_takes_the_power_that_planets_out_of_phase_give(gearset, level):
     taken, given = dissipated_and_given(gearset, response_at(gearset, level, 8.0))
@@ -100,7 +125,7 @@ def test_planets_out_of_phase_started_on_their_steady_state_stay_there(four, sti
 def test_the_memory_of_a_solved_speed_falls_free_at_once(four, stiffness):
     """A balance holds samples of all laws: some tens of megabytes a speed, which no search for garbage has to find."""
     gearset = gearset_of(assemble(four, Choice("bushing"), stiffness), np.array(RANGE), 4, 2)
-    balance = Balance(gearset, gearset.at(5.0), gearset.lattice, frozen=True)
+    balance = Balance(gearset, gearset.at(5.0), gearset.lattice)
     gone = weakref.ref(balance)
     gc.disable()
     try:

@@ -13,8 +13,8 @@ from exugear.dynamics.loads import LoadTable
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.steady.mean_system.mean_system import torque_of_vibration
-from exugear.steady.mean_system.mesh_ports import MISALIGNMENT
-from exugear.steady.nonlinear import Balance, nonlinear_response
+from exugear.steady.mean_system.mesh_ports import DEFLECTION, MISALIGNMENT, POSITION
+from exugear.steady.nonlinear import Balance
 from exugear.steady.point_solver import PointSolver, gearset_of
 from exugear.steady.response import dissipated_and_given, signals
 from exugear.steady.settings import SpeedRange, SteadySettings
@@ -268,13 +268,31 @@ def test_levels_agree_on_a_load_that_moves_along_the_face():
         assert (off < 5e-3 * np.maximum(size, 1e-3 * size.max())).all()
 
 
-def test_tangents_and_laws_held_in_place_are_one_where_the_load_moves():
-    """The level `parametric` by products of lines, and by samples in time."""
+def test_forces_by_products_of_lines_are_those_of_the_tangents_in_time():
+    """Level `parametric` where the load moves: F = k d - k w t - p and M = k w^2 t - k w d + p w at 256 angles."""
     solver = solver_of(assemble(SPUR, Choice("bushing"), moving_load()), (50.0, 150.0), "parametric")
-    by_lines = solver.response(80.0)
-    by_time = nonlinear_response(solver.gearset, solver.gearset.at(80.0), solver.lattice, None, True)[0]
-    assert np.linalg.norm(by_lines.motion - by_time.motion) < 1e-6 * np.linalg.norm(by_time.motion[1:])
-    taken, given = dissipated_and_given(solver.gearset, by_lines)
+    found, gearset = solver.response(80.0), solver.gearset
+    ports, waves = found.interface.ports, gearset.waves
+    readings = found.interface.read(found.motion)
+    readings[0] += ports.static
+    angles = 2.0 * np.pi * np.arange(256) / 256
+    values = gearset.lines.values(readings, angles[:, None])[:, 0]
+    deflection, tilt = values[:, DEFLECTION], values[:, MISALIGNMENT]
+    sense = 1.0 if gearset.forward(80.0)[0] else -1.0
+    position = ports.positions[0] + ports.static[0, POSITION] + sense * angles / (2.0 * np.pi)
+    turning = np.exp(2j * np.pi * position[:, None] * np.arange(gearset.harmonics + 1))
+    turning[:, 1:] *= 2.0
+    k, p, kw, pw, kww = (
+        (turning @ own[0]).real for own in (gearset.cycle_coefficients, gearset.cycle_pulls, *gearset.cycle_moments)
+    )
+    force, moment = k * deflection - kw * tilt - p, kww * tilt - kw * deflection + pw
+    by_time = np.fft.rfft(np.stack([force, moment], axis=1), axis=0)[gearset.lines.index[:, 0]] / 256
+    by_lines = found.excess[:, 0].copy()
+    by_lines[:, DEFLECTION] += waves.mean_stiffness[0] * readings[:, 0, DEFLECTION]
+    by_lines[0, DEFLECTION] -= waves.mean_stiffness[0] * waves.rest[0]
+    for own, other in zip(by_lines.T, by_time.T, strict=True):
+        assert np.linalg.norm(own - other) < 1e-6 * np.linalg.norm(other[1:])
+    taken, given = dissipated_and_given(gearset, found)
     assert given == pytest.approx(taken, rel=1e-6)
 
 

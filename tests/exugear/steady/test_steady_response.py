@@ -65,7 +65,7 @@ def test_more_lines_hardly_change_the_response(gearset, speed, change):
 @pytest.fixture(scope="module")
 def found(gearset):
     tracks = modes_over_speed(gearset.system, *RANGE, 3e3)
-    return crossings(gearset, tracks, lambda interface: transmission_errors(gearset, interface)), tracks
+    return crossings(gearset, tracks, lambda at: transmission_errors(gearset, at.ports, at.speed)), tracks
 
 
 def test_crossings_lie_on_the_modes_that_were_followed(gearset, found):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.optimize
+import scipy.signal
 
 from exugear.steady.harmonics.curve_peaks import predicted_top, standing_peaks
 
@@ -44,3 +45,15 @@ def test_what_rises_at_an_end_or_ripples_by_less_than_a_hundredth_is_no_peak():
     assert not standing_peaks(1.0 + x).size
     assert not standing_peaks(2.0 + 0.008 * np.cos(60.0 * x)).size
     assert len(standing_peaks(2.0 + 0.03 * np.cos(60.0 * x))) == 9
+
+
+@pytest.mark.parametrize("stands", [0.0, 1e-4, 0.01, 0.5])
+def test_peaks_stand_as_scipy_has_their_prominences(stands):
+    """Random walks, rounded so that many neighbours are equal, and a plateau at either end."""
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        values = np.abs(np.round(rng.normal(size=120).cumsum(), 1))
+        values[:2], values[-3:] = 9.0, 9.0
+        places = scipy.signal.find_peaks(values)[0]
+        stood = scipy.signal.peak_prominences(values, places)[0]
+        assert standing_peaks(values, stands).tolist() == places[stood >= stands * values[places]].tolist()

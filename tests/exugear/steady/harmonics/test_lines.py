@@ -12,9 +12,18 @@ import scipy.integrate
 from exugear.steady.harmonics.krylov import HarmonicBalanceError, solve_lines
 from exugear.steady.harmonics.lattice import lattice
 from exugear.steady.harmonics.lines import Modulator, beside, joined, line_set
-from exugear.steady.harmonics.products import Product
+from exugear.steady.harmonics.products import Coupling, Group
 
 BASES = (1.0, 0.5 * (1.0 + 5.0**0.5))
+
+
+def product_of(lines, base, coefficients, signal):
+    """Lines of the product of a signal with a function of one base's angle, by its coefficients c_0 .. c_h."""
+    both = np.concatenate([np.conj(coefficients[:0:-1]), coefficients])
+    harmonics = np.zeros((len(both), lines.index.shape[1]), dtype=np.int64)
+    harmonics[:, base] = np.arange(len(both)) - len(coefficients) + 1
+    coupling = Coupling(lines, (Group(0, 1, harmonics),))
+    return coupling.of([both[:, None, None]], signal[:, None])[:, 0]
 
 
 def random_lines(lines, inside, seed=0):
@@ -44,11 +53,27 @@ def test_the_product_of_lines_is_the_product_of_the_functions():
     """Lines of the factor reach two, the function's harmonics two: a set of four holds the whole product."""
     lines = line_set(BASES, 4, 4)
     signal, function = random_lines(lines, 2), np.array([2.0, 0.3 + 0.1j, 0.2j])
-    product = Product(lines, 1, 2).of(function, signal)
+    product = product_of(lines, 1, function, signal)
     angles = np.random.default_rng(1).uniform(0.0, 2.0 * np.pi, (20, 2))
     values = 2.0 + 2.0 * np.real(function[1] * np.exp(1j * angles[:, 1]) + function[2] * np.exp(2j * angles[:, 1]))
     expected = values * lines.values(signal, angles)
     np.testing.assert_allclose(lines.values(product, angles), expected, rtol=0.0, atol=1e-12)
+
+
+def test_signals_of_a_group_are_mixed_as_their_functions_say_at_every_angle():
+    """Nine signals that functions of both angles mix, which fill more than an octet, and one by itself beside them."""
+    lines, rng = line_set(BASES, 4, 4), np.random.default_rng(5)
+    signals = np.stack([random_lines(lines, 2, seed) for seed in range(10)], axis=1)
+    ways = np.array([[0, 0], [1, -1], [-1, 1]])
+    mixing = rng.normal(size=(2, 9, 9)) + 1j * rng.normal(size=(2, 9, 9))
+    functions = [np.array([mixing[0].real, mixing[1], mixing[1].conj()]), np.array([[[2.0 + 0.0j]]])]
+    groups = Group(0, 9, ways), Group(9, 1, ways[:1])
+    angles = rng.uniform(0.0, 2.0 * np.pi, (20, 2))
+    whole = mixing[0].real + 2.0 * np.real(mixing[1] * np.exp(1j * (angles[:, 0] - angles[:, 1]))[:, None, None])
+    values = lines.values(signals, angles)
+    found = lines.values(Coupling(lines, groups).of(functions, signals), angles)
+    np.testing.assert_allclose(found[:, :9], (whole @ values[:, :9, None])[..., 0], rtol=0.0, atol=1e-10)
+    np.testing.assert_allclose(found[:, 9], 2.0 * values[:, 9], rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("base", [0, 1])
@@ -65,10 +90,10 @@ def balance(damping, frequency, lines, functions, force):
     """Lines of x'' + 2 z x' + k(t) x = F with k = 1 + a function of each base's angle."""
     w = frequency * lines.orders
     answer = 1.0 / (1.0 - w**2 + 2j * damping * w)
-    factors = [(Product(lines, base, len(own) - 1), np.asarray(own)) for base, own in enumerate(functions)]
+    factors = [(base, np.asarray(own)) for base, own in enumerate(functions)]
 
     def apply(x):
-        return x + answer * sum(product.of(own, x) for product, own in factors)
+        return x + answer * sum(product_of(lines, base, own, x) for base, own in factors)
 
     right = np.zeros(len(w), dtype=complex)
     right[0] = force
@@ -160,7 +185,7 @@ def test_a_product_of_bases_that_share_lines_is_that_in_time():
     angle = 2.0 * np.pi * np.arange(512) / 512
     values = lines.values(signal, np.outer(angle, [4.0, 3.0]))
     factor = 1.0 + 0.4 * np.cos(4.0 * angle)
-    found = Product(lines, 0, 2).of(np.array([1.0, 0.2, 0.0], dtype=complex), signal)
+    found = product_of(lines, 0, np.array([1.0, 0.2, 0.0], dtype=complex), signal)
     known = np.fft.rfft(values * factor)[np.rint(lines.orders).astype(int)] / 512
     inside = lines.orders <= 8.0
     np.testing.assert_allclose(found[inside], known[inside], atol=1e-12)
