@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.signal
 from numpy.typing import NDArray
 
 from exugear.results.spectra.orders import OrderLine
@@ -129,6 +128,8 @@ def line_peaks(spectra: Waterfall, line: OrderLine, prominence: float) -> list[P
 
     Each has half of its width at half power as its resolution: what lies nearer to it cannot be told apart.
     """
+    import scipy.signal  # loads all of scipy.stats, for which others need not wait
+
     usable = np.flatnonzero(np.isfinite(spectra.along(line)))
     if usable.size < 3:
         return []

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from textwrap import shorten
 
 import numpy as np
-import scipy.signal
 from numpy.typing import ArrayLike
 
 from exugear.gearbox.parts import RPM
@@ -97,6 +96,8 @@ def order_cut(
     >>> bool(np.all(np.abs(np.abs(cut.amplitude) - 0.5) < 1e-3))
     True
     """
+    import scipy.signal  # loads all of scipy.stats, for which others need not wait
+
     signal, shaft = np.asarray(values, dtype=np.float64), np.asarray(speed, dtype=np.float64)
     length = round(window_length * rate)
     step = 0.5 * (np.abs(shaft[1:]) + np.abs(shaft[:-1])) / rate

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import scipy.interpolate
-import scipy.signal
 from numpy.typing import ArrayLike
 
 from fe_ste.tools.arrays import Floats
@@ -40,6 +38,8 @@ def resample_uniform(time: ArrayLike, values: ArrayLike, rate: float) -> tuple[F
     through a linear-phase low pass (Kaiser window) that keeps 80 % of the new band within 1 % and holds back
     aliases.
     """
+    import scipy.signal  # loads all of scipy.stats, for which others need not wait
+
     instants, signal = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     if instants.shape != signal.shape or instants.ndim != 1 or instants.size < 8:
         raise ValueError(f"time {instants.shape} and values {signal.shape} must be two rows of 8 or more samples")

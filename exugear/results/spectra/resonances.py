@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from textwrap import shorten
 
 import numpy as np
-import scipy.signal
 from numpy.typing import ArrayLike
 
 from exugear.gearbox.parts import RPM
@@ -98,6 +97,8 @@ def _highest(level: Floats) -> float:
 
 def peaks_on_line(spectra: Waterfall, line: OrderLine, prominence: float) -> list[Pick]:
     """Find the peaks of a least prominence (dB) along one order line, in order of time."""
+    import scipy.signal  # loads all of scipy.stats, for which others need not wait
+
     level = spectra.along(line)
     usable = np.flatnonzero(np.isfinite(level))
     if usable.size < 3:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import scipy.fft
-import scipy.signal
 from numpy.typing import ArrayLike
 
 from fe_ste.tools.arrays import Floats
@@ -40,6 +38,8 @@ def amplitude_spectrum(values: ArrayLike, rate: float, window: str = "hann", pad
     >>> float(frequency[50]), round(float(amplitude[50]), 12)
     (50.0, 3.0)
     """
+    import scipy.signal  # loads all of scipy.stats, for which others need not wait
+
     signal = np.asarray(values)
     kind = np.float32 if signal.dtype == np.float32 else np.float64
     count = padding * signal.shape[-1]
