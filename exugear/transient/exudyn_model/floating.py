@@ -27,7 +27,7 @@ import numpy as np
 from exugear.bodies.floating_body import FloatingBody
 from exugear.bodies.floating_coordinates import NO_TURN
 from exugear.bodies.reduced_body import TILT_X, TILT_Y
-from exugear.bodies.rotations import euler_rotation
+from exugear.bodies.rotations import euler_rotation, skew
 from exugear.kernels.coordinates import SPIN
 from exugear.transient.exudyn_model.floating_object import Rotation, add_floating_body
 from exugear.transient.exudyn_model.library import SolverFailure, exudyn, items, kinematics
@@ -126,10 +126,14 @@ class FloatingSystem:
         Tilts are those of the seat's axis; about z the motion is the elastic twist, the velocity the speed.
         """
         turn, _, arms, jacobian = self._kinematics(q)
+        return self._seat_motion(q, v, turn, arms, jacobian)
+
+    def _seat_motion(self, q: Floats, v: Floats, turn: Floats, arms: Floats, jacobian: Floats) -> tuple[Floats, Floats]:
+        """As `seat_motion`, with what `_kinematics` gives at these coordinates."""
         modal = q[self._modal]
         spatial = (jacobian @ v).reshape(-1, 6)
-        axes = turn[:, 2] + np.cross(self._turns @ modal @ turn.T, turn[:, 2])
-        axis_rates = np.cross(spatial[:, 3:], axes)
+        axes = turn[:, 2] + self._turns @ modal @ turn.T @ skew(turn[:, 2])
+        axis_rates = (skew(spatial[:, 3:]) @ axes[..., None])[..., 0]
         motion, velocity = np.empty_like(spatial), spatial.copy()
         motion[:, :3] = q[:3] + arms - self._arms
         # A tilt about +x moves the tip of the axis towards -y.
@@ -144,7 +148,7 @@ class FloatingSystem:
         arms = (self._arms + self._moves @ q[self._modal]) @ turn.T
         jacobian = np.zeros((len(arms), 6, len(q)))
         jacobian[:, :3, :3] = np.eye(3)
-        jacobian[:, :3, self._rotation] = np.cross(rates.T[None], arms[:, None]).transpose(0, 2, 1)
+        jacobian[:, :3, self._rotation] = -skew(arms) @ rates
         jacobian[:, 3:, self._rotation] = rates
         jacobian[:, :3, self._modal] = turn @ self._moves
         jacobian[:, 3:, self._modal] = turn @ self._turns
@@ -152,8 +156,8 @@ class FloatingSystem:
 
     def _force(self, mbs: Any, t: float, item: int, coordinates: Any, velocities: Any) -> Floats:
         q, v = np.array(coordinates), np.array(velocities)
-        turn, rates, _, jacobian = self._kinematics(q)
-        force: Floats = self.law.force(t, *self.seat_motion(q, v)) @ jacobian
+        turn, rates, arms, jacobian = self._kinematics(q)
+        force: Floats = self.law.force(t, *self._seat_motion(q, v, turn, arms, jacobian)) @ jacobian
         if self.stiffening:
             speed, modal = self._speed(turn, rates, v), self._modal
             force[modal] -= speed**2 * (self._spin_stiffness @ q[modal]) + speed * (self._spin_damping @ v[modal])
