@@ -1,9 +1,24 @@
-"""What all tests share, those of docstrings too: they read and write no flanks in the user's cache folder."""
+"""What all tests share, those of docstrings too: flanks and contacts computed once, kept until the tests end.
 
+They read and write none in the user's cache folder.
+"""
+
+import atexit
 import os
+import shutil
+import tempfile
 from typing import Any
 
-os.environ["EXUGEAR_FLANKS"] = "off"
+# Processes that work side by side are started by this one and share its folder.
+if "PYTEST_XDIST_WORKER" not in os.environ:
+    KEPT = os.environ["EXUGEAR_FLANKS"] = tempfile.mkdtemp(prefix="exugear-tests-")
+    OWNER = os.getpid()
+
+    @atexit.register
+    def remove_what_was_kept() -> None:
+        """At the end of this process, not of its forks."""
+        if os.getpid() == OWNER:
+            shutil.rmtree(KEPT, ignore_errors=True)
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:

@@ -24,20 +24,20 @@ import os, signal, sys
 from pathlib import Path
 from tests.exugear.life.test_stopped_lives import solved
 def die(done, total):
-    if done >= 25:
+    if done >= 15:
         os.kill(os.getpid(), signal.SIGKILL)
 solved(Path(sys.argv[1]), die)
 """
 
 
 def solved(path: Path, progress=None, input_hash: str = "this input"):
-    """Balance of the GRC under the law `table` at four angles, torques of both signs, with loads of a hub."""
+    """Balance of the GRC under the law `table` at two angles, torques of both signs, with loads of a hub."""
     changes = {"bodies.main_shaft.enabled": True, "static_load.torques_N_m": {"main_shaft": 240e3}}
     gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml").varied(changes)
     assembly = assemble(gearbox, Choice("bushing", "table"), surfaces(gearbox))
     hub = np.array([10e3, 0.0, 0.0, 0.0, 20e3])
     kept = KeptAngles(Store(path, input_hash))
-    return static_balance(assembly, "main_shaft", np.array([240e3, -60e3]), 4, progress, hub, kept)
+    return static_balance(assembly, "main_shaft", np.array([240e3, -60e3]), 2, progress, hub, kept)
 
 
 def arrays(balance) -> list[np.ndarray]:
@@ -49,10 +49,10 @@ def test_a_balance_that_was_killed_goes_on_with_the_same_bits(tmp_path):
     whole, partial = solved(tmp_path / "whole.npz"), tmp_path / "killed.npz"
     done = subprocess.run([sys.executable, "-c", KILLED, str(partial)], check=False)
     assert done.returncode == -signal.SIGKILL
-    assert repr(KeptAngles(Store(partial, "this input"))).startswith("<KeptAngles: 2 in")
+    assert repr(KeptAngles(Store(partial, "this input"))).startswith("<KeptAngles: 1 in")
     counted: list[int] = []
     resumed = solved(partial, lambda number, total: counted.append(number))
-    assert counted[:2] == [10, 20], "two angles are there and need no solution"
+    assert counted[0] == 10, "one angle is there and needs no solution"
     for one, other in zip(arrays(whole), arrays(resumed), strict=True):
         assert np.array_equal(one, other)
 
