@@ -25,3 +25,5 @@ BODY_SIZE = 6
 PADDED, PADDED_TILT, PADDED_SPIN = 8, 4, 6
 """Size of the padded row x y z 0 a b spin 0 that loops arranged for speed take a body's coordinates in, first tilt and
 spin there."""
+COSINE, SINE = range(2)
+"""Columns of the cosines and sines of all angles that turn anything, which such loops take once per evaluation."""

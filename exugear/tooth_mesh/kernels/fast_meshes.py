@@ -8,7 +8,7 @@ so that the loops need no exceptions, and nothing is allocated.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -28,17 +28,15 @@ what an account of energy takes of the mesh: elastic energy (J); power damped, o
 and of a force that is not conjugate to its deflection (W); of a table change of centre distance (m),
 misalignment (rad) and rate of the centre distance (m/s)."""
 STATES_SIZE = 11
-DEFLECTION_ROW, FORCE_ROW, CENTRE_ROW, MISALIGNMENT_ROW, BACK_ROW, BACK_MISALIGNMENT_ROW = range(6)
+DEFLECTION_ROW, FORCE_ROW = range(2)
 """Rows of `Meshes.rows`."""
-PLAIN_ROWS = 2
-"""Number of rows of meshes without a table."""
 FIXED, ALONG_COSINE, ALONG_SINE, SECOND = range(0, 4 * PADDED, PADDED)
 """First columns of the parts of each of them, and of those of the second gear."""
 TILT_ROW_X, TILT_ROW_Y, TILT_SHIFT, TILT_RESISTANCE, TILT_DAMPER, TILT_ARM, TILT_PUSH = range(7)
 """Columns of `Meshes.tilt`: the misalignment's row over the tilts of gear 1, its negative being that of gear 2;
 misalignment at zero tilts against that of the contact's state (rad); tilt stiffness, damping, lever and moment as in
 `exugear.tooth_mesh.kernels.meshes.MeshArrays.tilt`."""
-TURNING = 2 * PADDED
+PADDED_FRAME = 2 * PADDED
 """Place of the frame's angle in a gradient of `MeshMemory.gradients`, behind two padded gears."""
 KINETIC, ELASTIC, OF_LOADS, DISSIPATED, OF_VARYING_STIFFNESS, NON_CONSERVATIVE, OF_BEARING_RATES = range(7)
 """Columns of an account of energy, as runs take it (`exugear.transient.compiled.sampling`).
@@ -62,9 +60,9 @@ class Meshes(NamedTuple):
     way_pieces, way : of the load along the face
     spinning : (m,) 1 where the gears have their spins alone
     ends : (m, 2) numbers of the two gears' places
-    rows : (m, r, 48) rows over both gears' padded places: parts W0, W1, W2 of the first, then of the second gear, whose
+    rows : (m, 2, 48) rows over both gears' padded places: parts W0, W1, W2 of the first, then of the second gear, whose
         row is W0 + W1 cos psi + W2 sin psi at the angle psi of the frame
-    offsets : (m, r, 3) of each row: what cos psi, sin psi and psi itself add to its value
+    offsets : (m, 2, 3) of each row: what cos psi, sin psi and psi itself add to its value
     mean : (m, 2) stiffness (N/m) and damping (N s/m) at the static load, mean over the cycle
     nominal : (m,) deflection of gears in their nominal place, m
     table : None where no mesh follows one
@@ -121,6 +119,30 @@ class MeshMemory(NamedTuple):
     damping: Floats
 
 
+class MeshWork(Protocol):
+    """What laws read and fill of the memory of a loop over time: `exugear.transient.compiled.arrays.Work`."""
+
+    @property
+    def force(self) -> Floats:
+        """Generalized forces."""
+
+    @property
+    def turns(self) -> Floats:
+        """Cosine and sine of all angles that turn anything, (k, 2)."""
+
+    @property
+    def places(self) -> Floats:
+        """Padded coordinates and rates of all places, (p, 16)."""
+
+    @property
+    def loads(self) -> Floats:
+        """Generalized forces on all places, padded alike, (p, 16)."""
+
+    @property
+    def mesh(self) -> MeshMemory:
+        """Memory of the laws."""
+
+
 def padded_rows(rows: Floats, axis: Floats) -> tuple[Floats, Floats]:
     """Rows over padded places, their parts and offsets: see `Meshes`.
 
@@ -170,7 +192,7 @@ def row_motion(
     rate = sum_of(gradient_1 * eight(first, PADDED) + gradient_2 * eight(second, PADDED)) + turning * psi_rate
     put(gradient, 0, gradient_1)
     put(gradient, PADDED, gradient_2)
-    gradient[TURNING] = turning
+    gradient[PADDED_FRAME] = turning
     return value, rate
 
 
@@ -237,36 +259,22 @@ def error_at(m: int, end: int, angle: float, meshes: Meshes) -> tuple[float, flo
 
 
 @kernel
-def subtract_wheel_errors(
-    q: Floats, v: Floats, m: int, side: float, meshes: Meshes, gradient: Floats
+def subtract_errors(
+    q: Floats, v: Floats, m: int, side: float, meshes: Meshes, gradient: Floats, size: int, spin_place: int, frame: int
 ) -> tuple[float, float]:
-    """Change of a deflection and its rate by the gears' errors; changes its gradient too."""
+    """Change of a deflection and its rate by the gears' errors; changes its gradient too.
+
+    The gradient has `size` places for each gear, the spin at `spin_place` of them, and the frame's angle at `frame`.
+    """
     delta, rate = 0.0, 0.0
     index = meshes.coordinates[m]
     for end in range(2):
         if meshes.error_pieces[m, end] > 0:
-            spin, frame = index[BODY_SIZE * end + SPIN], index[FRAME]
-            error, slope = error_at(m, end, q[spin] - q[frame], meshes)
+            spin, psi = index[BODY_SIZE * end + SPIN], index[FRAME]
+            error, slope = error_at(m, end, q[spin] - q[psi], meshes)
             # A flank that stands back closes later; seen from the other flank it stands ahead (side -1).
             delta -= side * error
-            rate -= side * slope * (v[spin] - v[frame])
-            gradient[BODY_SIZE * end + SPIN] -= side * slope
-            gradient[FRAME] += side * slope
-    return delta, rate
-
-
-@kernel
-def subtract_errors(q: Floats, v: Floats, m: int, side: float, meshes: Meshes, gradient: Floats) -> tuple[float, float]:
-    """Change of a deflection and its rate by the gears' errors; changes its padded gradient too."""
-    delta, rate = 0.0, 0.0
-    index = meshes.coordinates[m]
-    for end in range(2):
-        if meshes.error_pieces[m, end] > 0:
-            spin, frame = index[BODY_SIZE * end + SPIN], index[FRAME]
-            error, slope = error_at(m, end, q[spin] - q[frame], meshes)
-            # A flank that stands back closes later; seen from the other flank it stands ahead (side -1).
-            delta -= side * error
-            rate -= side * slope * (v[spin] - v[frame])
-            gradient[PADDED * end + PADDED_SPIN] -= side * slope
-            gradient[TURNING] += side * slope
+            rate -= side * slope * (v[spin] - v[psi])
+            gradient[size * end + spin_place] -= side * slope
+            gradient[frame] += side * slope
     return delta, rate

@@ -1,7 +1,7 @@
 """All mesh laws in one table: their names, what they are in a line, and what the rest of the program must know.
 
 To add a law: a file of its name in this folder, with a `LAW`, and a row here. Only a law whose force is no stiffness
-over the mesh cycle times the deflection needs more, a branch in `exugear.tooth_mesh.laws.forms`. Nothing heavy is
+over the mesh cycle times the deflection needs more, a branch in `exugear.tooth_mesh.laws.along_row`. Nothing heavy is
 imported here, because the command line reads its choices from this table.
 """
 

@@ -21,6 +21,7 @@ import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Mesh
+from exugear.kernels.coordinates import BODY_SIZE, COSINE, SINE, SPIN
 from exugear.tooth_mesh.element import MeshElement
 from exugear.tooth_mesh.kernels.fast_meshes import (
     ALONG_DEFLECTION,
@@ -38,8 +39,9 @@ from exugear.tooth_mesh.kernels.fast_meshes import (
     TABLE_FORCE,
     Meshes,
     MeshMemory,
+    MeshWork,
     mesh_row,
-    subtract_wheel_errors,
+    subtract_errors,
 )
 from exugear.tooth_mesh.kernels.meshes import (
     CYCLE_POWER,
@@ -387,7 +389,7 @@ def fast_flank_force(
         row, misalignment_row, offset = table.back[m], table.back_misalignment[m], -deflection - table.backlash[m]
         phase, cycles, number = table.back_phase[m], -meshes.cycles[m], 1
     delta, rate = mesh_row(q, v, index, axis, row, c, s, gradient)
-    less, slower = subtract_wheel_errors(q, v, m, float(side), meshes, gradient)
+    less, slower = subtract_errors(q, v, m, float(side), meshes, gradient, BODY_SIZE, SPIN, FRAME)
     delta, rate = delta + offset + less, rate + slower
     misalignment = table.nominal[m, NOMINAL_MISALIGNMENT]
     # Gears with their spin alone neither move apart nor tilt; of the other flank one is told only where it touches.
@@ -458,6 +460,21 @@ def fast_table_force(
         memory.states[m, LAST_CENTRE], memory.states[m, LAST_CENTRE_RATE] = centre, rate
     for side in (1, -1):
         fast_flank_force(q, v, m, side, meshes, table, c, s, law_memory, memory)
+
+
+@kernel
+def add_table_mesh(
+    q: Floats, v: Floats, m: int, meshes: Meshes, table: TableArrays | None, law: Scratch | None, work: MeshWork
+) -> None:
+    """Add the force of a mesh with a table; without tables (None) nothing, and nothing of their law is compiled."""
+    if table is None:
+        return
+    if law is None:
+        return
+    c, s = work.turns[meshes.slot[m], COSINE], work.turns[meshes.slot[m], SINE]
+    fast_table_force(q, v, m, meshes, table, c, s, law, work.mesh)
+    for i in range(ROW_SIZE):
+        work.force[meshes.coordinates[m, i]] -= work.mesh.gradient[TABLE_FORCE, i]
 
 
 def pack_tables(elements: tuple[MeshElement, ...], index: Integers, averaged: bool, linear: bool) -> TableArrays:

@@ -20,8 +20,6 @@ STIFFNESS, DAMPING, ANGLE, SPEED, HALF_ACCELERATION = range(5)
 W_X, W_Y, W_Z, SIN_A, COS_A, SIN_B, COS_B = range(9, 16)
 """Columns of `Work.frames` behind the rotation matrix, row by row: angular velocity, sine and cosine of the tilts."""
 FRAME_SIZE = 16
-COSINE, SINE = range(2)
-"""Columns of `Work.turns`."""
 WRENCH = PADDED
 """First column of force and moment, global axes, in `Work.loads`, behind the generalized forces."""
 RELATIVE_PLACE, RELATIVE_AXIS, RELATIVE_VELOCITY, FIRST_TURNING, SECOND_TURNING, RELATIVE_TILT = range(0, 18, 3)

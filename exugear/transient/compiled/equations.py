@@ -12,6 +12,7 @@ from exugear.bodies.kernels.elastic import set_elastic_motion
 from exugear.bodies.kernels.travelling import place_travelling, share_travelling_forces
 from exugear.bodies.kernels.turning import set_turning_motion
 from exugear.kernels.coordinates import SPIN, TILT
+from exugear.tooth_mesh.laws.forms import add_meshes
 from exugear.transient.compiled.arrays import (
     ANGLE,
     COS_B,
@@ -27,7 +28,6 @@ from exugear.transient.compiled.arrays import (
     Work,
 )
 from exugear.transient.compiled.connectors import add_connectors
-from exugear.transient.compiled.meshes import add_meshes
 from exugear.transient.compiled.places import add_loads_of_places, gather_places, place_bodies
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import kernel

@@ -14,8 +14,8 @@ from exugear.gearbox.sections.entries import GROUND
 from exugear.kernels.coordinates import BODY_SIZE, PADDED, PADDED_TILT, SPIN, TILT
 from exugear.kernels.products import filled_up
 from exugear.tooth_mesh.kernels.fast_meshes import (
+    PADDED_FRAME,
     STATES_SIZE,
-    TURNING,
     Meshes,
     MeshMemory,
     padded_rows,
@@ -213,10 +213,7 @@ def _meshes(numbers: _Numbers, ends: Integers) -> Meshes:
     axis[given.coordinates[:, :FRAME].reshape(-1, 2, BODY_SIZE)[:, :, 0] < 0] = 0.0
     elements = numbers.assembly.elements
     table = given.table
-    kinds = [given.deflection, given.force]
-    if (given.form == TABLE_FORM).any():
-        kinds += [table.centre, table.misalignment, table.back, table.back_misalignment]
-    rows, offsets = padded_rows(np.stack(kinds, axis=1), axis)
+    rows, offsets = padded_rows(np.stack([given.deflection, given.force], axis=1), axis)
     return Meshes(
         coordinates=np.where(given.coordinates < 0, numbers.size, given.coordinates),
         slot=np.array([numbers.slot(int(c)) for c in given.coordinates[:, FRAME]], dtype=np.int64),
@@ -363,7 +360,7 @@ def work_for(equations: Equations, q: Floats, v: Floats) -> Work:
         rolling=np.zeros(0) if rolling is None else rolling_memory(rolling),
         mesh=MeshMemory(
             gradient=np.zeros((3, ROW_SIZE)),
-            gradients=np.zeros((4, TURNING + 1)),
+            gradients=np.zeros((4, PADDED_FRAME + 1)),
             states=np.zeros((count, STATES_SIZE)),
             pieces=np.zeros((count, 2), dtype=np.int64),
             law=None if equations.meshes.table is None else scratch_memory(),

@@ -8,14 +8,12 @@ from __future__ import annotations
 
 import math
 
-from exugear.kernels.coordinates import PADDED, PADDED_SPIN, PADDED_TILT, SPIN, TILT
+from exugear.kernels.coordinates import COSINE, PADDED, PADDED_SPIN, PADDED_TILT, SINE, SPIN, TILT
 from exugear.transient.compiled.arrays import (
     COS_A,
     COS_B,
-    COSINE,
     SIN_A,
     SIN_B,
-    SINE,
     W_X,
     W_Y,
     W_Z,

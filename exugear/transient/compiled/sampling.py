@@ -19,7 +19,7 @@ from exugear.bearings.kernels.rolling import (
 from exugear.bodies.kernels.elastic import motion_energies
 from exugear.bodies.kernels.turning import turning_energies, turning_weight_power
 from exugear.dynamics.signals import SignalLayout
-from exugear.kernels.coordinates import AXIAL, BODY_SIZE, PADDED, PADDED_TILT, SPIN, TILT
+from exugear.kernels.coordinates import AXIAL, BODY_SIZE, COSINE, PADDED, PADDED_TILT, SINE, SPIN, TILT
 from exugear.tooth_mesh.kernels.fast_meshes import (
     DISSIPATED,
     ELASTIC,
@@ -43,12 +43,10 @@ from exugear.tooth_mesh.kernels.table_law import TableArrays
 from exugear.tooth_mesh.laws.table import TABLE_FORM
 from exugear.transient.compiled.arrays import (
     COS_B,
-    COSINE,
     DAMPED,
     LAG,
     OFFSET,
     SIN_B,
-    SINE,
     SUPPORT_LOAD,
     W_X,
     W_Y,

@@ -36,7 +36,8 @@ from exugear.tooth_mesh.kernels.meshes import (
     row_dot,
 )
 from exugear.tooth_mesh.kernels.table_law import scratch_memory
-from exugear.tooth_mesh.laws.forms import MEMORY, TILTING, pass_meshes, tilted
+from exugear.tooth_mesh.laws.along_row import TILTING, tilted
+from exugear.tooth_mesh.laws.forms import MEMORY, pass_meshes
 from exugear.transient.compiled.solver import CompiledSystem
 from exugear.transient.compiled.step import choose_integration
 from fe_ste.tools.compilation import compiled

@@ -12,7 +12,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.tooth_mesh.kernels.meshes import periodic_cubic
 from exugear.tooth_mesh.law import MeshCurve
-from exugear.tooth_mesh.laws.forms import row_law
+from exugear.tooth_mesh.laws.along_row import row_law
 from exugear.tooth_mesh.laws.line_of_action import CURVE_FORM, STIFFNESS_FORM, curve_coefficients
 from exugear.tooth_mesh.laws.registry import LAWS, law_of
 from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
