@@ -36,7 +36,7 @@ from exugear.dynamics.fingerprint import input_hash
 from exugear.steady.excitation import Gearset
 from exugear.steady.mean_system.mean_system import MeanSystem
 from exugear.steady.point_solver import gearset_of
-from exugear.steady.response import transmission_error_line
+from exugear.steady.response import transmission_errors
 from exugear.tooth_mesh.contact_state import ContactState
 from exugear.tooth_mesh.law import MeshCurve
 
@@ -183,11 +183,11 @@ def amplitudes(gearset: Gearset, system: MeanSystem) -> dict[str, np.ndarray]:
     ports = gearset.ports_at(speed)
     motion = system.responses(speed, 2.0 * np.pi * FREQUENCIES, gearset.loads(ports))
     seen = np.einsum("fsm,s->fm", motion, gearset.row_of_overall(speed))
-    found = {}
+    found, errors = {}, transmission_errors(gearset, ports, speed)
     for line in range(1, len(gearset.lines.index)):
         multiples = gearset.lines.index[line]
         name = f"{multiples.max()} x {gearset.waves.base_names[int(np.argmax(multiples))].split(', ')[0]}"
-        amplitude = 2.0 * np.abs(seen @ transmission_error_line(gearset, ports, speed, line).ravel())
+        amplitude = 2.0 * np.abs(seen @ errors[line].ravel())
         reached = gearset.lines.orders[line] * FASTEST >= 2.0 * np.pi * FREQUENCIES
         found[name] = np.where(reached, amplitude, np.nan)
     return found
