@@ -91,7 +91,7 @@ def test_a_floating_frame_asks_for_exudyn_before_anything_is_computed(tmp_path):
     message = " ".join(outcome.stderr.split())
     assert "bodies.shaft.flexibility = 'ffrf' runs in Exudyn only; add --solver exudyn" in message
     assert list(tmp_path.iterdir()) == [case]
-    outcome = iso("run", case, "--variant", "flexible", "--solver", "exudyn", "--duration", 0.01, "--json")
+    outcome = iso("run", case, "--variant", "flexible", "--solver", "exudyn", "--duration", 0.002, "--json")
     assert outcome.exit_code == 0, outcome.stderr
     summary = json.loads(outcome.stdout)
     assert summary["solver"].endswith("generalized-alpha")

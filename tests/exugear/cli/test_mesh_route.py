@@ -74,7 +74,7 @@ def test_both_routes_give_the_same_run_and_each_file_says_which_it_was(case, tmp
 def test_both_routes_give_the_same_run_of_a_whole_gearbox(grc, stiffness, tmp_path, law):
     """By the law whose force is not along its deflection, and by that which knows how gears stand."""
     data = surfaces(grc) if law == "table" else stiffness
-    choice, options = Choice("bushing", law), {"duration": 0.003, "solver": "exudyn"}
+    choice, options = Choice("bushing", law), {"duration": 0.002, "solver": "exudyn"}
     runs = [
         simulate(grc, choice, data, tmp_path / route, mesh_route=route, **options) for route in ("element", "loads")
     ]
@@ -121,6 +121,6 @@ def test_the_example_of_the_grc_finds_round_off_only(tmp_path):
     spec = importlib.util.spec_from_file_location("grc750_textbook_loads", GRC / "textbook_loads.py")
     example = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(example)
-    differences = example.main(tmp_path, duration=0.003)
+    differences = example.main(tmp_path, duration=0.002)
     assert set(differences) == set(example.SIGNALS)
     assert max(differences.values()) < SEVEN_DIGITS

@@ -35,7 +35,7 @@ from exugear.life.life_diagrams import damage_matrix
 from exugear.life.life_file import limits, read_life
 from exugear.life.load_spectrum.counted import count_loads
 from exugear.life.pair_stresses import pair_stresses
-from exugear.life.static_balance import static_balance
+from exugear.life.static_balance import StaticBalance, static_balance
 from exugear.project import Project
 from exugear.tooth_mesh.kernels.meshes import FORCE
 from fe_ste.root_stress.mesh_cycle import MeshCycleStress
@@ -86,6 +86,12 @@ def content_of(table: str, folder: Path, **rating: Any) -> dict[str, Any]:
 
 
 TABLE = "torque_N_m,speed_rpm,hours\n100,1500,3\n200,1000,1\n"
+
+
+@pytest.fixture(scope="module")
+def balance(grc) -> StaticBalance:
+    """The GRC under its torque at one angle."""
+    return static_balance(grc.assembly(), "carrier", np.array([240e3]), 1)
 
 
 @pytest.fixture(scope="module")
@@ -196,11 +202,11 @@ def test_load_sharing_of_planets_is_told(grc):
     assert not any(one.startswith("K_gamma of high_speed") for one in life.assumptions)
 
 
-def test_misalignment_beyond_a_table_is_told(grc):
+def test_misalignment_beyond_a_table_is_told(grc, balance):
     """Stresses of a table from -10 to 10 um over the face, under a balance that tilts gears by more."""
     gearbox = grc.gearbox
     counted = count_loads(gearbox)
-    acting, balance = acting_loads(counted), static_balance(grc.assembly(), "carrier", np.array([240e3]), 1)
+    acting = acting_loads(counted)
     pair = gearbox.gear_pairs["high_speed"]
     flat = np.ones((1, 2))
     for opening, told in ((10e-6, 1), (1e-3, 0)):
@@ -336,7 +342,7 @@ def test_rolling_goes_round_in_a_circle(grc):
     assert q[assembly.spin["hss"]] == pytest.approx(2.0 * math.pi * grc.gearbox.train.ratio)
 
 
-def test_linear_laws_are_scaled_and_others_interpolated(grc):
+def test_linear_laws_are_scaled_and_others_interpolated(grc, balance):
     """Between its torques the balance of a linear variant is that of another solution; rows are solved one by one."""
     with_rows = grc.assembly()
     assembly = replace(with_rows.unloaded, connectors_at_rest=None)
@@ -344,7 +350,7 @@ def test_linear_laws_are_scaled_and_others_interpolated(grc):
     assert full.linear
     assert full.at(full.mesh_force, np.array([120e3, -60e3]))[0] == pytest.approx(half.mesh_force.values[0], rel=1e-3)
     assert full.at(full.mesh_force, np.array([-60e3]))[0] == pytest.approx(-0.25 * full.mesh_force.values[0])
-    rows = static_balance(with_rows, "carrier", np.array([240e3]), 1)
+    rows = balance
     direct = static_balance(with_rows, "carrier", np.array([150e3]), 1)
     assert not rows.linear
     found = rows.at(rows.bearing_load, np.array([150e3]))[0]
@@ -419,10 +425,9 @@ def test_channels_of_a_hub_are_read_with_their_sense(tmp_path):
     assert by_bin == pytest.approx(counted.distribution.hours)
 
 
-def test_planet_bearings_carry_the_couple_of_their_helix(grc):
+def test_planet_bearings_carry_the_couple_of_their_helix(grc, balance):
     """Radially both bearings of a planet carry two tangential forces and the pair that the axial forces make."""
     assembly = grc.assembly()
-    balance = static_balance(assembly, "carrier", np.array([240e3]), 1)
     names = [support.name for support in assembly.supports]
     load = balance.bearing_load.values[-1, 0, names.index("pl_a_1")]
     half = 240e3 / 3 / 0.308 / 2.0

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +33,7 @@ from exugear.project import Project
 from exugear.report.writer import write_report
 from fe_ste.root_stress.mesh_cycle import MeshCycleStress
 
-from ..spur_case import SPUR_CASE
+from ..spur_case import COARSE_INPUT, SPUR_CASE
 from .test_life import TABLE, content_of, hub_assembly
 
 GRC = Path("cases/grc750/gearbox.toml")
@@ -53,7 +55,10 @@ def hertzian(torque: float) -> MeshCycleStress:
     )
 
 
-def planets_with(pins: dict[str, Any]) -> dict[str, FlankLife]:
+@cache
+def planets_with(pin_of: int = 0) -> dict[str, FlankLife]:
+    """Flanks of the GRC, with the pin of a planet 60 um out of its place, or none."""
+    pins = {"pin": {"body": f"planet_{pin_of}", "tangential_um": 60.0}} if pin_of else {}
     content = {**Gearbox.from_toml(GRC).content, "pins": pins}
     gearbox = Gearbox.from_dict(content, str(GRC))
     project = Project(gearbox, Path("nowhere"), Choice("bushing", "iso6336"))
@@ -69,11 +74,8 @@ def planets_with(pins: dict[str, Any]) -> dict[str, FlankLife]:
 
 def test_the_worst_of_all_planets_is_rated_and_told():
     """A pin 60 um out of place lowers the planets' safety whichever planet it belongs to, and by the same."""
-    right = planets_with({})["planet sun_planet"]
-    by_planet = {
-        number: planets_with({"pin": {"body": f"planet_{number}", "tangential_um": 60.0}})["planet sun_planet"]
-        for number in (1, 2, 3)
-    }
+    right = planets_with()["planet sun_planet"]
+    by_planet = {number: planets_with(number)["planet sun_planet"] for number in (1, 2, 3)}
     safeties = [one.contact_safety for one in by_planet.values()]
     assert safeties == pytest.approx([safeties[0]] * 3, rel=3e-3)
     assert max(safeties) < 0.99 * right.contact_safety
@@ -85,7 +87,7 @@ def test_the_worst_of_all_planets_is_rated_and_told():
 
 def test_both_safeties_are_told_and_that_of_the_standard_has_its_factors():
     """One torque: stresses by hand from sigma_H0 and sigma_F0, K_v, K_gamma and K_Hbeta; its curve gives S."""
-    one = planets_with({})["im_pinion intermediate"]
+    one = planets_with()["im_pinion intermediate"]
     gearbox = Gearbox.from_toml(GRC)
     pair = gearbox.gear_pairs["intermediate"]
     ratio = (one.root_safety * one.root_stress) / (one.standard_root_safety * one.nominal_root)
@@ -96,12 +98,12 @@ def test_both_safeties_are_told_and_that_of_the_standard_has_its_factors():
     assert ratio == pytest.approx(1.05 * 1.2**exponent / 1.0, rel=2e-3)
     contact = (one.contact_safety * one.contact_stress) / (one.standard_contact_safety * one.nominal_contact)
     assert contact == pytest.approx(math.sqrt(1.05 * 1.2), rel=2e-3)
-    ring = planets_with({})["ring ring_planet"]  # its Y_F is that of Corrigendum 1, and its rim counts
+    ring = planets_with()["ring ring_planet"]  # its Y_F is that of Corrigendum 1, and its rim counts
     assert 1.0 < ring.standard_root_safety < math.inf and ring.nominal_root > 0.0
 
 
 def test_the_worst_of_each_figure_is_told_of_flanks_that_are_alike():
-    one = planets_with({})["planet sun_planet"]
+    one = planets_with()["planet sun_planet"]
     other = replace(one, contact_holder="planet_2", contact_damage=2.0 * one.contact_damage, root_static=0.5)
     found = worst_of([one, replace(other, compression=one.compression - 1.0)])
     assert found.contact_damage == 2.0 * one.contact_damage
@@ -145,6 +147,13 @@ def test_loads_far_beyond_a_table_are_refused_before_any_work(tmp_path):
         with pytest.raises(CaseError, match=r"0.87 kN m on shaft_1 are 8.7 times .* static_load.torques_N_m"):
             project.life()
         assert not project.folder.exists()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def coarse_tables() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("exugear.tooth_mesh.tables.TableInput", COARSE_INPUT)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -199,7 +208,7 @@ def test_infinite_damage_is_in_report_and_picture(broken):
 
 
 def test_no_stress_below_the_curve_is_called_a_failure():
-    lives = planets_with({}).values()
+    lives = planets_with().values()
     assert not list(failures(lives))
     one = replace(next(iter(lives)), root_damage=math.inf, root_worn=3e9, root_limit=2e9)
     (line,) = failures([one])

@@ -26,7 +26,7 @@ from fe_ste.standards.iso6336 import mesh_stiffness
 from fe_ste.standards.service_life import CASE_HARDENED_BENDING, CASE_HARDENED_CONTACT
 
 from ...case_mutations import toml_text
-from ...spur_case import SPUR_CASE
+from ...spur_case import COARSE_INPUT, SPUR_CASE
 
 GRC = Path("cases/grc750/gearbox.toml")
 STRENGTH: dict[str, Any] = {
@@ -238,8 +238,9 @@ def test_finite_elements_stand_beside_the_nominal_load_where_a_table_is_there(tm
     assert not (project.folder / "stress").exists(), "a check writes nothing"
 
 
-def test_finite_elements_of_a_life_stand_beside_its_spectrum_and_only_of_that_life(tmp_path):
+def test_finite_elements_of_a_life_stand_beside_its_spectrum_and_only_of_that_life(tmp_path, monkeypatch):
     """As the life has them; a life of other loads is told as such, and the page's data has the same sheet."""
+    monkeypatch.setattr("exugear.tooth_mesh.tables.TableInput", COARSE_INPUT)
     (tmp_path / "loads.csv").write_text("torque_N_m,speed_rpm,hours\n100,1500,500\n60,1500,500\n")
     content = spur(tmp_path)
     content["loads"] = {"body": "shaft_1", "life_years": 1.0, "sources": {"one": {"file": "loads.csv"}}}
