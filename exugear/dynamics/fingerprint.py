@@ -66,9 +66,9 @@ def input_hash(assembly: Assembly, load_case: str | None = None) -> str:
             if element.contact is not None
         },
         "load_ways": {
-            element.mesh.name: [f"{value:.9g}" for value in element.load_way]
+            element.mesh.name: [f"{value:.9g}" for value in element.load_ways.ravel()]
             for element in assembly.elements
-            if len(element.load_way)
+            if element.load_ways.size
         },
         "tables": {
             element.mesh.name: _digest(element.table.surface)

@@ -12,7 +12,7 @@ REDUCTION = 1
 #: Eigenmodes (`exugear.dynamics.eigenmodes.modes`, and the laws and matrices of `exugear.dynamics.assembly`).
 MODES = 3
 #: Runs in time (`exugear.transient`, both solvers, the laws, signals and filters).
-RUN = 8
+RUN = 9
 #: Life of gears and bearings (`exugear.life`, and the root stress of `fe_ste.root_stress`).
 LIFE = 7
 #: Steady responses (`exugear.steady`, and all that modes rest on).

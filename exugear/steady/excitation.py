@@ -395,6 +395,11 @@ class Gearset:
         return self.waves.cycle_coefficients("way", harmonics=self.harmonics)
 
     @cached_property
+    def cycle_moments_beyond(self) -> Complexes:
+        """Fourier coefficients (m, harmonics + 1) of the moment that the static load has beyond that way, N m."""
+        return self.waves.cycle_coefficients("moment", harmonics=self.harmonics)
+
+    @cached_property
     def cycle_moments(self) -> tuple[Complexes, Complexes, Complexes]:
         """Fourier coefficients (m, harmonics + 1) of that way times stiffness (N), pull (N m), and squared (N m)."""
         waves, harmonics = self.waves, self.harmonics

@@ -122,10 +122,11 @@ class Balance:
         """Harmonics (m, 3 q, h + 1) over the mesh cycle of what `_stiffness` has."""
         gearset = self.gearset
         if self._curved:
-            found = [*gearset.cycle_curves] + [gearset.cycle_ways] * gearset.wander
+            found = [*gearset.cycle_curves]
+            found += [gearset.cycle_ways, gearset.cycle_moments_beyond] if gearset.wander else []
         else:
             found = [gearset.cycle_coefficients, gearset.cycle_pulls]
-            found += [*gearset.cycle_moments] if gearset.wander else []
+            found += [*gearset.cycle_moments, gearset.cycle_moments_beyond] if gearset.wander else []
         rate = 2j * np.pi * np.arange(gearset.harmonics + 1)
         return np.stack([own * rate**order for own in found for order in range(3)], axis=1)
 

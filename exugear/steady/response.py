@@ -100,8 +100,18 @@ def transmission_errors(gearset: Gearset, ports: MeshPorts, speed: float) -> Com
         static[0, :, MISALIGNMENT] = ports.static[: len(mean), MISALIGNMENT]
         spectra |= {(DEFLECTION, MISALIGNMENT): -mean * ways, (MISALIGNMENT, DEFLECTION): -ways}
     found = _products(gearset, spectra, ports, speed, static)
+    if gearset.wander:
+        beyond = {(MISALIGNMENT, DEFLECTION): -_varying(gearset.cycle_moments_beyond)}
+        found += _products(gearset, beyond, ports, speed, _everywhere(gearset, found.shape))
     found[0] = 0.0
     return found
+
+
+def _everywhere(gearset: Gearset, shape: tuple[int, ...]) -> Complexes:
+    """Values (n, m, f) of one at all times in all places: what these have alike is what the mean wave has."""
+    ones = np.zeros(shape, dtype=complex)
+    ones[0, :, DEFLECTION] = [wave.wave == 0 for wave in gearset.waves.waves]
+    return ones
 
 
 def _varying(cycle: Complexes) -> Complexes:
@@ -160,15 +170,13 @@ def _of_group(values: Floats, group: Group) -> Floats:
 def given_forces(gearset: Gearset, interface: Interface) -> Complexes:
     """Find the forces (n, m, f) of tangents without deflection beyond those of the mean system: of curves alone."""
     waves, ports = gearset.waves, interface.ports
-    found = np.zeros((len(gearset.lines.index), *ports.forces.shape[:2]), dtype=complex)
-    if not waves.loads.any():
-        return found
-    # What all places have is what the mean wave has.
-    found[0, :, DEFLECTION] = [wave.wave == 0 for wave in waves.waves]
+    shape = len(gearset.lines.index), *ports.forces.shape[:2]
+    if not (waves.loads.any() or gearset.wander):
+        return np.zeros(shape, dtype=complex)
     spectra = {(DEFLECTION, DEFLECTION): -gearset.cycle_pulls}
     if gearset.wander:
-        spectra[MISALIGNMENT, DEFLECTION] = gearset.cycle_moments[1]
-    found = _products(gearset, spectra, ports, interface.speed, found)
+        spectra[MISALIGNMENT, DEFLECTION] = gearset.cycle_moments[1] - gearset.cycle_moments_beyond
+    found = _products(gearset, spectra, ports, interface.speed, _everywhere(gearset, shape))
     found[0, :, DEFLECTION] += waves.mean_stiffness * waves.rest
     return found
 

@@ -9,10 +9,12 @@ which has a potential, U = U(e) + (zt - zc) F0 (g - g0) + kg (g - g0)^2 / 2: the
 d has that in it, so that the load pushes between the axes as well. The load centre zc and that of a load more, zt, are
 means over the mesh cycle, in the transverse plane of action from the middle of the common face towards +z.
 
-Over the mesh cycle the load moves along the face, most of helical teeth: w(pmc) is the load centre of the table against
-its mean. It moves with the whole load, F w, so that no moment is left where teeth part; by the same potential the
-deflection under a constant load follows the misalignment by w (g - g0). While w changes, teeth take or give the power
-F w' (g - g0) dpmc/dt, as they do while the stiffness changes. Dampers act along the mean lever zt.
+Over the mesh cycle the load moves along the face, most of helical teeth, and what a little more deflection adds to it
+moves otherwise: c(pmc) and w(pmc) are load centre and tangent load centre against their means. By w the deflection
+under a constant load follows the misalignment, and the load its moment: F w + F0 (c - w), which at F0 is that of the
+contact. The latter part is given by the cycle alone, in the potential -F0 (c - w) (g - g0). While both change, teeth
+take or give the power (F w' + F0 (c' - w')) (g - g0) dpmc/dt, as they do while the stiffness changes. Dampers act along
+the mean lever zt.
 """
 
 from __future__ import annotations
@@ -37,13 +39,14 @@ class ContactCycle:
         Static transmission error, m.
     tangent_stiffness : tuple of float
         N/m.
-    load_centre : tuple of float
-        m.
+    load_centre, tangent_load_centre : tuple of float
+        Of the load, and of what a little more deflection adds to it, m.
     """
 
     deflection: Samples
     tangent_stiffness: Samples
     load_centre: Samples
+    tangent_load_centre: Samples
 
 
 @dataclass(frozen=True)
@@ -97,7 +100,8 @@ class ContactState:
         """
         cycle = self.cycle
         if cycle is not None:
-            cycle = replace(cycle, load_centre=tuple(flank * centre for centre in cycle.load_centre))
+            centres = (tuple(flank * centre for centre in own) for own in (cycle.load_centre, cycle.tangent_load_centre))
+            cycle = ContactCycle(cycle.deflection, cycle.tangent_stiffness, *centres)
         return replace(
             self,
             misalignment=flank * self.misalignment,

@@ -73,8 +73,8 @@ class MeshElement:
     offset : (3,) deflection (m), change of centre distance (m) and misalignment (rad) at zero coordinates
     table : for a law that follows a table; `stiffness` and `damping` are then what it has at the static load
     computed_from : input of the pair's table where contact is still to be solved at the static misalignment
-    load_way : (n,) way of the load along the face over the mesh cycle about its mean, in the axes of the mesh, m; empty
-        where it stays or nothing is known of it
+    load_ways : (2, n) way of the load along the face over the mesh cycle, and of what a little more deflection adds to
+        it, each about its mean, in the axes of the mesh, m; empty where they stay or nothing is known of them
     """
 
     mesh: Mesh
@@ -98,22 +98,22 @@ class MeshElement:
     offset: Floats
     table: TableFlanks | None = None
     computed_from: TableInput | None = None
-    load_way: Floats = field(default_factory=lambda: np.zeros(0))
+    load_ways: Floats = field(default_factory=lambda: np.zeros((2, 0)))
 
     def with_contact(self, contact: ContactState) -> MeshElement:
         """Return the mesh, whose teeth bear evenly so far, with a contact that was solved, in the axes of its table.
 
         The mean of a curved law's stiffness is then that of the contact. So are its changes over the mesh cycle and the
-        load's way along the face, as far as the positions of the contact tell; finer ones stay the table's. Where gears
+        load's ways along the face, as far as the positions of the contact tell; finer ones stay the table's. Where gears
         stand so askew that flanks touch long before or after their middles would, the deflection at mid-face is mostly
         that gap, and no measure of how teeth yield: the curve then begins at the gap.
         """
-        secant, tangent, way, load, gap = self.stiffness, self.tangent, self.load_way, self.load, 0.0
+        secant, tangent, ways, load, gap = self.stiffness, self.tangent, self.load_ways, self.load, 0.0
         if self.is_curved:
             straight = contact.force / contact.tangent_stiffness
             yielding = float(np.clip(contact.deflection, straight, STEEPEST * straight))
             gap = contact.deflection - yielding
-            secant, tangent, way = self._over_cycle(contact, yielding)
+            secant, tangent, ways = self._over_cycle(contact, yielding)
             secant = secant * (contact.force / yielding / np.mean(secant))
             tangent = tangent * (contact.tangent_stiffness / np.mean(tangent))
             load = contact.force
@@ -124,7 +124,7 @@ class MeshElement:
             stiffness=secant,
             tangent=tangent,
             load=load,
-            load_way=way,
+            load_ways=ways,
             contact=contact.seen_by(self.flank),
             damping=self.damping_time * float(np.mean(tangent)),
             deflection=self.deflection - slope * self.centre,
@@ -133,10 +133,10 @@ class MeshElement:
         )
 
     def _over_cycle(self, contact: ContactState, yielding: float) -> tuple[Floats, Floats, Floats]:
-        """Secant and tangent stiffness (n,), N/m, and way of the load (n,), m, as they change where the gears stand."""
+        """Secant and tangent stiffness (n,), N/m, and ways of the load (2, n), m, as they change where the gears stand."""
         cycle = contact.cycle
         if cycle is None:
-            return self.stiffness, self.tangent, self.load_way
+            return self.stiffness, self.tangent, self.load_ways
         deflection = changed_over_cycle(contact.force / self.stiffness, cycle.deflection)
         deflection += yielding - np.mean(deflection)
         softness = changed_over_cycle(1.0 / self.tangent, tuple(1.0 / np.array(cycle.tangent_stiffness)))
@@ -144,10 +144,12 @@ class MeshElement:
         # A curve needs teeth that yield wherever they are.
         deflection = np.maximum(deflection, yielding / STEEPEST)
         softness = np.maximum(softness, 1.0 / (STEEPEST * contact.tangent_stiffness))
-        way = self.load_way
-        if len(way):
-            way = self.flank * changed_over_cycle(self.flank * way, cycle.load_centre)
-        return contact.force / deflection, 1.0 / softness, way
+        ways = self.load_ways
+        if ways.size:
+            centres = cycle.load_centre, cycle.tangent_load_centre
+            pairs = zip(self.flank * ways, centres, strict=True)
+            ways = self.flank * np.array([changed_over_cycle(known, found) for known, found in pairs])
+        return contact.force / deflection, 1.0 / softness, ways
 
     @property
     def is_curved(self) -> bool:
@@ -249,7 +251,7 @@ def mesh_elements(
             offset=_offset(mesh, displaced or {}, deflection, centre),
             table=law.table_flanks(mesh, flank, ends, phase, data, time),
             computed_from=data.table if isinstance(data, MeshCurve) and flank == usual[mesh.name] else None,
-            load_way=_load_way(law, data, flank, usual[mesh.name]),
+            load_ways=_load_ways(law, data, flank, usual[mesh.name]),
         )
         if known is not None and law.tilts:
             element = replace(element.with_contact(known), computed_from=None)
@@ -267,10 +269,10 @@ def _at_load(law: Law, data: MeshData, mesh: Mesh, static_force: float) -> tuple
     return secant, tangent, load
 
 
-def _load_way(law: Law, data: MeshData, flank: int, usual: int) -> Floats:
-    """Way of the load (n,) as `MeshElement.load_way`; of the flank that a table is of, not of that behind."""
+def _load_ways(law: Law, data: MeshData, flank: int, usual: int) -> Floats:
+    """Ways of the load as `MeshElement.load_ways`; of the flank that a table is of, not of that behind."""
     # A flank -1 is that of the table turned about: the ends of the face change places.
-    return flank * law.load_way(data) if flank == usual else np.zeros(0)
+    return flank * law.load_ways(data) if flank == usual else np.zeros((2, 0))
 
 
 def _offset(mesh: Mesh, displaced: Mapping[str, tuple[float, float]], deflection: Floats, centre: Floats) -> Floats:

@@ -32,8 +32,9 @@ class MeshCurve:
         Load on the transverse line of action at which they are, N.
     table : TableInput, optional
         What they were computed from: contact at other loads and misalignments can be solved then.
-    load_centre : (n,) array, optional
-        Where the load bears along the face at the same positions, m from its middle, in the axes of the table.
+    load_centre, tangent_load_centre : (n,) arrays, optional
+        Where the load bears along the face at the same positions, and what a little more deflection adds to it, m from
+        its middle, in the axes of the table. The second is the first by default.
 
     Examples
     --------
@@ -47,6 +48,7 @@ class MeshCurve:
     force: float
     table: TableInput | None = None
     load_centre: Floats | None = None
+    tangent_load_centre: Floats | None = None
 
     def at(self, force: float) -> MeshCurve:
         """Return the same curve by its stiffness at another load (N); without any, at that of the table."""
@@ -122,9 +124,9 @@ class Law:
         values = data.stiffness if isinstance(data, MeshCurve) else np.atleast_1d(np.asarray(data, dtype=np.float64))
         return values, values
 
-    def load_way(self, data: MeshData) -> Floats:
-        """Way of the load along the face about its mean (n,), in the axes of the table, m; empty where it stays."""
-        return np.zeros(0)
+    def load_ways(self, data: MeshData) -> Floats:
+        """Ways of the load, and of what is added to it, along the face (2, n), as `MeshElement.load_ways`."""
+        return np.zeros((2, 0))
 
     def stiffness(self, mesh: Mesh, line_of_action: Floats, angles: Angles) -> tuple[Floats, float]:
         """Stiffness (n,) in the law's own coordinate, N/m, from that of `samples`; F_bt per scalar force of the law."""

@@ -119,7 +119,12 @@ def contact_state(contact: MeanContact) -> ContactState:
         float(contact.at(values, middle))
         for values in (contact.deflection, contact.stiffness, contact.load_centre, contact.tangent_load_centre)
     )
-    over_cycle = (contact.cycle_deflection, contact.cycle_stiffness, contact.cycle_load_centre)
+    over_cycle = (
+        contact.cycle_deflection,
+        contact.cycle_stiffness,
+        contact.cycle_load_centre,
+        contact.cycle_tangent_load_centre,
+    )
     return ContactState(
         force=contact.force,
         deflection=deflection,

@@ -10,7 +10,7 @@ from __future__ import annotations
 TABLE = 6
 
 #: Contact about a state (`fe_ste.transmission_error.mean_contact`); it rests on `TABLE`, too.
-MEAN_CONTACT = 4
+MEAN_CONTACT = 5
 
 #: Table by the reference analysis (`fe_ste.reference.table`, and what it is computed by).
 NONLINEAR_TABLE = 1

@@ -84,9 +84,9 @@ class MeanContact(Displayed):
         Middle of the contact slices, m.
     line_load : ndarray (2, k)
         Of all tooth pairs together, mean of the cycle, N/m.
-    cycle_deflection, cycle_stiffness, cycle_load_centre : ndarray (2, n)
-        Static transmission error (m), force over deflection by a little more force (N/m), and axial position of the
-        resultant (m) at n equal steps of the mesh cycle from its beginning.
+    cycle_deflection, cycle_stiffness, cycle_load_centre, cycle_tangent_load_centre : ndarray (2, n)
+        Static transmission error (m), force over deflection by a little more force (N/m), axial position of the
+        resultant (m) and of that of a little more force (m) at n equal steps of the mesh cycle from its beginning.
     """
 
     force: float
@@ -105,6 +105,7 @@ class MeanContact(Displayed):
     cycle_deflection: Floats
     cycle_stiffness: Floats
     cycle_load_centre: Floats
+    cycle_tangent_load_centre: Floats
 
     def _line(self) -> str:
         low, high = 1e6 * self.misalignment
@@ -121,7 +122,7 @@ class MeanContact(Displayed):
         Examples
         --------
         >>> two = np.array([0.0, 1.0])
-        >>> contact = MeanContact(1.0, 1.0, 1e-5 * two, *[two] * 13)
+        >>> contact = MeanContact(1.0, 1.0, 1e-5 * two, *[two] * 14)
         >>> float(contact.at(contact.load_centre, 5e-6))
         0.5
         """
@@ -230,6 +231,7 @@ def mean_contact(wanted: TableInput) -> MeanContact:
         cycle_deflection=finer["ste"].transpose("misalignment", "pmc").to_numpy(),
         cycle_stiffness=finer["tangent_stiffness"].transpose("misalignment", "pmc").to_numpy(),
         cycle_load_centre=finer["load_centre"].transpose("misalignment", "pmc").to_numpy(),
+        cycle_tangent_load_centre=finer["tangent_load_centre"].transpose("misalignment", "pmc").to_numpy(),
     )
 
 

@@ -40,6 +40,7 @@ def coarse_curves(gearbox: Gearbox) -> dict[str, MeshCurve]:
             wanted.torque[0] / wanted.pair.pinion.base_radius,
             wanted,
             state["load_centre"].to_numpy(),
+            state["tangent_load_centre"].to_numpy(),
         )
     return curves
 

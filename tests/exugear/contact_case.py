@@ -16,13 +16,14 @@ LOADS = {"sun_planet": 140e3, "ring_planet": 140e3, "intermediate": 180e3, "high
 def curves_of(stiffness: Mapping[str, np.ndarray]) -> dict[str, MeshCurve]:
     """Curves through a stiffness over the mesh cycle under 50 to 180 kN, exponents between 1.1 and 1.3.
 
-    Their load moves along the face by some millimetres, as that of helical teeth does.
+    Their load moves along the face by some millimetres, as that of helical teeth does, and what is added to it otherwise.
     """
     cycle = 2.0 * np.pi * np.arange(50) / 50
     exponent = 1.2 + 0.08 * np.cos(cycle + 2.0) + 0.02 * np.cos(2 * cycle)
     centre = 1e-3 + 3e-3 * np.cos(cycle + 1.0) + 1e-3 * np.sin(2 * cycle)
+    added = -2e-3 + 4e-3 * np.cos(cycle + 0.7) + 1.5e-3 * np.sin(3 * cycle)
     return {
-        name: MeshCurve(values, exponent * values, LOADS[name], load_centre=centre)
+        name: MeshCurve(values, exponent * values, LOADS[name], load_centre=centre, tangent_load_centre=added)
         for name, values in stiffness.items()
     }
 

@@ -26,7 +26,7 @@ from exugear.steady.harmonics.lines import Modulator
 from exugear.steady.harmonics.products import fourier_coefficients
 from exugear.steady.mean_system.mean_system import MeanSystem
 from exugear.steady.mean_system.rotating_frame import PlanetSet, RotatingFrame
-from exugear.tooth_mesh.kernels.meshes import FRAME, ROW_SIZE, frame_row
+from exugear.tooth_mesh.kernels.meshes import FRAME, MOMENT_BEYOND, ROW_SIZE, frame_row
 from exugear.tooth_mesh.laws.line_of_action import CURVE_FORM, EXPONENT
 from fe_ste.tools.arrays import Complexes, Floats
 
@@ -45,9 +45,10 @@ IN_PHASE = 1e-6
 """Mesh cycles by which planets in phase may differ."""
 SAME_BASE = 1e-9
 """Share by which mesh frequencies of one base may differ."""
-CycleQuantity = Literal["tangent", "secant", "exponent", "compliance", "way"]
+CycleQuantity = Literal["tangent", "secant", "exponent", "compliance", "way", "moment"]
 """Of a mesh at its static load: slope of the load, load over deflection (N/m), the curve's exponent less one, one over
-the secant (m/N), which is the static transmission error of a unit load, and the way of the load along the face (m)."""
+the secant (m/N), which is the static transmission error of a unit load, the way along the face of what a little more
+deflection adds to the load (m), and the moment that the static load has beyond it (N m)."""
 WAVES = ("mean", "cosine", "sine")
 """The first three, which central bodies feel."""
 
@@ -247,9 +248,11 @@ class MeshWaves:
         meshes, mesh = self.assembly.meshes, wave.first
         pieces, curved = int(meshes.pieces[mesh]), meshes.form[mesh] == CURVE_FORM
         powers = np.vander(np.arange(SAMPLES) / SAMPLES, 4, increasing=True).T
-        if quantity == "way":
-            moves = meshes.way_pieces[mesh] > 0
-            return np.asarray((meshes.way[mesh, :pieces] @ powers).ravel() if moves else np.zeros(pieces * SAMPLES))
+        if quantity in ("way", "moment"):
+            if meshes.way_pieces[mesh] == 0:
+                return np.zeros(pieces * SAMPLES)
+            first = 0 if quantity == "way" else MOMENT_BEYOND
+            return np.asarray((meshes.way[mesh, :pieces, first : first + 4] @ powers).ravel())
         secant = (meshes.stiffness[mesh, :pieces, :4] @ powers).ravel()
         more = meshes.stiffness[mesh, :pieces, EXPONENT : EXPONENT + 4] if curved else np.zeros((pieces, 4))
         exponent = (more @ powers).ravel()

@@ -127,39 +127,39 @@ def sample_wandering_line(tangents: Floats, readings: Floats) -> LawSamples:
 
     Parameters
     ----------
-    tangents : (15, s) array
-        Stiffness k (N/m), force that it has less p (N), and with the way w of the load k w, p w and k w^2; each with
-        two derivatives per cycle.
+    tangents : (18, s) array
+        Stiffness k (N/m), force that it has less p (N), with the way w of the load k w, p w and k w^2, and the moment
+        beyond it (N m); each with two derivatives per cycle.
     readings : (s, 3) array
         Deflection (m), misalignment against that of the contact's state (rad), and position as `sample_line` has it.
     """
     deflection, tilt, moved = readings.T
-    (k, k_slope), (p, p_slope), (kw, kw_slope), (pw, pw_slope), (kww, kww_slope) = (
-        _moved(own, moved) for own in tangents.reshape(5, 3, -1)
+    (k, k_slope), (p, p_slope), (kw, kw_slope), (pw, pw_slope), (kww, kww_slope), (beyond, beyond_slope) = (
+        _moved(own, moved) for own in tangents.reshape(6, 3, -1)
     )
     force = k * deflection - kw * tilt - p
-    moment = kww * tilt - kw * deflection + pw
+    moment = kww * tilt - kw * deflection + pw - beyond
     by_position = k_slope * deflection - kw_slope * tilt - p_slope
-    turning = kww_slope * tilt - kw_slope * deflection + pw_slope
+    turning = kww_slope * tilt - kw_slope * deflection + pw_slope - beyond_slope
     slope = np.stack([np.stack([k, -kw, by_position], axis=1), np.stack([-kw, kww, turning], axis=1)], axis=1)
     return LawSamples(np.stack([force, moment], axis=1), slope, np.zeros_like(slope))
 
 
 def sample_wandering_curve(curve: Floats, readings: Floats, load: float) -> LawSamples:
-    """Sample a curve whose load moves along the face, as `sample_curve`; its way (3, s) follows the curve's numbers.
+    """Sample a curve whose load moves along the face, as `sample_curve`; its way and the moment beyond it (6, s) follow the curve's numbers.
 
     Readings (s, 3) are those of `sample_wandering_line`.
     """
     deflection, tilt, moved = readings.T
-    way, way_slope = _moved(curve[6:], moved)
+    (way, way_slope), (beyond, beyond_slope) = _moved(curve[6:9], moved), _moved(curve[9:], moved)
     own = sample_curve(curve[:6], np.stack([deflection - way * tilt, moved], axis=1), load)
     force, k = own.force[:, 0], own.slope[:, 0, 0]
     by_position = own.slope[:, 0, 1] - k * way_slope * tilt
     along = np.stack([k, -way * k, by_position], axis=1)
     across = -way[:, None] * along
-    across[:, POSITION] -= way_slope * force
+    across[:, POSITION] -= way_slope * force + beyond_slope
     slope = np.stack([along, across], axis=1)
-    return LawSamples(np.stack([force, -way * force], axis=1), slope, np.zeros_like(slope))
+    return LawSamples(np.stack([force, -way * force - beyond], axis=1), slope, np.zeros_like(slope))
 
 
 def _moved(values: Floats, moved: Floats) -> tuple[Floats, Floats]:

@@ -57,7 +57,7 @@ class Meshes(NamedTuple):
     conjugate : (m,) 1 where the force row is the deflection row
     tilting : (m,) 1 where a law along a row resists misalignment
     tilt : (m, 7) columns as named in this module
-    way_pieces, way : of the load along the face
+    way_pieces, way : of the load's ways along the face
     spinning : (m,) 1 where the gears have their spins alone
     ends : (m, 2) numbers of the two gears' places
     rows : (m, 2, 48) rows over both gears' padded places: parts W0, W1, W2 of the first, then of the second gear, whose

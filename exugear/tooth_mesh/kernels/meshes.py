@@ -51,6 +51,8 @@ STATE_SIZE = 10
 TILT_STIFFNESS, TILT_DAMPING, TILT_LEVER, TILT_MOMENT, TILT_REST = range(5)
 """Columns of `MeshArrays.tilt`."""
 TILT_COLUMNS = 5
+WAY_COLUMNS, MOMENT_BEYOND = 8, 4
+"""Columns of `MeshArrays.way`, and the first of the moment in them."""
 
 
 class MeshArrays(NamedTuple):
@@ -69,8 +71,9 @@ class MeshArrays(NamedTuple):
     damping : (m,) N s/m
     tilt : (m, 5) of a law along a row that resists misalignment: tilt stiffness kg (N m/rad) and damping (N m s/rad),
         lever zt (m), moment F0 (zc - zt) (N m) and misalignment g0 (rad); zeros where it does not
-    way_pieces : (m,) number of equal pieces of the load's way along the face; 0 where it stays
-    way : (m, w, 4) coefficients of that way w over each piece of the mesh cycle, m
+    way_pieces : (m,) number of equal pieces of the load's ways along the face; 0 where it stays
+    way : (m, w, 8) coefficients over each piece of the mesh cycle: of the way w of what a little more deflection adds
+        to the load, m, then of the moment F0 (c - w) that the load itself has beyond it, N m
     line_of_action : (m,) F_bt per scalar mesh force
     error_pieces : (m, 2) number of equal cubic pieces of each gear's error over its revolution; 0 for no error
     error : (m, 2, e, 4) coefficients of the error over each piece, m along the transverse line of action
@@ -142,6 +145,19 @@ def stiffness_at(coefficients: Floats, pieces: int, pmc: float) -> tuple[float, 
     # The cubic's derivative is per piece; there are `pieces` of them to a cycle.
     slope = (c[1] + t * (2.0 * c[2] + t * 3.0 * c[3])) * pieces
     return value, slope
+
+
+@kernel
+def way_at(coefficients: Floats, pieces: int, pmc: float) -> tuple[float, float, float, float]:
+    """Way (m) and moment (N m) of coefficients (n, 8), each with its slope per cycle, as `stiffness_at`."""
+    scaled = (pmc - math.floor(pmc)) * pieces
+    piece = piece_at(scaled, pieces)
+    t = scaled - piece
+    c = coefficients[piece]
+    way: float = c[0] + t * (c[1] + t * (c[2] + t * c[3]))
+    moving = (c[1] + t * (2.0 * c[2] + t * 3.0 * c[3])) * pieces
+    moment: float = c[4] + t * (c[5] + t * (c[6] + t * c[7]))
+    return way, moving, moment, (c[5] + t * (2.0 * c[6] + t * 3.0 * c[7])) * pieces
 
 
 @kernel
@@ -233,11 +249,11 @@ def mesh_pmc(q: Floats, m: int, meshes: MeshArrays) -> float:
 
 
 @kernel
-def load_way(m: int, pmc: float, meshes: MeshArrays) -> tuple[float, float]:
-    """Way of the load of mesh m along the face at a position in its cycle, m, and its slope per cycle."""
+def load_way(m: int, pmc: float, meshes: MeshArrays) -> tuple[float, float, float, float]:
+    """Way w (m) of the load of mesh m at a position in its cycle, its slope; moment F0 (c - w) (N m), its slope."""
     if meshes.way_pieces[m] == 0:
-        return 0.0, 0.0
-    return stiffness_at(meshes.way[m], meshes.way_pieces[m], pmc)
+        return 0.0, 0.0, 0.0, 0.0
+    return way_at(meshes.way[m], meshes.way_pieces[m], pmc)
 
 
 @kernel

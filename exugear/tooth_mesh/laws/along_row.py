@@ -61,8 +61,8 @@ from exugear.tooth_mesh.kernels.meshes import (
     rate_gradient,
     relative_spin,
     row_dot,
-    stiffness_at,
     turn_rows,
+    way_at,
 )
 from exugear.tooth_mesh.kernels.table_law import NOMINAL_DEFLECTION, NOMINAL_MISALIGNMENT
 from exugear.tooth_mesh.laws.line_of_action import CURVE_FORM, curve_law, stiffness_law
@@ -124,11 +124,12 @@ def row_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Floats, 
     pmc = mesh_pmc(q, m, meshes)
     cycling = meshes.cycles[m] * relative_spin(v, index, 0)
     # The law, and its damper beside it, which stays where the load is in the mean.
-    way, moving = load_way(m, pmc, meshes)
+    way, moving, beyond, changing = load_way(m, pmc, meshes)
     elastic, k, _, energy, cycle_power = row_law(
         meshes.form[m], meshes.stiffness[m], meshes.pieces[m], delta - way * turned, pmc, cycling
     )
-    moment += way * elastic
+    moment += way * elastic + beyond
+    stored -= beyond * turned
     force = elastic + meshes.damping[m] * rate
     # It acts along a row of its own, which for most laws is that of the deflection.
     net_deflection(q, m, meshes, meshes.force[m], 1.0, acting, turning, bend)
@@ -139,7 +140,7 @@ def row_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Floats, 
     out[FORCE] = force * meshes.line_of_action[m]
     out[ENERGY] = energy + stored
     out[DAMPED_POWER] = meshes.damping[m] * rate * rate + lost
-    out[CYCLE_POWER] = cycle_power + elastic * moving * turned * cycling
+    out[CYCLE_POWER] = cycle_power + (elastic * moving + changing) * turned * cycling
     out[OTHER_POWER] = force * (row_dot(index, acting, v) - rate)
     out[OUTSIDE] = 0.0
     for i in range(ROW_SIZE):
@@ -162,7 +163,7 @@ def add_row_tangent(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Fl
         turned = tilted(q, m, meshes, memory)
         delta -= resists[TILT_LEVER] * turned
         add_tilt_tangent(v, index, turned, resists, memory, jq, jv)
-    way, moving = load_way(m, pmc, meshes)
+    way, moving, beyond, changing = load_way(m, pmc, meshes)
     elastic, k, by_pmc, _, _ = row_law(
         meshes.form[m], meshes.stiffness[m], meshes.pieces[m], delta - way * turned, pmc, 0.0
     )
@@ -174,7 +175,8 @@ def add_row_tangent(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Fl
     for i in range(ROW_SIZE):
         slope[i] = c * slope[i] + k * gradient[i]
     if meshes.way_pieces[m] > 0:
-        add_way_tangent(elastic, k, by_pmc * meshes.cycles[m], way, moving * meshes.cycles[m], memory, jq)
+        by_spin = (way * by_pmc + moving * elastic + changing) * meshes.cycles[m]
+        add_way_tangent(k * way, way, way * elastic + beyond, by_spin, memory, jq)
     slope[SPIN_1] += by_pmc * meshes.cycles[m]
     slope[FRAME] -= by_pmc * meshes.cycles[m]
     # Product rule: the row times the force's slope, and the row's own turning times the force.
@@ -191,24 +193,22 @@ def add_row_tangent(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Fl
 
 
 @kernel
-def add_way_tangent(
-    elastic: float, k: float, by_spin: float, way: float, moving: float, memory: Floats, jq: Floats
-) -> None:
+def add_way_tangent(across: float, way: float, moment: float, by_spin: float, memory: Floats, jq: Floats) -> None:
     """Add the derivatives of the moment of a load that moves along the face to the negative force, (13, 13).
 
-    What the misalignment takes of the force's slope goes to `memory`; `by_spin` and `moving` are slopes of the elastic
-    force (N) and of the load's way (m) by the spin of gear 1.
+    What the misalignment takes of the force's slope goes to `memory`; `across` is the stiffness times the way (N),
+    `by_spin` the slope of the moment (N m) by the spin of gear 1.
     """
     gradient, tilting, slope = memory[GRADIENT], memory[TILTING], memory[SLOPE]
     straight = memory[STILL]
     straight[:] = 0.0
     for i in range(ROW_SIZE):
-        slope[i] -= k * way * tilting[i]
+        slope[i] -= across * tilting[i]
         for j in range(ROW_SIZE):
-            jq[i, j] -= tilting[i] * way * k * (gradient[j] - way * tilting[j])
-        jq[i, SPIN_1] -= tilting[i] * (way * by_spin + moving * elastic)
-        jq[i, FRAME] += tilting[i] * (way * by_spin + moving * elastic)
-    turn_rows(memory[TILT_TURNING], straight, -way * elastic, jq)
+            jq[i, j] -= tilting[i] * across * (gradient[j] - way * tilting[j])
+        jq[i, SPIN_1] -= tilting[i] * by_spin
+        jq[i, FRAME] += tilting[i] * by_spin
+    turn_rows(memory[TILT_TURNING], straight, -moment, jq)
 
 
 @kernel
@@ -336,18 +336,17 @@ def add_tilting_mesh(
     frame, resists, state = meshes.coordinates[m, FRAME], meshes.tilt[m], work.mesh.states[m]
     turned, tilt_rate, x, y, turning = tilt_motion(m, v[frame], c, s, meshes, work.places)
     arm, stiffness, lost = resists[TILT_ARM], resists[TILT_RESISTANCE], resists[TILT_DAMPER] * tilt_rate
-    way, moving = 0.0, 0.0
+    way, moving, beyond, changing, cycling = 0.0, 0.0, 0.0, 0.0, 0.0
     if meshes.way_pieces[m] > 0:
         pmc, cycling = mesh_cycle(q, v, m, meshes)
-        way, slope = stiffness_at(meshes.way[m], meshes.way_pieces[m], pmc)
-        moving = slope * cycling
+        way, moving, beyond, changing = way_at(meshes.way[m], meshes.way_pieces[m], pmc)
     # Where the load bears beside the middle of the face, it deflects with the misalignment.
     approach, approaching = delta - arm * turned, rate - arm * tilt_rate
     elastic, _, _, energy, cycle_power = mesh_law(q, v, m, approach - way * turned, meshes)
-    cycle_power += elastic * moving * turned
+    cycle_power += (elastic * moving + changing) * cycling * turned
     force = elastic + meshes.damping[m] * approaching
     push_apart(m, force, work.mesh.gradients[DEFLECTION_ROW], meshes, work)
-    moment = resists[TILT_PUSH] - stiffness * turned - lost + arm * force + way * elastic
+    moment = resists[TILT_PUSH] - stiffness * turned - lost + arm * force + way * elastic + beyond
     first, second = work.loads[meshes.ends[m, 0]], work.loads[meshes.ends[m, 1]]
     first[PADDED_TILT] += moment * x
     first[PADDED_TILT + 1] += moment * y
@@ -356,5 +355,5 @@ def add_tilting_mesh(
     work.force[frame] += moment * turning
     keep_state(m, delta, approaching, approaching, force, energy, cycle_power, meshes, state)
     state[LAST_RATE] = rate
-    state[LAST_ENERGY] += (0.5 * stiffness * turned - resists[TILT_PUSH]) * turned
+    state[LAST_ENERGY] += (0.5 * stiffness * turned - resists[TILT_PUSH] - beyond) * turned
     state[LAST_DAMPED] += lost * tilt_rate

@@ -35,6 +35,7 @@ STIFFNESS_FORM, CURVE_FORM = 0, 2
 STRAIGHT = 0.05
 """Deflection over that of the table's load below which the curve is a straight line."""
 _LOG_STRAIGHT = math.log(STRAIGHT)
+_CENTRES = ("load_centre", "tangent_load_centre")
 EXPONENT, PER_LOAD = 4, 8
 """Columns of a curve's coefficients behind the four of F0 / s: four of m - 1, and 1 / F0 (1/N)."""
 
@@ -61,8 +62,9 @@ class LineOfAction(Law):
             return stiffness
         tangent = np.asarray(point["tangent_stiffness"].to_numpy(), dtype=np.float64)
         computed_from = wanted_table(gearbox, pair, len(stiffness))
-        centre = np.asarray(point["load_centre"].to_numpy(), dtype=np.float64)
-        return MeshCurve(stiffness, tangent, float(point["line_of_action_force"].mean()), computed_from, centre)
+        force = float(point["line_of_action_force"].mean())
+        centres = (np.asarray(point[name].to_numpy(), dtype=np.float64) for name in _CENTRES)
+        return MeshCurve(stiffness, tangent, force, computed_from, *centres)
 
     def samples(self, data: MeshData, mesh: Mesh, static_force: float) -> tuple[Floats, Floats]:
         """Secant and tangent stiffness along the line of action, as `Law.samples`."""
@@ -71,10 +73,13 @@ class LineOfAction(Law):
             return curve.stiffness, curve.tangent
         return super().samples(data, mesh, static_force)
 
-    def load_way(self, data: MeshData) -> Floats:
-        """Way of the table's load, as `Law.load_way`; none of a stiffness alone."""
-        centre = data.load_centre if self.curved and isinstance(data, MeshCurve) else None
-        return np.zeros(0) if centre is None else centre - np.mean(centre)
+    def load_ways(self, data: MeshData) -> Floats:
+        """Ways of the table's load, as `Law.load_ways`; none of a stiffness alone."""
+        if not self.curved or not isinstance(data, MeshCurve) or data.load_centre is None:
+            return super().load_ways(data)
+        added = data.load_centre if data.tangent_load_centre is None else data.tangent_load_centre
+        centres = np.array([data.load_centre, added])
+        return np.asarray(centres - centres.mean(axis=1, keepdims=True))
 
 
 def curve_coefficients(stiffness: Floats, tangent: Floats, force: float) -> Floats:

@@ -14,6 +14,7 @@ from exugear.tooth_mesh.kernels.meshes import (
     ROW_SIZE,
     TILT_COLUMNS,
     TILT_STIFFNESS,
+    WAY_COLUMNS,
     MeshArrays,
     periodic_cubic,
 )
@@ -56,7 +57,8 @@ def pack(
     tilts = _pack_tilts(elements, index, linear)
     # Its mean is in the lever; of gears that do not tilt it does nothing.
     resists = tilts[:, TILT_STIFFNESS] > 0.0
-    ways = [e.load_way if own and not averaged else np.zeros(0) for own, e in zip(resists, elements, strict=True)]
+    moves = resists & (not averaged)
+    ways = [e.load_ways if own else np.zeros((2, 0)) for own, e in zip(moves, elements, strict=True)]
     tables = pack_tables(elements, index, averaged, linear)
     if tangent:
         tables.nominal[:, NOMINAL_DEFLECTION] -= [element.rest for element in elements]
@@ -72,8 +74,8 @@ def pack(
         stiffness=stiffness,
         damping=np.array([e.damping for e in elements]),
         tilt=tilts,
-        way_pieces=np.array([len(way) for way in ways], dtype=np.int64),
-        way=_pack_cycles(ways),
+        way_pieces=np.array([own.shape[1] for own in ways], dtype=np.int64),
+        way=_pack_ways(elements, ways),
         line_of_action=np.array([e.line_of_action for e in elements]),
         error_pieces=np.array([[len(error) for error in e.errors] for e in elements], dtype=np.int64).reshape(count, 2),
         error=_pack_errors(elements),
@@ -121,12 +123,13 @@ def _indices(elements: tuple[MeshElement, ...], coordinates: Mapping[str, tuple[
     return index
 
 
-def _pack_cycles(samples: list[Floats]) -> Floats:
-    """Coefficients (m, n, 4) of periodic cubics through samples (n,) of each mesh; zeros behind shorter ones."""
-    coefficients = np.zeros((len(samples), max((len(own) for own in samples), default=0), 4))
-    for block, own in zip(coefficients, samples, strict=True):
-        if len(own):
-            block[: len(own)] = periodic_cubic(own)
+def _pack_ways(elements: tuple[MeshElement, ...], ways: list[Floats]) -> Floats:
+    """Fill `MeshArrays.way` from ways (2, n) of each mesh; zeros behind shorter ones."""
+    coefficients = np.zeros((len(ways), max((own.shape[1] for own in ways), default=0), WAY_COLUMNS))
+    for block, element, (of_load, added) in zip(coefficients, elements, ways, strict=True):
+        if added.size:
+            moment = element.load * (of_load - added)
+            block[: added.size] = np.hstack([periodic_cubic(added), periodic_cubic(moment)])
     return coefficients
 
 

@@ -65,7 +65,8 @@ def tilting_power(q, v, mesh, state, memory):
     rate = row_dot(mesh.coordinates[0], memory[TILTING], v)
     force, damper = state[FORCE] / mesh.line_of_action[0], mesh.damping[0] * (state[RATE] - resists[TILT_LEVER] * rate)
     moment = resists[TILT_MOMENT] - resists[TILT_STIFFNESS] * turned - resists[TILT_DAMPING] * rate
-    moment += resists[TILT_LEVER] * force + load_way(0, state[PMC], mesh)[0] * (force - damper)
+    way, _, beyond, _ = load_way(0, state[PMC], mesh)
+    moment += resists[TILT_LEVER] * force + way * (force - damper) + beyond
     return moment * rate
 
 

@@ -119,6 +119,7 @@ def test_what_changes_over_the_mesh_cycle_is_that_of_states_on_their_own(contact
             (contact.cycle_deflection, "ste"),
             (contact.cycle_stiffness, "tangent_stiffness"),
             (contact.cycle_load_centre, "load_centre"),
+            (contact.cycle_tangent_load_centre, "tangent_load_centre"),
         ):
             assert own[end] == pytest.approx(alone[name].to_numpy(), rel=1e-6)
             few, many = (np.fft.rfft(values)[1:3] / len(values) for values in (own[end], whole[name].to_numpy()))
