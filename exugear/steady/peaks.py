@@ -28,6 +28,8 @@ DRAWN, MANY_TURNS = 4096, 2e4
 """Angles of the input that teeth are looked at, and from which range they are drawn, rad."""
 HEARD = 1e-4
 """Share of the static force below which a line plays no part in whether teeth pull."""
+STRAINED = 0.3
+"""Dynamic over static load of a bearing from which a straight line about the static load is told to be none of it."""
 BESIDE = 0.03
 """Share of the speed within which a run-up's peak is looked for: sweeps shift it."""
 
@@ -300,6 +302,59 @@ def _pulling(data: xr.Dataset, places: list[int]) -> Floats:
         waves = (turning @ force[point, lines]).real
         shares[point] = np.mean(waves[:, 0] < np.hypot.reduce(waves[:, 1:], axis=1, initial=0.0))
     return shares
+
+
+@dataclass(frozen=True)
+class BearingSwing:
+    """A linear bearing whose load swings so far about the static one that its rows are no straight line there.
+
+    Attributes
+    ----------
+    bearing : str
+    count : int
+        At how many of the speeds.
+    speed : float
+        Of the input where it swings most, rad/s.
+    share : float
+        Of the static load that the vibration takes away at most there; from 1 on the bearing comes free.
+    """
+
+    bearing: str
+    count: int
+    speed: float
+    share: float
+
+
+def bearing_swings(data: xr.Dataset) -> tuple[BearingSwing, ...]:
+    """Find linear bearings whose vibration takes `STRAINED` of the static load or more, the worst first.
+
+    The lines of a speed are added up as if they met, along the static load. Planets' bearings, whose load turns in
+    fixed axes, are not looked at.
+
+    Parameters
+    ----------
+    data : Dataset
+        As `exugear.steady.steady_file.load_response` reads it.
+    """
+    names = [str(name) for name in data["signal"].to_numpy()]
+    found = []
+    for bearing, static in json.loads(data.attrs["bearing_static_loads"]).items():
+        signals = [f"support_force {bearing} {axis}" for axis in "xyz"]
+        if not set(signals) <= set(names):
+            continue
+        shares = _swinging(data, [names.index(name) for name in signals], np.array(static))
+        most = int(np.nanargmax(shares))
+        if shares[most] >= STRAINED:
+            count = int((shares >= STRAINED).sum())
+            found.append(BearingSwing(bearing, count, float(data["speed"][most]), float(shares[most])))
+    return tuple(sorted(found, key=lambda swing: -swing.share))
+
+
+def _swinging(data: xr.Dataset, places: list[int], static: Floats) -> Floats:
+    """Largest vibration along a static load (3,) at each speed, over that load."""
+    own = data[["amplitude", "phase"]].isel(signal=places, line=slice(1, None))
+    force = own["amplitude"].to_numpy() * np.exp(1j * own["phase"].to_numpy().astype(np.float64))
+    return np.asarray(np.nan_to_num(np.abs(force @ static).sum(axis=1)) / (static @ static))
 
 
 @dataclass(frozen=True)

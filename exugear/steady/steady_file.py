@@ -125,6 +125,7 @@ def _attributes(response: SteadyResponse) -> dict[str, Any]:
         "method_version": STEADY,
         "housing_factor": assembly.housing_factor,
         "bearing_laws": assembly.bearing_laws,
+        "bearing_static_loads": json.dumps(_static_loads(assembly)),
         "mesh_contact": assembly.contacts.in_words,
         "bearings_in_time": ", ".join(response.bearing_names),
         "growth_rate": response.growth_rate,
@@ -141,6 +142,19 @@ def _attributes(response: SteadyResponse) -> dict[str, Any]:
         "branch_ended": response.branch_ended,
         "unsolved": json.dumps([{"speed": speed, "reason": reason} for speed, reason in response.unsolved]),
         "crossings": json.dumps([asdict(crossing) for crossing in response.crossings]),
+    }
+
+
+def _static_loads(assembly: Assembly) -> dict[str, list[float]]:
+    """Force (N) on each bearing that is linear about its static load, where this stands still and is one."""
+    return {
+        point.bearing.name: [float(value) for value in point.load[:3]]
+        for point in assembly.operating_points
+        if point is not None
+        and point.bearing.law != "iso16281"
+        and point.load_stands_still
+        and not point.is_unloaded
+        and point.bearing.on not in assembly.spin
     }
 
 

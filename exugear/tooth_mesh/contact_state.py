@@ -100,7 +100,9 @@ class ContactState:
         """
         cycle = self.cycle
         if cycle is not None:
-            centres = (tuple(flank * centre for centre in own) for own in (cycle.load_centre, cycle.tangent_load_centre))
+            centres = (
+                tuple(flank * centre for centre in own) for own in (cycle.load_centre, cycle.tangent_load_centre)
+            )
             cycle = ContactCycle(cycle.deflection, cycle.tangent_stiffness, *centres)
         return replace(
             self,

@@ -104,9 +104,9 @@ class MeshElement:
         """Return the mesh, whose teeth bear evenly so far, with a contact that was solved, in the axes of its table.
 
         The mean of a curved law's stiffness is then that of the contact. So are its changes over the mesh cycle and the
-        load's ways along the face, as far as the positions of the contact tell; finer ones stay the table's. Where gears
-        stand so askew that flanks touch long before or after their middles would, the deflection at mid-face is mostly
-        that gap, and no measure of how teeth yield: the curve then begins at the gap.
+        load's ways along the face, as far as the positions of the contact tell; finer ones stay the table's. Where
+        gears stand so askew that flanks touch long before or after their middles would, the deflection at mid-face is
+        mostly that gap, and no measure of how teeth yield: the curve then begins at the gap.
         """
         secant, tangent, ways, load, gap = self.stiffness, self.tangent, self.load_ways, self.load, 0.0
         if self.is_curved:
@@ -133,7 +133,7 @@ class MeshElement:
         )
 
     def _over_cycle(self, contact: ContactState, yielding: float) -> tuple[Floats, Floats, Floats]:
-        """Secant and tangent stiffness (n,), N/m, and ways of the load (2, n), m, as they change where the gears stand."""
+        """Secant and tangent stiffness (n,), N/m, and ways of the load (2, n), m, where the gears stand."""
         cycle = contact.cycle
         if cycle is None:
             return self.stiffness, self.tangent, self.load_ways

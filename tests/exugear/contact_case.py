@@ -16,7 +16,8 @@ LOADS = {"sun_planet": 140e3, "ring_planet": 140e3, "intermediate": 180e3, "high
 def curves_of(stiffness: Mapping[str, np.ndarray]) -> dict[str, MeshCurve]:
     """Curves through a stiffness over the mesh cycle under 50 to 180 kN, exponents between 1.1 and 1.3.
 
-    Their load moves along the face by some millimetres, as that of helical teeth does, and what is added to it otherwise.
+    Their load moves along the face by some millimetres, as that of helical teeth does, and what is added to it moves
+    otherwise.
     """
     cycle = 2.0 * np.pi * np.arange(50) / 50
     exponent = 1.2 + 0.08 * np.cos(cycle + 2.0) + 0.02 * np.cos(2 * cycle)

@@ -17,7 +17,7 @@ from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.words import figure_text
 from exugear.results.run_file import read_run
 from exugear.results.spectra.run_spectra import VariantRun
-from exugear.steady.peaks import pulls
+from exugear.steady.peaks import bearing_swings, pulls
 from exugear.tooth_mesh.laws.registry import LAWS
 from exugear.transient.trust import verdict_of
 
@@ -138,6 +138,12 @@ def _of_response(response: xr.Dataset) -> list[Verdict]:
     for pull in () if LAWS[str(response.attrs["mesh_law"])].loses_contact else pulls(response):
         where = f"{pull.count} of {response.sizes['point']} speeds, longest at {abs(pull.speed) / RPM:.4g} rpm"
         said = f"teeth of {pull.mesh} would have to pull at {where}: they would part, and levels there are not real"
+        verdicts.append(Verdict(False, said))
+    for swing in bearing_swings(response):
+        said = (
+            f"vibration takes up to {100.0 * swing.share:.0f} % of the static load of the bearing {swing.bearing} (at "
+            f"{abs(swing.speed) / RPM:.4g} rpm): linear bearings make levels there too high"
+        )
         verdicts.append(Verdict(False, said))
     apart = float(np.nanmax(response["apart_share"], initial=0.0))
     if apart > 0.0:

@@ -146,9 +146,10 @@ def sample_wandering_line(tangents: Floats, readings: Floats) -> LawSamples:
 
 
 def sample_wandering_curve(curve: Floats, readings: Floats, load: float) -> LawSamples:
-    """Sample a curve whose load moves along the face, as `sample_curve`; its way and the moment beyond it (6, s) follow the curve's numbers.
+    """Sample a curve whose load moves along the face, as `sample_curve`.
 
-    Readings (s, 3) are those of `sample_wandering_line`.
+    Its way and the moment beyond it (6, s) follow the curve's numbers. Readings (s, 3) are those of
+    `sample_wandering_line`.
     """
     deflection, tilt, moved = readings.T
     (way, way_slope), (beyond, beyond_slope) = _moved(curve[6:9], moved), _moved(curve[9:], moved)
