@@ -16,6 +16,6 @@ RUN = 9
 #: Life of gears and bearings (`exugear.life`, and the root stress of `fe_ste.root_stress`).
 LIFE = 7
 #: Steady responses (`exugear.steady`, and all that modes rest on).
-STEADY = 9
+STEADY = 10
 #: Points of studies (`exugear.studies`: their figures; what these rest on has its own version).
 STUDY = 1

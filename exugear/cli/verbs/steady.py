@@ -357,7 +357,7 @@ def _tell_of_bearings(data: xr.Dataset) -> tuple[BearingSwing, ...]:
         more = f", and {len(swinging) - SHOWN_BEARINGS} more" if len(swinging) > SHOWN_BEARINGS else ""
         note(
             f"Vibration takes {100.0 * STRAINED:.0f} % or more of the static load of bearings ({worst}{more}): their "
-            "rows are no straight line so far off, and peaks there come out too high, by half where one would come free; "
+            "rows are no straight line so far off, and peaks there come out too high, by half where one comes free; "
             'law = "iso16281" and --level nonlinear follow them',
             style="yellow",
         )
