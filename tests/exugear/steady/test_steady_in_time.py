@@ -271,7 +271,7 @@ def test_levels_agree_on_a_load_that_moves_along_the_face():
 
 
 def test_forces_by_products_of_lines_are_those_of_the_tangents_in_time():
-    """Level `parametric` where the load moves: F = k d - k w t - p and M = k w^2 t - k w d + p w at 256 angles."""
+    """Level `parametric` where the load moves: F = k d - k w t - p, M = -w F - b at 256 angles."""
     solver = solver_of(assemble(SPUR, Choice("bushing"), moving_load()), (50.0, 150.0), "parametric")
     found, gearset = solver.response(80.0), solver.gearset
     ports, waves = found.interface.ports, gearset.waves
@@ -284,10 +284,9 @@ def test_forces_by_products_of_lines_are_those_of_the_tangents_in_time():
     position = ports.positions[0] + ports.static[0, POSITION] + sense * angles / (2.0 * np.pi)
     turning = np.exp(2j * np.pi * position[:, None] * np.arange(gearset.harmonics + 1))
     turning[:, 1:] *= 2.0
-    k, p, kw, pw, kww = (
-        (turning @ own[0]).real for own in (gearset.cycle_coefficients, gearset.cycle_pulls, *gearset.cycle_moments)
-    )
-    force, moment = k * deflection - kw * tilt - p, kww * tilt - kw * deflection + pw
+    cycles = gearset.cycle_coefficients, gearset.cycle_pulls, *gearset.cycle_moments, gearset.cycle_moments_beyond
+    k, p, kw, pw, kww, beyond = ((turning @ own[0]).real for own in cycles)
+    force, moment = k * deflection - kw * tilt - p, kww * tilt - kw * deflection + pw - beyond
     by_time = np.fft.rfft(np.stack([force, moment], axis=1), axis=0)[gearset.lines.index[:, 0]] / 256
     by_lines = found.excess[:, 0].copy()
     by_lines[:, DEFLECTION] += waves.mean_stiffness[0] * readings[:, 0, DEFLECTION]
