@@ -1,4 +1,4 @@
-"""Laws whose force depends on the deflection along a row and on pmc: both forms of their force.
+"""Laws whose force depends on the deflection along a row and on the mesh cycle: both forms of their force.
 
 The law itself stands here once, `row_law`: one with a force of its own is a branch there. Around it is what all of them
 share: damping, misalignment that teeth resist, the load that moves along the face. `row_force` with `add_row_tangent`
