@@ -22,6 +22,7 @@ from exugear.tooth_mesh.law import MeshCurve
 from exugear.tooth_mesh.static_contact import StaticContacts, static_contacts
 from fe_ste.contact.kinematics import ContactError
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.stores.cache import FOLDER_VARIABLE
 from fe_ste.transmission_error.known_contacts import forget_contacts
 from fe_ste.transmission_error.mean_contact import mean_contact
 from fe_ste.transmission_error.table import prepared_compliance
@@ -175,13 +176,17 @@ def test_what_is_kept_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     assert input_hash(assemble(gearbox_of("grc"), before.choice, curves)) == input_hash(before)
 
 
-def test_where_contact_cannot_be_solved_teeth_bear_evenly_and_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_where_contact_cannot_be_solved_teeth_bear_evenly_and_it_is_said(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     def failing(wanted: Any) -> Any:
         if wanted.pair.name == "intermediate":
             raise ContactError("pair intermediate: not today")
         return mean_contact(wanted)
 
     gearbox, curves = gearbox_of("grc"), curves_of("grc")
+    # Contacts that other tests have kept would be taken.
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
     forget_contacts()
     monkeypatch.setattr("fe_ste.transmission_error.known_contacts.mean_contact", failing)
     assembly = assemble(gearbox, Choice("bushing", "line_of_action"), curves)
