@@ -291,7 +291,7 @@ def test_a_gear_in_sectors_has_a_seat_for_each(box: Gearbox) -> None:
 
 
 @needs_gmsh
-@pytest.mark.validation
+@pytest.mark.long
 def test_the_grc_stands_on_its_mounts_with_elastic_housing(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
     # Second way: equilibrium of the whole gearbox. What goes in and does not come out is held by the trunnions' couple.
     assembly = assembled(grc, Choice("flexible"), stiffness, folder=tmp_path / "bodies")

@@ -75,7 +75,9 @@ def test_the_default_grid_of_a_template_is_solved_whole(tmp_path: Path) -> None:
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize(("kind", "cut"), [("pair", 12), ("parallel", 101), ("planetary", 18)])
+@pytest.mark.parametrize(
+    ("kind", "cut"), [("pair", 12), pytest.param("parallel", 101, marks=pytest.mark.long), ("planetary", 18)]
+)
 def test_wide_grids_of_templates_are_solved_whole_and_count_what_is_cut_off(
     kind: str, cut: int, tmp_path: Path
 ) -> None:

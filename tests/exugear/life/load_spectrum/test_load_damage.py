@@ -23,6 +23,8 @@ from ...gearbox.test_case_mutations import at_most, is_refused_in_words
 from ...spur_case import SPUR_CASE
 
 LIMIT = 60.0
+#: Damage for each change of the program, and for a release.
+MANY = pytest.mark.parametrize("seeds", [range(1000, 1100), pytest.param(range(1000, 1500), marks=pytest.mark.long)])
 SPUR = tomllib.loads(SPUR_CASE)
 TURBINE = {"torque": "RotTorq", "speed": "RotSpeed"}
 LOADS: dict[str, Any] = {
@@ -127,8 +129,9 @@ def test_damaged_keys_of_loads_are_refused_in_words_or_counted(case):
 
 
 @pytest.mark.validation
-def test_hundreds_of_cases_with_damaged_loads_are_refused_in_words_or_counted(case):
-    keys_survive(case, range(1000, 1500))
+@MANY
+def test_hundreds_of_cases_with_damaged_loads_are_refused_in_words_or_counted(case, seeds):
+    keys_survive(case, seeds)
 
 
 def damaged(content: bytes, rng: random.Random) -> bytes:
@@ -162,8 +165,9 @@ def test_damaged_files_of_many_are_refused_in_words_or_counted(case):
 
 
 @pytest.mark.validation
-def test_hundreds_of_damaged_files_of_many_are_refused_in_words_or_counted(case):
-    files_survive(case, range(1000, 1500))
+@MANY
+def test_hundreds_of_damaged_files_of_many_are_refused_in_words_or_counted(case, seeds):
+    files_survive(case, seeds)
 
 
 @pytest.mark.parametrize(

@@ -230,9 +230,9 @@ def test_bushing_variant_follows_exudyn_over_half_a_second(grc: Gearbox, stiffne
 
 @pytest.mark.validation
 def test_rigid_variant_follows_the_jointed_model_of_exudyn(grc: Gearbox, stiffness: dict) -> None:
-    """Over 0.5 s; generalized-alpha of second order, extrapolated from two steps to none."""
+    """Over 0.2 s; generalized-alpha of second order, extrapolated from two steps to none."""
     minimal, jointed = assemble(grc, Choice("rigid"), stiffness), assemble(grc, Choice("jointed"), stiffness)
-    speed, duration, interval = -4.8, 0.5, 5e-5
+    speed, duration, interval = -4.8, 0.2, 5e-5
     start = accelerating_start(minimal, LOAD, speed)
     speeds = {n: u * speed for n, u in grc.train.rolling_speeds("carrier", 1.0).items()}
     q = np.zeros(jointed.size)

@@ -65,7 +65,7 @@ def test_stored_signals_with_elastic_shafts_are_those_of_the_runge_kutta_method_
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize("variant", ["rigid", "bushing", "shafts", "flexible"])
+@pytest.mark.parametrize("variant", ["rigid", "bushing", "shafts", pytest.param("flexible", marks=pytest.mark.long)])
 @pytest.mark.parametrize("rpm", [-60.0, -205.0])
 def test_stored_signals_are_those_of_the_runge_kutta_method_at_a_fine_step(
     grc: Gearbox, grc_shafts: Gearbox, stiffness: dict, tmp_path: Path, variant: str, rpm: float
